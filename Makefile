@@ -1,0 +1,51 @@
+# Every command of the project, by hand and in CI. `make help` lists them.
+
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+MINUTES ?= 10
+
+# The first interpreter that is new enough and able to build an environment (Debian ships python3
+# without ensurepip). Name one yourself with: make PYTHON=/path/to/python
+PYTHON ?= $(shell for candidate in python3.11 python3.12 python3.13 python3.14 python3; do \
+	if $$candidate -c 'import ensurepip, sys, venv; sys.exit(sys.version_info < (3, 11))' \
+	>/dev/null 2>&1; then echo $$candidate; break; fi; done)
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test check bench soak clean
+
+help: ## list the targets
+	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /|/' \
+	| awk -F'|' '{ printf "  make %-7s %s\n", $$1, $$2 }'
+
+demo: $(STAMP) ## fly: both processes on this machine, the plant simulated
+	$(BIN)/tenbaud demo
+
+test: $(STAMP) ## run the tests, serially: some start real processes and need the cores
+	$(BIN)/python -m pytest
+
+check: $(STAMP) ## lint, format, types, and the project's own rules
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest tests/rules
+
+bench: $(STAMP) ## measure speed, and write bench.json
+	$(BIN)/python -m benchmarks
+
+soak: $(STAMP) ## run the long tests; MINUTES=n says for how long (10)
+	MINUTES=$(MINUTES) $(BIN)/python -m pytest -m soak
+
+clean: ## remove the environment and everything that was generated
+	rm -rf $(VENV) runs dist bench.json .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# The environment is built again whenever pyproject.toml changes.
+$(STAMP): pyproject.toml
+	@test -n "$(PYTHON)" || { \
+		echo "tenbaud needs Python 3.11 or newer with venv and ensurepip; none was found on PATH." >&2; \
+		echo "Install one (Debian: python3 and python3-venv) or name it: make PYTHON=/path/to/python" >&2; \
+		exit 1; }
+	@test -x $(BIN)/python || "$(PYTHON)" -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@

@@ -1,0 +1,50 @@
+"""Limits of a motor command and its form on the wire.
+
+The receiver limits and rounds a command before it is sent; both codecs use the value decoded from
+the wire, so they hold the same number. The guard beside the motors applies the same limits once
+more and normally changes nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from channel.codec import Vector
+
+VOLTS_MAX = 32.0
+"""Largest voltage that 16-bit millivolts carry with room to spare."""
+
+
+@dataclass(frozen=True, slots=True)
+class CommandLimits:
+    """Clamp and slew of each motor voltage."""
+
+    volts_max: float = 5.0
+    slew_volts_per_tick: float = math.inf
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.volts_max <= VOLTS_MAX:
+            raise ValueError(f"volts_max must be in (0, {VOLTS_MAX}], got {self.volts_max}")
+        if not self.slew_volts_per_tick > 0.0:
+            raise ValueError(f"the slew limit must be positive, got {self.slew_volts_per_tick}")
+
+    def apply(self, volts: Sequence[float], previous: Vector) -> Vector:
+        """Return the voltages clamped, then moved at most one slew step away from `previous`."""
+        step = self.slew_volts_per_tick
+        limited = []
+        for wanted, before in zip(volts, previous, strict=True):
+            value = min(max(wanted, -self.volts_max), self.volts_max)
+            limited.append(min(max(value, before - step), before + step))
+        return tuple(limited)
+
+
+def to_millivolts(volts: Sequence[float]) -> tuple[int, ...]:
+    """Round voltages to the whole millivolts that a frame carries."""
+    return tuple(round(1000.0 * value) for value in volts)
+
+
+def from_millivolts(millivolts: Sequence[int]) -> Vector:
+    """Return the voltages that both codecs use for a command of the wire."""
+    return tuple(value / 1000.0 for value in millivolts)

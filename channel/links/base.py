@@ -1,0 +1,67 @@
+"""What every link does: carry byte messages between the two ends, whole and in order if it can.
+
+A link promises little: a message may be lost in silence when the peer is not there. Index, epoch and
+acknowledgement belong to the sessions. A link is used by one thread.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from typing import Literal, Protocol, Self
+
+Role = Literal["transmitter", "receiver"]
+
+
+@dataclass(slots=True)
+class LinkCounts:
+    """What went over a link and what did not."""
+
+    messages_out: int = 0
+    bytes_out: int = 0
+    messages_in: int = 0
+    bytes_in: int = 0
+    dropped: Counter[str] = field(default_factory=Counter)
+    """messages not taken, by reason"""
+
+
+class Link(Protocol):
+    """One end of a link."""
+
+    name: str
+    """of the kind of link, for summaries"""
+    counts: LinkCounts
+
+    def send(self, data: bytes, is_symbol: bool = False) -> None:
+        """Put one message on the line. `is_symbol` marks the paid path of the uplink."""
+
+    def receive(self, timeout_s: float) -> bytes | None:
+        """Return the next message, or None after `timeout_s` seconds (0: only what is there)."""
+
+    def peer_present(self) -> bool:
+        """Return whether the other end is known to be there now."""
+
+    def close(self) -> None:
+        """Give the line back; may be called more than once."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, *_: object) -> None: ...
+
+
+class LinkBase:
+    """What the links share: a name, counts, and closing at the end of a `with`."""
+
+    name = ""
+
+    def __init__(self) -> None:
+        self.counts = LinkCounts()
+
+    def close(self) -> None:
+        """Give the line back."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

@@ -1,0 +1,161 @@
+"""The link over Zenoh: reliable, blocking, express, and nothing found by itself.
+
+Zenoh's defaults bind every interface and look around by multicast; here both are off and the
+endpoints are given. A reliable `put` to an absent peer is lost in silence, so a liveliness token
+tells who is there; its key carries the incarnation, since a half-open link would hide a restart.
+Keys, `NAME` being the session's name:
+
+    tenbaud/NAME/up/symbol      the paid path          transmitter -> receiver
+    tenbaud/NAME/up/control     everything else        transmitter -> receiver
+    tenbaud/NAME/down/command   all of the downlink    receiver -> transmitter
+    tenbaud/NAME/alive/ROLE/INCARNATION                liveliness
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import secrets
+from queue import Empty, SimpleQueue
+
+import zenoh
+
+from channel.errors import LinkError
+from channel.links.base import LinkBase, Role
+from channel.links.endpoints import check_endpoints
+
+QUEUE_MESSAGES_MAX = 10_000
+"""Inbound messages that wait for the loop; more are dropped and counted."""
+
+LEASE_MS = 2_000
+RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 2}
+
+_NAME = re.compile(r"[A-Za-z0-9_.-]+(/[A-Za-z0-9_.-]+)*")
+
+
+class ZenohLink(LinkBase):
+    """One end of a session over Zenoh.
+
+    `listen` and `connect` are Zenoh endpoints; one end listens, the other connects, either may start
+    first. Raises LinkError for a name or endpoint that cannot be used.
+    """
+
+    name = "zenoh"
+
+    def __init__(
+        self,
+        role: Role,
+        session_name: str,
+        *,
+        listen: tuple[str, ...] = (),
+        connect: tuple[str, ...] = (),
+        scouting: bool = False,
+        insecure: bool = False,
+    ) -> None:
+        super().__init__()
+        if not _NAME.fullmatch(session_name):
+            raise LinkError(
+                f"session name {session_name!r}: letters, digits, '_', '-', '.', and '/' between parts"
+            )
+        if not listen and not connect and not scouting:
+            raise LinkError("a Zenoh link needs an endpoint to listen on or to connect to")
+        check_endpoints(listen + connect, insecure)
+        self._inbox: SimpleQueue[bytes] = SimpleQueue()
+        self._peers: set[str] = set()
+        self._closed = False
+        try:
+            self._session = zenoh.open(_config(listen, connect, scouting))
+        except zenoh.ZError as error:
+            raise LinkError(f"Zenoh cannot use {', '.join(listen + connect)}: {error}") from error
+        try:
+            self._declare(role, f"tenbaud/{session_name}")
+        except BaseException:
+            self._session.close()
+            raise
+
+    def _declare(self, role: Role, root: str) -> None:
+        inbound, other = ("down", "receiver") if role == "transmitter" else ("up", "transmitter")
+        self._subscriber = self._session.declare_subscriber(
+            f"{root}/{inbound}/*", zenoh.handlers.Callback(self._on_sample, indirect=False)
+        )
+        alive = self._session.liveliness()
+        self._watch = alive.declare_subscriber(
+            f"{root}/alive/{other}/*",
+            zenoh.handlers.Callback(self._on_alive, indirect=False),
+            history=True,
+        )
+        outbound = ("up/symbol", "up/control") if role == "transmitter" else ("down/command",) * 2
+        self._symbols, self._control = (
+            self._session.declare_publisher(
+                f"{root}/{key}",
+                congestion_control=zenoh.CongestionControl.BLOCK,
+                priority=zenoh.Priority.REAL_TIME,
+                express=True,
+                reliability=zenoh.Reliability.RELIABLE,
+            )
+            for key in outbound
+        )
+        # Declared last: who sees the token can be heard already.
+        self._token = alive.declare_token(f"{root}/alive/{role}/{secrets.token_hex(4)}")
+
+    def send(self, data: bytes, is_symbol: bool = False) -> None:
+        """Publish one message; it is lost in silence when the peer is not there."""
+        try:
+            (self._symbols if is_symbol else self._control).put(data)
+        except zenoh.ZError as error:
+            raise LinkError(f"Zenoh could not send: {error}") from error
+        self.counts.messages_out += 1
+        self.counts.bytes_out += len(data)
+
+    def receive(self, timeout_s: float) -> bytes | None:
+        """Return the next message, or None after `timeout_s` seconds."""
+        try:
+            data = self._inbox.get(timeout_s > 0.0, timeout_s if timeout_s > 0.0 else None)
+        except Empty:
+            return None
+        self.counts.messages_in += 1
+        self.counts.bytes_in += len(data)
+        return data
+
+    def peer_present(self) -> bool:
+        """Return whether a liveliness token of the other end stands."""
+        return bool(self._peers)
+
+    def close(self) -> None:
+        """Close the Zenoh session; what was sent before is still delivered."""
+        if not self._closed:
+            self._closed = True
+            self._session.close()
+
+    # The two callbacks run on a thread of Zenoh and call nothing of Zenoh: they only hand over.
+
+    def _on_sample(self, sample: zenoh.Sample) -> None:
+        if self._inbox.qsize() >= QUEUE_MESSAGES_MAX:
+            self.counts.dropped["queue full"] += 1
+        else:
+            self._inbox.put(sample.payload.to_bytes())
+
+    def _on_alive(self, sample: zenoh.Sample) -> None:
+        key = str(sample.key_expr)
+        if sample.kind == zenoh.SampleKind.PUT:
+            self._peers.add(key)
+        else:
+            self._peers.discard(key)
+
+
+def _config(listen: tuple[str, ...], connect: tuple[str, ...], scouting: bool) -> zenoh.Config:
+    config = zenoh.Config()
+    settings: dict[str, object] = {
+        "mode": "peer",
+        "listen/endpoints": list(listen),
+        "connect/endpoints": list(connect),
+        "connect/retry": RETRY,
+        "scouting/delay": 0,
+        "scouting/multicast/enabled": scouting,
+        "scouting/gossip/enabled": False,
+        "transport/link/tx/lease": LEASE_MS,
+        "transport/shared_memory/enabled": False,
+    }
+    for path, value in settings.items():
+        config.insert_json5(path, json.dumps(value))
+    return config

@@ -1,0 +1,84 @@
+"""What R baud means, enforced and measured.
+
+Symbols leave on a fixed grid of slots, one per slot and none in advance or afterwards: whoever asks
+for more gets an erasure, not a burst. The two meters count what was paid for: coder bits on the way
+out, symbols per second on the receiver's own clock on the way in.
+"""
+
+from __future__ import annotations
+
+from math import log2
+
+from channel.frames import Frame, Symbol
+from channel.terms import Terms
+from channel.words import Alphabet
+
+
+class SlotShaper:
+    """Lets each slot's symbol pass once, while the slot lasts.
+
+    `slack_ns` forgives a clock that wakes a little early; it never lets two symbols into one slot.
+    """
+
+    def __init__(self, terms: Terms, slack_ns: int = 1_000_000) -> None:
+        self._terms = terms
+        self._slack_ns = slack_ns
+        self._next_slot = 0
+        self.refused = 0
+        """symbols that asked for a slot already used, over, or not yet there"""
+
+    def admit(self, slot: int, now_ns: int) -> bool:
+        """Return whether the symbol of this slot may leave at flight time `now_ns`."""
+        begins = self._terms.slot_ns(slot)
+        ends = self._terms.slot_ns(slot + 1)
+        if slot < self._next_slot or not begins - self._slack_ns <= now_ns < ends:
+            self.refused += 1
+            return False
+        self._next_slot = slot + 1
+        return True
+
+
+class UplinkMeter:
+    """Counts what the transmitter put on the line."""
+
+    def __init__(self, alphabet: Alphabet) -> None:
+        self._bits_per_symbol = log2(len(alphabet.symbols))
+        self.symbols = 0
+        self.wire_bytes = 0
+        self.control_bytes = 0
+        """of `wire_bytes`, those that carried no symbol"""
+
+    def count(self, frame: Frame, size: int) -> None:
+        """Count one frame of `size` bytes."""
+        self.wire_bytes += size
+        if isinstance(frame, Symbol):
+            self.symbols += 1
+        else:
+            self.control_bytes += size
+
+    @property
+    def coder_bits(self) -> float:
+        """Return the bits that the coder was paid for."""
+        return self.symbols * self._bits_per_symbol
+
+
+class BaudMeter:
+    """Measures symbols per second on the receiver's clock, between the first symbol and the last."""
+
+    def __init__(self) -> None:
+        self.symbols = 0
+        self._first_ns = 0
+        self._last_ns = 0
+
+    def on_symbol(self, now_ns: int) -> None:
+        """Count one symbol that arrived in time."""
+        if self.symbols == 0:
+            self._first_ns = now_ns
+        self._last_ns = now_ns
+        self.symbols += 1
+
+    @property
+    def baud(self) -> float | None:
+        """Return the measured rate; None before two symbols came at different times."""
+        span_ns = self._last_ns - self._first_ns
+        return (self.symbols - 1) * 1e9 / span_ns if span_ns > 0 else None

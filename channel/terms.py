@@ -1,0 +1,96 @@
+"""What both ends agree on about time: ticks, samples, slots, lead.
+
+A *tick* is one step of model and control (`h`). A *sample* is `N` ticks (`T_s = N h`) and has one
+word; each of its symbols takes one *slot* of the uplink. Flight time is in nanoseconds from tick 0,
+as integers, so that the two clocks and the virtual one never disagree by a rounding.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from channel.codec import Vector
+from channel.limits import CommandLimits
+
+Delivery = Literal["start", "end"]
+Clock = Literal["real", "virtual"]
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """The agreed timing of a flight, checked for sense."""
+
+    tick_ns: int
+    ticks_per_sample: int
+    """N"""
+    symbols_per_word: int
+    """b, the slots of one sample"""
+    lead_ticks: int
+    """D: the command of tick n + D is decided when the codec stands at tick n"""
+    rate_baud: float
+    """R: symbols per second that the uplink may carry"""
+    delivery: Delivery
+    """"start": a symbol is there when its slot begins (the paper); "end": when its slot is over"""
+    deadline_allowance_ns: int
+    """how long after its due time a symbol may come before its slot is taken for erased"""
+    downlink_budget_ns: int
+    """time set aside for a command frame to reach the plant"""
+    repeats: int
+    """W: how many earlier samples each command frame repeats"""
+    initial_command: Vector
+    """motor voltages of ticks 0 ... D - 1"""
+    limits: CommandLimits
+
+    @property
+    def sample_ns(self) -> int:
+        """Return the symbol period `T_s`."""
+        return self.tick_ns * self.ticks_per_sample
+
+    @property
+    def uplink_delivery_ns(self) -> int:
+        """Return how long after a sample's first tick its word is complete at the receiver."""
+        slots = self.symbols_per_word - 1 + (self.delivery == "end")
+        return slots * self.sample_ns // self.symbols_per_word
+
+    @property
+    def symbol_delay_ns(self) -> int:
+        """Return how long the line takes to deliver one symbol."""
+        return self.slot_ns(1) if self.delivery == "end" else 0
+
+    def slot_ns(self, slot: int) -> int:
+        """Return the flight time at which a slot begins."""
+        return slot * self.sample_ns // self.symbols_per_word
+
+    def slot_tick(self, slot: int) -> int:
+        """Return the first tick at or after the beginning of a slot."""
+        return -(-self.slot_ns(slot) // self.tick_ns)
+
+    @property
+    def lead_needed_ticks(self) -> int:
+        """Return the smallest `D` with which every command can be in time on a real clock."""
+        needed = self.uplink_delivery_ns + self.deadline_allowance_ns + self.downlink_budget_ns
+        return max(1, -(-needed // self.tick_ns))
+
+    def check(self, clock: Clock) -> None:
+        """Raise ValueError, with the arithmetic, where these terms cannot be flown."""
+        slots_per_s = 1e9 * self.symbols_per_word / self.sample_ns
+        if slots_per_s > self.rate_baud * (1.0 + 1e-9):
+            raise ValueError(
+                f"{self.symbols_per_word} symbol(s) every {self.sample_ns / 1e9:g} s ask for "
+                f"{slots_per_s:g} symbols/s, but the line carries rate_baud = {self.rate_baud:g}; "
+                "lengthen symbol_period_s or raise rate_baud"
+            )
+        ideal = clock == "virtual" and self.lead_ticks == 0 and self.uplink_delivery_ns == 0
+        if ideal or self.lead_ticks >= self.lead_needed_ticks:
+            return
+        if self.lead_ticks == 0 and clock == "real":
+            problem = "lead_ticks = 0 exists on the virtual clock only"
+        else:
+            problem = f"lead_ticks = {self.lead_ticks} is too short"
+        raise ValueError(
+            f"{problem}: uplink delivery {self.uplink_delivery_ns / 1e6:g} ms + deadline allowance "
+            f"{self.deadline_allowance_ns / 1e6:g} ms + downlink budget "
+            f"{self.downlink_budget_ns / 1e6:g} ms need lead_ticks >= {self.lead_needed_ticks} "
+            f"at {self.tick_ns / 1e6:g} ms a tick"
+        )

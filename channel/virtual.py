@@ -1,0 +1,98 @@
+"""The virtual clock between two processes.
+
+Virtual time belongs to the transmitter's process. It holds every message of both directions back
+until its virtual arrival, so the receiver only ever does one thing: it is given a *step* (a time, and
+the message that arrives then, or none because one was lost or a deadline is due) and answers with a
+*reply* (its frames, and its next deadline). One step, one reply: nothing can deadlock, and the
+flight is as fast as the messages go.
+
+    step   MAGIC u8 | 1 u8 | number u32 | time s64 | message bytes, if any
+    reply  MAGIC u8 | 2 u8 | number u32 | next deadline s64 (-1: none) | per frame: u16 length, bytes
+
+These envelopes exist on the virtual clock only and are not counted as wire bytes.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import NamedTuple, Protocol
+
+from channel.errors import FrameError
+
+MAGIC = 0xF5
+"""No wire version will ever be this, so an end on the wrong clock notices."""
+
+_STEP = struct.Struct("<BBIq")
+_LENGTH = struct.Struct("<H")
+
+
+class Step(NamedTuple):
+    """Time has passed to `time_ns`, and this message arrives."""
+
+    number: int
+    time_ns: int
+    data: bytes | None
+
+
+class Reply(NamedTuple):
+    """What the receiver did about a step."""
+
+    number: int
+    deadline_ns: int | None
+    frames: tuple[bytes, ...]
+
+
+class Peer(Protocol):
+    """The receiver as the virtual flight sees it: in this process or in another."""
+
+    def step(self, time_ns: int, data: bytes | None) -> Reply:
+        """Let virtual time pass to `time_ns` at the receiver and deliver `data`; LinkLost if silent."""
+
+
+def is_envelope(data: bytes) -> bool:
+    """Return whether these bytes belong to the virtual clock."""
+    return data[:1] == bytes((MAGIC,))
+
+
+def encode_step(step: Step) -> bytes:
+    """Return the bytes of a step; a step without a message is the bare head."""
+    return _STEP.pack(MAGIC, 1, step.number, step.time_ns) + (step.data or b"")
+
+
+def decode_step(data: bytes) -> Step:
+    """Return the step in these bytes, or raise FrameError."""
+    number, time_ns = _decode_head(data, 1)
+    return Step(number, time_ns, data[_STEP.size :] or None)
+
+
+def encode_reply(reply: Reply) -> bytes:
+    """Return the bytes of a reply."""
+    deadline = -1 if reply.deadline_ns is None else reply.deadline_ns
+    parts = [_STEP.pack(MAGIC, 2, reply.number, deadline)]
+    for frame in reply.frames:
+        parts += (_LENGTH.pack(len(frame)), frame)
+    return b"".join(parts)
+
+
+def decode_reply(data: bytes) -> Reply:
+    """Return the reply in these bytes, or raise FrameError."""
+    number, deadline = _decode_head(data, 2)
+    frames = []
+    offset = _STEP.size
+    while offset < len(data):
+        if len(data) < offset + _LENGTH.size:
+            raise FrameError("truncated reply of the virtual clock")
+        (length,) = _LENGTH.unpack_from(data, offset)
+        offset += _LENGTH.size
+        if len(data) < offset + length:
+            raise FrameError("truncated reply of the virtual clock")
+        frames.append(data[offset : offset + length])
+        offset += length
+    return Reply(number, None if deadline < 0 else deadline, tuple(frames))
+
+
+def _decode_head(data: bytes, kind: int) -> tuple[int, int]:
+    if len(data) < _STEP.size or data[0] != MAGIC or data[1] != kind:
+        raise FrameError("not an envelope of the virtual clock")
+    _, _, number, time_ns = _STEP.unpack_from(data)
+    return number, time_ns

@@ -1,0 +1,200 @@
+"""Frames as bytes, for every line that keeps message boundaries.
+
+    version u8 | kind u8 | session u32 | epoch u16 | body | CRC-16/CCITT-FALSE u16
+
+All little-endian; the CRC covers everything before it. Frames that belong to no session have zeros
+there. Bodies, by kind:
+
+    1 hello     incarnation u32, config digest 16 bytes, probe 8 bytes, version text
+    2 welcome   incarnation u32, first sample u32
+    3 refuse    incarnation u32, reason text, config text
+    4 symbol    slot u32, number u8
+    5 commands  last sample u32, echoes u8, then per echo: word u16, digest u64, millivolts s16 ...
+    6 desync    sample u32, digests u64 u64, state bytes
+    7 bye       reason text
+
+A text is a u16 length and that many bytes of UTF-8.
+"""
+
+from __future__ import annotations
+
+import struct
+from binascii import crc_hqx
+from collections.abc import Callable
+
+from channel.errors import FrameError
+from channel.frames import (
+    Bye,
+    Commands,
+    Desync,
+    Echo,
+    ForeignVersion,
+    Frame,
+    Hello,
+    Refuse,
+    Symbol,
+    Welcome,
+)
+
+WIRE_VERSION = 1
+FRAME_BYTES_MAX = 16_384
+"""No frame of ours comes near it; longer ones are dropped unread."""
+CRC_START = 0xFFFF
+
+_HEAD = struct.Struct("<BBIH")
+_CRC = struct.Struct("<H")
+_HELLO = struct.Struct("<I16s8s")
+_WELCOME = struct.Struct("<II")
+_NUMBER = struct.Struct("<I")
+_SYMBOL = struct.Struct("<IB")
+_COMMANDS = struct.Struct("<IB")
+_ECHO = struct.Struct("<HQ")
+_DESYNC = struct.Struct("<IQQ")
+_TEXT = struct.Struct("<H")
+
+
+def encode(frame: Frame) -> bytes:
+    """Return the bytes of a frame; ValueError for values that no frame can carry."""
+    try:
+        kind, session, epoch, body = _encode_body(frame)
+        message = _HEAD.pack(WIRE_VERSION, kind, session, epoch) + body
+    except struct.error as error:
+        raise ValueError(f"{frame} does not fit a frame: {error}") from error
+    if len(message) + _CRC.size > FRAME_BYTES_MAX:
+        raise ValueError(f"a frame has at most {FRAME_BYTES_MAX} bytes, this one {len(message)}")
+    return message + _CRC.pack(crc_hqx(message, CRC_START))
+
+
+def decode(data: bytes) -> Frame:
+    """Return the frame in these bytes; FrameError, with the reason, for anything else."""
+    if len(data) > FRAME_BYTES_MAX:
+        raise FrameError(f"oversized: {len(data)} bytes, at most {FRAME_BYTES_MAX}")
+    if len(data) < _HEAD.size + _CRC.size:
+        raise FrameError(f"truncated: {len(data)} bytes")
+    message = data[: -_CRC.size]
+    if _CRC.unpack(data[-_CRC.size :])[0] != crc_hqx(message, CRC_START):
+        raise FrameError("checksum")
+    version, kind, session, epoch = _HEAD.unpack_from(message)
+    if version != WIRE_VERSION:
+        return ForeignVersion(version)
+    reader = _READERS.get(kind)
+    if reader is None:
+        raise FrameError(f"unknown kind {kind}")
+    try:
+        return reader(session, epoch, message[_HEAD.size :])
+    except (struct.error, UnicodeDecodeError) as error:
+        raise FrameError(f"malformed frame of kind {kind}: {error}") from error
+
+
+def _encode_body(frame: Frame) -> tuple[int, int, int, bytes]:
+    match frame:
+        case Symbol():
+            body = _SYMBOL.pack(frame.slot, frame.number)
+            return 4, frame.session, frame.epoch, body
+        case Commands():
+            return 5, frame.session, frame.epoch, _encode_commands(frame)
+        case Hello():
+            body = _HELLO.pack(frame.incarnation, frame.config_digest, frame.numerics_probe)
+            return 1, 0, 0, body + _text(frame.version)
+        case Welcome():
+            body = _WELCOME.pack(frame.incarnation, frame.first_sample)
+            return 2, frame.session, frame.epoch, body
+        case Refuse():
+            body = _NUMBER.pack(frame.incarnation) + _text(frame.reason) + _text(frame.config)
+            return 3, 0, 0, body
+        case Desync():
+            body = _DESYNC.pack(frame.sample, frame.transmitter_digest, frame.receiver_digest)
+            return 6, frame.session, frame.epoch, body + frame.state
+        case Bye():
+            return 7, frame.session, 0, _text(frame.reason)
+        case ForeignVersion():
+            raise ValueError("a frame of another version is only ever received")
+
+
+def _encode_commands(frame: Commands) -> bytes:
+    last = frame.echoes[-1].sample
+    parts = [_COMMANDS.pack(last, len(frame.echoes))]
+    for echo in frame.echoes:
+        parts.append(_ECHO.pack(echo.word_number, echo.digest))
+        parts.append(struct.pack(f"<{len(echo.millivolts)}h", *echo.millivolts))
+    return b"".join(parts)
+
+
+def _decode_commands(session: int, epoch: int, body: bytes) -> Commands:
+    last, count = _COMMANDS.unpack_from(body)
+    size, rest = divmod(len(body) - _COMMANDS.size, count) if count else (0, 1)
+    volts, odd = divmod(size - _ECHO.size, 2)
+    if rest or odd or volts < 0 or last + 1 < count:
+        raise FrameError(f"malformed commands: {count} echoes in {len(body)} bytes")
+    echoes = []
+    for index in range(count):
+        offset = _COMMANDS.size + index * size
+        word_number, digest = _ECHO.unpack_from(body, offset)
+        millivolts = struct.unpack_from(f"<{volts}h", body, offset + _ECHO.size)
+        echoes.append(Echo(last + 1 - count + index, word_number, digest, millivolts))
+    return Commands(session, epoch, tuple(echoes))
+
+
+def _decode_hello(session: int, epoch: int, body: bytes) -> Hello:
+    incarnation, config_digest, probe = _HELLO.unpack_from(body)
+    version, rest = _take_text(body[_HELLO.size :])
+    _nothing_left(rest)
+    return Hello(incarnation, version, config_digest, probe)
+
+
+def _decode_welcome(session: int, epoch: int, body: bytes) -> Welcome:
+    incarnation, first_sample = _WELCOME.unpack(body)
+    return Welcome(session, epoch, first_sample, incarnation)
+
+
+def _decode_refuse(session: int, epoch: int, body: bytes) -> Refuse:
+    (incarnation,) = _NUMBER.unpack_from(body)
+    reason, rest = _take_text(body[_NUMBER.size :])
+    config, rest = _take_text(rest)
+    _nothing_left(rest)
+    return Refuse(incarnation, reason, config)
+
+
+def _decode_symbol(session: int, epoch: int, body: bytes) -> Symbol:
+    slot, number = _SYMBOL.unpack(body)
+    return Symbol(session, epoch, slot, number)
+
+
+def _decode_desync(session: int, epoch: int, body: bytes) -> Desync:
+    sample, ours, theirs = _DESYNC.unpack_from(body)
+    return Desync(session, epoch, sample, ours, theirs, body[_DESYNC.size :])
+
+
+def _decode_bye(session: int, epoch: int, body: bytes) -> Bye:
+    reason, rest = _take_text(body)
+    _nothing_left(rest)
+    return Bye(session, reason)
+
+
+_READERS: dict[int, Callable[[int, int, bytes], Frame]] = {
+    1: _decode_hello,
+    2: _decode_welcome,
+    3: _decode_refuse,
+    4: _decode_symbol,
+    5: _decode_commands,
+    6: _decode_desync,
+    7: _decode_bye,
+}
+
+
+def _text(text: str) -> bytes:
+    data = text.encode()
+    return _TEXT.pack(len(data)) + data
+
+
+def _take_text(data: bytes) -> tuple[str, bytes]:
+    (length,) = _TEXT.unpack_from(data)
+    end = _TEXT.size + length
+    if len(data) < end:
+        raise FrameError(f"truncated text: {len(data) - _TEXT.size} of {length} bytes")
+    return data[_TEXT.size : end].decode(), data[end:]
+
+
+def _nothing_left(rest: bytes) -> None:
+    if rest:
+        raise FrameError(f"{len(rest)} bytes too many")

@@ -1,0 +1,172 @@
+"""Torque disturbances: what pushes the plant beside its motors.
+
+A torque here is already divided by the inertia: an angular acceleration in rad/s^2, held for one
+plant step. Every disturbance is a pure function of the step index, so steps may be asked for again.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, Protocol
+
+from numpy.random import PCG64, Generator, SeedSequence
+
+GRAMMAR: Final = (
+    "comma-separated q=DENSITY (rad^2/s^3, at most once) and step=TORQUE@START[..END] "
+    "(rad/s^2, seconds), for example q=2e-3,step=0.5@10..12"
+)
+
+# Numbers drawn at once: large enough that numpy's cost per call vanishes, small enough (128 kB as
+# Python floats) that the length of a run costs no memory.
+_BLOCK_STEPS: Final = 4096
+
+# A time within this share of a step after a step's start counts as that start, so that 12.5 s is
+# step 1250 at 0.01 s whatever the rounding of the division.
+_STEP_TOLERANCE: Final = 1e-6
+
+
+class Disturbance(Protocol):
+    """A torque for every plant step."""
+
+    def torque(self, step_index: int) -> float:
+        """Angular acceleration (rad/s^2) held over step `step_index` (0 is the first)."""
+        ...
+
+
+class WhiteTorque:
+    """White torque: independent Gaussian values, one per step, of variance density / step.
+
+    Divided this way the rate wanders equally far whatever the step: its variance grows by
+    `spectral_density_rad2_s3` per second (two-sided density). Equal seeds give equal torques with
+    one version of numpy; the block number enters the seed, so only one block is ever kept.
+    """
+
+    __slots__ = ("_block", "_block_index", "_deviation", "_seed")
+
+    def __init__(self, spectral_density_rad2_s3: float, step_s: float, seed: int) -> None:
+        """Take a density of at least 0, a step above 0 and a seed of at least 0."""
+        if not (math.isfinite(spectral_density_rad2_s3) and spectral_density_rad2_s3 >= 0.0):
+            raise ValueError(
+                f"spectral_density_rad2_s3 is {spectral_density_rad2_s3}; "
+                "it must be finite and at least 0"
+            )
+        _require_step(step_s)
+        if seed < 0:
+            raise ValueError(f"seed is {seed}; it must be at least 0")
+        self._deviation = math.sqrt(spectral_density_rad2_s3 / step_s)
+        self._seed = seed
+        self._block_index: int | None = None
+        self._block: list[float] = []
+
+    def torque(self, step_index: int) -> float:
+        """Angular acceleration (rad/s^2) held over step `step_index` (at least 0)."""
+        block_index, offset = divmod(step_index, _BLOCK_STEPS)
+        if block_index != self._block_index:
+            if step_index < 0:
+                raise ValueError(f"step_index is {step_index}; it must be at least 0")
+            sequence = SeedSequence(self._seed, spawn_key=(block_index,))
+            normal = Generator(PCG64(sequence)).standard_normal(_BLOCK_STEPS)
+            self._block = (normal * self._deviation).tolist()
+            self._block_index = block_index
+        return self._block[offset]
+
+
+class StepTorque:
+    """A constant torque from `start_s` until `end_s`, or for ever: a push, or a hung weight.
+
+    It acts on whole steps: on those that begin in `start_s <= t < end_s`.
+    """
+
+    __slots__ = ("_end_step", "_start_step", "_torque_rad_s2")
+
+    def __init__(
+        self, start_s: float, torque_rad_s2: float, step_s: float, end_s: float | None = None
+    ) -> None:
+        """Take a start of at least 0 s, an end after it, and a finite torque."""
+        _require_step(step_s)
+        if not (math.isfinite(start_s) and start_s >= 0.0):
+            raise ValueError(f"start_s is {start_s}; it must be finite and at least 0")
+        if not math.isfinite(torque_rad_s2):
+            raise ValueError(f"torque_rad_s2 is {torque_rad_s2}; it must be finite")
+        if end_s is not None and not (math.isfinite(end_s) and end_s > start_s):
+            raise ValueError(f"end_s is {end_s}; it must be finite and above start_s = {start_s}")
+        self._torque_rad_s2 = float(torque_rad_s2)
+        self._start_step = math.ceil(start_s / step_s - _STEP_TOLERANCE)
+        self._end_step = None if end_s is None else math.ceil(end_s / step_s - _STEP_TOLERANCE)
+
+    def torque(self, step_index: int) -> float:
+        """Angular acceleration (rad/s^2) held over step `step_index`."""
+        if step_index < self._start_step:
+            return 0.0
+        if self._end_step is not None and step_index >= self._end_step:
+            return 0.0
+        return self._torque_rad_s2
+
+
+class Sum:
+    """Several disturbances at once."""
+
+    __slots__ = ("_parts",)
+
+    def __init__(self, *parts: Disturbance) -> None:
+        """Add up `parts`; of none at all the sum is 0."""
+        self._parts = parts
+
+    def torque(self, step_index: int) -> float:
+        """Angular acceleration (rad/s^2) held over step `step_index`."""
+        total = 0.0
+        for part in self._parts:
+            total += part.torque(step_index)
+        return total
+
+
+def parse_disturbance(text: str, step_s: float, seed: int) -> Disturbance:
+    """Build the disturbance a command line names, as `GRAMMAR` says.
+
+    Raises ValueError that names the piece that is wrong and repeats the grammar.
+    """
+    _require_step(step_s)
+    parts: list[Disturbance] = []
+    has_density = False
+    for piece in text.split(","):
+        kind, _, value = piece.strip().partition("=")
+        try:
+            if kind == "q":
+                if has_density:
+                    raise ValueError("q is given twice")
+                has_density = True
+                parts.append(WhiteTorque(_number(value, "q"), step_s, seed))
+            elif kind == "step":
+                parts.append(_parse_step(value, step_s))
+            else:
+                raise ValueError(f"unknown kind '{kind}'")
+        except ValueError as error:
+            raise ValueError(
+                f"disturbance piece '{piece.strip()}': {error}; expected {GRAMMAR}"
+            ) from None
+    return Sum(*parts)
+
+
+def _parse_step(value: str, step_s: float) -> StepTorque:
+    torque_text, at, times = value.partition("@")
+    if not at:
+        raise ValueError("a step needs '@START'")
+    start_text, dots, end_text = times.partition("..")
+    return StepTorque(
+        start_s=_number(start_text, "START"),
+        torque_rad_s2=_number(torque_text, "TORQUE"),
+        step_s=step_s,
+        end_s=_number(end_text, "END") if dots else None,
+    )
+
+
+def _number(text: str, name: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise ValueError(f"{name} is '{text}', not a number") from None
+
+
+def _require_step(step_s: float) -> None:
+    if not (math.isfinite(step_s) and step_s > 0.0):
+        raise ValueError(f"step_s is {step_s}; it must be finite and above 0")

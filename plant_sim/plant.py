@@ -1,0 +1,27 @@
+"""What every simulated plant offers, whatever it simulates."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+
+class Plant(Protocol):
+    """A plant advanced in fixed steps of held voltage.
+
+    A plant knows nothing of encoders, symbols or the network: it takes volts and has true angles.
+    The length of one step is fixed when the plant is built, because lags and integration constants
+    are computed once for it.
+    """
+
+    @property
+    def measured_rad(self) -> tuple[float, ...]:
+        """True angle of each axis that carries an encoder, in rad, unwrapped, in encoder order."""
+        ...
+
+    def advance(self, volts: tuple[float, ...]) -> None:
+        """Hold one voltage per motor for exactly one step; the plant does its own clamping.
+
+        Raises ValueError when the number of voltages is not the number of motors, or when one of
+        them is not finite.
+        """
+        ...

@@ -1,0 +1,32 @@
+"""A controller that repeats the voltages of a recorded flight."""
+
+from __future__ import annotations
+
+from channel.flight_log import FlightLog
+
+
+class RecordedController:
+    """A `Controller` for replays: row `tick` of the log is the command of `tick`.
+
+    The estimated state is ignored, because the flight has already happened.
+    """
+
+    def __init__(self, log: FlightLog) -> None:
+        """Replay `log`; ValueError when it was read without voltages."""
+        if not log.volts or not log.volts[0]:
+            raise ValueError("the flight log holds no voltages; read it with its volts columns")
+        self._volts = log.volts
+        self._last_row = len(log.volts) - 1
+
+    def command(self, tick: int, state: tuple[float, ...]) -> tuple[float, ...]:
+        """Return the voltages of row `tick`; past the end, those of the last row.
+
+        `state` is not read. Raises ValueError for a tick below 0.
+        """
+        if tick < 0:
+            raise ValueError(f"tick is {tick}; it must be at least 0")
+        return self._volts[min(tick, self._last_row)]
+
+    def reference_rad(self, tick: int) -> None:
+        """Return None at every `tick`: a recorded flight follows no reference of ours."""
+        return None

@@ -1,0 +1,56 @@
+"""The controller node without time and transport: bytes in, bytes out.
+
+Both drivers of the receiver, and a flight within one process, go through it.
+"""
+
+from __future__ import annotations
+
+from channel import wire
+from channel.errors import FrameError
+from channel.frames import Frame
+from channel.virtual import Reply
+from receiver.session import ReceiverSession
+
+
+class ReceiverEndpoint:
+    """Decodes what arrives for a session and encodes what it answers."""
+
+    def __init__(self, session: ReceiverSession) -> None:
+        self.session = session
+        self.wire_bytes_down = 0
+        self.wire_bytes_up = 0
+        self.malformed = 0
+
+    def on_bytes(self, data: bytes, now_ns: int) -> list[bytes]:
+        """Take one message that arrived at `now_ns`; return the messages to send."""
+        self.wire_bytes_up += len(data)
+        try:
+            frame = wire.decode(data)
+        except FrameError as error:
+            self.malformed += 1
+            self.session.on_malformed(str(error))
+            return []
+        return self._encode(self.session.on_frame(frame, now_ns))
+
+    def on_time(self, now_ns: int) -> list[bytes]:
+        """Let the deadlines up to `now_ns` pass; return the messages to send."""
+        return self._encode(self.session.on_deadline(now_ns))
+
+    def bye(self, reason: str) -> list[bytes]:
+        """End the session; return the messages that tell the peer."""
+        return self._encode(self.session.bye(reason))
+
+    def step(self, time_ns: int, data: bytes | None) -> Reply:
+        """Do one step of the virtual clock within this process (`channel.virtual.Peer`).
+
+        A symbol that arrives exactly at its deadline is in time, so it is taken first.
+        """
+        messages = self.on_bytes(data, time_ns) if data is not None else []
+        messages += self.on_time(time_ns)
+        return Reply(0, self.session.next_deadline(), tuple(messages))
+
+    def _encode(self, frames: list[Frame]) -> list[bytes]:
+        messages = [wire.encode(frame) for frame in frames]
+        for message in messages:
+            self.wire_bytes_down += len(message)
+        return messages

@@ -1,0 +1,313 @@
+"""The controller node's half of the protocol, without a socket, a clock or a thread.
+
+Three things drive it: a frame that arrived (`on_frame`), a deadline that passed (`on_deadline`) and
+the end of the flight (`bye`). Each returns the frames to send. The receiver decides, once per slot,
+what was received: the symbol, or nothing by the time of a later one or of the deadline. What it
+decided goes back with every command frame, and that echo is what the transmitter's copy consumes.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from enum import Enum
+
+from channel.codec import Codec, CodecState, Vector
+from channel.events import EVENT_CHANNEL, Event, EventKind, event_row
+from channel.frames import (
+    Bye,
+    Commands,
+    Desync,
+    Echo,
+    ForeignVersion,
+    Frame,
+    Hello,
+    Refuse,
+    Symbol,
+    Welcome,
+)
+from channel.identity import Identity
+from channel.lead import fly_sample
+from channel.limits import from_millivolts, to_millivolts
+from channel.recording import NullRecorder, Recorder
+from channel.shaper import BaudMeter
+from channel.terms import Terms
+from channel.wire import WIRE_VERSION
+from channel.words import ERASED, Word
+from receiver.controllers.base import Controller
+from receiver.records import SAMPLE_CHANNEL, TICK_CHANNEL
+
+GAP_SAMPLES_MAX = 64
+"""A symbol this far ahead is no gap any more but a different flight."""
+
+INPUTS_KEPT = 64
+
+
+class Phase(Enum):
+    """Where the receiver's session stands."""
+
+    WAITING = "waiting for a transmitter"
+    FLYING = "flying"
+    ENDED = "ended"
+
+
+class ReceiverSession:
+    """Turns symbols into commands; see the module's text.
+
+    `session_number` is drawn by the caller (32 bits, not zero), so that the session itself stays
+    deterministic.
+    """
+
+    def __init__(
+        self,
+        codec: Codec,
+        terms: Terms,
+        controller: Controller,
+        identity: Identity,
+        session_number: int,
+        recorder: Recorder | None = None,
+    ) -> None:
+        self.codec = codec
+        self.terms = terms
+        self.identity = identity
+        self.session_number = session_number
+        self.phase = Phase.WAITING
+        self.epoch = 0
+        self.state = codec.initial()
+        self.meter = BaudMeter()
+        self.counts: Counter[str] = Counter()
+        """erasures, symbols_late, stale_frames, refused_hellos, bad_commands"""
+        self.end_reason = ""
+        self.refusal: str | None = None
+        self.desync: Desync | None = None
+        self.events: deque[Event] = deque(maxlen=1000)
+        self.inputs: deque[tuple[int, Word]] = deque(maxlen=INPUTS_KEPT)
+        self._controller = controller
+        self._recorder = recorder or NullRecorder()
+        self._commands: deque[Vector] = deque([terms.initial_command] * terms.lead_ticks)
+        self._last_command = terms.initial_command
+        self._echoes: deque[Echo] = deque(maxlen=terms.repeats + 1)
+        self._peer_incarnation: int | None = None
+        self._slot = 0
+        self._word: list[int | None] = []
+        self._anchor: tuple[int, int] | None = None
+
+    # What arrives
+
+    def on_frame(self, frame: Frame, now_ns: int) -> list[Frame]:
+        """Take one frame that arrived at `now_ns` of this end's clock; return the frames to send."""
+        match frame:
+            case Symbol():
+                return self._on_symbol(frame, now_ns)
+            case Hello():
+                return self._on_hello(frame)
+            case Desync() if self._is_current(frame.session):
+                self._on_desync(frame)
+            case Bye() if frame.session == 0 or self._is_current(frame.session):
+                if self.phase is Phase.FLYING:
+                    self._end(f"the transmitter ended the flight: {frame.reason}")
+                elif self.refusal is not None:
+                    self.refusal = f"{self.refusal}\n  as the transmitter sees it: {frame.reason}"
+                    self._end("refused")
+            case ForeignVersion():
+                self._refuse(
+                    f"the transmitter speaks wire version {frame.version}, this end {WIRE_VERSION}: "
+                    "install the same tenbaud on both"
+                )
+            case _:
+                self.counts["stale_frames"] += 1
+        return []
+
+    def next_deadline(self) -> int | None:
+        """Return when the slot that is due is taken for erased; None while none is."""
+        if self._anchor is None or self.phase is not Phase.FLYING:
+            return None
+        anchor_slot, anchor_ns = self._anchor
+        due = self.terms.slot_ns(self._slot) - self.terms.slot_ns(anchor_slot)
+        return anchor_ns + due + self.terms.deadline_allowance_ns
+
+    def on_deadline(self, now_ns: int) -> list[Frame]:
+        """Erase the slots whose deadline has passed by `now_ns`; return the frames to send."""
+        frames: list[Frame] = []
+        deadline = self.next_deadline()
+        while deadline is not None and deadline <= now_ns:
+            frames += self._settle(None, now_ns)
+            deadline = self.next_deadline()
+        return frames
+
+    def bye(self, reason: str) -> list[Frame]:
+        """End the session from this side."""
+        was_flying = self.phase is Phase.FLYING
+        self._end(reason)
+        return [Bye(self.session_number, reason)] if was_flying else []
+
+    def on_malformed(self, why: str) -> None:
+        """Note that bytes came which are no frame."""
+        self.counts["malformed"] += 1
+        self._tell(EventKind.MALFORMED, f"dropped a message: {why}")
+
+    # The handshake
+
+    def _on_hello(self, hello: Hello) -> list[Frame]:
+        known = hello.incarnation == self._peer_incarnation
+        if self.phase is Phase.FLYING and not (known and self.state.sample == 0 and self._slot == 0):
+            self.counts["refused_hellos"] += 1
+            if known:
+                return []
+            return [Refuse(hello.incarnation, "this receiver is flying with another", "")]
+        if self.phase is Phase.ENDED:
+            return [Refuse(hello.incarnation, f"this receiver has ended: {self.end_reason}", "")]
+        problem = self._difference(hello)
+        if problem is not None:
+            self.counts["refused_hellos"] += 1
+            self._refuse(problem)
+            return [Refuse(hello.incarnation, problem, self.identity.config)]
+        if self.phase is Phase.WAITING:
+            self._peer_incarnation = hello.incarnation
+            self.phase = Phase.FLYING
+            self._tell(EventKind.STARTED, f"session {self.session_number:08x} begins")
+        return [Welcome(self.session_number, self.epoch, self.state.sample, hello.incarnation)]
+
+    def _difference(self, hello: Hello) -> str | None:
+        if hello.config_digest != self.identity.config_digest:
+            return (
+                "the shared configuration differs: transmitter "
+                f"{hello.config_digest.hex()[:12]}, receiver "
+                f"{self.identity.config_digest.hex()[:12]}"
+            )
+        if hello.version != self.identity.version:
+            return f"versions differ: transmitter {hello.version}, receiver {self.identity.version}"
+        if hello.numerics_probe != self.identity.numerics_probe:
+            return (
+                "the numerics probe differs: transmitter "
+                f"{hello.numerics_probe.hex()}, receiver {self.identity.numerics_probe.hex()}; the "
+                "two machines do not compute alike, so their codecs would drift apart"
+            )
+        return None
+
+    def _refuse(self, problem: str) -> None:
+        if self.refusal is None:
+            self._tell(EventKind.REFUSED, problem)
+        self.refusal = problem
+
+    # Symbols, slots, words
+
+    def _on_symbol(self, symbol: Symbol, now_ns: int) -> list[Frame]:
+        value = self.codec.coder.alphabet.symbol(symbol.number)
+        ahead = symbol.slot - self._slot
+        if not self._is_current(symbol.session) or symbol.epoch != self.epoch or value is None:
+            self.counts["stale_frames"] += 1
+            return []
+        if ahead < 0:
+            self.counts["symbols_late"] += 1
+            self._tell(EventKind.LATE_SYMBOL, f"slot {symbol.slot} was settled already: dropped")
+            return []
+        if ahead > GAP_SAMPLES_MAX * self.terms.symbols_per_word:
+            self.counts["stale_frames"] += 1
+            self._tell(EventKind.STALE, f"slot {symbol.slot} is {ahead} ahead: dropped")
+            return []
+        frames: list[Frame] = []
+        while self._slot < symbol.slot:
+            frames += self._settle(None, now_ns)
+        self._anchor = (symbol.slot, now_ns)
+        self.meter.on_symbol(now_ns)
+        return frames + self._settle(value, now_ns)
+
+    def _settle(self, symbol: int | None, now_ns: int) -> list[Frame]:
+        """Decide what this slot's symbol was; at the end of a word, fly its sample."""
+        if symbol is None:
+            self.counts["erasures"] += 1
+            self._tell(EventKind.ERASED, f"slot {self._slot} is erased")
+        self._slot += 1
+        self._word.append(symbol)
+        if len(self._word) < self.terms.symbols_per_word:
+            return []
+        symbols = [value for value in self._word if value is not None]
+        whole = len(symbols) == len(self._word)
+        self._word = []
+        return self._fly(tuple(symbols) if whole else ERASED, now_ns)
+
+    def _fly(self, word: Word, now_ns: int) -> list[Frame]:
+        before = self.state
+        lead = self.terms.lead_ticks
+        flown = fly_sample(self.codec, before, word, tuple(self._commands), self._decide)
+        self._commands.extend(flown.commands)
+        for _ in range(len(self._commands) - lead):
+            self._commands.popleft()
+        self.state = flown.state
+        self.inputs.append((before.sample, word))
+        digest = self.codec.digest(self.state)
+        millivolts = [mv for command in flown.commands for mv in to_millivolts(command)]
+        number = self.codec.coder.alphabet.word_number(word)
+        self._echoes.append(Echo(before.sample, number, digest, tuple(millivolts)))
+        self._record(before, word, flown.live, flown.commands, digest, now_ns)
+        return [Commands(self.session_number, self.epoch, tuple(self._echoes))]
+
+    def _decide(self, tick: int, state: Vector) -> Vector:
+        """Ask the controller, limit what it wants, and return it as the wire will carry it."""
+        volts = self._controller.command(tick, state)
+        if not all(-1e6 < value < 1e6 for value in volts):
+            self.counts["bad_commands"] += 1
+            volts = self._last_command
+        limited = self.terms.limits.apply(volts, self._last_command)
+        self._last_command = from_millivolts(to_millivolts(limited))
+        return self._last_command
+
+    # Ends and reports
+
+    def _on_desync(self, desync: Desync) -> None:
+        self.desync = desync
+        self.counts["desyncs"] += 1
+        self._tell(
+            EventKind.DESYNC,
+            f"the codecs differ after sample {desync.sample}: transmitter "
+            f"{desync.transmitter_digest:016x}, receiver {desync.receiver_digest:016x}",
+            desync.sample,
+        )
+        self._end("the two copies of the codec disagree")
+
+    def _is_current(self, session: int) -> bool:
+        return self.phase is Phase.FLYING and session == self.session_number
+
+    def _end(self, reason: str) -> None:
+        if self.phase is not Phase.ENDED:
+            self.phase = Phase.ENDED
+            self.end_reason = reason
+            self._tell(EventKind.ENDED, reason)
+
+    def _tell(self, kind: EventKind, text: str, sample: int | None = None) -> None:
+        at = self.state.sample if sample is None else sample
+        flight_ns = self.state.sample * self.terms.sample_ns
+        event = Event(kind, flight_ns, at, text)
+        self.events.append(event)
+        self._recorder.write(EVENT_CHANNEL, flight_ns, event_row(event))
+
+    def _record(
+        self,
+        before: CodecState,
+        word: Word,
+        live: list[Vector],
+        commands: list[Vector],
+        digest: int,
+        now_ns: int,
+    ) -> None:
+        terms = self.terms
+        state = self.state
+        self._recorder.write(
+            SAMPLE_CHANNEL,
+            before.sample * terms.sample_ns,
+            (
+                before.sample,
+                word,
+                self.codec.coder.ranges(before.coder),
+                state.model,
+                state.coder,
+                f"{digest:016x}",
+                now_ns / 1e9,
+            ),
+        )
+        tick = before.sample * terms.ticks_per_sample + terms.lead_ticks
+        for believed, command in zip(live, commands, strict=True):
+            reference = self._controller.reference_rad(tick)
+            row = (tick, reference, believed, command)
+            self._recorder.write(TICK_CHANNEL, tick * terms.tick_ns, row)
+            tick += 1

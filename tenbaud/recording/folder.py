@@ -1,0 +1,116 @@
+"""The folder of one run: its name, and the names of the files in it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from datetime import datetime
+from itertools import count
+from pathlib import Path
+
+from tenbaud.recording.errors import RecordingError
+
+DEFAULT_ROOT = Path("runs")
+CONFIG_NAME = "config.toml"
+TRANSMITTER_NAME = "transmitter.mcap"
+RECEIVER_NAME = "receiver.mcap"
+SUMMARY_NAME = "summary.json"
+FIGURE_NAME = "flight.png"
+
+
+@dataclass(frozen=True, slots=True)
+class RunFolder:
+    """Where the files of a run are, whether they exist or not."""
+
+    path: Path
+
+    @property
+    def config(self) -> Path:
+        """The complete configuration the run was flown with."""
+        return self.path / CONFIG_NAME
+
+    @property
+    def transmitter(self) -> Path:
+        """The sensor node's recording."""
+        return self.path / TRANSMITTER_NAME
+
+    @property
+    def receiver(self) -> Path:
+        """The controller node's recording."""
+        return self.path / RECEIVER_NAME
+
+    @property
+    def summary(self) -> Path:
+        """The run's numbers."""
+        return self.path / SUMMARY_NAME
+
+    @property
+    def figure(self) -> Path:
+        """The run's picture."""
+        return self.path / FIGURE_NAME
+
+    def recordings(self) -> list[Path]:
+        """The recordings that exist, the transmitter's first."""
+        return [path for path in (self.transmitter, self.receiver) if path.is_file()]
+
+
+def create_run_folder(
+    root: Path | None, name: str, explicit: Path | None, now: datetime | None = None
+) -> Path:
+    """Make a new, empty folder for a run and return it.
+
+    Without `explicit` it is `<root>/<local time>_<name>`, with -2, -3 ... appended if taken; root
+    is `runs` if not given. An explicit folder must not exist yet. `now` is the clock, for tests.
+    Raises RecordingError if the folder exists or cannot be made.
+    """
+    if explicit is not None:
+        if not _make(explicit):
+            raise RecordingError(
+                f"The run folder {explicit} exists already and is not overwritten. "
+                "Give a new folder, or none at all to have one named after date and time."
+            )
+        return explicit
+    moment = (now or datetime.now()).strftime("%Y-%m-%dT%H-%M-%S")
+    safe_name = re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-.") or "run"
+    base = root if root is not None else DEFAULT_ROOT
+    for number in count(1):
+        suffix = "" if number == 1 else f"-{number}"
+        folder = base / f"{moment}_{safe_name}{suffix}"
+        if _make(folder):
+            return folder
+    raise AssertionError("unreachable: the numbers do not end")
+
+
+def _make(folder: Path) -> bool:
+    """Make the folder; False if the name is taken. Asking first would leave a gap for another."""
+    try:
+        folder.mkdir(parents=True)
+    except OSError as error:
+        if isinstance(error, FileExistsError) and folder.parent.is_dir():
+            return False
+        raise RecordingError(
+            f"The run folder {folder} cannot be made: {error.strerror or error}. "
+            "Check that its parent is a folder that may be written to, or choose another place."
+        ) from error
+    return True
+
+
+def find_recordings(path: Path) -> list[Path]:
+    """The recordings meant by a path: those in a run folder, or the file itself.
+
+    Raises RecordingError if there are none.
+    """
+    if not path.is_dir():
+        if path.is_file():
+            return [path]
+        raise RecordingError(
+            f"{path} does not exist. Give the folder of a run, such as those in `runs/`, "
+            "or a recording in it."
+        )
+    found = RunFolder(path).recordings()
+    if not found:
+        raise RecordingError(
+            f"The folder {path} holds neither {TRANSMITTER_NAME} nor {RECEIVER_NAME}. "
+            "Give the folder of one run, not the folder that holds the runs."
+        )
+    return found

@@ -1,0 +1,149 @@
+"""Imports point one way, and the two transports stay behind their adapters."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from fnmatch import fnmatchcase
+
+import pytest
+
+from tests.rules.sources import PACKAGES, files_below, report
+
+MAY_IMPORT = {
+    "channel": {"channel"},
+    "plant_sim": {"plant_sim"},
+    "transmitter": {"transmitter", "channel", "plant_sim"},
+    "receiver": {"receiver", "channel"},
+    "tenbaud": set(PACKAGES),
+}
+"""For each package, the packages of this project that it may import."""
+
+NEVER = {"tests", "benchmarks"}
+"""These are not in the wheel, so nothing that is may need them."""
+
+ONLY_IN = {
+    "zenoh": ("channel/links/zenoh*.py",),
+    "serial": ("channel/links/serial*.py", "transmitter/rigs/*.py"),
+}
+"""A transport is replaceable as long as only its adapter knows it."""
+
+LAZY = ("zenoh", "channel.links.zenoh")
+"""Imported inside functions only, except by the adapter: a memory or serial flight needs no Zenoh,
+and loading it takes time and starts threads."""
+
+WITHOUT_ARRAYS = ("channel/*", "receiver/session*", "receiver/driver*")
+"""What must agree to the last bit, or run every tick, does without numpy and scipy."""
+
+
+def imports_of(source: str, name: str) -> Iterator[tuple[int, str, bool]]:
+    """Yield (line, dotted module, at module level) of every import, the literal dynamic too.
+
+    An import below ``if TYPE_CHECKING`` counts as one inside a function: it never runs.
+    """
+    package = name.removesuffix(".py").split("/")[:-1]
+
+    def visit(node: ast.AST, top: bool) -> Iterator[tuple[int, str, bool]]:
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield node.lineno, alias.name, top
+        elif isinstance(node, ast.ImportFrom):
+            stem = package[: len(package) - node.level + 1] if node.level else []
+            base = ".".join([*stem, *([node.module] if node.module else [])])
+            for alias in node.names:
+                yield node.lineno, f"{base}.{alias.name}", top
+        elif isinstance(node, ast.Call):
+            called = ast.unparse(node.func)
+            if called.split(".")[-1] in ("import_module", "__import__") and node.args:
+                argument = node.args[0]
+                if isinstance(argument, ast.Constant) and isinstance(argument.value, str):
+                    yield node.lineno, argument.value, top
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            top = False
+        guarded = isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
+        for child in ast.iter_child_nodes(node):
+            yield from visit(child, top and not guarded)
+
+    yield from visit(ast.parse(source, filename=name), True)
+
+
+def is_within(module: str, package: str) -> bool:
+    return module == package or module.startswith(package + ".")
+
+
+def findings_in(source: str, name: str) -> list[str]:
+    """Return one line for each import that breaks a rule."""
+    own = name.split("/")[0]
+    found = []
+    for line, module, at_module_level in imports_of(source, name):
+        root = module.split(".")[0]
+        where = f"{name}:{line}: imports {module}: "
+        if root in NEVER:
+            found.append(where + "it is not in the wheel")
+        if root in PACKAGES and root not in MAY_IMPORT[own]:
+            found.append(where + f"{own} may import only {sorted(MAY_IMPORT[own])}")
+        homes = ONLY_IN.get(root, ("*",))
+        if not any(fnmatchcase(name, home) for home in homes):
+            found.append(where + f"only {', '.join(homes)} may")
+        is_adapter = any(fnmatchcase(name, home) for home in ONLY_IN["zenoh"])
+        if at_module_level and not is_adapter and any(is_within(module, lazy) for lazy in LAZY):
+            found.append(where + "inside a function only, so that it loads when it is used")
+        if root in ("numpy", "scipy") and any(fnmatchcase(name, one) for one in WITHOUT_ARRAYS):
+            found.append(where + "this module does without arrays")
+    return found
+
+
+def test_every_import_of_the_packages_keeps_the_rules() -> None:
+    found = [line for name, source in files_below(*PACKAGES) for line in findings_in(source, name)]
+    assert not found, report(found)
+
+
+def test_every_package_is_there() -> None:
+    assert {name.split("/")[0] for name, _ in files_below(*PACKAGES)} == set(PACKAGES)
+
+
+@pytest.mark.parametrize(
+    ("name", "source"),
+    [
+        ("channel/codec.py", "import transmitter.session"),
+        ("channel/codec.py", "from plant_sim import pitch"),
+        ("channel/codec.py", "def f():\n    import tenbaud"),
+        ("channel/codec.py", "import numpy as np"),
+        ("channel/links/memory.py", "from scipy.linalg import expm"),
+        ("channel/links/memory.py", "def f():\n    import zenoh"),
+        ("channel/links/memory.py", "from . import zenoh"),
+        ("channel/links/memory.py", "import serial.tools"),
+        ("plant_sim/pitch.py", "from channel.numerics import sin"),
+        ("plant_sim/pitch.py", "import tests.golden"),
+        ("transmitter/session.py", "from receiver import session"),
+        ("transmitter/session.py", "import importlib\nimportlib.import_module('receiver.loop')"),
+        ("transmitter/rigs/quarc.py", "from ...tenbaud import config"),
+        ("transmitter/loop.py", "import serial"),
+        ("transmitter/loop.py", "from channel.links import zenoh"),
+        ("receiver/session.py", "import plant_sim"),
+        ("receiver/session.py", "import numpy"),
+        ("receiver/driver.py", "if True:\n    import numpy"),
+        ("tenbaud/cli.py", "from channel.links.zenoh import ZenohLink"),
+        ("tenbaud/doctor.py", "def f():\n    import zenoh"),
+    ],
+)
+def test_a_bad_import_is_caught(name: str, source: str) -> None:
+    assert findings_in(source, name) != []
+
+
+@pytest.mark.parametrize(
+    ("name", "source"),
+    [
+        ("channel/codec.py", "import math\nfrom channel import numerics\nfrom . import words"),
+        ("channel/links/zenoh.py", "import zenoh\nfrom .base import Link"),
+        ("channel/links/serial.py", "import serial"),
+        ("transmitter/session.py", "import channel.codec\nimport plant_sim"),
+        ("transmitter/rigs/bridge.py", "from serial import Serial\nimport numpy"),
+        ("receiver/session.py", "from receiver.controllers import pid"),
+        ("tenbaud/cli.py", "def f():\n    from channel.links.zenoh import ZenohLink"),
+        ("tenbaud/a.py", "if TYPE_CHECKING:\n    from channel.links.zenoh import ZenohLink"),
+        ("tenbaud/cli.py", "import transmitter, receiver, plant_sim, numpy"),
+    ],
+)
+def test_a_good_import_passes(name: str, source: str) -> None:
+    assert findings_in(source, name) == []

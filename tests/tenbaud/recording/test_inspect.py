@@ -1,0 +1,44 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from tenbaud.recording.inspect import describe, describe_text
+from tests.tenbaud.recording.rows import EVENT, Rows
+
+
+def test_run_folder_is_described_file_by_file(tmp_path: Path, fly: Callable[..., Path]) -> None:
+    folder = fly(tmp_path / "run", ticks=100)
+    transmitter, receiver = describe(folder)
+    assert (transmitter.path.name, receiver.path.name) == ("transmitter.mcap", "receiver.mcap")
+    assert transmitter.complete
+    assert transmitter.rows_dropped == 0
+    text = describe_text(folder)
+    for words in (
+        "complete",
+        "tick: 100 rows, 0.000 s to 0.990 s",
+        "measured_rad  [rad]  what the encoder read",
+        "lateness_ms   [ms]  after the due time  (wall clock)",
+        "seed = 7",
+        "start: the first symbol",
+    ):
+        assert words in text
+
+
+def test_cut_file_is_called_cut(tmp_path: Path, fly: Callable[..., Path]) -> None:
+    path = fly(tmp_path / "run", ticks=100) / "transmitter.mcap"
+    path.write_bytes(path.read_bytes()[:-100])
+    [description] = describe(path)
+    assert not description.complete
+    assert "cut: these are the rows up to the cut" in describe_text(path)
+
+
+def test_only_the_first_twenty_events_are_listed(
+    tmp_path: Path, record: Callable[[Path, Rows], Path]
+) -> None:
+    rows = [(EVENT, k, (k / 10, "erased", k, f"symbol {k} came late")) for k in range(30)]
+    path = record(tmp_path / "a.mcap", rows)
+    text = describe_text(path)
+    assert "the first 20 of 30 events" in text
+    assert "1.900 s  erased: symbol 19 came late (sample 19)" in text
+    assert "symbol 20" not in text

@@ -1,0 +1,119 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from mcap.writer import CompressionType, Writer
+
+from tenbaud.recording.encoding import channel_schema, row_encoder
+from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.reader import Recording, read_messages
+from tests.tenbaud.recording.rows import TICK, Rows, tick_row
+
+ROWS_PER_CHUNK = 50
+CHUNKS = 6
+
+
+@pytest.fixture(params=[CompressionType.ZSTD, CompressionType.NONE])
+def chunked(tmp_path: Path, request: pytest.FixtureRequest) -> tuple[Path, list[int]]:
+    """A file of several chunks, and where each of them ends."""
+    path = tmp_path / "a.mcap"
+    ends = []
+    with path.open("wb") as stream:
+        writer = Writer(stream, compression=request.param)
+        writer.start("tenbaud", "tenbaud")
+        schema = writer.register_schema("tick", "jsonschema", channel_schema(TICK))
+        channel = writer.register_channel("tick", "json", schema)
+        encode = row_encoder(TICK)
+        for tick in range(ROWS_PER_CHUNK * CHUNKS):
+            writer.add_message(channel, tick, encode(tick_row(tick, tick / 3)), tick)
+            if (tick + 1) % ROWS_PER_CHUNK == 0:
+                writer.flush()
+                ends.append(stream.tell())
+        writer.finish()
+    return path, ends
+
+
+def test_cut_file_is_read_up_to_the_cut_wherever_it_falls(chunked: tuple[Path, list[int]]) -> None:
+    path, ends = chunked
+    whole = path.read_bytes()
+    cuts = {len(whole) - 1, len(whole) - 9, *ends}
+    cuts |= {end + extra for end in ends[:-1] for extra in (1, 8, 9, 30, 200, 700)}
+    cuts |= set(range(9, ends[0], 97))
+    for cut in sorted(cuts):
+        path.write_bytes(whole[:cut])
+        stream = read_messages(path)
+        ticks = [row["tick"] for _, _, row in stream]
+        # The index behind a chunk may be cut without harm to the chunk.
+        certain = ROWS_PER_CHUNK * sum(end <= cut for end in ends)
+        assert ticks == list(range(len(ticks))), cut
+        assert certain <= len(ticks) <= certain + ROWS_PER_CHUNK, cut
+        assert not stream.complete, cut
+
+
+def test_blocks_that_were_never_filled_count_as_a_cut(chunked: tuple[Path, list[int]]) -> None:
+    path, ends = chunked
+    whole = path.read_bytes()
+    half_empty = whole[: ends[1] + 300] + bytes(len(whole) - ends[1] - 300)
+    path.write_bytes(half_empty)
+    stream = read_messages(path)
+    assert len(list(stream)) == 2 * ROWS_PER_CHUNK
+    assert not stream.complete
+
+
+def test_complete_file_says_so_only_after_its_end(chunked: tuple[Path, list[int]]) -> None:
+    stream = read_messages(chunked[0])
+    assert not stream.complete
+    assert len(list(stream)) == ROWS_PER_CHUNK * CHUNKS
+    assert stream.complete
+
+
+def test_recording_counts_rows_and_time_of_each_topic(tmp_path: Path, fly: Callable[..., Path]) -> None:
+    recording = Recording(fly(tmp_path / "run", ticks=100) / "transmitter.mcap")
+    assert recording.complete
+    assert {name: topic.rows for name, topic in recording.topics.items()} == {
+        "tick": 100,
+        "estimate": 100,
+        "sample": 10,
+        "event": 1,
+    }
+    assert recording.topics["sample"].first_time_ns == 0
+    assert recording.topics["sample"].last_time_ns == 900_000_000
+    assert recording.metadata["seed"] == "7"
+
+
+def test_wrong_files_are_named_with_what_to_do(tmp_path: Path) -> None:
+    empty, text = tmp_path / "empty.mcap", tmp_path / "text.mcap"
+    empty.write_bytes(b"")
+    text.write_text("tick,angle\n0,0.1\n")
+    for path, words in (
+        (tmp_path / "none.mcap", "cannot be read"),
+        (tmp_path, "cannot be read"),
+        (empty, "is empty"),
+        (text, "is not a recording"),
+    ):
+        with pytest.raises(RecordingError, match=words) as caught:
+            read_messages(path)
+        assert str(path) in str(caught.value)
+
+
+def test_file_of_another_program_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        channel = writer.register_channel("/imu", "cdr", 0)
+        writer.add_message(channel, 0, b"\x00", 0)
+        writer.finish()
+    with pytest.raises(RecordingError, match=r"not written by tenbaud.*'/imu'"):
+        list(read_messages(path))
+
+
+def test_file_cut_right_after_its_head_has_no_rows(
+    tmp_path: Path, record: Callable[[Path, Rows], Path]
+) -> None:
+    path = record(tmp_path / "a.mcap", [(TICK, 0, tick_row(0, 0.0))])
+    path.write_bytes(path.read_bytes()[:60])
+    assert Recording(path).topics == {}
+    assert not Recording(path).complete

@@ -1,0 +1,120 @@
+"""The guard beside the motors: limiter and watchdog.
+
+Every tick it is asked what to put on the motors. A command passes, in this order, a finite check, the
+clamp and the slew limit; with soft angle limits exceeded, or a sensor that cannot be trusted, nothing
+passes. When commands stay away the last one is held; after the time-out the voltage is taken to the
+safe one along a ramp, and there it stays, latched: while it is latched no symbol leaves.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+from channel.codec import Vector
+from channel.limits import CommandLimits
+
+
+class GuardState(StrEnum):
+    """What the guard is doing."""
+
+    READY = "ready"
+    RUNNING = "running"
+    HOLDING = "holding"
+    RAMPING = "ramping"
+    LATCHED = "latched"
+
+
+@dataclass(frozen=True, slots=True)
+class GuardSettings:
+    """When the guard steps in, and how. Times are in ticks."""
+
+    timeout_ticks: int
+    """age of the last command after which the voltage is taken down"""
+    ramp_ticks: int
+    """how long the way to the safe voltage takes"""
+    safe_volts: Vector
+    soft_limits_rad: Vector = ()
+    """largest angle of each measured axis, either way; empty: none"""
+
+    def __post_init__(self) -> None:
+        if self.timeout_ticks < 1 or self.ramp_ticks < 1:
+            raise ValueError(
+                "the guard's time-out and ramp take at least one tick, got "
+                f"{self.timeout_ticks} and {self.ramp_ticks}"
+            )
+
+
+class Guard:
+    """Decides the applied voltage of every tick."""
+
+    def __init__(self, limits: CommandLimits, settings: GuardSettings) -> None:
+        self._limits = limits
+        self._settings = settings
+        self.state = GuardState.READY
+        self.reason = ""
+        """why it ramps or latched"""
+        self.volts = settings.safe_volts
+        self._age_ticks = 0
+        self._ramp_from = settings.safe_volts
+        self._ramp_tick = 0
+
+    @property
+    def stopped(self) -> bool:
+        """Return whether the guard no longer passes commands."""
+        return self.state in (GuardState.RAMPING, GuardState.LATCHED)
+
+    def check_angles(self, tick: int, measured_rad: Vector) -> None:
+        """Trip when an angle is beyond its soft limit or not a number."""
+        limits = self._settings.soft_limits_rad
+        for axis, angle in enumerate(measured_rad):
+            if not math.isfinite(angle):
+                self.trip(f"axis {axis} reads {angle} at tick {tick}")
+            elif limits and abs(angle) > limits[axis]:
+                self.trip(
+                    f"axis {axis} is at {angle:.3f} rad at tick {tick}, beyond its soft limit of "
+                    f"{limits[axis]:g} rad"
+                )
+
+    def trip(self, reason: str) -> None:
+        """Take the voltage down from now on."""
+        if not self.stopped:
+            self.state = GuardState.RAMPING
+            self.reason = reason
+            self._ramp_from = self.volts
+            self._ramp_tick = 0
+
+    def apply(self, tick: int, command: Vector | None) -> Vector:
+        """Return the voltages of this tick; `command` is None when none has come."""
+        if command is not None and not all(math.isfinite(value) for value in command):
+            self.trip(f"the command of tick {tick} is not a number: {command}")
+        if not self.stopped:
+            self._take(tick, command)
+        if self.state is GuardState.RAMPING:
+            self._ramp()
+        return self.volts
+
+    def _take(self, tick: int, command: Vector | None) -> None:
+        if command is not None:
+            self.state = GuardState.RUNNING
+            self._age_ticks = 0
+            self.volts = self._limits.apply(command, self.volts)
+            return
+        self._age_ticks += 1
+        if self.state is GuardState.RUNNING:
+            self.state = GuardState.HOLDING
+        if self._age_ticks > self._settings.timeout_ticks:
+            self.trip(f"no command for {self._age_ticks} ticks up to tick {tick}")
+
+    def _ramp(self) -> None:
+        self._ramp_tick += 1
+        left = 1.0 - self._ramp_tick / self._settings.ramp_ticks
+        if left <= 0.0:
+            self.state = GuardState.LATCHED
+            self.volts = self._settings.safe_volts
+            return
+        self.volts = tuple(
+            safe + (start - safe) * left
+            for start, safe in zip(self._ramp_from, self._settings.safe_volts, strict=True)
+        )

@@ -1,0 +1,129 @@
+"""The sensor node: rig, session, guard and scores, joined for one tick at a time.
+
+A driver, real or virtual, calls `measure` at every tick, carries the frames, delivers what has come,
+and calls `actuate`. Nothing here knows which driver it is.
+"""
+
+from __future__ import annotations
+
+from channel.codec import Vector
+from channel.events import EVENT_CHANNEL, Event, EventKind, event_row
+from channel.frames import Frame, Symbol
+from channel.recording import NullRecorder, Recorder
+from transmitter.encoder_watch import EncoderWatch
+from transmitter.guard import Guard, GuardState
+from transmitter.records import TICK_CHANNEL
+from transmitter.rigs.base import Reading, Rig
+from transmitter.scores import Scores
+from transmitter.session import Phase, TransmitterSession
+
+
+class TransmitterNode:
+    """Everything of the sensor node but time and transport."""
+
+    def __init__(
+        self,
+        session: TransmitterSession,
+        rig: Rig,
+        guard: Guard,
+        scores: Scores,
+        recorder: Recorder | None = None,
+    ) -> None:
+        self.session = session
+        self.rig = rig
+        self.guard = guard
+        self.scores = scores
+        self.commands_late = 0
+        self.sensor_fault: str | None = None
+        self.tick = 0
+        self._recorder = recorder or NullRecorder()
+        self._reading: Reading | None = None
+        self._watch = EncoderWatch(session.codec, session.terms.tick_ns / 1e9)
+        self._applied = guard.volts
+        self._guard_told = guard.state
+
+    def measure(self, tick: int) -> list[Symbol] | None:
+        """Read the rig; return the symbols to send, or None when the rig has no more to read."""
+        self.tick = tick
+        reading = self.rig.read(tick)
+        if reading is None:
+            return None
+        self._reading = reading
+        self._check(tick, reading)
+        self.scores.on_angles(tick, reading.true_rad or reading.measured_rad)
+        if self.guard.stopped:
+            return []
+        return self.session.on_measurement(tick, reading.measured_rad)
+
+    def deliver(self, frame: Frame) -> list[Frame]:
+        """Hand an arrived frame to the session and score what it confirmed; return the answers."""
+        answers = self.session.on_frame(frame)
+        first = self.session.terms.ticks_per_sample
+        while self.session.confirmed:
+            done = self.session.confirmed.popleft()
+            pairs = zip(done.flown.coded, done.live, strict=True)
+            for tick, (coded, live) in enumerate(pairs, done.sample * first):
+                self.scores.on_estimate(tick, coded, live)
+        return answers
+
+    def actuate(self, tick: int, lateness_ns: int = 0) -> Vector:
+        """Put the tick's voltages on the motors; return them."""
+        reading = self._reading
+        if reading is None:
+            raise RuntimeError(f"tick {tick} is actuated before it was measured")
+        flying = self.session.phase is Phase.FLYING
+        if self.session.phase is Phase.ENDED:
+            self.guard.trip(self.session.end_reason)
+        command = self.session.command(tick) if flying else None
+        late = command is None and flying and not self.guard.stopped
+        self.commands_late += late
+        volts = self.guard.apply(tick, command)
+        self.rig.write(tick, volts)
+        self._applied = volts if reading.applied_volts is None else reading.applied_volts
+        time_ns = tick * self.session.terms.tick_ns
+        self._recorder.write(
+            TICK_CHANNEL,
+            time_ns,
+            (
+                tick,
+                time_ns / 1e9,
+                reading.measured_rad,
+                reading.true_rad,
+                command,
+                self._applied,
+                late,
+                lateness_ns / 1e6,
+                self.guard.state.value,
+            ),
+        )
+        if self.guard.state is not self._guard_told:
+            self._tell_guard()
+        return volts
+
+    @property
+    def latched(self) -> bool:
+        """Return whether the guard has reached the safe voltage and stays there."""
+        return self.guard.state is GuardState.LATCHED
+
+    def tell(self, kind: EventKind, text: str) -> None:
+        """Report something at the present tick."""
+        time_ns = self.tick * self.session.terms.tick_ns
+        event = Event(kind, time_ns, self.session.copies.confirmed.sample, text)
+        self.session.events.append(event)
+        self._recorder.write(EVENT_CHANNEL, time_ns, event_row(event))
+
+    def _check(self, tick: int, reading: Reading) -> None:
+        fault = reading.fault or self._watch.check(
+            reading.counts, self._applied, self.session.copies.confirmed.model
+        )
+        if fault is not None and not self.guard.stopped:
+            self.sensor_fault = f"tick {tick}: {fault}"
+            self.tell(EventKind.SENSOR, self.sensor_fault)
+            self.guard.trip(self.sensor_fault)
+        self.guard.check_angles(tick, reading.measured_rad)
+
+    def _tell_guard(self) -> None:
+        self._guard_told = self.guard.state
+        if self.guard.state is not GuardState.RUNNING:
+            text = f"guard {self.guard.state.value}"
+            self.tell(EventKind.GUARD, f"{text}: {self.guard.reason}".rstrip(": "))

@@ -1,0 +1,168 @@
+"""The sensor node on the real clock: every tick at its absolute deadline.
+
+The time until the next deadline is spent taking frames in, so that a tick itself only reads, sends
+and writes. A tick is `floor((t - t0) / h)`: after a pause the ticks that passed are gone, their slots
+become erasures at the receiver, and nothing is sent in a burst afterwards.
+"""
+
+from __future__ import annotations
+
+import heapq
+import time
+from collections.abc import Callable, Sequence
+
+from channel import wire
+from channel.errors import ConfigMismatch, FrameError, LinkLost
+from channel.events import EventKind
+from channel.frames import Frame, Symbol
+from channel.line import Delivery
+from channel.links.base import Link
+from channel.uplink import Uplink
+from channel.virtual import is_envelope
+from transmitter.node import TransmitterNode
+from transmitter.scores import LatenessMeter
+from transmitter.session import Phase
+
+HELLO_PERIOD_S = 0.2
+LEAD_IN_NS = 20_000_000
+"""Between the handshake and tick 0."""
+
+
+class RealFlight:
+    """Flies a node over a link in real time; see the module's text."""
+
+    def __init__(
+        self,
+        node: TransmitterNode,
+        uplink: Uplink,
+        link: Link,
+        should_stop: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self._node = node
+        self._uplink = uplink
+        self._link = link
+        self._should_stop = should_stop
+        self._outbox: list[tuple[int, int, bytes, bool]] = []
+        self._sent = 0
+        self._start_ns = 0
+        self._peer_told = True
+        self.lateness = LatenessMeter()
+        self.ticks_missed = 0
+        self.wire_bytes_down = 0
+        self.malformed = 0
+
+    def greet(self, peer_timeout_s: float) -> None:
+        """Ask for a session until there is one or a refusal; LinkLost when nobody answers."""
+        session = self._node.session
+        self._start_ns = asked_ns = time.monotonic_ns()
+        next_hello_ns = asked_ns
+        while session.phase is Phase.GREETING and session.refusal is None:
+            now_ns = time.monotonic_ns()
+            if self._should_stop():
+                return
+            if now_ns - asked_ns > peer_timeout_s * 1e9:
+                raise LinkLost(
+                    f"no receiver answered for {peer_timeout_s:g} s; is it running, with the same "
+                    "session name, the other end of this endpoint and --clock real?"
+                )
+            if now_ns >= next_hello_ns:
+                self._offer([session.hello()])
+                next_hello_ns = now_ns + round(HELLO_PERIOD_S * 1e9)
+            self._take_in(HELLO_PERIOD_S)
+
+    def run(self, ticks: int) -> int:
+        """Fly until `ticks`, the end of the rig or a stop; return the number of ticks that passed."""
+        node = self._node
+        tick_ns = node.session.terms.tick_ns
+        self._start_ns = time.monotonic_ns() + LEAD_IN_NS
+        self._peer_told = False
+        tick = 0
+        while tick < ticks and not node.latched and not self._should_stop():
+            self._wait_until(tick * tick_ns)
+            now_ns = self._now_ns()
+            lateness_ns = now_ns - tick * tick_ns
+            if lateness_ns >= tick_ns:
+                missed = lateness_ns // tick_ns
+                self.ticks_missed += missed
+                tick += missed
+            self.lateness.add(lateness_ns)
+            symbols = node.measure(tick)
+            if symbols is None:
+                return tick
+            self._offer(symbols)
+            self._send_due()
+            node.actuate(tick, lateness_ns)
+            self._watch_peer()
+            tick += 1
+        return tick
+
+    def finish(self, reason: str) -> None:
+        """Let the last echoes come in, then end the session on both sides."""
+        terms = self._node.session.terms
+        linger_ns = (
+            terms.uplink_delivery_ns
+            + terms.symbol_delay_ns
+            + terms.downlink_budget_ns
+            + terms.deadline_allowance_ns
+        )
+        until_ns = self._now_ns() + linger_ns
+        copies = self._node.session.copies
+        while self._node.session.phase is Phase.FLYING and self._now_ns() < until_ns:
+            if copies.lag_samples == 0 and not self._outbox:
+                break
+            self._take_in((until_ns - self._now_ns()) / 1e9)
+        for frame in self._node.session.bye(reason):
+            self._link.send(wire.encode(frame))
+
+    def _now_ns(self) -> int:
+        return time.monotonic_ns() - self._start_ns
+
+    def _wait_until(self, deadline_ns: int) -> None:
+        while (left_ns := deadline_ns - self._now_ns()) > 0:
+            self._take_in(left_ns / 1e9)
+
+    def _take_in(self, timeout_s: float) -> None:
+        """Send what is due and take one message, waiting for either at most `timeout_s`."""
+        self._send_due()
+        if self._outbox:
+            due_s = (self._outbox[0][0] - self._now_ns()) / 1e9
+            timeout_s = max(0.0, min(timeout_s, due_s))
+        data = self._link.receive(timeout_s)
+        if data is None:
+            return
+        if is_envelope(data):
+            raise ConfigMismatch(
+                "the receiver flies on the virtual clock, this end on the real one; give both the "
+                "same --clock"
+            )
+        self.wire_bytes_down += len(data)
+        try:
+            frame = wire.decode(data)
+        except FrameError as error:
+            self.malformed += 1
+            self._node.tell(EventKind.MALFORMED, f"dropped a frame: {error}")
+            return
+        self._offer(self._node.deliver(frame))
+
+    def _offer(self, frames: Sequence[Frame]) -> None:
+        for frame in frames:
+            for delivery in self._uplink.offer(frame, self._now_ns()):
+                self._queue(delivery, frame)
+
+    def _queue(self, delivery: Delivery, frame: Frame) -> None:
+        if delivery.data is None:
+            return
+        self._sent += 1
+        is_symbol = isinstance(frame, Symbol)
+        entry = (delivery.arrival_ns, self._sent, delivery.data, is_symbol)
+        heapq.heappush(self._outbox, entry)
+
+    def _send_due(self) -> None:
+        while self._outbox and self._outbox[0][0] <= self._now_ns():
+            _, _, data, is_symbol = heapq.heappop(self._outbox)
+            self._link.send(data, is_symbol)
+
+    def _watch_peer(self) -> None:
+        if not self._peer_told and not self._link.peer_present():
+            self._peer_told = True
+            self._node.tell(EventKind.PEER, "the receiver is gone")

@@ -1,0 +1,39 @@
+"""A simulated rig: a plant, and encoders that round its angles to counts."""
+
+from __future__ import annotations
+
+from channel.codec import Vector
+from plant_sim.encoder import Encoder, angles_rad
+from plant_sim.plant import Plant
+from transmitter.rigs.base import Reading, RigBase
+
+
+class SimulatedRig(RigBase):
+    """A plant that goes on by itself: at tick `n` it has had `n` steps, whoever was held up."""
+
+    name = "simulated"
+
+    def __init__(self, plant: Plant, encoders: tuple[Encoder, ...], safe_volts: Vector) -> None:
+        self._plant = plant
+        self._encoders = encoders
+        self._safe_volts = safe_volts
+        self._volts = safe_volts
+        self._tick = 0
+
+    def read(self, tick: int) -> Reading:
+        """Return the counts at a tick, and the true angles beside them."""
+        while self._tick < tick:
+            self._plant.advance(self._volts)
+            self._tick += 1
+        true = self._plant.measured_rad
+        pairs = zip(self._encoders, true, strict=True)
+        counts = tuple(encoder.counts(angle) for encoder, angle in pairs)
+        return Reading(counts, angles_rad(self._encoders, counts), true)
+
+    def write(self, tick: int, volts: Vector) -> None:
+        """Hold these voltages on the motors from this tick on."""
+        self._volts = volts
+
+    def safe_stop(self) -> None:
+        """Put the safe voltage on the motors."""
+        self._volts = self._safe_volts

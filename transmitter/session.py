@@ -1,0 +1,287 @@
+"""The sensor node's half of the protocol, without a socket, a clock or a thread.
+
+Three things drive it: a measurement (`on_measurement`, every tick), a frame that arrived
+(`on_frame`) and the question which command a tick has (`command`). The symbol of a slot depends on
+the measurement at its sample's first tick and on the provisional copy of the codec; the confirmed
+copy moves by echoes alone, and its digest is compared with the receiver's for every sample.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from enum import Enum
+
+from channel.codec import Codec, Vector
+from channel.events import EVENT_CHANNEL, Event, EventKind, event_row
+from channel.frames import (
+    Bye,
+    Commands,
+    Desync,
+    Echo,
+    ForeignVersion,
+    Frame,
+    Hello,
+    Refuse,
+    Symbol,
+    Welcome,
+)
+from channel.identity import Identity, differing_fields
+from channel.limits import from_millivolts
+from channel.recording import NullRecorder, Recorder
+from channel.terms import Terms
+from channel.wire import WIRE_VERSION
+from channel.words import ERASED, Word
+from transmitter.copies import Confirmed, Copies
+from transmitter.records import ESTIMATE_CHANNEL, SAMPLE_CHANNEL
+
+LAG_SAMPLES_MAX = 64
+"""Echoes may be this many samples behind before the session is given up."""
+
+INPUTS_KEPT = 64
+
+
+class Phase(Enum):
+    """Where the transmitter's session stands."""
+
+    GREETING = "waiting for a receiver"
+    FLYING = "flying"
+    ENDED = "ended"
+
+
+class TransmitterSession:
+    """Turns measurements into symbols and echoes into commands; see the module's text.
+
+    `incarnation` is drawn by the caller (32 bits), so that the session itself stays deterministic.
+    """
+
+    def __init__(
+        self,
+        codec: Codec,
+        terms: Terms,
+        identity: Identity,
+        incarnation: int,
+        recorder: Recorder | None = None,
+    ) -> None:
+        self.codec = codec
+        self.terms = terms
+        self.identity = identity
+        self.incarnation = incarnation
+        self.phase = Phase.GREETING
+        self.session_number = 0
+        self.epoch = 0
+        self.copies = Copies(codec, terms)
+        self.counts: Counter[str] = Counter()
+        """digest_checks, desyncs, stale_frames, words_missed, erasures"""
+        self.end_reason = ""
+        self.refusal: str | None = None
+        self.desync: Desync | None = None
+        self.confirmed: deque[Confirmed] = deque(maxlen=2 * LAG_SAMPLES_MAX)
+        """samples confirmed and not yet looked at by the node"""
+        self.events: deque[Event] = deque(maxlen=1000)
+        self.inputs: deque[tuple[int, Word]] = deque(maxlen=INPUTS_KEPT)
+        self._recorder = recorder or NullRecorder()
+        self._due: deque[tuple[int, Vector]] = deque(
+            enumerate([terms.initial_command] * terms.lead_ticks)
+        )
+        """commands of coming ticks"""
+        self._tick = 0
+        self._word: Word = ERASED
+
+    # What happens at a tick
+
+    def hello(self) -> Hello:
+        """Return the frame that asks for a session; to be repeated until there is one."""
+        identity = self.identity
+        return Hello(
+            self.incarnation, identity.version, identity.config_digest, identity.numerics_probe
+        )
+
+    def on_measurement(self, tick: int, measurement: Vector) -> list[Symbol]:
+        """Take the measurement of a tick; return the symbols whose slots begin with it.
+
+        A tick that was never seen, because the process was held up, sent no symbol: its sample's
+        word counts as not sent, and the next sample starts afresh.
+        """
+        self._tick = tick
+        if self.phase is not Phase.FLYING:
+            return []
+        sample, offset = divmod(tick, self.terms.ticks_per_sample)
+        while self.copies.next_sample < sample:
+            self.counts["words_missed"] += 1
+            self.copies.sent(ERASED)
+        if self.copies.next_sample == sample:
+            self._word = ERASED
+        if self.copies.lag_samples > LAG_SAMPLES_MAX:
+            self._end(f"no echo for {LAG_SAMPLES_MAX} samples: the receiver or its line is gone")
+            return []
+        if offset == 0 and self.copies.next_sample == sample:
+            self._word = self.codec.encode(self.copies.state_before_next(), measurement)
+            self.copies.sent(self._word)
+        return self._symbols_due(tick, sample)
+
+    def _symbols_due(self, tick: int, sample: int) -> list[Symbol]:
+        if self._word is ERASED:
+            return []
+        count = self.terms.symbols_per_word
+        return [
+            self._symbol(sample * count + index, self._word[index])
+            for index in range(count)
+            if self.terms.slot_tick(sample * count + index) == tick
+        ]
+
+    def _symbol(self, slot: int, symbol: int) -> Symbol:
+        number = self.codec.coder.alphabet.symbol_number(symbol)
+        return Symbol(self.session_number, self.epoch, slot, number)
+
+    def command(self, tick: int) -> Vector | None:
+        """Return the command of this tick, None when it has not come; earlier ones are forgotten."""
+        while self._due and self._due[0][0] < tick:
+            self._due.popleft()
+        return self._due[0][1] if self._due and self._due[0][0] == tick else None
+
+    # What arrives
+
+    def on_frame(self, frame: Frame) -> list[Frame]:
+        """Take one frame; return the frames to send."""
+        match frame:
+            case Commands() if self._is_current(frame.session) and frame.epoch == self.epoch:
+                return self._on_commands(frame)
+            case Welcome() if frame.incarnation == self.incarnation:
+                self._on_welcome(frame)
+            case Refuse() if frame.incarnation == self.incarnation:
+                return self._on_refuse(frame)
+            case Bye() if self._is_current(frame.session):
+                self._end(f"the receiver ended the flight: {frame.reason}")
+            case ForeignVersion():
+                self.refusal = (
+                    f"the receiver speaks wire version {frame.version}, this end {WIRE_VERSION}: "
+                    "install the same tenbaud on both"
+                )
+            case _:
+                self.counts["stale_frames"] += 1
+        return []
+
+    def bye(self, reason: str) -> list[Frame]:
+        """End the session from this side."""
+        was_flying = self.phase is Phase.FLYING
+        self._end(reason)
+        return [Bye(self.session_number, reason)] if was_flying else []
+
+    def _on_welcome(self, welcome: Welcome) -> None:
+        if self.phase is not Phase.GREETING:
+            return
+        self.session_number = welcome.session
+        self.epoch = welcome.epoch
+        self.phase = Phase.FLYING
+        self._tell(EventKind.STARTED, f"session {welcome.session:08x} begins")
+
+    def _on_refuse(self, refuse: Refuse) -> list[Frame]:
+        if self.phase is not Phase.GREETING:
+            return []
+        lines = [refuse.reason]
+        if refuse.config and refuse.config != self.identity.config:
+            lines += differing_fields(self.identity.config, refuse.config)
+        self.refusal = "\n  ".join(lines)
+        self._tell(EventKind.REFUSED, self.refusal)
+        return [Bye(0, self.refusal)]
+
+    def _on_commands(self, frame: Commands) -> list[Frame]:
+        for echo in frame.echoes:
+            expected = self.copies.confirmed.sample
+            if echo.sample < expected:
+                continue
+            if echo.sample > expected:
+                self._end(
+                    f"the echo of sample {expected} never came (got {echo.sample}): more than "
+                    f"{self.terms.repeats} command frames in a row were lost"
+                )
+                return []
+            problem = self._confirm(echo)
+            if problem is not None:
+                return [problem]
+        return []
+
+    def _confirm(self, echo: Echo) -> Desync | None:
+        """Advance the confirmed copy by one echo; return the report of a desync, if it is one."""
+        inputs = self.codec.model.input_size
+        per_sample = self.terms.ticks_per_sample
+        try:
+            word = self.codec.coder.alphabet.word(echo.word_number)
+        except ValueError:
+            word, known = ERASED, False
+        else:
+            # A held-up transmitter may hear of an erasure before it notices that it sent nothing;
+            # a word for a sample that has not been sent is nobody's.
+            known = word is ERASED or echo.sample < self.copies.next_sample
+        if not known or len(echo.millivolts) != inputs * per_sample:
+            self.counts["stale_frames"] += 1
+            return None
+        commands = [
+            from_millivolts(echo.millivolts[index * inputs : (index + 1) * inputs])
+            for index in range(per_sample)
+        ]
+        done = self.copies.confirm(word, commands, echo.digest)
+        self.confirmed.append(done)
+        self._due.extend(enumerate(commands, echo.sample * per_sample + self.terms.lead_ticks))
+        self.inputs.append((done.sample, word))
+        self.counts["digest_checks"] += 1
+        self.counts["erasures"] += word is ERASED
+        self._record(done)
+        return None if done.digest == echo.digest else self._on_desync(done)
+
+    def _on_desync(self, done: Confirmed) -> Desync:
+        self.counts["desyncs"] += 1
+        self.desync = Desync(
+            self.session_number,
+            self.epoch,
+            done.sample,
+            done.digest,
+            done.peer_digest,
+            self.codec.pack(done.flown.state),
+        )
+        self._tell(
+            EventKind.DESYNC,
+            f"the codecs differ after sample {done.sample}: transmitter {done.digest:016x}, "
+            f"receiver {done.peer_digest:016x}",
+            done.sample,
+        )
+        self._end("the two copies of the codec disagree")
+        return self.desync
+
+    # Reports
+
+    def _is_current(self, session: int) -> bool:
+        return self.phase is Phase.FLYING and session == self.session_number
+
+    def _end(self, reason: str) -> None:
+        if self.phase is not Phase.ENDED:
+            self.phase = Phase.ENDED
+            self.end_reason = reason
+            self._tell(EventKind.ENDED, reason)
+
+    def _tell(self, kind: EventKind, text: str, sample: int | None = None) -> None:
+        now_ns = self._tick * self.terms.tick_ns
+        at = self.copies.confirmed.sample if sample is None else sample
+        event = Event(kind, now_ns, at, text)
+        self.events.append(event)
+        self._recorder.write(EVENT_CHANNEL, now_ns, event_row(event))
+
+    def _record(self, done: Confirmed) -> None:
+        terms = self.terms
+        first_tick = done.sample * terms.ticks_per_sample
+        state = done.flown.state
+        row = (
+            done.sample,
+            done.word_sent,
+            done.word,
+            self.codec.coder.ranges(done.before.coder),
+            state.model,
+            state.coder,
+            f"{done.digest:016x}",
+            f"{done.peer_digest:016x}",
+            done.lag_samples,
+        )
+        self._recorder.write(SAMPLE_CHANNEL, done.sample * terms.sample_ns, row)
+        for offset, (coded, live) in enumerate(zip(done.flown.coded, done.live, strict=True)):
+            tick = first_tick + offset
+            self._recorder.write(ESTIMATE_CHANNEL, tick * terms.tick_ns, (tick, coded, live))

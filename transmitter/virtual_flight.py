@@ -1,0 +1,121 @@
+"""The sensor node on the virtual clock: as fast as the messages go, and the same every time.
+
+Every message has an arrival in virtual time; they wait in one queue, uplink and downlink together,
+and are taken out in order of time. At its arrival an uplink message is given to the peer as one step,
+and the peer's reply puts its frames into the queue. A deadline of the peer is a step without a
+message. So virtual time never passes an arrival that could still change it.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Sequence
+from itertools import count
+from typing import NamedTuple
+
+from channel import wire
+from channel.errors import FrameError
+from channel.events import EventKind
+from channel.frames import Frame
+from channel.line import Delivery, Line
+from channel.uplink import Uplink
+from channel.virtual import Peer, Reply
+from transmitter.node import TransmitterNode
+
+
+class _Arrival(NamedTuple):
+    time_ns: int
+    order: int
+    upward: bool
+    data: bytes | None
+
+
+class VirtualFlight:
+    """Flies a node against a peer; see the module's text."""
+
+    def __init__(self, node: TransmitterNode, uplink: Uplink, downlink: Line, peer: Peer) -> None:
+        self._node = node
+        self._uplink = uplink
+        self._downlink = downlink
+        self._peer = peer
+        self._arrivals: list[_Arrival] = []
+        self._order = count()
+        self._deadline_ns: int | None = None
+        self.wire_bytes_down = 0
+        self.malformed = 0
+
+    def greet(self) -> None:
+        """Carry the handshake out; the session then flies or holds a refusal."""
+        self._offer([self._node.session.hello()], 0)
+        self._pass_to(0)
+
+    def run(self, ticks: int, keep_going: Callable[[int], bool] = lambda _tick: True) -> int:
+        """Fly `ticks` ticks, or until the rig, the session or `keep_going` ends; return the ticks."""
+        node = self._node
+        tick_ns = node.session.terms.tick_ns
+        for tick in range(ticks):
+            now_ns = tick * tick_ns
+            self._pass_to(now_ns)
+            if node.latched:
+                return tick
+            symbols = node.measure(tick)
+            if symbols is None or not keep_going(tick):
+                return tick
+            self._offer(symbols, now_ns)
+            self._pass_to(now_ns)
+            node.actuate(tick)
+        return ticks
+
+    def finish(self, tick: int, reason: str) -> None:
+        """Let the last echoes come in, then end the session on both sides."""
+        terms = self._node.session.terms
+        now_ns = tick * terms.tick_ns
+        # What is still on the line arrives within one delivery and one deadline either way.
+        linger_ns = terms.uplink_delivery_ns + terms.symbol_delay_ns + terms.downlink_budget_ns
+        self._pass_to(now_ns + linger_ns, deadlines=False)
+        self._offer(self._node.session.bye(reason), now_ns + linger_ns)
+        self._pass_to(now_ns + linger_ns, deadlines=False)
+
+    def _offer(self, frames: Sequence[Frame], now_ns: int) -> None:
+        for frame in frames:
+            for delivery in self._uplink.offer(frame, now_ns):
+                self._push(delivery, upward=True)
+
+    def _push(self, delivery: Delivery, upward: bool) -> None:
+        arrival = _Arrival(delivery.arrival_ns, next(self._order), upward, delivery.data)
+        heapq.heappush(self._arrivals, arrival)
+
+    def _pass_to(self, now_ns: int, deadlines: bool = True) -> None:
+        """Let virtual time pass to `now_ns`, this moment included."""
+        while True:
+            arrival = self._arrivals[0] if self._arrivals else None
+            deadline = self._deadline_ns if deadlines else None
+            if deadline is not None and (arrival is None or deadline < arrival.time_ns):
+                if deadline > now_ns:
+                    return
+                self._step(deadline, None)
+                continue
+            if arrival is None or arrival.time_ns > now_ns:
+                return
+            heapq.heappop(self._arrivals)
+            if arrival.upward:
+                self._step(arrival.time_ns, arrival.data)
+            elif arrival.data is not None:
+                self._take(arrival.data, arrival.time_ns)
+
+    def _step(self, time_ns: int, data: bytes | None) -> None:
+        reply: Reply = self._peer.step(time_ns, data)
+        self._deadline_ns = reply.deadline_ns
+        for frame in reply.frames:
+            for delivery in self._downlink.carry(frame, False, time_ns):
+                self._push(delivery, upward=False)
+
+    def _take(self, data: bytes, now_ns: int) -> None:
+        self.wire_bytes_down += len(data)
+        try:
+            frame = wire.decode(data)
+        except FrameError as error:
+            self.malformed += 1
+            self._node.tell(EventKind.MALFORMED, f"dropped a frame: {error}")
+            return
+        self._offer(self._node.deliver(frame), now_ns)

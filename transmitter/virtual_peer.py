@@ -1,0 +1,51 @@
+"""The receiver's process, as the virtual flight steps it over a link."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from channel.errors import LinkLost
+from channel.links.base import Link
+from channel.virtual import Reply, Step, decode_reply, encode_step, is_envelope
+
+RETRY_S = 0.25
+"""A step is repeated after this silence; the receiver answers a repeated one from memory."""
+
+
+class LinkPeer:
+    """Steps a receiver over a link; LinkLost when it stays silent for `peer_timeout_s`."""
+
+    def __init__(
+        self,
+        link: Link,
+        peer_timeout_s: float,
+        should_stop: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self._link = link
+        self._peer_timeout_s = peer_timeout_s
+        self._should_stop = should_stop
+        self._number = 0
+
+    def step(self, time_ns: int, data: bytes | None) -> Reply:
+        """Send one step and wait for its reply."""
+        self._number += 1
+        message = encode_step(Step(self._number, time_ns, data))
+        self._link.send(message)
+        asked_at = time.monotonic()
+        while True:
+            answer = self._link.receive(RETRY_S)
+            if answer is not None and is_envelope(answer):
+                reply = decode_reply(answer)
+                if reply.number == self._number:
+                    return reply
+                continue
+            if self._should_stop():
+                raise KeyboardInterrupt
+            if time.monotonic() - asked_at > self._peer_timeout_s:
+                raise LinkLost(
+                    f"the receiver did not answer for {self._peer_timeout_s:g} s; is it running, "
+                    "with the same session name, the other end of this endpoint and --clock virtual?"
+                )
+            if answer is None:
+                self._link.send(message)

@@ -7,7 +7,7 @@ as integers, so that the two clocks and the virtual one never disagree by a roun
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from channel.codec import Vector
@@ -71,6 +71,11 @@ class Terms:
         """Return the smallest `D` with which every command can be in time on a real clock."""
         needed = self.uplink_delivery_ns + self.deadline_allowance_ns + self.downlink_budget_ns
         return max(1, -(-needed // self.tick_ns))
+
+    def with_shortest_lead(self, clock: Clock) -> Terms:
+        """Return these terms with the smallest lead that `check` allows on this clock."""
+        ideal = clock == "virtual" and self.uplink_delivery_ns == 0
+        return replace(self, lead_ticks=0 if ideal else self.lead_needed_ticks)
 
     def check(self, clock: Clock) -> None:
         """Raise ValueError, with the arithmetic, where these terms cannot be flown."""

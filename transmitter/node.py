@@ -17,6 +17,8 @@ from transmitter.rigs.base import Reading, Rig
 from transmitter.scores import Scores
 from transmitter.session import Phase, TransmitterSession
 
+STOPPED = "stopped by the user"
+
 
 class TransmitterNode:
     """Everything of the sensor node but time and transport."""

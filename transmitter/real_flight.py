@@ -19,7 +19,7 @@ from channel.line import Delivery
 from channel.links.base import Link
 from channel.uplink import Uplink
 from channel.virtual import is_envelope
-from transmitter.node import TransmitterNode
+from transmitter.node import STOPPED, TransmitterNode
 from transmitter.scores import LatenessMeter
 from transmitter.session import Phase
 
@@ -71,13 +71,15 @@ class RealFlight:
             self._take_in(HELLO_PERIOD_S)
 
     def run(self, ticks: int) -> int:
-        """Fly until `ticks`, the end of the rig or a stop; return the number of ticks that passed."""
+        """Fly until `ticks`, the end of the rig or the safe voltage; return the ticks that passed."""
         node = self._node
         tick_ns = node.session.terms.tick_ns
         self._start_ns = time.monotonic_ns() + LEAD_IN_NS
         self._peer_told = False
         tick = 0
-        while tick < ticks and not node.latched and not self._should_stop():
+        while tick < ticks and not node.latched:
+            if self._should_stop():
+                node.guard.trip(STOPPED)
             self._wait_until(tick * tick_ns)
             now_ns = self._now_ns()
             lateness_ns = now_ns - tick * tick_ns

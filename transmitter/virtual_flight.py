@@ -20,7 +20,7 @@ from channel.frames import Frame
 from channel.line import Delivery, Line
 from channel.uplink import Uplink
 from channel.virtual import Peer, Reply
-from transmitter.node import TransmitterNode
+from transmitter.node import STOPPED, TransmitterNode
 
 
 class _Arrival(NamedTuple):
@@ -49,8 +49,8 @@ class VirtualFlight:
         self._offer([self._node.session.hello()], 0)
         self._pass_to(0)
 
-    def run(self, ticks: int, keep_going: Callable[[int], bool] = lambda _tick: True) -> int:
-        """Fly `ticks` ticks, or until the rig, the session or `keep_going` ends; return the ticks."""
+    def run(self, ticks: int, should_stop: Callable[[], bool] = lambda: False) -> int:
+        """Fly until `ticks`, the end of the rig or the safe voltage; return the ticks that passed."""
         node = self._node
         tick_ns = node.session.terms.tick_ns
         for tick in range(ticks):
@@ -58,8 +58,10 @@ class VirtualFlight:
             self._pass_to(now_ns)
             if node.latched:
                 return tick
+            if should_stop():
+                node.guard.trip(STOPPED)
             symbols = node.measure(tick)
-            if symbols is None or not keep_going(tick):
+            if symbols is None:
                 return tick
             self._offer(symbols, now_ns)
             self._pass_to(now_ns)

@@ -23,6 +23,8 @@ def _number(value: object) -> str:
     if type(value) is float:
         # Only infinities and NaN differ from zero when subtracted from themselves.
         return repr(value) if value - value == 0.0 else "null"
+    if type(value) is int:
+        return repr(value)
     if isinstance(value, float):
         return _number(float(value))
     return _encode_any(value)

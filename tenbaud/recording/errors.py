@@ -1,7 +1,9 @@
-"""The error that a person sees when a recording or a run folder cannot be used."""
+"""The error of recordings and run folders."""
 
 from __future__ import annotations
 
+from channel.errors import TenbaudError
 
-class RecordingError(Exception):
-    """Says what happened, to which file, and what to do next."""
+
+class RecordingError(TenbaudError):
+    """A recording or a run folder cannot be made, read or compared; the text says what to do."""

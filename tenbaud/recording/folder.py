@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from itertools import count
 from pathlib import Path
+from typing import BinaryIO
 
 from tenbaud.recording.errors import RecordingError
 
@@ -114,3 +115,19 @@ def find_recordings(path: Path) -> list[Path]:
             "Give the folder of one run, not the folder that holds the runs."
         )
     return found
+
+
+def open_new_recording(path: Path) -> BinaryIO:
+    """Open a file for writing; RecordingError if it holds data or cannot be made."""
+    try:
+        if path.exists() and path.stat().st_size > 0:
+            raise RecordingError(
+                f"The recording {path} exists already and is not overwritten. "
+                "Choose another folder or move the file away."
+            )
+        return path.open("wb")
+    except OSError as error:
+        raise RecordingError(
+            f"The recording {path} cannot be created: {error.strerror or error}. "
+            "Check that its folder exists and may be written to."
+        ) from error

@@ -13,13 +13,13 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import BinaryIO, Self
+from typing import Self
 
 from mcap.writer import CompressionType, Writer
 
 from channel.recording import RecordChannel
 from tenbaud.recording.encoding import channel_schema, row_encoder
-from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.folder import open_new_recording
 
 PROFILE = "tenbaud"
 RUN_METADATA = "run"
@@ -29,7 +29,7 @@ END_METADATA = "recorder"
 POLL_PERIOD_S = 0.1
 # Together with one poll period and the time of a batch this stays below the promised second.
 FLUSH_PERIOD_S = 0.8
-CHUNK_BYTES = 262144
+CHUNK_BYTES = 1 << 20
 # A batch holds the interpreter for some 2 ms. The pause after it lets a waiting 100 Hz loop run at
 # once instead of after the interpreter's own 5 ms switch interval.
 BATCH_ROWS = 200
@@ -70,8 +70,8 @@ class McapRecorder:
         self._error: str | None = None
         self._failed = False
         self._writers: dict[int, _ChannelWriter] = {}
-        self._stream = _create(path)
-        # Compressed, a row of twelve fields takes a third of the bytes for under 1 us more. The
+        self._stream = open_new_recording(path)
+        # Compressed, a row of twelve fields takes a third of the bytes for about 1 us more. The
         # message indexes stay, though they cost about as much time: viewers that find chunk
         # indexes in a file look a topic's rows up in the message indexes.
         self._writer = Writer(self._stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
@@ -219,10 +219,12 @@ class McapRecorder:
             self._failed = True
             self._dropped_in_thread += self._rows_unflushed
             self._rows_unflushed = 0
-            cause = error.strerror if isinstance(error, OSError) else None
+            cause, advice = repr(error), "Please report this as a fault of tenbaud."
+            if isinstance(error, OSError):
+                cause = error.strerror or cause
+                advice = "Free some space or choose another folder for the next run."
             self._note(
-                f"The recording {self.path} stopped: {cause or repr(error)}. The flight goes on "
-                "unrecorded. Free some space or choose another folder for the next run."
+                f"The recording {self.path} stopped: {cause}. The flight goes on unrecorded. {advice}"
             )
 
     def _note(self, text: str) -> None:
@@ -237,21 +239,6 @@ class _ChannelWriter:
         self.channel = channel
         self.channel_id = channel_id
         self.encode = row_encoder(channel)
-
-
-def _create(path: Path) -> BinaryIO:
-    try:
-        if path.exists() and path.stat().st_size > 0:
-            raise RecordingError(
-                f"The recording {path} exists already and is not overwritten. "
-                "Choose another folder or move the file away."
-            )
-        return path.open("wb")
-    except OSError as error:
-        raise RecordingError(
-            f"The recording {path} cannot be created: {error.strerror or error}. "
-            "Check that its folder exists and may be written to."
-        ) from error
 
 
 def _bad_row_text(path: Path, channel: RecordChannel, row: Sequence[object], error: Exception) -> str:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
 
+from channel.recording import RecordChannel
 from tenbaud.recording.folder import RECEIVER_NAME, TRANSMITTER_NAME
 from tenbaud.recording.writer import McapRecorder
 from tests.tenbaud.recording.rows import (
@@ -41,7 +42,8 @@ def fly(record: Callable[[Path, Rows], Path]) -> Callable[..., Path]:
     """Write the folder of a plausible flight of a 100 Hz loop over 10 bit/s."""
 
     def write(folder: Path, ticks: int = 600, erased: tuple[int, ...] = ()) -> Path:
-        transmitter, receiver = [], []
+        transmitter: list[tuple[RecordChannel, int, Sequence[object]]] = []
+        receiver: list[tuple[RecordChannel, int, Sequence[object]]] = []
         for tick in range(ticks):
             time_ns = tick * 10_000_000
             time_s = tick * 0.01

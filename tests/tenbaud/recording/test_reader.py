@@ -62,6 +62,16 @@ def test_blocks_that_were_never_filled_count_as_a_cut(chunked: tuple[Path, list[
     assert not stream.complete
 
 
+def test_damaged_chunk_is_not_believed(chunked: tuple[Path, list[int]]) -> None:
+    path, ends = chunked
+    damaged = bytearray(path.read_bytes())
+    damaged[ends[1] + 200] ^= 1
+    path.write_bytes(damaged)
+    stream = read_messages(path)
+    assert len(list(stream)) == 2 * ROWS_PER_CHUNK
+    assert not stream.complete
+
+
 def test_complete_file_says_so_only_after_its_end(chunked: tuple[Path, list[int]]) -> None:
     stream = read_messages(chunked[0])
     assert not stream.complete

@@ -1,0 +1,8 @@
+"""Lets `python -m tenbaud` do what `tenbaud` does."""
+
+from __future__ import annotations
+
+from tenbaud.cli.app import main
+
+if __name__ == "__main__":
+    main()

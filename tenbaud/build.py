@@ -1,0 +1,143 @@
+"""From a configuration to the parts that it describes. Nothing is opened or started here."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from channel.codec import Codec
+from channel.coders.zoom import ZoomCoder, ZoomParameters
+from channel.errors import TenbaudError
+from channel.flight_log import FlightColumns, FlightLog
+from channel.identity import Identity, numerics_probe
+from channel.limits import CommandLimits
+from channel.models.pitch import PitchModel, PitchParameters
+from channel.terms import Clock, Terms
+from tenbaud.config.load import ConfigError
+from tenbaud.config.schema import FlightConfig
+
+
+@cache
+def software_version() -> str:
+    """Return the installed version of tenbaud."""
+    try:
+        return version("tenbaud")
+    except PackageNotFoundError:
+        return "0+source"
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """What both ends build alike from their configuration."""
+
+    config: FlightConfig
+    clock: Clock
+    codec: Codec
+    terms: Terms
+    identity: Identity
+
+    @property
+    def flight_ticks(self) -> int:
+        """Return the ticks of the flight: whole samples, at least one."""
+        samples = round(self.config.duration_s * 1e9) // self.terms.sample_ns
+        return max(1, samples) * self.terms.ticks_per_sample
+
+    @property
+    def window_start_tick(self) -> int:
+        """Return where errors begin to count: after the first period of the reference.
+
+        A flight that is over by then, or that has no periodic reference, counts from its beginning.
+        """
+        reference = self.config.receiver.reference
+        periodic = self.config.receiver.controller == "pid" and reference.kind in ("square", "sine")
+        start = round(reference.period_s * 1e9) // self.terms.tick_ns if periodic else 0
+        return start if start < self.flight_ticks else 0
+
+
+def agree(config: FlightConfig, clock: Clock) -> Agreement:
+    """Return codec, terms and identity of a configuration; ConfigError where they make no flight."""
+    try:
+        codec = build_codec(config)
+        terms = build_terms(config, codec, clock)
+        terms.check(clock)
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+    shared = config.shared_json(terms.lead_ticks)
+    identity = Identity(software_version(), shared, numerics_probe(codec))
+    return Agreement(config, clock, codec, terms, identity)
+
+
+def build_codec(config: FlightConfig) -> Codec:
+    """Return the codec: pitch model and zoom coder."""
+    ticks = round(config.timing.symbol_period_s / config.timing.tick_s)
+    model = PitchModel(model_parameters(config), config.timing.tick_s)
+    coder = config.coder
+    parameters = ZoomParameters(
+        initial_range=coder.initial_range_rad,
+        minimum_range=coder.minimum_range_rad,
+        decay=coder.decay,
+        window=coder.window_signs,
+        gains=tuple((gain,) for gain in coder.gains),
+        impulse=coder.correction == "impulse",
+    )
+    return Codec(model, ZoomCoder(parameters), ticks)
+
+
+def model_parameters(config: FlightConfig) -> PitchParameters:
+    """Return the parameters of the codec's model."""
+    return PitchParameters(**config.model.model_dump(exclude={"kind"}))
+
+
+def build_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:
+    """Return the terms, with the lead chosen where it is "auto"."""
+    lead = config.timing.lead_ticks
+    terms = Terms(
+        tick_ns=round(config.timing.tick_s * 1e9),
+        ticks_per_sample=codec.ticks_per_sample,
+        symbols_per_word=codec.coder.alphabet.symbols_per_word,
+        lead_ticks=0 if lead == "auto" else lead,
+        rate_baud=config.channel.rate_baud,
+        delivery=config.channel.delivery,
+        deadline_allowance_ns=round(config.channel.deadline_allowance_s * 1e9),
+        downlink_budget_ns=round(config.channel.downlink_budget_s * 1e9),
+        repeats=config.channel.repeats,
+        initial_command=config.limits.initial_volts,
+        limits=build_limits(config),
+    )
+    if lead != "auto":
+        return terms
+    return terms.with_shortest_lead(clock)
+
+
+def build_limits(config: FlightConfig) -> CommandLimits:
+    """Return clamp and slew, the latter per tick."""
+    slew = config.limits.slew_volts_per_s * config.timing.tick_s
+    return CommandLimits(config.limits.volts_max, slew)
+
+
+def read_flight_log(config: FlightConfig) -> FlightLog:
+    """Read the recorded flight that the configuration names."""
+    section = config.flight_log
+    if not section.file:
+        raise ConfigError("flight_log.file names no recording; give --rig replay:FILE")
+    columns = FlightColumns(
+        index_column=section.index_column,
+        counts_columns=(section.counts_column,),
+        volts_columns=section.volts_columns,
+    )
+    try:
+        return FlightLog.read(Path(section.file), columns)
+    except ValueError as error:
+        raise RecordingUnusable(str(error)) from error
+
+
+class RecordingUnusable(TenbaudError):
+    """A recorded flight that cannot be replayed; the text names file, line and column."""
+
+
+def ticks_of(seconds: float, config: FlightConfig) -> int:
+    """Return a time as a whole number of ticks, at least one."""
+    return max(1, math.ceil(seconds / config.timing.tick_s - 1e-9))

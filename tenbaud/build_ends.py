@@ -1,0 +1,147 @@
+"""The parts of one end: rig and guard of the transmitter, controller and reference of the receiver."""
+
+from __future__ import annotations
+
+import secrets
+from pathlib import Path
+
+from channel.line import Line
+from channel.recording import Recorder
+from channel.shaper import SlotShaper, UplinkMeter
+from channel.uplink import Uplink
+from plant_sim.disturbance import parse_disturbance
+from plant_sim.encoder import Encoder
+from plant_sim.pitch import PitchParameters, PitchPlant
+from receiver.controllers.base import Controller
+from receiver.controllers.pid import Pid, PidGains
+from receiver.controllers.recorded import RecordedController
+from receiver.endpoint import ReceiverEndpoint
+from receiver.references import Constant, Csv, Reference, Sine, Square, Step
+from receiver.session import ReceiverSession
+from tenbaud.build import Agreement, read_flight_log, ticks_of
+from tenbaud.config.load import ConfigError
+from tenbaud.config.schema import FlightConfig
+from transmitter.guard import Guard, GuardSettings
+from transmitter.node import TransmitterNode
+from transmitter.rigs.base import Rig
+from transmitter.rigs.replay import ReplayRig
+from transmitter.rigs.simulated import SimulatedRig
+from transmitter.scores import Scores
+from transmitter.session import LAG_SAMPLES_MAX, TransmitterSession
+
+
+def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> TransmitterNode:
+    """Return the sensor node of a configuration."""
+    config, terms = agreement.config, agreement.terms
+    session = TransmitterSession(
+        agreement.codec, terms, agreement.identity, secrets.randbits(32), recorder
+    )
+    reference = build_reference(config)
+    scores = Scores(
+        agreement.codec.model,
+        agreement.window_start_tick,
+        (LAG_SAMPLES_MAX + 2) * terms.ticks_per_sample,
+        reference.angle_rad if config.receiver.controller == "pid" else lambda _tick: None,
+    )
+    return TransmitterNode(session, build_rig(config), build_guard(agreement), scores, recorder)
+
+
+def build_uplink(agreement: Agreement) -> Uplink:
+    """Return the transmitter's way out: grid, delivery delay and meter."""
+    terms = agreement.terms
+    alphabet = agreement.codec.coder.alphabet
+    return Uplink(SlotShaper(terms), Line(terms.symbol_delay_ns), UplinkMeter(alphabet))
+
+
+def build_receiver(agreement: Agreement, recorder: Recorder | None) -> ReceiverEndpoint:
+    """Return the controller node of a configuration."""
+    session = ReceiverSession(
+        agreement.codec,
+        agreement.terms,
+        build_controller(agreement.config),
+        agreement.identity,
+        secrets.randbits(31) + 1,
+        recorder,
+    )
+    return ReceiverEndpoint(session)
+
+
+def build_rig(config: FlightConfig) -> Rig:
+    """Return the rig: the plant off the model by the configured mismatch, or a recorded flight."""
+    section = config.transmitter
+    encoder = Encoder(
+        section.encoder_counts_per_turn, section.encoder_sign, section.encoder_zero_counts
+    )
+    if section.rig == "replay":
+        return ReplayRig(read_flight_log(config), (encoder,))
+    tick_s = config.timing.tick_s
+    nominal = PitchParameters(
+        **config.model.model_dump(exclude={"kind"}), volts_max=config.limits.volts_max
+    )
+    disturbance = None
+    if section.plant.disturbance:
+        try:
+            disturbance = parse_disturbance(section.plant.disturbance, tick_s, config.seed)
+        except ValueError as error:
+            raise ConfigError(f"transmitter.plant.disturbance: {error}") from error
+    plant = PitchPlant(
+        nominal.mismatched(section.plant.mismatch),
+        tick_s,
+        disturbance,
+        initial_angle_rad=section.plant.initial_angle_rad,
+    )
+    return SimulatedRig(plant, (encoder,), section.safe_volts)
+
+
+def build_guard(agreement: Agreement) -> Guard:
+    """Return limiter and watchdog beside the motors."""
+    section = agreement.config.transmitter
+    terms = agreement.terms
+    wanted_s = section.watchdog_s
+    timeout_s = max(5 * terms.sample_ns / 1e9, 0.1) if wanted_s == "auto" else wanted_s
+    soft = () if section.soft_limit_rad is None else (section.soft_limit_rad,)
+    settings = GuardSettings(
+        timeout_ticks=ticks_of(timeout_s, agreement.config),
+        ramp_ticks=ticks_of(section.ramp_s, agreement.config),
+        safe_volts=section.safe_volts,
+        soft_limits_rad=soft,
+    )
+    return Guard(terms.limits, settings)
+
+
+def build_controller(config: FlightConfig) -> Controller:
+    """Return the controller."""
+    section = config.receiver
+    if section.controller == "recorded":
+        return RecordedController(read_flight_log(config))
+    pid = section.pid
+    return Pid(
+        PidGains(pid.proportional, pid.integral, pid.derivative, pid.unit),
+        build_reference(config),
+        config.timing.tick_s,
+        volts_max=config.limits.volts_max,
+        normal_force_volts=pid.normal_force_volts,
+        anti_windup=pid.anti_windup,
+    )
+
+
+def build_reference(config: FlightConfig) -> Reference:
+    """Return the set-point over the ticks."""
+    section = config.receiver.reference
+    tick_s = config.timing.tick_s
+    match section.kind:
+        case "square":
+            return Square(section.amplitude_rad, section.period_s, tick_s)
+        case "sine":
+            return Sine(section.amplitude_rad, section.period_s, tick_s)
+        case "step":
+            return Step(section.amplitude_rad, section.start_s, tick_s)
+        case "constant":
+            return Constant(section.amplitude_rad, tick_s)
+        case "csv":
+            if not section.file:
+                raise ConfigError("receiver.reference.file names no file for the csv reference")
+            try:
+                return Csv(Path(section.file), tick_s)
+            except ValueError as error:
+                raise ConfigError(f"receiver.reference: {error}") from error

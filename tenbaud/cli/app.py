@@ -1,0 +1,64 @@
+"""The commands, gathered. Each lives in a module of its own beside this one."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from tenbaud.cli import demo, nodes, runs
+from tenbaud.flight.outcome import ExitCode, outcome_of
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    help="""Fly a helicopter over a ten-baud wire.
+
+    Both ends on this machine:   [bold]tenbaud demo[/bold]
+
+    One end per terminal:        [bold]tenbaud receive[/bold]   and   [bold]tenbaud transmit[/bold]
+    """,
+)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from tenbaud.build import software_version
+
+        typer.echo(f"tenbaud {software_version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show version.")
+    ] = False,
+) -> None:
+    """Take the options that come before the command."""
+
+
+app.command()(demo.demo)
+app.command()(nodes.transmit)
+app.command()(nodes.receive)
+app.command()(runs.inspect)
+app.command()(runs.diff)
+app.command()(runs.presets)
+
+
+def main() -> None:
+    """Run the command line; errors become one message and an exit code."""
+    from channel.errors import TenbaudError
+    from tenbaud.recording.errors import RecordingError
+
+    try:
+        app()
+    except (TenbaudError, RecordingError, ValueError) as error:
+        typer.echo(f"tenbaud: {error}", err=True)
+        code = outcome_of(error).code
+        sys.exit(ExitCode.USAGE if code is ExitCode.FAILED else code)
+    except KeyboardInterrupt:
+        sys.exit(ExitCode.INTERRUPTED)

@@ -1,0 +1,138 @@
+"""`tenbaud demo`: both ends on this machine, from nothing to a figure."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tenbaud.cli import options
+
+if TYPE_CHECKING:
+    from tenbaud.build import Agreement
+    from tenbaud.flight.demo import DemoResult
+    from tenbaud.recording.folder import RunFolder
+
+DEFAULT_MISMATCHES = (0.0, 0.1)
+
+
+def demo(
+    preset: options.Preset = None,
+    config: options.ConfigFile = None,
+    clock: options.Clock = options.ClockOption.VIRTUAL,
+    duration: options.Duration = None,
+    seed: options.Seed = None,
+    lead: options.Lead = None,
+    delivery: options.Delivery = None,
+    link: Annotated[
+        str | None, typer.Option(help="zenoh: two processes; memory: both ends in this one.")
+    ] = None,
+    rig: Annotated[
+        str | None, typer.Option(help="simulated, or replay:FILE for a recorded flight.")
+    ] = None,
+    mismatch: Annotated[
+        list[float] | None,
+        typer.Option(
+            help="Simulated plant off the codec's model, 0.1 for 10 %; repeatable. Not given: 0 "
+            "and 0.1, one flight each (with --json, 0 alone).",
+            show_default=False,
+        ),
+    ] = None,
+    disturbance: Annotated[
+        str | None, typer.Option(help='Torque on the plant, such as "q=2e-3,step=0.5@30".')
+    ] = None,
+    settings: options.Settings = None,
+    out: options.Out = None,
+    json: options.AsJson = False,
+) -> None:
+    """Fly both ends on this machine: two processes, one bit per sample between them.
+
+    [dim]tenbaud demo[/dim]
+
+    [dim]tenbaud demo --preset tuned-10baud --clock real --duration 20 --mismatch 0.1[/dim]
+    """
+    from tenbaud.build import agree
+    from tenbaud.config.load import load_config
+
+    replayed = rig is not None and rig.startswith("replay")
+    flights: list[float | None] = list(mismatch or ())
+    if not flights:
+        single = json or replayed
+        flights = [None] if single else list(DEFAULT_MISMATCHES)
+    if preset is None and config is None and replayed:
+        preset = "uiuc-10baud"
+    agreements = [
+        agree(
+            load_config(
+                preset,
+                config,
+                options.overrides(
+                    duration=duration,
+                    seed=seed,
+                    lead=lead,
+                    delivery=delivery,
+                    link=link,
+                    rig=rig,
+                    mismatch=off,
+                    disturbance=disturbance,
+                    settings=settings,
+                ),
+            ),
+            clock.value,
+        )
+        for off in flights
+    ]
+    raise typer.Exit(_fly_all(agreements, out, json))
+
+
+def _fly_all(agreements: list[Agreement], out: options.Out, as_json: bool) -> int:
+    from tenbaud.flight.ends import write_json
+    from tenbaud.flight.report import show_summaries
+    from tenbaud.recording.folder import RunFolder, create_run_folder
+
+    results: list[DemoResult] = []
+    folders: list[RunFolder] = []
+    for index, agreement in enumerate(agreements):
+        explicit = out
+        if out is not None and index:
+            explicit = out.with_name(f"{out.name}-{index + 1}")
+        folder = RunFolder(create_run_folder(None, agreement.config.preset, explicit))
+        result = _fly_shown(agreement, folder)
+        results.append(result)
+        folders.append(folder)
+        if as_json:
+            write_json(result.summary)
+        for message in result.messages:
+            typer.echo(message, err=True)
+        if result.code:
+            break
+    if not as_json:
+        show_summaries([result.summary for result in results], folders)
+    return int(results[-1].code)
+
+
+def _fly_shown(agreement: Agreement, folder: RunFolder) -> DemoResult:
+    """Fly once, with a progress bar where there is a terminal to see it."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from tenbaud.flight.demo import fly_demo
+    from tenbaud.flight.status import Status
+
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as bar:
+        task = bar.add_task("starting", total=agreement.flight_ticks)
+
+        def on_status(status: Status) -> None:
+            if status["role"] == "transmitter":
+                bar.update(task, completed=status["tick"], description=_line(status))
+
+        return fly_demo(agreement, folder, on_status)
+
+
+def _line(status: dict[str, object]) -> str:
+    from tenbaud.flight.status import status_line
+
+    return status_line(status)

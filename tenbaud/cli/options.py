@@ -1,0 +1,121 @@
+"""The options that several commands share, and how they become configuration."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+
+class ClockOption(StrEnum):
+    """On which clock to fly."""
+
+    REAL = "real"
+    VIRTUAL = "virtual"
+
+
+Preset = Annotated[
+    str | None, typer.Option(help="Preset to fly; `tenbaud presets` lists them.", show_default=False)
+]
+ConfigFile = Annotated[
+    Path | None,
+    typer.Option("--config", help="TOML file over the preset; the same at both ends."),
+]
+Duration = Annotated[float | None, typer.Option(help="Flight time in seconds.", show_default=False)]
+Seed = Annotated[int | None, typer.Option(help="Seed of everything random.", show_default=False)]
+Lead = Annotated[
+    int | None,
+    typer.Option(help="Command lead D in ticks; chosen from the delivery times if not given."),
+]
+Delivery = Annotated[
+    str | None,
+    typer.Option(help="start: a bit is there at once (the paper); end: after its slot (a wire)."),
+]
+Clock = Annotated[
+    ClockOption, typer.Option(help="virtual: as fast as messages go; real: in real time.")
+]
+Out = Annotated[
+    Path | None, typer.Option(help="New folder for the run; runs/<time>_<name> if not given.")
+]
+AsJson = Annotated[
+    bool, typer.Option("--json", help="Summary on standard output as JSON, nothing else there.")
+]
+Settings = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="Any field, such as --set coder.window_signs=3; repeatable."),
+]
+Session = Annotated[
+    str | None, typer.Option(help="Session name; the same at both ends.", show_default=False)
+]
+Listen = Annotated[list[str] | None, typer.Option(help="Zenoh endpoint to listen on; repeatable.")]
+Connect = Annotated[list[str] | None, typer.Option(help="Zenoh endpoint to connect to; repeatable.")]
+Insecure = Annotated[
+    bool,
+    typer.Option(help="Allow addresses beyond this machine without encryption or authentication."),
+]
+
+
+def overrides(
+    *,
+    duration: float | None = None,
+    seed: int | None = None,
+    lead: int | None = None,
+    delivery: str | None = None,
+    session: str | None = None,
+    rig: str | None = None,
+    mismatch: float | None = None,
+    disturbance: str | None = None,
+    link: str | None = None,
+    settings: list[str] | None = None,
+) -> dict[str, Any]:
+    """Return the configuration that these options set, as nested sections."""
+    values: dict[str, Any] = {}
+    for name, value in (
+        ("duration_s", duration),
+        ("seed", seed),
+        ("timing.lead_ticks", lead),
+        ("channel.delivery", delivery),
+        ("link.session", session),
+        ("link.kind", link),
+        ("transmitter.plant.mismatch", mismatch),
+        ("transmitter.plant.disturbance", disturbance),
+    ):
+        if value is not None:
+            _put(values, name, value)
+    if rig is not None:
+        _put_rig(values, rig)
+    for setting in settings or []:
+        name, value = _parse_setting(setting)
+        _put(values, name, value)
+    return values
+
+
+def _put_rig(values: dict[str, Any], rig: str) -> None:
+    kind, colon, file = rig.partition(":")
+    _put(values, "transmitter.rig", kind)
+    if kind == "replay":
+        if not colon or not file:
+            raise typer.BadParameter("write --rig replay:FILE, with the recorded flight's file")
+        _put(values, "receiver.controller", "recorded")
+        _put(values, "flight_log.file", str(Path(file).resolve()))
+
+
+def _parse_setting(setting: str) -> tuple[str, Any]:
+    import tomllib
+
+    name, equals, text = setting.partition("=")
+    if not equals:
+        raise typer.BadParameter(f"--set {setting}: write FIELD=VALUE")
+    try:
+        return name.strip(), tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return name.strip(), text
+
+
+def _put(values: dict[str, Any], name: str, value: object) -> None:
+    *sections, field = name.split(".")
+    for section in sections:
+        values = values.setdefault(section, {})
+    values[field] = value

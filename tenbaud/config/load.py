@@ -1,0 +1,114 @@
+"""Reading a configuration: a preset, then a file over it, then the command line over both."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from channel.errors import TenbaudError
+from tenbaud.config.schema import FlightConfig
+
+DEFAULT_PRESET = "paper-10baud"
+
+
+class ConfigError(TenbaudError):
+    """A configuration that cannot be used; the text names file, field, value and allowed range."""
+
+
+def preset_names() -> list[str]:
+    """Return the presets shipped with the package."""
+    folder = files("tenbaud") / "presets"
+    return sorted(item.name[:-5] for item in folder.iterdir() if item.name.endswith(".toml"))
+
+
+def load_config(
+    preset: str | None = None,
+    path: Path | None = None,
+    overrides: dict[str, Any] | None = None,
+) -> FlightConfig:
+    """Return the checked configuration.
+
+    A file may name the preset that it builds on (`preset = "..."`); an explicit `preset` wins.
+    Raises ConfigError.
+    """
+    from_file = _read_toml(path) if path is not None else {}
+    base = preset or from_file.get("preset") or DEFAULT_PRESET
+    if not isinstance(base, str):
+        raise ConfigError(f"{path}: preset must be a name in quotes, got {base!r}")
+    values = _merge(_read_preset(base), from_file)
+    values = _merge(values, overrides or {})
+    values["preset"] = base
+    try:
+        return FlightConfig.model_validate(values)
+    except ValidationError as error:
+        source = str(path) if path is not None else f"preset {base}"
+        lines = [_describe(detail) for detail in error.errors()]
+        raise ConfigError(
+            f"{source}, with the command line over it:\n  " + "\n  ".join(lines)
+        ) from error
+
+
+def dump_config(config: FlightConfig) -> str:
+    """Return a configuration as TOML that `load_config` reads back to the same values."""
+    import tomli_w
+
+    return tomli_w.dumps(config.model_dump(mode="json", exclude_none=True))
+
+
+def _read_preset(name: str) -> dict[str, Any]:
+    resource = files("tenbaud") / "presets" / f"{name}.toml"
+    if not resource.is_file():
+        near = difflib.get_close_matches(name, preset_names(), 1)
+        hint = f" Did you mean {near[0]}?" if near else ""
+        raise ConfigError(f"there is no preset {name!r}.{hint} Known: {', '.join(preset_names())}")
+    return tomllib.loads(resource.read_text())
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text())
+    except OSError as error:
+        raise ConfigError(f"cannot read the configuration {path}: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path} is not TOML: {error}") from error
+
+
+def _merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
+    merged = dict(base)
+    for key, value in over.items():
+        below = merged.get(key)
+        if isinstance(value, dict) and isinstance(below, dict):
+            merged[key] = _merge(below, value)
+        else:
+            merged[key] = value
+    return merged
+
+
+def _describe(detail: ErrorDetails) -> str:
+    # The names of a union's branches ("int", "literal['auto']") are no part of the field's name.
+    branches = ("literal[", "int", "float", "constrained", "tuple[", "function-", "str")
+    place = [str(part) for part in detail["loc"] if not str(part).startswith(branches)]
+    name = ".".join(place) or "(whole file)"
+    if detail["type"] == "extra_forbidden":
+        return f"{name}: unknown field{_nearest(place)}"
+    message = detail["msg"].removeprefix("Value error, ")
+    if isinstance(detail["input"], dict | FlightConfig):
+        return f"{name}: {message}"
+    return f"{name} = {detail['input']!r}: {message}"
+
+
+def _nearest(place: list[str]) -> str:
+    fields: Any = FlightConfig.model_fields
+    for part in place[:-1]:
+        section = fields[part].annotation if part in fields else None
+        fields = getattr(section, "model_fields", {})
+    near = difflib.get_close_matches(place[-1], list(fields), 1)
+    if near:
+        return f"; did you mean {near[0]}?"
+    return f"; known here: {', '.join(fields)}" if fields else ""

@@ -1,0 +1,205 @@
+"""The configuration of a flight: one TOML file for both ends.
+
+The sections `timing`, `channel`, `model`, `coder` and `limits` are *shared*: both ends must have them
+alike, and the handshake compares their digest. The others concern one end, or how it is run.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+
+SHARED_SECTIONS = ("timing", "channel", "model", "coder", "limits")
+
+
+class Section(BaseModel):
+    """Unknown fields are errors; values do not change after loading."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Timing(Section):
+    """Ticks, samples and lead."""
+
+    tick_s: Annotated[float, Field(gt=0.0, le=1.0)] = 0.01
+    """h: control tick"""
+    symbol_period_s: Annotated[float, Field(gt=0.0, le=60.0)] = 0.1
+    """T_s: one word per this time; a whole number of ticks"""
+    lead_ticks: Annotated[int, Field(ge=0, le=10_000)] | Literal["auto"] = "auto"
+    """D: command lead; "auto": 0 where the virtual clock allows it, else the smallest that is safe"""
+
+    @model_validator(mode="after")
+    def _whole_ticks(self) -> Timing:
+        ticks = self.symbol_period_s / self.tick_s
+        if ticks < 0.5 or abs(ticks - round(ticks)) > 1e-6 * ticks:
+            raise ValueError(
+                f"symbol_period_s = {self.symbol_period_s:g} is {ticks:g} ticks of tick_s = "
+                f"{self.tick_s:g}; it must be a whole number of them"
+            )
+        return self
+
+
+class ChannelSection(Section):
+    """What the line carries, and when."""
+
+    rate_baud: Annotated[float, Field(gt=0.0, le=100_000.0)] = 10.0
+    """R: symbols per second that may go up the link"""
+    delivery: Literal["start", "end"] = "start"
+    """a symbol is there when its slot begins (the paper), or when its slot is over (a real wire)"""
+    deadline_allowance_s: NotNegative = 0.02
+    """how long after its due time a symbol may come before its slot is erased"""
+    downlink_budget_s: NotNegative = 0.01
+    """time set aside for a command frame to reach the plant"""
+    repeats: Annotated[int, Field(ge=0, le=32)] = 2
+    """W: earlier samples that each command frame repeats"""
+
+
+class PitchModelSection(Section):
+    """The pitch model (11),(12) that both codecs predict with."""
+
+    kind: Literal["pitch"] = "pitch"
+    rate_damping_per_s: Annotated[float, Field(ge=0.0, le=100.0)] = 0.1
+    stiffness_per_s2: Annotated[float, Field(ge=-100.0, le=1000.0)] = 0.5
+    torque_gain_rad_per_v_s2: Annotated[float, Field(ge=-100.0, le=100.0)] = 0.35
+    equilibrium_rad: Annotated[float, Field(ge=-3.2, le=3.2)] = -0.115
+    motor_lag_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.08
+
+
+class ZoomCoderSection(Section):
+    """The paper's coder (16)-(22) and the observer gains."""
+
+    kind: Literal["zoom"] = "zoom"
+    window_signs: Annotated[int, Field(ge=1, le=16)] = 2
+    """how many signs the saturation test of (19) looks at; the paper's has two"""
+    initial_range_rad: Positive = 0.5
+    minimum_range_rad: Positive = 0.05
+    decay: Annotated[float, Field(gt=0.0, le=1.0)] = 0.95
+    correction: Literal["held", "impulse"] = "held"
+    """held over the sample as in (22), or added to the state at once"""
+    gains: tuple[float, float] = (4.1, 8.6)
+    """l1 and l2 of (23): 1/s and 1/s^2 when held, per unit when impulse"""
+
+
+class Limits(Section):
+    """What a command may be; the receiver keeps to it and the guard beside the motors checks it."""
+
+    volts_max: Annotated[float, Field(gt=0.0, le=32.0)] = 5.0
+    slew_volts_per_s: Positive = 1000.0
+    initial_volts: tuple[float, float] = (0.0, 0.0)
+    """command of the ticks before the first one decided"""
+
+
+class PlantSection(Section):
+    """The simulated plant, relative to the codec's model."""
+
+    mismatch: float | tuple[float, float, float] = 0.0
+    """fraction by which damping, stiffness and gain are off the model: 0.1 is 10 % more of each"""
+    disturbance: str = ""
+    """such as "q=2e-3,step=0.5@30": white torque density in rad^2/s^3, torque steps in rad/s^2"""
+    initial_angle_rad: Annotated[float, Field(ge=-3.2, le=3.2)] = 0.0
+
+    @field_validator("mismatch")
+    @classmethod
+    def _plausible(cls, value: float | tuple[float, ...]) -> float | tuple[float, ...]:
+        for fraction in value if isinstance(value, tuple) else (value,):
+            if not -1.0 < fraction < 10.0:
+                raise ValueError("a fraction must be above -1 (nothing left) and below 10")
+        return value
+
+
+class TransmitterSection(Section):
+    """The sensor node."""
+
+    rig: Literal["simulated", "replay"] = "simulated"
+    encoder_counts_per_turn: Annotated[int, Field(ge=2, le=10_000_000)] = 4096
+    encoder_sign: Literal[-1, 1] = 1
+    encoder_zero_counts: int = 0
+    plant: PlantSection = PlantSection()
+    watchdog_s: Positive | Literal["auto"] = "auto"
+    """age of the last command after which the voltage is taken down; "auto": max(5 T_s, 0.1 s)"""
+    ramp_s: Positive = 1.0
+    """time from the held voltage to the safe one"""
+    safe_volts: tuple[float, float] = (0.0, 0.0)
+    soft_limit_rad: Positive | None = None
+    """largest measured angle before the motors are taken down; none: no limit"""
+
+
+class PidSection(Section):
+    """PID law (24)."""
+
+    proportional: float = 0.1
+    integral: float = 0.053
+    derivative: float = 0.12
+    unit: Literal["V/rad", "V/deg"] = "V/deg"
+    """the paper prints no unit; only V/deg follows its reference"""
+    anti_windup: Literal["conditional", "none"] = "conditional"
+    normal_force_volts: float = 0.0
+    """w of (1), common to both motors"""
+
+
+class ReferenceSection(Section):
+    """What the controller steers to."""
+
+    kind: Literal["square", "step", "sine", "constant", "csv"] = "square"
+    amplitude_rad: Annotated[float, Field(ge=-6.3, le=6.3)] = 1.5707963267948966
+    period_s: Positive = 25.0
+    start_s: NotNegative = 1.0
+    """when the step happens"""
+    file: str = ""
+    """for csv: columns time_s, angle_rad"""
+
+
+class ReceiverSection(Section):
+    """The controller node."""
+
+    controller: Literal["pid", "recorded"] = "pid"
+    pid: PidSection = PidSection()
+    reference: ReferenceSection = ReferenceSection()
+
+
+class FlightLogSection(Section):
+    """A recorded flight, for the replay rig and the recorded controller."""
+
+    file: str = ""
+    index_column: str = "step"
+    counts_column: str = "pitch_counts"
+    volts_columns: tuple[str, str] = ("right_volts", "left_volts")
+    """front and rear motor; their difference pitches the body"""
+
+
+class LinkSection(Section):
+    """Where the other end is."""
+
+    kind: Literal["zenoh", "memory"] = "zenoh"
+    session: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+(/[A-Za-z0-9_.-]+)*$")] = "helicopter"
+    peer_timeout_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 10.0
+
+
+class FlightConfig(Section):
+    """Everything about a flight."""
+
+    preset: str = "paper-10baud"
+    """which preset the file builds on"""
+    description: str = ""
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
+    duration_s: Annotated[float, Field(gt=0.0, le=1e7)] = 100.0
+    timing: Timing = Timing()
+    channel: ChannelSection = ChannelSection()
+    model: PitchModelSection = PitchModelSection()
+    coder: ZoomCoderSection = ZoomCoderSection()
+    limits: Limits = Limits()
+    transmitter: TransmitterSection = TransmitterSection()
+    receiver: ReceiverSection = ReceiverSection()
+    flight_log: FlightLogSection = FlightLogSection()
+    link: LinkSection = LinkSection()
+
+    def shared_json(self, lead_ticks: int) -> str:
+        """Return the shared part as canonical JSON, with the command lead that was chosen."""
+        shared = self.model_dump(mode="json", include=set(SHARED_SECTIONS))
+        shared["timing"]["lead_ticks"] = lead_ticks
+        return json.dumps(shared, sort_keys=True, separators=(",", ":"))

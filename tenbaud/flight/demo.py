@@ -1,0 +1,177 @@
+"""Both ends on this machine: two processes of the same command, joined by Zenoh on loopback."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO
+
+from channel.errors import LinkLost
+from channel.links.base import Role
+from channel.links.endpoints import free_endpoint
+from tenbaud.build import Agreement
+from tenbaud.config.load import dump_config
+from tenbaud.flight.ends import run_in_memory
+from tenbaud.flight.outcome import ExitCode
+from tenbaud.flight.report import write_summary
+from tenbaud.flight.status import Status
+from tenbaud.flight.stop import StopFlag
+from tenbaud.flight.summary import Summary, joined
+from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.folder import RunFolder
+
+OnStatus = Callable[[Status], None]
+ENDING_TIMEOUT_S = 15.0
+
+
+@dataclass(slots=True)
+class DemoResult:
+    """What both processes reported."""
+
+    summary: Summary
+    code: ExitCode
+    messages: list[str]
+    """what the two ends said on their way out, if it was not a plain success"""
+
+
+def fly_demo(agreement: Agreement, folder: RunFolder, on_status: OnStatus) -> DemoResult:
+    """Fly once into an existing, empty run folder; write summary and figure there."""
+    folder.config.write_text(dump_config(agreement.config))
+    if agreement.config.link.kind == "memory":
+        outcome, upper, lower = run_in_memory(agreement, folder, "auto")
+        messages = [] if outcome.code is ExitCode.OK else [outcome.text]
+        result = DemoResult(joined(upper, lower), outcome.code, messages)
+    else:
+        result = _fly_processes(agreement, folder, on_status)
+    write_summary(folder, result.summary)
+    try:
+        _draw(agreement, folder, result.summary)
+    except (RecordingError, OSError) as error:
+        result.messages.append(f"no figure was drawn: {error}")
+    return result
+
+
+def _draw(agreement: Agreement, folder: RunFolder, summary: Summary) -> None:
+    from tenbaud.recording.figure import draw_flight
+
+    config = agreement.config
+    title = f"{config.preset}: {summary.get('plant', '')}, {config.channel.rate_baud:g} bit/s"
+    draw_flight(folder.transmitter, folder.receiver, folder.figure, title)
+
+
+def _fly_processes(agreement: Agreement, folder: RunFolder, on_status: OnStatus) -> DemoResult:
+    endpoint = free_endpoint()
+    with StopFlag() as stop:
+        receiver = _Child("receiver", agreement, folder, ["--listen", endpoint], on_status)
+        transmitter = _Child("transmitter", agreement, folder, ["--connect", endpoint], on_status)
+        ends = (transmitter, receiver)
+        try:
+            _wait(ends, stop)
+        finally:
+            for end in ends:
+                end.end()
+    if not transmitter.summary:
+        raise LinkLost("the transmitter ended without a summary:\n  " + transmitter.last_words())
+    summary = joined(transmitter.summary, receiver.summary)
+    code = ExitCode(transmitter.process.returncode or receiver.process.returncode)
+    if code is not ExitCode.OK and summary["exit_code"] == ExitCode.OK:
+        summary["outcome"], summary["exit_code"] = receiver.last_words(), int(code)
+    messages = [end.last_words() for end in ends if end.process.returncode]
+    return DemoResult(summary, code, messages)
+
+
+def _wait(ends: tuple[_Child, _Child], stop: StopFlag) -> None:
+    """Wait for both processes; pass a signal on, and do not outlive a half-dead pair."""
+    passed_on = False
+    patience_s = ENDING_TIMEOUT_S
+    while any(end.process.poll() is None for end in ends):
+        for end in ends:
+            try:
+                end.process.wait(0.1)
+            except subprocess.TimeoutExpired:
+                continue
+        if stop() and not passed_on:
+            passed_on = True
+            for end in ends:
+                end.signal(signal.SIGINT)
+        if passed_on or any(end.process.poll() is not None for end in ends):
+            patience_s -= 0.1
+            if patience_s < 0.0:
+                return
+
+
+@dataclass(slots=True)
+class _Child:
+    """One end as a process of its own; its two pipes are read by two threads."""
+
+    role: Role
+    agreement: Agreement
+    folder: RunFolder
+    link: list[str]
+    on_status: OnStatus
+    process: subprocess.Popen[str] = field(init=False)
+    summary: Summary = field(init=False, default_factory=dict)
+    said: list[str] = field(init=False, default_factory=list)
+    _threads: list[threading.Thread] = field(init=False, default_factory=list)
+
+    def __post_init__(self) -> None:
+        verb = "transmit" if self.role == "transmitter" else "receive"
+        folder: Path = self.folder.path
+        command = [sys.executable, "-m", "tenbaud", verb, "--json", "--status", "lines"]
+        command += ["--config", str(self.folder.config), "--run-folder", str(folder)]
+        command += ["--clock", self.agreement.clock, *self.link]
+        # Its own group: a Ctrl-C at the terminal comes once, through the parent.
+        self.process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        for target, stream in (
+            (self._read_summary, self.process.stdout),
+            (self._read_status, self.process.stderr),
+        ):
+            thread = threading.Thread(target=target, args=(stream,), daemon=True)
+            thread.start()
+            self._threads.append(thread)
+
+    def _read_summary(self, stream: IO[str]) -> None:
+        text = stream.read()
+        if text.strip():
+            self.summary = json.loads(text)
+
+    def _read_status(self, stream: IO[str]) -> None:
+        for line in stream:
+            if line.startswith("{"):
+                self.on_status(json.loads(line))
+            elif line.strip():
+                self.said.append(line.rstrip())
+
+    def signal(self, number: int) -> None:
+        """Send a signal to the process if it still runs."""
+        if self.process.poll() is None:
+            self.process.send_signal(number)
+
+    def end(self) -> None:
+        """Make sure that the process has ended, and read what it left."""
+        if self.process.poll() is None:
+            self.process.terminate()
+            try:
+                self.process.wait(5.0)
+            except subprocess.TimeoutExpired:
+                self.process.kill()
+                self.process.wait()
+        for thread in self._threads:
+            thread.join(5.0)
+
+    def last_words(self) -> str:
+        """Return what the process said last."""
+        return "\n  ".join(self.said[-6:]) or f"{self.role}: exit code {self.process.returncode}"

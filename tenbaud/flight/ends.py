@@ -1,0 +1,188 @@
+"""One end, run whole: recording opened, link opened, flown, everything closed, figures returned."""
+
+from __future__ import annotations
+
+import gc
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from channel.links.base import Link, Role
+from receiver.endpoint import ReceiverEndpoint
+from tenbaud.build import Agreement
+from tenbaud.flight import receive, transmit
+from tenbaud.flight.outcome import Outcome, outcome_of
+from tenbaud.flight.status import Status, StatusMode, StatusReporter
+from tenbaud.flight.stop import StopFlag
+from tenbaud.flight.summary import Summary, receiver_part, transmitter_part
+from tenbaud.recording.folder import RunFolder
+from tenbaud.recording.writer import McapRecorder
+
+SWITCH_INTERVAL_S = 0.0002
+"""A busy recorder thread may keep the loop waiting this long; Python's default is 5 ms."""
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoints:
+    """Where an end listens and connects."""
+
+    listen: tuple[str, ...] = ()
+    connect: tuple[str, ...] = ()
+    insecure: bool = False
+
+
+def open_link(agreement: Agreement, role: Role, endpoints: Endpoints) -> Link:
+    """Return an open Zenoh link for one end."""
+    from channel.links.zenoh import ZenohLink
+
+    return ZenohLink(
+        role,
+        agreement.config.link.session,
+        listen=endpoints.listen,
+        connect=endpoints.connect,
+        insecure=endpoints.insecure,
+    )
+
+
+def run_transmitter(
+    agreement: Agreement, endpoints: Endpoints, folder: RunFolder, status: StatusMode
+) -> tuple[Outcome, Summary]:
+    """Fly one flight as the transmitter; the outcome says how it ended."""
+    with _end(agreement, "transmitter", folder) as (recorder, stop):
+        run = transmit.prepare(agreement, recorder)
+        with (
+            open_link(agreement, "transmitter", endpoints) as link,
+            StatusReporter(lambda: transmitter_status(run), status),
+        ):
+            outcome = _guarded(lambda: _fly(run, link, stop))
+        summary = transmitter_part(run, outcome)
+        return outcome, _with_recording(summary, recorder)
+
+
+def run_receiver(
+    agreement: Agreement, endpoints: Endpoints, folder: RunFolder, status: StatusMode
+) -> tuple[Outcome, Summary]:
+    """Serve one flight as the receiver; the outcome says how it ended."""
+    with _end(agreement, "receiver", folder) as (recorder, stop):
+        endpoint = receive.prepare(agreement, recorder)
+        with (
+            open_link(agreement, "receiver", endpoints) as link,
+            StatusReporter(lambda: receiver_status(agreement, endpoint), status),
+        ):
+            outcome = _guarded(lambda: receive.serve(agreement, endpoint, link, stop))
+        summary = receiver_part(agreement, endpoint, outcome)
+        return outcome, _with_recording(summary, recorder)
+
+
+def run_in_memory(
+    agreement: Agreement, folder: RunFolder, status: StatusMode
+) -> tuple[Outcome, Summary, Summary]:
+    """Fly both ends in this process, on the virtual clock, without a link."""
+    with (
+        _end(agreement, "transmitter", folder) as (recorder, stop),
+        open_recorder(agreement, "receiver", folder.receiver) as receiver_recorder,
+    ):
+        run = transmit.prepare(agreement, recorder)
+        endpoint = receive.prepare(agreement, receiver_recorder)
+        with StatusReporter(lambda: transmitter_status(run), status):
+            outcome = _guarded(lambda: transmit.fly_virtual(run, endpoint, stop))
+        upper = transmitter_part(run, outcome)
+        lower = receiver_part(agreement, endpoint, outcome)
+        return outcome, _with_recording(upper, recorder), lower
+
+
+def open_recorder(agreement: Agreement, role: Role, path: Path) -> McapRecorder:
+    """Return a recorder for one end, its file headed by what was flown."""
+    metadata = {
+        "role": role,
+        "preset": agreement.config.preset,
+        "clock": agreement.clock,
+        "version": agreement.identity.version,
+        "config_digest": agreement.identity.config_digest.hex(),
+        "numerics_probe": agreement.identity.numerics_probe.hex(),
+        "tick_s": repr(agreement.config.timing.tick_s),
+        "shared_config": agreement.identity.config,
+        "seed": str(agreement.config.seed),
+    }
+    # Virtual time can outrun the disk and is not disturbed by waiting for it.
+    return McapRecorder(path, metadata, wait_when_full=agreement.clock == "virtual")
+
+
+def transmitter_status(run: transmit.TransmitterRun) -> Status:
+    """Return what a person wants to know of a running transmitter."""
+    node = run.node
+    coder = run.agreement.codec.coder
+    tick_s = run.agreement.terms.tick_ns / 1e9
+    return {
+        "role": "transmitter",
+        "phase": node.session.phase.value,
+        "tick": node.tick,
+        "of_ticks": run.agreement.flight_ticks,
+        "time_s": node.tick * tick_s,
+        "pitch_rad": node.scores.last_angle_rad,
+        "error_rad": node.scores.last_coded_error_rad,
+        "range_rad": coder.ranges(node.session.copies.confirmed.coder)[0],
+        "erasures": node.session.counts["erasures"],
+        "desyncs": node.session.counts["desyncs"],
+        "guard": node.guard.state.value,
+    }
+
+
+def receiver_status(agreement: Agreement, endpoint: ReceiverEndpoint) -> Status:
+    """Return what a person wants to know of a running receiver."""
+    session = endpoint.session
+    return {
+        "role": "receiver",
+        "phase": session.phase.value,
+        "time_s": session.state.sample * agreement.terms.sample_ns / 1e9,
+        "pitch_rad": session.state.model[0],
+        "range_rad": agreement.codec.coder.ranges(session.state.coder)[0],
+        "erasures": session.counts["erasures"],
+        "baud": session.meter.baud,
+    }
+
+
+def write_json(summary: Summary) -> None:
+    """Print a summary on standard output."""
+    sys.stdout.write(json.dumps(summary, indent=2) + "\n")
+
+
+@contextmanager
+def _end(
+    agreement: Agreement, role: Role, folder: RunFolder
+) -> Iterator[tuple[McapRecorder, StopFlag]]:
+    path = folder.transmitter if role == "transmitter" else folder.receiver
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
+    with StopFlag() as stop, open_recorder(agreement, role, path) as recorder:
+        # What was built so far stays; the collector need not look at it in flight.
+        gc.collect()
+        gc.freeze()
+        yield recorder, stop
+
+
+def _fly(run: transmit.TransmitterRun, link: Link, stop: StopFlag) -> Outcome:
+    if run.agreement.clock == "real":
+        return transmit.fly_real(run, link, stop)
+    return transmit.fly_virtual(run, transmit.link_peer(run, link, stop), stop)
+
+
+def _guarded(fly: Callable[[], Outcome]) -> Outcome:
+    """Fly; an exception becomes the outcome, so that recording and figures are kept."""
+    try:
+        return fly()
+    except (Exception, KeyboardInterrupt) as error:
+        return outcome_of(error)
+
+
+def _with_recording(summary: Summary, recorder: McapRecorder) -> Summary:
+    """Close the recording and add what became of it."""
+    recorder.close()
+    return {
+        **summary,
+        "recording_rows": recorder.rows_written,
+        "recording_rows_lost": recorder.rows_dropped,
+        "recording_error": recorder.error,
+    }

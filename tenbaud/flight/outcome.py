@@ -1,0 +1,48 @@
+"""How a flight ended, for people and for exit codes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+from channel.errors import ConfigMismatch, DesyncError, LinkLost, SafetyStop, TenbaudError
+
+
+class ExitCode(IntEnum):
+    """Exit codes of every command."""
+
+    OK = 0
+    FAILED = 1
+    USAGE = 2
+    MISMATCH = 3
+    LINK_LOST = 4
+    DESYNC = 5
+    SAFETY_STOP = 6
+    INTERRUPTED = 130
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """The end of a flight."""
+
+    code: ExitCode
+    text: str
+
+
+FLIGHT_OVER = "the flight is over"
+
+
+def outcome_of(error: BaseException) -> Outcome:
+    """Return the outcome that an exception stands for."""
+    if isinstance(error, KeyboardInterrupt):
+        return Outcome(ExitCode.INTERRUPTED, "interrupted")
+    for kind, code in (
+        (ConfigMismatch, ExitCode.MISMATCH),
+        (LinkLost, ExitCode.LINK_LOST),
+        (DesyncError, ExitCode.DESYNC),
+        (SafetyStop, ExitCode.SAFETY_STOP),
+        (TenbaudError, ExitCode.USAGE),
+    ):
+        if isinstance(error, kind):
+            return Outcome(code, str(error))
+    return Outcome(ExitCode.FAILED, f"{type(error).__name__}: {error}")

@@ -1,0 +1,102 @@
+"""A flight's figures for people: a table on the screen, and `summary.json` in the run folder."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+from tenbaud.flight.summary import Summary
+from tenbaud.recording.folder import RunFolder
+
+ROWS: tuple[tuple[str, str, str], ...] = (
+    ("plant", "plant", "{}"),
+    ("outcome", "outcome", "{}"),
+    ("duration", "duration_s", "{:g} s"),
+    ("samples, one word each", "samples", "{}"),
+    ("coder bits up", "coder_bits_up", "{:g}"),
+    ("baud: configured", "baud_configured", "{:g}"),
+    ("baud: measured by the receiver", "baud_measured", "{:.3f}"),
+    ("wire bytes up / down", "wire_bytes", "{}"),
+    ("erasures / late symbols", "lost", "{}"),
+    ("digest checks", "digest_checks", "{}"),
+    ("desyncs", "desyncs", "{}"),
+    ("largest pitch in the window", "pitch_amplitude_rad", "{:.3f} rad"),
+    ("error of the codec: max / rms", "error_coded", "{}"),
+    ("error as lived: max / rms", "error_live", "{}"),
+    ("tracking, rms", "tracking_rms_rad", "{:.3f} rad"),
+    ("command lead", "lead_ticks", "{} ticks"),
+    ("late commands", "commands_late", "{}"),
+    ("loop lateness p50 / p99 / max", "lateness", "{}"),
+    ("times real time", "realtime_factor", "{:.0f}"),
+    ("recording lost", "recording_trouble", "{}"),
+)
+
+
+def write_summary(folder: RunFolder, summary: Summary) -> None:
+    """Write `summary.json`; a full disk is told, not raised."""
+    try:
+        folder.summary.write_text(json.dumps(summary, indent=2) + "\n")
+    except OSError as error:
+        import typer
+
+        typer.echo(f"tenbaud: {folder.summary} could not be written: {error.strerror}", err=True)
+
+
+def show_summary(summary: Summary, folder: RunFolder) -> None:
+    """Print one flight."""
+    show_summaries([summary], [folder])
+
+
+def show_summaries(summaries: Sequence[Summary], folders: Sequence[RunFolder]) -> None:
+    """Print flights side by side, and where their files are."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console()
+    first = summaries[0]
+    title = f"{first['preset']} over {first['link']}, {first['clock']} clock"
+    table = Table(title=title, title_justify="left", show_header=False)
+    table.add_column(style="dim")
+    for _ in summaries:
+        table.add_column(overflow="fold")
+    for label, name, form in ROWS:
+        cells = [_cell(summary, name, form) for summary in summaries]
+        if any(cells):
+            table.add_row(label, *cells)
+    console.print(table)
+    for folder in folders:
+        figure = f"  figure {folder.figure.name}" if folder.figure.is_file() else ""
+        console.print(f"recorded in {folder.path}{figure}", soft_wrap=True, highlight=False)
+
+
+def _cell(summary: Summary, name: str, form: str) -> str:
+    value = _value(summary, name)
+    return "" if value is None else form.format(value)
+
+
+def _value(summary: Summary, name: str) -> Any:
+    get = summary.get
+    match name:
+        case "wire_bytes":
+            return f"{get('wire_bytes_up')} / {get('wire_bytes_down')}"
+        case "lost":
+            return f"{get('erasures')} / {get('symbols_late', '-')}"
+        case "error_coded" | "error_live":
+            largest, rms = get(f"{name}_max_fraction"), get(f"{name}_rms_fraction")
+            if largest is None or rms is None:
+                return None
+            return f"{largest:.2%} / {rms:.2%} of the largest pitch"
+        case "lateness":
+            if get("loop_late_ms_p50") is None:
+                return None
+            return (
+                f"{get('loop_late_ms_p50'):.2f} / {get('loop_late_ms_p99'):.2f} / "
+                f"{get('loop_late_ms_max'):.2f} ms"
+            )
+        case "recording_trouble":
+            if not get("recording_rows_lost") and not get("recording_error"):
+                return None
+            return f"{get('recording_rows_lost')} rows: {get('recording_error') or 'queue full'}"
+        case _:
+            return get(name)

@@ -1,0 +1,35 @@
+"""Stopping on a signal: the first asks the flight to end safely, the second ends it at once."""
+
+from __future__ import annotations
+
+import signal
+from types import FrameType
+from typing import Self
+
+SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+
+
+class StopFlag:
+    """Within a `with`, signals raise this flag instead of ending the process."""
+
+    def __init__(self) -> None:
+        self.raised = False
+        self._before: dict[int, object] = {}
+
+    def __call__(self) -> bool:
+        """Return whether the flight was asked to stop."""
+        return self.raised
+
+    def __enter__(self) -> Self:
+        for number in SIGNALS:
+            self._before[number] = signal.signal(number, self._on_signal)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._before.items():
+            signal.signal(number, handler)  # type: ignore[arg-type]
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        if self.raised:
+            raise KeyboardInterrupt
+        self.raised = True

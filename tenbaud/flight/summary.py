@@ -1,0 +1,114 @@
+"""The figures of a flight: what each end can say, joined into one `summary.json`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from receiver.endpoint import ReceiverEndpoint
+from tenbaud.build import Agreement
+from tenbaud.flight.outcome import Outcome
+from tenbaud.flight.transmit import TransmitterRun
+from transmitter.scores import ErrorMeter
+
+Summary = dict[str, Any]
+
+
+def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
+    """Return what the transmitter knows: plant, errors, bits sent, its loop."""
+    node, terms, config = run.node, run.agreement.terms, run.agreement.config
+    session, scores, meter = node.session, node.scores, run.uplink.meter
+    flown_s = run.ticks * terms.tick_ns / 1e9
+    return {
+        **_common(run.agreement, outcome),
+        "plant": _plant_name(run.agreement),
+        "seed": config.seed,
+        "duration_s": flown_s,
+        "samples": session.copies.next_sample,
+        "coder_bits_up": meter.coder_bits,
+        "wire_bytes_up": meter.wire_bytes,
+        "wire_bytes_down": run.wire_bytes_down,
+        "erasures": session.counts["erasures"],
+        "digest_checks": session.counts["digest_checks"],
+        "desyncs": session.counts["desyncs"],
+        "window_start_s": run.agreement.window_start_tick * terms.tick_ns / 1e9,
+        "pitch_amplitude_rad": scores.angle_max_rad,
+        "reference_amplitude_rad": scores.reference_max_rad or None,
+        **_errors("error_coded", scores.coded, scores.angle_max_rad, scores.reference_max_rad),
+        **_errors("error_live", scores.live, scores.angle_max_rad, scores.reference_max_rad),
+        "tracking_rms_rad": scores.tracking.rms,
+        "commands_late": node.commands_late,
+        "symbols_refused": run.uplink.shaper.refused,
+        "words_missed": session.counts["words_missed"],
+        "sensor_fault": node.sensor_fault,
+        "loop_late_ms_p50": None,
+        "loop_late_ms_p99": None,
+        "loop_late_ms_max": None,
+        "realtime_factor": flown_s / run.flight_s if run.flight_s else None,
+        **run.extra,
+    }
+
+
+def receiver_part(agreement: Agreement, endpoint: ReceiverEndpoint, outcome: Outcome) -> Summary:
+    """Return what the receiver knows: symbols as they arrived, on its own clock."""
+    session = endpoint.session
+    return {
+        **_common(agreement, outcome),
+        "samples": session.state.sample,
+        "baud_measured": session.meter.baud,
+        "wire_bytes_up": endpoint.wire_bytes_up,
+        "wire_bytes_down": endpoint.wire_bytes_down,
+        "erasures": session.counts["erasures"],
+        "symbols_late": session.counts["symbols_late"],
+        "stale_frames": session.counts["stale_frames"],
+        "bad_commands": session.counts["bad_commands"],
+        "malformed": endpoint.malformed,
+    }
+
+
+def joined(transmitter: Summary, receiver: Summary) -> Summary:
+    """Return one summary: the transmitter's figures, and those that only the receiver has."""
+    own = ("baud_measured", "symbols_late", "stale_frames", "bad_commands")
+    return {**transmitter, **{name: receiver.get(name) for name in own}}
+
+
+def _common(agreement: Agreement, outcome: Outcome) -> Summary:
+    config = agreement.config
+    return {
+        "preset": config.preset,
+        "outcome": outcome.text,
+        "exit_code": int(outcome.code),
+        "link": config.link.kind,
+        "clock": agreement.clock,
+        "lead_ticks": agreement.terms.lead_ticks,
+        "delivery": config.channel.delivery,
+        "baud_configured": config.channel.rate_baud,
+        "config_digest": agreement.identity.config_digest.hex(),
+        "numerics_probe": agreement.identity.numerics_probe.hex(),
+        "version": agreement.identity.version,
+    }
+
+
+def _plant_name(agreement: Agreement) -> str:
+    section = agreement.config.transmitter
+    if section.rig == "replay":
+        return f"replay of {agreement.config.flight_log.file}"
+    mismatch = section.plant.mismatch
+    off = mismatch if isinstance(mismatch, tuple) else (mismatch,)
+    name = "pitch"
+    if any(off):
+        name += " off the model by " + ", ".join(f"{value:+.0%}" for value in off)
+    if section.plant.disturbance:
+        name += f", disturbed by {section.plant.disturbance}"
+    return name
+
+
+def _errors(name: str, meter: ErrorMeter, angle_max: float, reference_max: float) -> Summary:
+    rms = meter.rms
+    some = meter.count > 0
+    return {
+        f"{name}_max_rad": meter.largest if some else None,
+        f"{name}_rms_rad": rms,
+        f"{name}_max_fraction": meter.largest / angle_max if some and angle_max else None,
+        f"{name}_rms_fraction": rms / angle_max if rms is not None and angle_max else None,
+        f"{name}_max_of_reference": meter.largest / reference_max if some and reference_max else None,
+    }

@@ -5,25 +5,28 @@ Both drivers of an end send through it, so that nobody can go around the baud ra
 
 from __future__ import annotations
 
-from channel import wire
 from channel.frames import Frame, Symbol
 from channel.line import Delivery, Line
 from channel.shaper import SlotShaper, UplinkMeter
+from channel.wire import DATAGRAM, Wire
 
 
 class Uplink:
     """The transmitter's way out."""
 
-    def __init__(self, shaper: SlotShaper, line: Line, meter: UplinkMeter) -> None:
+    def __init__(
+        self, shaper: SlotShaper, line: Line, meter: UplinkMeter, wire: Wire = DATAGRAM
+    ) -> None:
         self.shaper = shaper
         self.line = line
         self.meter = meter
+        self.wire = wire
 
     def offer(self, frame: Frame, now_ns: int) -> list[Delivery]:
         """Return the arrivals of a frame offered at flight time `now_ns`; none if it is refused."""
         is_symbol = isinstance(frame, Symbol)
         if isinstance(frame, Symbol) and not self.shaper.admit(frame.slot, now_ns):
             return []
-        data = wire.encode(frame)
-        self.meter.count(frame, len(data))
+        data = self.wire.encode(frame)
+        self.meter.count(frame, self.wire.size(data))
         return self.line.carry(data, is_symbol, now_ns)

@@ -21,6 +21,7 @@ from __future__ import annotations
 import struct
 from binascii import crc_hqx
 from collections.abc import Callable
+from typing import Protocol
 
 from channel.errors import FrameError
 from channel.frames import (
@@ -51,6 +52,38 @@ _COMMANDS = struct.Struct("<IB")
 _ECHO = struct.Struct("<HQ")
 _DESYNC = struct.Struct("<IQQ")
 _TEXT = struct.Struct("<H")
+
+
+class Wire(Protocol):
+    """How frames look on one kind of line. A link says which it needs."""
+
+    def encode(self, frame: Frame) -> bytes:
+        """Return the message for a frame; ValueError for values that no frame can carry."""
+
+    def decode(self, data: bytes) -> Frame:
+        """Return the frame in a message; FrameError, with the reason, for anything else."""
+
+    def size(self, data: bytes) -> int:
+        """Return how many bytes a message takes on the line, framing included."""
+
+
+class DatagramWire:
+    """The frames of this module, one per message: for every line that keeps message boundaries."""
+
+    def encode(self, frame: Frame) -> bytes:
+        """Return the bytes of a frame."""
+        return encode(frame)
+
+    def decode(self, data: bytes) -> Frame:
+        """Return the frame in these bytes."""
+        return decode(data)
+
+    def size(self, data: bytes) -> int:
+        """Return the length: the frame is all that we put on such a line."""
+        return len(data)
+
+
+DATAGRAM = DatagramWire()
 
 
 def encode(frame: Frame) -> bytes:

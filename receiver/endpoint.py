@@ -5,27 +5,28 @@ Both drivers of the receiver, and a flight within one process, go through it.
 
 from __future__ import annotations
 
-from channel import wire
 from channel.errors import FrameError
 from channel.frames import Frame
 from channel.virtual import Reply
+from channel.wire import DATAGRAM, Wire
 from receiver.session import ReceiverSession
 
 
 class ReceiverEndpoint:
     """Decodes what arrives for a session and encodes what it answers."""
 
-    def __init__(self, session: ReceiverSession) -> None:
+    def __init__(self, session: ReceiverSession, wire: Wire = DATAGRAM) -> None:
         self.session = session
+        self.wire = wire
         self.wire_bytes_down = 0
         self.wire_bytes_up = 0
         self.malformed = 0
 
     def on_bytes(self, data: bytes, now_ns: int) -> list[bytes]:
         """Take one message that arrived at `now_ns`; return the messages to send."""
-        self.wire_bytes_up += len(data)
+        self.wire_bytes_up += self.wire.size(data)
         try:
-            frame = wire.decode(data)
+            frame = self.wire.decode(data)
         except FrameError as error:
             self.malformed += 1
             self.session.on_malformed(str(error))
@@ -50,7 +51,7 @@ class ReceiverEndpoint:
         return Reply(0, self.session.next_deadline(), tuple(messages))
 
     def _encode(self, frames: list[Frame]) -> list[bytes]:
-        messages = [wire.encode(frame) for frame in frames]
+        messages = [self.wire.encode(frame) for frame in frames]
         for message in messages:
-            self.wire_bytes_down += len(message)
+            self.wire_bytes_down += self.wire.size(message)
         return messages

@@ -9,6 +9,7 @@ from channel.line import Line
 from channel.recording import Recorder
 from channel.shaper import SlotShaper, UplinkMeter
 from channel.uplink import Uplink
+from channel.wire import Wire
 from plant_sim.disturbance import parse_disturbance
 from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters, PitchPlant
@@ -46,14 +47,14 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
     return TransmitterNode(session, build_rig(config), build_guard(agreement), scores, recorder)
 
 
-def build_uplink(agreement: Agreement) -> Uplink:
-    """Return the transmitter's way out: grid, delivery delay and meter."""
+def build_uplink(agreement: Agreement, wire: Wire) -> Uplink:
+    """Return the transmitter's way out onto a line: grid, delivery delay and meter."""
     terms = agreement.terms
     alphabet = agreement.codec.coder.alphabet
-    return Uplink(SlotShaper(terms), Line(terms.symbol_delay_ns), UplinkMeter(alphabet))
+    return Uplink(SlotShaper(terms), Line(terms.symbol_delay_ns), UplinkMeter(alphabet), wire)
 
 
-def build_receiver(agreement: Agreement, recorder: Recorder | None) -> ReceiverEndpoint:
+def build_receiver(agreement: Agreement, recorder: Recorder | None, wire: Wire) -> ReceiverEndpoint:
     """Return the controller node of a configuration."""
     session = ReceiverSession(
         agreement.codec,
@@ -63,7 +64,7 @@ def build_receiver(agreement: Agreement, recorder: Recorder | None) -> ReceiverE
         secrets.randbits(31) + 1,
         recorder,
     )
-    return ReceiverEndpoint(session)
+    return ReceiverEndpoint(session, wire)
 
 
 def build_rig(config: FlightConfig) -> Rig:

@@ -11,7 +11,6 @@ import heapq
 import time
 from collections.abc import Callable, Sequence
 
-from channel import wire
 from channel.errors import ConfigMismatch, FrameError, LinkLost
 from channel.events import EventKind
 from channel.frames import Frame, Symbol
@@ -40,6 +39,7 @@ class RealFlight:
     ) -> None:
         self._node = node
         self._uplink = uplink
+        self._wire = uplink.wire
         self._link = link
         self._should_stop = should_stop
         self._outbox: list[tuple[int, int, bytes, bool]] = []
@@ -114,7 +114,7 @@ class RealFlight:
                 break
             self._take_in((until_ns - self._now_ns()) / 1e9)
         for frame in self._node.session.bye(reason):
-            self._link.send(wire.encode(frame))
+            self._link.send(self._wire.encode(frame))
 
     def _now_ns(self) -> int:
         return time.monotonic_ns() - self._start_ns
@@ -137,9 +137,9 @@ class RealFlight:
                 "the receiver flies on the virtual clock, this end on the real one; give both the "
                 "same --clock"
             )
-        self.wire_bytes_down += len(data)
+        self.wire_bytes_down += self._wire.size(data)
         try:
-            frame = wire.decode(data)
+            frame = self._wire.decode(data)
         except FrameError as error:
             self.malformed += 1
             self._node.tell(EventKind.MALFORMED, f"dropped a frame: {error}")

@@ -13,7 +13,6 @@ from collections.abc import Callable, Sequence
 from itertools import count
 from typing import NamedTuple
 
-from channel import wire
 from channel.errors import FrameError
 from channel.events import EventKind
 from channel.frames import Frame
@@ -36,6 +35,7 @@ class VirtualFlight:
     def __init__(self, node: TransmitterNode, uplink: Uplink, downlink: Line, peer: Peer) -> None:
         self._node = node
         self._uplink = uplink
+        self._wire = uplink.wire
         self._downlink = downlink
         self._peer = peer
         self._arrivals: list[_Arrival] = []
@@ -113,9 +113,9 @@ class VirtualFlight:
                 self._push(delivery, upward=False)
 
     def _take(self, data: bytes, now_ns: int) -> None:
-        self.wire_bytes_down += len(data)
+        self.wire_bytes_down += self._wire.size(data)
         try:
-            frame = wire.decode(data)
+            frame = self._wire.decode(data)
         except FrameError as error:
             self.malformed += 1
             self._node.tell(EventKind.MALFORMED, f"dropped a frame: {error}")

@@ -10,6 +10,8 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Literal, Protocol, Self
 
+from channel.wire import DATAGRAM, Wire
+
 Role = Literal["transmitter", "receiver"]
 
 
@@ -31,6 +33,8 @@ class Link(Protocol):
     name: str
     """of the kind of link, for summaries"""
     counts: LinkCounts
+    wire: Wire
+    """how frames look on this kind of line"""
 
     def send(self, data: bytes, is_symbol: bool = False) -> None:
         """Put one message on the line. `is_symbol` marks the paid path of the uplink."""
@@ -53,6 +57,7 @@ class LinkBase:
     """What the links share: a name, counts, and closing at the end of a `with`."""
 
     name = ""
+    wire: Wire = DATAGRAM
 
     def __init__(self) -> None:
         self.counts = LinkCounts()

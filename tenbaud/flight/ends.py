@@ -11,8 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from channel.links.base import Link, Role
+from channel.wire import DATAGRAM
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build import Agreement
+from tenbaud.build_ends import build_receiver
 from tenbaud.flight import receive, transmit
 from tenbaud.flight.outcome import Outcome, outcome_of
 from tenbaud.flight.status import Status, StatusMode, StatusReporter
@@ -52,12 +54,10 @@ def run_transmitter(
 ) -> tuple[Outcome, Summary]:
     """Fly one flight as the transmitter; the outcome says how it ended."""
     with _end(agreement, "transmitter", folder) as (recorder, stop):
-        run = transmit.prepare(agreement, recorder)
-        with (
-            open_link(agreement, "transmitter", endpoints) as link,
-            StatusReporter(lambda: transmitter_status(run), status),
-        ):
-            outcome = _guarded(lambda: _fly(run, link, stop))
+        with open_link(agreement, "transmitter", endpoints) as link:
+            run = transmit.prepare(agreement, recorder, link.wire)
+            with StatusReporter(lambda: transmitter_status(run), status):
+                outcome = _guarded(lambda: _fly(run, link, stop))
         summary = transmitter_part(run, outcome)
         return outcome, _with_recording(summary, recorder)
 
@@ -67,12 +67,10 @@ def run_receiver(
 ) -> tuple[Outcome, Summary]:
     """Serve one flight as the receiver; the outcome says how it ended."""
     with _end(agreement, "receiver", folder) as (recorder, stop):
-        endpoint = receive.prepare(agreement, recorder)
-        with (
-            open_link(agreement, "receiver", endpoints) as link,
-            StatusReporter(lambda: receiver_status(agreement, endpoint), status),
-        ):
-            outcome = _guarded(lambda: receive.serve(agreement, endpoint, link, stop))
+        with open_link(agreement, "receiver", endpoints) as link:
+            endpoint = build_receiver(agreement, recorder, link.wire)
+            with StatusReporter(lambda: receiver_status(agreement, endpoint), status):
+                outcome = _guarded(lambda: receive.serve(agreement, endpoint, link, stop))
         summary = receiver_part(agreement, endpoint, outcome)
         return outcome, _with_recording(summary, recorder)
 
@@ -85,8 +83,8 @@ def run_in_memory(
         _end(agreement, "transmitter", folder) as (recorder, stop),
         open_recorder(agreement, "receiver", folder.receiver) as receiver_recorder,
     ):
-        run = transmit.prepare(agreement, recorder)
-        endpoint = receive.prepare(agreement, receiver_recorder)
+        run = transmit.prepare(agreement, recorder, DATAGRAM)
+        endpoint = build_receiver(agreement, receiver_recorder, DATAGRAM)
         with StatusReporter(lambda: transmitter_status(run), status):
             outcome = _guarded(lambda: transmit.fly_virtual(run, endpoint, stop))
         upper = transmitter_part(run, outcome)

@@ -4,21 +4,14 @@ from __future__ import annotations
 
 from channel.errors import ConfigMismatch
 from channel.links.base import Link
-from channel.recording import Recorder
 from receiver.endpoint import ReceiverEndpoint
 from receiver.real_service import serve_real
 from receiver.session import Phase
 from receiver.virtual_service import serve_virtual
 from tenbaud.build import Agreement
-from tenbaud.build_ends import build_receiver
 from tenbaud.flight.outcome import FLIGHT_OVER, ExitCode, Outcome
 from tenbaud.flight.transmit import Stop
 from transmitter.node import STOPPED
-
-
-def prepare(agreement: Agreement, recorder: Recorder | None) -> ReceiverEndpoint:
-    """Return a receiver that is ready to serve."""
-    return build_receiver(agreement, recorder)
 
 
 def serve(agreement: Agreement, endpoint: ReceiverEndpoint, link: Link, should_stop: Stop) -> Outcome:

@@ -13,6 +13,7 @@ from channel.links.base import Link
 from channel.recording import Recorder
 from channel.uplink import Uplink
 from channel.virtual import Peer
+from channel.wire import Wire
 from tenbaud.build import Agreement
 from tenbaud.build_ends import build_transmitter, build_uplink
 from tenbaud.flight.outcome import FLIGHT_OVER, ExitCode, Outcome
@@ -40,10 +41,10 @@ class TransmitterRun:
     """figures of the clock that was flown on"""
 
 
-def prepare(agreement: Agreement, recorder: Recorder | None) -> TransmitterRun:
+def prepare(agreement: Agreement, recorder: Recorder | None, wire: Wire) -> TransmitterRun:
     """Return a transmitter that is ready to fly."""
     node = build_transmitter(agreement, recorder)
-    return TransmitterRun(agreement, node, build_uplink(agreement))
+    return TransmitterRun(agreement, node, build_uplink(agreement, wire))
 
 
 def fly_virtual(run: TransmitterRun, peer: Peer, should_stop: Stop) -> Outcome:

@@ -1,55 +1,24 @@
 """How a row becomes a JSON object, and how a channel describes its fields to a reader.
 
-Floats are written by `repr`, the shortest text that reads back as the same 64 bits. JSON has no
-infinity and no NaN; both become null.
+Floats are written as the shortest text that reads back as the same 64 bits. JSON has no infinity and
+no NaN; both become null. orjson does it some ten times faster than the standard library, which counts
+at 30,000 rows a second beside a flight on the virtual clock.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
+from typing import get_args
+
+import orjson
 
 from channel.recording import Field, FieldType, RecordChannel
 
 KEY_PROPERTY = "key"
 """In a schema: the name of the field that counts the rows (tick or sample)."""
 
-# The general encoder is correct for every type but two to three times slower than the functions
-# below, which are written for what nearly every row consists of: plain floats.
-_encode_any = json.JSONEncoder(allow_nan=False, separators=(",", ":")).encode
-
-
-def _number(value: object) -> str:
-    if type(value) is float:
-        # Only infinities and NaN differ from zero when subtracted from themselves.
-        return repr(value) if value - value == 0.0 else "null"
-    if type(value) is int:
-        return repr(value)
-    if isinstance(value, float):
-        return _number(float(value))
-    return _encode_any(value)
-
-
-def _numbers(values: object) -> str:
-    if isinstance(values, list | tuple):
-        return "[" + ",".join([_number(value) for value in values]) + "]"
-    return _encode_any(values)
-
-
-def _boolean(value: object) -> str:
-    if value is True:
-        return "true"
-    return "false" if value is False else _encode_any(value)
-
-
-_ENCODERS: dict[FieldType, Callable[[object], str]] = {
-    "number": _number,
-    "integer": _number,
-    "numbers": _numbers,
-    "integers": _numbers,
-    "boolean": _boolean,
-    "string": _encode_any,
-}
+_FIELD_TYPES: tuple[FieldType, ...] = get_args(FieldType)
 
 
 def row_encoder(channel: RecordChannel) -> Callable[[Sequence[object]], bytes]:
@@ -57,13 +26,10 @@ def row_encoder(channel: RecordChannel) -> Callable[[Sequence[object]], bytes]:
 
     It raises TypeError or ValueError for a row of the wrong length or a value JSON cannot hold.
     """
-    names = [json.dumps(field.name).replace("%", "%%") for field in channel.fields]
-    template = "{" + ",".join(f"{name}:%s" for name in names) + "}"
-    encoders = [_ENCODERS[field.type] for field in channel.fields]
+    names = [field.name for field in channel.fields]
 
     def encode(row: Sequence[object]) -> bytes:
-        texts = [encoder(value) for encoder, value in zip(encoders, row, strict=True)]
-        return (template % tuple(texts)).encode()
+        return orjson.dumps(dict(zip(names, row, strict=True)))
 
     return encode
 
@@ -110,7 +76,7 @@ def _field_from_schema(name: str, schema: dict[str, object]) -> Field:
     items = schema.get("items")
     if kind == "array" and isinstance(items, dict):
         kind = f"{items['type']}s"
-    for known in _ENCODERS:
+    for known in _FIELD_TYPES:
         if known == kind:
             return Field(
                 name,

@@ -6,7 +6,6 @@ a file without an end, so it is used for every file.
 
 from __future__ import annotations
 
-import json
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -14,6 +13,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import orjson
 from mcap.exceptions import McapError
 from mcap.records import Channel, Footer, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
@@ -53,7 +53,7 @@ class MessageStream:
 
     def __iter__(self) -> Iterator[tuple[str, int, Row]]:
         for topic, time_ns, data in self.undecoded():
-            yield topic, time_ns, json.loads(data)
+            yield topic, time_ns, orjson.loads(data)
 
     def undecoded(self) -> Iterator[tuple[str, int, bytes]]:
         """The same messages as the bytes in the file: for counting, where decoding is wasted."""

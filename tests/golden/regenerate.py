@@ -15,7 +15,12 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from channel import numerics
+from channel import numerics, wire
+from channel.codec import Codec
+from channel.coders.zoom import ZoomCoder, ZoomParameters
+from channel.frames import Bye, Commands, Desync, Echo, Frame, Hello, Refuse, Symbol, Welcome
+from channel.limits import from_millivolts
+from channel.models.pitch import PitchModel, PitchParameters
 
 FOLDER = Path(__file__).resolve().parent
 
@@ -41,7 +46,73 @@ def numerics_vectors() -> dict[str, list[list[str]]]:
     }
 
 
+def example_frames() -> list[Frame]:
+    """Return one frame of every kind and variant; the golden bytes are theirs, in this order."""
+    digest = 0x0123456789ABCDEF
+    echo = Echo(6, 1, digest, (1500, -1500, 0, 32767, -32768, 1))
+    return [
+        Hello(0xDEADBEEF, "0.1.0", bytes(range(16)), bytes(range(100, 108))),
+        Hello(0, "", bytes(16), bytes(8)),
+        Welcome(0x01020304, 5, 6, 0xDEADBEEF),
+        Refuse(0xDEADBEEF, "versions differ: 1 and \u00b5", '{"rate_baud": 10.0}'),
+        Symbol(0x01020304, 5, 0x0A0B0C0D, 1),
+        Symbol(0xFFFFFFFF, 0xFFFF, 0xFFFFFFFF, 0xFF),
+        Commands(0x01020304, 5, (echo,)),
+        Commands(0x01020304, 5, (echo, Echo(7, 0xFFFF, 2**64 - 1, (0, 1, 2, 3, 4, 5)))),
+        Commands(0x01020304, 0, (Echo(0, 0, 0, ()),)),
+        Desync(0x01020304, 5, 300, digest, digest + 1, bytes(range(32))),
+        Desync(0x01020304, 5, 0, 0, 1, b""),
+        Bye(0x01020304, "done"),
+        Bye(0, ""),
+    ]
+
+
+def frame_vectors() -> dict[str, list[list[str]]]:
+    """Return [kind, bytes in hex] of `example_frames`."""
+    frames = example_frames()
+    return {"frames": [[type(frame).__name__, wire.encode(frame).hex()] for frame in frames]}
+
+
+GOLDEN_CODECS: dict[str, Codec] = {
+    "paper": Codec(PitchModel(PitchParameters(), 0.01), ZoomCoder(ZoomParameters()), 10),
+    "three signs, impulse": Codec(
+        PitchModel(PitchParameters(), 0.01),
+        ZoomCoder(ZoomParameters(window=3, gains=((0.4,), (0.6,)), impulse=True)),
+        5,
+    ),
+}
+
+
+def codec_vectors() -> dict[str, list[list[object]]]:
+    """Return [word, millivolts of all ticks, digest, model in hex, coder in hex] of each sample."""
+    chooser = random.Random(20240614)
+    vectors: dict[str, list[list[object]]] = {}
+    for name, codec in GOLDEN_CODECS.items():
+        state = codec.initial()
+        rows: list[list[object]] = []
+        for sample in range(60):
+            word = None if sample % 9 == 4 else (chooser.choice((-1, 1, 1)),)
+            pairs = [
+                (chooser.randrange(-5000, 5001), chooser.randrange(-5000, 5001))
+                for _ in range(codec.ticks_per_sample)
+            ]
+            state = codec.step(state, word, [from_millivolts(pair) for pair in pairs])
+            rows.append(
+                [
+                    word and list(word),
+                    [value for pair in pairs for value in pair],
+                    f"{codec.digest(state):016x}",
+                    [value.hex() for value in state.model],
+                    [value.hex() for value in state.coder],
+                ]
+            )
+        vectors[name] = rows
+    return vectors
+
+
 GENERATORS: dict[str, Callable[[], object]] = {
+    "codec": codec_vectors,
+    "frames": frame_vectors,
     "numerics": numerics_vectors,
 }
 """Name of each golden file (without .json) and what makes its content."""

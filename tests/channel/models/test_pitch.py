@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -67,7 +68,7 @@ def test_when_a_sample_is_flown_then_it_solves_the_observer_equation(zoom: objec
 
 def test_when_the_tick_is_halved_then_the_error_falls_sixteenfold() -> None:
     errors = [error_after_one_sample(ticks) for ticks in (1, 2, 4, 8)]
-    for coarse, fine in zip(errors, errors[1:], strict=False):
+    for coarse, fine in itertools.pairwise(errors):
         assert 12.0 < coarse / fine < 22.0, errors
 
 

@@ -25,6 +25,11 @@ class LinkCounts:
     bytes_in: int = 0
     dropped: Counter[str] = field(default_factory=Counter)
     """messages not taken, by reason"""
+    reconnects: int = 0
+    """times that a line which had gone came back"""
+    line_bytes_out: int = 0
+    """on lines that we frame ourselves: every byte put there, framing and notices included"""
+    line_bytes_in: int = 0
 
 
 class Link(Protocol):

@@ -1,4 +1,4 @@
-"""Consistent overhead byte stuffing (Cheshire and Baker): bytes without zeros, so that zero can delimit.
+"""Consistent overhead byte stuffing (Cheshire and Baker): no zeros within, so that zero can delimit.
 
 A message is cut at its zeros; each piece is preceded by its length plus one, and a piece of 254 bytes
 without a zero by 255. The cost is one byte for up to 254.

@@ -5,8 +5,9 @@ bounded queue. When the port goes, as a USB adapter does when it is pulled out, 
 open it again until it is back; what is sent meanwhile is dropped and counted, as on any line.
 
 A serial line does not tell who is at its other end, so the two links tell each other, in seven bytes
-each time: a link that opens asks, the other answers, and one that closes says so. `peer_present` is
-what follows from that: the port is open, and the peer was heard within `quiet_s` and has not closed.
+each time: a link that opens asks, the other answers, and one that closes says so. On a line so slow
+that this would hold symbols up they keep quiet. `peer_present` is what follows: the port is open, and
+the peer was heard within `quiet_s` and has not taken leave.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from channel.links.serial_port import check_port, open_port
 from channel.serial_budget import LINE_BITS_PER_BYTE
 from channel.serial_stream import Deframer, Received
 from channel.serial_wire import SerialWire, stuff, stuff_notice
+from channel.wire import Wire
 
 DEFAULT_LINE_RATE_BAUD = 115_200
 
@@ -64,7 +66,8 @@ class SerialLink(LinkBase):
     ) -> None:
         super().__init__()
         check_port(port, insecure)
-        self.wire: SerialWire = wire
+        self.wire: Wire = wire
+        self._symbols = wire
         self._url = port
         self._line_rate_baud = line_rate_baud
         self._symbol_age_max_s = symbol_age_max_s
@@ -75,20 +78,21 @@ class SerialLink(LinkBase):
         self._busy_until = 0.0
         self._last_message = (b"", 0.0)
         self._heard_at: float | None = None
+        self._leaving = False
         self._stop = threading.Event()
         self._writing = threading.Lock()
         self._port: serial.SerialBase | None = open_port(port, line_rate_baud)
         self._thread = threading.Thread(target=self._read, name="serial", daemon=True)
         self._thread.start()
-        self._write(stuff_notice(_ASK))
+        self._notify(_ASK)
 
     def send(self, data: bytes, is_symbol: bool = False) -> None:
         """Put one message on the line; dropped and counted when the line is gone or far behind."""
         if self._stop.is_set():
             raise LinkError("the link is closed")
-        raw = data if is_symbol and self.wire.is_symbol(data) else stuff(data)
+        raw = data if is_symbol and self._symbols.is_symbol(data) else stuff(data)
         now = time.monotonic()
-        duration_s = len(raw) * LINE_BITS_PER_BYTE / self._line_rate_baud
+        duration_s = self._duration_s(raw)
         last, again_at = self._last_message
         if duration_s > LONG_MESSAGE_S and data == last and now < again_at:
             self._drop("repeated too soon")
@@ -129,7 +133,10 @@ class SerialLink(LinkBase):
         """Take leave, let what was sent go out, and give the port back."""
         if self._stop.is_set():
             return
-        self._write(stuff_notice(_GONE))
+        with self._writing:
+            # No answer to a question that is just arriving may follow the farewell.
+            self._leaving = True
+        self._notify(_GONE)
         port = self._port
         with contextlib.suppress(*_PORT_ERRORS):
             if port is not None:
@@ -143,10 +150,20 @@ class SerialLink(LinkBase):
     def _drop(self, kind: str) -> None:
         self.counts.dropped[kind] += 1
 
-    def _write(self, raw: bytes) -> bool:
+    def _notify(self, body: bytes) -> None:
+        raw = stuff_notice(body)
+        if self._duration_s(raw) <= LONG_MESSAGE_S:
+            self._write(raw, is_answer=body == _HERE)
+
+    def _duration_s(self, raw: bytes) -> float:
+        return len(raw) * LINE_BITS_PER_BYTE / self._line_rate_baud
+
+    def _write(self, raw: bytes, is_answer: bool = False) -> bool:
         """Put bytes on the line; return whether they are on it, all of them."""
         with self._writing:
             port = self._port
+            if is_answer and self._leaving:
+                return False
             if port is None:
                 self._drop("unplugged")
                 return False
@@ -173,7 +190,7 @@ class SerialLink(LinkBase):
             try:
                 data = port.read(1)
                 if data:
-                    data += port.read(port.in_waiting)
+                    data += port.read(port.in_waiting)  # type: ignore[attr-defined]
             except _PORT_ERRORS:
                 self._lose(port)
                 continue
@@ -186,7 +203,7 @@ class SerialLink(LinkBase):
         if received.is_notice:
             self._heard_at = None if received.message == _GONE else now
             if received.message == _ASK:
-                self._write(stuff_notice(_HERE))
+                self._notify(_HERE)
             return
         self._heard_at = now
         if self._inbox.qsize() >= QUEUE_MESSAGES_MAX:
@@ -213,7 +230,7 @@ class SerialLink(LinkBase):
             self._busy_until = 0.0
             with self._writing:
                 self._port = port
-            self._write(stuff_notice(_ASK))
+            self._notify(_ASK)
             return
 
 

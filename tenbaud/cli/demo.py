@@ -26,8 +26,14 @@ def demo(
     lead: options.Lead = None,
     delivery: options.Delivery = None,
     link: Annotated[
-        str | None, typer.Option(help="zenoh: two processes; memory: both ends in this one.")
+        str | None,
+        typer.Option(
+            help="zenoh: two processes; memory: both ends in this one; serial: two processes "
+            "and a line between them that this command emulates."
+        ),
     ] = None,
+    line_rate: options.LineRate = None,
+    downlink: options.Downlink = None,
     rig: Annotated[
         str | None, typer.Option(help="simulated, or replay:FILE for a recorded flight.")
     ] = None,
@@ -73,6 +79,8 @@ def demo(
                     lead=lead,
                     delivery=delivery,
                     link=link,
+                    line_rate=line_rate,
+                    downlink=downlink,
                     rig=rig,
                     mismatch=off,
                     disturbance=disturbance,

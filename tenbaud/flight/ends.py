@@ -41,7 +41,9 @@ def open_link(agreement: Agreement, role: Role, endpoints: Endpoints) -> Link:
     if agreement.config.link.kind == "serial":
         from tenbaud.serial_terms import open_serial
 
-        return open_serial(agreement, role, endpoints.insecure, lambda: _zenoh(agreement, role, endpoints))
+        return open_serial(
+            agreement, role, endpoints.insecure, lambda: _zenoh(agreement, role, endpoints)
+        )
     return _zenoh(agreement, role, endpoints)
 
 

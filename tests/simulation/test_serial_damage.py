@@ -94,9 +94,9 @@ def test_when_nothing_is_damaged_then_the_serial_wire_changes_no_bit_of_the_flig
     plain = pitch_flight(THREE_SIGNS, mismatch=0.1).fly(20.0)
     up = StreamLine(WIRE, 0.0, 0, upward=True)
     down = StreamLine(WIRE, 0.0, 1, upward=False)
-    serial = pitch_flight(
-        THREE_SIGNS, mismatch=0.1, uplink_line=up, downlink_line=down, wire=WIRE
-    ).fly(20.0)
+    serial = pitch_flight(THREE_SIGNS, mismatch=0.1, uplink_line=up, downlink_line=down, wire=WIRE).fly(
+        20.0
+    )
     assert serial.digests == plain.digests
     assert not up.dropped
     assert not down.dropped

@@ -135,6 +135,10 @@ class EmulatedLine:
         """Return how many of them were changed on the way."""
         return self._ways[way].damaged
 
+    def spoil(self, way: Way, share: float) -> None:
+        """Change this share of the bytes from now on."""
+        self._ways[way].damage = share
+
     def inject(self, way: Way, data: bytes) -> None:
         """Put bytes on the line that nobody sent."""
         with self._lock:

@@ -37,9 +37,12 @@ class Link(Protocol):
 
     name: str
     """of the kind of link, for summaries"""
-    counts: LinkCounts
     wire: Wire
     """how frames look on this kind of line"""
+
+    @property
+    def counts(self) -> LinkCounts:
+        """Return what went over it until now."""
 
     def send(self, data: bytes, is_symbol: bool = False) -> None:
         """Put one message on the line. `is_symbol` marks the paid path of the uplink."""

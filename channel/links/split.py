@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 from channel.frames import Frame
-from channel.links.base import Link, LinkBase, Role
+from channel.links.base import Link, LinkCounts, Role
 from channel.wire import Wire
 
 DOWNWARD_KINDS = (2, 3, 5)
@@ -31,16 +33,28 @@ class SplitWire:
         return (self._down if downward else self._up).size(data)
 
 
-class SplitLink(LinkBase):
+class SplitLink:
     """Sends on one link and hears on the other, as the role asks; owns and closes both."""
 
     def __init__(self, role: Role, up: Link, down: Link) -> None:
-        super().__init__()
         self.name = f"{up.name} up, {down.name} down"
-        self.wire = SplitWire(up.wire, down.wire)
+        self.wire: Wire = SplitWire(up.wire, down.wire)
         self._out, self._in = (up, down) if role == "transmitter" else (down, up)
-        # One set of counts for both: what goes out counts on one, what comes in on the other.
-        up.counts = down.counts = self.counts
+
+    @property
+    def counts(self) -> LinkCounts:
+        """Return what went out on the one, came in on the other, and was dropped on both."""
+        out, come = self._out.counts, self._in.counts
+        return LinkCounts(
+            messages_out=out.messages_out,
+            bytes_out=out.bytes_out,
+            messages_in=come.messages_in,
+            bytes_in=come.bytes_in,
+            dropped=out.dropped + come.dropped,
+            reconnects=out.reconnects + come.reconnects,
+            line_bytes_out=out.line_bytes_out + come.line_bytes_out,
+            line_bytes_in=out.line_bytes_in + come.line_bytes_in,
+        )
 
     def send(self, data: bytes, is_symbol: bool = False) -> None:
         """Put one message on the outward line."""
@@ -58,3 +72,9 @@ class SplitLink(LinkBase):
         """Give both lines back."""
         self._out.close()
         self._in.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

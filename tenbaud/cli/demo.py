@@ -25,13 +25,7 @@ def demo(
     seed: options.Seed = None,
     lead: options.Lead = None,
     delivery: options.Delivery = None,
-    link: Annotated[
-        str | None,
-        typer.Option(
-            help="zenoh: two processes; memory: both ends in this one; serial: two processes "
-            "and a line between them that this command emulates."
-        ),
-    ] = None,
+    link: options.DemoLink = None,
     line_rate: options.LineRate = None,
     downlink: options.Downlink = None,
     rig: Annotated[

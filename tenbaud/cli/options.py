@@ -52,6 +52,13 @@ Session = Annotated[
 Listen = Annotated[list[str] | None, typer.Option(help="Zenoh endpoint to listen on; repeatable.")]
 Connect = Annotated[list[str] | None, typer.Option(help="Zenoh endpoint to connect to; repeatable.")]
 Link = Annotated[str | None, typer.Option(help="zenoh, or serial with --port.", show_default=False)]
+DemoLink = Annotated[
+    str | None,
+    typer.Option(
+        help="zenoh: two processes; serial: two processes and an emulated line between them; memory: "
+        "both ends in this process."
+    ),
+]
 Port = Annotated[
     str | None,
     typer.Option(

@@ -84,6 +84,10 @@ class TransmitterSession:
             enumerate([terms.initial_command] * terms.lead_ticks)
         )
         """commands of coming ticks"""
+        self._slots_of_offset: dict[int, list[int]] = {}
+        """for each tick of a sample at which slots begin, their places in the word"""
+        for index in range(terms.symbols_per_word):
+            self._slots_of_offset.setdefault(terms.slot_tick(index), []).append(index)
         self._tick = 0
         self._word: Word = ERASED
 
@@ -117,17 +121,14 @@ class TransmitterSession:
         if offset == 0 and self.copies.next_sample == sample:
             self._word = self.codec.encode(self.copies.state_before_next(), measurement)
             self.copies.sent(self._word)
-        return self._symbols_due(tick, sample)
+        return self._symbols_due(sample, offset)
 
-    def _symbols_due(self, tick: int, sample: int) -> list[Symbol]:
-        if self._word is ERASED:
+    def _symbols_due(self, sample: int, offset: int) -> list[Symbol]:
+        due = self._slots_of_offset.get(offset)
+        if due is None or self._word is ERASED:
             return []
-        count = self.terms.symbols_per_word
-        return [
-            self._symbol(sample * count + index, self._word[index])
-            for index in range(count)
-            if self.terms.slot_tick(sample * count + index) == tick
-        ]
+        first = sample * self.terms.symbols_per_word
+        return [self._symbol(first + index, self._word[index]) for index in due]
 
     def _symbol(self, slot: int, symbol: int) -> Symbol:
         number = self.codec.coder.alphabet.symbol_number(symbol)

@@ -2,93 +2,21 @@
 
 from __future__ import annotations
 
-import random
+import math
 from dataclasses import replace
 
 import pytest
 
+from channel import numerics
 from channel.codec import Codec
-from channel.coders.zoom import ZoomCoder
 from channel.line import Delivery, Line
-from channel.words import WIRE_ERASED, Alphabet
-from tests.channel.chua import (
-    CHUA_TICK_S,
-    CHUA_TICKS_PER_SAMPLE,
-    CHUA_ZOOM,
-    ChuaModel,
-    ChuaPlant,
-)
-from tests.channel.parts import PAPER, THREE_SIGNS, ConstantController, terms
-from tests.channel.two_axes import TWO_AXES_ZOOM, TwoAxes, TwoAxesPlant
-from tests.simulation.flight import Flight, assemble, pitch_flight
+from channel.models import pitch
+from tests.channel.parts import PAPER, THREE_SIGNS
+from tests.simulation.flight import assert_lockstep, pitch_flight
+from tests.simulation.lines import DelayingLine, JitterLine, LossyLine, SlowDownlink
 from transmitter.session import Phase
 
 MS = 1_000_000
-SEED = 20240617
-
-
-class LossyLine(Line):
-    """Loses a share of the symbols, or the ones that are named."""
-
-    def __init__(
-        self, share: float = 0.0, lost: frozenset[int] = frozenset(), delay_ns: int = 0
-    ) -> None:
-        super().__init__(delay_ns)
-        self._share = share
-        self._lost = lost
-        self._chooser = random.Random(SEED)
-        self._symbols = 0
-        self.losses = 0
-
-    def carry(self, data: bytes, is_symbol: bool, now_ns: int) -> list[Delivery]:
-        deliveries = super().carry(data, is_symbol, now_ns)
-        if is_symbol:
-            number = self._symbols
-            self._symbols += 1
-            if number in self._lost or self._chooser.random() < self._share:
-                self.losses += 1
-                return [Delivery(delivery.arrival_ns, None) for delivery in deliveries]
-        return deliveries
-
-
-class JitterLine(Line):
-    """Delays each symbol by a random time from 0 to `jitter_ns`."""
-
-    def __init__(self, jitter_ns: int) -> None:
-        super().__init__()
-        self._jitter_ns = jitter_ns
-        self._chooser = random.Random(SEED)
-
-    def carry(self, data: bytes, is_symbol: bool, now_ns: int) -> list[Delivery]:
-        extra_ns = self._chooser.randrange(self._jitter_ns + 1) if is_symbol else 0
-        return [Delivery(now_ns + extra_ns, data)]
-
-
-class DelayingLine(Line):
-    """Delays the symbols that are named by `extra_ns`."""
-
-    def __init__(self, numbers: frozenset[int], extra_ns: int) -> None:
-        super().__init__()
-        self._numbers = numbers
-        self._extra_ns = extra_ns
-        self._symbols = 0
-
-    def carry(self, data: bytes, is_symbol: bool, now_ns: int) -> list[Delivery]:
-        extra_ns = self._extra_ns if is_symbol and self._symbols in self._numbers else 0
-        self._symbols += is_symbol
-        return [Delivery(now_ns + extra_ns, data)]
-
-
-def assert_lockstep(flight: Flight, samples: int) -> None:
-    """One digest check per sample, every one of them equal, and nothing left over."""
-    assert flight.transmitter.counts["digest_checks"] == samples
-    assert flight.transmitter.counts["desyncs"] == 0
-    assert flight.receiver.counts["desyncs"] == 0
-    assert flight.transmitter.copies.confirmed == flight.receiver.state
-    assert flight.transmitter.copies.lag_samples == 0
-    assert flight.digests == flight.received.column("sample", "digest")
-    assert len(set(flight.digests)) == samples
-    assert flight.transmitter.counts["stale_frames"] == flight.receiver.counts["stale_frames"] == 0
 
 
 @pytest.mark.parametrize(
@@ -203,19 +131,6 @@ def test_when_symbols_arrive_at_other_times_within_their_deadlines_then_states_a
         assert columns[0] == columns[1]
 
 
-class SlowDownlink(Line):
-    """Takes its time for everything but the handshake."""
-
-    def __init__(self, delay_ns: int) -> None:
-        super().__init__()
-        self._slow_ns = delay_ns
-        self._frames = 0
-
-    def carry(self, data: bytes, is_symbol: bool, now_ns: int) -> list[Delivery]:
-        self._frames += 1
-        return [Delivery(now_ns + (self._slow_ns if self._frames > 1 else 0), data)]
-
-
 @pytest.mark.parametrize(("delay_ms", "late"), [(10, False), (30, False), (31, True)])
 def test_when_the_downlink_is_slow_then_commands_are_late_only_beyond_the_lead(
     delay_ms: int, late: bool
@@ -252,10 +167,6 @@ class WrongSine:
         self.measured = codec.model.measured
 
     def tick(self, state, command, held):  # type: ignore[no-untyped-def]
-        import math
-
-        from channel import numerics
-        from channel.models import pitch
 
         self.ticks += 1
         if self.ticks <= self._first_tick:
@@ -301,71 +212,6 @@ def test_when_one_end_computes_a_sine_one_ulp_off_then_it_is_reported_and_ends_s
     assert flight.ticks <= report.sample * 10 + 60
     applied = flight.sent.column("tick", "applied_volts")
     assert applied[-1] == (0.0, 0.0)
-
-
-# Other models
-
-
-def test_when_chua_is_flown_through_both_sessions_then_no_command_is_needed() -> None:
-    codec = Codec(ChuaModel(CHUA_TICK_S), ZoomCoder(CHUA_ZOOM), CHUA_TICKS_PER_SAMPLE)
-    flight_terms = terms(tick_ns=5 * MS, rate_baud=20.0, initial_command=(), lead_ticks=7)
-    flight_terms.check("real")
-    flight = assemble(
-        codec,
-        flight_terms,
-        ChuaPlant(CHUA_TICK_S),
-        ConstantController(),
-        uplink_line=LossyLine(0.05),
-        window_start_tick=4000,
-        safe_volts=(),
-        counts_per_turn=100_000,
-    ).fly(100.0)
-    assert flight.ticks == 20_000
-    assert flight.transmitter.counts["digest_checks"] == flight.receiver.state.sample >= 1990
-    assert flight.transmitter.counts["desyncs"] == 0
-    assert flight.node.commands_late == 0
-    assert flight.node.scores.angle_max_rad > 1.5
-    assert flight.node.scores.coded.largest < 0.2
-
-
-@pytest.mark.parametrize("ticks", [4, 5])
-def test_when_two_axes_are_flown_then_a_word_takes_two_slots(ticks: int) -> None:
-    codec = Codec(TwoAxes(0.01), ZoomCoder(TWO_AXES_ZOOM), ticks)
-    flight_terms = terms(
-        ticks_per_sample=ticks, symbols_per_word=2, rate_baud=50.0, lead_ticks=2 * ticks
-    )
-    flight_terms.check("real")
-
-    class Damper(ConstantController):
-        def command(self, tick, state):  # type: ignore[no-untyped-def]
-            return (-4.0 * state[0] - 4.0 * state[2], -4.0 * state[1] - 4.0 * state[3])
-
-    flight = assemble(
-        codec, flight_terms, TwoAxesPlant(0.01, (0.4, -0.2, 0.0, 0.3)), Damper(), window_start_tick=1000
-    ).fly(20.0)
-    samples = 2000 // ticks
-    assert_lockstep(flight, samples)
-    assert flight.receiver.counts["erasures"] == 0
-    assert flight.virtual._uplink.meter.symbols == 2 * samples
-    assert flight.node.scores.coded.largest < 0.05
-    assert flight.node.scores.angle_max_rad < 0.2
-
-
-def test_when_one_symbol_of_a_word_of_two_is_lost_then_both_ends_see_the_word_erased() -> None:
-    codec = Codec(TwoAxes(0.01), ZoomCoder(TWO_AXES_ZOOM), 4)
-    flight_terms = terms(ticks_per_sample=4, symbols_per_word=2, rate_baud=50.0, lead_ticks=8)
-    lost = frozenset({20, 31, 40, 41})
-    flight = assemble(
-        codec,
-        flight_terms,
-        TwoAxesPlant(0.01, (0.1, 0.0, 0.0, 0.0)),
-        ConstantController(0.0, 0.0),
-        uplink_line=LossyLine(lost=lost),
-    ).fly(2.0)
-    assert_lockstep(flight, 50)
-    words = flight.sent.column("sample", "word")
-    assert [sample for sample, word in enumerate(words) if word is None] == [10, 15, 20]
-    assert Alphabet((-1, 1), 2).word(WIRE_ERASED) is None
 
 
 def test_when_command_frames_are_lost_within_the_repeats_then_nothing_is_missing() -> None:

@@ -78,9 +78,7 @@ class Scores:
     def on_estimate(self, tick: int, coded: Vector, live: Vector | None) -> None:
         """Note what was estimated of a tick; ticks come in order."""
         measured = self._model.measured
-        self._estimates.append(
-            (tick, measured(coded)[0], None if live is None else measured(live)[0])
-        )
+        self._estimates.append((tick, measured(coded)[0], None if live is None else measured(live)[0]))
         self._join()
 
     def _join(self) -> None:

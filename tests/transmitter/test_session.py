@@ -7,11 +7,13 @@ from typing import Any
 
 import pytest
 
-from channel.codec import CodecState, Vector
+from channel.codec import Codec, CodecState, Vector
+from channel.coders.zoom import ZoomCoder
 from channel.events import EventKind
 from channel.frames import Bye, Commands, Desync, Echo, ForeignVersion, Frame, Refuse, Symbol, Welcome
 from channel.words import ERASED, WIRE_ERASED, Word
 from tests.channel.parts import identity_of, pitch_codec, terms
+from tests.channel.two_axes import TWO_AXES_ZOOM, TwoAxes
 from transmitter.session import LAG_SAMPLES_MAX, Phase, TransmitterSession
 
 CODEC = pitch_codec()
@@ -147,6 +149,34 @@ def test_when_ticks_were_missed_then_their_samples_send_nothing_and_nothing_is_m
     assert symbol.slot == 4
     assert session.counts["words_missed"] == 3
     assert session.copies.lag_samples == 5
+
+
+def two_axes() -> TransmitterSession:
+    """Return a session whose words have two symbols."""
+    codec = Codec(TwoAxes(0.01), ZoomCoder(TWO_AXES_ZOOM), 10)
+    session = TransmitterSession(codec, terms(symbols_per_word=2), IDENTITY, INCARNATION)
+    session.on_frame(Welcome(SESSION, 0, 0, INCARNATION))
+    return session
+
+
+def test_when_a_word_has_two_symbols_then_each_leaves_at_the_beginning_of_its_slot() -> None:
+    session = two_axes()
+    left = {}
+    for tick in range(20):
+        # Only the measurement of the first tick counts; what follows must not change the word.
+        angles = (0.5, -0.5) if tick == 0 else (-0.5, 0.5) if tick == 10 else (9.0, 9.0)
+        for symbol in session.on_measurement(tick, angles):
+            left[tick] = (symbol.slot, symbol.number)
+    assert left == {0: (0, 1), 5: (1, 0), 10: (2, 0), 15: (3, 1)}
+
+
+def test_when_the_first_tick_of_a_word_was_missed_then_none_of_its_symbols_leaves() -> None:
+    session = two_axes()
+    assert len(session.on_measurement(0, (0.5, 0.5))) == 1
+    assert session.on_measurement(15, (0.5, 0.5)) == []
+    assert [symbol.slot for symbol in session.on_measurement(20, (0.5, 0.5))] == [4]
+    assert [symbol.slot for symbol in session.on_measurement(25, (0.5, 0.5))] == [5]
+    assert session.counts["words_missed"] == 1
 
 
 def test_when_echoes_stay_away_then_slots_do_not_wait_until_the_session_is_given_up() -> None:

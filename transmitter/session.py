@@ -84,12 +84,7 @@ class TransmitterSession:
             enumerate([terms.initial_command] * terms.lead_ticks)
         )
         """commands of coming ticks"""
-        self._slots_of_offset: dict[int, list[int]] = {}
-        """for each tick of a sample at which slots begin, their places in the word"""
-        for index in range(terms.symbols_per_word):
-            self._slots_of_offset.setdefault(terms.slot_tick(index), []).append(index)
         self._tick = 0
-        self._word: Word = ERASED
 
     # What happens at a tick
 
@@ -101,7 +96,9 @@ class TransmitterSession:
         )
 
     def on_measurement(self, tick: int, measurement: Vector) -> list[Symbol]:
-        """Take the measurement of a tick; return the symbols whose slots begin with it.
+        """Take the measurement of a tick; return the symbols of the sample that begins with it.
+
+        A word has a slot for each of its symbols; whoever sends them holds each until its slot.
 
         A tick that was never seen, because the process was held up, sent no symbol: its sample's
         word counts as not sent, and the next sample starts afresh.
@@ -113,22 +110,15 @@ class TransmitterSession:
         while self.copies.next_sample < sample:
             self.counts["words_missed"] += 1
             self.copies.sent(ERASED)
-        if self.copies.next_sample == sample:
-            self._word = ERASED
         if self.copies.lag_samples > LAG_SAMPLES_MAX:
             self._end(f"no echo for {LAG_SAMPLES_MAX} samples: the receiver or its line is gone")
             return []
-        if offset == 0 and self.copies.next_sample == sample:
-            self._word = self.codec.encode(self.copies.state_before_next(), measurement)
-            self.copies.sent(self._word)
-        return self._symbols_due(sample, offset)
-
-    def _symbols_due(self, sample: int, offset: int) -> list[Symbol]:
-        due = self._slots_of_offset.get(offset)
-        if due is None or self._word is ERASED:
+        if offset != 0 or self.copies.next_sample != sample:
             return []
+        word = self.codec.encode(self.copies.state_before_next(), measurement)
+        self.copies.sent(word)
         first = sample * self.terms.symbols_per_word
-        return [self._symbol(first + index, self._word[index]) for index in due]
+        return [self._symbol(slot, symbol) for slot, symbol in enumerate(word, first)]
 
     def _symbol(self, slot: int, symbol: int) -> Symbol:
         number = self.codec.coder.alphabet.symbol_number(symbol)
@@ -153,7 +143,7 @@ class TransmitterSession:
                 return self._on_refuse(frame)
             case Bye() if self._is_current(frame.session):
                 self._end(f"the receiver ended the flight: {frame.reason}")
-            case ForeignVersion():
+            case ForeignVersion() if self.phase is Phase.GREETING:
                 self.refusal = (
                     f"the receiver speaks wire version {frame.version}, this end {WIRE_VERSION}: "
                     "install the same tenbaud on both"

@@ -112,19 +112,12 @@ def test_when_a_second_transmitter_leaves_then_the_flight_goes_on() -> None:
     assert session.phase is Phase.FLYING
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="a frame of another version in flight sets a refusal, and the real service leaves on it",
-)
 def test_when_a_frame_of_another_version_comes_in_flight_then_it_is_no_refusal() -> None:
     session = flying()
     session.on_frame(ForeignVersion(9), 0)
     assert session.refusal is None
 
 
-@pytest.mark.xfail(
-    strict=True, reason="the refusal of an earlier transmitter stays when the next one flies"
-)
 def test_when_a_right_transmitter_follows_a_refused_one_then_the_refusal_is_forgotten() -> None:
     session = receiver()
     session.on_frame(hello(version="2.0"), 0)
@@ -132,9 +125,6 @@ def test_when_a_right_transmitter_follows_a_refused_one_then_the_refusal_is_forg
     assert session.refusal is None
 
 
-@pytest.mark.xfail(
-    strict=True, reason="the refusal quotes the foreign version text, so the frame may grow too long"
-)
 def test_when_a_foreign_version_text_is_long_then_the_refusal_can_still_be_sent() -> None:
     (answer,) = receiver().on_frame(hello(version="v" * 16_340), 0)
     wire.encode(answer)

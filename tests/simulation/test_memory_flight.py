@@ -142,10 +142,6 @@ def test_when_the_downlink_is_slow_then_commands_are_late_only_beyond_the_lead(
     assert len(flight.digests) >= 99
 
 
-@pytest.mark.xfail(
-    strict=True,
-    reason="greet() passes time to 0 only, so with any downlink delay the first samples go by unsent",
-)
 def test_when_the_downlink_is_slow_then_the_handshake_is_still_over_before_the_flight() -> None:
     line = Line(delay_ns=10 * MS)
     flight = pitch_flight(lead_ticks=3, downlink_line=line).fly(10.0)

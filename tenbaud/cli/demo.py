@@ -35,7 +35,7 @@ def demo(
         list[float] | None,
         typer.Option(
             help="Simulated plant off the codec's model, 0.1 for 10 %; repeatable. Not given: 0 "
-            "and 0.1, one flight each (with --json, 0 alone).",
+            "and 0.1, one flight each (one as configured with --json or --config).",
             show_default=False,
         ),
     ] = None,
@@ -59,7 +59,7 @@ def demo(
     replayed = rig is not None and rig.startswith("replay")
     flights: list[float | None] = list(mismatch or ())
     if not flights:
-        single = json or replayed
+        single = json or replayed or config is not None
         flights = [None] if single else list(DEFAULT_MISMATCHES)
     if preset is None and config is None and replayed:
         preset = "uiuc-10baud"

@@ -148,9 +148,13 @@ def _run(
         mode,  # type: ignore[arg-type]
     )
     if whole:
-        from tenbaud.flight.report import write_summary
+        from tenbaud.flight.report import draw_run, figure_title, write_summary
 
         write_summary(folder, summary)
+        if role == "transmitter" and summary["samples"]:
+            problem = draw_run(folder, figure_title(config, summary))
+            if problem is not None:
+                typer.echo(problem, err=True)
     if as_json:
         ends.write_json(summary)
     elif whole and summary["samples"]:

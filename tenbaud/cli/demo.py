@@ -35,13 +35,11 @@ def demo(
         list[float] | None,
         typer.Option(
             help="Simulated plant off the codec's model, 0.1 for 10 %; repeatable. Not given: 0 "
-            "and 0.1, one flight each (with --json, 0 alone).",
+            "and 0.1, one flight each (one as configured with --json or --config).",
             show_default=False,
         ),
     ] = None,
-    disturbance: Annotated[
-        str | None, typer.Option(help='Torque on the plant, such as "q=2e-3,step=0.5@30".')
-    ] = None,
+    disturbance: options.Disturbance = None,
     settings: options.Settings = None,
     out: options.Out = None,
     json: options.AsJson = False,
@@ -53,12 +51,13 @@ def demo(
     [dim]tenbaud demo --preset tuned-10baud --clock real --duration 20 --mismatch 0.1[/dim]
     """
     from tenbaud.build import agree
+    from tenbaud.build_ends import check_parts
     from tenbaud.config.load import load_config
 
     replayed = rig is not None and rig.startswith("replay")
     flights: list[float | None] = list(mismatch or ())
     if not flights:
-        single = json or replayed
+        single = json or replayed or config is not None
         flights = [None] if single else list(DEFAULT_MISMATCHES)
     if preset is None and config is None and replayed:
         preset = "uiuc-10baud"
@@ -85,6 +84,8 @@ def demo(
         )
         for off in flights
     ]
+    for agreement in agreements:
+        check_parts(agreement.config)
     raise typer.Exit(_fly_all(agreements, out, json))
 
 

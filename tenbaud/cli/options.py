@@ -76,6 +76,9 @@ Downlink = Annotated[
         show_default=False,
     ),
 ]
+Disturbance = Annotated[
+    str | None, typer.Option(help='Torque on the plant, such as "q=2e-3,step=0.5@30".')
+]
 Insecure = Annotated[
     bool,
     typer.Option(help="Allow addresses beyond this machine without encryption or authentication."),

@@ -24,11 +24,10 @@ from tenbaud.build import Agreement
 from tenbaud.config.load import dump_config
 from tenbaud.flight.ends import run_in_memory
 from tenbaud.flight.outcome import ExitCode
-from tenbaud.flight.report import write_summary
+from tenbaud.flight.report import draw_run, figure_title, write_summary
 from tenbaud.flight.status import Status
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, joined
-from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RunFolder
 from tenbaud.serial_line import EmulatedLine
 
@@ -56,19 +55,10 @@ def fly_demo(agreement: Agreement, folder: RunFolder, on_status: OnStatus) -> De
     else:
         result = _fly_processes(agreement, folder, on_status)
     write_summary(folder, result.summary)
-    try:
-        _draw(agreement, folder, result.summary)
-    except (RecordingError, OSError) as error:
-        result.messages.append(f"no figure was drawn: {error}")
+    problem = draw_run(folder, figure_title(agreement.config, result.summary))
+    if problem is not None:
+        result.messages.append(problem)
     return result
-
-
-def _draw(agreement: Agreement, folder: RunFolder, summary: Summary) -> None:
-    from tenbaud.recording.figure import draw_flight
-
-    config = agreement.config
-    title = f"{config.preset}: {summary.get('plant', '')}, {config.channel.rate_baud:g} bit/s"
-    draw_flight(folder.transmitter, folder.receiver, folder.figure, title)
 
 
 def _fly_processes(agreement: Agreement, folder: RunFolder, on_status: OnStatus) -> DemoResult:

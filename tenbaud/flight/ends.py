@@ -56,6 +56,7 @@ def _zenoh(agreement: Agreement, role: Role, endpoints: Endpoints) -> Link:
         listen=endpoints.listen,
         connect=endpoints.connect,
         insecure=endpoints.insecure,
+        clock=agreement.clock,
     )
 
 

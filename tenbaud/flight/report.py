@@ -6,7 +6,9 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
+from tenbaud.config.schema import FlightConfig
 from tenbaud.flight.summary import Summary
+from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RunFolder
 
 ROWS: tuple[tuple[str, str, str], ...] = (
@@ -44,6 +46,23 @@ def write_summary(folder: RunFolder, summary: Summary) -> None:
         import typer
 
         typer.echo(f"tenbaud: {folder.summary} could not be written: {error.strerror}", err=True)
+
+
+def draw_run(folder: RunFolder, title: str) -> str | None:
+    """Draw the figure of a run from the recordings that are there; return what went wrong, if so."""
+    from tenbaud.recording.figure import draw_flight
+
+    receiver = folder.receiver if folder.receiver.is_file() else None
+    try:
+        draw_flight(folder.transmitter, receiver, folder.figure, title)
+    except (RecordingError, OSError) as error:
+        return f"no figure was drawn: {error}"
+    return None
+
+
+def figure_title(config: FlightConfig, summary: Summary) -> str:
+    """Return what stands over a flight's figure."""
+    return f"{config.preset}: {summary.get('plant', '')}, {config.channel.rate_baud:g} bit/s"
 
 
 def show_summary(summary: Summary, folder: RunFolder) -> None:

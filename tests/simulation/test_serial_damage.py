@@ -44,7 +44,9 @@ def assert_nothing_silent(flight: Flight) -> None:
 
 
 def uplink_damage(samples: int) -> None:
-    flight, up = damaged_flight(seed=1, damage_down=0.0, ticks_per_sample=2, deadline_allowance_ns=0)
+    flight, up = damaged_flight(
+        seed=1, damage_down=0.0, ticks_per_sample=2, deadline_allowance_ns=5_000_000
+    )
     assert fly_on(flight, samples) == samples
     assert_nothing_silent(flight)
     assert flight.transmitter.copies.confirmed == flight.receiver.state
@@ -52,7 +54,7 @@ def uplink_damage(samples: int) -> None:
     assert up.bytes_damaged > 0.008 * samples
     assert up.symbols_changed > 0
     assert up.dropped["check bits"] > 0
-    assert flight.receiver.counts["erasures"] > 0.005 * samples
+    assert 0.005 * samples < flight.receiver.counts["erasures"] < 0.03 * samples
     # Yet as many symbols flew, at one byte each, as there were samples.
     assert flight.node.session.copies.next_sample == samples
 
@@ -62,14 +64,18 @@ def damage_both_ways(samples: int) -> None:
     total = sessions = erased = 0
     while total < samples:
         flight, _ = damaged_flight(
-            seed=sessions, damage_down=DAMAGE, ticks_per_sample=2, deadline_allowance_ns=0, repeats=4
+            seed=sessions,
+            damage_down=DAMAGE,
+            ticks_per_sample=2,
+            deadline_allowance_ns=5_000_000,
+            repeats=4,
         )
         total += fly_on(flight, 500)
         assert_nothing_silent(flight)
-        erased += flight.receiver.counts["erasures"]
+        erased += flight.transmitter.counts["erasures"]
         sessions += 1
     assert sessions > 1
-    assert erased > 0
+    assert 0 < erased < 0.1 * total
 
 
 def test_when_symbol_bytes_are_damaged_then_the_copies_stay_in_lockstep() -> None:

@@ -127,11 +127,12 @@ def test_when_it_flies_at_ten_baud_then_ten_bytes_a_second_go_up_and_ten_baud_ar
     symbol_bytes = meter.wire_bytes - meter.control_bytes
     assert symbol_bytes == meter.symbols == meter.coder_bits
     # A busy machine may hold the loop up past a slot, which is then an erasure and no byte.
-    missing = 100 - symbol_bytes
-    assert 0 <= missing <= 3
+    assert 97 <= symbol_bytes <= 100
+    erased = flown.receiver.session.counts["erasures"]
+    assert erased <= 6
     # Beside the symbols only the handshake, the farewell and the links' own notices.
     assert carried == flown.up_bytes
-    assert flown.receiver.session.meter.baud == pytest.approx(10.0, abs=0.1 + 0.11 * missing)
+    assert flown.receiver.session.meter.baud == pytest.approx(10.0, abs=0.1 + 0.11 * erased)
     assert not flown.dropped
 
 
@@ -241,7 +242,7 @@ def test_when_the_demo_flies_over_a_serial_line_then_it_is_the_flight_of_any_lin
     assert summary["line_bytes_out"] > 80
     if clock == "real":
         missing = summary["erasures"]
-        assert missing <= 3
+        assert missing <= 6
         assert summary["baud_measured"] == pytest.approx(10.0, abs=0.1 + 0.13 * missing)
         return
     memory = run("demo", "--link", "memory", "--out", "memory", *common, cwd=tmp_path)

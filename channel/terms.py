@@ -46,6 +46,10 @@ class Terms:
     initial_command: Vector
     """motor voltages of ticks 0 ... D - 1"""
     limits: CommandLimits
+    uplink_line_ns: int = 0
+    """on a line of finite rate: how long a symbol is on its way"""
+    downlink_line_ns: int = 0
+    """on a line of finite rate: how long a command frame is on its way"""
 
     @property
     def sample_ns(self) -> int:
@@ -71,6 +75,7 @@ class Terms:
     def lead_needed_ticks(self) -> int:
         """Return the smallest `D` with which every command can be in time on a real clock."""
         needed = self.uplink_delivery_ns + self.deadline_allowance_ns + self.downlink_budget_ns
+        needed += self.uplink_line_ns + self.downlink_line_ns
         return max(1, -(-needed // self.tick_ns))
 
     def with_shortest_lead(self, clock: Clock) -> Terms:
@@ -101,9 +106,15 @@ class Terms:
             problem = "lead_ticks = 0 exists on the virtual clock only"
         else:
             problem = f"lead_ticks = {self.lead_ticks} is too short"
+        line = ""
+        if self.uplink_line_ns or self.downlink_line_ns:
+            line = (
+                f" + {self.uplink_line_ns / 1e6:.3g} ms for a symbol and "
+                f"{self.downlink_line_ns / 1e6:.3g} ms for a command frame on the serial line"
+            )
         raise ValueError(
             f"{problem}: uplink delivery {self.uplink_delivery_ns / 1e6:g} ms + deadline allowance "
             f"{self.deadline_allowance_ns / 1e6:g} ms + downlink budget "
-            f"{self.downlink_budget_ns / 1e6:g} ms need lead_ticks >= {self.lead_needed_ticks} "
+            f"{self.downlink_budget_ns / 1e6:g} ms{line} need lead_ticks >= {self.lead_needed_ticks} "
             f"at {self.tick_ns / 1e6:g} ms a tick"
         )

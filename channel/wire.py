@@ -33,6 +33,7 @@ from channel.frames import (
     Frame,
     Hello,
     Refuse,
+    ShortSymbol,
     Symbol,
     Welcome,
 )
@@ -142,8 +143,8 @@ def _encode_body(frame: Frame) -> tuple[int, int, int, bytes]:
             return 6, frame.session, frame.epoch, body + frame.state
         case Bye():
             return 7, frame.session, 0, _text(frame.reason)
-        case ForeignVersion():
-            raise ValueError("a frame of another version is only ever received")
+        case ForeignVersion() | ShortSymbol():
+            raise ValueError(f"{frame} is only ever received")
 
 
 def _encode_commands(frame: Commands) -> bytes:

@@ -22,6 +22,7 @@ from channel.frames import (
     Frame,
     Hello,
     Refuse,
+    ShortSymbol,
     Symbol,
     Welcome,
 )
@@ -35,6 +36,7 @@ from channel.wire import WIRE_VERSION
 from channel.words import ERASED, Word
 from receiver.controllers.base import Controller
 from receiver.records import SAMPLE_CHANNEL, TICK_CHANNEL
+from receiver.short_slots import SlotFinder
 
 GAP_SAMPLES_MAX = 64
 """A symbol this far ahead is no gap any more but a different flight."""
@@ -78,7 +80,7 @@ class ReceiverSession:
         self.state = codec.initial()
         self.meter = BaudMeter()
         self.counts: Counter[str] = Counter()
-        """erasures, symbols_late, stale_frames, refused_hellos, bad_commands"""
+        """erasures, symbols_late, symbols_misplaced, stale_frames, refused_hellos, bad_commands"""
         self.end_reason = ""
         self.refusal: str | None = None
         self.desync: Desync | None = None
@@ -93,6 +95,7 @@ class ReceiverSession:
         self._slot = 0
         self._word: list[int | None] = []
         self._anchor: tuple[int, int] | None = None
+        self._slots = SlotFinder(terms)
 
     # What arrives
 
@@ -101,7 +104,10 @@ class ReceiverSession:
         match frame:
             case Symbol():
                 return self._on_symbol(frame, now_ns)
+            case ShortSymbol():
+                return self._on_short_symbol(frame, now_ns)
             case Hello():
+                self._slots.greeted(now_ns)
                 return self._on_hello(frame)
             case Desync() if self._is_current(frame.session):
                 self._on_desync(frame)
@@ -217,6 +223,25 @@ class ReceiverSession:
         self._anchor = (symbol.slot, now_ns)
         self.meter.on_symbol(now_ns)
         return frames + self._settle(value, now_ns)
+
+    def _on_short_symbol(self, short: ShortSymbol, now_ns: int) -> list[Frame]:
+        """Take a symbol byte of a serial line, as the symbol of this session that it can only be."""
+        if self.phase is not Phase.FLYING:
+            self.counts["stale_frames"] += 1
+            return []
+        place = self._slots.find(short, self._slot, now_ns)
+        frames: list[Frame] = []
+        if place.slot is None:
+            self.counts["symbols_misplaced"] += 1
+            self._tell(EventKind.STALE, f"a symbol of slot ...{short.slot_low} is not due: dropped")
+        elif place.in_time:
+            symbol = Symbol(self.session_number, self.epoch, place.slot, short.number)
+            frames = self._on_symbol(symbol, now_ns)
+        else:
+            self.counts["symbols_late"] += 1
+            self._tell(EventKind.LATE_SYMBOL, f"slot {place.slot} came after its deadline: dropped")
+        self._anchor = place.anchor or self._anchor
+        return frames
 
     def _settle(self, symbol: int | None, now_ns: int) -> list[Frame]:
         """Decide what this slot's symbol was; at the end of a word, fly its sample."""

@@ -25,9 +25,9 @@ def demo(
     seed: options.Seed = None,
     lead: options.Lead = None,
     delivery: options.Delivery = None,
-    link: Annotated[
-        str | None, typer.Option(help="zenoh: two processes; memory: both ends in this one.")
-    ] = None,
+    link: options.DemoLink = None,
+    line_rate: options.LineRate = None,
+    downlink: options.Downlink = None,
     rig: Annotated[
         str | None, typer.Option(help="simulated, or replay:FILE for a recorded flight.")
     ] = None,
@@ -39,9 +39,7 @@ def demo(
             show_default=False,
         ),
     ] = None,
-    disturbance: Annotated[
-        str | None, typer.Option(help='Torque on the plant, such as "q=2e-3,step=0.5@30".')
-    ] = None,
+    disturbance: options.Disturbance = None,
     settings: options.Settings = None,
     out: options.Out = None,
     json: options.AsJson = False,
@@ -74,6 +72,8 @@ def demo(
                     lead=lead,
                     delivery=delivery,
                     link=link,
+                    line_rate=line_rate,
+                    downlink=downlink,
                     rig=rig,
                     mismatch=off,
                     disturbance=disturbance,

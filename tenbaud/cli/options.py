@@ -51,6 +51,34 @@ Session = Annotated[
 ]
 Listen = Annotated[list[str] | None, typer.Option(help="Zenoh endpoint to listen on; repeatable.")]
 Connect = Annotated[list[str] | None, typer.Option(help="Zenoh endpoint to connect to; repeatable.")]
+Link = Annotated[str | None, typer.Option(help="zenoh, or serial with --port.", show_default=False)]
+DemoLink = Annotated[
+    str | None,
+    typer.Option(
+        help="zenoh: two processes; serial: two processes and an emulated line between them; memory: "
+        "both ends in this process."
+    ),
+]
+Port = Annotated[
+    str | None,
+    typer.Option(
+        help="Serial port of this end: /dev/ttyUSB0, COM3, socket://HOST:PORT, rfc2217://HOST:PORT.",
+        show_default=False,
+    ),
+]
+LineRate = Annotated[
+    int | None, typer.Option(help="Bits per second on the serial line (115200).", show_default=False)
+]
+Downlink = Annotated[
+    str | None,
+    typer.Option(
+        help="Commands come back another way than the serial line: zenoh, or a second port.",
+        show_default=False,
+    ),
+]
+Disturbance = Annotated[
+    str | None, typer.Option(help='Torque on the plant, such as "q=2e-3,step=0.5@30".')
+]
 Insecure = Annotated[
     bool,
     typer.Option(help="Allow addresses beyond this machine without encryption or authentication."),
@@ -68,6 +96,9 @@ def overrides(
     mismatch: float | None = None,
     disturbance: str | None = None,
     link: str | None = None,
+    port: str | None = None,
+    line_rate: int | None = None,
+    downlink: str | None = None,
     settings: list[str] | None = None,
 ) -> dict[str, Any]:
     """Return the configuration that these options set, as nested sections."""
@@ -79,6 +110,9 @@ def overrides(
         ("channel.delivery", delivery),
         ("link.session", session),
         ("link.kind", link),
+        ("link.port", port),
+        ("link.line_rate_baud", line_rate),
+        ("link.downlink", downlink),
         ("transmitter.plant.mismatch", mismatch),
         ("transmitter.plant.disturbance", disturbance),
     ):

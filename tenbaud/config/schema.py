@@ -175,9 +175,17 @@ class FlightLogSection(Section):
 class LinkSection(Section):
     """Where the other end is."""
 
-    kind: Literal["zenoh", "memory"] = "zenoh"
+    kind: Literal["zenoh", "serial", "memory"] = "zenoh"
     session: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+(/[A-Za-z0-9_.-]+)*$")] = "helicopter"
     peer_timeout_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 10.0
+    port: str = ""
+    """serial: this end's port, /dev/ttyUSB0, COM3, socket://HOST:PORT, rfc2217://HOST:PORT"""
+    line_rate_baud: Annotated[int, Field(ge=50, le=10_000_000)] = 115_200
+    """serial: bits per second on the line, ten of them for a byte"""
+    downlink: str = ""
+    """serial: "zenoh", or a second port for the commands; empty: the same line carries them back"""
+    downlink_rate_baud: Annotated[int, Field(ge=50, le=10_000_000)] = 115_200
+    """serial: of that second port"""
 
 
 class FlightConfig(Section):

@@ -21,6 +21,9 @@ ROWS: tuple[tuple[str, str, str], ...] = (
     ("baud: measured by the receiver", "baud_measured", "{:.3f}"),
     ("wire bytes up / down", "wire_bytes", "{}"),
     ("erasures / late symbols", "lost", "{}"),
+    ("bytes on the serial line up / down", "line_bytes", "{}"),
+    ("dropped by the link", "link_dropped", "{}"),
+    ("reconnects", "reconnects", "{}"),
     ("digest checks", "digest_checks", "{}"),
     ("desyncs", "desyncs", "{}"),
     ("largest pitch in the window", "pitch_amplitude_rad", "{:.3f} rad"),
@@ -101,6 +104,13 @@ def _value(summary: Summary, name: str) -> Any:
             return f"{get('wire_bytes_up')} / {get('wire_bytes_down')}"
         case "lost":
             return f"{get('erasures')} / {get('symbols_late', '-')}"
+        case "line_bytes":
+            up, down = get("line_bytes_out"), get("line_bytes_in")
+            return f"{up} / {down}" if up else None
+        case "link_dropped":
+            return ", ".join(f"{kind} {n}" for kind, n in (get("link_dropped") or {}).items()) or None
+        case "reconnects":
+            return get("reconnects") or None
         case "error_coded" | "error_live":
             largest, rms = get(f"{name}_max_fraction"), get(f"{name}_rms_fraction")
             if largest is None or rms is None:

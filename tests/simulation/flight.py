@@ -12,6 +12,7 @@ from channel.line import Line
 from channel.shaper import SlotShaper, UplinkMeter
 from channel.terms import Terms
 from channel.uplink import Uplink
+from channel.wire import DATAGRAM, Wire
 from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters, PitchPlant
 from plant_sim.plant import Plant
@@ -77,6 +78,7 @@ def assemble(
     window_start_tick: int = 0,
     safe_volts: Vector = (0.0, 0.0),
     counts_per_turn: int = COUNTS_PER_TURN,
+    wire: Wire = DATAGRAM,
 ) -> Flight:
     """Join the two ends; `receiver_codec` is for a receiver that computes otherwise."""
     identity = identity_of(codec)
@@ -100,8 +102,9 @@ def assemble(
         SlotShaper(flight_terms),
         uplink_line or Line(flight_terms.symbol_delay_ns),
         UplinkMeter(codec.coder.alphabet),
+        wire,
     )
-    endpoint = ReceiverEndpoint(receiver)
+    endpoint = ReceiverEndpoint(receiver, wire)
     virtual = VirtualFlight(node, uplink, downlink_line or Line(), endpoint)
     return Flight(transmitter, receiver, node, virtual, endpoint, sent, received)
 
@@ -115,6 +118,7 @@ def pitch_flight(
     downlink_line: Line | None = None,
     receiver_codec: Codec | None = None,
     window_start_s: float = 25.0,
+    wire: Wire = DATAGRAM,
     **term_changes: Any,
 ) -> Flight:
     """Return the paper's flight: its plant (off by `mismatch`), its PID law, its square wave."""
@@ -132,6 +136,7 @@ def pitch_flight(
         uplink_line=uplink_line,
         downlink_line=downlink_line,
         window_start_tick=round(window_start_s / TICK_S),
+        wire=wire,
     )
 
 

@@ -27,6 +27,11 @@ class SlotShaper:
         self.refused = 0
         """symbols that asked for a slot already used, over, or not yet there"""
 
+    def leaves_ns(self, slot: int, now_ns: int) -> int:
+        """Return when a symbol handed over now may leave: a slot that begins within the tick waits."""
+        begins = self._terms.slot_ns(slot)
+        return begins if now_ns < begins < now_ns + self._terms.tick_ns else now_ns
+
     def admit(self, slot: int, now_ns: int) -> bool:
         """Return whether the symbol of this slot may leave at flight time `now_ns`."""
         begins = self._terms.slot_ns(slot)

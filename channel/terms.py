@@ -63,8 +63,14 @@ class Terms:
         return slot * self.sample_ns // self.symbols_per_word
 
     def slot_tick(self, slot: int) -> int:
-        """Return the first tick at or after the beginning of a slot."""
-        return -(-self.slot_ns(slot) // self.tick_ns)
+        """Return the tick at which a slot's symbol is handed over.
+
+        The first one at or after the slot's beginning, but at the latest the last tick of its sample:
+        slots shorter than a tick begin between two, and the uplink holds their symbols until then.
+        """
+        sample = slot // self.symbols_per_word
+        last = (sample + 1) * self.ticks_per_sample - 1
+        return min(-(-self.slot_ns(slot) // self.tick_ns), last)
 
     @property
     def lead_needed_ticks(self) -> int:

@@ -25,8 +25,10 @@ class Uplink:
     def offer(self, frame: Frame, now_ns: int) -> list[Delivery]:
         """Return the arrivals of a frame offered at flight time `now_ns`; none if it is refused."""
         is_symbol = isinstance(frame, Symbol)
-        if isinstance(frame, Symbol) and not self.shaper.admit(frame.slot, now_ns):
-            return []
+        if isinstance(frame, Symbol):
+            now_ns = self.shaper.leaves_ns(frame.slot, now_ns)
+            if not self.shaper.admit(frame.slot, now_ns):
+                return []
         data = self.wire.encode(frame)
         self.meter.count(frame, self.wire.size(data))
         return self.line.carry(data, is_symbol, now_ns)

@@ -20,6 +20,10 @@ from plant_sim.identification.estimator import Array
 from plant_sim.identification.pitch import PitchEstimates, PitchSettings
 from plant_sim.identification.record import PitchRecord
 
+BOUNDS = ((-5.0, -50.0, -50.0, -math.pi), (50.0, 500.0, 50.0, math.pi))
+"""What a_w, a_th, k_v and theta_0 can be: beyond these there is no helicopter, only a fit gone wild."""
+
+SEGMENT_S = 5.0
 SMOOTHING_S = 0.3
 """Length of the local cubic that gives the rate at a segment's start."""
 
@@ -54,7 +58,7 @@ def fit(
     *,
     estimate_equilibrium: bool,
     settings: PitchSettings | None = None,
-    segment_s: float = 5.0,
+    segment_s: float = SEGMENT_S,
 ) -> CrossCheck:
     """Fit the model to a record, beginning at the estimates `start`."""
     settings = settings or PitchSettings()
@@ -67,7 +71,11 @@ def fit(
         # A wild guess of the parameters may fling the body away; keep the numbers finite.
         return np.clip((simulated - segments.angle_rad).ravel(), -10.0, 10.0)
 
-    solution = least_squares(residuals, guess, method="trf", x_scale=np.maximum(np.abs(guess), 0.05))
+    low, high = (np.array(bound[: len(guess)]) for bound in BOUNDS)
+    inside = np.clip(guess, low + 1e-6, high - 1e-6)
+    solution = least_squares(
+        residuals, inside, bounds=(low, high), x_scale=np.maximum(np.abs(guess), 0.05)
+    )
     jacobian: Array = np.asarray(solution.jac, dtype=np.float64)
     covariance = _covariance(jacobian, solution.fun, segments.angle_rad.shape[1])
     deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -119,7 +127,7 @@ def _segments(record: PitchRecord, settings: PitchSettings, segment_s: float) ->
     whole = math.exp(-h / lag) if lag > 0.0 else 0.0
     half = math.exp(-0.5 * h / lag) if lag > 0.0 else 0.0
     mu = np.empty(len(record) + 1)
-    mu[0] = volts[0]
+    mu[0] = 0.0
     for index, held in enumerate(volts.tolist()):
         mu[index + 1] = held + (mu[index] - held) * whole
     middle = volts + (mu[:-1] - volts) * half

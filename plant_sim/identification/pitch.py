@@ -62,7 +62,8 @@ class PitchIdentifier:
     """On-line: voltages and angle of one tick in, estimates out.
 
     `equilibrium_rad` is theta_0; None has it estimated with the others. The voltages of a tick are
-    those held from it to the next one.
+    those held from it to the next one. Before the first tick the motors are taken to be off and the
+    body to rest; of a record that begins otherwise, set `settle_s` to the filters' memory.
     """
 
     def __init__(
@@ -94,7 +95,7 @@ class PitchIdentifier:
         )
         lag = settings.motor_lag_s
         self._left = math.exp(-step_s / lag) if lag > 0.0 else 0.0
-        self._mu: float | None = None
+        self._mu = 0.0
         self._settle_steps = round(settings.settle_s / step_s)
         self.samples = 0
         self.samples_saturated = 0
@@ -116,7 +117,7 @@ class PitchIdentifier:
                 "must be finite"
             )
         front, rear = self._acting(front_volts), self._acting(rear_volts)
-        mu = front - rear if self._mu is None else self._mu
+        mu = self._mu
         angle = angle_rad if self.equilibrium_rad is None else angle_rad - self.equilibrium_rad
         pull = [math.sin(angle)]
         if self.equilibrium_rad is None:

@@ -22,7 +22,7 @@ class StaticParameters:
 
     bits: int = 1
     """b, symbols in a word"""
-    range: float = math.pi
+    range: float = 3.141592653589793
     """half the width that the cells cover, in the unit of the measurement (rad)"""
     gains: Gains = ((4.1,), (8.6,))
     """a row per corrected model state, one column: one measured axis"""

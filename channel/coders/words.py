@@ -25,7 +25,7 @@ class WordsParameters:
 
     bits: int = 10
     """b, symbols in a word"""
-    range: float = math.pi
+    range: float = 3.141592653589793
     """half the width that the words cover, in the unit of the measurement (rad)"""
     period_s: float = 0.01
     """T, time between two words"""

@@ -16,6 +16,11 @@ from channel.limits import CommandLimits
 Delivery = Literal["start", "end"]
 Clock = Literal["real", "virtual"]
 
+# What a command frame can hold (channel/wire.py): 16 KiB in all, its echoes counted in one byte.
+ECHO_BYTES = 10
+ECHOES_MAX = 255
+ECHOES_BYTES_MAX = 16_000
+
 
 @dataclass(frozen=True, slots=True)
 class Terms:
@@ -62,16 +67,6 @@ class Terms:
         """Return the flight time at which a slot begins."""
         return slot * self.sample_ns // self.symbols_per_word
 
-    def slot_tick(self, slot: int) -> int:
-        """Return the tick at which a slot's symbol is handed over.
-
-        The first one at or after the slot's beginning, but at the latest the last tick of its sample:
-        slots shorter than a tick begin between two, and the uplink holds their symbols until then.
-        """
-        sample = slot // self.symbols_per_word
-        last = (sample + 1) * self.ticks_per_sample - 1
-        return min(-(-self.slot_ns(slot) // self.tick_ns), last)
-
     @property
     def lead_needed_ticks(self) -> int:
         """Return the smallest `D` with which every command can be in time on a real clock."""
@@ -91,6 +86,13 @@ class Terms:
                 f"{self.symbols_per_word} symbol(s) every {self.sample_ns / 1e9:g} s ask for "
                 f"{slots_per_s:g} symbols/s, but the line carries rate_baud = {self.rate_baud:g}; "
                 "lengthen symbol_period_s or raise rate_baud"
+            )
+        echo_bytes = ECHO_BYTES + 2 * len(self.initial_command) * self.ticks_per_sample
+        if (self.repeats + 1) * echo_bytes > ECHOES_BYTES_MAX or self.repeats >= ECHOES_MAX:
+            raise ValueError(
+                f"a command frame of 1 + repeats = {self.repeats + 1} echoes, {echo_bytes} bytes each, "
+                f"would be too long: at most {ECHOES_MAX} echoes and {ECHOES_BYTES_MAX} bytes; lower "
+                "repeats"
             )
         ideal = clock == "virtual" and self.lead_ticks == 0 and self.uplink_delivery_ns == 0
         if ideal or self.lead_ticks >= self.lead_needed_ticks:

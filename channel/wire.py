@@ -127,6 +127,8 @@ def _encode_body(frame: Frame) -> tuple[int, int, int, bytes]:
         case Commands():
             return 5, frame.session, frame.epoch, _encode_commands(frame)
         case Hello():
+            if len(frame.config_digest) != 16 or len(frame.numerics_probe) != 8:
+                raise ValueError("a greeting has a digest of 16 bytes and a probe of 8")
             body = _HELLO.pack(frame.incarnation, frame.config_digest, frame.numerics_probe)
             return 1, 0, 0, body + _text(frame.version)
         case Welcome():
@@ -145,7 +147,13 @@ def _encode_body(frame: Frame) -> tuple[int, int, int, bytes]:
 
 
 def _encode_commands(frame: Commands) -> bytes:
+    if not frame.echoes:
+        raise ValueError("a command frame has at least one echo")
     last = frame.echoes[-1].sample
+    shape = [(last + 1 - len(frame.echoes) + index) for index in range(len(frame.echoes))]
+    volts = {len(echo.millivolts) for echo in frame.echoes}
+    if [echo.sample for echo in frame.echoes] != shape or len(volts) > 1:
+        raise ValueError("the echoes of a command frame are consecutive and equally long")
     parts = [_COMMANDS.pack(last, len(frame.echoes))]
     for echo in frame.echoes:
         parts.append(_ECHO.pack(echo.word_number, echo.digest))

@@ -41,6 +41,9 @@ GAP_SAMPLES_MAX = 64
 
 INPUTS_KEPT = 64
 
+VERSION_SHOWN = 40
+"""Characters of a peer's version text that are quoted back."""
+
 
 class Phase(Enum):
     """Where the receiver's session stands."""
@@ -102,13 +105,12 @@ class ReceiverSession:
                 return self._on_hello(frame)
             case Desync() if self._is_current(frame.session):
                 self._on_desync(frame)
-            case Bye() if frame.session == 0 or self._is_current(frame.session):
-                if self.phase is Phase.FLYING:
-                    self._end(f"the transmitter ended the flight: {frame.reason}")
-                elif self.refusal is not None:
-                    self.refusal = f"{self.refusal}\n  as the transmitter sees it: {frame.reason}"
-                    self._end("refused")
-            case ForeignVersion():
+            case Bye() if self._is_current(frame.session):
+                self._end(f"the transmitter ended the flight: {frame.reason}")
+            case Bye() if self.refusal is not None and frame.session == 0:
+                self.refusal = f"{self.refusal}\n  as the transmitter sees it: {frame.reason}"
+                self._end("refused")
+            case ForeignVersion() if self.phase is Phase.WAITING:
                 self._refuse(
                     f"the transmitter speaks wire version {frame.version}, this end {WIRE_VERSION}: "
                     "install the same tenbaud on both"
@@ -164,6 +166,7 @@ class ReceiverSession:
         if self.phase is Phase.WAITING:
             self._peer_incarnation = hello.incarnation
             self.phase = Phase.FLYING
+            self.refusal = None
             self._tell(EventKind.STARTED, f"session {self.session_number:08x} begins")
         return [Welcome(self.session_number, self.epoch, self.state.sample, hello.incarnation)]
 
@@ -175,7 +178,10 @@ class ReceiverSession:
                 f"{self.identity.config_digest.hex()[:12]}"
             )
         if hello.version != self.identity.version:
-            return f"versions differ: transmitter {hello.version}, receiver {self.identity.version}"
+            return (
+                f"versions differ: transmitter {hello.version[:VERSION_SHOWN]}, receiver "
+                f"{self.identity.version}"
+            )
         if hello.numerics_probe != self.identity.numerics_probe:
             return (
                 "the numerics probe differs: transmitter "
@@ -244,12 +250,26 @@ class ReceiverSession:
 
     def _decide(self, tick: int, state: Vector) -> Vector:
         """Ask the controller, limit what it wants, and return it as the wire will carry it."""
-        volts = self._controller.command(tick, state)
-        if not all(-1e6 < value < 1e6 for value in volts):
-            self.counts["bad_commands"] += 1
-            volts = self._last_command
+        volts = self._ask(tick, state)
         limited = self.terms.limits.apply(volts, self._last_command)
         self._last_command = from_millivolts(to_millivolts(limited))
+        return self._last_command
+
+    def _ask(self, tick: int, state: Vector) -> Vector:
+        """Return what the controller wants; its last command where it fails or wants nonsense."""
+        try:
+            volts = self._controller.command(tick, state)
+            if len(volts) == len(self._last_command) and all(-1e6 < value < 1e6 for value in volts):
+                return volts
+            problem = f"wants {volts}"
+        except Exception as error:  # a controller is the user's code; the flight goes on without it
+            problem = f"failed: {type(error).__name__}: {error}"
+        self.counts["bad_commands"] += 1
+        if self.counts["bad_commands"] == 1:
+            self._tell(
+                EventKind.CONTROLLER,
+                f"at tick {tick} the controller {problem}; its last command is kept",
+            )
         return self._last_command
 
     # Ends and reports

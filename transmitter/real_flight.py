@@ -69,6 +69,7 @@ class RealFlight:
                 self._offer([session.hello()])
                 next_hello_ns = now_ns + round(HELLO_PERIOD_S * 1e9)
             self._take_in(HELLO_PERIOD_S)
+        self._send_due()
 
     def run(self, ticks: int) -> int:
         """Fly until `ticks`, the end of the rig or the safe voltage; return the ticks that passed."""

@@ -85,7 +85,6 @@ class TransmitterSession:
         )
         """commands of coming ticks"""
         self._tick = 0
-        self._word: Word = ERASED
 
     # What happens at a tick
 
@@ -97,7 +96,9 @@ class TransmitterSession:
         )
 
     def on_measurement(self, tick: int, measurement: Vector) -> list[Symbol]:
-        """Take the measurement of a tick; return the symbols whose slots begin with it.
+        """Take the measurement of a tick; return the symbols of the sample that begins with it.
+
+        A word has a slot for each of its symbols; whoever sends them holds each until its slot.
 
         A tick that was never seen, because the process was held up, sent no symbol: its sample's
         word counts as not sent, and the next sample starts afresh.
@@ -109,25 +110,15 @@ class TransmitterSession:
         while self.copies.next_sample < sample:
             self.counts["words_missed"] += 1
             self.copies.sent(ERASED)
-        if self.copies.next_sample == sample:
-            self._word = ERASED
         if self.copies.lag_samples > LAG_SAMPLES_MAX:
             self._end(f"no echo for {LAG_SAMPLES_MAX} samples: the receiver or its line is gone")
             return []
-        if offset == 0 and self.copies.next_sample == sample:
-            self._word = self.codec.encode(self.copies.state_before_next(), measurement)
-            self.copies.sent(self._word)
-        return self._symbols_due(tick, sample)
-
-    def _symbols_due(self, tick: int, sample: int) -> list[Symbol]:
-        if self._word is ERASED:
+        if offset != 0 or self.copies.next_sample != sample:
             return []
-        count = self.terms.symbols_per_word
-        return [
-            self._symbol(sample * count + index, self._word[index])
-            for index in range(count)
-            if self.terms.slot_tick(sample * count + index) == tick
-        ]
+        word = self.codec.encode(self.copies.state_before_next(), measurement)
+        self.copies.sent(word)
+        first = sample * self.terms.symbols_per_word
+        return [self._symbol(slot, symbol) for slot, symbol in enumerate(word, first)]
 
     def _symbol(self, slot: int, symbol: int) -> Symbol:
         number = self.codec.coder.alphabet.symbol_number(symbol)
@@ -152,7 +143,7 @@ class TransmitterSession:
                 return self._on_refuse(frame)
             case Bye() if self._is_current(frame.session):
                 self._end(f"the receiver ended the flight: {frame.reason}")
-            case ForeignVersion():
+            case ForeignVersion() if self.phase is Phase.GREETING:
                 self.refusal = (
                     f"the receiver speaks wire version {frame.version}, this end {WIRE_VERSION}: "
                     "install the same tenbaud on both"

@@ -47,7 +47,8 @@ class VirtualFlight:
     def greet(self) -> None:
         """Carry the handshake out; the session then flies or holds a refusal."""
         self._offer([self._node.session.hello()], 0)
-        self._pass_to(0)
+        while self._arrivals:
+            self._pass_to(self._arrivals[0].time_ns)
 
     def run(self, ticks: int, should_stop: Callable[[], bool] = lambda: False) -> int:
         """Fly until `ticks`, the end of the rig or the safe voltage; return the ticks that passed."""

@@ -53,6 +53,7 @@ def demo(
     [dim]tenbaud demo --preset tuned-10baud --clock real --duration 20 --mismatch 0.1[/dim]
     """
     from tenbaud.build import agree
+    from tenbaud.build_ends import check_parts
     from tenbaud.config.load import load_config
 
     replayed = rig is not None and rig.startswith("replay")
@@ -83,6 +84,8 @@ def demo(
         )
         for off in flights
     ]
+    for agreement in agreements:
+        check_parts(agreement.config)
     raise typer.Exit(_fly_all(agreements, out, json))
 
 

@@ -48,10 +48,7 @@ def load_config(
         return FlightConfig.model_validate(values)
     except ValidationError as error:
         source = str(path) if path is not None else f"preset {base}"
-        lines = [_describe(detail) for detail in error.errors()]
-        raise ConfigError(
-            f"{source}, with the command line over it:\n  " + "\n  ".join(lines)
-        ) from error
+        raise ConfigError(_describe_all(source, error)) from error
 
 
 def dump_config(config: FlightConfig) -> str:
@@ -100,20 +97,31 @@ def _other_kind(key: str, below: Any, over: Any) -> bool:
     return "kind" in over and over["kind"] != below.get("kind", default)
 
 
-def _describe(detail: ErrorDetails) -> str:
+def _describe_all(source: str, error: ValidationError) -> str:
+    """Return one line per field; one that may be of several types has an error for each."""
+    problems: dict[str, list[str]] = {}
+    for detail in error.errors():
+        what, why = _describe(detail)
+        problems.setdefault(what, []).append(why)
+    lines = [f"{what}: {' or '.join(whys)}" for what, whys in problems.items()]
+    return "\n  ".join([f"{source}, with the command line over it:", *lines])
+
+
+def _describe(detail: ErrorDetails) -> tuple[str, str]:
     # The names of a union's branches ("int", "literal['auto']") are no part of the field's name.
     branches = ("literal[", "int", "float", "constrained", "tuple[", "function-", "str")
     place = [str(part) for part in detail["loc"] if not str(part).startswith(branches)]
     kind = place.pop(1) if len(place) > 1 and place[1] in KINDS.get(place[0], {}) else None
     name = ".".join(place) or "(whole file)"
     if detail["type"] == "extra_forbidden":
-        return f"{name}: unknown field{_nearest(place, kind)}"
+        return name, f"unknown field{_nearest(place, kind)}"
     if detail["type"] == "union_tag_invalid":
-        return f"{name}.kind: known are {', '.join(KINDS[name])}, got {detail['ctx']['tag']!r}"
+        tag = detail["ctx"]["tag"]
+        return f"{name}.kind", f"known are {', '.join(KINDS[name])}, got {tag!r}"
     message = detail["msg"].removeprefix("Value error, ")
     if isinstance(detail["input"], dict | FlightConfig):
-        return f"{name}: {message}"
-    return f"{name} = {detail['input']!r}: {message}"
+        return name, message
+    return f"{name} = {detail['input']!r}", message
 
 
 def _nearest(place: list[str], kind: str | None) -> str:

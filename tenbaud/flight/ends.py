@@ -46,6 +46,7 @@ def open_link(agreement: Agreement, role: Role, endpoints: Endpoints) -> Link:
         listen=endpoints.listen,
         connect=endpoints.connect,
         insecure=endpoints.insecure,
+        clock=agreement.clock,
     )
 
 

@@ -40,8 +40,10 @@ class DemoResult:
     """what the two ends said on their way out, if it was not a plain success"""
 
 
-def fly_demo(agreement: Agreement, folder: RunFolder, on_status: OnStatus) -> DemoResult:
-    """Fly once into an existing, empty run folder; write summary and figure there."""
+def fly_demo(
+    agreement: Agreement, folder: RunFolder, on_status: OnStatus, *, draw: bool = True
+) -> DemoResult:
+    """Fly once into an existing, empty run folder; write summary and, if wished, figure there."""
     folder.config.write_text(dump_config(agreement.config))
     if agreement.config.link.kind == "memory":
         outcome, upper, lower = run_in_memory(agreement, folder, "auto")
@@ -50,6 +52,8 @@ def fly_demo(agreement: Agreement, folder: RunFolder, on_status: OnStatus) -> De
     else:
         result = _fly_processes(agreement, folder, on_status)
     write_summary(folder, result.summary)
+    if not draw:
+        return result
     try:
         _draw(agreement, folder, result.summary)
     except (RecordingError, OSError) as error:

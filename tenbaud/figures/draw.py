@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from scipy.signal import lfilter
 
 from plant_sim.pitch import PitchParameters, PitchPlant
 from receiver.controllers.pid import PAPER_GAINS, Pid
@@ -34,7 +35,7 @@ def ideal_loop(duration_s: float) -> tuple[Series, Series, Series]:
         pitch[tick] = plant.angle_rad
         wanted[tick] = reference.angle_rad(tick)
         plant.advance(controller.command(tick, (plant.angle_rad, plant.rate_rad_s)))
-    return np.arange(count) * TICK_S, pitch, wanted
+    return np.arange(count, dtype=np.float64) * np.float64(TICK_S), pitch, wanted
 
 
 def draw_ideal(paths: Sequence[Path]) -> tuple[Series, Series, Series]:
@@ -136,11 +137,18 @@ def draw_recorded(flown: Flown, split_s: float, paths: Sequence[Path]) -> None:
     save(figure, paths)
 
 
-def rate_error(flown: Flown, start_s: float, end_s: float) -> float:
-    """Return the rms error of a flight's rate estimate against its true rate, rad/s."""
+def rate_error(flown: Flown, filter_s: float = 0.0) -> float:
+    """Return the rms error of a flight's rate estimate against its true rate, rad/s.
+
+    `filter_s` is the time constant of a low-pass behind the estimate, as `coder.rate_filter_s` is.
+    """
     curves = _curves(flown)
-    used = (curves.times_s >= start_s) & (curves.times_s < end_s) & ~np.isnan(curves.coded_rate)
-    return float(np.sqrt(np.mean((curves.coded_rate - true_rate(curves))[used] ** 2)))
+    rate = curves.coded_rate
+    if filter_s > 0.0:
+        share = TICK_S / (TICK_S + filter_s)
+        rate = np.asarray(lfilter([share], [1.0, share - 1.0], np.nan_to_num(rate)))
+    used = ~np.isnan(curves.coded_rate)
+    return float(np.sqrt(np.mean((rate - true_rate(curves))[used] ** 2)))
 
 
 def _curves(flown: Flown) -> Curves:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -88,24 +88,41 @@ class Flown:
         return self.largest_rad / self.reference_rad if self.reference_rad else float("nan")
 
 
+class Task(NamedTuple):
+    """Something else to compute beside the flights: a function of a module, and its arguments."""
+
+    name: str
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    weight: float = 3.0
+
+
 def fly_all(
-    jobs: Iterable[Job], folder: Path, on_done: Callable[[Job], None] = lambda job: None
-) -> dict[str, Flown]:
-    """Fly every job, two at a time, the long ones first; return what came of them by name."""
+    jobs: Iterable[Job],
+    folder: Path,
+    tasks: Iterable[Task] = (),
+    on_done: Callable[[str, float], None] = lambda name, weight: None,
+) -> tuple[dict[str, Flown], dict[str, Any]]:
+    """Fly every job and do every task, two at a time, long ones first; return both by name."""
     # spawn: a forked child would inherit the locks of whatever threads the parent has.
     context = multiprocessing.get_context("spawn")
-    ordered = sorted(jobs, key=lambda job: -job.weight)
+    flights = [Task(job.name, fly, (job, folder), job.weight) for job in jobs]
+    ordered = sorted([*flights, *tasks], key=lambda task: -task.weight)
     flown: dict[str, Flown] = {}
+    others: dict[str, Any] = {}
     with ProcessPoolExecutor(WORKERS, mp_context=context) as pool:
-        waiting: dict[Future[Flown], Job] = {pool.submit(fly, job, folder): job for job in ordered}
+        waiting: dict[Future[Any], Task] = {
+            pool.submit(task.function, *task.arguments): task for task in ordered
+        }
         try:
             for done in as_completed(waiting):
-                flown[waiting[done].name] = done.result()
-                on_done(waiting[done])
+                task = waiting[done]
+                (flown if task.function is fly else others)[task.name] = done.result()
+                on_done(task.name, task.weight)
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
-    return flown
+    return flown, others
 
 
 def fly(job: Job, folder: Path) -> Flown:

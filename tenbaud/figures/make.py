@@ -10,8 +10,15 @@ from pathlib import Path
 from tenbaud.build_ends import nominal_plant
 from tenbaud.config.load import load_config
 from tenbaud.figures import draw, plan, real
-from tenbaud.figures.flights import Flown, Job, fly_all
-from tenbaud.figures.identified import Trials, identification_trials
+from tenbaud.figures.flights import Flown, Job, Task, fly_all
+from tenbaud.figures.identified import (
+    EXCITATIONS,
+    SEEDS,
+    Trials,
+    clean_trial,
+    largest_error,
+    noisy_trial,
+)
 from tenbaud.identify.figures import draw_estimates, draw_excitation
 
 NUMBERS = ("3", "4", "5", "6", "7", "8")
@@ -27,7 +34,9 @@ class Results:
     trials: Trials | None = None
     first_half: real.FirstHalf | None = None
     ideal_largest_rad: float = 0.0
-    ideal_reached: bool = False
+    """largest pitch with the ideal controller"""
+    ideal_left_rad: float = 0.0
+    """its mean distance from the reference in the last second before each jump"""
     seconds: float = 0.0
 
 
@@ -44,23 +53,40 @@ def make_figures(
     if whole and data is not None:
         results.first_half = real.identify_first_half(data)
     jobs = _jobs(wanted, whole, folder, data, results.first_half)
-    total = sum(job.weight for job in jobs) + 10.0
+    tasks = _trials(wanted, whole)
+    total = sum(job.weight for job in jobs) + sum(task.weight for task in tasks) + 5.0
     done = 0.0
 
-    def on_done(job: Job) -> None:
+    def on_done(name: str, weight: float) -> None:
         nonlocal done
-        done += job.weight
-        on_progress(done, total, job.name)
+        done += weight
+        on_progress(done, total, name)
 
     on_progress(0.0, total, "flying")
-    results.flown = fly_all(jobs, folder / "flights", on_done) if jobs else {}
-    if wanted & {"3", "4"}:
-        on_progress(done, total, "identification")
-        results.trials = identification_trials(noisy=whole)
+    results.flown, others = fly_all(jobs, folder / "flights", tasks, on_done)
+    if tasks:
+        clean = [others[f"clean-{text}"] for text in EXCITATIONS]
+        errors = [largest_error(one.result.estimates) for one in clean]
+        noisy = [pair for name, pair in others.items() if name.startswith("noisy-")]
+        results.trials = Trials(clean, errors, noisy)
+    on_progress(done, total, "drawing")
     _draw(wanted, results, folder, pictures)
     on_progress(total, total, "done")
     results.seconds = time.perf_counter() - started
     return results
+
+
+def _trials(wanted: set[str], whole: bool) -> list[Task]:
+    if not wanted & {"3", "4"}:
+        return []
+    tasks = [Task(f"clean-{text}", clean_trial, (text,)) for text in EXCITATIONS]
+    if whole:
+        tasks += [
+            Task(f"noisy-{text}-{seed}", noisy_trial, (text, seed))
+            for text in EXCITATIONS
+            for seed in SEEDS
+        ]
+    return tasks
 
 
 def _jobs(
@@ -104,8 +130,8 @@ def _draw(wanted: set[str], results: Results, folder: Path, pictures: Path) -> N
     if "5" in wanted:
         times, pitch, wanted_rad = draw.draw_ideal(paths("paper-figure-5"))
         results.ideal_largest_rad = float(abs(pitch).max())
-        late = (times % 12.5) > 10.0
-        results.ideal_reached = bool((abs(pitch - wanted_rad)[late] < 0.8).all())
+        late = (times % (draw.PERIOD_S / 2)) >= draw.PERIOD_S / 2 - 1.0
+        results.ideal_left_rad = float(abs(pitch - wanted_rad)[late].mean())
     for number, rate in (("6", 20), ("7", 10)):
         if number in wanted:
             draw.draw_transmission(

@@ -83,7 +83,14 @@ def uiuc_jobs(data: Path, model: dict[str, Any]) -> list[Job]:
         paper = _replayed(file, timing=timing, channel=channel, model=model, duration_s=2.0 * HALF_S)
         jobs += [
             Job(f"uiuc-paper-{rate}", "paper-10baud", paper, window_start_s=HALF_S),
-            Job(f"uiuc-tuned-{rate}", f"uiuc-{rate}baud", _replayed(file), True, HALF_S, rate == 10),
+            Job(
+                f"uiuc-tuned-{rate}",
+                f"uiuc-{rate}baud",
+                _replayed(file),
+                processes=rate < 50,
+                window_start_s=HALF_S,
+                keep_series=rate == 10,
+            ),
             Job(
                 f"uiuc-words-{rate}",
                 "usual-1000baud",

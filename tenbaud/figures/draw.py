@@ -14,7 +14,16 @@ from receiver.controllers.pid import PAPER_GAINS, Pid
 from receiver.references import Square
 from tenbaud.figures.curves import true_rate
 from tenbaud.figures.flights import Curves, Flown
-from tenbaud.figures.style import FAINT, LINE_A, LINE_B, LINE_C, decimated, new_figure, save
+from tenbaud.figures.style import (
+    FAINT,
+    LINE_A,
+    LINE_B,
+    LINE_C,
+    decimated,
+    legend_above,
+    new_figure,
+    save,
+)
 from tenbaud.recording.figure import Series
 
 TICK_S = 0.01
@@ -46,7 +55,7 @@ def draw_ideal(paths: Sequence[Path]) -> tuple[Series, Series, Series]:
     panel.plot(*decimated(times, wanted), color=FAINT, linestyle="-.", label=r"$\theta_*$")
     panel.set_ylabel("pitch, rad")
     panel.set_xlabel("time, s")
-    panel.legend(loc="upper right", ncols=2, fontsize=8, frameon=False)
+    legend_above(panel)
     save(figure, paths)
     return times, pitch, wanted
 
@@ -69,14 +78,14 @@ def draw_transmission(off: Flown, exact: Flown, paths: Sequence[Path]) -> None:
     )
     upper.set_ylabel("rad")
     upper.set_title("(a) pitch and estimate, plant 10 % off the model", loc="left", fontsize=9)
-    upper.legend(loc="upper right", ncols=3, fontsize=8, frameon=False)
+    legend_above(upper)
     for one, colour, label in ((model, FAINT, "exact plant"), (curves, LINE_B, "plant 10 % off")):
         error.plot(
             *decimated(one.times_s, one.pitch_rad - one.coded_rad), color=colour, lw=0.8, label=label
         )
     error.set_ylabel("rad")
     error.set_title(r"(a) error $e=\theta-\hat\theta$", loc="left", fontsize=9)
-    error.legend(loc="upper right", ncols=2, fontsize=8, frameon=False)
+    legend_above(error)
     for panel, one, label in (
         (lower, curves, "(b) range $M_k$, plant 10 % off"),
         (lower_exact, model, "(b) range $M_k$, exact plant"),
@@ -106,7 +115,7 @@ def draw_rates(
         panel.plot(times, curves.coded_rate[shown], color=colour, ls=style, lw=1.0, label=label)
         panel.plot(times, true_rate(curves)[shown], color=LINE_A, lw=1.0, label="true rate")
         panel.set_ylabel("rad/s")
-        panel.legend(loc="upper right", ncols=2, fontsize=8, frameon=False)
+        legend_above(panel)
     low, high = panels[0].get_ylim()
     panels[1].set_ylim(low, high)
     panels[-1].set_xlabel("time, s")
@@ -121,7 +130,7 @@ def draw_recorded(flown: Flown, split_s: float, paths: Sequence[Path]) -> None:
     panels[0].plot(
         *decimated(curves.times_s, curves.coded_rad), color=LINE_C, lw=0.8, label="estimate, 10 bit/s"
     )
-    panels[0].legend(loc="upper left", ncols=2, fontsize=8, frameon=False)
+    legend_above(panels[0])
     panels[1].plot(
         *decimated(curves.times_s, curves.pitch_rad - curves.coded_rad), color=LINE_B, lw=0.8
     )
@@ -129,7 +138,7 @@ def draw_recorded(flown: Flown, split_s: float, paths: Sequence[Path]) -> None:
         panel.axvline(split_s, color="#d01c1f", lw=0.9, ls="--")
         panel.set_ylabel(label)
     panels[0].set_title(
-        "recorded flight: left of the line the presets were tuned, right of it they are judged",
+        "left of the line the presets were tuned, right of it they are judged",
         loc="left",
         fontsize=9,
     )

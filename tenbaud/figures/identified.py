@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-from plant_sim.identification.experiment import REST_S
+import numpy as np
+
+from plant_sim.identification.excitation import parse_excitation
+from plant_sim.identification.experiment import REST_S, excite
 from plant_sim.identification.pitch import PitchSettings
 from plant_sim.identification.record import PitchRecord, identify
+from plant_sim.pitch import PitchPlant
 from tenbaud.build_ends import nominal_plant
 from tenbaud.config.load import load_config
 from tenbaud.identify.run import Identified, run
@@ -16,7 +21,8 @@ EXCITATIONS = ("square:0.2,0,2.5", "square:0.25,0.1,3")
 """Frequency (Hz), bias (V), magnitude (V) of (a) and (b); the paper gives none of them."""
 
 SEEDS = (1, 2, 3)
-NOISE = "q=2e-3"
+NOISE_DENSITY = 2e-3
+NOISE = f"q={NOISE_DENSITY}"
 NOISY_SETTINGS = PitchSettings(filter_bandwidth_rad_s=3.0, forgetting_per_s=0.002)
 CLEAN_S = 60.0
 NOISY_S = 180.0
@@ -46,6 +52,30 @@ def noisy_trial(excitation: str, seed: int) -> tuple[float, float]:
     history = identify(record, rest, NOISY_SETTINGS).history
     early = history[round(CLEAN_S / record.step_s) - 1]
     return largest_error(tuple(early)), largest_error(tuple(history[-1]))
+
+
+def best_possible_damping_error(excitation: str, duration_s: float = CLEAN_S) -> float:
+    """Return the least standard error of `a_w`, relative, that any unbiased method can have.
+
+    It is the Cramer-Rao bound for angles and rates known without error and the noise torque alone:
+    q times the inverse of the integral of phi phi', phi being the unfiltered regressors.
+    """
+    true = nominal_plant(load_config("paper-10baud"))
+    step_s = 0.01
+    plant = PitchPlant(true, step_s, initial_angle_rad=true.equilibrium_rad)
+    rows = []
+
+    def step(_tick: int, front: float, rear: float) -> float:
+        angle, rate, front_lagged, rear_lagged = plant.state
+        rows.append((rate, math.sin(angle - true.equilibrium_rad), front_lagged - rear_lagged))
+        plant.advance((front, rear))
+        return angle
+
+    excite(step, parse_excitation(excitation, step_s), step_s, duration_s)
+    regressors = np.array(rows)
+    information = regressors.T @ regressors * step_s / NOISE_DENSITY
+    deviation = math.sqrt(float(np.linalg.inv(information)[0, 0]))
+    return deviation / true.rate_damping_per_s
 
 
 def record_of(excitation: str, duration_s: float, disturbance: str = "", seed: int = 1) -> PitchRecord:

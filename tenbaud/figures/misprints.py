@@ -6,8 +6,8 @@ MISPRINTS: tuple[tuple[str, str, str], ...] = (
     (
         "(12)",
         "the same letter for the filter's output and for the voltage",
-        "`T_m vbar' + vbar = v` and `mu = vbar_f - vbar_r`: only then is `mu` the output of the low-pass "
-        "filters, as the sentence below it says",
+        "`T_m vbar' + vbar = v` and `mu = vbar_f - vbar_r`: only then is `mu` the output of the "
+        "low-pass filters, as the sentence below it says",
     ),
     (
         "(13)",
@@ -23,7 +23,7 @@ MISPRINTS: tuple[tuple[str, str, str], ...] = (
     (
         "(10)",
         "as printed, `Gamma` grows without bound when the excitation fades",
-        "`alpha` is scaled by `1 - |Gamma| / bound`; with excitation nothing changes",
+        "`alpha` is scaled by `1 - norm(Gamma) / bound`; with excitation nothing changes",
     ),
     (
         "(19), signals",

@@ -37,6 +37,11 @@ def new_figure(
     return figure, panels
 
 
+def legend_above(panel: Axes) -> None:
+    """Put the legend above the panel's right end, where no curve is."""
+    panel.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=4, fontsize=8, frameon=False)
+
+
 def decimated(times: Series, values: Series) -> tuple[Series, Series]:
     """Return a curve of few enough points for a small file, its extremes kept."""
     return decimate(np.asarray(times), np.asarray(values), POINTS)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from tenbaud.figures.style import LINE_A, LINE_B, decimated, new_figure, save
+from tenbaud.figures.style import LINE_A, LINE_B, decimated, legend_above, new_figure, save
 from tenbaud.identify.run import Identified
 
 
@@ -23,7 +23,7 @@ def draw_excitation(runs: Sequence[Identified], paths: Sequence[Path]) -> None:
         )
         panel.set_ylabel(r"$\theta$, rad; $\mu_f$, V")
         panel.set_title(f"({letter}) {one.name}", loc="left", fontsize=9)
-        panel.legend(loc="upper right", ncols=2, fontsize=8, frameon=False)
+        legend_above(panel)
     panels[-1].set_xlabel("time, s")
     save(figure, paths)
 
@@ -48,6 +48,6 @@ def draw_estimates(
         low = min(0.0, *(2.0 * min(0.0, one.result.history[-1, column]) for one in runs))
         panel.set_ylim(low - 0.1 * lasting, 2.0 * lasting + 1e-6)
         panel.set_ylabel(label)
-    panels[0].legend(loc="upper right", ncols=3, fontsize=8, frameon=False)
+    legend_above(panels[0])
     panels[-1].set_xlabel("time, s")
     save(figure, paths)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tenbaud.cli import demo, nodes, runs
+from tenbaud.cli import demo, nodes, rig, runs
 from tenbaud.flight.outcome import ExitCode, outcome_of
 
 app = typer.Typer(
@@ -47,6 +47,8 @@ app.command()(nodes.receive)
 app.command()(runs.inspect)
 app.command()(runs.diff)
 app.command()(runs.presets)
+app.command()(rig.rig)
+app.command()(rig.rig_check)
 
 
 def main() -> None:

@@ -28,9 +28,8 @@ def demo(
     link: Annotated[
         str | None, typer.Option(help="zenoh: two processes; memory: both ends in this one.")
     ] = None,
-    rig: Annotated[
-        str | None, typer.Option(help="simulated, or replay:FILE for a recorded flight.")
-    ] = None,
+    rig: Annotated[str | None, typer.Option(help=options.RIG_HELP)] = None,
+    dry_run: options.DryRun = False,
     mismatch: Annotated[
         list[float] | None,
         typer.Option(
@@ -58,7 +57,7 @@ def demo(
     replayed = rig is not None and rig.startswith("replay")
     flights: list[float | None] = list(mismatch or ())
     if not flights:
-        single = json or replayed
+        single = json or (rig or "simulated") != "simulated"
         flights = [None] if single else list(DEFAULT_MISMATCHES)
     if preset is None and config is None and replayed:
         preset = "uiuc-10baud"
@@ -74,6 +73,7 @@ def demo(
                     delivery=delivery,
                     link=link,
                     rig=rig,
+                    dry_run=dry_run,
                     mismatch=off,
                     disturbance=disturbance,
                     settings=settings,

@@ -39,10 +39,7 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
         (LAG_SAMPLES_MAX + 2) * terms.ticks_per_sample,
         reference.angle_rad if config.receiver.controller == "pid" else lambda _tick: None,
     )
-    rig = build_rig(config)
-    if rig.is_real and agreement.clock == "virtual":
-        raise ConfigError(f"{rig.name} moves in real time: add --clock real")
-    return TransmitterNode(session, rig, build_guard(agreement), scores, recorder)
+    return TransmitterNode(session, build_rig(config), build_guard(agreement), scores, recorder)
 
 
 def build_uplink(agreement: Agreement, wire: Wire) -> Uplink:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from plant_sim.disturbance import parse_disturbance
 from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters, PitchPlant
-from tenbaud.build import read_flight_log
+from tenbaud.build import REAL_RIGS, read_flight_log
 from tenbaud.config.load import ConfigError
 from tenbaud.config.rig_schema import AxisSection
 from tenbaud.config.schema import FlightConfig
@@ -17,7 +17,6 @@ from transmitter.rigs.formats.base import SerialFormat
 from transmitter.rigs.replay import ReplayRig
 from transmitter.rigs.simulated import SimulatedRig
 
-REAL_RIGS = ("serial", "quarc", "hil")
 MEASURED = ("pitch",)
 
 
@@ -121,9 +120,7 @@ def serial_format(config: FlightConfig) -> SerialFormat:
         return CobsFormat()
     if section.format == "qsb":
         return QsbFormat()
-    return AsciiFormat(
-        section.columns, section.poll, section.command_style, section.pulse_full_volts
-    )
+    return AsciiFormat(section.columns, section.poll, section.command_style, section.pulse_full_volts)
 
 
 def _build_serial(config: FlightConfig, settings: DeviceSettings) -> DeviceRig:

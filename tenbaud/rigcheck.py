@@ -63,9 +63,7 @@ class _Watcher:
 
     def __init__(self, axes: tuple[Axis, ...], first: DeviceSample, angles: tuple[float, ...]) -> None:
         self.axes = [
-            AxisCheck(
-                axis.name, axis.channel, first.counts[axis.channel], 0, angle, angle, angle
-            )
+            AxisCheck(axis.name, axis.channel, first.counts[axis.channel], 0, angle, angle, angle)
             for axis, angle in zip(axes, angles, strict=True)
         ]
         self.longest_gap_ns = 0
@@ -173,7 +171,9 @@ def show_check(result: RigCheck) -> None:
     from rich.table import Table
 
     console = Console()
-    table = Table(title=f"{result.rig}: {result.seconds:g} s, its output never opened", title_justify="left")
+    table = Table(
+        title=f"{result.rig}: {result.seconds:g} s, its output never opened", title_justify="left"
+    )
     for heading in ("axis", "channel", "counts now", "angle now", "from ... to", "fastest", "moved"):
         table.add_column(heading, justify="left" if heading == "axis" else "right")
     for axis in result.axes:
@@ -187,7 +187,11 @@ def show_check(result: RigCheck) -> None:
             "yes" if axis.moved else "no",
         )
     console.print(table)
-    clock = "" if result.device_clock_ppm is None else f", its clock {result.device_clock_ppm:+.0f} ppm off ours"
+    clock = (
+        ""
+        if result.device_clock_ppm is None
+        else f", its clock {result.device_clock_ppm:+.0f} ppm off ours"
+    )
     console.print(
         f"{result.samples_per_s:.1f} samples/s, longest gap {result.longest_gap_ms:.1f} ms{clock}; "
         f"flags: {', '.join(result.flags) or 'none'}",

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tenbaud.cli import demo, nodes, rig, runs
+from tenbaud.cli import demo, doctor, nodes, rig, runs
 from tenbaud.flight.outcome import ExitCode, outcome_of
 
 app = typer.Typer(
@@ -47,6 +47,7 @@ app.command()(nodes.receive)
 app.command()(runs.inspect)
 app.command()(runs.diff)
 app.command()(runs.presets)
+app.command()(doctor.doctor)
 app.command()(rig.rig)
 app.command()(rig.rig_check)
 

@@ -53,7 +53,9 @@ def rig(
         list[str] | None,
         typer.Option(help="Such as stuck@5..8, silent@5, unplug@5..7, reset@5, drop=0.01; repeatable."),
     ] = None,
-    duration: Annotated[float | None, typer.Option(help="Seconds to run; for ever if not given.")] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="Seconds to run; for ever if not given.")
+    ] = None,
     settings: options.Settings = None,
     json: options.AsJson = False,
 ) -> None:
@@ -99,7 +101,9 @@ def _emulate(emulator: RigEmulator, form: str, duration_s: float | None, as_json
         # The first line, so that a script can read where the device is.
         sys.stdout.write(json_module.dumps({"port": address}) + "\n" if as_json else f"{address}\n")
         sys.stdout.flush()
-        typer.echo(f"tenbaud rig: {form} at {address}; Ctrl-C ends it\n  {_hint(form, address)}", err=True)
+        typer.echo(
+            f"tenbaud rig: {form} at {address}; Ctrl-C ends it\n  {_hint(form, address)}", err=True
+        )
         until = None if duration_s is None else time.monotonic() + duration_s
         try:
             emulator.run(lambda: stop() or (until is not None and time.monotonic() > until))

@@ -214,7 +214,7 @@ class DeviceRig(RigBase):
             return
         sample = self.timeline.take(raw, host_ns)
         before = self._latest
-        if before is None or sample.restarted and not self._enabled:
+        if before is None or (sample.restarted and not self._enabled):
             self._first = sample
         elif self._enabled:
             problem = self._judge(before, sample)

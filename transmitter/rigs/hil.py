@@ -71,9 +71,7 @@ def load_library(card_type: str) -> HilLibrary:
             "package source (github.com/quanser/quanser_sdk_linux); on Windows install the wheel in "
             "%QSDK_DIR%python. Without a board, `--rig hil:fake` shows how it goes"
         ) from error
-    return HilLibrary(
-        HIL, HILError, Clock.HARDWARE_CLOCK_0, BufferOverflowMode.OVERWRITE_ON_OVERFLOW
-    )
+    return HilLibrary(HIL, HILError, Clock.HARDWARE_CLOCK_0, BufferOverflowMode.OVERWRITE_ON_OVERFLOW)
 
 
 class HilRig(DeviceRig):
@@ -124,7 +122,9 @@ class HilRig(DeviceRig):
                     if taken <= 0:
                         raise RigError(f"{self.name}: the timed reader returned no sample")
                     index += 1
-                    self._take(RawSample(tuple(int(value) for value in counts), index), time.monotonic_ns())
+                    self._take(
+                        RawSample(tuple(int(value) for value in counts), index), time.monotonic_ns()
+                    )
                     if self.settings.output:
                         self._output()
         finally:
@@ -133,15 +133,15 @@ class HilRig(DeviceRig):
     def _start_task(self, channels: int) -> None:
         assert self._library is not None
         rate = self._hil.sample_rate_hz
-        self._task = self._card.task_create_encoder_reader(max(1, round(rate)), self._encoders, channels)
+        self._task = self._card.task_create_encoder_reader(
+            max(1, round(rate)), self._encoders, channels
+        )
         with contextlib.suppress(self._library.error):
             # Otherwise a reader that is held up once gets an error instead of the newest sample.
             self._card.task_set_buffer_overflow_mode(self._task, self._library.overwrite_on_overflow)
         if self.settings.output:
             self._start_watchdog()
-        self._card.task_start(
-            self._task, self._library.hardware_clock, rate, type(self._card).INFINITE
-        )
+        self._card.task_start(self._task, self._library.hardware_clock, rate, type(self._card).INFINITE)
 
     def _start_watchdog(self) -> None:
         """Start the board's watchdog; many boards do not take the state, and some have none."""

@@ -169,7 +169,10 @@ class QuarcBridge(DeviceRig):
             return f" {self._last_unit_error}"
         if self.counts["connections"] == 0:
             other = "client" if self._role == "server" else "server"
-            return f": nothing connected; is the model running, with its Stream {other} block? {self._problem}"
+            return (
+                f": nothing connected; is the model running, with its Stream {other} block? "
+                f"{self._problem}"
+            )
         return f": connected, but no whole unit of {len(self._layout.fields)} doubles came"
 
 

@@ -89,9 +89,7 @@ class Timeline:
         self._device_us += step_us
         return self._placed(raw, host_ns, step_us / 1e6, False)
 
-    def _placed(
-        self, raw: RawSample, host_ns: int, elapsed_s: float, restarted: bool
-    ) -> DeviceSample:
+    def _placed(self, raw: RawSample, host_ns: int, elapsed_s: float, restarted: bool) -> DeviceSample:
         device_us = None if raw.device_us is None else self._device_us
         return DeviceSample(raw.counts, raw.flags, host_ns, device_us, elapsed_s, restarted)
 

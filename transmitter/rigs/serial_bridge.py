@@ -6,6 +6,7 @@ A port that disappears is opened again as soon as it is back.
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from typing import TYPE_CHECKING
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     import serial
 
 READ_TIMEOUT_S = 0.02
+READ_BYTES = 4096
 WRITE_TIMEOUT_S = 0.05
 REOPEN_PERIOD_S = 0.2
 POLL_PERIOD_S = 0.005
@@ -38,6 +40,7 @@ class BytePort:
         self._line_baud = line_baud
         self._port: serial.SerialBase | None = None
         self._lock = threading.Lock()
+        self._is_socket = url.startswith("socket://")
 
     def open(self) -> None:
         """Open for this process alone; RigError, with what to do, when that is impossible."""
@@ -54,10 +57,8 @@ class BytePort:
         except (serial.SerialException, OSError, ValueError) as error:
             raise RigError(_cannot_open(self.url, error)) from error
         # FTDI adapters collect bytes for 16 ms unless told otherwise; others do not know the call.
-        try:
+        with contextlib.suppress(Exception):
             port.set_low_latency_mode(True)
-        except (AttributeError, NotImplementedError, OSError, ValueError):
-            pass
         self._port = port
         self.problem = ""
 
@@ -70,8 +71,8 @@ class BytePort:
         """Try to get a lost device back; return whether it is there."""
         try:
             self.open()
-        except RigError as error:
-            self.problem = str(error)
+        except RigError:
+            # `problem` still says how it was lost; that it is not back is plain from that.
             return False
         self.reconnects += 1
         return True
@@ -82,9 +83,20 @@ class BytePort:
         if port is None:
             return b""
         try:
-            return bytes(port.read(max(1, port.in_waiting)))
-        except (OSError, TypeError, ValueError) as error:
-            # TypeError: pyserial's way to say that another thread closed the port.
+            if not self._is_socket:
+                return bytes(port.read(max(1, getattr(port, "in_waiting", 1))))
+            # A socket does not say how much waits: take one byte, then whatever is there.
+            first = bytes(port.read(1))
+            if not first:
+                return b""
+            port.timeout = 0
+            try:
+                return first + bytes(port.read(READ_BYTES))
+            finally:
+                port.timeout = READ_TIMEOUT_S
+        except Exception as error:
+            # OSError, TypeError, ValueError, termios.error: pyserial lets them all through when a
+            # device vanishes or another thread closes the port.
             self._lose(error)
             return b""
 
@@ -96,7 +108,7 @@ class BytePort:
         try:
             with self._lock:
                 port.write(data)
-        except (OSError, TypeError, ValueError) as error:
+        except Exception as error:
             if type(error).__name__ != "SerialTimeoutException":
                 self._lose(error)
             return False
@@ -106,21 +118,25 @@ class BytePort:
         """Give the port back."""
         port, self._port = self._port, None
         if port is not None:
-            try:
+            # What was written last says that the motors are off: let it out before the port closes.
+            with contextlib.suppress(Exception):
                 port.flush()
+            with contextlib.suppress(Exception):
                 port.close()
-            except (OSError, ValueError):
-                pass
 
     def _lose(self, error: Exception) -> None:
         self.problem = f"({self.url} is gone: {error})"
-        self.close()
+        port, self._port = self._port, None
+        if port is not None:
+            with contextlib.suppress(Exception):
+                port.close()
 
 
 class SerialBridge(DeviceRig):
     """Encoders, and mostly motors, at the other end of a serial line.
 
-    `motor_port` is a second line for the commands, in `motor_format`: an encoder adapter has no outputs.
+    `motor_port` is a second line for the commands, in `motor_format`: an encoder adapter has no
+    outputs.
     """
 
     name = "serial bridge"
@@ -183,7 +199,7 @@ class SerialBridge(DeviceRig):
         if not lost or (lost == [self._motor_port] and not self.settings.output):
             return True
         self._problem = lost[0].problem
-        if self._closing.wait(REOPEN_PERIOD_S) or not all([port.reopen() for port in lost]):
+        if self._closing.wait(REOPEN_PERIOD_S) or not all(port.reopen() for port in lost):
             return False
         self._problem = ""
         if self._port in lost:

@@ -63,7 +63,11 @@ class EmulatedDevice:
     """The board. Time comes in as nanoseconds of any monotonic clock; it must not go back."""
 
     def __init__(
-        self, body: Body, now_ns: int, watchdog_s: float = DEFAULT_WATCHDOG_S, faults: Faults | None = None
+        self,
+        body: Body,
+        now_ns: int,
+        watchdog_s: float = DEFAULT_WATCHDOG_S,
+        faults: Faults | None = None,
     ) -> None:
         self.faults = faults or Faults()
         self.volts: tuple[float, float] = OFF

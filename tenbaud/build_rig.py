@@ -21,7 +21,7 @@ MEASURED = ("pitch",)
 
 
 def build_rig(config: FlightConfig) -> Rig:
-    """Return the rig: the plant off the model by the configured mismatch, a recording, or a real one."""
+    """Return the rig: a plant off the model by the configured mismatch, a recording, or a real one."""
     section = config.transmitter
     if section.rig in REAL_RIGS:
         rig: Rig = build_device(config, output=not section.dry_run)

@@ -145,13 +145,17 @@ def _problems(result: RigCheck, config: FlightConfig) -> list[str]:
     ):
         if result.counts.get(name):
             found.append(f"{result.counts[name]} {what}")
-    for flag in ("estop_open", "encoder_error"):
-        if flag in result.flags:
-            found.append(f"the device reports {flag.replace('_', ' ')}")
-    for axis in result.axes:
-        limit = config.transmitter.bridge.rate_max_rad_per_s
-        if axis.rate_max_rad_per_s > limit:
-            found.append(f"{axis.name} turned faster than {limit:g} rad/s: a jump in flight")
+    found += [
+        f"the device reports {flag.replace('_', ' ')}"
+        for flag in ("estop_open", "encoder_error")
+        if flag in result.flags
+    ]
+    limit = config.transmitter.bridge.rate_max_rad_per_s
+    found += [
+        f"{axis.name} turned faster than {limit:g} rad/s: a jump in flight"
+        for axis in result.axes
+        if axis.rate_max_rad_per_s > limit
+    ]
     return found
 
 
@@ -174,16 +178,24 @@ def show_check(result: RigCheck) -> None:
     table = Table(
         title=f"{result.rig}: {result.seconds:g} s, its output never opened", title_justify="left"
     )
-    for heading in ("axis", "channel", "counts now", "angle now", "from ... to", "fastest", "moved"):
+    for heading in (
+        "axis",
+        "channel",
+        "counts now",
+        "angle now, rad",
+        "from ... to, rad",
+        "rad/s, at most",
+        "moved",
+    ):
         table.add_column(heading, justify="left" if heading == "axis" else "right")
     for axis in result.axes:
         table.add_row(
             axis.name,
             str(axis.channel),
             str(axis.counts_last),
-            f"{axis.angle_rad:+.4f} rad",
+            f"{axis.angle_rad:+.4f}",
             f"{axis.angle_min_rad:+.3f} ... {axis.angle_max_rad:+.3f}",
-            f"{axis.rate_max_rad_per_s:.2f} rad/s",
+            f"{axis.rate_max_rad_per_s:.2f}",
             "yes" if axis.moved else "no",
         )
     console.print(table)

@@ -22,6 +22,25 @@ class AxisSection(Section):
     """counts at 0 rad; "first": those of the first sample, with the body at 0 rad then"""
 
 
+class TravelSection(AxisSection):
+    """The arm's turning about its post; it may go round and round."""
+
+    counts_per_turn: Annotated[int, Field(ge=2, le=10_000_000)] = 8192
+
+
+class PitchSection(AxisSection):
+    """The body's tilt: the axis that is flown."""
+
+    channel: Channel = 1
+
+
+class ElevationSection(AxisSection):
+    """The arm's height. Its counts fall as it rises on the rigs that we know of."""
+
+    channel: Channel = 2
+    sign: Sign = -1
+
+
 class MotorsSection(Section):
     """What a motor voltage becomes on its way to the device."""
 
@@ -39,9 +58,9 @@ class MotorsSection(Section):
 class BridgeSection(Section):
     """What holds for every real rig."""
 
-    travel: AxisSection = AxisSection(channel=0, counts_per_turn=8192)
-    pitch: AxisSection = AxisSection(channel=1, counts_per_turn=4096)
-    elevation: AxisSection = AxisSection(channel=2, counts_per_turn=4096, sign=-1)
+    travel: TravelSection = TravelSection()
+    pitch: PitchSection = PitchSection()
+    elevation: ElevationSection = ElevationSection()
     axes: tuple[Literal["travel", "pitch", "elevation"], ...] = ("travel", "pitch", "elevation")
     """those that are wired; pitch must be among them"""
     motors: MotorsSection = MotorsSection()

@@ -126,7 +126,5 @@ def test_the_rigs_watchdog_never_trips(tmp_path: Path) -> None:
 
 
 def _last_tick(folder: Path) -> dict[str, object]:
-    row: dict[str, object] = {}
-    for _, _, row in MessageStream(folder / "transmitter.mcap", "tick"):
-        pass
-    return row
+    rows = [row for _, _, row in MessageStream(folder / "transmitter.mcap", "tick")]
+    return rows[-1]

@@ -220,5 +220,5 @@ class HilRig(DeviceRig):
         try:
             yield
         except self._library.error as error:
-            text = getattr(error, "get_error_message", lambda: str(error))()
-            raise RigError(f"{self.name} {what}: {text}") from error
+            told = getattr(error, "get_error_message", None)
+            raise RigError(f"{self.name} {what}: {told() if told else error}") from error

@@ -7,6 +7,7 @@ import shutil
 import struct
 import subprocess
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -92,7 +93,7 @@ def test_samples_come_at_their_rate_with_sequence_and_time(board: Board) -> None
     assert 479 <= len(samples) <= 481
     assert [sample.sequence for sample in samples] == list(range(1, len(samples) + 1))
     times = [sample.device_us or 0 for sample in samples]
-    steps = [after - before for before, after in zip(times, times[1:], strict=False)]
+    steps = [after - before for before, after in pairwise(times)]
     assert all(PERIOD_US - 500 <= step <= PERIOD_US + 500 for step in steps)
     assert board.format.counts == {}
 

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import contextlib
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -41,10 +43,8 @@ def test_whatever_is_encoded_has_no_zero_and_comes_back(data: bytes) -> None:
 
 @given(st.binary(max_size=40))
 def test_garbage_is_decoded_or_refused_and_nothing_else(data: bytes) -> None:
-    try:
+    with contextlib.suppress(ValueError):
         assert len(cobs_decode(data)) < len(data)
-    except ValueError:
-        pass
 
 
 @pytest.mark.parametrize("data", [b"", b"\0", b"\x05\x01", b"\x03\x01\0", b"\x02\x01\0"])

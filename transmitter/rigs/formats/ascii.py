@@ -6,7 +6,7 @@ sequence and a checksum: `E,seq,t_us,c0,c1,c2*HH`, `HH` being the exclusive or o
 before `*` in hexadecimal. Lines that begin with `#` are the device's log.
 
 Commands back are `U,seq,v0,v1*HH` and `S*53` (stop). For the firmware of ros_arduino_bridge, which is
-asked (`poll = "e\\r"`) and takes raw pulse widths, commands are `o p0 p1`.
+asked with `e` and a carriage return and takes raw pulse widths, commands are `o p0 p1`.
 """
 
 from __future__ import annotations

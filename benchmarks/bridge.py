@@ -72,8 +72,8 @@ def bridge_latency(samples: int = SAMPLES) -> dict[str, float]:
         None,
         {
             # One tick per sample and per symbol: every sensor frame makes a symbol of its own.
-            "timing": {"tick_s": PERIOD_S, "symbol_period_s": PERIOD_S, "lead_ticks": 200},
-            "channel": {"rate_baud": 1 / PERIOD_S, "deadline_allowance_s": 1.9},
+            "timing": {"tick_s": PERIOD_S, "symbol_period_s": PERIOD_S, "lead_ticks": 5},
+            "channel": {"rate_baud": 1 / PERIOD_S, "deadline_allowance_s": 0.04},
             "transmitter": {
                 "rig": "serial",
                 "serial": {"port": device.path, "format": "cobs"},

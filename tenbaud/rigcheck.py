@@ -178,23 +178,16 @@ def show_check(result: RigCheck) -> None:
     table = Table(
         title=f"{result.rig}: {result.seconds:g} s, its output never opened", title_justify="left"
     )
-    for heading in (
-        "axis",
-        "channel",
-        "counts now",
-        "angle now, rad",
-        "from ... to, rad",
-        "rad/s, at most",
-        "moved",
-    ):
-        table.add_column(heading, justify="left" if heading == "axis" else "right")
+    table.add_column("axis (channel)")
+    for heading in ("counts", "rad now", "least", "most", "rad/s", "moved"):
+        table.add_column(heading, justify="right")
     for axis in result.axes:
         table.add_row(
-            axis.name,
-            str(axis.channel),
+            f"{axis.name} ({axis.channel})",
             str(axis.counts_last),
             f"{axis.angle_rad:+.4f}",
-            f"{axis.angle_min_rad:+.3f} ... {axis.angle_max_rad:+.3f}",
+            f"{axis.angle_min_rad:+.3f}",
+            f"{axis.angle_max_rad:+.3f}",
             f"{axis.rate_max_rad_per_s:.2f}",
             "yes" if axis.moved else "no",
         )

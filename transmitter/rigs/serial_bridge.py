@@ -7,9 +7,10 @@ A port that disappears is opened again as soon as it is back.
 from __future__ import annotations
 
 import contextlib
+import select
 import threading
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from transmitter.rigs.axes import Axis, Motors
 from transmitter.rigs.device import DeviceRig, DeviceSettings
@@ -40,6 +41,8 @@ class BytePort:
         self._line_baud = line_baud
         self._port: serial.SerialBase | None = None
         self._lock = threading.Lock()
+        self._handle: int | None = None
+        """to ask whether the port takes more; None where there is none"""
         self._is_socket = url.startswith("socket://")
 
     def open(self) -> None:
@@ -51,16 +54,27 @@ class BytePort:
                 self.url,
                 baudrate=self._line_baud,
                 timeout=READ_TIMEOUT_S,
-                write_timeout=WRITE_TIMEOUT_S,
-                exclusive=True,
+                **self._local_options(),
             )
         except (serial.SerialException, OSError, ValueError) as error:
             raise RigError(_cannot_open(self.url, error)) from error
         # FTDI adapters collect bytes for 16 ms unless told otherwise; others do not know the call.
         with contextlib.suppress(Exception):
             port.set_low_latency_mode(True)
+        try:
+            self._handle = port.fileno()
+            port.write_timeout = 0
+        except (AttributeError, OSError, ValueError):
+            # Windows, and rfc2217: they keep the time-out.
+            self._handle = None
         self._port = port
         self.problem = ""
+
+    def _local_options(self) -> dict[str, Any]:
+        """Return what a serial server over RFC 2217 does not know."""
+        if self.url.startswith("rfc2217://"):
+            return {}
+        return {"write_timeout": WRITE_TIMEOUT_S, "exclusive": True}
 
     @property
     def is_open(self) -> bool:
@@ -101,18 +115,22 @@ class BytePort:
             return b""
 
     def write(self, data: bytes) -> bool:
-        """Send these bytes; return whether the port took them."""
+        """Send these bytes without waiting; return whether the port took them all."""
         port = self._port
         if port is None or not data:
             return not data
         try:
             with self._lock:
-                port.write(data)
+                if self._handle is None:
+                    return port.write(data) == len(data)
+                # pyserial would wait, after the write, until the port could take more: up to its
+                # time-out, in the middle of a tick. So it is asked beforehand and told not to wait.
+                _, ready, _ = select.select([], [self._handle], [], 0.0)
+                return bool(ready) and port.write(data) == len(data)
         except Exception as error:
             if type(error).__name__ != "SerialTimeoutException":
                 self._lose(error)
             return False
-        return True
 
     def close(self) -> None:
         """Give the port back."""

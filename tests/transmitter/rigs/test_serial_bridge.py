@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import socket
+import threading
 import time
 from pathlib import Path
 from typing import Any
 
 import pytest
+import serial
+import serial.rfc2217
 
 from tests.transmitter.rigs.emulated import emulated, fly, serial_rig, wait_until
 from transmitter.rigs.emulator.loop import RigEmulator
@@ -147,11 +151,67 @@ def test_unplugging_is_told_and_plugging_in_again_is_noticed(tmp_path: Path) -> 
         assert is_off(emulator)
 
 
-@pytest.mark.parametrize("scheme", ["socket://"])
-def test_serial_over_tcp_is_a_port_like_any_other(scheme: str) -> None:
+def test_serial_over_tcp_is_a_port_like_any_other() -> None:
     with (
         emulated("cobs", "tcp:127.0.0.1:0") as emulator,
-        serial_rig(scheme + emulator.line.address) as rig,
+        serial_rig("socket://" + emulator.line.address) as rig,
+    ):
+        assert fly(rig, 0.3, (1.0, 2.0)) is None
+        assert emulator.device.volts == (1.0, 2.0)
+
+
+class PtyPort(serial.Serial):  # type: ignore[misc]
+    """A pseudo-terminal has no modem lines, and the server half asks for them."""
+
+    cts = dsr = ri = cd = property(lambda self: False)
+
+    def _update_dtr_state(self) -> None: ...
+
+    def _update_rts_state(self) -> None: ...
+
+
+class SerialServer:
+    """A port offered over RFC 2217, with pyserial's own server half."""
+
+    def __init__(self, device: str) -> None:
+        self._device = device
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.address = f"127.0.0.1:{self._listener.getsockname()[1]}"
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+
+    def __enter__(self) -> SerialServer:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        self._thread.join(5.0)
+        self._listener.close()
+
+    def write(self, data: bytes) -> None:
+        self._peer.sendall(data)
+
+    def _serve(self) -> None:
+        self._peer, _ = self._listener.accept()
+        with PtyPort(self._device, timeout=0.01) as port, self._peer as peer:
+            manager = serial.rfc2217.PortManager(port, self)
+            peer.settimeout(0.002)
+            while not self._stop.is_set():
+                with contextlib.suppress(TimeoutError):
+                    data = peer.recv(4096)
+                    if not data:
+                        return
+                    port.write(b"".join(manager.filter(data)))
+                data = port.read(port.in_waiting)
+                peer.sendall(b"".join(manager.escape(data)))
+
+
+def test_a_serial_server_is_a_port_like_any_other() -> None:
+    with (
+        emulated("cobs") as emulator,
+        SerialServer(emulator.line.address) as server,
+        serial_rig("rfc2217://" + server.address) as rig,
     ):
         assert fly(rig, 0.3, (1.0, 2.0)) is None
         assert emulator.device.volts == (1.0, 2.0)

@@ -53,8 +53,8 @@ def test_an_emulated_rig_flies_like_the_simulated_one(form: str, tmp_path: Path)
     assert summary["error_coded_rms_rad"] == pytest.approx(expected, rel=0.1)
     assert device.get("watchdog_trips", 0) == 0
     assert (device["volts"], device["enabled"]) == (OFF, False)
-    # The flight's ticks, then the way down: one second of the guard's ramp, a command per tick.
-    assert summary["rig"]["writes"] > 100 * SECONDS + 90
+    # One command a tick at most, so more of them than ticks are those of the way down.
+    assert summary["rig"]["writes"] > 100 * SECONDS
 
 
 def test_a_rig_that_goes_silent_ends_at_the_safe_voltage_on_both_sides(tmp_path: Path) -> None:
@@ -71,9 +71,11 @@ def test_a_rig_that_goes_silent_ends_at_the_safe_voltage_on_both_sides(tmp_path:
 
 def test_an_unplugged_rig_ends_the_flight_and_flies_again_when_it_is_back(tmp_path: Path) -> None:
     link = tmp_path / "rig"
-    rig = RigProcess("cobs", "--port", f"pty:{link}", "--fault", "unplug@0.5..2", "--watchdog", "0.3")
+    rig = RigProcess("cobs", "--port", f"pty:{link}", "--fault", "unplug@0.5..3", "--watchdog", "1")
     try:
-        arguments = ("--clock", "real", "--rig", f"cobs:{link}", *PATIENT)
+        # Less patient than the watch for a stuck encoder, which sees the standing counts too.
+        stale = ("--set", "transmitter.bridge.stale_s=0.5")
+        arguments = ("--clock", "real", "--rig", f"cobs:{link}", *PATIENT, *stale)
         first = demo(*arguments, seconds=6.0, out=tmp_path / "first")
         second = demo(*arguments, seconds=1.0, out=tmp_path / "second")
     finally:
@@ -112,13 +114,16 @@ def test_a_minute_of_the_papers_coder_flies_like_the_simulated_one(form: str, tm
 
 @pytest.mark.soak
 def test_the_rigs_watchdog_never_trips(tmp_path: Path) -> None:
-    """With its own 100 ms, for as many minutes as asked for."""
+    """With its own 100 ms, for as many minutes as asked for.
+
+    Over TCP: bytes in a pseudo-terminal wait for a kernel worker, which a busy machine delays.
+    """
     minutes = float(os.environ.get("MINUTES", "10"))
     flown = fly_emulated(
         "cobs",
         tmp_path / "run",
         seconds=60.0 * minutes,
-        rig_arguments=("--watchdog", "0.1"),
+        rig_arguments=("--watchdog", "0.1", "--port", "tcp:127.0.0.1:0"),
     )
     assert flown.code == 0, flown.said
     assert flown.device.get("watchdog_trips", 0) == 0

@@ -194,7 +194,11 @@ class SerialServer:
 
     def _serve(self) -> None:
         self._peer, _ = self._listener.accept()
-        with PtyPort(self._device, timeout=0.01) as port, self._peer as peer:
+        with (
+            PtyPort(self._device, timeout=0.01) as port,
+            self._peer as peer,
+            contextlib.suppress(OSError),
+        ):
             manager = serial.rfc2217.PortManager(port, self)
             peer.settimeout(0.002)
             while not self._stop.is_set():

@@ -13,6 +13,7 @@ import math
 import select
 import socket
 import struct
+import threading
 import time
 from typing import Literal
 
@@ -60,6 +61,7 @@ class QuarcBridge(DeviceRig):
         self._peer: socket.socket | None = None
         self._sequence = 0
         self._last_unit_error = ""
+        self._lock = threading.Lock()
 
     def _connect(self) -> None:
         if self._role == "server":
@@ -152,7 +154,9 @@ class QuarcBridge(DeviceRig):
             self.counts["writes_lost"] += 1
             return
         try:
-            peer.sendall(data)
+            # The reader's thread turns the outputs off too; two units must not mix.
+            with self._lock:
+                peer.sendall(data)
         except OSError as error:
             # A unit may have gone out in part; only a new connection is aligned again.
             self.counts["writes_lost"] += 1

@@ -21,6 +21,16 @@ from tests.tenbaud.emulated_flight import PATIENT, RigProcess, demo, fly_emulate
 SECONDS = 5.0
 SOAK_SECONDS = 60.0
 OFF = [0.0, 0.0]
+TCP = ("--port", "tcp:127.0.0.1:0")
+# With an enable element the emulated body starts at tick 0, as the simulated one does; without it the
+# first voltage that is not zero starts it, some ticks later.
+ENABLE = ("--set", "transmitter.quarc.command_fields=['front','rear','enable']")
+PEERS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "cobs": ((), ()),
+    "ascii": ((), ()),
+    "quarc": ((*TCP, *ENABLE), ENABLE),
+}
+"""What the rig and what both ends are started with, by format."""
 
 
 @cache
@@ -42,8 +52,8 @@ def simulated_rms(seconds: float, lead_ticks: int) -> float:
 
 @pytest.mark.parametrize("form", ["cobs", "ascii", "quarc"])
 def test_an_emulated_rig_flies_like_the_simulated_one(form: str, tmp_path: Path) -> None:
-    port = ("--port", "tcp:127.0.0.1:0") if form == "quarc" else ()
-    flown = fly_emulated(form, tmp_path / "real", seconds=SECONDS, rig_arguments=port)
+    rig, ends = PEERS[form]
+    flown = fly_emulated(form, tmp_path / "real", seconds=SECONDS, rig_arguments=rig, arguments=ends)
     assert flown.code == 0, flown.said
     summary, device = flown.summary, flown.device
     assert summary["desyncs"] == 0
@@ -105,8 +115,10 @@ def test_a_real_rig_is_refused_on_the_virtual_clock(tmp_path: Path) -> None:
 @pytest.mark.parametrize("form", ["cobs", "ascii", "quarc"])
 def test_a_minute_of_the_papers_coder_flies_like_the_simulated_one(form: str, tmp_path: Path) -> None:
     """The errors of the window after the first period of the reference."""
-    port = ("--port", "tcp:127.0.0.1:0") if form == "quarc" else ()
-    flown = fly_emulated(form, tmp_path / "real", seconds=SOAK_SECONDS, rig_arguments=port)
+    rig, ends = PEERS[form]
+    flown = fly_emulated(
+        form, tmp_path / "real", seconds=SOAK_SECONDS, rig_arguments=rig, arguments=ends
+    )
     assert flown.code == 0, flown.said
     expected = simulated_rms(SOAK_SECONDS, flown.summary["lead_ticks"])
     assert flown.summary["error_coded_rms_rad"] == pytest.approx(expected, rel=0.1)

@@ -149,9 +149,9 @@ def quarc_fields(config: FlightConfig) -> tuple[str, ...]:
     fields = tuple(axes.get(name, name) for name in config.transmitter.quarc.fields)
     for name in fields:
         is_channel = len(name) == 2 and name[0] == "c" and name[1].isdigit()
-        if not is_channel and name not in ("seq", "time_s", "-"):
+        if not is_channel and name not in ("seq", "time_s", "flags", "-"):
             raise ConfigError(
-                f"transmitter.quarc.fields: {name!r} is no wired axis, c0 to c9, seq, time_s or -"
+                f"transmitter.quarc.fields: {name!r} is no wired axis, c0 to c9, seq, time_s, flags or -"
             )
     if not any(name == axes["pitch"] for name in fields):
         raise ConfigError("transmitter.quarc.fields: the pitch is not among them")

@@ -99,7 +99,8 @@ class QuarcSection(Section):
     """what this end is; the model's Stream block is the other"""
     byte_order: Literal["little", "big"] = "little"
     fields: tuple[str, ...] = ("travel", "pitch", "elevation")
-    """of the vector that the model sends: travel, pitch, elevation, c0 ... c9, seq, time_s, -"""
+    """of the vector that the model sends: travel, pitch, elevation, c0 ... c9, seq, time_s,
+    flags, -"""
     unit: Literal["counts", "rad", "deg"] = "counts"
     """of its angles"""
     command_fields: tuple[Literal["front", "rear", "seq", "enable"], ...] = ("front", "rear")

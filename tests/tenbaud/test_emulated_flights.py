@@ -24,11 +24,16 @@ OFF = [0.0, 0.0]
 TCP = ("--port", "tcp:127.0.0.1:0")
 # With an enable element the emulated body starts at tick 0, as the simulated one does; without it the
 # first voltage that is not zero starts it, some ticks later.
-ENABLE = ("--set", "transmitter.quarc.command_fields=['front','rear','enable']")
+VECTORS = (
+    "--set",
+    "transmitter.quarc.command_fields=['front','rear','enable']",
+    "--set",
+    "transmitter.quarc.fields=['seq','flags','travel','pitch','elevation']",
+)
 PEERS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "cobs": ((), ()),
     "ascii": ((), ()),
-    "quarc": ((*TCP, *ENABLE), ENABLE),
+    "quarc": ((*TCP, *VECTORS), VECTORS),
 }
 """What the rig and what both ends are started with, by format."""
 

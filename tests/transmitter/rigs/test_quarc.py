@@ -214,6 +214,18 @@ def test_both_roles_fly_with_the_emulator(role: str) -> None:
         assert wait_until(lambda: emulator.device.volts == (0.0, 0.0))
 
 
+def test_a_latched_watchdog_in_the_flags_ends_the_flight() -> None:
+    vectors = {"fields": ["flags", "pitch"], "command_fields": ["front", "rear", "enable"]}
+    config = rig_config(rig="quarc", quarc=vectors)
+    with emulated("quarc", "tcp:127.0.0.1:0", config) as emulator:
+        port = int(emulator.line.address.rpartition(":")[2])
+        with quarc_rig(port, **vectors) as rig:
+            assert fly(rig, 0.3, (3.0, -3.0)) is None
+            assert wait_until(lambda: emulator.device.counts["watchdog_trips"])
+            assert "watchdog" in str(fly(rig, 1.0))
+            assert wait_until(lambda: emulator.device.volts == (0.0, 0.0))
+
+
 def test_unplugging_and_plugging_in_again() -> None:
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port = probe.getsockname()[1]

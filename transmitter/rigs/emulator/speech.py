@@ -184,7 +184,11 @@ class DoublesSpeech:
 
     def encode(self, sample: RawSample) -> bytes:
         """Return one unit."""
-        known = {"seq": sample.sequence or 0, "time_s": (sample.device_us or 0) / 1e6}
+        known: dict[str, float] = {
+            "seq": sample.sequence or 0,
+            "time_s": (sample.device_us or 0) / 1e6,
+            "flags": int(sample.flags),
+        }
         for channel, counts in enumerate(sample.counts):
             known[f"c{channel}"] = counts * self._scale
         return self._out.pack(*(known.get(name, 0.0) for name in self._fields))

@@ -28,7 +28,7 @@ class UnitError(ValueError):
 class DoublesLayout:
     """Names and scales of the doubles in one direction's unit.
 
-    `fields` for what comes in: `seq`, `time_s`, `c0` ... `c9` (or travel, pitch, elevation), `-`. An
+    `fields` for what comes in: `seq`, `time_s`, `flags` (those of the other formats), `c0` ... `c9` (or travel, pitch, elevation), `-`. An
     angle in rad or deg is turned into counts with `counts_per_turn` of its channel.
     """
 
@@ -55,6 +55,7 @@ class DoublesLayout:
         values = self.struct.unpack(data)
         counts: dict[int, int] = {}
         sequence = time_us = None
+        flags = DeviceFlag(0)
         for name, value in zip(self.fields, values, strict=True):
             self._check(name, value)
             if name == "-":
@@ -63,11 +64,13 @@ class DoublesLayout:
                 sequence = round(value)
             elif name == "time_s":
                 time_us = round(value * 1e6)
+            elif name == "flags":
+                flags = DeviceFlag(round(value) & 0x0F)
             else:
                 channel = int(name[1:])
                 counts[channel] = math.floor(value * self._scales.get(channel, 1.0) + 0.5)
         found = tuple(counts.get(index, 0) for index in range(max(counts) + 1))
-        return RawSample(found, sequence, time_us, DeviceFlag(0))
+        return RawSample(found, sequence, time_us, flags)
 
     def _check(self, name: str, value: float) -> None:
         if math.isfinite(value) and (value == 0.0 or PLAUSIBLE_MIN < abs(value) < PLAUSIBLE_MAX):

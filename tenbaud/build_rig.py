@@ -151,7 +151,8 @@ def quarc_fields(config: FlightConfig) -> tuple[str, ...]:
         is_channel = len(name) == 2 and name[0] == "c" and name[1].isdigit()
         if not is_channel and name not in ("seq", "time_s", "flags", "-"):
             raise ConfigError(
-                f"transmitter.quarc.fields: {name!r} is no wired axis, c0 to c9, seq, time_s, flags or -"
+                f"transmitter.quarc.fields: {name!r} is no wired axis, c0 to c9, seq, time_s, "
+                "flags or -"
             )
     if not any(name == axes["pitch"] for name in fields):
         raise ConfigError("transmitter.quarc.fields: the pitch is not among them")
@@ -170,9 +171,11 @@ def _build_quarc(config: FlightConfig, settings: DeviceSettings) -> DeviceRig:
     from transmitter.rigs.quarc import QuarcBridge
 
     section = config.transmitter.quarc
-    axes = build_axes(config)
+    fields = quarc_fields(config)
+    # An axis that the model does not send is not wired, as far as we are concerned.
+    axes = tuple(axis for axis in build_axes(config) if f"c{axis.channel}" in fields)
     layout = DoublesLayout(
-        quarc_fields(config),
+        fields,
         section.byte_order,
         section.unit,
         {axis.channel: axis.counts_per_turn for axis in axes},

@@ -267,6 +267,11 @@ class DeviceRig(RigBase):
             )
         if self._thread_error is not None:
             raise self._thread_error
+        if self._latest is None and self.counts["short_samples"]:
+            raise RigError(
+                f"{self.name}: its samples have fewer channels than transmitter.bridge.axes names; "
+                "list there what is wired; the motors were not enabled"
+            )
         if self._latest is None:
             raise RigError(
                 f"{self.name}: no valid sample for {timeout_s:g} s{self._no_sample_hint()}; the "

@@ -241,6 +241,14 @@ def test_the_wrong_format_is_told_with_what_came() -> None:
         assert emulator.device.counts["commands"] == 0
 
 
+def test_fewer_channels_than_axes_are_told() -> None:
+    bridge = {"first_sample_timeout_s": 0.5, "elevation": {"channel": 3}}
+    with emulated("cobs") as emulator:
+        with pytest.raises(RigError, match=r"bridge\.axes"):
+            serial_rig(emulator.line.address, bridge=bridge).open()
+        assert emulator.device.counts["commands"] == 0 or is_off(emulator)
+
+
 def test_an_open_emergency_stop_refuses_to_open(tmp_path: Path) -> None:
     with emulated("cobs", faults=("estop@0.1",)) as emulator:
         with serial_rig(emulator.line.address) as rig:

@@ -28,8 +28,9 @@ class UnitError(ValueError):
 class DoublesLayout:
     """Names and scales of the doubles in one direction's unit.
 
-    `fields` for what comes in: `seq`, `time_s`, `flags` (those of the other formats), `c0` ... `c9` (or travel, pitch, elevation), `-`. An
-    angle in rad or deg is turned into counts with `counts_per_turn` of its channel.
+    `fields` for what comes in: `seq`, `time_s`, `flags` (those of the other formats), `c0` ... `c9`
+    (the channels of travel, pitch and elevation), `-`. An angle in rad or deg is turned into counts
+    with `counts_per_turn` of its channel.
     """
 
     wraps = WRAPS

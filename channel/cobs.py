@@ -1,44 +1,50 @@
 """Consistent overhead byte stuffing (Cheshire and Baker): no zeros within, so that zero can delimit.
 
 A message is cut at its zeros; each piece is preceded by its length plus one, and a piece of 254 bytes
-without a zero by 255. The cost is one byte for up to 254.
+without a zero by 255. The cost is one byte for up to 254. A reader that comes in the middle, or lost a
+byte, is right again at the next zero.
 """
 
 from __future__ import annotations
 
-_RUN_MAX = 254
+_RUN_MAX = 0xFE
+"""Longest run without a zero that one code byte stands for."""
 
 
 def cobs_encode(data: bytes) -> bytes:
-    """Return the message without zeros; never empty."""
-    out = bytearray()
-    for piece in data.split(b"\0"):
-        start = 0
-        while len(piece) - start >= _RUN_MAX:
-            out.append(_RUN_MAX + 1)
-            out += piece[start : start + _RUN_MAX]
-            start += _RUN_MAX
-        out.append(len(piece) - start + 1)
-        out += piece[start:]
-    return bytes(out)
+    """Return the data without zeros, the ending zero not included."""
+    encoded = bytearray()
+    runs = data.split(b"\0")
+    for index, run in enumerate(runs):
+        rest, full = run, False
+        while len(rest) >= _RUN_MAX:
+            encoded += b"\xff" + rest[:_RUN_MAX]
+            rest, full = rest[_RUN_MAX:], True
+        # A full run stands for no zero of its own; at the very end nothing need follow it.
+        if rest or not full or index + 1 < len(runs):
+            encoded.append(len(rest) + 1)
+            encoded += rest
+    return bytes(encoded)
 
 
 def cobs_decode(data: bytes) -> bytes:
-    """Return the message that was encoded; ValueError for bytes that encode none."""
-    out = bytearray()
-    place = 0
-    while place < len(data):
-        code = data[place]
-        end = place + code
-        if code == 0 or end > len(data):
-            raise ValueError(f"code {code} at byte {place} of {len(data)}")
-        piece = data[place + 1 : end]
-        if 0 in piece:
-            raise ValueError(f"a zero within the run at byte {place}")
-        out += piece
-        place = end
-        if code <= _RUN_MAX and place < len(data):
-            out.append(0)
-    if place == 0:
-        raise ValueError("no bytes at all")
-    return bytes(out)
+    """Return what was encoded; ValueError for bytes that no encoder writes."""
+    if not data:
+        raise ValueError("an empty COBS frame")
+    decoded = bytearray()
+    position = 0
+    while position < len(data):
+        code = data[position]
+        end = position + code
+        if code == 0:
+            raise ValueError(f"a zero inside a COBS frame, at byte {position}")
+        if end > len(data):
+            raise ValueError(f"a COBS frame that ends {end - len(data)} bytes early")
+        run = data[position + 1 : end]
+        if 0 in run:
+            raise ValueError(f"a zero inside a COBS frame, after byte {position}")
+        decoded += run
+        if code <= _RUN_MAX and end < len(data):
+            decoded.append(0)
+        position = end
+    return bytes(decoded)

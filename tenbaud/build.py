@@ -19,6 +19,8 @@ from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
 from tenbaud.serial_terms import on_serial_line
 
+REAL_RIGS = ("serial", "quarc", "hil")
+
 
 @cache
 def software_version() -> str:
@@ -59,6 +61,11 @@ class Agreement:
 
 def agree(config: FlightConfig, clock: Clock) -> Agreement:
     """Return codec, terms and identity of a configuration; ConfigError where they make no flight."""
+    if clock == "virtual" and config.transmitter.rig in REAL_RIGS:
+        raise ConfigError(
+            f"the {config.transmitter.rig} rig moves in real time and has no virtual clock: "
+            "add --clock real"
+        )
     try:
         codec = build_codec(config)
         terms = build_terms(config, codec, clock)

@@ -10,9 +10,6 @@ from channel.recording import Recorder
 from channel.shaper import SlotShaper, UplinkMeter
 from channel.uplink import Uplink
 from channel.wire import Wire
-from plant_sim.disturbance import parse_disturbance
-from plant_sim.encoder import Encoder
-from plant_sim.pitch import PitchParameters, PitchPlant
 from receiver.controllers.base import Controller
 from receiver.controllers.pid import Pid, PidGains
 from receiver.controllers.recorded import RecordedController
@@ -20,13 +17,11 @@ from receiver.endpoint import ReceiverEndpoint
 from receiver.references import Constant, Csv, Reference, Sine, Square, Step
 from receiver.session import ReceiverSession
 from tenbaud.build import Agreement, read_flight_log, ticks_of
+from tenbaud.build_rig import build_rig
 from tenbaud.config.load import ConfigError
-from tenbaud.config.schema import FlightConfig, PitchModelSection
+from tenbaud.config.schema import FlightConfig
 from transmitter.guard import Guard, GuardSettings
 from transmitter.node import TransmitterNode
-from transmitter.rigs.base import Rig
-from transmitter.rigs.replay import ReplayRig
-from transmitter.rigs.simulated import SimulatedRig
 from transmitter.scores import Scores
 from transmitter.session import LAG_SAMPLES_MAX, TransmitterSession
 
@@ -71,38 +66,6 @@ def check_parts(config: FlightConfig) -> None:
     """Build what can be wrong in files and texts, so that it is told before anything starts."""
     build_rig(config)
     build_controller(config)
-
-
-def build_rig(config: FlightConfig) -> Rig:
-    """Return the rig: the plant off the model by the configured mismatch, or a recorded flight."""
-    section = config.transmitter
-    encoder = Encoder(
-        section.encoder_counts_per_turn, section.encoder_sign, section.encoder_zero_counts
-    )
-    if section.rig == "replay":
-        return ReplayRig(read_flight_log(config), (encoder,))
-    tick_s = config.timing.tick_s
-    nominal = nominal_plant(config)
-    disturbance = None
-    if section.plant.disturbance:
-        try:
-            disturbance = parse_disturbance(section.plant.disturbance, tick_s, config.seed)
-        except ValueError as error:
-            raise ConfigError(f"transmitter.plant.disturbance: {error}") from error
-    plant = PitchPlant(
-        nominal.mismatched(section.plant.mismatch),
-        tick_s,
-        disturbance,
-        initial_angle_rad=section.plant.initial_angle_rad,
-    )
-    return SimulatedRig(plant, (encoder,), section.safe_volts)
-
-
-def nominal_plant(config: FlightConfig) -> PitchParameters:
-    """Return the plant that the codec's model describes, or that stands in where it has none."""
-    model = config.model
-    section = model if isinstance(model, PitchModelSection) else config.transmitter.plant.pitch
-    return PitchParameters(**section.model_dump(exclude={"kind"}), volts_max=config.limits.volts_max)
 
 
 def build_guard(agreement: Agreement) -> Guard:

@@ -12,7 +12,7 @@ from channel.frames import Frame, Symbol
 from channel.recording import NullRecorder, Recorder
 from transmitter.encoder_watch import EncoderWatch
 from transmitter.guard import Guard, GuardState
-from transmitter.records import TICK_CHANNEL
+from transmitter.records import DEVICE_CHANNEL, TICK_CHANNEL, device_row
 from transmitter.rigs.base import Reading, Rig
 from transmitter.scores import Scores
 from transmitter.session import Phase, TransmitterSession
@@ -51,6 +51,9 @@ class TransmitterNode:
         if reading is None:
             return None
         self._reading = reading
+        if reading.device is not None:
+            time_ns = tick * self.session.terms.tick_ns
+            self._recorder.write(DEVICE_CHANNEL, time_ns, device_row(tick, reading.device))
         self._check(tick, reading)
         self.scores.on_angles(tick, reading.true_rad or reading.measured_rad)
         if self.guard.stopped:

@@ -18,6 +18,7 @@ from channel.line import Delivery
 from channel.links.base import Link
 from channel.uplink import Uplink
 from channel.virtual import is_envelope
+from transmitter.landing import Landing
 from transmitter.node import STOPPED, TransmitterNode
 from transmitter.scores import LatenessMeter
 from transmitter.session import Phase
@@ -99,8 +100,11 @@ class RealFlight:
             tick += 1
         return tick
 
-    def finish(self, reason: str) -> None:
-        """Let the last echoes come in, then end the session on both sides."""
+    def finish(self, reason: str, tick: int = 0) -> None:
+        """Let the last echoes come in, end the session on both sides, take a real rig's motors down.
+
+        `tick` is the first one that was not flown.
+        """
         terms = self._node.session.terms
         linger_ns = (
             terms.uplink_delivery_ns
@@ -110,14 +114,19 @@ class RealFlight:
             + terms.uplink_line_ns
             + terms.downlink_line_ns
         )
+        landing = Landing(self._node, tick)
         until_ns = self._now_ns() + linger_ns
         copies = self._node.session.copies
         while self._node.session.phase is Phase.FLYING and self._now_ns() < until_ns:
             if copies.lag_samples == 0 and not self._outbox:
                 break
-            self._take_in((until_ns - self._now_ns()) / 1e9)
+            landing.step(self._now_ns())
+            self._take_in((min(until_ns, landing.next_ns) - self._now_ns()) / 1e9)
         for frame in self._node.session.bye(reason):
             self._link.send(self._wire.encode(frame))
+        while not landing.over:
+            landing.step(self._now_ns())
+            self._wait_until(min(landing.next_ns, self._now_ns() + terms.tick_ns))
 
     def _now_ns(self) -> int:
         return time.monotonic_ns() - self._start_ns

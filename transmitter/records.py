@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from channel.recording import Field, RecordChannel
+from transmitter.rigs.base import DeviceNote
 
 TICK_CHANNEL = RecordChannel(
     "tick",
@@ -18,6 +19,23 @@ TICK_CHANNEL = RecordChannel(
         Field("guard", "string", "", "state of the guard beside the motors"),
     ),
 )
+
+DEVICE_CHANNEL = RecordChannel(
+    "device",
+    (
+        Field("tick", "integer", "", "index of the tick"),
+        Field("counts", "integers", "", "of every encoder channel of a real rig"),
+        Field("device_s", "number", "s", "the rig's own time since its first sample", timing=True),
+        Field("age_ms", "number", "ms", "how long ago the sample had arrived", timing=True),
+        Field("lost", "integer", "", "samples missing in the rig's sequence so far", timing=True),
+    ),
+)
+
+
+def device_row(tick: int, note: DeviceNote) -> tuple[object, ...]:
+    """Return the row of `DEVICE_CHANNEL` for what a rig said."""
+    return (tick, note.counts, note.device_s, note.age_ms, note.lost)
+
 
 ESTIMATE_CHANNEL = RecordChannel(
     "estimate",

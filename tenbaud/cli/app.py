@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tenbaud.cli import demo, figures, identify, nodes, runs
+from tenbaud.cli import demo, doctor, figures, identify, nodes, rig, runs
 from tenbaud.flight.outcome import ExitCode, outcome_of
 
 app = typer.Typer(
@@ -49,6 +49,9 @@ app.command()(figures.figures)
 app.command()(runs.inspect)
 app.command()(runs.diff)
 app.command()(runs.presets)
+app.command()(doctor.doctor)
+app.command()(rig.rig)
+app.command()(rig.rig_check)
 
 
 def main() -> None:

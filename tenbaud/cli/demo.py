@@ -28,9 +28,8 @@ def demo(
     link: options.DemoLink = None,
     line_rate: options.LineRate = None,
     downlink: options.Downlink = None,
-    rig: Annotated[
-        str | None, typer.Option(help="simulated, or replay:FILE for a recorded flight.")
-    ] = None,
+    rig: Annotated[str | None, typer.Option(help=options.RIG_HELP)] = None,
+    dry_run: options.DryRun = False,
     mismatch: Annotated[
         list[float] | None,
         typer.Option(
@@ -57,7 +56,7 @@ def demo(
     replayed = rig is not None and rig.startswith("replay")
     flights: list[float | None] = list(mismatch or ())
     if not flights:
-        single = json or replayed or config is not None
+        single = json or config is not None or (rig or "simulated") != "simulated"
         flights = [None] if single else list(DEFAULT_MISMATCHES)
     if preset is None and config is None and replayed:
         preset = "uiuc-10baud"
@@ -75,6 +74,7 @@ def demo(
                     line_rate=line_rate,
                     downlink=downlink,
                     rig=rig,
+                    dry_run=dry_run,
                     mismatch=off,
                     disturbance=disturbance,
                     settings=settings,

@@ -33,9 +33,8 @@ def transmit(
     seed: options.Seed = None,
     lead: options.Lead = None,
     delivery: options.Delivery = None,
-    rig: Annotated[
-        str | None, typer.Option(help="simulated, or replay:FILE for a recorded flight.")
-    ] = None,
+    rig: Annotated[str | None, typer.Option(help=options.RIG_HELP)] = None,
+    dry_run: options.DryRun = False,
     mismatch: Annotated[
         float | None, typer.Option(help="Simulated plant off the codec's model, 0.1 for 10 %.")
     ] = None,
@@ -68,6 +67,7 @@ def transmit(
         line_rate=line_rate,
         downlink=downlink,
         rig=rig,
+        dry_run=dry_run,
         mismatch=mismatch,
         disturbance=disturbance,
         settings=settings,

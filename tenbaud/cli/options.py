@@ -8,6 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
+from tenbaud.cli import rigs
+
 
 class ClockOption(StrEnum):
     """On which clock to fly."""
@@ -85,6 +87,15 @@ Insecure = Annotated[
 ]
 
 
+DryRun = Annotated[
+    bool, typer.Option("--dry-run", help="Read the rig and never drive it: no command is sent.")
+]
+RIG_HELP = (
+    "simulated, replay:FILE for a recorded flight, or a real rig: cobs:PORT, ascii:PORT, qsb:PORT, "
+    "quarc:HOST:PORT, quarc-server:PORT, hil[:CARD]."
+)
+
+
 def overrides(
     *,
     duration: float | None = None,
@@ -99,6 +110,7 @@ def overrides(
     port: str | None = None,
     line_rate: int | None = None,
     downlink: str | None = None,
+    dry_run: bool = False,
     settings: list[str] | None = None,
 ) -> dict[str, Any]:
     """Return the configuration that these options set, as nested sections."""
@@ -120,6 +132,8 @@ def overrides(
             _put(values, name, value)
     if rig is not None:
         _put_rig(values, rig)
+    if dry_run:
+        _put(values, "transmitter.dry_run", True)
     for setting in settings or []:
         name, value = _parse_setting(setting)
         _put(values, name, value)
@@ -128,6 +142,10 @@ def overrides(
 
 def _put_rig(values: dict[str, Any], rig: str) -> None:
     kind, colon, file = rig.partition(":")
+    if kind in rigs.KINDS:
+        for name, value in rigs.settings_of(kind, file).items():
+            _put(values, name, value)
+        return
     _put(values, "transmitter.rig", kind)
     if kind == "replay":
         if not colon or not file:

@@ -10,26 +10,12 @@ import json
 from collections.abc import Callable
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Discriminator,
-    Field,
-    Tag,
-    field_validator,
-    model_validator,
-)
+from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
+from tenbaud.config.rig_schema import BridgeSection, HilSection, QuarcSection, SerialSection
+from tenbaud.config.section import NotNegative, Positive, Section
 
 SHARED_SECTIONS = ("timing", "channel", "model", "coder", "limits")
-
-
-class Section(BaseModel):
-    """Unknown fields are errors; values do not change after loading."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class Timing(Section):
@@ -209,7 +195,9 @@ class PlantSection(Section):
 class TransmitterSection(Section):
     """The sensor node."""
 
-    rig: Literal["simulated", "replay"] = "simulated"
+    rig: Literal["simulated", "replay", "serial", "quarc", "hil"] = "simulated"
+    dry_run: bool = False
+    """read the rig and never drive it"""
     encoder_counts_per_turn: Annotated[int, Field(ge=2, le=10_000_000)] = 4096
     encoder_sign: Literal[-1, 1] = 1
     encoder_zero_counts: int = 0
@@ -221,6 +209,10 @@ class TransmitterSection(Section):
     safe_volts: tuple[float, float] = (0.0, 0.0)
     soft_limit_rad: Positive | None = None
     """largest measured angle before the motors are taken down; none: no limit"""
+    bridge: BridgeSection = BridgeSection()
+    serial: SerialSection = SerialSection()
+    quarc: QuarcSection = QuarcSection()
+    hil: HilSection = HilSection()
 
 
 class PidSection(Section):

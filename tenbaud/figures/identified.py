@@ -12,7 +12,7 @@ from plant_sim.identification.experiment import REST_S, excite
 from plant_sim.identification.pitch import PitchSettings
 from plant_sim.identification.record import PitchRecord, identify
 from plant_sim.pitch import PitchPlant
-from tenbaud.build_ends import nominal_plant
+from tenbaud.build_rig import nominal_plant
 from tenbaud.config.load import load_config
 from tenbaud.identify.run import Identified, run
 from tenbaud.identify.sources import from_rig

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tenbaud.build_ends import nominal_plant
+from tenbaud.build_rig import nominal_plant
 from tenbaud.config.load import load_config
 from tenbaud.figures import draw, plan, real
 from tenbaud.figures.flights import Flown, Job, Task, fly_all

@@ -62,8 +62,8 @@ Under white torque of 2e-3 rad^2/s^3 (filters of 3 rad/s, `alpha` = 0.002), both
 {tables.noise_table(results)}
 
 The damping `a_w` is the hard one. Under this torque no unbiased method can have a standard error of
-`a_w` below {best(a):.1%} with (a) and {best(b):.1%} with (b) after 60 s (the Cramer-Rao bound for angles
-and rates known exactly), so that 10 % cannot be promised of a single record of that length."""
+`a_w` below {best(a):.1%} with (a) and {best(b):.1%} with (b) after 60 s (the Cramer-Rao bound for
+angles and rates known exactly), so that 10 % cannot be promised of a single record of that length."""
 
 
 def _loop(results: Results) -> str:

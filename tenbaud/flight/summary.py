@@ -8,6 +8,7 @@ from typing import Any
 from channel.links.base import Link
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build import Agreement
+from tenbaud.config.schema import TransmitterSection
 from tenbaud.flight.outcome import Outcome
 from tenbaud.flight.transmit import TransmitterRun
 from transmitter.scores import ErrorMeter
@@ -113,6 +114,8 @@ def _plant_name(agreement: Agreement) -> str:
     section = agreement.config.transmitter
     if section.rig == "replay":
         return f"replay of {Path(agreement.config.flight_log.file).name}"
+    if section.rig != "simulated":
+        return real_rig_name(section)
     mismatch = section.plant.mismatch
     off = mismatch if isinstance(mismatch, tuple) else (mismatch,)
     name = "pitch"
@@ -121,6 +124,17 @@ def _plant_name(agreement: Agreement) -> str:
     if section.plant.disturbance:
         name += f", disturbed by {section.plant.disturbance}"
     return name
+
+
+def real_rig_name(section: TransmitterSection) -> str:
+    """Return where a real rig is, in a few words."""
+    match section.rig:
+        case "serial":
+            return f"rig at {section.serial.port}, {section.serial.format}"
+        case "quarc":
+            return f"QUARC model at {section.quarc.host}:{section.quarc.port}"
+        case _:
+            return f"Quanser {section.hil.card_type} {section.hil.card_identifier}"
 
 
 def _errors(name: str, meter: ErrorMeter, angle_max: float, reference_max: float) -> Summary:

@@ -77,10 +77,12 @@ def fly_real(run: TransmitterRun, link: Link, should_stop: Stop) -> Outcome:
         try:
             run.ticks = flight.run(run.agreement.flight_ticks)
             outcome = _outcome(run, link.peer_present())
-            flight.finish(_farewell(outcome))
+            flight.finish(_farewell(outcome), run.ticks)
         finally:
             run.flight_s = time.perf_counter() - started
             run.wire_bytes_down = flight.wire_bytes_down
+            if figures := run.node.rig.figures():
+                run.extra["rig"] = figures
             lateness = flight.lateness
             run.extra |= {
                 "malformed": flight.malformed,

@@ -15,7 +15,7 @@ VECTORS = [
     (b"\x11\x22\x33\x44", b"\x05\x11\x22\x33\x44"),
     (b"\x11\x00\x00\x00", b"\x02\x11\x01\x01\x01"),
     (b"\x01" * 253, b"\xfe" + b"\x01" * 253),
-    (b"\x01" * 254, b"\xff" + b"\x01" * 254 + b"\x01"),
+    (b"\x01" * 254, b"\xff" + b"\x01" * 254),
     (b"\x01" * 255, b"\xff" + b"\x01" * 254 + b"\x02\x01"),
     (b"\x01" * 254 + b"\x00", b"\xff" + b"\x01" * 254 + b"\x01\x01"),
 ]
@@ -29,8 +29,8 @@ def test_when_a_known_message_is_encoded_then_its_known_bytes_come(
     assert cobs_decode(stuffed) == message
 
 
-def test_when_the_last_full_run_lacks_its_closing_code_then_it_is_decoded_all_the_same() -> None:
-    assert cobs_decode(b"\xff" + b"\x01" * 254) == b"\x01" * 254
+def test_when_the_last_full_run_has_a_closing_code_then_it_is_decoded_all_the_same() -> None:
+    assert cobs_decode(b"\xff" + b"\x01" * 254 + b"\x01") == b"\x01" * 254
 
 
 def test_when_any_message_is_encoded_then_no_zero_is_in_it_and_it_comes_back() -> None:

@@ -9,6 +9,20 @@ from channel.codec import Vector
 
 
 @dataclass(frozen=True, slots=True)
+class DeviceNote:
+    """What a real device said with a reading, beside the measured axes."""
+
+    counts: tuple[int, ...]
+    """of every encoder channel, those that are not measured axes too"""
+    device_s: float | None
+    """its own time since its first sample"""
+    age_ms: float
+    """how long ago the sample arrived"""
+    lost: int
+    """samples that are missing in its sequence so far"""
+
+
+@dataclass(frozen=True, slots=True)
 class Reading:
     """One look at the rig."""
 
@@ -22,12 +36,18 @@ class Reading:
     """voltages that were applied regardless of ours, in a recorded flight"""
     fault: str | None = None
     """why this reading cannot be trusted; the guard takes the rig to its safe voltage"""
+    device: DeviceNote | None = None
+    """of a real rig"""
 
 
 class Rig(Protocol):
     """A plant with encoders and motors. `read` and `write` alternate, one pair per tick."""
 
     name: str
+    is_real: bool
+    """a body that moves in real time: it cannot be flown on the virtual clock"""
+    ramps_down: bool
+    """after a flight the voltages are taken down along the guard's ramp, not dropped"""
 
     def open(self) -> None:
         """Get ready; the motors stay off."""
@@ -44,6 +64,9 @@ class Rig(Protocol):
     def close(self) -> None:
         """Leave the rig at its safe voltage and give it back."""
 
+    def figures(self) -> dict[str, object]:
+        """Return what the rig counted, for the summary; empty where there is nothing to count."""
+
     def __enter__(self) -> Self: ...
 
     def __exit__(self, *_: object) -> None: ...
@@ -53,9 +76,15 @@ class RigBase:
     """Opening and closing for a `with`, the same for every rig."""
 
     name = ""
+    is_real = False
+    ramps_down = False
 
     def open(self) -> None:
         """Nothing to get ready."""
+
+    def figures(self) -> dict[str, object]:
+        """Nothing is counted."""
+        return {}
 
     def safe_stop(self) -> None:
         """Nothing turns."""

@@ -1,0 +1,152 @@
+"""`tenbaud rig`: a process that behaves like a real device. `tenbaud rig-check`: first contact."""
+
+from __future__ import annotations
+
+import json as json_module
+import sys
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tenbaud.cli import options
+from tenbaud.flight.outcome import ExitCode
+
+if TYPE_CHECKING:
+    from transmitter.rigs.emulator.loop import RigEmulator
+
+FormatOption = Annotated[str, typer.Option("--format", help="ascii, cobs, quarc or qsb.")]
+PortOption = Annotated[
+    str,
+    typer.Option(
+        help="pty, pty:LINK (a name for it), /dev/NAME, tcp:HOST:PORT (0: any) to listen, "
+        "tcp-connect:HOST:PORT."
+    ),
+]
+
+
+def rig(
+    form: FormatOption = "cobs",
+    port: PortOption = "pty",
+    preset: options.Preset = None,
+    config: options.ConfigFile = None,
+    seed: options.Seed = None,
+    mismatch: Annotated[
+        float | None, typer.Option(help="Body off the codec's model, 0.1 for 10 %.")
+    ] = None,
+    disturbance: Annotated[
+        str | None, typer.Option(help='Torque on the body, such as "q=2e-3,step=0.5@30".')
+    ] = None,
+    replay: Annotated[
+        str | None, typer.Option(help="Recorded flight that turns the encoder instead of a body.")
+    ] = None,
+    samples_per_s: Annotated[
+        float | None, typer.Option("--rate", help="Samples per second; 480 for cobs.")
+    ] = None,
+    lines: Annotated[
+        str, typer.Option(help="ascii: checked (E,...*HH), plain (t_us,c0,c1,c2), counts (c0 c1 c2).")
+    ] = "checked",
+    polled: Annotated[bool, typer.Option(help="ascii: a sample for every line `e`.")] = False,
+    watchdog: Annotated[
+        float, typer.Option(help="Seconds without a command after which the outputs go off.")
+    ] = 0.1,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(help="Such as stuck@5..8, silent@5, unplug@5..7, reset@5, drop=0.01; repeatable."),
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="Seconds to run; for ever if not given.")
+    ] = None,
+    settings: options.Settings = None,
+    json: options.AsJson = False,
+) -> None:
+    """Behave like a real rig in real time: encoders, motors, a watchdog, and faults on request.
+
+    [dim]tenbaud rig --format cobs --port pty:./rig --mismatch 0.1[/dim]
+
+    [dim]tenbaud rig --format quarc --port tcp:127.0.0.1:18000 --fault silent@10[/dim]
+    """
+    from tenbaud.build_emulator import build_emulator
+    from tenbaud.config.load import load_config
+
+    changed = options.overrides(
+        seed=seed,
+        mismatch=mismatch,
+        disturbance=disturbance,
+        rig=None if replay is None else f"replay:{replay}",
+        settings=settings,
+    )
+    if preset is None and config is None and replay is not None:
+        preset = "uiuc-10baud"
+    emulator = build_emulator(
+        load_config(preset, config, changed),
+        form,  # type: ignore[arg-type]
+        port,
+        line_form=lines,
+        polled=polled,
+        samples_per_s=samples_per_s,
+        watchdog_s=watchdog,
+        faults=tuple(fault or ()),
+    )
+    _emulate(emulator, form, duration, json)
+
+
+def _emulate(emulator: RigEmulator, form: str, duration_s: float | None, as_json: bool) -> None:
+    import time
+
+    from tenbaud.flight.stop import StopFlag
+
+    with StopFlag() as stop:
+        emulator.line.plug()
+        address = emulator.line.address
+        # The first line, so that a script can read where the device is.
+        sys.stdout.write(json_module.dumps({"port": address}) + "\n" if as_json else f"{address}\n")
+        sys.stdout.flush()
+        typer.echo(
+            f"tenbaud rig: {form} at {address}; Ctrl-C ends it\n  {_hint(form, address)}", err=True
+        )
+        until = None if duration_s is None else time.monotonic() + duration_s
+        try:
+            emulator.run(lambda: stop() or (until is not None and time.monotonic() > until))
+        finally:
+            emulator.line.unplug()
+    figures = emulator.figures()
+    if as_json:
+        sys.stdout.write(json_module.dumps(figures) + "\n")
+    else:
+        typer.echo(", ".join(f"{name} {value}" for name, value in figures.items()))
+
+
+def _hint(form: str, address: str) -> str:
+    where = f"{form}:{address}"
+    if form != "quarc" and not address.startswith("/"):
+        where = f"{form}:socket://{address}" if ":" in address else where
+    if form == "qsb":
+        return f"look at it with: tenbaud rig-check --rig {where}"
+    return f"fly it with: tenbaud demo --clock real --rig {where}"
+
+
+def rig_check(
+    rig: Annotated[str, typer.Option(help=options.RIG_HELP)] = "",
+    preset: options.Preset = None,
+    config: options.ConfigFile = None,
+    seconds: Annotated[float, typer.Option(help="How long to look.")] = 10.0,
+    settings: options.Settings = None,
+    json: options.AsJson = False,
+) -> None:
+    """Read a rig's encoders and say what comes; its output is never opened.
+
+    Turn each axis by hand while it runs: counts, angles, signs, rates and gaps are shown.
+
+    [dim]tenbaud rig-check --rig cobs:/dev/ttyACM0[/dim]
+    """
+    from tenbaud.config.load import load_config
+    from tenbaud.rigcheck import check_rig, show_check
+
+    changed = options.overrides(rig=rig or None, settings=settings)
+    result = check_rig(load_config(preset, config, changed), seconds, live=not json)
+    if json:
+        sys.stdout.write(json_module.dumps(result.as_dict(), indent=2) + "\n")
+    else:
+        show_check(result)
+    if result.problems:
+        raise typer.Exit(int(ExitCode.FAILED))

@@ -1,0 +1,164 @@
+"""An emulated device without its line: body, encoders, outputs, watchdog.
+
+It behaves like a board beside a real body. The body rests until the motors are first enabled, then
+moves in real time whoever listens. The outputs are cut when no command comes for the watchdog's time,
+and stay cut until a command says that the motors are off: arming again is on purpose.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Protocol
+
+from channel.flight_log import FlightLog
+from plant_sim.encoder import Encoder
+from plant_sim.plant import Plant
+from transmitter.rigs.emulator.faults import Faults
+from transmitter.rigs.samples import DeviceFlag, RawSample
+
+NS = 1_000_000_000
+DEFAULT_WATCHDOG_S = 0.1
+OFF = (0.0, 0.0)
+PITCH_CHANNEL = 1
+CHANNELS = 3
+
+
+class Body(Protocol):
+    """Whatever turns the pitch encoder."""
+
+    def counts_at(self, time_ns: int, volts: tuple[float, float]) -> int:
+        """Return the counts at a time since the motors were first enabled, volts held until then."""
+
+
+class SimulatedBody:
+    """A plant that is stepped up to the time asked for."""
+
+    def __init__(self, plant: Plant, step_ns: int, encoder: Encoder) -> None:
+        self._plant = plant
+        self._step_ns = step_ns
+        self._encoder = encoder
+        self._steps = 0
+
+    def counts_at(self, time_ns: int, volts: tuple[float, float]) -> int:
+        """Advance to this time and read the encoder."""
+        while (self._steps + 1) * self._step_ns <= time_ns:
+            self._plant.advance(volts)
+            self._steps += 1
+        return self._encoder.counts(self._plant.measured_rad[0])
+
+
+class RecordedBody:
+    """A recorded flight: its counts come again, one row per tick; past the last, the last stays."""
+
+    def __init__(self, log: FlightLog, tick_ns: int) -> None:
+        self._log = log
+        self._tick_ns = tick_ns
+
+    def counts_at(self, time_ns: int, volts: tuple[float, float]) -> int:
+        """Return the row of this time."""
+        return self._log.counts[min(max(0, time_ns) // self._tick_ns, len(self._log) - 1)][0]
+
+
+class EmulatedDevice:
+    """The board. Time comes in as nanoseconds of any monotonic clock; it must not go back."""
+
+    def __init__(
+        self,
+        body: Body,
+        now_ns: int,
+        watchdog_s: float = DEFAULT_WATCHDOG_S,
+        faults: Faults | None = None,
+    ) -> None:
+        self.faults = faults or Faults()
+        self.volts: tuple[float, float] = OFF
+        self.enabled = False
+        self.tripped = False
+        self.counts: Counter[str] = Counter()
+        """samples, commands, watchdog_trips, resets"""
+        self.flags = DeviceFlag(0)
+        self._body = body
+        self._watchdog_ns = round(watchdog_s * NS)
+        self._boot_ns = now_ns
+        self._first_enabled_ns: int | None = None
+        self._heard_ns = now_ns
+        self._sequence = 0
+        self._zero = [0] * CHANNELS
+        self._pitch = 0
+        self._stuck_at: int | None = None
+
+    def flight_s(self, now_ns: int) -> float | None:
+        """Return the time since the motors were first enabled, None before."""
+        if self._first_enabled_ns is None:
+            return None
+        return (now_ns - self._first_enabled_ns) / NS
+
+    def advance(self, now_ns: int) -> None:
+        """Let time pass: the body moves, the watchdog looks."""
+        if self.enabled and now_ns - self._heard_ns > self._watchdog_ns:
+            # The outputs went off when the time was over, not when somebody looked.
+            self._move(self._heard_ns + self._watchdog_ns)
+            self.enabled, self.tripped, self.volts = False, True, OFF
+            self.counts["watchdog_trips"] += 1
+        self._move(now_ns)
+        flight_s = self.flight_s(now_ns)
+        if self.faults.active("estop", flight_s) is not None:
+            self.enabled, self.volts = False, OFF
+            self.flags |= DeviceFlag.ESTOP_OPEN
+        else:
+            self.flags &= ~DeviceFlag.ESTOP_OPEN
+        if self.faults.take_due("reset", flight_s) is not None:
+            self._reset(now_ns)
+
+    def command(
+        self, now_ns: int, volts: tuple[float, float], enable: bool, zero_encoders: bool = False
+    ) -> None:
+        """Take a command that came whole."""
+        self.advance(now_ns)
+        self.counts["commands"] += 1
+        self._heard_ns = now_ns
+        if zero_encoders:
+            self._zero[PITCH_CHANNEL] = self._pitch
+        if not enable:
+            self.enabled, self.tripped, self.volts = False, False, OFF
+            return
+        if self.tripped or self.flags & DeviceFlag.ESTOP_OPEN:
+            return
+        if self._first_enabled_ns is None:
+            self._first_enabled_ns = now_ns
+        self.enabled, self.volts = True, volts
+
+    def sample(self, now_ns: int) -> RawSample:
+        """Return the sample of this moment."""
+        self.advance(now_ns)
+        self.counts["samples"] += 1
+        self._sequence += 1
+        flags = self.flags
+        flags |= DeviceFlag.WATCHDOG_TRIPPED if self.tripped else DeviceFlag(0)
+        flags |= DeviceFlag.OUTPUT_ENABLED if self.enabled else DeviceFlag(0)
+        time_us = (now_ns - self._boot_ns) // 1000
+        return RawSample((0, self._read_pitch(now_ns), 0), self._sequence, time_us, flags)
+
+    def _read_pitch(self, now_ns: int) -> int:
+        flight_s = self.flight_s(now_ns)
+        counts = self._pitch - self._zero[PITCH_CHANNEL]
+        jump = self.faults.take_due("jump", flight_s)
+        if jump is not None:
+            self._zero[PITCH_CHANNEL] -= round(jump.amount)
+        if self.faults.active("stuck", flight_s) is None:
+            self._stuck_at = None
+            return counts
+        if self._stuck_at is None:
+            self._stuck_at = counts
+        return self._stuck_at
+
+    def _move(self, now_ns: int) -> None:
+        if self._first_enabled_ns is not None:
+            self._pitch = self._body.counts_at(now_ns - self._first_enabled_ns, self.volts)
+
+    def _reset(self, now_ns: int) -> None:
+        """Begin anew, as a board does after a dip of its supply: counts and clock start at zero."""
+        self.counts["resets"] += 1
+        self.enabled, self.tripped, self.volts = False, False, OFF
+        self._zero[PITCH_CHANNEL] = self._pitch
+        self._sequence = 0
+        self._boot_ns = now_ns

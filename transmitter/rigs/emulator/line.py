@@ -1,0 +1,244 @@
+"""The line of an emulated device: a pseudo-terminal of its own, a serial port, or TCP."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import socket
+from pathlib import Path
+from typing import Protocol
+
+from transmitter.rigs.errors import RigError
+
+READ_BYTES = 4096
+
+
+class DeviceLine(Protocol):
+    """Bytes in and out, without ever waiting; what nobody takes is lost, as on a real line."""
+
+    address: str
+    """what the other side opens"""
+
+    def plug(self) -> None:
+        """Put the device on its line."""
+
+    def unplug(self) -> None:
+        """Take it off."""
+
+    def wait(self, timeout_s: float) -> None:
+        """Wait until something came, or for this long."""
+
+    def read(self) -> bytes:
+        """Return what has come."""
+
+    def write(self, data: bytes) -> bool:
+        """Send; return whether it went out whole."""
+
+
+class PtyLine:
+    """A pseudo-terminal, made anew at every plugging in; `link` names it all the same."""
+
+    def __init__(self, link: str = "") -> None:
+        self._link = Path(link) if link else None
+        self._master = self._slave = -1
+        self.address = link
+
+    def plug(self) -> None:
+        """Make the pseudo-terminal."""
+        import tty
+
+        self._master, self._slave = os.openpty()
+        # Our own hold on the other side keeps reads from failing while nobody has it open.
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        path = os.ttyname(self._slave)
+        if self._link is None:
+            self.address = path
+            return
+        if self._link.is_symlink():
+            self._link.unlink()
+        self._link.symlink_to(path)
+
+    def unplug(self) -> None:
+        """Let it vanish."""
+        for handle in (self._master, self._slave):
+            if handle >= 0:
+                os.close(handle)
+        self._master = self._slave = -1
+        if self._link is not None and self._link.is_symlink():
+            self._link.unlink()
+
+    def wait(self, timeout_s: float) -> None:
+        """Wait for bytes."""
+        _wait(self._master, timeout_s)
+
+    def read(self) -> bytes:
+        """Return what the other side wrote."""
+        return _read_fd(self._master)
+
+    def write(self, data: bytes) -> bool:
+        """Write as much as its buffer holds."""
+        try:
+            return self._master >= 0 and os.write(self._master, data) == len(data)
+        except OSError:
+            return False
+
+
+class SerialLine:
+    """A real serial port: the other computer is at the end of a crossed cable."""
+
+    def __init__(self, device: str, line_baud: int) -> None:
+        self.address = device
+        self._line_baud = line_baud
+        self._handle = -1
+
+    def plug(self) -> None:
+        """Open the port."""
+        import serial
+
+        try:
+            self._port = serial.Serial(self.address, self._line_baud, timeout=0, exclusive=True)
+        except (serial.SerialException, OSError) as error:
+            raise RigError(f"{self.address} cannot be opened: {error}") from error
+        self._handle = self._port.fileno()
+        os.set_blocking(self._handle, False)
+
+    def unplug(self) -> None:
+        """Close it."""
+        self._handle = -1
+        self._port.close()
+
+    def wait(self, timeout_s: float) -> None:
+        """Wait for bytes."""
+        _wait(self._handle, timeout_s)
+
+    def read(self) -> bytes:
+        """Return what has come."""
+        return _read_fd(self._handle)
+
+    def write(self, data: bytes) -> bool:
+        """Write as much as the driver takes."""
+        try:
+            return self._handle >= 0 and os.write(self._handle, data) == len(data)
+        except OSError:
+            return False
+
+
+class TcpLine:
+    """One TCP connection at a time: accepted here, or made to the other side."""
+
+    def __init__(self, host: str, port: int, *, connects: bool = False) -> None:
+        self._host, self._port = host, port
+        self._connects = connects
+        self._listener: socket.socket | None = None
+        self._peer: socket.socket | None = None
+        self._plugged = False
+        self._pending = b""
+        self.address = f"{host}:{port}"
+
+    def plug(self) -> None:
+        """Listen, or begin to connect."""
+        self._plugged = True
+        if self._connects:
+            return
+        try:
+            self._listener = socket.create_server((self._host, self._port), backlog=1)
+        except OSError as error:
+            raise RigError(f"{self.address} cannot be listened on: {error}") from error
+        self._listener.setblocking(False)
+        self._port = self._listener.getsockname()[1]
+        self.address = f"{self._host}:{self._port}"
+
+    def unplug(self) -> None:
+        """Drop the connection and do not take another."""
+        self._plugged = False
+        self._drop()
+        if self._listener is not None:
+            self._listener.close()
+            self._listener = None
+
+    def wait(self, timeout_s: float) -> None:
+        """Wait for bytes or for somebody to connect."""
+        handle = self._peer or self._listener
+        _wait(-1 if handle is None else handle.fileno(), timeout_s)
+
+    def read(self) -> bytes:
+        """Return what has come."""
+        if self._peer is None and not self._meet():
+            return b""
+        assert self._peer is not None
+        try:
+            data = self._peer.recv(READ_BYTES)
+        except BlockingIOError:
+            return b""
+        except OSError:
+            data = b""
+        if not data:
+            self._drop()
+        return data
+
+    def write(self, data: bytes) -> bool:
+        """Send whole units only: a piece of one would shift all that follow."""
+        if self._peer is None:
+            return False
+        try:
+            if self._pending:
+                self._pending = self._pending[self._peer.send(self._pending) :]
+            if self._pending:
+                return False
+            self._pending = data[self._peer.send(data) :]
+        except BlockingIOError:
+            return False
+        except OSError:
+            self._drop()
+            return False
+        return True
+
+    def _meet(self) -> bool:
+        if not self._plugged:
+            return False
+        try:
+            if self._listener is not None:
+                self._peer, _ = self._listener.accept()
+            else:
+                self._peer = socket.create_connection((self._host, self._port), 0.05)
+        except OSError:
+            return False
+        self._peer.setblocking(False)
+        self._peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return True
+
+    def _drop(self) -> None:
+        self._pending = b""
+        peer, self._peer = self._peer, None
+        if peer is not None:
+            with contextlib.suppress(OSError):
+                peer.close()
+
+
+def parse_line(text: str, line_baud: int) -> PtyLine | SerialLine | TcpLine:
+    """Return the line that a command line names; ValueError for one that is none."""
+    kind, _, rest = text.partition(":")
+    if kind == "pty":
+        return PtyLine(rest)
+    if kind in ("tcp", "tcp-connect"):
+        host, _, port = rest.rpartition(":")
+        if not host or not port.isdigit():
+            raise ValueError(f"port {text!r}: write tcp:HOST:PORT or tcp-connect:HOST:PORT")
+        return TcpLine(host, int(port), connects=kind == "tcp-connect")
+    if not text:
+        raise ValueError("port: pty, pty:LINK, /dev/NAME, tcp:HOST:PORT or tcp-connect:HOST:PORT")
+    return SerialLine(text, line_baud)
+
+
+def _wait(handle: int, timeout_s: float) -> None:
+    handles = [handle] if handle >= 0 else []
+    select.select(handles, [], [], max(0.0, timeout_s))
+
+
+def _read_fd(handle: int) -> bytes:
+    try:
+        return os.read(handle, READ_BYTES) if handle >= 0 else b""
+    except OSError:
+        return b""

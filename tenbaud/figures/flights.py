@@ -8,6 +8,7 @@ a recording; equal inputs give equal states there, which the tests of the demo h
 from __future__ import annotations
 
 import multiprocessing
+import signal
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
@@ -20,6 +21,9 @@ from channel.errors import TenbaudError
 from tenbaud.recording.figure import Series
 
 WORKERS = 2
+GRACE_S = 3.0
+"""What a worker gets to end its flight when the command is interrupted."""
+
 Overrides = dict[str, Any]
 
 
@@ -110,7 +114,7 @@ def fly_all(
     ordered = sorted([*flights, *tasks], key=lambda task: -task.weight)
     flown: dict[str, Flown] = {}
     others: dict[str, Any] = {}
-    with ProcessPoolExecutor(WORKERS, mp_context=context) as pool:
+    with ProcessPoolExecutor(WORKERS, context, initializer=_leave_interrupts_to_parent) as pool:
         waiting: dict[Future[Any], Task] = {
             pool.submit(task.function, *task.arguments): task for task in ordered
         }
@@ -120,9 +124,24 @@ def fly_all(
                 (flown if task.function is fly else others)[task.name] = done.result()
                 on_done(task.name, task.weight)
         except BaseException:
-            pool.shutdown(cancel_futures=True)
+            _end_workers()
             raise
     return flown, others
+
+
+def _end_workers() -> None:
+    """End the pool's processes: those in flight may first end their two ends, then no more waiting."""
+    workers = multiprocessing.active_children()
+    for worker in workers:
+        worker.terminate()
+    for worker in workers:
+        worker.join(GRACE_S)
+        worker.kill()
+
+
+def _leave_interrupts_to_parent() -> None:
+    """A Ctrl-C reaches the whole group; a worker that dies of it would leave its pool waiting."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def fly(job: Job, folder: Path) -> Flown:

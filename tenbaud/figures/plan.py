@@ -56,7 +56,7 @@ def pitch_jobs() -> list[Job]:
                 rate,
                 flight_name(coder, rate, percent),
                 plant(percent / 100.0),
-                processes=(coder == "paper" and percent < 20) or (coder == "tuned" and percent == 10),
+                processes=coder == "paper" and percent < 20,
                 keep_series=coder == "paper" and percent < 20,
             )
         )
@@ -92,6 +92,14 @@ def rate_jobs() -> list[Job]:
     ]
 
 
+def zooming_name(preset: str, case: str) -> str:
+    """Return the name of a flight of `zooming_jobs`, or of the same one among `pitch_jobs`."""
+    coder = {"paper-10baud": "paper", "three": "three", "tuned-10baud": "tuned"}.get(preset)
+    if coder is None or case == "push":
+        return f"zooming-{preset}-{case}"
+    return flight_name(coder, 10, 0 if case == "exact" else 10)
+
+
 def zooming_jobs() -> list[Job]:
     """Return the flights that show what the adaptive rule is for."""
     jobs = []
@@ -101,7 +109,9 @@ def zooming_jobs() -> list[Job]:
             ("10percent", plant(0.1)),
             ("push", plant(0.1, PUSH)),
         ):
-            name = f"zooming-{preset}-{label}"
+            name = zooming_name(preset, label)
+            if not name.startswith("zooming"):
+                continue
             if preset == "three":
                 jobs.append(coder_job("three", 10, name, overrides))
             else:

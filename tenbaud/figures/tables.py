@@ -190,7 +190,7 @@ def zooming_table(results: Results) -> str:
     for preset, label in names.items():
         cells = []
         for case in ("exact", "10percent", "push"):
-            one = results.flown[f"zooming-{preset}-{case}"]
+            one = results.flown[plan.zooming_name(preset, case)]
             lost = one.pitch_rad > 6.3
             cells.append("the loop is lost" if lost else percent(one.largest))
         rows.append((label, *cells))

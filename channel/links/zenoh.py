@@ -37,7 +37,9 @@ class ZenohLink(LinkBase):
     """One end of a session over Zenoh.
 
     `listen` and `connect` are Zenoh endpoints; one end listens, the other connects, either may start
-    first. Raises LinkError for a name or endpoint that cannot be used.
+    first. `best_effort`: a symbol that the network cannot take at once is dropped, an erasure, instead
+    of keeping the loop waiting; all else stays reliable. Raises LinkError for a name or endpoint that
+    cannot be used.
     """
 
     name = "zenoh"
@@ -51,6 +53,7 @@ class ZenohLink(LinkBase):
         connect: tuple[str, ...] = (),
         scouting: bool = False,
         insecure: bool = False,
+        best_effort: bool = False,
     ) -> None:
         super().__init__()
         if not _NAME.fullmatch(session_name):
@@ -68,12 +71,12 @@ class ZenohLink(LinkBase):
         except zenoh.ZError as error:
             raise LinkError(f"Zenoh cannot use {', '.join(listen + connect)}: {error}") from error
         try:
-            self._declare(role, f"tenbaud/{session_name}")
+            self._declare(role, f"tenbaud/{session_name}", best_effort)
         except BaseException:
             self._session.close()
             raise
 
-    def _declare(self, role: Role, root: str) -> None:
+    def _declare(self, role: Role, root: str, best_effort: bool) -> None:
         inbound, other = ("down", "receiver") if role == "transmitter" else ("up", "transmitter")
         self._subscriber = self._session.declare_subscriber(
             f"{root}/{inbound}/*", zenoh.handlers.Callback(self._on_sample, indirect=False)
@@ -88,12 +91,14 @@ class ZenohLink(LinkBase):
         self._symbols, self._control = (
             self._session.declare_publisher(
                 f"{root}/{key}",
-                congestion_control=zenoh.CongestionControl.BLOCK,
+                congestion_control=zenoh.CongestionControl.DROP
+                if may_drop
+                else zenoh.CongestionControl.BLOCK,
                 priority=zenoh.Priority.REAL_TIME,
                 express=True,
-                reliability=zenoh.Reliability.RELIABLE,
+                reliability=zenoh.Reliability.BEST_EFFORT if may_drop else zenoh.Reliability.RELIABLE,
             )
-            for key in outbound
+            for key, may_drop in zip(outbound, (best_effort, False), strict=True)
         )
         # Declared last: who sees the token can be heard already.
         self._token = alive.declare_token(f"{root}/alive/{role}/{secrets.token_hex(4)}")

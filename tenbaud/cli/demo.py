@@ -31,17 +31,13 @@ def demo(
     rig: Annotated[
         str | None, typer.Option(help="simulated, or replay:FILE for a recorded flight.")
     ] = None,
-    mismatch: Annotated[
-        list[float] | None,
-        typer.Option(
-            help="Simulated plant off the codec's model, 0.1 for 10 %; repeatable. Not given: 0 "
-            "and 0.1, one flight each (with --json, 0 alone).",
-            show_default=False,
-        ),
-    ] = None,
+    mismatch: options.Mismatches = None,
     disturbance: Annotated[
         str | None, typer.Option(help='Torque on the plant, such as "q=2e-3,step=0.5@30".')
     ] = None,
+    impair: options.Impair = None,
+    on_desync: options.OnDesync = None,
+    sabotage: options.Sabotage = None,
     settings: options.Settings = None,
     out: options.Out = None,
     json: options.AsJson = False,
@@ -51,6 +47,8 @@ def demo(
     [dim]tenbaud demo[/dim]
 
     [dim]tenbaud demo --preset tuned-10baud --clock real --duration 20 --mismatch 0.1[/dim]
+
+    [dim]tenbaud demo --impair "loss=0.3,up:flip=0.02" --sabotage sample=700,field=range[/dim]
     """
     from tenbaud.build import agree
     from tenbaud.config.load import load_config
@@ -76,6 +74,9 @@ def demo(
                     rig=rig,
                     mismatch=off,
                     disturbance=disturbance,
+                    impair=impair,
+                    on_desync=on_desync,
+                    sabotage=sabotage,
                     settings=settings,
                 ),
             ),

@@ -38,6 +38,9 @@ def transmit(
     disturbance: Annotated[
         str | None, typer.Option(help='Torque on the plant, such as "q=2e-3,step=0.5@30".')
     ] = None,
+    impair: options.Impair = None,
+    on_desync: options.OnDesync = None,
+    sabotage: options.Sabotage = None,
     settings: options.Settings = None,
     insecure: options.Insecure = False,
     out: options.Out = None,
@@ -60,6 +63,9 @@ def transmit(
         rig=rig,
         mismatch=mismatch,
         disturbance=disturbance,
+        impair=impair,
+        on_desync=on_desync,
+        sabotage=sabotage,
         settings=settings,
     )
     endpoints = (tuple(listen or ()), tuple(connect or ()), insecure)
@@ -79,6 +85,8 @@ def receive(
         str | None,
         typer.Option(help="replay:FILE when the transmitter replays: its voltages are used."),
     ] = None,
+    impair: options.Impair = None,
+    sabotage: options.Sabotage = None,
     settings: options.Settings = None,
     insecure: options.Insecure = False,
     out: options.Out = None,
@@ -93,7 +101,14 @@ def receive(
     [dim]tenbaud receive --listen tcp/127.0.0.1:7447 --clock virtual --json[/dim]
     """
     changed = options.overrides(
-        lead=lead, delivery=delivery, session=session, rig=rig, settings=settings
+        lead=lead,
+        delivery=delivery,
+        session=session,
+        rig=rig,
+        impair=impair,
+        sabotage=sabotage,
+        sabotaged_end="receiver",
+        settings=settings,
     )
     endpoints = (tuple(listen or ()), tuple(connect or ()), insecure)
     _run("receiver", preset, config, changed, clock, endpoints, out, run_folder, json, status)

@@ -51,6 +51,38 @@ Session = Annotated[
 ]
 Listen = Annotated[list[str] | None, typer.Option(help="Zenoh endpoint to listen on; repeatable.")]
 Connect = Annotated[list[str] | None, typer.Option(help="Zenoh endpoint to connect to; repeatable.")]
+Mismatches = Annotated[
+    list[float] | None,
+    typer.Option(
+        "--mismatch",
+        help="Simulated plant off the codec's model, 0.1 for 10 %; repeatable. Not given: 0 "
+        "and 0.1, one flight each (with --json, 0 alone).",
+        show_default=False,
+    ),
+]
+Impair = Annotated[
+    str | None,
+    typer.Option(
+        help='What goes wrong on the line, such as "loss=0.2,up:flip=0.01,delay=30ms±10ms". On a real '
+        "clock each end spoils what it sends: give both the same text.",
+        show_default=False,
+    ),
+]
+Sabotage = Annotated[
+    str | None,
+    typer.Option(
+        help="Spoil this end's codec in one bit, such as sample=500,field=range, to see it found out.",
+        show_default=False,
+    ),
+]
+OnDesync = Annotated[
+    str | None,
+    typer.Option(
+        "--on-desync",
+        help="When the two codecs differ: rejoin (go on from a common state) or stop (exit code 5).",
+        show_default=False,
+    ),
+]
 Insecure = Annotated[
     bool,
     typer.Option(help="Allow addresses beyond this machine without encryption or authentication."),
@@ -68,6 +100,10 @@ def overrides(
     mismatch: float | None = None,
     disturbance: str | None = None,
     link: str | None = None,
+    impair: str | None = None,
+    on_desync: str | None = None,
+    sabotage: str | None = None,
+    sabotaged_end: str = "transmitter",
     settings: list[str] | None = None,
 ) -> dict[str, Any]:
     """Return the configuration that these options set, as nested sections."""
@@ -81,6 +117,9 @@ def overrides(
         ("link.kind", link),
         ("transmitter.plant.mismatch", mismatch),
         ("transmitter.plant.disturbance", disturbance),
+        ("link.impairments", impair),
+        ("transmitter.on_desync", on_desync),
+        (f"{sabotaged_end}.sabotage", sabotage),
     ):
         if value is not None:
             _put(values, name, value)

@@ -9,8 +9,19 @@ from __future__ import annotations
 import json
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from channel.impairments import parse_impairments
+from channel.sabotage import parse_sabotage
+
+
+def _checked_sabotage(text: str) -> str:
+    if text:
+        parse_sabotage(text)
+    return text
+
+
+SabotageText = Annotated[str, AfterValidator(_checked_sabotage)]
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 
@@ -127,6 +138,10 @@ class TransmitterSection(Section):
     safe_volts: tuple[float, float] = (0.0, 0.0)
     soft_limit_rad: Positive | None = None
     """largest measured angle before the motors are taken down; none: no limit"""
+    on_desync: Literal["rejoin", "stop"] = "rejoin"
+    """after digests that differ: go on from a common state, or end the flight (exit code 5)"""
+    sabotage: SabotageText = ""
+    """such as "sample=500,field=range": spoil this end's codec in one bit, to see it found out"""
 
 
 class PidSection(Section):
@@ -160,6 +175,8 @@ class ReceiverSection(Section):
     controller: Literal["pid", "recorded"] = "pid"
     pid: PidSection = PidSection()
     reference: ReferenceSection = ReferenceSection()
+    sabotage: SabotageText = ""
+    """such as "sample=500,field=range": spoil this end's codec in one bit, to see it found out"""
 
 
 class FlightLogSection(Section):
@@ -178,6 +195,17 @@ class LinkSection(Section):
     kind: Literal["zenoh", "memory"] = "zenoh"
     session: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+(/[A-Za-z0-9_.-]+)*$")] = "helicopter"
     peer_timeout_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 10.0
+    """silence after which an end gives the other one up"""
+    best_effort: bool = False
+    """symbols may be dropped by a congested network instead of waiting; nothing else changes"""
+    impairments: str = ""
+    """such as "loss=0.2,up:flip=0.01,delay=30ms±10ms": what goes wrong on the line, on purpose"""
+
+    @field_validator("impairments")
+    @classmethod
+    def _readable(cls, value: str) -> str:
+        parse_impairments(value)
+        return value
 
 
 class FlightConfig(Section):

@@ -46,6 +46,7 @@ def open_link(agreement: Agreement, role: Role, endpoints: Endpoints) -> Link:
         listen=endpoints.listen,
         connect=endpoints.connect,
         insecure=endpoints.insecure,
+        best_effort=agreement.config.link.best_effort,
     )
 
 
@@ -104,6 +105,7 @@ def open_recorder(agreement: Agreement, role: Role, path: Path) -> McapRecorder:
         "tick_s": repr(agreement.config.timing.tick_s),
         "shared_config": agreement.identity.config,
         "seed": str(agreement.config.seed),
+        "impairments": agreement.config.link.impairments,
     }
     # Virtual time can outrun the disk and is not disturbed by waiting for it.
     return McapRecorder(path, metadata, wait_when_full=agreement.clock == "virtual")

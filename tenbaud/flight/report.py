@@ -21,6 +21,9 @@ ROWS: tuple[tuple[str, str, str], ...] = (
     ("erasures / late symbols", "lost", "{}"),
     ("digest checks", "digest_checks", "{}"),
     ("desyncs", "desyncs", "{}"),
+    ("rejoins, and what they cost", "rejoins", "{}"),
+    ("asked to go wrong", "impairments", "{}"),
+    ("went wrong, up / down", "impaired", "{}"),
     ("largest pitch in the window", "pitch_amplitude_rad", "{:.3f} rad"),
     ("error of the codec: max / rms", "error_coded", "{}"),
     ("error as lived: max / rms", "error_live", "{}"),
@@ -82,6 +85,14 @@ def _value(summary: Summary, name: str) -> Any:
             return f"{get('wire_bytes_up')} / {get('wire_bytes_down')}"
         case "lost":
             return f"{get('erasures')} / {get('symbols_late', '-')}"
+        case "rejoins":
+            return f"{get('rejoins')}, {get('rejoin_bytes')} control bytes" if get("rejoins") else None
+        case "impairments":
+            return get(name) or None
+        case "impaired":
+            ways = [get("impaired_up") or {}, get("impaired_down") or {}]
+            told = [", ".join(f"{count} {what}" for what, count in way.items()) for way in ways]
+            return " / ".join(text or "-" for text in told) if any(told) else None
         case "error_coded" | "error_live":
             largest, rms = get(f"{name}_max_fraction"), get(f"{name}_rms_fraction")
             if largest is None or rms is None:

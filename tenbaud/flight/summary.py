@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from channel.impairments import ImpairedLine
+from channel.line import Line
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build import Agreement
 from tenbaud.flight.outcome import Outcome
@@ -30,6 +32,12 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         "erasures": session.counts["erasures"],
         "digest_checks": session.counts["digest_checks"],
         "desyncs": session.counts["desyncs"],
+        "rejoins": session.counts["rejoins"],
+        "rejoin_bytes": run.rejoin_bytes,
+        "guard_rearmed": node.rearmed,
+        "impairments": config.link.impairments,
+        "impaired_up": impaired(run.uplink.line),
+        "impaired_down": impaired(run.downlink),
         "window_start_s": run.agreement.window_start_tick * terms.tick_ns / 1e9,
         "pitch_amplitude_rad": scores.angle_max_rad,
         "reference_amplitude_rad": scores.reference_max_rad or None,
@@ -62,6 +70,8 @@ def receiver_part(agreement: Agreement, endpoint: ReceiverEndpoint, outcome: Out
         "stale_frames": session.counts["stale_frames"],
         "bad_commands": session.counts["bad_commands"],
         "malformed": endpoint.malformed,
+        "desyncs": session.counts["desyncs"],
+        "rejoins": session.counts["rejoins"],
     }
 
 
@@ -69,6 +79,11 @@ def joined(transmitter: Summary, receiver: Summary) -> Summary:
     """Return one summary: the transmitter's figures, and those that only the receiver has."""
     own = ("baud_measured", "symbols_late", "stale_frames", "bad_commands")
     return {**transmitter, **{name: receiver.get(name) for name in own}}
+
+
+def impaired(line: Line) -> dict[str, int]:
+    """Return how many messages a line did what to, on purpose."""
+    return dict(line.counts) if isinstance(line, ImpairedLine) else {}
 
 
 def _common(agreement: Agreement, outcome: Outcome) -> Summary:

@@ -35,8 +35,16 @@ class CommandLimits:
         step = self.slew_volts_per_tick
         limited = []
         for wanted, before in zip(volts, previous, strict=True):
-            value = min(max(wanted, -self.volts_max), self.volts_max)
-            limited.append(min(max(value, before - step), before + step))
+            value = wanted
+            if value > self.volts_max:
+                value = self.volts_max
+            elif value < -self.volts_max:
+                value = -self.volts_max
+            if value > before + step:
+                value = before + step
+            elif value < before - step:
+                value = before - step
+            limited.append(value)
         return tuple(limited)
 
 

@@ -113,12 +113,11 @@ class ReceiverSession:
                 return self._on_hello(frame)
             case Desync() if self._is_current(frame.session):
                 return self._on_desync(frame)
-            case Bye() if frame.session == 0 or self._is_current(frame.session):
-                if self.phase is Phase.FLYING:
-                    self._end(f"the transmitter ended the flight: {frame.reason}")
-                elif self.refusal is not None:
-                    self.refusal = f"{self.refusal}\n  as the transmitter sees it: {frame.reason}"
-                    self._end("refused")
+            case Bye() if self._is_current(frame.session):
+                self._end(f"the transmitter ended the flight: {frame.reason}")
+            case Bye() if self.refusal is not None and frame.session == 0:
+                self.refusal = f"{self.refusal}\n  as the transmitter sees it: {frame.reason}"
+                self._end("refused")
             case ForeignVersion():
                 self._refuse(
                     f"the transmitter speaks wire version {frame.version}, this end {WIRE_VERSION}: "

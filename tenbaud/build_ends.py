@@ -101,6 +101,12 @@ def build_receiver(agreement: Agreement, recorder: Recorder | None, wire: Wire) 
     return ReceiverEndpoint(session, wire)
 
 
+def check_parts(config: FlightConfig) -> None:
+    """Build what can be wrong in files and texts, so that it is told before anything starts."""
+    build_rig(config)
+    build_controller(config)
+
+
 def build_rig(config: FlightConfig) -> Rig:
     """Return the rig: the plant off the model by the configured mismatch, or a recorded flight."""
     section = config.transmitter

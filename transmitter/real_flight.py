@@ -72,6 +72,7 @@ class RealFlight:
                 self._offer([session.hello()])
                 next_hello_ns = now_ns + period_ns
             self._take_in(period_ns / 1e9)
+        self._send_due()
 
     def run(self, ticks: int) -> int:
         """Fly so many ticks, or until the end of the rig or the safe voltage; return the tick reached.

@@ -57,34 +57,47 @@ class Scores:
         self.last_angle_rad: float | None = None
         self._model = model
         self._reference = reference
-        self._angles: deque[tuple[int, Vector]] = deque(maxlen=span_ticks)
+        # An estimate may come before its angle (the echo of a sample's first tick speaks of all its
+        # ticks) or long after it; each waits for the other.
+        self._angles: deque[tuple[int, float]] = deque(maxlen=span_ticks)
+        self._estimates: deque[tuple[int, float, float | None]] = deque(maxlen=span_ticks)
 
     def on_angles(self, tick: int, angles_rad: Vector) -> None:
-        """Note the angles of a tick."""
-        self._angles.append((tick, angles_rad))
-        self.last_angle_rad = angles_rad[0]
-        if tick < self.window_start_tick:
-            return
-        self.angle_max_rad = max(self.angle_max_rad, abs(angles_rad[0]))
-        reference = self._reference(tick)
-        if reference is not None:
-            self.reference_max_rad = max(self.reference_max_rad, abs(reference))
-            self.tracking.add(reference - angles_rad[0])
+        """Note the angles of a tick; ticks come in order."""
+        angle = angles_rad[0]
+        self.last_angle_rad = angle
+        if tick >= self.window_start_tick:
+            self.angle_max_rad = max(self.angle_max_rad, abs(angle))
+            reference = self._reference(tick)
+            if reference is not None:
+                self.reference_max_rad = max(self.reference_max_rad, abs(reference))
+                self.tracking.add(reference - angle)
+        self._angles.append((tick, angle))
+        self._join()
 
     def on_estimate(self, tick: int, coded: Vector, live: Vector | None) -> None:
-        """Compare the estimates of a tick with its angle; ticks come in order."""
-        while self._angles and self._angles[0][0] < tick:
-            self._angles.popleft()
-        if not self._angles or self._angles[0][0] != tick:
-            return
-        angle = self._angles[0][1][0]
-        error = angle - self._model.measured(coded)[0]
-        self.last_coded_error_rad = error
-        if tick < self.window_start_tick:
-            return
-        self.coded.add(error)
-        if live is not None:
-            self.live.add(angle - self._model.measured(live)[0])
+        """Note what was estimated of a tick; ticks come in order."""
+        measured = self._model.measured
+        self._estimates.append((tick, measured(coded)[0], None if live is None else measured(live)[0]))
+        self._join()
+
+    def _join(self) -> None:
+        """Score every tick of which both sides are known; forget those that one side skipped."""
+        angles, estimates = self._angles, self._estimates
+        while angles and estimates:
+            if angles[0][0] < estimates[0][0]:
+                angles.popleft()
+            elif estimates[0][0] < angles[0][0]:
+                estimates.popleft()
+            else:
+                self._score(angles.popleft()[1], *estimates.popleft())
+
+    def _score(self, angle: float, tick: int, coded: float, live: float | None) -> None:
+        self.last_coded_error_rad = angle - coded
+        if tick >= self.window_start_tick:
+            self.coded.add(angle - coded)
+            if live is not None:
+                self.live.add(angle - live)
 
 
 class LatenessMeter:

@@ -100,6 +100,10 @@ class TransmitterSession:
             enumerate([terms.initial_command] * terms.lead_ticks)
         )
         """commands of coming ticks"""
+        self._slots_of_offset: dict[int, list[int]] = {}
+        """for each tick of a sample at which slots begin, their places in the word"""
+        for index in range(terms.symbols_per_word):
+            self._slots_of_offset.setdefault(terms.slot_tick(index), []).append(index)
         self._tick = -1
         self._word: Word = ERASED
 
@@ -132,7 +136,7 @@ class TransmitterSession:
         if offset == 0 and self.copies.next_sample == sample:
             self._word = self.codec.encode(self.copies.state_before_next(), measurement)
             self.copies.sent(self._word)
-        return self._symbols_due(tick, sample)
+        return self._symbols_due(sample, offset)
 
     def rejoin(self, why: Why, text: str) -> list[Frame]:
         """Stop sending symbols and ask for a new epoch; return the frames that do."""
@@ -149,15 +153,12 @@ class TransmitterSession:
         report = self.desync if self._asking.why is Why.DESYNC else None
         return [self.hello()] if report is None else [report, self.hello()]
 
-    def _symbols_due(self, tick: int, sample: int) -> list[Frame]:
-        if self._word is ERASED:
+    def _symbols_due(self, sample: int, offset: int) -> list[Frame]:
+        due = self._slots_of_offset.get(offset)
+        if due is None or self._word is ERASED:
             return []
-        count = self.terms.symbols_per_word
-        return [
-            self._symbol(sample * count + index, self._word[index])
-            for index in range(count)
-            if self.terms.slot_tick(sample * count + index) == tick
-        ]
+        first = sample * self.terms.symbols_per_word
+        return [self._symbol(first + index, self._word[index]) for index in due]
 
     def _symbol(self, slot: int, symbol: int) -> Symbol:
         number = self.codec.coder.alphabet.symbol_number(symbol)

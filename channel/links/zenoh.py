@@ -16,16 +16,14 @@ from __future__ import annotations
 import json
 import re
 import secrets
-from queue import Empty, SimpleQueue
 
 import zenoh
 
 from channel.errors import LinkError
 from channel.links.base import LinkBase, Role
 from channel.links.endpoints import check_endpoints
-
-QUEUE_MESSAGES_MAX = 10_000
-"""Inbound messages that wait for the loop; more are dropped and counted."""
+from channel.links.zenoh_inbox import ChannelInbox, Inbox, QueueInbox
+from channel.terms import Clock
 
 LEASE_MS = 2_000
 RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 2}
@@ -37,8 +35,9 @@ class ZenohLink(LinkBase):
     """One end of a session over Zenoh.
 
     `listen` and `connect` are Zenoh endpoints; one end listens, the other connects, either may start
-    first. `best_effort`: a symbol that the network cannot take at once is dropped, an erasure, instead
-    of keeping the loop waiting; all else stays reliable. Raises LinkError for a name or endpoint that
+    first. On the virtual clock waits are kept to a tenth of a second, and messages are quicker.
+    `best_effort`: a symbol that the network cannot take at once is dropped, an erasure, instead of
+    keeping the loop waiting; all else stays reliable. Raises LinkError for a name or endpoint that
     cannot be used.
     """
 
@@ -54,6 +53,7 @@ class ZenohLink(LinkBase):
         scouting: bool = False,
         insecure: bool = False,
         best_effort: bool = False,
+        clock: Clock = "real",
     ) -> None:
         super().__init__()
         if not _NAME.fullmatch(session_name):
@@ -63,7 +63,7 @@ class ZenohLink(LinkBase):
         if not listen and not connect and not scouting:
             raise LinkError("a Zenoh link needs an endpoint to listen on or to connect to")
         check_endpoints(listen + connect, insecure)
-        self._inbox: SimpleQueue[bytes] = SimpleQueue()
+        self._inbox: Inbox | None = None
         self._peers: set[str] = set()
         self._closed = False
         try:
@@ -71,16 +71,18 @@ class ZenohLink(LinkBase):
         except zenoh.ZError as error:
             raise LinkError(f"Zenoh cannot use {', '.join(listen + connect)}: {error}") from error
         try:
-            self._declare(role, f"tenbaud/{session_name}", best_effort)
+            self._declare(role, f"tenbaud/{session_name}", clock, best_effort)
         except BaseException:
-            self._session.close()
+            self.close()
             raise
 
-    def _declare(self, role: Role, root: str, best_effort: bool) -> None:
+    def _declare(self, role: Role, root: str, clock: Clock, best_effort: bool) -> None:
         inbound, other = ("down", "receiver") if role == "transmitter" else ("up", "transmitter")
-        self._subscriber = self._session.declare_subscriber(
-            f"{root}/{inbound}/*", zenoh.handlers.Callback(self._on_sample, indirect=False)
-        )
+        key = f"{root}/{inbound}/*"
+        if clock == "virtual":
+            self._inbox = ChannelInbox(self._session, key)
+        else:
+            self._inbox = QueueInbox(self._session, key, self.counts.dropped)
         alive = self._session.liveliness()
         self._watch = alive.declare_subscriber(
             f"{root}/alive/{other}/*",
@@ -114,9 +116,8 @@ class ZenohLink(LinkBase):
 
     def receive(self, timeout_s: float) -> bytes | None:
         """Return the next message, or None after `timeout_s` seconds."""
-        try:
-            data = self._inbox.get(timeout_s > 0.0, timeout_s if timeout_s > 0.0 else None)
-        except Empty:
+        data = self._inbox.get(timeout_s) if self._inbox is not None else None
+        if data is None:
             return None
         self.counts.messages_in += 1
         self.counts.bytes_in += len(data)
@@ -130,17 +131,12 @@ class ZenohLink(LinkBase):
         """Close the Zenoh session; what was sent before is still delivered."""
         if not self._closed:
             self._closed = True
+            if self._inbox is not None:
+                self._inbox.close()
             self._session.close()
 
-    # The two callbacks run on a thread of Zenoh and call nothing of Zenoh: they only hand over.
-
-    def _on_sample(self, sample: zenoh.Sample) -> None:
-        if self._inbox.qsize() >= QUEUE_MESSAGES_MAX:
-            self.counts.dropped["queue full"] += 1
-        else:
-            self._inbox.put(sample.payload.to_bytes())
-
     def _on_alive(self, sample: zenoh.Sample) -> None:
+        # On a thread of Zenoh; calls nothing of Zenoh.
         key = str(sample.key_expr)
         if sample.kind == zenoh.SampleKind.PUT:
             self._peers.add(key)

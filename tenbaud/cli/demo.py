@@ -51,6 +51,7 @@ def demo(
     [dim]tenbaud demo --impair "loss=0.3,up:flip=0.02" --sabotage sample=700,field=range[/dim]
     """
     from tenbaud.build import agree
+    from tenbaud.build_ends import check_parts
     from tenbaud.config.load import load_config
 
     replayed = rig is not None and rig.startswith("replay")
@@ -84,6 +85,8 @@ def demo(
         )
         for off in flights
     ]
+    for agreement in agreements:
+        check_parts(agreement.config)
     raise typer.Exit(_fly_all(agreements, out, json))
 
 

@@ -126,8 +126,9 @@ def _run(
     as_json: bool,
     status: str,
 ) -> None:
-    from channel.links.endpoints import DEFAULT_ENDPOINT
+    from channel.links.endpoints import DEFAULT_ENDPOINT, check_endpoints
     from tenbaud.build import agree
+    from tenbaud.build_ends import check_parts
     from tenbaud.config.load import dump_config, load_config
     from tenbaud.flight import ends
     from tenbaud.flight.outcome import ExitCode
@@ -140,6 +141,8 @@ def _run(
         # Without any address both ends meet on this machine: the receiver listens.
         listen = (DEFAULT_ENDPOINT,) if role == "receiver" else ()
         connect = () if role == "receiver" else (DEFAULT_ENDPOINT,)
+    check_endpoints(listen + connect, insecure)
+    check_parts(config)
     if insecure:
         typer.echo(
             "tenbaud: --insecure: whoever reaches this address can read the symbols and command "
@@ -165,7 +168,7 @@ def _run(
         write_summary(folder, summary)
     if as_json:
         ends.write_json(summary)
-    elif whole:
+    elif whole and summary["samples"]:
         from tenbaud.flight.report import show_summary
 
         show_summary(summary, folder)

@@ -48,10 +48,7 @@ def load_config(
         return FlightConfig.model_validate(values)
     except ValidationError as error:
         source = str(path) if path is not None else f"preset {base}"
-        lines = [_describe(detail) for detail in error.errors()]
-        raise ConfigError(
-            f"{source}, with the command line over it:\n  " + "\n  ".join(lines)
-        ) from error
+        raise ConfigError(_describe_all(source, error)) from error
 
 
 def dump_config(config: FlightConfig) -> str:
@@ -90,17 +87,27 @@ def _merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
     return merged
 
 
-def _describe(detail: ErrorDetails) -> str:
+def _describe_all(source: str, error: ValidationError) -> str:
+    """Return one line per field; one that may be of several types has an error for each."""
+    problems: dict[str, list[str]] = {}
+    for detail in error.errors():
+        what, why = _describe(detail)
+        problems.setdefault(what, []).append(why)
+    lines = [f"{what}: {' or '.join(whys)}" for what, whys in problems.items()]
+    return "\n  ".join([f"{source}, with the command line over it:", *lines])
+
+
+def _describe(detail: ErrorDetails) -> tuple[str, str]:
     # The names of a union's branches ("int", "literal['auto']") are no part of the field's name.
     branches = ("literal[", "int", "float", "constrained", "tuple[", "function-", "str")
     place = [str(part) for part in detail["loc"] if not str(part).startswith(branches)]
     name = ".".join(place) or "(whole file)"
     if detail["type"] == "extra_forbidden":
-        return f"{name}: unknown field{_nearest(place)}"
+        return name, f"unknown field{_nearest(place)}"
     message = detail["msg"].removeprefix("Value error, ")
     if isinstance(detail["input"], dict | FlightConfig):
-        return f"{name}: {message}"
-    return f"{name} = {detail['input']!r}: {message}"
+        return name, message
+    return f"{name} = {detail['input']!r}", message
 
 
 def _nearest(place: list[str]) -> str:

@@ -47,6 +47,7 @@ def open_link(agreement: Agreement, role: Role, endpoints: Endpoints) -> Link:
         connect=endpoints.connect,
         insecure=endpoints.insecure,
         best_effort=agreement.config.link.best_effort,
+        clock=agreement.clock,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from channel.impairments import ImpairedLine
@@ -106,7 +107,7 @@ def _common(agreement: Agreement, outcome: Outcome) -> Summary:
 def _plant_name(agreement: Agreement) -> str:
     section = agreement.config.transmitter
     if section.rig == "replay":
-        return f"replay of {agreement.config.flight_log.file}"
+        return f"replay of {Path(agreement.config.flight_log.file).name}"
     mismatch = section.plant.mismatch
     off = mismatch if isinstance(mismatch, tuple) else (mismatch,)
     name = "pitch"

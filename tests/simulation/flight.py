@@ -133,3 +133,15 @@ def pitch_flight(
         downlink_line=downlink_line,
         window_start_tick=round(window_start_s / TICK_S),
     )
+
+
+def assert_lockstep(flight: Flight, samples: int) -> None:
+    """One digest check per sample, every one of them equal, and nothing left over."""
+    assert flight.transmitter.counts["digest_checks"] == samples
+    assert flight.transmitter.counts["desyncs"] == 0
+    assert flight.receiver.counts["desyncs"] == 0
+    assert flight.transmitter.copies.confirmed == flight.receiver.state
+    assert flight.transmitter.copies.lag_samples == 0
+    assert flight.digests == flight.received.column("sample", "digest")
+    assert len(set(flight.digests)) == samples
+    assert flight.transmitter.counts["stale_frames"] == flight.receiver.counts["stale_frames"] == 0

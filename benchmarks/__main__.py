@@ -1,0 +1,44 @@
+"""Runs every benchmark, or those named: `python -m benchmarks codec virtual`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+from benchmarks.codec import codec_figures
+from benchmarks.figures import Figure, show, write
+from benchmarks.flights import cold_start_figures, memory_figures, real_figures, virtual_figures
+
+BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
+    "codec": codec_figures,
+    "start": cold_start_figures,
+    "virtual": virtual_figures,
+    "real": real_figures,
+    "memory": memory_figures,
+}
+
+
+def main(names: list[str]) -> int:
+    """Run the named benchmarks, all without names; return the exit code."""
+    unknown = [name for name in names if name not in BENCHMARKS]
+    if unknown:
+        print(f"no benchmark {', '.join(unknown)}; there are {', '.join(BENCHMARKS)}", file=sys.stderr)
+        return 2
+    figures: list[Figure] = []
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        for name in names or BENCHMARKS:
+            task = progress.add_task(name)
+            figures += BENCHMARKS[name]()
+            progress.remove_task(task)
+    show(figures)
+    write(figures, Path("bench.json"))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,142 @@
+"""The demo as a newcomer runs it: two processes, Zenoh on loopback, a folder with everything."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tenbaud.config.load import load_config
+from tenbaud.recording.diff import first_difference
+from tenbaud.recording.folder import RunFolder
+from tests.tenbaud.processes import run
+
+SUMMARY_FIELDS = [
+    "preset",
+    "plant",
+    "link",
+    "clock",
+    "duration_s",
+    "samples",
+    "coder_bits_up",
+    "baud_configured",
+    "baud_measured",
+    "wire_bytes_up",
+    "wire_bytes_down",
+    "erasures",
+    "digest_checks",
+    "desyncs",
+    "pitch_amplitude_rad",
+    "error_coded_max_fraction",
+    "error_coded_rms_fraction",
+    "error_live_max_fraction",
+    "error_live_rms_fraction",
+    "commands_late",
+    "symbols_late",
+    "tracking_rms_rad",
+    "loop_late_ms_p50",
+    "loop_late_ms_p99",
+    "loop_late_ms_max",
+    "realtime_factor",
+    "config_digest",
+    "numerics_probe",
+    "window_start_s",
+]
+
+REAL_FLIGHT = Path(__file__).parents[3] / "shared" / "data" / "uiuc_closed_loop.csv"
+
+
+def test_when_the_demo_flies_the_paper_then_every_sample_is_checked(tmp_path: Path) -> None:
+    ended = run("demo", "--json", "--mismatch", "0.1", "--out", "run", cwd=tmp_path)
+    assert ended.code == 0, ended.err
+    summary = ended.summary
+    assert set(SUMMARY_FIELDS) <= summary.keys()
+    assert summary["samples"] == summary["digest_checks"] == summary["coder_bits_up"] == 1000
+    assert summary["desyncs"] == summary["erasures"] == summary["commands_late"] == 0
+    assert summary["baud_measured"] == pytest.approx(10.0, abs=1e-6)
+    assert summary["window_start_s"] == 25.0
+    assert 0.0 < summary["error_coded_max_fraction"] <= 0.05
+    assert summary["error_live_max_fraction"] == summary["error_coded_max_fraction"]
+
+    folder = RunFolder(tmp_path / "run")
+    assert folder.figure.read_bytes().startswith(b"\x89PNG")
+    assert load_config(path=folder.config).transmitter.plant.mismatch == 0.1
+    assert first_difference(folder.path) is None, "the two ends' recordings"
+
+
+def test_when_the_tuned_preset_flies_off_its_model_then_it_errs_less_than_two_percent(
+    tmp_path: Path,
+) -> None:
+    ended = run("demo", "--json", "--preset", "tuned-10baud", "--mismatch", "0.1", cwd=tmp_path)
+    assert ended.code == 0, ended.err
+    assert ended.summary["error_live_max_fraction"] <= 0.02
+
+
+def test_when_a_person_runs_it_then_both_plants_are_shown_and_nothing_else_on_stdout(
+    tmp_path: Path,
+) -> None:
+    ended = run("demo", "--duration", "30", cwd=tmp_path)
+    assert ended.code == 0, ended.err
+    assert "digest checks" in ended.out
+    assert "300" in ended.out
+    assert "+10%" in ended.out
+    assert len(list((tmp_path / "runs").iterdir())) == 2
+
+
+@pytest.mark.skipif(not REAL_FLIGHT.is_file(), reason="the recorded flights are not beside the tree")
+def test_when_a_real_flight_is_replayed_then_its_pitch_is_known_remotely(tmp_path: Path) -> None:
+    ended = run("demo", "--json", "--rig", f"replay:{REAL_FLIGHT}", "--out", "run", cwd=tmp_path)
+    assert ended.code == 0, ended.err
+    summary = ended.summary
+    assert summary["preset"] == "uiuc-10baud"
+    assert summary["samples"] == summary["digest_checks"] == 1200
+    assert summary["error_live_rms_fraction"] <= 0.08
+    assert (tmp_path / "run" / "flight.png").is_file()
+
+
+def test_when_the_wire_delivers_at_the_end_of_a_slot_then_it_flies_on_the_provisional_copy(
+    tmp_path: Path,
+) -> None:
+    arguments = ["--delivery", "end", "--preset", "tuned-10baud", "--mismatch", "0.1"]
+    summary = run("demo", "--json", *arguments, cwd=tmp_path).summary
+    assert summary["lead_ticks"] == 13
+    assert summary["desyncs"] == summary["erasures"] == summary["commands_late"] == 0
+    assert summary["error_live_max_fraction"] > summary["error_coded_max_fraction"]
+    assert summary["error_live_max_fraction"] < 0.05
+
+
+def test_when_flown_on_every_clock_and_link_then_the_states_are_identical(tmp_path: Path) -> None:
+    flown = ["--lead", "25", "--duration", "3", "--mismatch", "0.1", "--disturbance", "q=2e-3"]
+    for name, how in (
+        ("real", ["--clock", "real"]),
+        ("virtual", []),
+        ("memory", ["--link", "memory"]),
+    ):
+        ended = run("demo", "--json", "--out", name, *flown, *how, cwd=tmp_path)
+        assert ended.code == 0, ended.err
+        assert ended.summary["commands_late"] == ended.summary["erasures"] == 0, name
+    for other in ("virtual", "memory"):
+        difference = first_difference(tmp_path / "real", tmp_path / other)
+        assert difference is None, f"real and {other}: {difference}"
+
+
+def test_when_the_real_clock_flies_then_the_receiver_measures_the_baud_rate(tmp_path: Path) -> None:
+    ended = run("demo", "--json", "--clock", "real", "--duration", "10", cwd=tmp_path)
+    assert ended.code == 0, ended.err
+    summary = ended.summary
+    assert summary["baud_measured"] == pytest.approx(10.0, abs=0.1)
+    assert summary["digest_checks"] == 100
+    assert summary["desyncs"] == 0
+    assert summary["loop_late_ms_p99"] is not None
+
+
+def test_when_the_seed_changes_then_the_disturbed_flight_changes(tmp_path: Path) -> None:
+    flown = ["--disturbance", "q=2e-2", "--duration", "3", "--link", "memory", "--json"]
+    for name, seed in (("a", "1"), ("b", "2"), ("c", "1")):
+        assert run("demo", *flown, "--seed", seed, "--out", name, cwd=tmp_path).code == 0
+    assert first_difference(tmp_path / "a", tmp_path / "c") is None
+    difference = first_difference(tmp_path / "a", tmp_path / "b")
+    assert difference is not None
+    assert difference.kind == "value"
+    assert run("diff", "a", "b", cwd=tmp_path).code == 1
+    assert run("diff", "a", "c", cwd=tmp_path).code == 0

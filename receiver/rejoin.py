@@ -95,7 +95,7 @@ class Greeter:
                 f"{hello.config_digest.hex()[:12]}, receiver {ours.config_digest.hex()[:12]}"
             )
         if hello.version != ours.version:
-            return f"versions differ: transmitter {hello.version}, receiver {ours.version}"
+            return f"versions differ: transmitter {hello.version[:64]}, receiver {ours.version}"
         if hello.numerics_probe != ours.numerics_probe:
             return (
                 "the numerics probe differs: transmitter "

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections import Counter, deque
 from enum import Enum
 
-from channel.codec import Codec, CodecState, Vector
+from channel.codec import Codec, Vector
 from channel.events import EVENT_CHANNEL, Event, EventKind, event_row
 from channel.frames import (
     Bye,
@@ -39,7 +39,7 @@ from channel.terms import Terms
 from channel.wire import WIRE_VERSION
 from channel.words import ERASED, Word
 from receiver.controllers.base import Controller
-from receiver.records import SAMPLE_CHANNEL, TICK_CHANNEL
+from receiver.records import write_commands, write_sample
 from receiver.rejoin import Greeter, Verdict, carried_to
 
 GAP_SAMPLES_MAX = HISTORY_SAMPLES
@@ -179,7 +179,7 @@ class ReceiverSession:
                 self._refuse(problem)
                 return [Refuse(hello.incarnation, problem, self.identity.config)]
             case _:
-                self.counts["stale_frames"] += 1
+                self.counts["refused_hellos"] += 1
                 return []
 
     def _begin(self, hello: Hello) -> list[Frame]:
@@ -190,6 +190,7 @@ class ReceiverSession:
         first = max(self.state.sample + (1 if self._word else 0), hello.sample)
         if last is None:
             self.phase = Phase.FLYING
+            self.refusal = None
             self.state = self.codec.initial()._replace(sample=first)
         elif self.epoch >= EPOCH_MAX:
             self._end(f"{EPOCH_MAX} rejoins: something is wrong with this line")
@@ -219,7 +220,7 @@ class ReceiverSession:
             first,
             hello.incarnation,
             hello.request,
-            to_millivolts(hold),
+            () if hold == self.terms.initial_command else to_millivolts(hold),
             state,
         )
         self._greeter.welcome = welcome
@@ -261,7 +262,7 @@ class ReceiverSession:
 
     def _on_foreign_symbol(self, symbol: Symbol) -> list[Frame]:
         """Answer a transmitter that flies in a session or an epoch that is not the present one."""
-        if self.phase is Phase.WAITING:
+        if self.phase is Phase.WAITING and self.refusal is None:
             return [Unknown(symbol.session, symbol.epoch)]
         welcome = self._greeter.welcome
         missed = self._is_current(symbol.session) and symbol.epoch < self.epoch
@@ -297,7 +298,9 @@ class ReceiverSession:
         millivolts = [mv for command in flown.commands for mv in to_millivolts(command)]
         number = self.codec.coder.alphabet.word_number(word)
         self._echoes.append(Echo(before.sample, number, digest, tuple(millivolts)))
-        self._record(before, word, flown.live, flown.commands, digest, now_ns)
+        ranges = self.codec.coder.ranges(before.coder)
+        write_sample(self._recorder, self.terms, word, ranges, self.state, digest, now_ns)
+        write_commands(self._recorder, self.terms, before.sample, flown, self._controller)
         return [Commands(self.session_number, self.epoch, tuple(self._echoes))]
 
     def _decide(self, tick: int, state: Vector) -> Vector:
@@ -359,34 +362,3 @@ class ReceiverSession:
         event = Event(kind, flight_ns, at, text)
         self.events.append(event)
         self._recorder.write(EVENT_CHANNEL, flight_ns, event_row(event))
-
-    def _record(
-        self,
-        before: CodecState,
-        word: Word,
-        live: list[Vector],
-        commands: list[Vector],
-        digest: int,
-        now_ns: int,
-    ) -> None:
-        terms = self.terms
-        state = self.state
-        self._recorder.write(
-            SAMPLE_CHANNEL,
-            before.sample * terms.sample_ns,
-            (
-                before.sample,
-                word,
-                self.codec.coder.ranges(before.coder),
-                state.model,
-                state.coder,
-                f"{digest:016x}",
-                now_ns / 1e9,
-            ),
-        )
-        tick = before.sample * terms.ticks_per_sample + terms.lead_ticks
-        for believed, command in zip(live, commands, strict=True):
-            reference = self._controller.reference_rad(tick)
-            row = (tick, reference, believed, command)
-            self._recorder.write(TICK_CHANNEL, tick * terms.tick_ns, row)
-            tick += 1

@@ -106,6 +106,7 @@ class TransmitterSession:
             self._slots_of_offset.setdefault(terms.slot_tick(index), []).append(index)
         self._tick = -1
         self._word: Word = ERASED
+        self._word_sample = -1
 
     # What happens at a tick
 
@@ -129,12 +130,13 @@ class TransmitterSession:
         while self.copies.next_sample < sample:
             self.counts["words_missed"] += 1
             self.copies.sent(ERASED)
-        if self.copies.next_sample == sample:
+        if sample != self._word_sample:
             self._word = ERASED
         if self.copies.lag_samples > LAG_SAMPLES_MAX:
             return self.rejoin(Why.LAG, f"no echo for {LAG_SAMPLES_MAX} samples")
         if offset == 0 and self.copies.next_sample == sample:
             self._word = self.codec.encode(self.copies.state_before_next(), measurement)
+            self._word_sample = sample
             self.copies.sent(self._word)
         return self._symbols_due(sample, offset)
 

@@ -32,9 +32,7 @@ def demo(
         str | None, typer.Option(help="simulated, or replay:FILE for a recorded flight.")
     ] = None,
     mismatch: options.Mismatches = None,
-    disturbance: Annotated[
-        str | None, typer.Option(help='Torque on the plant, such as "q=2e-3,step=0.5@30".')
-    ] = None,
+    disturbance: options.Disturbance = None,
     impair: options.Impair = None,
     on_desync: options.OnDesync = None,
     sabotage: options.Sabotage = None,

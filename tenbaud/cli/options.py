@@ -60,6 +60,9 @@ Mismatches = Annotated[
         show_default=False,
     ),
 ]
+Disturbance = Annotated[
+    str | None, typer.Option(help='Torque on the plant, such as "q=2e-3,step=0.5@30".')
+]
 Impair = Annotated[
     str | None,
     typer.Option(

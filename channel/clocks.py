@@ -20,16 +20,19 @@ class SkewedClock:
         jumps = sum(jump for at, jump in self._steps if since_ns >= at)
         return self._start_ns + round(since_ns * self._rate) + jumps
 
-    def reached(self, shown_ns: int) -> int:
-        """Return the first true time at which the clock shows at least `shown_ns`."""
-        before_ns = -(2**62)
+    def reached(self, shown_ns: int, not_before_ns: int = -(2**62)) -> int:
+        """Return the first true time, not before another, at which the clock shows `shown_ns`.
+
+        A clock that jumped back shows it twice.
+        """
+        before_ns = not_before_ns
         jumps = 0
         for at, jump in (*self._steps, (2**62, 0)):
             wanted = round((shown_ns - self._start_ns - jumps) / self._rate) + self._start_ns
             wanted = max(wanted, before_ns)
             if wanted < at + self._start_ns:
                 break
-            before_ns = at + self._start_ns
+            before_ns = max(before_ns, at + self._start_ns)
             jumps += jump
         while self.shown(wanted) < shown_ns:
             wanted += 1

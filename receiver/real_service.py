@@ -40,11 +40,11 @@ def serve_real(
     session = endpoint.session
     way_out = _WayOut(line or Line(), link)
     shown = clock.shown if clock is not None else lambda true_ns: true_ns
-    reached = clock.reached if clock is not None else lambda shown_ns: shown_ns
+    reached = clock.reached if clock is not None else lambda shown_ns, _now_ns: shown_ns
     heard_ns = time.monotonic_ns()
     while session.phase is not Phase.ENDED and not should_stop():
         deadline_ns = session.next_deadline()
-        due_ns = None if deadline_ns is None else reached(deadline_ns)
+        due_ns = None if deadline_ns is None else reached(deadline_ns, time.monotonic_ns())
         data = link.receive(_patience_s(due_ns, way_out.next_due_ns))
         now_ns = time.monotonic_ns()
         messages: list[bytes] = []

@@ -49,60 +49,67 @@ class Verdict(Enum):
 class Greeter:
     """Judges requests; remembers who is flown with and what was answered."""
 
-    def __init__(self, identity: Identity) -> None:
-        self._identity = identity
+    def __init__(self) -> None:
         self.welcome: Welcome | None = None
         """last answer given"""
         self._stranger: int | None = None
         self._symbols_since = 0
 
-    def judge(self, hello: Hello, advanced: bool, silent_slots: int) -> Verdict:
-        """Return the verdict on a request.
+    def judge(
+        self, hello: Hello, identity: Identity, advanced: bool, silent_slots: int
+    ) -> Verdict:
+        """Return the verdict on a request to an end of this identity.
 
         `advanced`: a symbol was received on the last answer. `silent_slots`: slots missed in a row.
         """
         last = self.welcome
         if last is None:
-            return Verdict.BEGIN if self.difference(hello) is None else Verdict.REFUSE
+            return _admitted(hello, identity)
         if hello.incarnation != last.incarnation:
-            return self._judge_stranger(hello, advanced, silent_slots)
+            return self._judge_stranger(hello, identity, advanced, silent_slots)
         if hello.request < last.request or (hello.request == last.request and advanced):
             return Verdict.IGNORE
         if hello.request == last.request:
             age = hello.sample - last.first_sample
             return Verdict.REPEAT if age <= ANSWER_AGE_SAMPLES_MAX else Verdict.BEGIN
-        return Verdict.BEGIN
+        return _admitted(hello, identity)
 
     def on_symbol(self) -> None:
         """Note that the present transmitter is heard."""
         self._symbols_since += 1
 
-    def _judge_stranger(self, hello: Hello, advanced: bool, silent_slots: int) -> Verdict:
+    def _judge_stranger(
+        self, hello: Hello, identity: Identity, advanced: bool, silent_slots: int
+    ) -> Verdict:
         if hello.incarnation != self._stranger:
             self._stranger, self._symbols_since = hello.incarnation, 0
         if self._symbols_since >= ALIVE_SYMBOLS:
             return Verdict.BUSY
         if advanced and silent_slots < SILENT_SLOTS:
             return Verdict.IGNORE
-        return Verdict.BEGIN if self.difference(hello) is None else Verdict.REFUSE
+        return _admitted(hello, identity)
 
-    def difference(self, hello: Hello) -> str | None:
-        """Return in what a transmitter differs so that it cannot be flown with; None: in nothing."""
-        ours = self._identity
-        if hello.config_digest != ours.config_digest:
-            return (
-                "the shared configuration differs: transmitter "
-                f"{hello.config_digest.hex()[:12]}, receiver {ours.config_digest.hex()[:12]}"
-            )
-        if hello.version != ours.version:
-            return f"versions differ: transmitter {hello.version[:64]}, receiver {ours.version}"
-        if hello.numerics_probe != ours.numerics_probe:
-            return (
-                "the numerics probe differs: transmitter "
-                f"{hello.numerics_probe.hex()}, receiver {ours.numerics_probe.hex()}; the "
-                "two machines do not compute alike, so their codecs would drift apart"
-            )
-        return None
+
+def _admitted(hello: Hello, identity: Identity) -> Verdict:
+    return Verdict.BEGIN if difference(hello, identity) is None else Verdict.REFUSE
+
+
+def difference(hello: Hello, ours: Identity) -> str | None:
+    """Return in what a transmitter differs so that it cannot be flown with; None: in nothing."""
+    if hello.config_digest != ours.config_digest:
+        return (
+            "the shared configuration differs: transmitter "
+            f"{hello.config_digest.hex()[:12]}, receiver {ours.config_digest.hex()[:12]}"
+        )
+    if hello.version != ours.version:
+        return f"versions differ: transmitter {hello.version[:64]}, receiver {ours.version}"
+    if hello.numerics_probe != ours.numerics_probe:
+        return (
+            "the numerics probe differs: transmitter "
+            f"{hello.numerics_probe.hex()}, receiver {ours.numerics_probe.hex()}; the "
+            "two machines do not compute alike, so their codecs would drift apart"
+        )
+    return None
 
 
 def carried_to(

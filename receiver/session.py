@@ -40,7 +40,7 @@ from channel.wire import WIRE_VERSION
 from channel.words import ERASED, Word
 from receiver.controllers.base import Controller
 from receiver.records import write_commands, write_sample
-from receiver.rejoin import Greeter, Verdict, carried_to
+from receiver.rejoin import Greeter, Verdict, carried_to, difference
 
 GAP_SAMPLES_MAX = HISTORY_SAMPLES
 """A symbol this far ahead is no gap any more; after as many erasures in a row none are counted on."""
@@ -87,7 +87,7 @@ class ReceiverSession:
         self.desync: Desync | None = None
         self.events: deque[Event] = deque(maxlen=1000)
         self.history = History(codec)
-        self._greeter = Greeter(identity)
+        self._greeter = Greeter()
         self._controller = controller
         self._recorder = recorder or NullRecorder()
         self._commands: deque[Vector] = deque([terms.initial_command] * terms.lead_ticks)
@@ -164,7 +164,9 @@ class ReceiverSession:
     def _on_hello(self, hello: Hello) -> list[Frame]:
         if self.phase is Phase.ENDED:
             return [Refuse(hello.incarnation, f"this receiver has ended: {self.end_reason}", "")]
-        verdict = self._greeter.judge(hello, self._advanced, self._silent_slots)
+        verdict = self._greeter.judge(
+            hello, self.identity, self._advanced, self._silent_slots
+        )
         match verdict:
             case Verdict.REPEAT if self._greeter.welcome is not None:
                 return [self._greeter.welcome]
@@ -175,7 +177,7 @@ class ReceiverSession:
                 return [Refuse(hello.incarnation, "this receiver is flying with another", "")]
             case Verdict.REFUSE:
                 self.counts["refused_hellos"] += 1
-                problem = self._greeter.difference(hello) or ""
+                problem = difference(hello, self.identity) or ""
                 self._refuse(problem)
                 return [Refuse(hello.incarnation, problem, self.identity.config)]
             case _:

@@ -55,9 +55,7 @@ class Greeter:
         self._stranger: int | None = None
         self._symbols_since = 0
 
-    def judge(
-        self, hello: Hello, identity: Identity, advanced: bool, silent_slots: int
-    ) -> Verdict:
+    def judge(self, hello: Hello, identity: Identity, advanced: bool, silent_slots: int) -> Verdict:
         """Return the verdict on a request to an end of this identity.
 
         `advanced`: a symbol was received on the last answer. `silent_slots`: slots missed in a row.

@@ -164,9 +164,7 @@ class ReceiverSession:
     def _on_hello(self, hello: Hello) -> list[Frame]:
         if self.phase is Phase.ENDED:
             return [Refuse(hello.incarnation, f"this receiver has ended: {self.end_reason}", "")]
-        verdict = self._greeter.judge(
-            hello, self.identity, self._advanced, self._silent_slots
-        )
+        verdict = self._greeter.judge(hello, self.identity, self._advanced, self._silent_slots)
         match verdict:
             case Verdict.REPEAT if self._greeter.welcome is not None:
                 return [self._greeter.welcome]

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import heapq
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import count
 
 from channel.clocks import SkewedClock
-from channel.codec import Vector
-from channel.frames import Symbol
+from channel.codec import Codec, Vector
+from channel.errors import FrameError
+from channel.frames import Frame, Symbol
 from channel.impairments import ImpairedLine, Impairments
 from channel.sabotage import SabotagedCodec
 from channel.shaper import SlotShaper, UplinkMeter
@@ -29,6 +30,7 @@ from tests.channel.parts import TICK_NS, TICK_S, identity_of, pitch_codec
 from tests.simulation.faults import FAULTY_S, QUIET_S, Plan
 from tests.simulation.flight import COUNTS_PER_TURN, REFERENCE
 from tests.simulation.watch import Watch
+from transmitter.copies import Confirmed
 from transmitter.guard import Guard, GuardSettings
 from transmitter.node import TransmitterNode
 from transmitter.rigs.base import Reading, RigBase
@@ -59,11 +61,20 @@ class WorldRig(RigBase):
         self.volts = volts
 
 
+class BlindSession(TransmitterSession):
+    """What must never be: it sees that the digests differ, and goes on."""
+
+    def _on_desync(self, done: Confirmed) -> list[Frame]:
+        return []
+
+
 class World:
     """One flight under a plan; `fly` raises `SafetyViolation` or `LivenessViolation`."""
 
-    def __init__(self, plan: Plan) -> None:
+    def __init__(self, plan: Plan, blind: bool = False) -> None:
+        """`blind` makes a transmitter that stays silent about digests that differ: a canary."""
         self.plan = plan
+        self.blind = blind
         self.terms = plan.terms
         self.codec = pitch_codec(plan.zoom, plan.terms.ticks_per_sample)
         self.identity = identity_of(self.codec)
@@ -78,6 +89,8 @@ class World:
         )
         self.down = ImpairedLine(plan.down, alphabet, f"{plan.seed} down")
         self.now_ns = 0
+        self.calm_ns = 0
+        """when faults stop, true time"""
         self._events: list[tuple[int, int, Callable[[], None]]] = []
         self._order = count()
         self._started = 0
@@ -88,6 +101,7 @@ class World:
         self._origin_ns = 0
         self._greeted = False
         self.recovered_ns: int | None = None
+        """from then until both ends were locked"""
 
     # The two processes
 
@@ -106,22 +120,21 @@ class World:
         self._started += 1
         self._generation += 1
         recorder = self.watch.transmitter_started()
-        session = TransmitterSession(
+        kind = BlindSession if self.blind else TransmitterSession
+        session = kind(
             self._codec_of("transmitter"), self.terms, self.identity, self._started, recorder
         )
         guard = Guard(self.terms.limits, GuardSettings(50, 50, (0.0, 0.0)))
         scores = Scores(self.codec.model, 0, 2000, REFERENCE.angle_rad)
         self.node = TransmitterNode(session, self.rig, guard, scores, recorder, ALIVE_TICKS)
         self.watch.node = self.node
-        self.uplink = Uplink(
-            SlotShaper(self.terms), self.up, UplinkMeter(self.codec.coder.alphabet)
-        )
+        self.uplink = Uplink(SlotShaper(self.terms), self.up, UplinkMeter(self.codec.coder.alphabet))
         self._greeted = False
         self._origin_ns = self.now_ns
         self.rig.volts = (0.0, 0.0)
         self._greet(self._generation)
 
-    def _codec_of(self, end: str):  # type: ignore[no-untyped-def]
+    def _codec_of(self, end: str) -> Codec:
         codec = self.codec
         for which, sabotage in self.plan.sabotage:
             if which == end:
@@ -144,8 +157,9 @@ class World:
         for start_ns, end_ns, direction in plan.partitions:
             self.at(start_ns, lambda direction=direction: self._cut(direction, 1.0))
             self.at(end_ns, lambda direction=direction: self._cut(direction, 0.0))
-        last_outage_ns = max((at + out for (at, _), out in zip(plan.restarts, plan.outages_ns, strict=True)), default=0)
-        self.calm_ns = max(round(FAULTY_S * 1e9), last_outage_ns + 1)
+        outages = zip(plan.restarts, plan.outages_ns, strict=True)
+        last_ns = max((at + outage_ns for (at, _), outage_ns in outages), default=0)
+        self.calm_ns = max(round(FAULTY_S * 1e9), last_ns + 1)
         self.at(self.calm_ns, self._calm)
         tick_end_ns = self.calm_ns + round(QUIET_S * 1e9)
         for index in range(tick_end_ns // TICK_NS):
@@ -205,7 +219,7 @@ class World:
         self.watch.on_tick(tick, self.node)
         self._tick(tick + 1, generation)
 
-    def _offer(self, frames) -> None:  # type: ignore[no-untyped-def]
+    def _offer(self, frames: Sequence[Frame]) -> None:
         assert self.uplink is not None
         flight_ns = self.now_ns - self._origin_ns
         for frame in frames:
@@ -222,7 +236,7 @@ class World:
             return
         try:
             frame = decode(data)
-        except Exception:
+        except FrameError:
             self.faults["downlink frames dropped by their check"] += 1
             return
         answers = node.deliver(frame)

@@ -90,9 +90,10 @@ def soak(minutes: float, first_seed: int, workers: int) -> dict[str, object]:
     worst, hours = 0.0, 0.0
     problems: list[str] = []
     started = time.monotonic()
-    with multiprocessing.get_context("spawn").Pool(workers) as pool:
-        clean = pool.apply_async(fly_clean, (round(CLEAN_SYMBOLS * share),))
-        fuzzed = pool.apply_async(fuzz_all, (round(FUZZ_INPUTS * share), first_seed))
+    context = multiprocessing.get_context("spawn")
+    with context.Pool(workers) as pool, context.Pool(2) as beside:
+        clean = beside.apply_async(fly_clean, (round(CLEAN_SYMBOLS * share),))
+        fuzzed = beside.apply_async(fuzz_all, (round(FUZZ_INPUTS * share), first_seed))
         seeds = iter(range(first_seed, 2**62))
         while time.monotonic() < until:
             batch = [next(seeds) for _ in range(4 * workers)]

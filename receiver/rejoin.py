@@ -111,13 +111,18 @@ def difference(hello: Hello, ours: Identity) -> str | None:
 
 
 def carried_to(
-    codec: Codec, state: CodecState, sample: int, known: Sequence[Vector], hold: Vector
+    codec: Codec,
+    state: CodecState,
+    sample: int,
+    known: Sequence[Vector],
+    hold: Vector,
+    silent_samples: int,
 ) -> CodecState:
     """Return a state carried on without corrections to a later sample.
 
-    `known` are the commands of its first ticks, `hold` that of all others. At most
-    `HISTORY_SAMPLES` samples are computed; beyond, as for a state that diverges, only the index
-    moves on, and the initial state is what is left.
+    `known` are the commands of its first ticks, `hold` that of all others; `silent_samples` had no
+    symbol before. At most `HISTORY_SAMPLES` samples are computed; beyond, as for a state that
+    diverges, only the index moves on, and the initial state is what is left.
     """
     paused = sample - state.sample
     if paused > HISTORY_SAMPLES:
@@ -129,6 +134,6 @@ def carried_to(
             state = codec.step(state, ERASED, ticks)
     except CodecDiverged:
         return codec.initial()._replace(sample=sample)
-    if paused > KEEP_CODER_SAMPLES:
+    if paused + silent_samples > KEEP_CODER_SAMPLES:
         return state._replace(coder=codec.coder.initial())
     return state

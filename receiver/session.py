@@ -200,8 +200,9 @@ class ReceiverSession:
             self.counts["rejoins"] += 1
             if hello.incarnation == last.incarnation:
                 hold = self._last_command
+                silent = self._silent_slots // self.terms.symbols_per_word
                 known = tuple(self._commands)
-                self.state = carried_to(self.codec, self.state, first, known, hold)
+                self.state = carried_to(self.codec, self.state, first, known, hold, silent)
                 state = self.codec.pack(self.state)
             else:
                 # A rig that was started again is at rest, and so is what is known of it.

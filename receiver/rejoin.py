@@ -4,10 +4,12 @@
   long as nothing was flown on them, unless the answer has grown too old to begin with.
 * A second transmitter is refused while the first one is heard. When the first has fallen silent, the
   second is taken for the same rig started again.
-* The first sample is `max(own next sample, first sample that the transmitter can still send)`. The
-  request names a sample whose slot lies ahead of it, and no symbol leaves while it is open, so no
-  slot is used twice; symbols of the old epoch that are still on the line are dropped by their epoch.
-  A start that has passed when the answer arrives costs erasures, never lockstep.
+* The first sample is `max(own next sample, first sample that the transmitter can still send + m)`,
+  `m` being the command lead in whole samples. The request names a sample whose slot lies ahead of it,
+  and no symbol leaves while it is open, so no slot is used twice; symbols of the old epoch that are
+  still on the line are dropped by their epoch. The lead is as long as the round trip, so the answer
+  is there before the start, and the command to hold lasts until the first one decided. A start that
+  has passed all the same costs erasures, never lockstep.
 """
 
 from __future__ import annotations
@@ -23,8 +25,9 @@ from channel.identity import Identity
 from channel.lockstep import HISTORY_SAMPLES
 from channel.words import ERASED
 
-ANSWER_AGE_SAMPLES_MAX = 16
-"""A start that lies further back than this is not offered again; it is longer than any round trip."""
+ANSWER_AGE_SAMPLES_MAX = 4
+"""A start that lies further back than this is not offered again: the motors would have no command for
+so long."""
 
 SILENT_SLOTS = 2
 """Slots missed in a row after which a transmitter may be taken for gone, if another one asks."""

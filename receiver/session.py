@@ -187,7 +187,10 @@ class ReceiverSession:
         last = self._greeter.welcome
         state = b""
         hold = self.terms.initial_command
-        first = max(self.state.sample + (1 if self._word else 0), hello.sample)
+        own = self.state.sample + (1 if self._word else 0)
+        begun = last is not None or hello.sample > 0
+        margin = -(-self.terms.lead_ticks // self.terms.ticks_per_sample) if begun else 0
+        first = max(own, hello.sample + margin)
         if last is None:
             self.phase = Phase.FLYING
             self.refusal = None

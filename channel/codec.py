@@ -40,8 +40,8 @@ from channel.words import Alphabet, Word
 
 Vector = tuple[float, ...]
 
-STATE_MAX = 1e9
-"""A state beyond this is no estimate any more; no plant of ours comes within a factor of a million."""
+STATE_MAX = 5e4
+"""A state beyond this is no estimate any more; angles stay within what `numerics.sin` takes."""
 
 
 class Model(Protocol):

@@ -93,6 +93,19 @@ class Symbol:
 
 
 @dataclass(frozen=True, slots=True)
+class ShortSymbol:
+    """A symbol as a byte of a serial line carries it: the receiver finds its slot by the time.
+
+    Only ever received; the other end sent a Symbol.
+    """
+
+    number: int
+    slot_low: int
+    """the slot modulo `slot_modulus`"""
+    slot_modulus: int
+
+
+@dataclass(frozen=True, slots=True)
 class Echo:
     """What the receiver consumed for one sample, and what it decided on it."""
 
@@ -155,5 +168,5 @@ class ForeignVersion:
 
 
 Frame: TypeAlias = (
-    Hello | Welcome | Refuse | Symbol | Commands | Desync | Unknown | Bye | ForeignVersion
+    Hello | Welcome | Refuse | Symbol | ShortSymbol | Commands | Desync | Unknown | Bye | ForeignVersion
 )

@@ -56,7 +56,8 @@ def numerics_probe(codec: Codec) -> bytes:
         for _ in range(codec.ticks_per_sample):
             noise = noise * 1_103_515_245 + 12_345 & 0x7FFFFFFF
             volts = ((noise >> 12) % 9_001 - 4_500) / 1000.0
-            commands.append((volts, -volts)[:1] * codec.model.input_size)
+            signs = (1.0 if motor % 2 == 0 else -1.0 for motor in range(codec.model.input_size))
+            commands.append(tuple(sign * volts for sign in signs))
         state = codec.step(state, word, commands)
         digest.update(codec.pack(state))
     return digest.digest()
@@ -66,7 +67,7 @@ def differing_fields(ours: str, theirs: str) -> list[str]:
     """Return one line for each field in which two shared configurations (JSON) differ."""
     try:
         left, right = _flatten(json.loads(ours)), _flatten(json.loads(theirs))
-    except ValueError:
+    except (ValueError, RecursionError):
         return ["the peer's configuration cannot be read"]
     missing = "(absent)"
     return [

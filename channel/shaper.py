@@ -15,27 +15,23 @@ from channel.words import Alphabet
 
 
 class SlotShaper:
-    """Lets each slot's symbol pass once, while the slot lasts.
+    """Lets each slot's symbol leave once, when the slot begins or while it lasts."""
 
-    `slack_ns` forgives a clock that wakes a little early; it never lets two symbols into one slot.
-    """
-
-    def __init__(self, terms: Terms, slack_ns: int = 1_000_000) -> None:
+    def __init__(self, terms: Terms) -> None:
         self._terms = terms
-        self._slack_ns = slack_ns
         self._next_slot = 0
         self.refused = 0
-        """symbols that asked for a slot already used, over, or not yet there"""
+        """symbols that asked for a slot already used, over, or more than a sample away"""
 
-    def admit(self, slot: int, now_ns: int) -> bool:
-        """Return whether the symbol of this slot may leave at flight time `now_ns`."""
+    def departure_ns(self, slot: int, now_ns: int) -> int | None:
+        """Return when the symbol of this slot, offered now, leaves; None: it does not."""
         begins = self._terms.slot_ns(slot)
         ends = self._terms.slot_ns(slot + 1)
-        if slot < self._next_slot or not begins - self._slack_ns <= now_ns < ends:
+        if slot < self._next_slot or not begins - self._terms.sample_ns <= now_ns < ends:
             self.refused += 1
-            return False
+            return None
         self._next_slot = slot + 1
-        return True
+        return max(begins, now_ns)
 
 
 class UplinkMeter:

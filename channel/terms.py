@@ -16,6 +16,11 @@ from channel.limits import CommandLimits
 Delivery = Literal["start", "end"]
 Clock = Literal["real", "virtual"]
 
+# What a command frame can hold (channel/wire.py): 16 KiB in all, its echoes counted in one byte.
+ECHO_BYTES = 10
+ECHOES_MAX = 255
+ECHOES_BYTES_MAX = 16_000
+
 
 @dataclass(frozen=True, slots=True)
 class Terms:
@@ -41,6 +46,10 @@ class Terms:
     initial_command: Vector
     """motor voltages of ticks 0 ... D - 1"""
     limits: CommandLimits
+    uplink_line_ns: int = 0
+    """on a line of finite rate: how long a symbol is on its way"""
+    downlink_line_ns: int = 0
+    """on a line of finite rate: how long a command frame is on its way"""
 
     @property
     def sample_ns(self) -> int:
@@ -62,14 +71,11 @@ class Terms:
         """Return the flight time at which a slot begins."""
         return slot * self.sample_ns // self.symbols_per_word
 
-    def slot_tick(self, slot: int) -> int:
-        """Return the first tick at or after the beginning of a slot."""
-        return -(-self.slot_ns(slot) // self.tick_ns)
-
     @property
     def lead_needed_ticks(self) -> int:
         """Return the smallest `D` with which every command can be in time on a real clock."""
         needed = self.uplink_delivery_ns + self.deadline_allowance_ns + self.downlink_budget_ns
+        needed += self.uplink_line_ns + self.downlink_line_ns
         return max(1, -(-needed // self.tick_ns))
 
     def with_shortest_lead(self, clock: Clock) -> Terms:
@@ -86,6 +92,13 @@ class Terms:
                 f"{slots_per_s:g} symbols/s, but the line carries rate_baud = {self.rate_baud:g}; "
                 "lengthen symbol_period_s or raise rate_baud"
             )
+        echo_bytes = ECHO_BYTES + 2 * len(self.initial_command) * self.ticks_per_sample
+        if (self.repeats + 1) * echo_bytes > ECHOES_BYTES_MAX or self.repeats >= ECHOES_MAX:
+            raise ValueError(
+                f"a command frame of 1 + repeats = {self.repeats + 1} echoes, {echo_bytes} bytes each, "
+                f"would be too long: at most {ECHOES_MAX} echoes and {ECHOES_BYTES_MAX} bytes; lower "
+                "repeats"
+            )
         ideal = clock == "virtual" and self.lead_ticks == 0 and self.uplink_delivery_ns == 0
         if ideal or self.lead_ticks >= self.lead_needed_ticks:
             return
@@ -93,9 +106,15 @@ class Terms:
             problem = "lead_ticks = 0 exists on the virtual clock only"
         else:
             problem = f"lead_ticks = {self.lead_ticks} is too short"
+        line = ""
+        if self.uplink_line_ns or self.downlink_line_ns:
+            line = (
+                f" + {self.uplink_line_ns / 1e6:.3g} ms for a symbol and "
+                f"{self.downlink_line_ns / 1e6:.3g} ms for a command frame on the serial line"
+            )
         raise ValueError(
             f"{problem}: uplink delivery {self.uplink_delivery_ns / 1e6:g} ms + deadline allowance "
             f"{self.deadline_allowance_ns / 1e6:g} ms + downlink budget "
-            f"{self.downlink_budget_ns / 1e6:g} ms need lead_ticks >= {self.lead_needed_ticks} "
+            f"{self.downlink_budget_ns / 1e6:g} ms{line} need lead_ticks >= {self.lead_needed_ticks} "
             f"at {self.tick_ns / 1e6:g} ms a tick"
         )

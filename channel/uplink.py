@@ -24,9 +24,11 @@ class Uplink:
 
     def offer(self, frame: Frame, now_ns: int) -> list[Delivery]:
         """Return the arrivals of a frame offered at flight time `now_ns`; none if it is refused."""
-        is_symbol = isinstance(frame, Symbol)
-        if isinstance(frame, Symbol) and not self.shaper.admit(frame.slot, now_ns):
+        leaves_ns: int | None = now_ns
+        if isinstance(frame, Symbol):
+            leaves_ns = self.shaper.departure_ns(frame.slot, now_ns)
+        if leaves_ns is None:
             return []
         data = self.wire.encode(frame)
         self.meter.count(frame, self.wire.size(data))
-        return self.line.carry(data, is_symbol, now_ns)
+        return self.line.carry(data, isinstance(frame, Symbol), leaves_ns)

@@ -20,7 +20,8 @@ from typing import NamedTuple, Protocol
 from channel.errors import FrameError
 
 MAGIC = 0xF5
-"""No wire version will ever be this, so an end on the wrong clock notices."""
+"""No wire version will ever be this, so an end on the wrong clock notices. A single byte on a serial
+line can be: no envelope is that short."""
 
 _STEP = struct.Struct("<BBIq")
 _LENGTH = struct.Struct("<H")
@@ -51,7 +52,7 @@ class Peer(Protocol):
 
 def is_envelope(data: bytes) -> bool:
     """Return whether these bytes belong to the virtual clock."""
-    return data[:1] == bytes((MAGIC,))
+    return len(data) >= _STEP.size and data[0] == MAGIC
 
 
 def encode_step(step: Step) -> bytes:

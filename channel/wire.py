@@ -36,6 +36,7 @@ from channel.frames import (
     Frame,
     Hello,
     Refuse,
+    ShortSymbol,
     Symbol,
     Unknown,
     Welcome,
@@ -145,11 +146,13 @@ def _encode_body(frame: Frame) -> tuple[int, int, int, bytes]:
             return 7, frame.session, 0, _text(frame.reason)
         case Unknown():
             return 8, frame.session, frame.epoch, b""
-        case ForeignVersion():
-            raise ValueError("a frame of another version is only ever received")
+        case ForeignVersion() | ShortSymbol():
+            raise ValueError(f"{frame} is only ever received")
 
 
 def _encode_hello(frame: Hello) -> bytes:
+    if len(frame.config_digest) != 16 or len(frame.numerics_probe) != 8:
+        raise ValueError("a greeting has a digest of 16 bytes and a probe of 8")
     body = _HELLO.pack(
         frame.incarnation,
         frame.request,
@@ -168,7 +171,13 @@ def _encode_welcome(frame: Welcome) -> bytes:
 
 
 def _encode_commands(frame: Commands) -> bytes:
+    if not frame.echoes:
+        raise ValueError("a command frame has at least one echo")
     last = frame.echoes[-1].sample
+    shape = [(last + 1 - len(frame.echoes) + index) for index in range(len(frame.echoes))]
+    volts = {len(echo.millivolts) for echo in frame.echoes}
+    if [echo.sample for echo in frame.echoes] != shape or len(volts) > 1:
+        raise ValueError("the echoes of a command frame are consecutive and equally long")
     parts = [_COMMANDS.pack(last, len(frame.echoes))]
     for echo in frame.echoes:
         parts.append(_ECHO.pack(echo.word_number, echo.digest))

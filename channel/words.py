@@ -19,6 +19,10 @@ WIRE_ERASED: Final = 0xFFFF
 """An erasure as a frame carries it; word numbers stay below."""
 
 
+SYMBOLS_MAX: Final = 256
+"""A frame has one byte for a symbol."""
+
+
 class Alphabet:
     """The symbols of a coder, and the numbering of its words on the wire.
 
@@ -27,8 +31,10 @@ class Alphabet:
     """
 
     def __init__(self, symbols: tuple[int, ...], symbols_per_word: int) -> None:
-        if len(symbols) < 2 or len(set(symbols)) != len(symbols):
-            raise ValueError(f"an alphabet needs at least two distinct symbols, got {symbols}")
+        if not 2 <= len(symbols) <= SYMBOLS_MAX or len(set(symbols)) != len(symbols):
+            raise ValueError(
+                f"an alphabet needs 2 to {SYMBOLS_MAX} distinct symbols, got {len(symbols)}"
+            )
         words = 1
         for _ in range(symbols_per_word):
             words *= len(symbols)

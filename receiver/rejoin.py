@@ -38,6 +38,9 @@ ALIVE_SYMBOLS = 3
 KEEP_CODER_SAMPLES = 10
 """After a pause longer than this the coder starts from its initial range: the plant has moved on."""
 
+VERSION_SHOWN = 40
+"""Characters of a peer's version text that are quoted back."""
+
 
 class Verdict(Enum):
     """What to do about a request."""
@@ -103,7 +106,7 @@ def difference(hello: Hello, ours: Identity) -> str | None:
             f"{hello.config_digest.hex()[:12]}, receiver {ours.config_digest.hex()[:12]}"
         )
     if hello.version != ours.version:
-        return f"versions differ: transmitter {hello.version[:64]}, receiver {ours.version}"
+        return f"versions differ: transmitter {hello.version[:VERSION_SHOWN]}, receiver {ours.version}"
     if hello.numerics_probe != ours.numerics_probe:
         return (
             "the numerics probe differs: transmitter "

@@ -25,6 +25,7 @@ from channel.frames import (
     Frame,
     Hello,
     Refuse,
+    ShortSymbol,
     Symbol,
     Unknown,
     Welcome,
@@ -41,6 +42,7 @@ from channel.words import ERASED, Word
 from receiver.controllers.base import Controller
 from receiver.records import write_commands, write_sample
 from receiver.rejoin import Greeter, Verdict, carried_to, difference
+from receiver.short_slots import SlotFinder
 
 GAP_SAMPLES_MAX = HISTORY_SAMPLES
 """A symbol this far ahead is no gap any more; after as many erasures in a row none are counted on."""
@@ -81,7 +83,8 @@ class ReceiverSession:
         self.state = codec.initial()
         self.meter = BaudMeter()
         self.counts: Counter[str] = Counter()
-        """erasures, symbols_late, stale_frames, refused_hellos, bad_commands, desyncs, rejoins"""
+        """erasures, symbols_late, symbols_misplaced, stale_frames, refused_hellos, bad_commands,
+        desyncs, rejoins"""
         self.end_reason = ""
         self.refusal: str | None = None
         self.desync: Desync | None = None
@@ -101,6 +104,7 @@ class ReceiverSession:
         """whether a symbol of this epoch has been received"""
         self._silent_slots = 0
         self._reported: tuple[int, int] | None = None
+        self._slots = SlotFinder(terms)
 
     # What arrives
 
@@ -109,7 +113,10 @@ class ReceiverSession:
         match frame:
             case Symbol():
                 return self._on_symbol(frame, now_ns)
+            case ShortSymbol():
+                return self._on_short_symbol(frame, now_ns)
             case Hello():
+                self._slots.greeted(now_ns)
                 return self._on_hello(frame)
             case Desync() if self._is_current(frame.session):
                 return self._on_desync(frame)
@@ -118,7 +125,7 @@ class ReceiverSession:
             case Bye() if self.refusal is not None and frame.session == 0:
                 self.refusal = f"{self.refusal}\n  as the transmitter sees it: {frame.reason}"
                 self._end("refused")
-            case ForeignVersion():
+            case ForeignVersion() if self.phase is Phase.WAITING:
                 self._refuse(
                     f"the transmitter speaks wire version {frame.version}, this end {WIRE_VERSION}: "
                     "install the same tenbaud on both"
@@ -275,6 +282,25 @@ class ReceiverSession:
             return [welcome]
         return []
 
+    def _on_short_symbol(self, short: ShortSymbol, now_ns: int) -> list[Frame]:
+        """Take a symbol byte of a serial line, as the symbol of this session that it can only be."""
+        if self.phase is not Phase.FLYING:
+            self.counts["stale_frames"] += 1
+            return []
+        place = self._slots.find(short, self._slot, now_ns)
+        frames: list[Frame] = []
+        if place.slot is None:
+            self.counts["symbols_misplaced"] += 1
+            self._tell(EventKind.STALE, f"a symbol of slot ...{short.slot_low} is not due: dropped")
+        elif place.in_time:
+            symbol = Symbol(self.session_number, self.epoch, place.slot, short.number)
+            frames = self._on_symbol(symbol, now_ns)
+        else:
+            self.counts["symbols_late"] += 1
+            self._tell(EventKind.LATE_SYMBOL, f"slot {place.slot} came after its deadline: dropped")
+        self._anchor = place.anchor or self._anchor
+        return frames
+
     def _settle(self, symbol: int | None, now_ns: int) -> list[Frame]:
         """Decide what this slot's symbol was; at the end of a word, fly its sample."""
         if symbol is None:
@@ -309,12 +335,26 @@ class ReceiverSession:
 
     def _decide(self, tick: int, state: Vector) -> Vector:
         """Ask the controller, limit what it wants, and return it as the wire will carry it."""
-        volts = self._controller.command(tick, state)
-        if not all(-1e6 < value < 1e6 for value in volts):
-            self.counts["bad_commands"] += 1
-            volts = self._last_command
+        volts = self._ask(tick, state)
         limited = self.terms.limits.apply(volts, self._last_command)
         self._last_command = from_millivolts(to_millivolts(limited))
+        return self._last_command
+
+    def _ask(self, tick: int, state: Vector) -> Vector:
+        """Return what the controller wants; its last command where it fails or wants nonsense."""
+        try:
+            volts = self._controller.command(tick, state)
+            if len(volts) == len(self._last_command) and all(-1e6 < value < 1e6 for value in volts):
+                return volts
+            problem = f"wants {volts}"
+        except Exception as error:  # a controller is the user's code; the flight goes on without it
+            problem = f"failed: {type(error).__name__}: {error}"
+        self.counts["bad_commands"] += 1
+        if self.counts["bad_commands"] == 1:
+            self._tell(
+                EventKind.CONTROLLER,
+                f"at tick {tick} the controller {problem}; its last command is kept",
+            )
         return self._last_command
 
     # Ends and reports

@@ -19,6 +19,7 @@ from channel.models.pitch import PitchModel, PitchParameters
 from channel.terms import Clock, Terms
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
+from tenbaud.serial_terms import on_serial_line
 
 
 @cache
@@ -125,6 +126,8 @@ def build_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:
         initial_command=config.limits.initial_volts,
         limits=build_limits(config),
     )
+    if config.link.kind == "serial":
+        terms = on_serial_line(config.link, codec, terms)
     if lead != "auto":
         return terms
     shortest = terms.with_shortest_lead(clock)

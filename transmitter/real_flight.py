@@ -114,6 +114,8 @@ class RealFlight:
             + terms.downlink_budget_ns
             + terms.deadline_allowance_ns
             + self._uplink.line.longest_delay_ns
+            + terms.uplink_line_ns
+            + terms.downlink_line_ns
         )
         until_ns = self._now_ns() + linger_ns
         copies = self._node.session.copies

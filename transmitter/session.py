@@ -36,7 +36,7 @@ from channel.lockstep import HISTORY_SAMPLES, LOCKSTEP_CHANNEL, History
 from channel.recording import NullRecorder, Recorder
 from channel.terms import Terms
 from channel.wire import WIRE_VERSION
-from channel.words import ERASED, Word
+from channel.words import ERASED
 from transmitter.copies import Confirmed, Copies
 from transmitter.records import ESTIMATE_CHANNEL, SAMPLE_CHANNEL
 from transmitter.rejoin import Asking, start_of
@@ -100,13 +100,7 @@ class TransmitterSession:
             enumerate([terms.initial_command] * terms.lead_ticks)
         )
         """commands of coming ticks"""
-        self._slots_of_offset: dict[int, list[int]] = {}
-        """for each tick of a sample at which slots begin, their places in the word"""
-        for index in range(terms.symbols_per_word):
-            self._slots_of_offset.setdefault(terms.slot_tick(index), []).append(index)
         self._tick = -1
-        self._word: Word = ERASED
-        self._word_sample = -1
 
     # What happens at a tick
 
@@ -117,9 +111,10 @@ class TransmitterSession:
     def on_measurement(self, tick: int, measurement: Vector) -> list[Frame]:
         """Take the measurement of a tick; return the frames that leave with it.
 
-        These are the symbols whose slots begin with the tick, or the request for a new epoch. A tick
-        that was never seen, because the process was held up, sent no symbol: its sample's word
-        counts as not sent, and the next sample starts afresh.
+        These are the symbols of the sample that begins with it, or the request for a new epoch. A word
+        has a slot for each of its symbols; whoever sends them holds each until its slot. A tick that
+        was never seen, because the process was held up, sent no symbol: its sample's word counts as
+        not sent, and the next sample starts afresh.
         """
         self._tick = tick
         if self.phase is Phase.REJOINING:
@@ -130,15 +125,14 @@ class TransmitterSession:
         while self.copies.next_sample < sample:
             self.counts["words_missed"] += 1
             self.copies.sent(ERASED)
-        if sample != self._word_sample:
-            self._word = ERASED
         if self.copies.lag_samples > LAG_SAMPLES_MAX:
             return self.rejoin(Why.LAG, f"no echo for {LAG_SAMPLES_MAX} samples")
-        if offset == 0 and self.copies.next_sample == sample:
-            self._word = self.codec.encode(self.copies.state_before_next(), measurement)
-            self._word_sample = sample
-            self.copies.sent(self._word)
-        return self._symbols_due(sample, offset)
+        if offset != 0 or self.copies.next_sample != sample:
+            return []
+        word = self.codec.encode(self.copies.state_before_next(), measurement)
+        self.copies.sent(word)
+        first = sample * self.terms.symbols_per_word
+        return [self._symbol(slot, symbol) for slot, symbol in enumerate(word, first)]
 
     def rejoin(self, why: Why, text: str) -> list[Frame]:
         """Stop sending symbols and ask for a new epoch; return the frames that do."""
@@ -154,13 +148,6 @@ class TransmitterSession:
             return []
         report = self.desync if self._asking.why is Why.DESYNC else None
         return [self.hello()] if report is None else [report, self.hello()]
-
-    def _symbols_due(self, sample: int, offset: int) -> list[Frame]:
-        due = self._slots_of_offset.get(offset)
-        if due is None or self._word is ERASED:
-            return []
-        first = sample * self.terms.symbols_per_word
-        return [self._symbol(first + index, self._word[index]) for index in due]
 
     def _symbol(self, slot: int, symbol: int) -> Symbol:
         number = self.codec.coder.alphabet.symbol_number(symbol)
@@ -189,7 +176,7 @@ class TransmitterSession:
                 return self._on_refuse(frame)
             case Bye() if self._has_session and frame.session == self.session_number:
                 self._end(f"the receiver ended the flight: {frame.reason}")
-            case ForeignVersion():
+            case ForeignVersion() if self.phase is Phase.GREETING:
                 self.refusal = (
                     f"the receiver speaks wire version {frame.version}, this end {WIRE_VERSION}: "
                     "install the same tenbaud on both"
@@ -220,7 +207,6 @@ class TransmitterSession:
         self.epoch = welcome.epoch
         self.heard_tick = self._tick
         self.copies.restart(state, hold)
-        self._word = ERASED
         self.epoch_tick = state.sample * self.terms.ticks_per_sample
         self._due = deque(enumerate([hold] * self.terms.lead_ticks, self.epoch_tick))
         self.phase = Phase.FLYING

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from channel.errors import LinkLost
+from channel.errors import FrameError, LinkLost
 from channel.links.base import Link
 from channel.virtual import Reply, Step, decode_reply, encode_step, is_envelope
 
@@ -36,7 +36,10 @@ class LinkPeer:
         while True:
             answer = self._link.receive(RETRY_S)
             if answer is not None and is_envelope(answer):
-                reply = decode_reply(answer)
+                try:
+                    reply = decode_reply(answer)
+                except FrameError:
+                    continue  # damaged on the way; silence repeats the step
                 if reply.number == self._number:
                     return reply
                 continue

@@ -25,6 +25,11 @@ class LinkCounts:
     bytes_in: int = 0
     dropped: Counter[str] = field(default_factory=Counter)
     """messages not taken, by reason"""
+    reconnects: int = 0
+    """times that a line which had gone came back"""
+    line_bytes_out: int = 0
+    """on lines that we frame ourselves: every byte put there, framing and notices included"""
+    line_bytes_in: int = 0
 
 
 class Link(Protocol):
@@ -32,9 +37,12 @@ class Link(Protocol):
 
     name: str
     """of the kind of link, for summaries"""
-    counts: LinkCounts
     wire: Wire
     """how frames look on this kind of line"""
+
+    @property
+    def counts(self) -> LinkCounts:
+        """Return what went over it until now."""
 
     def send(self, data: bytes, is_symbol: bool = False) -> None:
         """Put one message on the line. `is_symbol` marks the paid path of the uplink."""

@@ -25,9 +25,9 @@ def demo(
     seed: options.Seed = None,
     lead: options.Lead = None,
     delivery: options.Delivery = None,
-    link: Annotated[
-        str | None, typer.Option(help="zenoh: two processes; memory: both ends in this one.")
-    ] = None,
+    link: options.DemoLink = None,
+    line_rate: options.LineRate = None,
+    downlink: options.Downlink = None,
     rig: Annotated[
         str | None, typer.Option(help="simulated, or replay:FILE for a recorded flight.")
     ] = None,
@@ -55,7 +55,7 @@ def demo(
     replayed = rig is not None and rig.startswith("replay")
     flights: list[float | None] = list(mismatch or ())
     if not flights:
-        single = json or replayed
+        single = json or replayed or config is not None
         flights = [None] if single else list(DEFAULT_MISMATCHES)
     if preset is None and config is None and replayed:
         preset = "uiuc-10baud"
@@ -70,6 +70,8 @@ def demo(
                     lead=lead,
                     delivery=delivery,
                     link=link,
+                    line_rate=line_rate,
+                    downlink=downlink,
                     rig=rig,
                     mismatch=off,
                     disturbance=disturbance,

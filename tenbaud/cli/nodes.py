@@ -24,6 +24,10 @@ def transmit(
     listen: options.Listen = None,
     connect: options.Connect = None,
     session: options.Session = None,
+    link: options.Link = None,
+    port: options.Port = None,
+    line_rate: options.LineRate = None,
+    downlink: options.Downlink = None,
     clock: options.Clock = options.ClockOption.REAL,
     duration: options.Duration = None,
     seed: options.Seed = None,
@@ -53,6 +57,8 @@ def transmit(
     [dim]tenbaud transmit --preset tuned-10baud[/dim]
 
     [dim]tenbaud transmit --connect tcp/127.0.0.1:7447 --clock virtual --json[/dim]
+
+    [dim]tenbaud transmit --link serial --port /dev/ttyUSB0[/dim]
     """
     changed = options.overrides(
         duration=duration,
@@ -60,6 +66,10 @@ def transmit(
         lead=lead,
         delivery=delivery,
         session=session,
+        link=link,
+        port=port,
+        line_rate=line_rate,
+        downlink=downlink,
         rig=rig,
         mismatch=mismatch,
         disturbance=disturbance,
@@ -78,6 +88,10 @@ def receive(
     listen: options.Listen = None,
     connect: options.Connect = None,
     session: options.Session = None,
+    link: options.Link = None,
+    port: options.Port = None,
+    line_rate: options.LineRate = None,
+    downlink: options.Downlink = None,
     clock: options.Clock = options.ClockOption.REAL,
     lead: options.Lead = None,
     delivery: options.Delivery = None,
@@ -99,11 +113,17 @@ def receive(
     [dim]tenbaud receive --preset tuned-10baud[/dim]
 
     [dim]tenbaud receive --listen tcp/127.0.0.1:7447 --clock virtual --json[/dim]
+
+    [dim]tenbaud receive --link serial --port /dev/ttyUSB1[/dim]
     """
     changed = options.overrides(
         lead=lead,
         delivery=delivery,
         session=session,
+        link=link,
+        port=port,
+        line_rate=line_rate,
+        downlink=downlink,
         rig=rig,
         impair=impair,
         sabotage=sabotage,
@@ -137,7 +157,11 @@ def _run(
     config = load_config(preset, path, changed)
     agreement = agree(config, clock.value)
     listen, connect, insecure = addresses
-    if not listen and not connect:
+    serial = config.link.kind == "serial"
+    if serial and config.link.downlink != "zenoh":
+        if listen or connect:
+            raise typer.BadParameter("--listen and --connect are Zenoh's; a serial line has --port")
+    elif not listen and not connect:
         # Without any address both ends meet on this machine: the receiver listens.
         listen = (DEFAULT_ENDPOINT,) if role == "receiver" else ()
         connect = () if role == "receiver" else (DEFAULT_ENDPOINT,)
@@ -153,7 +177,8 @@ def _run(
     folder = RunFolder(run_folder or create_run_folder(None, f"{role}-{config.preset}", out))
     if whole:
         folder.config.write_text(dump_config(config))
-        _introduce(role, agreement.identity, config.seed, listen + connect, folder.path)
+        ports = tuple(filter(None, (config.link.port, config.link.downlink))) if serial else ()
+        _introduce(role, agreement.identity, config.seed, ports + listen + connect, folder.path)
     run_end = ends.run_transmitter if role == "transmitter" else ends.run_receiver
     mode = status if status in ("lines", "none") else "auto"
     outcome, summary = run_end(
@@ -163,9 +188,13 @@ def _run(
         mode,  # type: ignore[arg-type]
     )
     if whole:
-        from tenbaud.flight.report import write_summary
+        from tenbaud.flight.report import draw_run, figure_title, write_summary
 
         write_summary(folder, summary)
+        if role == "transmitter" and summary["samples"]:
+            problem = draw_run(folder, figure_title(config, summary))
+            if problem is not None:
+                typer.echo(problem, err=True)
     if as_json:
         ends.write_json(summary)
     elif whole and summary["samples"]:

@@ -56,7 +56,32 @@ Mismatches = Annotated[
     typer.Option(
         "--mismatch",
         help="Simulated plant off the codec's model, 0.1 for 10 %; repeatable. Not given: 0 "
-        "and 0.1, one flight each (with --json, 0 alone).",
+        "and 0.1, one flight each (one as configured with --json or --config).",
+        show_default=False,
+    ),
+]
+Link = Annotated[str | None, typer.Option(help="zenoh, or serial with --port.", show_default=False)]
+DemoLink = Annotated[
+    str | None,
+    typer.Option(
+        help="zenoh: two processes; serial: two processes and an emulated line between them; memory: "
+        "both ends in this process."
+    ),
+]
+Port = Annotated[
+    str | None,
+    typer.Option(
+        help="Serial port of this end: /dev/ttyUSB0, COM3, socket://HOST:PORT, rfc2217://HOST:PORT.",
+        show_default=False,
+    ),
+]
+LineRate = Annotated[
+    int | None, typer.Option(help="Bits per second on the serial line (115200).", show_default=False)
+]
+Downlink = Annotated[
+    str | None,
+    typer.Option(
+        help="Commands come back another way than the serial line: zenoh, or a second port.",
         show_default=False,
     ),
 ]
@@ -107,6 +132,9 @@ def overrides(
     on_desync: str | None = None,
     sabotage: str | None = None,
     sabotaged_end: str = "transmitter",
+    port: str | None = None,
+    line_rate: int | None = None,
+    downlink: str | None = None,
     settings: list[str] | None = None,
 ) -> dict[str, Any]:
     """Return the configuration that these options set, as nested sections."""
@@ -118,6 +146,9 @@ def overrides(
         ("channel.delivery", delivery),
         ("link.session", session),
         ("link.kind", link),
+        ("link.port", port),
+        ("link.line_rate_baud", line_rate),
+        ("link.downlink", downlink),
         ("transmitter.plant.mismatch", mismatch),
         ("transmitter.plant.disturbance", disturbance),
         ("link.impairments", impair),

@@ -192,12 +192,20 @@ class FlightLogSection(Section):
 class LinkSection(Section):
     """Where the other end is."""
 
-    kind: Literal["zenoh", "memory"] = "zenoh"
+    kind: Literal["zenoh", "serial", "memory"] = "zenoh"
     session: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+(/[A-Za-z0-9_.-]+)*$")] = "helicopter"
     peer_timeout_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 10.0
     """silence after which an end gives the other one up"""
+    port: str = ""
+    """serial: this end's port, /dev/ttyUSB0, COM3, socket://HOST:PORT, rfc2217://HOST:PORT"""
+    line_rate_baud: Annotated[int, Field(ge=50, le=10_000_000)] = 115_200
+    """serial: bits per second on the line, ten of them for a byte"""
+    downlink: str = ""
+    """serial: "zenoh", or a second port for the commands; empty: the same line carries them back"""
+    downlink_rate_baud: Annotated[int, Field(ge=50, le=10_000_000)] = 115_200
+    """serial: of that second port"""
     best_effort: bool = False
-    """symbols may be dropped by a congested network instead of waiting; nothing else changes"""
+    """Zenoh: a congested network may drop symbols instead of letting them wait"""
     impairments: str = ""
     """such as "loss=0.2,up:flip=0.01,delay=30ms±10ms": what goes wrong on the line, on purpose"""
 

@@ -1,4 +1,7 @@
-"""Both ends on this machine: two processes of the same command, joined by Zenoh on loopback."""
+"""Both ends on this machine: two processes of the same command.
+
+Zenoh on loopback joins them, or a serial line that this process emulates.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +10,11 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import IO
 
 from channel.errors import LinkLost
@@ -19,12 +24,12 @@ from tenbaud.build import Agreement
 from tenbaud.config.load import dump_config
 from tenbaud.flight.ends import run_in_memory
 from tenbaud.flight.outcome import ExitCode
-from tenbaud.flight.report import write_summary
+from tenbaud.flight.report import draw_run, figure_title, write_summary
 from tenbaud.flight.status import Status
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, joined
-from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RunFolder
+from tenbaud.serial_line import EmulatedLine
 
 OnStatus = Callable[[Status], None]
 ENDING_TIMEOUT_S = 15.0
@@ -50,26 +55,16 @@ def fly_demo(agreement: Agreement, folder: RunFolder, on_status: OnStatus) -> De
     else:
         result = _fly_processes(agreement, folder, on_status)
     write_summary(folder, result.summary)
-    try:
-        _draw(agreement, folder, result.summary)
-    except (RecordingError, OSError) as error:
-        result.messages.append(f"no figure was drawn: {error}")
+    problem = draw_run(folder, figure_title(agreement.config, result.summary))
+    if problem is not None:
+        result.messages.append(problem)
     return result
 
 
-def _draw(agreement: Agreement, folder: RunFolder, summary: Summary) -> None:
-    from tenbaud.recording.figure import draw_flight
-
-    config = agreement.config
-    title = f"{config.preset}: {summary.get('plant', '')}, {config.channel.rate_baud:g} bit/s"
-    draw_flight(folder.transmitter, folder.receiver, folder.figure, title)
-
-
 def _fly_processes(agreement: Agreement, folder: RunFolder, on_status: OnStatus) -> DemoResult:
-    endpoint = free_endpoint()
-    with StopFlag() as stop:
-        receiver = _Child("receiver", agreement, folder, ["--listen", endpoint], on_status)
-        transmitter = _Child("transmitter", agreement, folder, ["--connect", endpoint], on_status)
+    with StopFlag() as stop, _meeting_place(agreement) as (up, down):
+        receiver = _Child("receiver", agreement, folder, down, on_status)
+        transmitter = _Child("transmitter", agreement, folder, up, on_status)
         ends = (transmitter, receiver)
         try:
             _wait(ends, stop)
@@ -84,6 +79,34 @@ def _fly_processes(agreement: Agreement, folder: RunFolder, on_status: OnStatus)
         summary["outcome"], summary["exit_code"] = receiver.last_words(), int(code)
     messages = [end.last_words() for end in ends if end.process.returncode]
     return DemoResult(summary, code, messages)
+
+
+@contextmanager
+def _meeting_place(agreement: Agreement) -> Iterator[tuple[list[str], list[str]]]:
+    """Within the `with`, the two ends can meet: options for the transmitter and the receiver."""
+    section = agreement.config.link
+    if section.kind != "serial":
+        endpoint = free_endpoint()
+        yield ["--connect", endpoint], ["--listen", endpoint]
+        return
+    with ExitStack() as stack:
+        up = _emulated(stack, section.line_rate_baud)
+        transmitter = ["--port", str(up.transmitter_port)]
+        receiver = ["--port", str(up.receiver_port)]
+        if section.downlink == "zenoh":
+            endpoint = free_endpoint()
+            transmitter += ["--connect", endpoint]
+            receiver += ["--listen", endpoint]
+        elif section.downlink:
+            down = _emulated(stack, section.downlink_rate_baud)
+            transmitter += ["--downlink", str(down.transmitter_port)]
+            receiver += ["--downlink", str(down.receiver_port)]
+        yield transmitter, receiver
+
+
+def _emulated(stack: ExitStack, rate_baud: float) -> EmulatedLine:
+    folder = Path(stack.enter_context(TemporaryDirectory(prefix="tenbaud-line-")))
+    return stack.enter_context(EmulatedLine(folder, rate_baud))
 
 
 def _wait(ends: tuple[_Child, _Child], stop: StopFlag) -> None:

@@ -19,7 +19,7 @@ from tenbaud.flight import receive, transmit
 from tenbaud.flight.outcome import Outcome, outcome_of
 from tenbaud.flight.status import Status, StatusMode, StatusReporter
 from tenbaud.flight.stop import StopFlag
-from tenbaud.flight.summary import Summary, receiver_part, transmitter_part
+from tenbaud.flight.summary import Summary, link_part, receiver_part, transmitter_part
 from tenbaud.recording.folder import RunFolder
 from tenbaud.recording.writer import McapRecorder
 
@@ -37,7 +37,17 @@ class Endpoints:
 
 
 def open_link(agreement: Agreement, role: Role, endpoints: Endpoints) -> Link:
-    """Return an open Zenoh link for one end."""
+    """Return an open link for one end: over a serial line if it is configured so, else over Zenoh."""
+    if agreement.config.link.kind == "serial":
+        from tenbaud.serial_terms import open_serial
+
+        return open_serial(
+            agreement, role, endpoints.insecure, lambda: _zenoh(agreement, role, endpoints)
+        )
+    return _zenoh(agreement, role, endpoints)
+
+
+def _zenoh(agreement: Agreement, role: Role, endpoints: Endpoints) -> Link:
     from channel.links.zenoh import ZenohLink
 
     return ZenohLink(
@@ -60,7 +70,7 @@ def run_transmitter(
             run = transmit.prepare(agreement, recorder, link.wire)
             with StatusReporter(lambda: transmitter_status(run), status):
                 outcome = _guarded(lambda: _fly(run, link, stop))
-        summary = transmitter_part(run, outcome)
+        summary = transmitter_part(run, outcome) | link_part(link)
         return outcome, _with_recording(summary, recorder)
 
 
@@ -73,7 +83,7 @@ def run_receiver(
             endpoint = build_receiver(agreement, recorder, link.wire)
             with StatusReporter(lambda: receiver_status(agreement, endpoint), status):
                 outcome = _guarded(lambda: receive.serve(agreement, endpoint, link, stop))
-        summary = receiver_part(agreement, endpoint, outcome)
+        summary = receiver_part(agreement, endpoint, outcome) | link_part(link)
         return outcome, _with_recording(summary, recorder)
 
 

@@ -6,7 +6,9 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
+from tenbaud.config.schema import FlightConfig
 from tenbaud.flight.summary import Summary
+from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RunFolder
 
 ROWS: tuple[tuple[str, str, str], ...] = (
@@ -19,6 +21,9 @@ ROWS: tuple[tuple[str, str, str], ...] = (
     ("baud: measured by the receiver", "baud_measured", "{:.3f}"),
     ("wire bytes up / down", "wire_bytes", "{}"),
     ("erasures / late symbols", "lost", "{}"),
+    ("bytes on the serial line up / down", "line_bytes", "{}"),
+    ("dropped by the link", "link_dropped", "{}"),
+    ("reconnects", "reconnects", "{}"),
     ("digest checks", "digest_checks", "{}"),
     ("desyncs", "desyncs", "{}"),
     ("rejoins, and what they cost", "rejoins", "{}"),
@@ -44,6 +49,23 @@ def write_summary(folder: RunFolder, summary: Summary) -> None:
         import typer
 
         typer.echo(f"tenbaud: {folder.summary} could not be written: {error.strerror}", err=True)
+
+
+def draw_run(folder: RunFolder, title: str) -> str | None:
+    """Draw the figure of a run from the recordings that are there; return what went wrong, if so."""
+    from tenbaud.recording.figure import draw_flight
+
+    receiver = folder.receiver if folder.receiver.is_file() else None
+    try:
+        draw_flight(folder.transmitter, receiver, folder.figure, title)
+    except (RecordingError, OSError) as error:
+        return f"no figure was drawn: {error}"
+    return None
+
+
+def figure_title(config: FlightConfig, summary: Summary) -> str:
+    """Return what stands over a flight's figure."""
+    return f"{config.preset}: {summary.get('plant', '')}, {config.channel.rate_baud:g} bit/s"
 
 
 def show_summary(summary: Summary, folder: RunFolder) -> None:
@@ -93,6 +115,13 @@ def _value(summary: Summary, name: str) -> Any:
             ways = [get("impaired_up") or {}, get("impaired_down") or {}]
             told = [", ".join(f"{count} {what}" for what, count in way.items()) for way in ways]
             return " / ".join(text or "-" for text in told) if any(told) else None
+        case "line_bytes":
+            up, down = get("line_bytes_out"), get("line_bytes_in")
+            return f"{up} / {down}" if up else None
+        case "link_dropped":
+            return ", ".join(f"{kind} {n}" for kind, n in (get("link_dropped") or {}).items()) or None
+        case "reconnects":
+            return get("reconnects") or None
         case "error_coded" | "error_live":
             largest, rms = get(f"{name}_max_fraction"), get(f"{name}_rms_fraction")
             if largest is None or rms is None:

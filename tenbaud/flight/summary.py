@@ -7,6 +7,7 @@ from typing import Any
 
 from channel.impairments import ImpairedLine
 from channel.line import Line
+from channel.links.base import Link
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build import Agreement
 from tenbaud.flight.outcome import Outcome
@@ -68,6 +69,7 @@ def receiver_part(agreement: Agreement, endpoint: ReceiverEndpoint, outcome: Out
         "wire_bytes_down": endpoint.wire_bytes_down,
         "erasures": session.counts["erasures"],
         "symbols_late": session.counts["symbols_late"],
+        "symbols_misplaced": session.counts["symbols_misplaced"],
         "stale_frames": session.counts["stale_frames"],
         "bad_commands": session.counts["bad_commands"],
         "malformed": endpoint.malformed,
@@ -76,10 +78,28 @@ def receiver_part(agreement: Agreement, endpoint: ReceiverEndpoint, outcome: Out
     }
 
 
+def link_part(link: Link) -> Summary:
+    """Return what an end's link saw of its line: what it dropped and why, and its own bytes if any."""
+    counts = link.counts
+    return {
+        "link_dropped": dict(counts.dropped),
+        "reconnects": counts.reconnects,
+        "line_bytes_out": counts.line_bytes_out,
+        "line_bytes_in": counts.line_bytes_in,
+    }
+
+
 def joined(transmitter: Summary, receiver: Summary) -> Summary:
     """Return one summary: the transmitter's figures, and those that only the receiver has."""
-    own = ("baud_measured", "symbols_late", "stale_frames", "bad_commands")
-    return {**transmitter, **{name: receiver.get(name) for name in own}}
+    own = ("baud_measured", "symbols_late", "symbols_misplaced", "stale_frames", "bad_commands")
+    dropped = {**transmitter.get("link_dropped", {})}
+    for kind, count in receiver.get("link_dropped", {}).items():
+        dropped[kind] = dropped.get(kind, 0) + count
+    both = {
+        "link_dropped": dropped,
+        "reconnects": transmitter.get("reconnects", 0) + receiver.get("reconnects", 0),
+    }
+    return {**transmitter, **both, **{name: receiver.get(name) for name in own}}
 
 
 def impaired(line: Line) -> dict[str, int]:

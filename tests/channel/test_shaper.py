@@ -21,41 +21,50 @@ HELLO = Hello(1, "1.0", bytes(16), bytes(8))
 def test_when_symbols_come_in_their_slots_then_each_passes_once() -> None:
     shaper = SlotShaper(terms())
     for slot in range(50):
-        assert shaper.admit(slot, slot * 100 * MS)
-        assert not shaper.admit(slot, slot * 100 * MS + 1)
+        assert shaper.departure_ns(slot, slot * 100 * MS + 3) == slot * 100 * MS + 3
+        assert shaper.departure_ns(slot, slot * 100 * MS + 4) is None
     assert shaper.refused == 50
 
 
-def test_when_a_symbol_comes_before_its_slot_then_only_the_slack_is_forgiven() -> None:
-    shaper = SlotShaper(terms(), slack_ns=1 * MS)
-    assert not shaper.admit(1, 99 * MS - 1)
-    assert shaper.admit(1, 99 * MS)
+def test_when_a_symbol_comes_before_its_slot_then_it_waits_for_it() -> None:
+    shaper = SlotShaper(terms())
+    assert shaper.departure_ns(1, 99 * MS) == 100 * MS
+    assert shaper.departure_ns(2, 100 * MS) == 200 * MS
+
+
+def test_when_a_symbol_comes_more_than_a_sample_ahead_then_it_is_refused() -> None:
+    shaper = SlotShaper(terms())
+    assert shaper.departure_ns(2, 100 * MS - 1) is None
+    assert shaper.refused == 1
 
 
 def test_when_a_symbol_comes_after_its_slot_then_it_is_refused() -> None:
     shaper = SlotShaper(terms())
-    assert not shaper.admit(1, 200 * MS)
-    assert shaper.admit(2, 300 * MS - 1)
+    assert shaper.departure_ns(1, 200 * MS) is None
+    assert shaper.departure_ns(2, 300 * MS - 1) == 300 * MS - 1
     assert shaper.refused == 1
 
 
 def test_when_symbols_were_held_up_then_they_do_not_leave_in_a_burst() -> None:
     shaper = SlotShaper(terms())
-    passed = [slot for slot in range(20) if shaper.admit(slot, 1050 * MS)]
-    assert passed == [10]
-    assert shaper.refused == 19
+    leaves = [shaper.departure_ns(slot, 1050 * MS) for slot in range(20)]
+    assert leaves == [None] * 10 + [1050 * MS, 1100 * MS] + [None] * 8
+    assert shaper.refused == 18
 
 
-def test_when_a_slot_has_passed_then_an_earlier_one_never_does() -> None:
-    shaper = SlotShaper(terms(), slack_ns=150 * MS)
-    assert shaper.admit(2, 190 * MS)
-    assert not shaper.admit(1, 190 * MS)
+def test_when_a_slot_has_been_used_then_an_earlier_one_never_is() -> None:
+    shaper = SlotShaper(terms())
+    assert shaper.departure_ns(2, 190 * MS) == 200 * MS
+    assert shaper.departure_ns(1, 190 * MS) is None
 
 
-def test_when_slots_do_not_fit_ticks_then_symbols_sent_at_ticks_pass() -> None:
-    some = terms(ticks_per_sample=5, symbols_per_word=2)
+@pytest.mark.parametrize(("ticks", "symbols"), [(5, 2), (1, 10), (7, 3)])
+def test_when_a_word_is_offered_whole_then_its_symbols_leave_evenly(ticks: int, symbols: int) -> None:
+    some = terms(ticks_per_sample=ticks, symbols_per_word=symbols)
     shaper = SlotShaper(some)
-    assert all(shaper.admit(slot, some.slot_tick(slot) * some.tick_ns) for slot in range(100))
+    for sample in range(20):
+        for slot in range(sample * symbols, (sample + 1) * symbols):
+            assert shaper.departure_ns(slot, sample * some.sample_ns) == some.slot_ns(slot)
 
 
 def test_when_frames_are_metered_then_only_symbols_are_coder_bits() -> None:
@@ -87,7 +96,7 @@ def test_when_two_symbols_come_at_once_then_no_rate_is_made_up() -> None:
 
 def test_when_a_symbol_is_offered_out_of_its_slot_then_nothing_leaves_and_nothing_is_paid() -> None:
     uplink = Uplink(SlotShaper(terms()), Line(3, 1), UplinkMeter(Alphabet((-1, 1), 1)))
-    assert uplink.offer(Symbol(1, 0, 1, 0), 0) == []
+    assert uplink.offer(Symbol(1, 0, 2, 0), 0) == []
     assert uplink.meter.wire_bytes == 0
     assert uplink.shaper.refused == 1
 

@@ -129,11 +129,6 @@ def test_when_values_fit_no_frame_then_encoding_refuses(frame: Frame) -> None:
         wire.encode(frame)
 
 
-@pytest.mark.xfail(
-    strict=True,
-    raises=(IndexError, pytest.fail.Exception),
-    reason="encode does not look at what the ids name",
-)
 @pytest.mark.parametrize(
     "frame",
     [

@@ -15,6 +15,7 @@ from channel.errors import LinkError
 from channel.links.base import Link
 from channel.links.endpoints import free_endpoint
 from channel.links.memory import memory_pair
+from tests.contract.serial_pairs import make_serial, make_split
 
 PATIENCE_S = 10.0
 """How long anything may take before a test fails; none of them waits that long when all is well."""
@@ -37,7 +38,12 @@ def make_zenoh(stack: ExitStack) -> Pair:
     return transmitter, receiver
 
 
-MAKERS: dict[str, Callable[[ExitStack], Pair]] = {"memory": make_memory, "zenoh": make_zenoh}
+MAKERS: dict[str, Callable[[ExitStack], Pair]] = {
+    "memory": make_memory,
+    "zenoh": make_zenoh,
+    "serial": make_serial,
+    "split": make_split,
+}
 
 
 def until(condition: Callable[[], bool]) -> bool:

@@ -12,6 +12,7 @@ from channel.line import Line
 from channel.shaper import SlotShaper, UplinkMeter
 from channel.terms import Terms
 from channel.uplink import Uplink
+from channel.wire import DATAGRAM, Wire
 from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters, PitchPlant
 from plant_sim.plant import Plant
@@ -78,6 +79,7 @@ def assemble(
     safe_volts: Vector = (0.0, 0.0),
     counts_per_turn: int = COUNTS_PER_TURN,
     stop_on_desync: bool = False,
+    wire: Wire = DATAGRAM,
 ) -> Flight:
     """Join the two ends; `receiver_codec` is for a receiver that computes otherwise."""
     identity = identity_of(codec)
@@ -103,8 +105,9 @@ def assemble(
         SlotShaper(flight_terms),
         uplink_line or Line(flight_terms.symbol_delay_ns),
         UplinkMeter(codec.coder.alphabet),
+        wire,
     )
-    endpoint = ReceiverEndpoint(receiver)
+    endpoint = ReceiverEndpoint(receiver, wire)
     virtual = VirtualFlight(node, uplink, downlink_line or Line(), endpoint)
     return Flight(transmitter, receiver, node, virtual, endpoint, sent, received)
 
@@ -119,6 +122,7 @@ def pitch_flight(
     receiver_codec: Codec | None = None,
     window_start_s: float = 25.0,
     stop_on_desync: bool = False,
+    wire: Wire = DATAGRAM,
     **term_changes: Any,
 ) -> Flight:
     """Return the paper's flight: its plant (off by `mismatch`), its PID law, its square wave."""
@@ -137,6 +141,7 @@ def pitch_flight(
         downlink_line=downlink_line,
         window_start_tick=round(window_start_s / TICK_S),
         stop_on_desync=stop_on_desync,
+        wire=wire,
     )
 
 

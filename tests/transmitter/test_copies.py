@@ -107,6 +107,27 @@ def test_when_unknown_commands_were_guessed_wrong_then_the_echo_replaces_them() 
         assert pair.state_before_next() == truth[sample + 1] == pair.confirmed
 
 
+@pytest.mark.parametrize("lead", [0, 3, 5, 8, 20])
+@pytest.mark.parametrize("lag", [1, 2, 3, 5])
+def test_when_some_commands_are_known_then_only_the_others_are_guessed(lead: int, lag: int) -> None:
+    pair, sent = copies(lead), words()
+    # Each command lasts for some samples, so that guesses are right now and then.
+    echoed = [[((sample // 3) % 5 / 2.0, 0.5)] * 5 for sample in range(SAMPLES)]
+    known = [(0.0, 0.0)] * lead
+    last: Vector = (0.0, 0.0)
+    for sample in range(SAMPLES):
+        assumed = known + [last] * (5 * sample + 5)
+        state = CODEC.initial()
+        for index in range(sample):
+            state = CODEC.step(state, sent[index], assumed[5 * index : 5 * index + 5])
+        assert pair.state_before_next() == state
+        pair.sent(sent[sample])
+        if sample >= lag:
+            pair.confirm(sent[sample - lag], echoed[sample - lag], 0)
+            known += echoed[sample - lag]
+            last = known[-1]
+
+
 def test_when_the_confirmed_copy_moves_then_what_was_sent_has_no_part_in_it() -> None:
     honest, wrong = copies(10), copies(10)
     sent, echoed = words(), commands()

@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from channel.codec import CodecState, Vector
+from channel.codec import Codec, CodecState, Vector
+from channel.coders.zoom import ZoomCoder
 from channel.events import EventKind
 from channel.frames import (
     Bye,
@@ -24,6 +25,7 @@ from channel.frames import (
 )
 from channel.words import ERASED, WIRE_ERASED, Word
 from tests.channel.parts import identity_of, pitch_codec, terms
+from tests.channel.two_axes import TWO_AXES_ZOOM, TwoAxes
 from transmitter.session import LAG_SAMPLES_MAX, Phase, TransmitterSession
 
 CODEC = pitch_codec()
@@ -125,9 +127,6 @@ def test_when_the_receiver_speaks_another_wire_version_then_both_are_named() -> 
     assert "wire version 9, this end 1" in str(session.refusal)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="a frame of another version in flight sets a refusal of a session that flies"
-)
 def test_when_a_frame_of_another_version_comes_in_flight_then_it_is_no_refusal() -> None:
     session = flying()
     session.on_frame(ForeignVersion(9))
@@ -163,7 +162,35 @@ def test_when_ticks_were_missed_then_their_samples_send_nothing_and_nothing_is_m
     assert session.copies.lag_samples == 5
 
 
-def test_when_echoes_stay_away_then_slots_do_not_wait_until_the_a_rejoin_is_asked_for() -> None:
+def two_axes() -> TransmitterSession:
+    """Return a session whose words have two symbols."""
+    codec = Codec(TwoAxes(0.01), ZoomCoder(TWO_AXES_ZOOM), 10)
+    session = TransmitterSession(codec, terms(symbols_per_word=2), IDENTITY, INCARNATION)
+    session.on_frame(Welcome(SESSION, 0, 0, INCARNATION))
+    return session
+
+
+def test_when_a_word_has_two_symbols_then_both_are_given_with_their_slots() -> None:
+    session = two_axes()
+    left = {}
+    for tick in range(20):
+        # Only the measurement of the first tick counts.
+        angles = (0.5, -0.5) if tick == 0 else (-0.5, 0.5) if tick == 10 else (9.0, 9.0)
+        symbols = session.on_measurement(tick, angles)
+        if symbols:
+            left[tick] = [(symbol.slot, symbol.number) for symbol in symbols]
+    assert left == {0: [(0, 1), (1, 0)], 10: [(2, 0), (3, 1)]}
+
+
+def test_when_the_first_tick_of_a_word_was_missed_then_none_of_its_symbols_leaves() -> None:
+    session = two_axes()
+    assert len(session.on_measurement(0, (0.5, 0.5))) == 2
+    assert session.on_measurement(15, (0.5, 0.5)) == []
+    assert [symbol.slot for symbol in session.on_measurement(20, (0.5, 0.5))] == [4, 5]
+    assert session.counts["words_missed"] == 1
+
+
+def test_when_echoes_stay_away_then_slots_do_not_wait_until_a_rejoin_is_asked_for() -> None:
     session = flying(lead_ticks=13)
     sent = [symbol for tick in range(640) for symbol in session.on_measurement(tick, (1.0,))]
     assert [symbol.slot for symbol in sent] == list(range(64))

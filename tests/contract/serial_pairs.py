@@ -1,0 +1,40 @@
+"""Pairs of links whose line, or one direction of it, is serial."""
+
+from __future__ import annotations
+
+import tempfile
+from contextlib import ExitStack
+from pathlib import Path
+
+from channel.links.base import Link
+from channel.links.memory import memory_pair
+from channel.links.serial import SerialLink
+from channel.links.split import SplitLink
+from channel.serial_wire import SerialWire
+from tenbaud.serial_line import EmulatedLine
+
+FAST_BAUD = 4_000_000
+"""The links believe in such a line; the emulated one passes bytes on as fast as it goes."""
+
+
+def make_serial(stack: ExitStack) -> tuple[Link, Link]:
+    folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+    line = stack.enter_context(EmulatedLine(folder, None))
+    wire = SerialWire(2)
+    transmitter = stack.enter_context(
+        SerialLink("transmitter", str(line.transmitter_port), wire, line_rate_baud=FAST_BAUD)
+    )
+    receiver = stack.enter_context(
+        SerialLink("receiver", str(line.receiver_port), wire, line_rate_baud=FAST_BAUD)
+    )
+    return transmitter, receiver
+
+
+def make_split(stack: ExitStack) -> tuple[Link, Link]:
+    """Serial up, memory down."""
+    up = make_serial(stack)
+    down = memory_pair()
+    return (
+        stack.enter_context(SplitLink("transmitter", up[0], down[0])),
+        stack.enter_context(SplitLink("receiver", up[1], down[1])),
+    )

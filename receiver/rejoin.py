@@ -15,14 +15,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from enum import Enum, auto
 from itertools import chain, repeat
 
 from channel.codec import Codec, CodecState, Vector
 from channel.errors import CodecDiverged
-from channel.frames import Hello, Welcome
+from channel.frames import Desync, Hello, Welcome
 from channel.identity import Identity
-from channel.lockstep import HISTORY_SAMPLES
+from channel.lockstep import HISTORY_SAMPLES, History
+from channel.terms import Terms
 from channel.words import ERASED
 
 ANSWER_AGE_SAMPLES_MAX = 4
@@ -114,6 +116,23 @@ def difference(hello: Hello, ours: Identity) -> str | None:
             "two machines do not compute alike, so their codecs would drift apart"
         )
     return None
+
+
+def first_sample(hello: Hello, own: int, terms: Terms, begun: bool) -> int:
+    """Return where a session or an epoch begins; `own` is this end's next sample.
+
+    At the very start of both there is no line to wait for: tick 0 has not come yet.
+    """
+    if not begun and hello.sample == 0:
+        return own
+    margin = -(-terms.lead_ticks // terms.ticks_per_sample)
+    return max(own, hello.sample + margin)
+
+
+def desync_answer(theirs: Desync, history: History, codec: Codec) -> Desync:
+    """Return the answer to the report of a lockstep failure: the same, with this end's state."""
+    own = history.state_after(theirs.sample)
+    return replace(theirs, state=b"" if own is None else codec.pack(own))
 
 
 def carried_to(

@@ -41,7 +41,7 @@ from channel.wire import WIRE_VERSION
 from channel.words import ERASED, Word
 from receiver.controllers.base import Controller
 from receiver.records import write_commands, write_sample
-from receiver.rejoin import Greeter, Verdict, carried_to, difference
+from receiver.rejoin import Greeter, Verdict, carried_to, desync_answer, difference, first_sample
 from receiver.short_slots import SlotFinder
 
 GAP_SAMPLES_MAX = HISTORY_SAMPLES
@@ -116,8 +116,9 @@ class ReceiverSession:
             case ShortSymbol():
                 return self._on_short_symbol(frame, now_ns)
             case Hello():
+                answer = self._on_hello(frame)
                 self._slots.greeted(now_ns)
-                return self._on_hello(frame)
+                return answer
             case Desync() if self._is_current(frame.session):
                 return self._on_desync(frame)
             case Bye() if self._is_current(frame.session):
@@ -172,22 +173,19 @@ class ReceiverSession:
         if self.phase is Phase.ENDED:
             return [Refuse(hello.incarnation, f"this receiver has ended: {self.end_reason}", "")]
         verdict = self._greeter.judge(hello, self.identity, self._advanced, self._silent_slots)
+        if verdict is Verdict.REPEAT and self._greeter.welcome is not None:
+            return [self._greeter.welcome]
+        if verdict is Verdict.BEGIN:
+            return self._begin(hello)
+        self.counts["refused_hellos"] += 1
         match verdict:
-            case Verdict.REPEAT if self._greeter.welcome is not None:
-                return [self._greeter.welcome]
-            case Verdict.BEGIN:
-                return self._begin(hello)
             case Verdict.BUSY:
-                self.counts["refused_hellos"] += 1
                 return [Refuse(hello.incarnation, "this receiver is flying with another", "")]
             case Verdict.REFUSE:
-                self.counts["refused_hellos"] += 1
                 problem = difference(hello, self.identity) or ""
                 self._refuse(problem)
                 return [Refuse(hello.incarnation, problem, self.identity.config)]
-            case _:
-                self.counts["refused_hellos"] += 1
-                return []
+        return []
 
     def _begin(self, hello: Hello) -> list[Frame]:
         """Begin a session, or a new epoch of it; return the answer."""
@@ -195,9 +193,11 @@ class ReceiverSession:
         state = b""
         hold = self.terms.initial_command
         own = self.state.sample + (1 if self._word else 0)
-        begun = last is not None or hello.sample > 0
-        margin = -(-self.terms.lead_ticks // self.terms.ticks_per_sample) if begun else 0
-        first = max(own, hello.sample + margin)
+        first = first_sample(hello, own, self.terms, begun=last is not None)
+        count = self.terms.symbols_per_word
+        if last is None or hello.incarnation != last.incarnation:
+            ahead = first - hello.sample if hello.sample else 0
+            self._slots.begin(first * count, ahead * count)
         if last is None:
             self.phase = Phase.FLYING
             self.refusal = None
@@ -217,7 +217,7 @@ class ReceiverSession:
             else:
                 # A rig that was started again is at rest, and so is what is known of it.
                 self.state = self.codec.initial()._replace(sample=first)
-        self._slot = first * self.terms.symbols_per_word
+        self._slot = first * count
         self._word = []
         self._anchor = None
         self._advanced = False
@@ -361,15 +361,7 @@ class ReceiverSession:
 
     def _on_desync(self, theirs: Desync) -> list[Frame]:
         """Write a failure down and answer with this end's state; the request that follows rejoins."""
-        own = self.history.state_after(theirs.sample)
-        answer = Desync(
-            theirs.session,
-            theirs.epoch,
-            theirs.sample,
-            theirs.transmitter_digest,
-            theirs.receiver_digest,
-            b"" if own is None else self.codec.pack(own),
-        )
+        answer = desync_answer(theirs, self.history, self.codec)
         if self._reported == (theirs.epoch, theirs.sample):
             return [answer]
         self._reported = (theirs.epoch, theirs.sample)

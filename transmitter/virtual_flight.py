@@ -23,7 +23,7 @@ from transmitter.node import STOPPED, TransmitterNode
 from transmitter.session import Phase
 
 GREETINGS_MAX = 1000
-"""Requests for a session, one per sample period of virtual time, before the line is given up."""
+"""Requests for a session before the line is given up."""
 
 
 class _Arrival(NamedTuple):
@@ -51,14 +51,17 @@ class VirtualFlight:
         self.malformed = 0
 
     def greet(self) -> None:
-        """Carry the handshake out; the session then flies or holds a refusal, or nobody answered."""
+        """Carry the handshake out; the session then flies or holds a refusal, or nobody answered.
+
+        It takes place before the flight's time begins, however long the line takes.
+        """
         session = self._node.session
-        period_ns = session.terms.sample_ns
-        for attempt in range(-GREETINGS_MAX, 0):
+        for _ in range(GREETINGS_MAX):
+            self._offer([session.hello()], 0)
+            while self._arrivals:
+                self._pass_to(self._arrivals[0].time_ns)
             if session.phase is not Phase.GREETING or session.refusal is not None:
                 return
-            self._offer([session.hello()], attempt * period_ns)
-            self._pass_to((attempt + 1) * period_ns - 1)
 
     def run(self, ticks: int, should_stop: Callable[[], bool] = lambda: False) -> int:
         """Fly so many ticks, or until the end of the rig or the safe voltage; return the tick reached.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
@@ -28,9 +28,7 @@ def demo(
     link: options.DemoLink = None,
     line_rate: options.LineRate = None,
     downlink: options.Downlink = None,
-    rig: Annotated[
-        str | None, typer.Option(help="simulated, or replay:FILE for a recorded flight.")
-    ] = None,
+    rig: options.Rig = None,
     mismatch: options.Mismatches = None,
     disturbance: options.Disturbance = None,
     impair: options.Impair = None,

@@ -85,6 +85,7 @@ Downlink = Annotated[
         show_default=False,
     ),
 ]
+Rig = Annotated[str | None, typer.Option(help="simulated, or replay:FILE for a recorded flight.")]
 Disturbance = Annotated[
     str | None, typer.Option(help='Torque on the plant, such as "q=2e-3,step=0.5@30".')
 ]

@@ -135,7 +135,7 @@ def test_when_the_kind_is_unknown_then_it_is_named(kind: int) -> None:
     [
         (7, b"\x0a\x00abc", "truncated text: 3 of 10 bytes"),
         (7, b"\x02\x00abc", "1 bytes too many"),
-        (1, bytes(28) + b"\x05\x00ab", "truncated text"),
+        (1, bytes(37) + b"\x05\x00ab", "truncated text"),
         (3, bytes(4) + b"\x01\x00a" + b"\xff\xff", "truncated text"),
         (3, bytes(4) + b"\x01\x00a" + b"\x00\x00" + b"x", "1 bytes too many"),
         (5, bytes(5), "malformed commands: 0 echoes"),

@@ -27,9 +27,9 @@ def serve(agreement: Agreement, endpoint: ReceiverEndpoint, link: Link, should_s
             # There the transmitter's process holds both directions of the line.
             serve_virtual(endpoint, link, timeout_s, should_stop)
         else:
-            line = build_line(agreement, "down", link.wire)
+            endpoint.downlink = build_line(agreement, "down", link.wire)
             clock = SkewedClock(agreement.faults, time.monotonic_ns())
-            serve_real(endpoint, link, timeout_s, should_stop, line, clock)
+            serve_real(endpoint, link, timeout_s, should_stop, endpoint.downlink, clock)
     finally:
         if agreement.clock == "real" and session.phase is Phase.FLYING:
             for message in endpoint.bye(STOPPED if should_stop() else "the receiver failed"):

@@ -75,6 +75,7 @@ def receiver_part(agreement: Agreement, endpoint: ReceiverEndpoint, outcome: Out
         "malformed": endpoint.malformed,
         "desyncs": session.counts["desyncs"],
         "rejoins": session.counts["rejoins"],
+        "impaired_down": impaired(endpoint.downlink),
     }
 
 
@@ -99,6 +100,8 @@ def joined(transmitter: Summary, receiver: Summary) -> Summary:
         "link_dropped": dropped,
         "reconnects": transmitter.get("reconnects", 0) + receiver.get("reconnects", 0),
     }
+    if receiver.get("impaired_down"):
+        both["impaired_down"] = receiver["impaired_down"]
     return {**transmitter, **both, **{name: receiver.get(name) for name in own}}
 
 

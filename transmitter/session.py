@@ -122,11 +122,11 @@ class TransmitterSession:
         if self.phase is not Phase.FLYING:
             return []
         sample, offset = divmod(tick, self.terms.ticks_per_sample)
+        if sample - self.copies.confirmed.sample > LAG_SAMPLES_MAX:
+            return self.rejoin(Why.LAG, f"no echo for {LAG_SAMPLES_MAX} samples")
         while self.copies.next_sample < sample:
             self.counts["words_missed"] += 1
             self.copies.sent(ERASED)
-        if self.copies.lag_samples > LAG_SAMPLES_MAX:
-            return self.rejoin(Why.LAG, f"no echo for {LAG_SAMPLES_MAX} samples")
         if offset != 0 or self.copies.next_sample != sample:
             return []
         word = self.codec.encode(self.copies.state_before_next(), measurement)

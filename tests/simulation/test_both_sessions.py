@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
 from channel.frames import Frame, Symbol
+from channel.lockstep import HISTORY_SAMPLES
 from receiver.session import Phase as ReceiverPhase
 from receiver.session import ReceiverSession
 from tests.channel.parts import (
@@ -147,7 +148,7 @@ class BothSessions(RuleBasedStateMachine):
 
     @invariant()
     def history_is_bounded(self) -> None:
-        assert self.transmitter.copies.lag_samples <= 64 + 71
+        assert self.transmitter.copies.lag_samples <= HISTORY_SAMPLES + 1
 
     @invariant()
     def nobody_ends(self) -> None:

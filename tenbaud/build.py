@@ -9,14 +9,13 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from channel.codec import Codec
-from channel.coders.zoom import ZoomCoder, ZoomParameters
 from channel.errors import TenbaudError
 from channel.flight_log import FlightColumns, FlightLog
 from channel.identity import Identity, numerics_probe
 from channel.impairments import LineFaults, parse_impairments
 from channel.limits import CommandLimits
-from channel.models.pitch import PitchModel, PitchParameters
 from channel.terms import Clock, Terms
+from tenbaud.build_codec import build_codec
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
 from tenbaud.serial_terms import on_serial_line
@@ -87,27 +86,6 @@ def agree(config: FlightConfig, clock: Clock) -> Agreement:
     shared = config.shared_json(terms.lead_ticks)
     identity = Identity(software_version(), shared, numerics_probe(codec))
     return Agreement(config, clock, codec, terms, identity)
-
-
-def build_codec(config: FlightConfig) -> Codec:
-    """Return the codec: pitch model and zoom coder."""
-    ticks = round(config.timing.symbol_period_s / config.timing.tick_s)
-    model = PitchModel(model_parameters(config), config.timing.tick_s)
-    coder = config.coder
-    parameters = ZoomParameters(
-        initial_range=coder.initial_range_rad,
-        minimum_range=coder.minimum_range_rad,
-        decay=coder.decay,
-        window=coder.window_signs,
-        gains=tuple((gain,) for gain in coder.gains),
-        impulse=coder.correction == "impulse",
-    )
-    return Codec(model, ZoomCoder(parameters), ticks)
-
-
-def model_parameters(config: FlightConfig) -> PitchParameters:
-    """Return the parameters of the codec's model."""
-    return PitchParameters(**config.model.model_dump(exclude={"kind"}))
 
 
 def build_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:

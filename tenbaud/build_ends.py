@@ -24,7 +24,7 @@ from receiver.references import Constant, Csv, Reference, Sine, Square, Step
 from receiver.session import ReceiverSession
 from tenbaud.build import Agreement, read_flight_log, ticks_of
 from tenbaud.config.load import ConfigError
-from tenbaud.config.schema import FlightConfig
+from tenbaud.config.schema import FlightConfig, PitchModelSection
 from transmitter.guard import Guard, GuardSettings
 from transmitter.node import TransmitterNode
 from transmitter.rigs.base import Rig
@@ -116,9 +116,7 @@ def build_rig(config: FlightConfig) -> Rig:
     if section.rig == "replay":
         return ReplayRig(read_flight_log(config), (encoder,))
     tick_s = config.timing.tick_s
-    nominal = PitchParameters(
-        **config.model.model_dump(exclude={"kind"}), volts_max=config.limits.volts_max
-    )
+    nominal = nominal_plant(config)
     disturbance = None
     if section.plant.disturbance:
         try:
@@ -132,6 +130,13 @@ def build_rig(config: FlightConfig) -> Rig:
         initial_angle_rad=section.plant.initial_angle_rad,
     )
     return SimulatedRig(plant, (encoder,), section.safe_volts)
+
+
+def nominal_plant(config: FlightConfig) -> PitchParameters:
+    """Return the plant that the codec's model describes, or that stands in where it has none."""
+    model = config.model
+    section = model if isinstance(model, PitchModelSection) else config.transmitter.plant.pitch
+    return PitchParameters(**section.model_dump(exclude={"kind"}), volts_max=config.limits.volts_max)
 
 
 def build_guard(agreement: Agreement) -> Guard:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tenbaud.cli import demo, nodes, runs
+from tenbaud.cli import demo, figures, identify, nodes, runs
 from tenbaud.flight.outcome import ExitCode, outcome_of
 
 app = typer.Typer(
@@ -44,6 +44,8 @@ def _root(
 app.command()(demo.demo)
 app.command()(nodes.transmit)
 app.command()(nodes.receive)
+app.command()(identify.identify)
+app.command()(figures.figures)
 app.command()(runs.inspect)
 app.command()(runs.diff)
 app.command()(runs.presets)

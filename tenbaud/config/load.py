@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from channel.errors import TenbaudError
-from tenbaud.config.schema import FlightConfig
+from tenbaud.config.schema import KINDS, FlightConfig
 
 DEFAULT_PRESET = "paper-10baud"
 
@@ -80,11 +80,21 @@ def _merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
     merged = dict(base)
     for key, value in over.items():
         below = merged.get(key)
-        if isinstance(value, dict) and isinstance(below, dict):
+        if _other_kind(key, below, value):
+            merged[key] = value
+        elif isinstance(value, dict) and isinstance(below, dict):
             merged[key] = _merge(below, value)
         else:
             merged[key] = value
     return merged
+
+
+def _other_kind(key: str, below: Any, over: Any) -> bool:
+    """Return whether a section changes its kind, so that fields of the old one mean nothing."""
+    if key not in KINDS or not isinstance(below, dict) or not isinstance(over, dict):
+        return False
+    default = next(iter(KINDS[key]))
+    return "kind" in over and over["kind"] != below.get("kind", default)
 
 
 def _describe_all(source: str, error: ValidationError) -> str:
@@ -101,18 +111,26 @@ def _describe(detail: ErrorDetails) -> tuple[str, str]:
     # The names of a union's branches ("int", "literal['auto']") are no part of the field's name.
     branches = ("literal[", "int", "float", "constrained", "tuple[", "function-", "str")
     place = [str(part) for part in detail["loc"] if not str(part).startswith(branches)]
+    kind = place.pop(1) if len(place) > 1 and place[1] in KINDS.get(place[0], {}) else None
     name = ".".join(place) or "(whole file)"
     if detail["type"] == "extra_forbidden":
-        return name, f"unknown field{_nearest(place)}"
+        return name, f"unknown field{_nearest(place, kind)}"
+    if detail["type"] == "union_tag_invalid":
+        tag = detail["ctx"]["tag"]
+        return f"{name}.kind", f"known are {', '.join(KINDS[name])}, got {tag!r}"
     message = detail["msg"].removeprefix("Value error, ")
     if isinstance(detail["input"], dict | FlightConfig):
         return name, message
     return f"{name} = {detail['input']!r}", message
 
 
-def _nearest(place: list[str]) -> str:
+def _nearest(place: list[str], kind: str | None) -> str:
     fields: Any = FlightConfig.model_fields
-    for part in place[:-1]:
+    sections = place[:-1]
+    if kind is not None:
+        fields = KINDS[place[0]][kind].model_fields
+        sections = place[1:-1]
+    for part in sections:
         section = fields[part].annotation if part in fields else None
         fields = getattr(section, "model_fields", {})
     near = difflib.get_close_matches(place[-1], list(fields), 1)

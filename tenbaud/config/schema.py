@@ -7,9 +7,19 @@ alike, and the handshake compares their digest. The others concern one end, or h
 from __future__ import annotations
 
 import json
-from typing import Annotated, Literal
+from collections.abc import Callable
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    field_validator,
+    model_validator,
+)
 
 from channel.impairments import parse_impairments
 from channel.sabotage import parse_sabotage
@@ -81,6 +91,12 @@ class PitchModelSection(Section):
     motor_lag_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.08
 
 
+class HoldModelSection(Section):
+    """No model: angle and rate stay as the last word set them. For the coder `words`."""
+
+    kind: Literal["hold"] = "hold"
+
+
 class ZoomCoderSection(Section):
     """The paper's coder (16)-(22) and the observer gains."""
 
@@ -96,6 +112,83 @@ class ZoomCoderSection(Section):
     """l1 and l2 of (23): 1/s and 1/s^2 when held, per unit when impulse"""
 
 
+class FixedCoderSection(Section):
+    """One sign per sample and a range that never changes."""
+
+    kind: Literal["fixed"] = "fixed"
+    range_rad: Positive = 0.1
+    correction: Literal["held", "impulse"] = "held"
+    gains: tuple[float, float] = (4.1, 8.6)
+
+
+class TimedCoderSection(Section):
+    """One sign per sample and a range that shrinks with time: time-based zooming."""
+
+    kind: Literal["timed"] = "timed"
+    initial_range_rad: Positive = 0.5
+    minimum_range_rad: Positive = 0.05
+    decay: Annotated[float, Field(gt=0.0, le=1.0)] = 0.95
+    correction: Literal["held", "impulse"] = "held"
+    gains: tuple[float, float] = (4.1, 8.6)
+
+
+class StaticCoderSection(Section):
+    """The measurement itself in a few bits, without memory (16)."""
+
+    kind: Literal["static"] = "static"
+    bits: Annotated[int, Field(ge=1, le=15)] = 1
+    range_rad: Positive = 3.141592653589793
+    """half the width that the cells cover"""
+    correction: Literal["held", "impulse"] = "held"
+    gains: tuple[float, float] = (4.1, 8.6)
+
+
+class WordsCoderSection(Section):
+    """The usual loop: the angle as a word, the rate by differences. For the model `hold`."""
+
+    kind: Literal["words"] = "words"
+    bits: Annotated[int, Field(ge=1, le=15)] = 10
+    range_rad: Positive = 3.141592653589793
+    rate_filter_s: NotNegative = 0.0
+    """tau of a low-pass behind the differentiator; 0: none"""
+
+
+def _kind_or(default: str) -> Callable[[Any], str]:
+    """Return the discriminator of a section whose `kind` may be left out."""
+
+    def kind(value: Any) -> str:
+        named = value.get("kind", default) if isinstance(value, dict) else value.kind
+        return str(named)
+
+    return kind
+
+
+ModelSection: TypeAlias = Annotated[
+    Annotated[PitchModelSection, Tag("pitch")] | Annotated[HoldModelSection, Tag("hold")],
+    Discriminator(_kind_or("pitch")),
+]
+CoderSection: TypeAlias = Annotated[
+    Annotated[ZoomCoderSection, Tag("zoom")]
+    | Annotated[FixedCoderSection, Tag("fixed")]
+    | Annotated[TimedCoderSection, Tag("timed")]
+    | Annotated[StaticCoderSection, Tag("static")]
+    | Annotated[WordsCoderSection, Tag("words")],
+    Discriminator(_kind_or("zoom")),
+]
+
+KINDS: dict[str, dict[str, type[Section]]] = {
+    "model": {"pitch": PitchModelSection, "hold": HoldModelSection},
+    "coder": {
+        "zoom": ZoomCoderSection,
+        "fixed": FixedCoderSection,
+        "timed": TimedCoderSection,
+        "static": StaticCoderSection,
+        "words": WordsCoderSection,
+    },
+}
+"""Sections that come in kinds; the first kind is what a section without `kind` is."""
+
+
 class Limits(Section):
     """What a command may be; the receiver keeps to it and the guard beside the motors checks it."""
 
@@ -108,6 +201,8 @@ class Limits(Section):
 class PlantSection(Section):
     """The simulated plant, relative to the codec's model."""
 
+    pitch: PitchModelSection = PitchModelSection()
+    """what the plant is relative to when the codec's model is no pitch model"""
     mismatch: float | tuple[float, float, float] = 0.0
     """fraction by which damping, stiffness and gain are off the model: 0.1 is 10 % more of each"""
     disturbance: str = ""
@@ -226,8 +321,8 @@ class FlightConfig(Section):
     duration_s: Annotated[float, Field(gt=0.0, le=1e7)] = 100.0
     timing: Timing = Timing()
     channel: ChannelSection = ChannelSection()
-    model: PitchModelSection = PitchModelSection()
-    coder: ZoomCoderSection = ZoomCoderSection()
+    model: ModelSection = PitchModelSection()
+    coder: CoderSection = ZoomCoderSection()
     limits: Limits = Limits()
     transmitter: TransmitterSection = TransmitterSection()
     receiver: ReceiverSection = ReceiverSection()

@@ -45,8 +45,10 @@ class DemoResult:
     """what the two ends said on their way out, if it was not a plain success"""
 
 
-def fly_demo(agreement: Agreement, folder: RunFolder, on_status: OnStatus) -> DemoResult:
-    """Fly once into an existing, empty run folder; write summary and figure there."""
+def fly_demo(
+    agreement: Agreement, folder: RunFolder, on_status: OnStatus, *, draw: bool = True
+) -> DemoResult:
+    """Fly once into an existing, empty run folder; write summary and, if wished, figure there."""
     folder.config.write_text(dump_config(agreement.config))
     if agreement.config.link.kind == "memory":
         outcome, upper, lower = run_in_memory(agreement, folder, "auto")
@@ -55,7 +57,7 @@ def fly_demo(agreement: Agreement, folder: RunFolder, on_status: OnStatus) -> De
     else:
         result = _fly_processes(agreement, folder, on_status)
     write_summary(folder, result.summary)
-    problem = draw_run(folder, figure_title(agreement.config, result.summary))
+    problem = draw_run(folder, figure_title(agreement.config, result.summary)) if draw else None
     if problem is not None:
         result.messages.append(problem)
     return result

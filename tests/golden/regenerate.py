@@ -17,6 +17,9 @@ from pathlib import Path
 
 from channel import numerics, wire
 from channel.codec import Codec
+from channel.coders.static import StaticCoder, StaticParameters
+from channel.coders.timed import TimedCoder, TimedParameters
+from channel.coders.words import WordsCoder, WordsParameters
 from channel.coders.zoom import ZoomCoder, ZoomParameters
 from channel.frames import (
     Bye,
@@ -32,6 +35,7 @@ from channel.frames import (
     Why,
 )
 from channel.limits import from_millivolts
+from channel.models.hold import HoldModel
 from channel.models.pitch import PitchModel, PitchParameters
 
 FOLDER = Path(__file__).resolve().parent
@@ -95,6 +99,11 @@ GOLDEN_CODECS: dict[str, Codec] = {
         ZoomCoder(ZoomParameters(window=3, gains=((0.4,), (0.6,)), impulse=True)),
         5,
     ),
+    "time-based zooming": Codec(PitchModel(PitchParameters(), 0.01), TimedCoder(TimedParameters()), 10),
+    "memoryless, three bits": Codec(
+        PitchModel(PitchParameters(), 0.01), StaticCoder(StaticParameters(bits=3)), 5
+    ),
+    "words of ten bits": Codec(HoldModel(0.01), WordsCoder(WordsParameters(rate_filter_s=0.03)), 1),
 }
 
 
@@ -106,7 +115,7 @@ def codec_vectors() -> dict[str, list[list[object]]]:
         state = codec.initial()
         rows: list[list[object]] = []
         for sample in range(60):
-            word = None if sample % 9 == 4 else (chooser.choice((-1, 1, 1)),)
+            word = None if sample % 9 == 4 else _word(codec, chooser)
             pairs = [
                 (chooser.randrange(-5000, 5001), chooser.randrange(-5000, 5001))
                 for _ in range(codec.ticks_per_sample)
@@ -123,6 +132,14 @@ def codec_vectors() -> dict[str, list[list[object]]]:
             )
         vectors[name] = rows
     return vectors
+
+
+def _word(codec: Codec, chooser: random.Random) -> tuple[int, ...]:
+    """Return a word; of single signs more +1 than -1, so that ranges grow as well as shrink."""
+    alphabet = codec.coder.alphabet
+    if alphabet.symbols == (-1, 1) and alphabet.symbols_per_word == 1:
+        return (chooser.choice((-1, 1, 1)),)
+    return tuple(chooser.choice(alphabet.symbols) for _ in range(alphabet.symbols_per_word))
 
 
 GENERATORS: dict[str, Callable[[], object]] = {

@@ -1,0 +1,7 @@
+"""What identification says when the data cannot carry an estimate."""
+
+from __future__ import annotations
+
+
+class IdentificationError(ValueError):
+    """Data or settings that no estimate can come from; the text names the cause and what to do."""

@@ -1,0 +1,128 @@
+"""The codec of a configuration: one entry per kind of model and per kind of coder.
+
+A new kind needs a section in `tenbaud.config.schema` and one entry here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from channel.codec import Codec, Coder, Model
+from channel.coders.static import StaticCoder, StaticParameters
+from channel.coders.timed import TimedCoder, TimedParameters
+from channel.coders.words import WordsCoder, WordsParameters
+from channel.coders.zoom import ZoomCoder, ZoomParameters
+from channel.models.hold import HoldModel
+from channel.models.pitch import PitchModel, PitchParameters
+from tenbaud.config.schema import (
+    FixedCoderSection,
+    FlightConfig,
+    HoldModelSection,
+    PitchModelSection,
+    StaticCoderSection,
+    TimedCoderSection,
+    WordsCoderSection,
+    ZoomCoderSection,
+)
+
+
+def build_codec(config: FlightConfig) -> Codec:
+    """Return the codec of a configuration; ValueError where its parts do not fit each other."""
+    ticks = round(config.timing.symbol_period_s / config.timing.tick_s)
+    model = MODELS[config.model.kind](config.model, config)
+    coder = CODERS[config.coder.kind](config.coder, config)
+    needs_hold = isinstance(coder, WordsCoder)
+    if needs_hold != isinstance(model, HoldModel):
+        raise ValueError(
+            f"coder.kind = {config.coder.kind!r} and model.kind = {config.model.kind!r} do not go "
+            "together: the coder 'words' sets angle and rate of the model 'hold', and no other"
+        )
+    return Codec(model, coder, ticks)
+
+
+def model_parameters(section: PitchModelSection) -> PitchParameters:
+    """Return the parameters of the pitch model."""
+    return PitchParameters(**section.model_dump(exclude={"kind"}))
+
+
+def _pitch(section: PitchModelSection, config: FlightConfig) -> Model:
+    return PitchModel(model_parameters(section), config.timing.tick_s)
+
+
+def _hold(section: HoldModelSection, config: FlightConfig) -> Model:
+    return HoldModel(config.timing.tick_s)
+
+
+def _gains(gains: tuple[float, float]) -> tuple[tuple[float, ...], ...]:
+    return tuple((gain,) for gain in gains)
+
+
+def _zoom(section: ZoomCoderSection, config: FlightConfig) -> Coder:
+    return ZoomCoder(
+        ZoomParameters(
+            initial_range=section.initial_range_rad,
+            minimum_range=section.minimum_range_rad,
+            decay=section.decay,
+            window=section.window_signs,
+            gains=_gains(section.gains),
+            impulse=section.correction == "impulse",
+        )
+    )
+
+
+def _fixed(section: FixedCoderSection, config: FlightConfig) -> Coder:
+    return TimedCoder(
+        TimedParameters(
+            initial_range=section.range_rad,
+            minimum_range=section.range_rad,
+            decay=1.0,
+            gains=_gains(section.gains),
+            impulse=section.correction == "impulse",
+        )
+    )
+
+
+def _timed(section: TimedCoderSection, config: FlightConfig) -> Coder:
+    return TimedCoder(
+        TimedParameters(
+            initial_range=section.initial_range_rad,
+            minimum_range=section.minimum_range_rad,
+            decay=section.decay,
+            gains=_gains(section.gains),
+            impulse=section.correction == "impulse",
+        )
+    )
+
+
+def _static(section: StaticCoderSection, config: FlightConfig) -> Coder:
+    return StaticCoder(
+        StaticParameters(
+            bits=section.bits,
+            range=section.range_rad,
+            gains=_gains(section.gains),
+            impulse=section.correction == "impulse",
+        )
+    )
+
+
+def _words(section: WordsCoderSection, config: FlightConfig) -> Coder:
+    return WordsCoder(
+        WordsParameters(
+            bits=section.bits,
+            range=section.range_rad,
+            period_s=config.timing.symbol_period_s,
+            rate_filter_s=section.rate_filter_s,
+        )
+    )
+
+
+MODELS: dict[str, Callable[[Any, FlightConfig], Model]] = {"pitch": _pitch, "hold": _hold}
+
+CODERS: dict[str, Callable[[Any, FlightConfig], Coder]] = {
+    "zoom": _zoom,
+    "fixed": _fixed,
+    "timed": _timed,
+    "static": _static,
+    "words": _words,
+}

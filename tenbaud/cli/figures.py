@@ -1,0 +1,96 @@
+"""`tenbaud figures`: the paper's figures from fresh flights, and the page that compares."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tenbaud.cli import options
+
+DATA_VARIABLE = "TENBAUD_FLIGHT_DATA"
+
+
+def figures(
+    which: Annotated[
+        list[str] | None, typer.Argument(help="3, 4, 5, 6, 7, 8 or all; several may be given.")
+    ] = None,
+    docs: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for REPRODUCTION.md and, in figures/, its pictures, such as docs; not "
+            "given: they go into the run's folder.",
+            show_default=False,
+        ),
+    ] = None,
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            envvar=DATA_VARIABLE,
+            help="Folder with the recorded flights (uiuc_closed_loop.csv and others).",
+            show_default=False,
+        ),
+    ] = None,
+    out: options.Out = None,
+) -> None:
+    """Fly and draw the paper's Figs. 3 to 8; with all of them, write the page that compares.
+
+    [dim]tenbaud figures 7[/dim]
+
+    [dim]tenbaud figures all --docs docs --data ../shared/data[/dim]
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from tenbaud.figures.make import NUMBERS, make_figures
+    from tenbaud.recording.folder import create_run_folder
+
+    wanted = _wanted(which or ["all"], NUMBERS)
+    found = _data(data)
+    folder = create_run_folder(None, "figures", out)
+    pictures = (docs or folder) / "figures"
+    pictures.mkdir(parents=True, exist_ok=True)
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as bar:
+        task = bar.add_task("starting", total=1.0)
+
+        def on_progress(done: float, total: float, what: str) -> None:
+            bar.update(task, completed=done, total=total, description=what)
+
+        results = make_figures(wanted, folder, pictures, found, on_progress)
+    typer.echo(f"{len(results.flown)} flights in {results.seconds:.0f} s; pictures in {pictures}")
+    typer.echo(f"SVG and recordings in {folder}")
+    if wanted != set(NUMBERS):
+        return
+    from tenbaud.figures.page import write_page
+
+    page = (docs or folder) / "REPRODUCTION.md"
+    write_page(page, results)
+    typer.echo(f"the table is in {page}")
+    if found is None:
+        typer.echo(
+            f"the recorded flights were left out: give their folder with --data or in {DATA_VARIABLE}",
+            err=True,
+        )
+
+
+def _wanted(names: list[str], known: tuple[str, ...]) -> set[str]:
+    for name in names:
+        if name not in (*known, "all"):
+            raise typer.BadParameter(f"'{name}': known are {', '.join(known)} and all")
+    return set(known) if "all" in names else set(names)
+
+
+def _data(given: Path | None) -> Path | None:
+    from tenbaud.config.load import ConfigError
+    from tenbaud.figures.real import UIUC_FILE
+
+    if given is None:
+        beside = Path("..") / "shared" / "data"
+        return beside if (beside / UIUC_FILE).is_file() else None
+    if not (given / UIUC_FILE).is_file():
+        raise ConfigError(f"{given} holds no {UIUC_FILE}; give the folder of the recorded flights")
+    return given

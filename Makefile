@@ -33,11 +33,12 @@ check: $(STAMP) ## lint, format, types, and the project's own rules
 bench: $(STAMP) ## measure speed, and write bench.json
 	$(BIN)/python -m benchmarks
 
-soak: $(STAMP) ## run the long tests; MINUTES=n says for how long (10)
+soak: $(STAMP) ## fly seeds under faults for MINUTES=n (10) into soak.json, then the long tests
+	$(BIN)/python -m tests.simulation.soak --minutes $(MINUTES)
 	MINUTES=$(MINUTES) $(BIN)/python -m pytest -m soak
 
 clean: ## remove the environment and everything that was generated
-	rm -rf $(VENV) runs dist bench.json .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) runs dist bench.json soak.json .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # The environment is built again whenever pyproject.toml changes.

@@ -15,6 +15,7 @@ class EventKind(StrEnum):
     ENDED = "ended"
     REFUSED = "refused"
     DESYNC = "desync"
+    REJOIN = "rejoin"
     ERASED = "erased"
     LATE_SYMBOL = "late_symbol"
     LATE_COMMAND = "late_command"

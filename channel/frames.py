@@ -1,17 +1,38 @@
 """The messages of the two sessions. How they look on a line is `channel.wire`'s affair.
 
-Uplink: Hello, Symbol, Desync, Bye. Downlink: Welcome, Refuse, Commands, Bye.
+Uplink: Hello, Symbol, Desync, Bye. Downlink: Welcome, Refuse, Commands, Desync, Unknown, Bye.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import TypeAlias
+
+
+class Why(IntEnum):
+    """Why a transmitter asks for a session."""
+
+    START = 0
+    """it has none"""
+    DESYNC = 1
+    """the digests of a sample differed"""
+    GAP = 2
+    """echoes were lost, more in a row than command frames repeat"""
+    LAG = 3
+    """no echo came for as long as the history lasts"""
+    UNKNOWN = 4
+    """the receiver does not know the session: it was restarted, or lost track"""
+    GUARD = 5
+    """commands stayed away until the watchdog took the voltage down"""
 
 
 @dataclass(frozen=True, slots=True)
 class Hello:
-    """The transmitter is there and asks for a session."""
+    """The transmitter is there and asks for a session, or for a new epoch of the one it has.
+
+    It is repeated until it is answered, so an answer names the request that it belongs to.
+    """
 
     incarnation: int
     """drawn anew by every process, 32 bits"""
@@ -21,11 +42,19 @@ class Hello:
     """16 bytes, of the shared part of the configuration"""
     numerics_probe: bytes
     """8 bytes, of the codec run over fixed vectors"""
+    request: int = 0
+    """counts the times that this process asked; repetitions of one request are equal"""
+    session: int = 0
+    """that the transmitter flew in; 0: none yet"""
+    epoch: int = 0
+    sample: int = 0
+    """first sample that the transmitter can still send, in its own count"""
+    why: Why = Why.START
 
 
 @dataclass(frozen=True, slots=True)
 class Welcome:
-    """The receiver accepts: symbols may start."""
+    """The receiver accepts: symbols may start, with `first_sample`, from a common state."""
 
     session: int
     """drawn by the receiver, 32 bits; every later frame of both directions carries it"""
@@ -33,6 +62,12 @@ class Welcome:
     first_sample: int
     incarnation: int
     """of the Hello that is answered"""
+    request: int = 0
+    """of the Hello that is answered"""
+    hold_millivolts: tuple[int, ...] = ()
+    """command of the first `D` ticks from `first_sample` on; empty: the initial command"""
+    state: bytes = b""
+    """codec state before `first_sample`, in canonical bytes; empty: the initial one"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +129,10 @@ class Commands:
 
 @dataclass(frozen=True, slots=True)
 class Desync:
-    """The transmitter's copy differs from the receiver's after this sample."""
+    """The transmitter's copy differs from the receiver's after this sample.
+
+    The receiver answers with the same frame and its own state, so that both can write both down.
+    """
 
     session: int
     epoch: int
@@ -102,7 +140,15 @@ class Desync:
     transmitter_digest: int
     receiver_digest: int
     state: bytes
-    """the transmitter's state after the sample, in the codec's canonical bytes"""
+    """the sender's state after the sample, in the codec's canonical bytes; empty: not kept"""
+
+
+@dataclass(frozen=True, slots=True)
+class Unknown:
+    """The receiver got a symbol of a session that it does not know: ask for another."""
+
+    session: int
+    epoch: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,5 +168,5 @@ class ForeignVersion:
 
 
 Frame: TypeAlias = (
-    Hello | Welcome | Refuse | Symbol | ShortSymbol | Commands | Desync | Bye | ForeignVersion
+    Hello | Welcome | Refuse | Symbol | ShortSymbol | Commands | Desync | Unknown | Bye | ForeignVersion
 )

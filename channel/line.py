@@ -23,6 +23,11 @@ class Line:
         self._symbol_delay_ns = symbol_delay_ns
         self._delay_ns = delay_ns
 
+    @property
+    def longest_delay_ns(self) -> int:
+        """Return how long a message may be under way."""
+        return max(self._symbol_delay_ns, self._delay_ns)
+
     def carry(self, data: bytes, is_symbol: bool, now_ns: int) -> list[Delivery]:
         """Return the arrivals of a message put on the line at flight time `now_ns`."""
         delay = self._symbol_delay_ns if is_symbol else self._delay_ns

@@ -5,13 +5,16 @@
 All little-endian; the CRC covers everything before it. Frames that belong to no session have zeros
 there. Bodies, by kind:
 
-    1 hello     incarnation u32, config digest 16 bytes, probe 8 bytes, version text
-    2 welcome   incarnation u32, first sample u32
+    1 hello     incarnation u32, request u32, sample u32, why u8, config digest 16 bytes,
+                probe 8 bytes, version text
+    2 welcome   incarnation u32, request u32, first sample u32, motors u8, millivolts s16 ...,
+                state bytes
     3 refuse    incarnation u32, reason text, config text
     4 symbol    slot u32, number u8
     5 commands  last sample u32, echoes u8, then per echo: word u16, digest u64, millivolts s16 ...
     6 desync    sample u32, digests u64 u64, state bytes
     7 bye       reason text
+    8 unknown   nothing
 
 A text is a u16 length and that many bytes of UTF-8.
 """
@@ -35,7 +38,9 @@ from channel.frames import (
     Refuse,
     ShortSymbol,
     Symbol,
+    Unknown,
     Welcome,
+    Why,
 )
 
 WIRE_VERSION = 1
@@ -45,8 +50,8 @@ CRC_START = 0xFFFF
 
 _HEAD = struct.Struct("<BBIH")
 _CRC = struct.Struct("<H")
-_HELLO = struct.Struct("<I16s8s")
-_WELCOME = struct.Struct("<II")
+_HELLO = struct.Struct("<IIIB16s8s")
+_WELCOME = struct.Struct("<IIIB")
 _NUMBER = struct.Struct("<I")
 _SYMBOL = struct.Struct("<IB")
 _COMMANDS = struct.Struct("<IB")
@@ -128,13 +133,9 @@ def _encode_body(frame: Frame) -> tuple[int, int, int, bytes]:
         case Commands():
             return 5, frame.session, frame.epoch, _encode_commands(frame)
         case Hello():
-            if len(frame.config_digest) != 16 or len(frame.numerics_probe) != 8:
-                raise ValueError("a greeting has a digest of 16 bytes and a probe of 8")
-            body = _HELLO.pack(frame.incarnation, frame.config_digest, frame.numerics_probe)
-            return 1, 0, 0, body + _text(frame.version)
+            return 1, frame.session, frame.epoch, _encode_hello(frame)
         case Welcome():
-            body = _WELCOME.pack(frame.incarnation, frame.first_sample)
-            return 2, frame.session, frame.epoch, body
+            return 2, frame.session, frame.epoch, _encode_welcome(frame)
         case Refuse():
             body = _NUMBER.pack(frame.incarnation) + _text(frame.reason) + _text(frame.config)
             return 3, 0, 0, body
@@ -143,8 +144,30 @@ def _encode_body(frame: Frame) -> tuple[int, int, int, bytes]:
             return 6, frame.session, frame.epoch, body + frame.state
         case Bye():
             return 7, frame.session, 0, _text(frame.reason)
+        case Unknown():
+            return 8, frame.session, frame.epoch, b""
         case ForeignVersion() | ShortSymbol():
             raise ValueError(f"{frame} is only ever received")
+
+
+def _encode_hello(frame: Hello) -> bytes:
+    if len(frame.config_digest) != 16 or len(frame.numerics_probe) != 8:
+        raise ValueError("a greeting has a digest of 16 bytes and a probe of 8")
+    body = _HELLO.pack(
+        frame.incarnation,
+        frame.request,
+        frame.sample,
+        frame.why,
+        frame.config_digest,
+        frame.numerics_probe,
+    )
+    return body + _text(frame.version)
+
+
+def _encode_welcome(frame: Welcome) -> bytes:
+    hold = frame.hold_millivolts
+    head = _WELCOME.pack(frame.incarnation, frame.request, frame.first_sample, len(hold))
+    return head + struct.pack(f"<{len(hold)}h", *hold) + frame.state
 
 
 def _encode_commands(frame: Commands) -> bytes:
@@ -178,15 +201,21 @@ def _decode_commands(session: int, epoch: int, body: bytes) -> Commands:
 
 
 def _decode_hello(session: int, epoch: int, body: bytes) -> Hello:
-    incarnation, config_digest, probe = _HELLO.unpack_from(body)
+    incarnation, request, sample, why, config_digest, probe = _HELLO.unpack_from(body)
     version, rest = _take_text(body[_HELLO.size :])
     _nothing_left(rest)
-    return Hello(incarnation, version, config_digest, probe)
+    try:
+        reason = Why(why)
+    except ValueError:
+        raise FrameError(f"hello for the unknown reason {why}") from None
+    return Hello(incarnation, version, config_digest, probe, request, session, epoch, sample, reason)
 
 
 def _decode_welcome(session: int, epoch: int, body: bytes) -> Welcome:
-    incarnation, first_sample = _WELCOME.unpack(body)
-    return Welcome(session, epoch, first_sample, incarnation)
+    incarnation, request, first_sample, motors = _WELCOME.unpack_from(body)
+    hold = struct.unpack_from(f"<{motors}h", body, _WELCOME.size)
+    state = body[_WELCOME.size + 2 * motors :]
+    return Welcome(session, epoch, first_sample, incarnation, request, hold, state)
 
 
 def _decode_refuse(session: int, epoch: int, body: bytes) -> Refuse:
@@ -213,6 +242,11 @@ def _decode_bye(session: int, epoch: int, body: bytes) -> Bye:
     return Bye(session, reason)
 
 
+def _decode_unknown(session: int, epoch: int, body: bytes) -> Unknown:
+    _nothing_left(body)
+    return Unknown(session, epoch)
+
+
 _READERS: dict[int, Callable[[int, int, bytes], Frame]] = {
     1: _decode_hello,
     2: _decode_welcome,
@@ -221,6 +255,7 @@ _READERS: dict[int, Callable[[int, int, bytes], Frame]] = {
     5: _decode_commands,
     6: _decode_desync,
     7: _decode_bye,
+    8: _decode_unknown,
 }
 
 

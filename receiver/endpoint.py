@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from channel.errors import FrameError
 from channel.frames import Frame
+from channel.line import Line
 from channel.virtual import Reply
 from channel.wire import DATAGRAM, Wire
 from receiver.session import ReceiverSession
@@ -21,6 +22,8 @@ class ReceiverEndpoint:
         self.wire_bytes_down = 0
         self.wire_bytes_up = 0
         self.malformed = 0
+        self.downlink = Line()
+        """this end's own way out, on a real clock"""
 
     def on_bytes(self, data: bytes, now_ns: int) -> list[bytes]:
         """Take one message that arrived at `now_ns`; return the messages to send."""

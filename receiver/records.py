@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from channel.recording import Field, RecordChannel
+from channel.codec import CodecState, Vector
+from channel.lead import FlownSample
+from channel.recording import Field, RecordChannel, Recorder
+from channel.terms import Terms
+from channel.words import Word
+from receiver.controllers.base import Controller
 
 TICK_CHANNEL = RecordChannel(
     "tick",
@@ -26,3 +31,29 @@ SAMPLE_CHANNEL = RecordChannel(
         Field("arrival_s", "number", "s", "when the word was decided, on this clock", timing=True),
     ),
 )
+
+
+def write_sample(
+    recorder: Recorder,
+    terms: Terms,
+    word: Word,
+    ranges: Vector,
+    after: CodecState,
+    digest: int,
+    now_ns: int,
+) -> None:
+    """Write one sample down: `ranges` before its word, `after` the state after it."""
+    sample = after.sample - 1
+    row = (sample, word, ranges, after.model, after.coder, f"{digest:016x}", now_ns / 1e9)
+    recorder.write(SAMPLE_CHANNEL, sample * terms.sample_ns, row)
+
+
+def write_commands(
+    recorder: Recorder, terms: Terms, sample: int, flown: FlownSample, controller: Controller
+) -> None:
+    """Write down the commands that were decided with one sample."""
+    tick = sample * terms.ticks_per_sample + terms.lead_ticks
+    for believed, command in zip(flown.live, flown.commands, strict=True):
+        row = (tick, controller.reference_rad(tick), believed, command)
+        recorder.write(TICK_CHANNEL, tick * terms.tick_ns, row)
+        tick += 1

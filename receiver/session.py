@@ -4,6 +4,9 @@ Three things drive it: a frame that arrived (`on_frame`), a deadline that passed
 the end of the flight (`bye`). Each returns the frames to send. The receiver decides, once per slot,
 what was received: the symbol, or nothing by the time of a later one or of the deadline. What it
 decided goes back with every command frame, and that echo is what the transmitter's copy consumes.
+
+A transmitter that asks for a session gets one, and one that asks again a new epoch of it: a start
+sample, the state to start from, and the command to hold until the first one decided (`rejoin`).
 """
 
 from __future__ import annotations
@@ -11,7 +14,7 @@ from __future__ import annotations
 from collections import Counter, deque
 from enum import Enum
 
-from channel.codec import Codec, CodecState, Vector
+from channel.codec import Codec, Vector
 from channel.events import EVENT_CHANNEL, Event, EventKind, event_row
 from channel.frames import (
     Bye,
@@ -24,27 +27,27 @@ from channel.frames import (
     Refuse,
     ShortSymbol,
     Symbol,
+    Unknown,
     Welcome,
 )
 from channel.identity import Identity
 from channel.lead import fly_sample
 from channel.limits import from_millivolts, to_millivolts
+from channel.lockstep import HISTORY_SAMPLES, LOCKSTEP_CHANNEL, History
 from channel.recording import NullRecorder, Recorder
 from channel.shaper import BaudMeter
 from channel.terms import Terms
 from channel.wire import WIRE_VERSION
 from channel.words import ERASED, Word
 from receiver.controllers.base import Controller
-from receiver.records import SAMPLE_CHANNEL, TICK_CHANNEL
+from receiver.records import write_commands, write_sample
+from receiver.rejoin import Greeter, Verdict, carried_to, desync_answer, difference, first_sample
 from receiver.short_slots import SlotFinder
 
-GAP_SAMPLES_MAX = 64
-"""A symbol this far ahead is no gap any more but a different flight."""
+GAP_SAMPLES_MAX = HISTORY_SAMPLES
+"""A symbol this far ahead is no gap any more; after as many erasures in a row none are counted on."""
 
-INPUTS_KEPT = 64
-
-VERSION_SHOWN = 40
-"""Characters of a peer's version text that are quoted back."""
+EPOCH_MAX = 0xFFFF
 
 
 class Phase(Enum):
@@ -80,21 +83,27 @@ class ReceiverSession:
         self.state = codec.initial()
         self.meter = BaudMeter()
         self.counts: Counter[str] = Counter()
-        """erasures, symbols_late, symbols_misplaced, stale_frames, refused_hellos, bad_commands"""
+        """erasures, symbols_late, symbols_misplaced, stale_frames, refused_hellos, bad_commands,
+        desyncs, rejoins"""
         self.end_reason = ""
         self.refusal: str | None = None
         self.desync: Desync | None = None
         self.events: deque[Event] = deque(maxlen=1000)
-        self.inputs: deque[tuple[int, Word]] = deque(maxlen=INPUTS_KEPT)
+        self.history = History(codec)
+        self._greeter = Greeter()
         self._controller = controller
         self._recorder = recorder or NullRecorder()
         self._commands: deque[Vector] = deque([terms.initial_command] * terms.lead_ticks)
         self._last_command = terms.initial_command
         self._echoes: deque[Echo] = deque(maxlen=terms.repeats + 1)
-        self._peer_incarnation: int | None = None
         self._slot = 0
         self._word: list[int | None] = []
         self._anchor: tuple[int, int] | None = None
+        """slot and arrival of the last symbol in time; None: no slot is due by the clock"""
+        self._advanced = False
+        """whether a symbol of this epoch has been received"""
+        self._silent_slots = 0
+        self._reported: tuple[int, int] | None = None
         self._slots = SlotFinder(terms)
 
     # What arrives
@@ -107,10 +116,11 @@ class ReceiverSession:
             case ShortSymbol():
                 return self._on_short_symbol(frame, now_ns)
             case Hello():
+                answer = self._on_hello(frame)
                 self._slots.greeted(now_ns)
-                return self._on_hello(frame)
+                return answer
             case Desync() if self._is_current(frame.session):
-                self._on_desync(frame)
+                return self._on_desync(frame)
             case Bye() if self._is_current(frame.session):
                 self._end(f"the transmitter ended the flight: {frame.reason}")
             case Bye() if self.refusal is not None and frame.session == 0:
@@ -138,7 +148,11 @@ class ReceiverSession:
         frames: list[Frame] = []
         deadline = self.next_deadline()
         while deadline is not None and deadline <= now_ns:
+            self._silent_slots += 1
             frames += self._settle(None, now_ns)
+            if self._silent_slots >= GAP_SAMPLES_MAX * self.terms.symbols_per_word:
+                self._anchor = None
+                self._tell(EventKind.PEER, f"no symbol for {GAP_SAMPLES_MAX} samples: waiting for one")
             deadline = self.next_deadline()
         return frames
 
@@ -156,50 +170,80 @@ class ReceiverSession:
     # The handshake
 
     def _on_hello(self, hello: Hello) -> list[Frame]:
-        known = hello.incarnation == self._peer_incarnation
-        if self.phase is Phase.FLYING and not (known and self.state.sample == 0 and self._slot == 0):
-            self.counts["refused_hellos"] += 1
-            if known:
-                return []
-            return [Refuse(hello.incarnation, "this receiver is flying with another", "")]
         if self.phase is Phase.ENDED:
             return [Refuse(hello.incarnation, f"this receiver has ended: {self.end_reason}", "")]
-        problem = self._difference(hello)
-        if problem is not None:
-            self.counts["refused_hellos"] += 1
-            self._refuse(problem)
-            return [Refuse(hello.incarnation, problem, self.identity.config)]
-        if self.phase is Phase.WAITING:
-            self._peer_incarnation = hello.incarnation
+        verdict = self._greeter.judge(hello, self.identity, self._advanced, self._silent_slots)
+        if verdict is Verdict.REPEAT and self._greeter.welcome is not None:
+            return [self._greeter.welcome]
+        if verdict is Verdict.BEGIN:
+            return self._begin(hello)
+        self.counts["refused_hellos"] += 1
+        match verdict:
+            case Verdict.BUSY:
+                return [Refuse(hello.incarnation, "this receiver is flying with another", "")]
+            case Verdict.REFUSE:
+                problem = difference(hello, self.identity) or ""
+                self._refuse(problem)
+                return [Refuse(hello.incarnation, problem, self.identity.config)]
+        return []
+
+    def _begin(self, hello: Hello) -> list[Frame]:
+        """Begin a session, or a new epoch of it; return the answer."""
+        last = self._greeter.welcome
+        state = b""
+        hold = self.terms.initial_command
+        own = self.state.sample + (1 if self._word else 0)
+        first = first_sample(hello, own, self.terms, begun=last is not None)
+        count = self.terms.symbols_per_word
+        if last is None or hello.incarnation != last.incarnation:
+            ahead = first - hello.sample if hello.sample else 0
+            self._slots.begin(first * count, ahead * count)
+        if last is None:
             self.phase = Phase.FLYING
             self.refusal = None
-            self._tell(EventKind.STARTED, f"session {self.session_number:08x} begins")
-        return [Welcome(self.session_number, self.epoch, self.state.sample, hello.incarnation)]
-
-    def _difference(self, hello: Hello) -> str | None:
-        if hello.config_digest != self.identity.config_digest:
-            return (
-                "the shared configuration differs: transmitter "
-                f"{hello.config_digest.hex()[:12]}, receiver "
-                f"{self.identity.config_digest.hex()[:12]}"
-            )
-        if hello.version != self.identity.version:
-            return (
-                f"versions differ: transmitter {hello.version[:VERSION_SHOWN]}, receiver "
-                f"{self.identity.version}"
-            )
-        if hello.numerics_probe != self.identity.numerics_probe:
-            return (
-                "the numerics probe differs: transmitter "
-                f"{hello.numerics_probe.hex()}, receiver {self.identity.numerics_probe.hex()}; the "
-                "two machines do not compute alike, so their codecs would drift apart"
-            )
-        return None
+            self.state = self.codec.initial()._replace(sample=first)
+        elif self.epoch >= EPOCH_MAX:
+            self._end(f"{EPOCH_MAX} rejoins: something is wrong with this line")
+            return [Bye(self.session_number, self.end_reason)]
+        else:
+            self.epoch += 1
+            self.counts["rejoins"] += 1
+            if hello.incarnation == last.incarnation:
+                hold = self._last_command
+                silent = self._silent_slots // self.terms.symbols_per_word
+                known = tuple(self._commands)
+                self.state = carried_to(self.codec, self.state, first, known, hold, silent)
+                state = self.codec.pack(self.state)
+            else:
+                # A rig that was started again is at rest, and so is what is known of it.
+                self.state = self.codec.initial()._replace(sample=first)
+        self._slot = first * count
+        self._word = []
+        self._anchor = None
+        self._advanced = False
+        self._silent_slots = 0
+        self._echoes.clear()
+        self._last_command = hold
+        self._commands = deque([hold] * self.terms.lead_ticks)
+        welcome = Welcome(
+            self.session_number,
+            self.epoch,
+            first,
+            hello.incarnation,
+            hello.request,
+            () if hold == self.terms.initial_command else to_millivolts(hold),
+            state,
+        )
+        self._greeter.welcome = welcome
+        text = f"session {self.session_number:08x}, epoch {self.epoch}, begins at sample {first}"
+        self._tell(EventKind.STARTED if last is None else EventKind.REJOIN, text)
+        return [welcome]
 
     def _refuse(self, problem: str) -> None:
         if self.refusal is None:
             self._tell(EventKind.REFUSED, problem)
-        self.refusal = problem
+        if self.phase is Phase.WAITING:
+            self.refusal = problem
 
     # Symbols, slots, words
 
@@ -208,7 +252,7 @@ class ReceiverSession:
         ahead = symbol.slot - self._slot
         if not self._is_current(symbol.session) or symbol.epoch != self.epoch or value is None:
             self.counts["stale_frames"] += 1
-            return []
+            return self._on_foreign_symbol(symbol)
         if ahead < 0:
             self.counts["symbols_late"] += 1
             self._tell(EventKind.LATE_SYMBOL, f"slot {symbol.slot} was settled already: dropped")
@@ -216,13 +260,27 @@ class ReceiverSession:
         if ahead > GAP_SAMPLES_MAX * self.terms.symbols_per_word:
             self.counts["stale_frames"] += 1
             self._tell(EventKind.STALE, f"slot {symbol.slot} is {ahead} ahead: dropped")
-            return []
+            return [Unknown(symbol.session, symbol.epoch)]
+        self._advanced = True
+        self._silent_slots = 0
+        self._greeter.on_symbol()
         frames: list[Frame] = []
         while self._slot < symbol.slot:
             frames += self._settle(None, now_ns)
         self._anchor = (symbol.slot, now_ns)
         self.meter.on_symbol(now_ns)
         return frames + self._settle(value, now_ns)
+
+    def _on_foreign_symbol(self, symbol: Symbol) -> list[Frame]:
+        """Answer a transmitter that flies in a session or an epoch that is not the present one."""
+        if self.phase is Phase.WAITING and self.refusal is None:
+            return [Unknown(symbol.session, symbol.epoch)]
+        welcome = self._greeter.welcome
+        missed = self._is_current(symbol.session) and symbol.epoch < self.epoch
+        if missed and not self._advanced and welcome is not None:
+            # It flies on without knowing of the new epoch: the answer was lost.
+            return [welcome]
+        return []
 
     def _on_short_symbol(self, short: ShortSymbol, now_ns: int) -> list[Frame]:
         """Take a symbol byte of a serial line, as the symbol of this session that it can only be."""
@@ -265,12 +323,14 @@ class ReceiverSession:
         for _ in range(len(self._commands) - lead):
             self._commands.popleft()
         self.state = flown.state
-        self.inputs.append((before.sample, word))
+        self.history.add(self.epoch, word, self.state)
         digest = self.codec.digest(self.state)
         millivolts = [mv for command in flown.commands for mv in to_millivolts(command)]
         number = self.codec.coder.alphabet.word_number(word)
         self._echoes.append(Echo(before.sample, number, digest, tuple(millivolts)))
-        self._record(before, word, flown.live, flown.commands, digest, now_ns)
+        ranges = self.codec.coder.ranges(before.coder)
+        write_sample(self._recorder, self.terms, word, ranges, self.state, digest, now_ns)
+        write_commands(self._recorder, self.terms, before.sample, flown, self._controller)
         return [Commands(self.session_number, self.epoch, tuple(self._echoes))]
 
     def _decide(self, tick: int, state: Vector) -> Vector:
@@ -299,16 +359,29 @@ class ReceiverSession:
 
     # Ends and reports
 
-    def _on_desync(self, desync: Desync) -> None:
-        self.desync = desync
+    def _on_desync(self, theirs: Desync) -> list[Frame]:
+        """Write a failure down and answer with this end's state; the request that follows rejoins."""
+        answer = desync_answer(theirs, self.history, self.codec)
+        if self._reported == (theirs.epoch, theirs.sample):
+            return [answer]
+        self._reported = (theirs.epoch, theirs.sample)
+        self.desync = theirs
         self.counts["desyncs"] += 1
         self._tell(
             EventKind.DESYNC,
-            f"the codecs differ after sample {desync.sample}: transmitter "
-            f"{desync.transmitter_digest:016x}, receiver {desync.receiver_digest:016x}",
-            desync.sample,
+            f"the codecs differ after sample {theirs.sample}: transmitter "
+            f"{theirs.transmitter_digest:016x}, receiver {theirs.receiver_digest:016x}",
+            theirs.sample,
         )
-        self._end("the two copies of the codec disagree")
+        row = self.history.failure_row(
+            theirs.epoch,
+            theirs.sample,
+            theirs.receiver_digest,
+            theirs.transmitter_digest,
+            theirs.state,
+        )
+        self._recorder.write(LOCKSTEP_CHANNEL, theirs.sample * self.terms.sample_ns, row)
+        return [answer]
 
     def _is_current(self, session: int) -> bool:
         return self.phase is Phase.FLYING and session == self.session_number
@@ -325,34 +398,3 @@ class ReceiverSession:
         event = Event(kind, flight_ns, at, text)
         self.events.append(event)
         self._recorder.write(EVENT_CHANNEL, flight_ns, event_row(event))
-
-    def _record(
-        self,
-        before: CodecState,
-        word: Word,
-        live: list[Vector],
-        commands: list[Vector],
-        digest: int,
-        now_ns: int,
-    ) -> None:
-        terms = self.terms
-        state = self.state
-        self._recorder.write(
-            SAMPLE_CHANNEL,
-            before.sample * terms.sample_ns,
-            (
-                before.sample,
-                word,
-                self.codec.coder.ranges(before.coder),
-                state.model,
-                state.coder,
-                f"{digest:016x}",
-                now_ns / 1e9,
-            ),
-        )
-        tick = before.sample * terms.ticks_per_sample + terms.lead_ticks
-        for believed, command in zip(live, commands, strict=True):
-            reference = self._controller.reference_rad(tick)
-            row = (tick, reference, believed, command)
-            self._recorder.write(TICK_CHANNEL, tick * terms.tick_ns, row)
-            tick += 1

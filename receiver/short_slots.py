@@ -54,6 +54,8 @@ class SlotFinder:
         self._delay_ns = terms.symbol_delay_ns
         self._allowance = terms.deadline_allowance_ns / self._slot_ns
         self._greeted_ns = 0
+        self._first_slot = 0
+        self._ahead_ns = 0
         self._zero_ns: float | None = None
         """when slot 0 would have arrived, by the schedule"""
         self._taken = 0
@@ -63,6 +65,13 @@ class SlotFinder:
         """Note the time of a hello that was answered with a welcome."""
         if self._zero_ns is None:
             self._greeted_ns = now_ns
+
+    def begin(self, first_slot: int, ahead_slots: int) -> None:
+        """Forget the schedule: another transmitter begins, so many slots after its hello."""
+        self._zero_ns = None
+        self._rival = None
+        self._first_slot = first_slot
+        self._ahead_ns = round(ahead_slots * self._slot_ns)
 
     def find(self, symbol: ShortSymbol, expected: int, now_ns: int) -> Place:
         """Return where a symbol byte that came at `now_ns` belongs; `expected` is not settled yet."""
@@ -87,11 +96,12 @@ class SlotFinder:
         return Place(None if early > 0.0 and slot >= expected else slot, False, None)
 
     def _first(self, symbol: ShortSymbol, now_ns: int) -> Place:
-        since_ns = now_ns - self._greeted_ns - self._delay_ns
+        since_ns = now_ns - self._greeted_ns - self._delay_ns - self._ahead_ns
+        first = self._first_slot
         place = (since_ns - START_NS / 2) / self._slot_ns
-        slot = _nearest(symbol, max(0.0, place))
-        earliest = (since_ns - START_NS) / self._slot_ns - EARLY_SLOTS
-        latest = (since_ns + START_SLACK_NS) / self._slot_ns + EARLY_SLOTS
+        slot = _nearest(symbol, first + max(0.0, place))
+        earliest = first + (since_ns - START_NS) / self._slot_ns - EARLY_SLOTS
+        latest = first + (since_ns + START_SLACK_NS) / self._slot_ns + EARLY_SLOTS
         if not earliest <= slot <= latest:
             return Place(None, False, None)
         self._start(slot, now_ns)

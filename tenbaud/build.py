@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -12,6 +12,7 @@ from channel.codec import Codec
 from channel.errors import TenbaudError
 from channel.flight_log import FlightColumns, FlightLog
 from channel.identity import Identity, numerics_probe
+from channel.impairments import LineFaults, parse_impairments
 from channel.limits import CommandLimits
 from channel.terms import Clock, Terms
 from tenbaud.build_codec import build_codec
@@ -46,6 +47,23 @@ class Agreement:
         """Return the ticks of the flight: whole samples, at least one."""
         samples = round(self.config.duration_s * 1e9) // self.terms.sample_ns
         return max(1, samples) * self.terms.ticks_per_sample
+
+    @property
+    def faults(self) -> LineFaults:
+        """Return what goes wrong on the line, on purpose."""
+        return parse_impairments(self.config.link.impairments)
+
+    @property
+    def desyncs_expected(self) -> float:
+        """Return how many lockstep failures were asked for.
+
+        An inverted bit passes the frame's 16-bit check once in 65,536 times, so raw errors on the
+        downlink explain any number.
+        """
+        if self.faults.down.raw or self.faults.up.raw:
+            return math.inf
+        ends = (self.config.transmitter, self.config.receiver)
+        return len([end for end in ends if end.sabotage])
 
     @property
     def window_start_tick(self) -> int:
@@ -97,7 +115,11 @@ def build_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:
         terms = on_serial_line(config.link, codec, terms)
     if lead != "auto":
         return terms
-    return terms.with_shortest_lead(clock)
+    shortest = terms.with_shortest_lead(clock)
+    delay_ns = parse_impairments(config.link.impairments).longest_delay_ns
+    if not delay_ns:
+        return shortest
+    return replace(terms, lead_ticks=terms.lead_needed_ticks + -(-delay_ns // terms.tick_ns))
 
 
 def build_limits(config: FlightConfig) -> CommandLimits:

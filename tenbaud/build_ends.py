@@ -5,8 +5,11 @@ from __future__ import annotations
 import secrets
 from pathlib import Path
 
+from channel.codec import Codec
+from channel.impairments import Direction, ImpairedLine
 from channel.line import Line
 from channel.recording import Recorder
+from channel.sabotage import SabotagedCodec, parse_sabotage
 from channel.shaper import SlotShaper, UplinkMeter
 from channel.uplink import Uplink
 from channel.wire import Wire
@@ -30,7 +33,12 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
     """Return the sensor node of a configuration."""
     config, terms = agreement.config, agreement.terms
     session = TransmitterSession(
-        agreement.codec, terms, agreement.identity, secrets.randbits(32), recorder
+        sabotaged(agreement.codec, config.transmitter.sabotage),
+        terms,
+        agreement.identity,
+        secrets.randbits(32),
+        recorder,
+        stop_on_desync=config.transmitter.on_desync == "stop",
     )
     reference = build_reference(config)
     scores = Scores(
@@ -39,20 +47,46 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
         (LAG_SAMPLES_MAX + 2) * terms.ticks_per_sample,
         reference.angle_rad if config.receiver.controller == "pid" else lambda _tick: None,
     )
-    return TransmitterNode(session, build_rig(config), build_guard(agreement), scores, recorder)
+    # Only a rig that hurts nobody is armed again by itself.
+    rearm_s = config.link.peer_timeout_s if config.transmitter.rig == "simulated" else None
+    rearm_ticks = None if rearm_s is None else ticks_of(rearm_s, config)
+    return TransmitterNode(
+        session, build_rig(config), build_guard(agreement), scores, recorder, rearm_ticks
+    )
 
 
 def build_uplink(agreement: Agreement, wire: Wire) -> Uplink:
     """Return the transmitter's way out onto a line: grid, delivery delay and meter."""
     terms = agreement.terms
     alphabet = agreement.codec.coder.alphabet
-    return Uplink(SlotShaper(terms), Line(terms.symbol_delay_ns), UplinkMeter(alphabet), wire)
+    line = build_line(agreement, "up", wire)
+    return Uplink(SlotShaper(terms), line, UplinkMeter(alphabet), wire)
+
+
+def build_line(agreement: Agreement, direction: Direction, wire: Wire) -> Line:
+    """Return one direction of the line, with what goes wrong on it."""
+    one = agreement.faults.up if direction == "up" else agreement.faults.down
+    delay_ns = agreement.terms.symbol_delay_ns if direction == "up" else 0
+    if not one.any:
+        return Line(delay_ns)
+    alphabet = agreement.codec.coder.alphabet
+    return ImpairedLine(one, alphabet, f"{agreement.config.seed} {direction}", wire, delay_ns)
+
+
+def sabotaged(codec: Codec, text: str) -> Codec:
+    """Return the codec, spoilt as the configuration asks."""
+    if not text:
+        return codec
+    try:
+        return SabotagedCodec(codec, parse_sabotage(text))
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
 
 
 def build_receiver(agreement: Agreement, recorder: Recorder | None, wire: Wire) -> ReceiverEndpoint:
     """Return the controller node of a configuration."""
     session = ReceiverSession(
-        agreement.codec,
+        sabotaged(agreement.codec, agreement.config.receiver.sabotage),
         agreement.terms,
         build_controller(agreement.config),
         agreement.identity,

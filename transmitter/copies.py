@@ -53,6 +53,15 @@ class Copies:
         self._last_command = terms.initial_command
         self._live: deque[Vector | None] = deque([None] * terms.lead_ticks)
 
+    def restart(self, state: CodecState, hold: Vector) -> None:
+        """Take a new common state; the `D` ticks from its first one on have the command `hold`."""
+        self.confirmed = self._provisional = state
+        self._commands = deque([hold] * self.terms.lead_ticks)
+        self._last_command = hold
+        self._live = deque([None] * self.terms.lead_ticks)
+        self._sent.clear()
+        self._assumed.clear()
+
     @property
     def next_sample(self) -> int:
         """Return the sample whose word is to be sent next."""

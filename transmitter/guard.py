@@ -3,7 +3,8 @@
 Every tick it is asked what to put on the motors. A command passes, in this order, a finite check, the
 clamp and the slew limit; with soft angle limits exceeded, or a sensor that cannot be trusted, nothing
 passes. When commands stay away the last one is held; after the time-out the voltage is taken to the
-safe one along a ramp, and there it stays, latched: while it is latched no symbol leaves.
+safe one along a ramp, and there it stays, latched: while it is latched no symbol leaves. It is
+re-armed on purpose only.
 """
 
 from __future__ import annotations
@@ -55,6 +56,8 @@ class Guard:
         self.state = GuardState.READY
         self.reason = ""
         """why it ramps or latched"""
+        self.timed_out = False
+        """whether that was nothing but commands that stayed away"""
         self.volts = settings.safe_volts
         self._age_ticks = 0
         self._ramp_from = settings.safe_volts
@@ -77,13 +80,27 @@ class Guard:
                     f"{limits[axis]:g} rad"
                 )
 
-    def trip(self, reason: str) -> None:
+    def trip(self, reason: str, timed_out: bool = False) -> None:
         """Take the voltage down from now on."""
         if not self.stopped:
             self.state = GuardState.RAMPING
             self.reason = reason
+            self.timed_out = timed_out
             self._ramp_from = self.volts
             self._ramp_tick = 0
+        elif self.timed_out and not timed_out:
+            # Something worse than silence: no command makes it good again.
+            self.timed_out = False
+            self.reason = reason
+
+    def rearm(self) -> None:
+        """Pass commands again, from the voltage that the motors have now."""
+        if not self.timed_out:
+            raise RuntimeError(f"the guard cannot be re-armed: {self.reason or 'it is not stopped'}")
+        self.state = GuardState.READY
+        self.reason = ""
+        self.timed_out = False
+        self._age_ticks = 0
 
     def apply(self, tick: int, command: Vector | None) -> Vector:
         """Return the voltages of this tick; `command` is None when none has come."""
@@ -105,7 +122,7 @@ class Guard:
         if self.state is GuardState.RUNNING:
             self.state = GuardState.HOLDING
         if self._age_ticks > self._settings.timeout_ticks:
-            self.trip(f"no command for {self._age_ticks} ticks up to tick {tick}")
+            self.trip(f"no command for {self._age_ticks} ticks up to tick {tick}", timed_out=True)
 
     def _ramp(self) -> None:
         self._ramp_tick += 1

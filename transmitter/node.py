@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from channel.codec import Vector
 from channel.events import EVENT_CHANNEL, Event, EventKind, event_row
-from channel.frames import Frame, Symbol
+from channel.frames import Frame, Why
 from channel.recording import NullRecorder, Recorder
 from transmitter.encoder_watch import EncoderWatch
 from transmitter.guard import Guard, GuardState
@@ -21,7 +21,12 @@ STOPPED = "stopped by the user"
 
 
 class TransmitterNode:
-    """Everything of the sensor node but time and transport."""
+    """Everything of the sensor node but time and transport.
+
+    `rearm_ticks`: re-arm the guard by itself, with a rejoin, after commands have stayed away, for as
+    long as the receiver has been silent for no more than this many ticks. None: never; for every rig
+    that could hurt somebody the way back is to start the node again.
+    """
 
     def __init__(
         self,
@@ -30,6 +35,7 @@ class TransmitterNode:
         guard: Guard,
         scores: Scores,
         recorder: Recorder | None = None,
+        rearm_ticks: int | None = None,
     ) -> None:
         self.session = session
         self.rig = rig
@@ -38,14 +44,16 @@ class TransmitterNode:
         self.commands_late = 0
         self.sensor_fault: str | None = None
         self.tick = 0
+        self.rearmed = 0
+        self._rearm_ticks = rearm_ticks
         self._recorder = recorder or NullRecorder()
         self._reading: Reading | None = None
         self._watch = EncoderWatch(session.codec, session.terms.tick_ns / 1e9)
         self._applied = guard.volts
         self._guard_told = guard.state
 
-    def measure(self, tick: int) -> list[Symbol] | None:
-        """Read the rig; return the symbols to send, or None when the rig has no more to read."""
+    def measure(self, tick: int) -> list[Frame] | None:
+        """Read the rig; return the frames to send, or None when the rig has no more to read."""
         self.tick = tick
         reading = self.rig.read(tick)
         if reading is None:
@@ -56,9 +64,12 @@ class TransmitterNode:
             self._recorder.write(DEVICE_CHANNEL, time_ns, device_row(tick, reading.device))
         self._check(tick, reading)
         self.scores.on_angles(tick, reading.true_rad or reading.measured_rad)
+        asking: list[Frame] = []
         if self.guard.stopped:
-            return []
-        return self.session.on_measurement(tick, reading.measured_rad)
+            if not self._may_rearm:
+                return []
+            asking = self.session.rejoin(Why.GUARD, "the guard stopped")
+        return asking + self.session.on_measurement(tick, reading.measured_rad)
 
     def deliver(self, frame: Frame) -> list[Frame]:
         """Hand an arrived frame to the session and score what it confirmed; return the answers."""
@@ -69,6 +80,9 @@ class TransmitterNode:
             pairs = zip(done.flown.coded, done.live, strict=True)
             for tick, (coded, live) in enumerate(pairs, done.sample * first):
                 self.scores.on_estimate(tick, coded, live)
+        if self.guard.stopped and self._may_rearm and self.session.phase is Phase.FLYING:
+            self.guard.rearm()
+            self.rearmed += 1
         return answers
 
     def actuate(self, tick: int, lateness_ns: int = 0) -> Vector:
@@ -76,11 +90,13 @@ class TransmitterNode:
         reading = self._reading
         if reading is None:
             raise RuntimeError(f"tick {tick} is actuated before it was measured")
-        flying = self.session.phase is Phase.FLYING
-        if self.session.phase is Phase.ENDED:
-            self.guard.trip(self.session.end_reason)
-        command = self.session.command(tick) if flying else None
-        late = command is None and flying and not self.guard.stopped
+        session = self.session
+        if session.phase is Phase.ENDED:
+            self.guard.trip(session.end_reason)
+        asleep = session.phase in (Phase.GREETING, Phase.ENDED)
+        command = None if asleep else session.command(tick)
+        owed = session.phase is Phase.FLYING and tick >= session.epoch_tick
+        late = command is None and owed and not self.guard.stopped
         self.commands_late += late
         volts = self.guard.apply(tick, command)
         self.rig.write(tick, volts)
@@ -109,6 +125,21 @@ class TransmitterNode:
     def latched(self) -> bool:
         """Return whether the guard has reached the safe voltage and stays there."""
         return self.guard.state is GuardState.LATCHED
+
+    @property
+    def over(self) -> bool:
+        """Return whether the flight is over: latched, and nothing left to wait for."""
+        return self.latched and not self._may_rearm
+
+    @property
+    def _may_rearm(self) -> bool:
+        session = self.session
+        return (
+            self._rearm_ticks is not None
+            and self.guard.timed_out
+            and session.phase in (Phase.FLYING, Phase.REJOINING)
+            and self.tick - session.heard_tick <= self._rearm_ticks
+        )
 
     def tell(self, kind: EventKind, text: str) -> None:
         """Report something at the present tick."""

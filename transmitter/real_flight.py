@@ -7,15 +7,14 @@ become erasures at the receiver, and nothing is sent in a burst afterwards.
 
 from __future__ import annotations
 
-import heapq
 import time
 from collections.abc import Callable, Sequence
 
 from channel.errors import ConfigMismatch, FrameError, LinkLost
 from channel.events import EventKind
-from channel.frames import Frame, Symbol
-from channel.line import Delivery
+from channel.frames import Commands, Frame, Symbol
 from channel.links.base import Link
+from channel.outbox import Outbox
 from channel.uplink import Uplink
 from channel.virtual import is_envelope
 from transmitter.landing import Landing
@@ -24,6 +23,7 @@ from transmitter.scores import LatenessMeter
 from transmitter.session import Phase
 
 HELLO_PERIOD_S = 0.2
+"""Longest time between two requests for a session; a sample period if that is shorter."""
 LEAD_IN_NS = 20_000_000
 """Between the handshake and tick 0."""
 
@@ -43,13 +43,15 @@ class RealFlight:
         self._wire = uplink.wire
         self._link = link
         self._should_stop = should_stop
-        self._outbox: list[tuple[int, int, bytes, bool]] = []
-        self._sent = 0
+        self._outbox = Outbox()
         self._start_ns = 0
         self._peer_told = True
+        """what was last told about the receiver: it is there"""
         self.lateness = LatenessMeter()
         self.ticks_missed = 0
         self.wire_bytes_down = 0
+        self.control_bytes_down = 0
+        """of `wire_bytes_down`, those that carried no commands"""
         self.malformed = 0
 
     def greet(self, peer_timeout_s: float) -> None:
@@ -57,6 +59,7 @@ class RealFlight:
         session = self._node.session
         self._start_ns = asked_ns = time.monotonic_ns()
         next_hello_ns = asked_ns
+        period_ns = min(session.terms.sample_ns, round(HELLO_PERIOD_S * 1e9))
         while session.phase is Phase.GREETING and session.refusal is None:
             now_ns = time.monotonic_ns()
             if self._should_stop():
@@ -68,18 +71,21 @@ class RealFlight:
                 )
             if now_ns >= next_hello_ns:
                 self._offer([session.hello()])
-                next_hello_ns = now_ns + round(HELLO_PERIOD_S * 1e9)
-            self._take_in(HELLO_PERIOD_S)
+                next_hello_ns = now_ns + period_ns
+            self._take_in(period_ns / 1e9)
         self._send_due()
 
     def run(self, ticks: int) -> int:
-        """Fly until `ticks`, the end of the rig or the safe voltage; return the ticks that passed."""
+        """Fly so many ticks, or until the end of the rig or the safe voltage; return the tick reached.
+
+        The first tick is that of the session's first sample, which is not 0 when the receiver has
+        been flying before.
+        """
         node = self._node
         tick_ns = node.session.terms.tick_ns
-        self._start_ns = time.monotonic_ns() + LEAD_IN_NS
-        self._peer_told = False
-        tick = 0
-        while tick < ticks and not node.latched:
+        tick = first = node.session.epoch_tick
+        self._start_ns = time.monotonic_ns() + LEAD_IN_NS - first * tick_ns
+        while tick < first + ticks and not node.over:
             if self._should_stop():
                 node.guard.trip(STOPPED)
             self._wait_until(tick * tick_ns)
@@ -90,10 +96,10 @@ class RealFlight:
                 self.ticks_missed += missed
                 tick += missed
             self.lateness.add(lateness_ns)
-            symbols = node.measure(tick)
-            if symbols is None:
+            frames = node.measure(tick)
+            if frames is None:
                 return tick
-            self._offer(symbols)
+            self._offer(frames)
             self._send_due()
             node.actuate(tick, lateness_ns)
             self._watch_peer()
@@ -111,6 +117,7 @@ class RealFlight:
             + terms.symbol_delay_ns
             + terms.downlink_budget_ns
             + terms.deadline_allowance_ns
+            + self._uplink.line.longest_delay_ns
             + terms.uplink_line_ns
             + terms.downlink_line_ns
         )
@@ -122,6 +129,7 @@ class RealFlight:
                 break
             landing.step(self._now_ns())
             self._take_in((min(until_ns, landing.next_ns) - self._now_ns()) / 1e9)
+        # The farewell is spared the line's delay: this process is about to end.
         for frame in self._node.session.bye(reason):
             self._link.send(self._wire.encode(frame))
         while not landing.over:
@@ -138,9 +146,9 @@ class RealFlight:
     def _take_in(self, timeout_s: float) -> None:
         """Send what is due and take one message, waiting for either at most `timeout_s`."""
         self._send_due()
-        if self._outbox:
-            due_s = (self._outbox[0][0] - self._now_ns()) / 1e9
-            timeout_s = max(0.0, min(timeout_s, due_s))
+        due_ns = self._outbox.next_due_ns
+        if due_ns is not None:
+            timeout_s = max(0.0, min(timeout_s, (due_ns - self._now_ns()) / 1e9))
         data = self._link.receive(timeout_s)
         if data is None:
             return
@@ -156,27 +164,21 @@ class RealFlight:
             self.malformed += 1
             self._node.tell(EventKind.MALFORMED, f"dropped a frame: {error}")
             return
+        if not isinstance(frame, Commands):
+            self.control_bytes_down += self._wire.size(data)
         self._offer(self._node.deliver(frame))
 
     def _offer(self, frames: Sequence[Frame]) -> None:
         for frame in frames:
-            for delivery in self._uplink.offer(frame, self._now_ns()):
-                self._queue(delivery, frame)
-
-    def _queue(self, delivery: Delivery, frame: Frame) -> None:
-        if delivery.data is None:
-            return
-        self._sent += 1
-        is_symbol = isinstance(frame, Symbol)
-        entry = (delivery.arrival_ns, self._sent, delivery.data, is_symbol)
-        heapq.heappush(self._outbox, entry)
+            deliveries = self._uplink.offer(frame, self._now_ns())
+            self._outbox.put(deliveries, isinstance(frame, Symbol))
 
     def _send_due(self) -> None:
-        while self._outbox and self._outbox[0][0] <= self._now_ns():
-            _, _, data, is_symbol = heapq.heappop(self._outbox)
+        for data, is_symbol in self._outbox.take(self._now_ns()):
             self._link.send(data, is_symbol)
 
     def _watch_peer(self) -> None:
-        if not self._peer_told and not self._link.peer_present():
-            self._peer_told = True
-            self._node.tell(EventKind.PEER, "the receiver is gone")
+        present = self._link.peer_present()
+        if present is not self._peer_told:
+            self._peer_told = present
+            self._node.tell(EventKind.PEER, f"the receiver is {'there again' if present else 'gone'}")

@@ -4,6 +4,9 @@ Three things drive it: a measurement (`on_measurement`, every tick), a frame tha
 (`on_frame`) and the question which command a tick has (`command`). The symbol of a slot depends on
 the measurement at its sample's first tick and on the provisional copy of the codec; the confirmed
 copy moves by echoes alone, and its digest is compared with the receiver's for every sample.
+
+When lockstep is gone (digests that differ, echoes lost or too old, a receiver that was restarted) no
+symbol leaves any more; the session asks for a new epoch, and goes on from the state in the answer.
 """
 
 from __future__ import annotations
@@ -23,21 +26,23 @@ from channel.frames import (
     Hello,
     Refuse,
     Symbol,
+    Unknown,
     Welcome,
+    Why,
 )
 from channel.identity import Identity, differing_fields
 from channel.limits import from_millivolts
+from channel.lockstep import HISTORY_SAMPLES, LOCKSTEP_CHANNEL, History
 from channel.recording import NullRecorder, Recorder
 from channel.terms import Terms
 from channel.wire import WIRE_VERSION
-from channel.words import ERASED, Word
+from channel.words import ERASED
 from transmitter.copies import Confirmed, Copies
 from transmitter.records import ESTIMATE_CHANNEL, SAMPLE_CHANNEL
+from transmitter.rejoin import Asking, start_of
 
-LAG_SAMPLES_MAX = 64
-"""Echoes may be this many samples behind before the session is given up."""
-
-INPUTS_KEPT = 64
+LAG_SAMPLES_MAX = HISTORY_SAMPLES
+"""Echoes may be this many samples behind before a rejoin is asked for."""
 
 
 class Phase(Enum):
@@ -45,6 +50,7 @@ class Phase(Enum):
 
     GREETING = "waiting for a receiver"
     FLYING = "flying"
+    REJOINING = "asking for a common state"
     ENDED = "ended"
 
 
@@ -52,6 +58,7 @@ class TransmitterSession:
     """Turns measurements into symbols and echoes into commands; see the module's text.
 
     `incarnation` is drawn by the caller (32 bits), so that the session itself stays deterministic.
+    `stop_on_desync`: end the flight at the first digest that differs, instead of rejoining.
     """
 
     def __init__(
@@ -61,6 +68,8 @@ class TransmitterSession:
         identity: Identity,
         incarnation: int,
         recorder: Recorder | None = None,
+        *,
+        stop_on_desync: bool = False,
     ) -> None:
         self.codec = codec
         self.terms = terms
@@ -71,54 +80,74 @@ class TransmitterSession:
         self.epoch = 0
         self.copies = Copies(codec, terms)
         self.counts: Counter[str] = Counter()
-        """digest_checks, desyncs, stale_frames, words_missed, erasures"""
+        """digest_checks, desyncs, rejoins, stale_frames, words_missed, erasures"""
         self.end_reason = ""
         self.refusal: str | None = None
         self.desync: Desync | None = None
+        """the last one"""
+        self.heard_tick = 0
+        """when the last frame of the present epoch came"""
+        self.epoch_tick = 0
+        """first tick of the present epoch"""
         self.confirmed: deque[Confirmed] = deque(maxlen=2 * LAG_SAMPLES_MAX)
         """samples confirmed and not yet looked at by the node"""
         self.events: deque[Event] = deque(maxlen=1000)
-        self.inputs: deque[tuple[int, Word]] = deque(maxlen=INPUTS_KEPT)
+        self.history = History(codec)
+        self._asking = Asking(identity, incarnation, terms)
+        self._stop_on_desync = stop_on_desync
         self._recorder = recorder or NullRecorder()
         self._due: deque[tuple[int, Vector]] = deque(
             enumerate([terms.initial_command] * terms.lead_ticks)
         )
         """commands of coming ticks"""
-        self._tick = 0
+        self._tick = -1
 
     # What happens at a tick
 
     def hello(self) -> Hello:
         """Return the frame that asks for a session; to be repeated until there is one."""
-        identity = self.identity
-        return Hello(
-            self.incarnation, identity.version, identity.config_digest, identity.numerics_probe
-        )
+        return self._asking.hello(self.session_number, self.epoch, self._tick)
 
-    def on_measurement(self, tick: int, measurement: Vector) -> list[Symbol]:
-        """Take the measurement of a tick; return the symbols of the sample that begins with it.
+    def on_measurement(self, tick: int, measurement: Vector) -> list[Frame]:
+        """Take the measurement of a tick; return the frames that leave with it.
 
-        A word has a slot for each of its symbols; whoever sends them holds each until its slot.
-
-        A tick that was never seen, because the process was held up, sent no symbol: its sample's
-        word counts as not sent, and the next sample starts afresh.
+        These are the symbols of the sample that begins with it, or the request for a new epoch. A word
+        has a slot for each of its symbols; whoever sends them holds each until its slot. A tick that
+        was never seen, because the process was held up, sent no symbol: its sample's word counts as
+        not sent, and the next sample starts afresh.
         """
         self._tick = tick
+        if self.phase is Phase.REJOINING:
+            return self._ask()
         if self.phase is not Phase.FLYING:
             return []
         sample, offset = divmod(tick, self.terms.ticks_per_sample)
+        if sample - self.copies.confirmed.sample > LAG_SAMPLES_MAX:
+            return self.rejoin(Why.LAG, f"no echo for {LAG_SAMPLES_MAX} samples")
         while self.copies.next_sample < sample:
             self.counts["words_missed"] += 1
             self.copies.sent(ERASED)
-        if self.copies.lag_samples > LAG_SAMPLES_MAX:
-            self._end(f"no echo for {LAG_SAMPLES_MAX} samples: the receiver or its line is gone")
-            return []
         if offset != 0 or self.copies.next_sample != sample:
             return []
         word = self.codec.encode(self.copies.state_before_next(), measurement)
         self.copies.sent(word)
         first = sample * self.terms.symbols_per_word
         return [self._symbol(slot, symbol) for slot, symbol in enumerate(word, first)]
+
+    def rejoin(self, why: Why, text: str) -> list[Frame]:
+        """Stop sending symbols and ask for a new epoch; return the frames that do."""
+        if self.phase is not Phase.FLYING:
+            return []
+        self.phase = Phase.REJOINING
+        self._asking.begin(why, self._tick)
+        self._tell(EventKind.REJOIN, f"{text}: asking for a new epoch after {self.epoch}")
+        return self._ask()
+
+    def _ask(self) -> list[Frame]:
+        if not self._asking.due(self._tick):
+            return []
+        report = self.desync if self._asking.why is Why.DESYNC else None
+        return [self.hello()] if report is None else [report, self.hello()]
 
     def _symbol(self, slot: int, symbol: int) -> Symbol:
         number = self.codec.coder.alphabet.symbol_number(symbol)
@@ -137,11 +166,15 @@ class TransmitterSession:
         match frame:
             case Commands() if self._is_current(frame.session) and frame.epoch == self.epoch:
                 return self._on_commands(frame)
-            case Welcome() if frame.incarnation == self.incarnation:
+            case Welcome() if self._asking.is_answered_by(frame):
                 self._on_welcome(frame)
+            case Unknown() if self._is_current(frame.session) and frame.epoch == self.epoch:
+                return self.rejoin(Why.UNKNOWN, "the receiver does not know this session (any more)")
+            case Desync() if frame.session == self.session_number and self.desync is not None:
+                self._record_failure(self.desync, frame)
             case Refuse() if frame.incarnation == self.incarnation:
                 return self._on_refuse(frame)
-            case Bye() if self._is_current(frame.session):
+            case Bye() if self._has_session and frame.session == self.session_number:
                 self._end(f"the receiver ended the flight: {frame.reason}")
             case ForeignVersion() if self.phase is Phase.GREETING:
                 self.refusal = (
@@ -154,45 +187,63 @@ class TransmitterSession:
 
     def bye(self, reason: str) -> list[Frame]:
         """End the session from this side."""
-        was_flying = self.phase is Phase.FLYING
+        had_session = self._has_session
         self._end(reason)
-        return [Bye(self.session_number, reason)] if was_flying else []
+        return [Bye(self.session_number, reason)] if had_session else []
 
     def _on_welcome(self, welcome: Welcome) -> None:
-        if self.phase is not Phase.GREETING:
+        newer = welcome.session == self.session_number and welcome.epoch > self.epoch
+        if self.phase is Phase.ENDED or (self.phase is Phase.FLYING and not newer):
+            self.counts["stale_frames"] += 1
             return
+        try:
+            state, hold = start_of(welcome, self.codec, self.terms)
+        except ValueError as error:
+            self.counts["stale_frames"] += 1
+            self._tell(EventKind.STALE, f"dropped a welcome: {error}")
+            return
+        again = self.phase is not Phase.GREETING
         self.session_number = welcome.session
         self.epoch = welcome.epoch
+        self.heard_tick = self._tick
+        self.copies.restart(state, hold)
+        self.epoch_tick = state.sample * self.terms.ticks_per_sample
+        self._due = deque(enumerate([hold] * self.terms.lead_ticks, self.epoch_tick))
         self.phase = Phase.FLYING
-        self._tell(EventKind.STARTED, f"session {welcome.session:08x} begins")
+        self.counts["rejoins"] += again
+        text = f"session {welcome.session:08x}, epoch {welcome.epoch}, begins at sample {state.sample}"
+        self._tell(EventKind.REJOIN if again else EventKind.STARTED, text)
 
     def _on_refuse(self, refuse: Refuse) -> list[Frame]:
-        if self.phase is not Phase.GREETING:
+        if self.phase not in (Phase.GREETING, Phase.REJOINING):
             return []
         lines = [refuse.reason]
         if refuse.config and refuse.config != self.identity.config:
             lines += differing_fields(self.identity.config, refuse.config)
         self.refusal = "\n  ".join(lines)
         self._tell(EventKind.REFUSED, self.refusal)
+        if self.phase is Phase.REJOINING:
+            self._end(f"the receiver refused to go on: {refuse.reason}")
         return [Bye(0, self.refusal)]
 
     def _on_commands(self, frame: Commands) -> list[Frame]:
+        self.heard_tick = self._tick
         for echo in frame.echoes:
             expected = self.copies.confirmed.sample
             if echo.sample < expected:
                 continue
             if echo.sample > expected:
-                self._end(
-                    f"the echo of sample {expected} never came (got {echo.sample}): more than "
-                    f"{self.terms.repeats} command frames in a row were lost"
+                return self.rejoin(
+                    Why.GAP,
+                    f"the echo of sample {expected} never came (got {echo.sample}), more than "
+                    f"{self.terms.repeats} command frames in a row were lost",
                 )
-                return []
             problem = self._confirm(echo)
-            if problem is not None:
-                return [problem]
+            if problem:
+                return problem
         return []
 
-    def _confirm(self, echo: Echo) -> Desync | None:
+    def _confirm(self, echo: Echo) -> list[Frame]:
         """Advance the confirmed copy by one echo; return the report of a desync, if it is one."""
         inputs = self.codec.model.input_size
         per_sample = self.terms.ticks_per_sample
@@ -206,7 +257,7 @@ class TransmitterSession:
             known = word is ERASED or echo.sample < self.copies.next_sample
         if not known or len(echo.millivolts) != inputs * per_sample:
             self.counts["stale_frames"] += 1
-            return None
+            return []
         commands = [
             from_millivolts(echo.millivolts[index * inputs : (index + 1) * inputs])
             for index in range(per_sample)
@@ -214,13 +265,13 @@ class TransmitterSession:
         done = self.copies.confirm(word, commands, echo.digest)
         self.confirmed.append(done)
         self._due.extend(enumerate(commands, echo.sample * per_sample + self.terms.lead_ticks))
-        self.inputs.append((done.sample, word))
+        self.history.add(self.epoch, word, done.flown.state)
         self.counts["digest_checks"] += 1
         self.counts["erasures"] += word is ERASED
         self._record(done)
-        return None if done.digest == echo.digest else self._on_desync(done)
+        return [] if done.digest == echo.digest else self._on_desync(done)
 
-    def _on_desync(self, done: Confirmed) -> Desync:
+    def _on_desync(self, done: Confirmed) -> list[Frame]:
         self.counts["desyncs"] += 1
         self.desync = Desync(
             self.session_number,
@@ -236,13 +287,20 @@ class TransmitterSession:
             f"receiver {done.peer_digest:016x}",
             done.sample,
         )
-        self._end("the two copies of the codec disagree")
-        return self.desync
+        self._record_failure(self.desync, None)
+        if self._stop_on_desync:
+            ended = [self.desync, *self.bye("the two copies of the codec disagree")]
+            return ended
+        return self.rejoin(Why.DESYNC, "the two copies of the codec disagree")
 
     # Reports
 
     def _is_current(self, session: int) -> bool:
         return self.phase is Phase.FLYING and session == self.session_number
+
+    @property
+    def _has_session(self) -> bool:
+        return self.phase in (Phase.FLYING, Phase.REJOINING)
 
     def _end(self, reason: str) -> None:
         if self.phase is not Phase.ENDED:
@@ -256,6 +314,16 @@ class TransmitterSession:
         event = Event(kind, now_ns, at, text)
         self.events.append(event)
         self._recorder.write(EVENT_CHANNEL, now_ns, event_row(event))
+
+    def _record_failure(self, own: Desync, theirs: Desync | None) -> None:
+        """Write a lockstep failure down: when it is found, and once more with the receiver's state."""
+        if theirs is not None and (theirs.epoch, theirs.sample) != (own.epoch, own.sample):
+            return
+        peer = b"" if theirs is None else theirs.state
+        row = self.history.failure_row(
+            own.epoch, own.sample, own.transmitter_digest, own.receiver_digest, peer
+        )
+        self._recorder.write(LOCKSTEP_CHANNEL, own.sample * self.terms.sample_ns, row)
 
     def _record(self, done: Confirmed) -> None:
         terms = self.terms

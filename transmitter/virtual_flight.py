@@ -15,11 +15,15 @@ from typing import NamedTuple
 
 from channel.errors import FrameError
 from channel.events import EventKind
-from channel.frames import Frame
+from channel.frames import Commands, Frame
 from channel.line import Delivery, Line
 from channel.uplink import Uplink
 from channel.virtual import Peer, Reply
 from transmitter.node import STOPPED, TransmitterNode
+from transmitter.session import Phase
+
+GREETINGS_MAX = 1000
+"""Requests for a session before the line is given up."""
 
 
 class _Arrival(NamedTuple):
@@ -42,32 +46,47 @@ class VirtualFlight:
         self._order = count()
         self._deadline_ns: int | None = None
         self.wire_bytes_down = 0
+        self.control_bytes_down = 0
+        """of `wire_bytes_down`, those that carried no commands"""
         self.malformed = 0
 
     def greet(self) -> None:
-        """Carry the handshake out; the session then flies or holds a refusal."""
-        self._offer([self._node.session.hello()], 0)
-        while self._arrivals:
-            self._pass_to(self._arrivals[0].time_ns)
+        """Carry the handshake out; the session then flies or holds a refusal, or nobody answered.
+
+        It takes place before the flight's time begins, however long the line takes.
+        """
+        session = self._node.session
+        for _ in range(GREETINGS_MAX):
+            self._offer([session.hello()], 0)
+            while self._arrivals:
+                self._pass_to(self._arrivals[0].time_ns)
+            if session.phase is not Phase.GREETING or session.refusal is not None:
+                return
 
     def run(self, ticks: int, should_stop: Callable[[], bool] = lambda: False) -> int:
-        """Fly until `ticks`, the end of the rig or the safe voltage; return the ticks that passed."""
+        """Fly so many ticks, or until the end of the rig or the safe voltage; return the tick reached.
+
+        The first tick is that of the session's first sample, which is not 0 when the receiver has
+        been flying before.
+        """
         node = self._node
         tick_ns = node.session.terms.tick_ns
-        for tick in range(ticks):
+        first = node.session.epoch_tick
+        for tick in range(first, first + ticks):
             now_ns = tick * tick_ns
             self._pass_to(now_ns)
-            if node.latched:
+            if node.over:
                 return tick
             if should_stop():
                 node.guard.trip(STOPPED)
-            symbols = node.measure(tick)
-            if symbols is None:
+            frames = node.measure(tick)
+            if frames is None:
                 return tick
-            self._offer(symbols, now_ns)
-            self._pass_to(now_ns)
+            if frames:
+                self._offer(frames, now_ns)
+                self._pass_to(now_ns)
             node.actuate(tick)
-        return ticks
+        return first + ticks
 
     def finish(self, tick: int, reason: str) -> None:
         """Let the last echoes come in, then end the session on both sides."""
@@ -75,9 +94,13 @@ class VirtualFlight:
         now_ns = tick * terms.tick_ns
         # What is still on the line arrives within one delivery and one deadline either way.
         linger_ns = terms.uplink_delivery_ns + terms.symbol_delay_ns + terms.downlink_budget_ns
+        linger_ns += self._uplink.line.longest_delay_ns + self._downlink.longest_delay_ns
         self._pass_to(now_ns + linger_ns, deadlines=False)
-        self._offer(self._node.session.bye(reason), now_ns + linger_ns)
-        self._pass_to(now_ns + linger_ns, deadlines=False)
+        # The farewell is spared what goes wrong on the line: the receiver's process must hear it.
+        for frame in self._node.session.bye(reason):
+            data = self._wire.encode(frame)
+            self._uplink.meter.count(frame, self._wire.size(data))
+            self._step(now_ns + linger_ns, data)
 
     def _offer(self, frames: Sequence[Frame], now_ns: int) -> None:
         for frame in frames:
@@ -121,4 +144,6 @@ class VirtualFlight:
             self.malformed += 1
             self._node.tell(EventKind.MALFORMED, f"dropped a frame: {error}")
             return
+        if not isinstance(frame, Commands):
+            self.control_bytes_down += self._wire.size(data)
         self._offer(self._node.deliver(frame), now_ns)

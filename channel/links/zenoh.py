@@ -35,8 +35,10 @@ class ZenohLink(LinkBase):
     """One end of a session over Zenoh.
 
     `listen` and `connect` are Zenoh endpoints; one end listens, the other connects, either may start
-    first. On the virtual clock waits are kept to a tenth of a second, and messages are quicker. Raises
-    LinkError for a name or endpoint that cannot be used.
+    first. On the virtual clock waits are kept to a tenth of a second, and messages are quicker.
+    `best_effort`: a symbol that the network cannot take at once is dropped, an erasure, instead of
+    keeping the loop waiting; all else stays reliable. Raises LinkError for a name or endpoint that
+    cannot be used.
     """
 
     name = "zenoh"
@@ -50,6 +52,7 @@ class ZenohLink(LinkBase):
         connect: tuple[str, ...] = (),
         scouting: bool = False,
         insecure: bool = False,
+        best_effort: bool = False,
         clock: Clock = "real",
     ) -> None:
         super().__init__()
@@ -68,12 +71,12 @@ class ZenohLink(LinkBase):
         except zenoh.ZError as error:
             raise LinkError(f"Zenoh cannot use {', '.join(listen + connect)}: {error}") from error
         try:
-            self._declare(role, f"tenbaud/{session_name}", clock)
+            self._declare(role, f"tenbaud/{session_name}", clock, best_effort)
         except BaseException:
             self.close()
             raise
 
-    def _declare(self, role: Role, root: str, clock: Clock) -> None:
+    def _declare(self, role: Role, root: str, clock: Clock, best_effort: bool) -> None:
         inbound, other = ("down", "receiver") if role == "transmitter" else ("up", "transmitter")
         key = f"{root}/{inbound}/*"
         if clock == "virtual":
@@ -90,12 +93,14 @@ class ZenohLink(LinkBase):
         self._symbols, self._control = (
             self._session.declare_publisher(
                 f"{root}/{key}",
-                congestion_control=zenoh.CongestionControl.BLOCK,
+                congestion_control=zenoh.CongestionControl.DROP
+                if may_drop
+                else zenoh.CongestionControl.BLOCK,
                 priority=zenoh.Priority.REAL_TIME,
                 express=True,
-                reliability=zenoh.Reliability.RELIABLE,
+                reliability=zenoh.Reliability.BEST_EFFORT if may_drop else zenoh.Reliability.RELIABLE,
             )
-            for key in outbound
+            for key, may_drop in zip(outbound, (best_effort, False), strict=True)
         )
         # Declared last: who sees the token can be heard already.
         self._token = alive.declare_token(f"{root}/alive/{role}/{secrets.token_hex(4)}")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -28,17 +29,13 @@ def demo(
     link: options.DemoLink = None,
     line_rate: options.LineRate = None,
     downlink: options.Downlink = None,
-    rig: Annotated[str | None, typer.Option(help=options.RIG_HELP)] = None,
+    rig: options.Rig = None,
     dry_run: options.DryRun = False,
-    mismatch: Annotated[
-        list[float] | None,
-        typer.Option(
-            help="Simulated plant off the codec's model, 0.1 for 10 %; repeatable. Not given: 0 "
-            "and 0.1, one flight each (one as configured with --json or --config).",
-            show_default=False,
-        ),
-    ] = None,
+    mismatch: options.Mismatches = None,
     disturbance: options.Disturbance = None,
+    impair: options.Impair = None,
+    on_desync: options.OnDesync = None,
+    sabotage: options.Sabotage = None,
     settings: options.Settings = None,
     out: options.Out = None,
     json: options.AsJson = False,
@@ -48,11 +45,9 @@ def demo(
     [dim]tenbaud demo[/dim]
 
     [dim]tenbaud demo --preset tuned-10baud --clock real --duration 20 --mismatch 0.1[/dim]
-    """
-    from tenbaud.build import agree
-    from tenbaud.build_ends import check_parts
-    from tenbaud.config.load import load_config
 
+    [dim]tenbaud demo --impair "loss=0.3,up:flip=0.02" --sabotage sample=700,field=range[/dim]
+    """
     replayed = rig is not None and rig.startswith("replay")
     flights: list[float | None] = list(mismatch or ())
     if not flights:
@@ -60,33 +55,45 @@ def demo(
         flights = [None] if single else list(DEFAULT_MISMATCHES)
     if preset is None and config is None and replayed:
         preset = "uiuc-10baud"
-    agreements = [
-        agree(
-            load_config(
-                preset,
-                config,
-                options.overrides(
-                    duration=duration,
-                    seed=seed,
-                    lead=lead,
-                    delivery=delivery,
-                    link=link,
-                    line_rate=line_rate,
-                    downlink=downlink,
-                    rig=rig,
-                    dry_run=dry_run,
-                    mismatch=off,
-                    disturbance=disturbance,
-                    settings=settings,
-                ),
-            ),
-            clock.value,
+    changes = [
+        options.overrides(
+            duration=duration,
+            seed=seed,
+            lead=lead,
+            delivery=delivery,
+            link=link,
+            line_rate=line_rate,
+            downlink=downlink,
+            rig=rig,
+            dry_run=dry_run,
+            mismatch=off,
+            disturbance=disturbance,
+            impair=impair,
+            on_desync=on_desync,
+            sabotage=sabotage,
+            settings=settings,
         )
         for off in flights
     ]
+    agreements = _agree_all(preset, config, changes, clock)
+    raise typer.Exit(_fly_all(agreements, out, json))
+
+
+def _agree_all(
+    preset: str | None,
+    config: Path | None,
+    changes: list[dict[str, Any]],
+    clock: options.ClockOption,
+) -> list[Agreement]:
+    """Return the flights, each checked as far as it can be before anything starts."""
+    from tenbaud.build import agree
+    from tenbaud.build_ends import check_parts
+    from tenbaud.config.load import load_config
+
+    agreements = [agree(load_config(preset, config, change), clock.value) for change in changes]
     for agreement in agreements:
         check_parts(agreement.config)
-    raise typer.Exit(_fly_all(agreements, out, json))
+    return agreements
 
 
 def _fly_all(agreements: list[Agreement], out: options.Out, as_json: bool) -> int:

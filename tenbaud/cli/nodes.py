@@ -41,6 +41,9 @@ def transmit(
     disturbance: Annotated[
         str | None, typer.Option(help='Torque on the plant, such as "q=2e-3,step=0.5@30".')
     ] = None,
+    impair: options.Impair = None,
+    on_desync: options.OnDesync = None,
+    sabotage: options.Sabotage = None,
     settings: options.Settings = None,
     insecure: options.Insecure = False,
     out: options.Out = None,
@@ -70,6 +73,9 @@ def transmit(
         dry_run=dry_run,
         mismatch=mismatch,
         disturbance=disturbance,
+        impair=impair,
+        on_desync=on_desync,
+        sabotage=sabotage,
         settings=settings,
     )
     endpoints = (tuple(listen or ()), tuple(connect or ()), insecure)
@@ -93,6 +99,8 @@ def receive(
         str | None,
         typer.Option(help="replay:FILE when the transmitter replays: its voltages are used."),
     ] = None,
+    impair: options.Impair = None,
+    sabotage: options.Sabotage = None,
     settings: options.Settings = None,
     insecure: options.Insecure = False,
     out: options.Out = None,
@@ -117,6 +125,9 @@ def receive(
         line_rate=line_rate,
         downlink=downlink,
         rig=rig,
+        impair=impair,
+        sabotage=sabotage,
+        sabotaged_end="receiver",
         settings=settings,
     )
     endpoints = (tuple(listen or ()), tuple(connect or ()), insecure)

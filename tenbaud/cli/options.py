@@ -53,6 +53,15 @@ Session = Annotated[
 ]
 Listen = Annotated[list[str] | None, typer.Option(help="Zenoh endpoint to listen on; repeatable.")]
 Connect = Annotated[list[str] | None, typer.Option(help="Zenoh endpoint to connect to; repeatable.")]
+Mismatches = Annotated[
+    list[float] | None,
+    typer.Option(
+        "--mismatch",
+        help="Simulated plant off the codec's model, 0.1 for 10 %; repeatable. Not given: 0 "
+        "and 0.1, one flight each (one as configured with --json or --config).",
+        show_default=False,
+    ),
+]
 Link = Annotated[str | None, typer.Option(help="zenoh, or serial with --port.", show_default=False)]
 DemoLink = Annotated[
     str | None,
@@ -78,8 +87,36 @@ Downlink = Annotated[
         show_default=False,
     ),
 ]
+RIG_HELP = (
+    "simulated, replay:FILE for a recorded flight, or a real rig: cobs:PORT, ascii:PORT, qsb:PORT, "
+    "quarc:HOST:PORT, quarc-server:PORT, hil[:CARD]."
+)
+Rig = Annotated[str | None, typer.Option(help=RIG_HELP)]
 Disturbance = Annotated[
     str | None, typer.Option(help='Torque on the plant, such as "q=2e-3,step=0.5@30".')
+]
+Impair = Annotated[
+    str | None,
+    typer.Option(
+        help='What goes wrong on the line, such as "loss=0.2,up:flip=0.01,delay=30ms±10ms". On a real '
+        "clock each end spoils what it sends: give both the same text.",
+        show_default=False,
+    ),
+]
+Sabotage = Annotated[
+    str | None,
+    typer.Option(
+        help="Spoil this end's codec in one bit, such as sample=500,field=range, to see it found out.",
+        show_default=False,
+    ),
+]
+OnDesync = Annotated[
+    str | None,
+    typer.Option(
+        "--on-desync",
+        help="When the two codecs differ: rejoin (go on from a common state) or stop (exit code 5).",
+        show_default=False,
+    ),
 ]
 Insecure = Annotated[
     bool,
@@ -90,10 +127,6 @@ Insecure = Annotated[
 DryRun = Annotated[
     bool, typer.Option("--dry-run", help="Read the rig and never drive it: no command is sent.")
 ]
-RIG_HELP = (
-    "simulated, replay:FILE for a recorded flight, or a real rig: cobs:PORT, ascii:PORT, qsb:PORT, "
-    "quarc:HOST:PORT, quarc-server:PORT, hil[:CARD]."
-)
 
 
 def overrides(
@@ -107,6 +140,10 @@ def overrides(
     mismatch: float | None = None,
     disturbance: str | None = None,
     link: str | None = None,
+    impair: str | None = None,
+    on_desync: str | None = None,
+    sabotage: str | None = None,
+    sabotaged_end: str = "transmitter",
     port: str | None = None,
     line_rate: int | None = None,
     downlink: str | None = None,
@@ -127,6 +164,9 @@ def overrides(
         ("link.downlink", downlink),
         ("transmitter.plant.mismatch", mismatch),
         ("transmitter.plant.disturbance", disturbance),
+        ("link.impairments", impair),
+        ("transmitter.on_desync", on_desync),
+        (f"{sabotaged_end}.sabotage", sabotage),
     ):
         if value is not None:
             _put(values, name, value)

@@ -10,10 +10,21 @@ import json
 from collections.abc import Callable
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import Discriminator, Field, Tag, field_validator, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
 
+from channel.impairments import parse_impairments
+from channel.sabotage import parse_sabotage
 from tenbaud.config.rig_schema import BridgeSection, HilSection, QuarcSection, SerialSection
 from tenbaud.config.section import NotNegative, Positive, Section
+
+
+def _checked_sabotage(text: str) -> str:
+    if text:
+        parse_sabotage(text)
+    return text
+
+
+SabotageText = Annotated[str, AfterValidator(_checked_sabotage)]
 
 SHARED_SECTIONS = ("timing", "channel", "model", "coder", "limits")
 
@@ -213,6 +224,10 @@ class TransmitterSection(Section):
     serial: SerialSection = SerialSection()
     quarc: QuarcSection = QuarcSection()
     hil: HilSection = HilSection()
+    on_desync: Literal["rejoin", "stop"] = "rejoin"
+    """after digests that differ: go on from a common state, or end the flight (exit code 5)"""
+    sabotage: SabotageText = ""
+    """such as "sample=500,field=range": spoil this end's codec in one bit, to see it found out"""
 
 
 class PidSection(Section):
@@ -246,6 +261,8 @@ class ReceiverSection(Section):
     controller: Literal["pid", "recorded"] = "pid"
     pid: PidSection = PidSection()
     reference: ReferenceSection = ReferenceSection()
+    sabotage: SabotageText = ""
+    """such as "sample=500,field=range": spoil this end's codec in one bit, to see it found out"""
 
 
 class FlightLogSection(Section):
@@ -264,6 +281,7 @@ class LinkSection(Section):
     kind: Literal["zenoh", "serial", "memory"] = "zenoh"
     session: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+(/[A-Za-z0-9_.-]+)*$")] = "helicopter"
     peer_timeout_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 10.0
+    """silence after which an end gives the other one up"""
     port: str = ""
     """serial: this end's port, /dev/ttyUSB0, COM3, socket://HOST:PORT, rfc2217://HOST:PORT"""
     line_rate_baud: Annotated[int, Field(ge=50, le=10_000_000)] = 115_200
@@ -272,6 +290,16 @@ class LinkSection(Section):
     """serial: "zenoh", or a second port for the commands; empty: the same line carries them back"""
     downlink_rate_baud: Annotated[int, Field(ge=50, le=10_000_000)] = 115_200
     """serial: of that second port"""
+    best_effort: bool = False
+    """Zenoh: a congested network may drop symbols instead of letting them wait"""
+    impairments: str = ""
+    """such as "loss=0.2,up:flip=0.01,delay=30ms±10ms": what goes wrong on the line, on purpose"""
+
+    @field_validator("impairments")
+    @classmethod
+    def _readable(cls, value: str) -> str:
+        parse_impairments(value)
+        return value
 
 
 class FlightConfig(Section):

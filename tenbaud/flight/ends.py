@@ -56,6 +56,7 @@ def _zenoh(agreement: Agreement, role: Role, endpoints: Endpoints) -> Link:
         listen=endpoints.listen,
         connect=endpoints.connect,
         insecure=endpoints.insecure,
+        best_effort=agreement.config.link.best_effort,
         clock=agreement.clock,
     )
 
@@ -115,6 +116,7 @@ def open_recorder(agreement: Agreement, role: Role, path: Path) -> McapRecorder:
         "tick_s": repr(agreement.config.timing.tick_s),
         "shared_config": agreement.identity.config,
         "seed": str(agreement.config.seed),
+        "impairments": agreement.config.link.impairments,
     }
     # Virtual time can outrun the disk and is not disturbed by waiting for it.
     return McapRecorder(path, metadata, wait_when_full=agreement.clock == "virtual")

@@ -26,6 +26,9 @@ ROWS: tuple[tuple[str, str, str], ...] = (
     ("reconnects", "reconnects", "{}"),
     ("digest checks", "digest_checks", "{}"),
     ("desyncs", "desyncs", "{}"),
+    ("rejoins, and what they cost", "rejoins", "{}"),
+    ("asked to go wrong", "impairments", "{}"),
+    ("went wrong, up / down", "impaired", "{}"),
     ("largest pitch in the window", "pitch_amplitude_rad", "{:.3f} rad"),
     ("error of the codec: max / rms", "error_coded", "{}"),
     ("error as lived: max / rms", "error_live", "{}"),
@@ -104,6 +107,14 @@ def _value(summary: Summary, name: str) -> Any:
             return f"{get('wire_bytes_up')} / {get('wire_bytes_down')}"
         case "lost":
             return f"{get('erasures')} / {get('symbols_late', '-')}"
+        case "rejoins":
+            return f"{get('rejoins')}, {get('rejoin_bytes')} control bytes" if get("rejoins") else None
+        case "impairments":
+            return get(name) or None
+        case "impaired":
+            ways = [get("impaired_up") or {}, get("impaired_down") or {}]
+            told = [", ".join(f"{count} {what}" for what, count in way.items()) for way in ways]
+            return " / ".join(text or "-" for text in told) if any(told) else None
         case "line_bytes":
             up, down = get("line_bytes_out"), get("line_bytes_in")
             return f"{up} / {down}" if up else None

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from channel.impairments import ImpairedLine
+from channel.line import Line
 from channel.links.base import Link
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build import Agreement
@@ -33,6 +35,12 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         "erasures": session.counts["erasures"],
         "digest_checks": session.counts["digest_checks"],
         "desyncs": session.counts["desyncs"],
+        "rejoins": session.counts["rejoins"],
+        "rejoin_bytes": run.rejoin_bytes,
+        "guard_rearmed": node.rearmed,
+        "impairments": config.link.impairments,
+        "impaired_up": impaired(run.uplink.line),
+        "impaired_down": impaired(run.downlink),
         "window_start_s": run.agreement.window_start_tick * terms.tick_ns / 1e9,
         "pitch_amplitude_rad": scores.angle_max_rad,
         "reference_amplitude_rad": scores.reference_max_rad or None,
@@ -66,6 +74,9 @@ def receiver_part(agreement: Agreement, endpoint: ReceiverEndpoint, outcome: Out
         "stale_frames": session.counts["stale_frames"],
         "bad_commands": session.counts["bad_commands"],
         "malformed": endpoint.malformed,
+        "desyncs": session.counts["desyncs"],
+        "rejoins": session.counts["rejoins"],
+        "impaired_down": impaired(endpoint.downlink),
     }
 
 
@@ -90,7 +101,14 @@ def joined(transmitter: Summary, receiver: Summary) -> Summary:
         "link_dropped": dropped,
         "reconnects": transmitter.get("reconnects", 0) + receiver.get("reconnects", 0),
     }
+    if receiver.get("impaired_down"):
+        both["impaired_down"] = receiver["impaired_down"]
     return {**transmitter, **both, **{name: receiver.get(name) for name in own}}
+
+
+def impaired(line: Line) -> dict[str, int]:
+    """Return how many messages a line did what to, on purpose."""
+    return dict(line.counts) if isinstance(line, ImpairedLine) else {}
 
 
 def _common(agreement: Agreement, outcome: Outcome) -> Summary:

@@ -7,7 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from channel.errors import ConfigMismatch
+from channel.clocks import SkewedClock, SkewedPeer
+from channel.errors import ConfigMismatch, LinkLost
+from channel.frames import Desync
 from channel.line import Line
 from channel.links.base import Link
 from channel.recording import Recorder
@@ -15,7 +17,7 @@ from channel.uplink import Uplink
 from channel.virtual import Peer
 from channel.wire import Wire
 from tenbaud.build import Agreement
-from tenbaud.build_ends import build_transmitter, build_uplink
+from tenbaud.build_ends import build_line, build_transmitter, build_uplink
 from tenbaud.flight.outcome import FLIGHT_OVER, ExitCode, Outcome
 from transmitter.node import STOPPED, TransmitterNode
 from transmitter.real_flight import RealFlight
@@ -33,7 +35,12 @@ class TransmitterRun:
     agreement: Agreement
     node: TransmitterNode
     uplink: Uplink
+    downlink: Line
+    """on the virtual clock; on a real one the receiver has its own"""
     ticks: int = 0
+    """flown by this process"""
+    rejoin_bytes: int = 0
+    """what rejoins cost: control frames of both directions, without greeting and farewell"""
     flight_s: float = 0.0
     """wall-clock time of the flight itself"""
     wire_bytes_down: int = 0
@@ -44,20 +51,28 @@ class TransmitterRun:
 def prepare(agreement: Agreement, recorder: Recorder | None, wire: Wire) -> TransmitterRun:
     """Return a transmitter that is ready to fly."""
     node = build_transmitter(agreement, recorder)
-    return TransmitterRun(agreement, node, build_uplink(agreement, wire))
+    downlink = build_line(agreement, "down", wire)
+    return TransmitterRun(agreement, node, build_uplink(agreement, wire), downlink)
 
 
 def fly_virtual(run: TransmitterRun, peer: Peer, should_stop: Stop) -> Outcome:
     """Fly on the virtual clock against a peer in this process or another."""
-    flight = VirtualFlight(run.node, run.uplink, Line(), peer)
+    faults = run.agreement.faults
+    if faults.skew_ppm or faults.clock_steps:
+        peer = SkewedPeer(peer, SkewedClock(faults))
+    flight = VirtualFlight(run.node, run.uplink, run.downlink, peer)
     with run.node.rig:
         flight.greet()
         _check_welcome(run)
+        greeting_bytes = _control_bytes(run, flight)
         started = time.perf_counter()
+        first = run.node.session.epoch_tick
         try:
-            run.ticks = flight.run(run.agreement.flight_ticks, should_stop)
+            end = flight.run(run.agreement.flight_ticks, should_stop)
+            run.ticks = end - first
+            run.rejoin_bytes = _control_bytes(run, flight) - greeting_bytes
             outcome = _outcome(run, True)
-            flight.finish(run.ticks, _farewell(outcome))
+            flight.finish(end, _farewell(outcome))
         finally:
             run.flight_s = time.perf_counter() - started
             run.wire_bytes_down = flight.wire_bytes_down
@@ -73,9 +88,12 @@ def fly_real(run: TransmitterRun, link: Link, should_stop: Stop) -> Outcome:
         if should_stop():
             return Outcome(ExitCode.INTERRUPTED, STOPPED)
         _check_welcome(run)
+        greeting_bytes = _control_bytes(run, flight)
         started = time.perf_counter()
+        first = run.node.session.epoch_tick
         try:
-            run.ticks = flight.run(run.agreement.flight_ticks)
+            run.ticks = flight.run(run.agreement.flight_ticks) - first
+            run.rejoin_bytes = _control_bytes(run, flight) - greeting_bytes
             outcome = _outcome(run, link.peer_present())
             flight.finish(_farewell(outcome), run.ticks)
         finally:
@@ -103,6 +121,12 @@ def _check_welcome(run: TransmitterRun) -> None:
     session = run.node.session
     if session.refusal is not None:
         raise ConfigMismatch(f"the receiver refused: {session.refusal}")
+    if session.phase is Phase.GREETING:
+        raise LinkLost("no answer to any request for a session came through this line")
+
+
+def _control_bytes(run: TransmitterRun, flight: VirtualFlight | RealFlight) -> int:
+    return run.uplink.meter.control_bytes + flight.control_bytes_down
 
 
 def _farewell(outcome: Outcome) -> str:
@@ -111,13 +135,10 @@ def _farewell(outcome: Outcome) -> str:
 
 def _outcome(run: TransmitterRun, peer_present: bool) -> Outcome:
     node, session = run.node, run.node.session
-    if session.desync is not None:
-        desync = session.desync
-        return Outcome(
-            ExitCode.DESYNC,
-            f"the codecs differ after sample {desync.sample}: transmitter "
-            f"{desync.transmitter_digest:016x}, receiver {desync.receiver_digest:016x}",
-        )
+    if session.refusal is not None:
+        raise ConfigMismatch(f"the receiver refused to go on: {session.refusal}")
+    if session.desync is not None and session.phase is Phase.ENDED:
+        return Outcome(ExitCode.DESYNC, desync_text(session.desync))
     if node.guard.reason == STOPPED:
         return Outcome(ExitCode.INTERRUPTED, STOPPED)
     if session.phase is Phase.ENDED or (node.guard.stopped and not peer_present):
@@ -130,4 +151,24 @@ def _outcome(run: TransmitterRun, peer_present: bool) -> Outcome:
             ExitCode.SAFETY_STOP,
             f"the guard took the motors to their safe voltage: {node.guard.reason}",
         )
+    if session.phase is not Phase.FLYING:
+        return Outcome(
+            ExitCode.LINK_LOST, "the flight ended while the transmitter was asking for a common state"
+        )
+    desyncs = session.counts["desyncs"]
+    if session.desync is not None and desyncs > run.agreement.desyncs_expected:
+        return Outcome(
+            ExitCode.DESYNC,
+            f"the copies of the codec differed {desyncs} time(s) and nobody asked for it; the flight "
+            f"went on, but this should never happen: {desync_text(session.desync)}. Both states are "
+            "in the recordings (`tenbaud diff RUN`); please report it",
+        )
     return Outcome(ExitCode.OK, FLIGHT_OVER)
+
+
+def desync_text(desync: Desync) -> str:
+    """Return a lockstep failure as a sentence."""
+    return (
+        f"the codecs differ after sample {desync.sample}: transmitter "
+        f"{desync.transmitter_digest:016x}, receiver {desync.receiver_digest:016x}"
+    )

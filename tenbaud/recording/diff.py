@@ -121,7 +121,9 @@ def _compare_files(comparison: Comparison) -> Iterator[Difference]:
         # An end that recorded no sample at all cannot be checked, and `schema` says so.
         sides = [side for side in (first, second) if comparison.lockstep or topic in side.topics]
         channels = [side.schema(topic) for side in sides]
-        difference = _compare_topic(first, second, channels[0], _fields(channels, comparison.lockstep))
+        fields = _fields(channels, comparison.lockstep)
+        rejoined = comparison.lockstep and (_rejoined(first) or _rejoined(second))
+        difference = _compare_topic(first, second, channels[0], fields, rejoined)
         if difference is not None:
             yield difference
 
@@ -137,8 +139,19 @@ def _fields(channels: list[RecordChannel], only_common: bool) -> list[str]:
     return [name for name in kept if name not in timing]
 
 
+def _rejoined(recording: Recording) -> bool:
+    """Whether the ends began anew: samples flown by one end only belong to the pause before."""
+    if IGNORED_TOPIC not in recording.topics:
+        return False
+    return any(row.get("kind") == "rejoin" for _, row in recording.rows(IGNORED_TOPIC))
+
+
 def _compare_topic(
-    first: Recording, second: Recording, channel: RecordChannel, fields: list[str]
+    first: Recording,
+    second: Recording,
+    channel: RecordChannel,
+    fields: list[str],
+    skip_missing: bool,
 ) -> Difference | None:
     key_name = channel.fields[0].name
     left, right = _keyed(first, channel, key_name), _keyed(second, channel, key_name)
@@ -152,6 +165,12 @@ def _compare_topic(
     here, there = next(left, None), next(right, None)
     while here is not None and there is not None:
         if here[0] != there[0]:
+            if skip_missing:
+                if _before(there[0], here[0]):
+                    there = next(right, None)
+                else:
+                    here = next(left, None)
+                continue
             missing = (NO_ROW, "(a row)") if _before(there[0], here[0]) else ("(a row)", NO_ROW)
             at = there if missing[0] == NO_ROW else here
             return difference("missing row", at, key_name, missing)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from channel.impairments import parse_impairments
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.reader import Recording
 
@@ -27,6 +28,8 @@ REFERENCE_COLOUR = "#8a8a8a"
 CODED_COLOUR = "#0b6fb8"
 LIVE_COLOUR = "#d9730d"
 ERASURE_COLOUR = "#d01c1f"
+FLIP_COLOUR = "#8e3fb0"
+REJOIN_COLOUR = "#2a8c4a"
 
 
 @dataclass(slots=True)
@@ -54,6 +57,12 @@ class _Flight:
     range: _Curve = field(default_factory=_Curve)
     symbols: _Curve = field(default_factory=_Curve)
     erasures_s: list[float] = field(default_factory=list)
+    flips_s: list[float] = field(default_factory=list)
+    """samples whose word arrived as another one"""
+    desyncs_s: list[float] = field(default_factory=list)
+    rejoins_s: list[float] = field(default_factory=list)
+    cuts_s: list[tuple[float, float]] = field(default_factory=list)
+    """times in which nothing was to pass, on purpose"""
 
 
 def draw_flight(transmitter: Path, receiver: Path | None, output: Path, title: str) -> None:
@@ -108,6 +117,7 @@ def _read_flight(transmitter: Path, receiver: Path | None) -> _Flight:
         flight.error_coded.add(time_s, pitch_rad - coded_rad)
         flight.error_live.add(time_s, pitch_rad - live_rad)
     _read_samples(recording, flight)
+    _read_faults(recording, flight)
     if receiver is not None:
         for time_ns, row in Recording(receiver).rows("tick"):
             flight.reference.add(time_ns / 1e9, _first(row.get("reference_rad")))
@@ -121,12 +131,28 @@ def _read_samples(recording: Recording, flight: _Flight) -> None:
         flight.range.add(time_s, _first(row.get("range")))
         if row.get("word") is None:
             flight.erasures_s.append(time_s)
+        elif row.get("word_sent") not in (None, row["word"]):
+            flight.flips_s.append(time_s)
         words.append((time_s, row.get("word") or [np.nan]))
     for index, (time_s, word) in enumerate(words):
         # The symbols of a word fill its sample period evenly; the last period is not recorded.
         period_s = words[index + 1][0] - time_s if index + 1 < len(words) else 0.0
         for slot, symbol in enumerate(word):
             flight.symbols.add(time_s + period_s * slot / len(word), symbol)
+
+
+def _read_faults(recording: Recording, flight: _Flight) -> None:
+    if "event" in recording.topics:
+        for time_ns, row in recording.rows("event"):
+            if row.get("kind") == "desync":
+                flight.desyncs_s.append(time_ns / 1e9)
+            elif row.get("kind") == "rejoin" and "begins" in str(row.get("text")):
+                flight.rejoins_s.append(time_ns / 1e9)
+    faults = parse_impairments(str(recording.metadata.get("impairments", "")))
+    end_s = flight.pitch.times_s[-1]
+    for start_ns, end_ns in {*faults.up.cuts, *faults.down.cuts}:
+        if start_ns / 1e9 < end_s:
+            flight.cuts_s.append((start_ns / 1e9, min(end_ns / 1e9, end_s)))
 
 
 def _first(value: Any) -> float:
@@ -142,6 +168,23 @@ def _draw_pitch(panel: Axes, flight: _Flight) -> None:
     _plot(panel, flight.pitch, r"pitch $\theta$", color=PITCH_COLOUR, linewidth=2.2)
     _plot(panel, flight.live, "live estimate", color=LIVE_COLOUR, linewidth=0.8)
     _plot(panel, flight.coded, "coded estimate", color=CODED_COLOUR, linewidth=0.8)
+    for index, (start_s, end_s) in enumerate(flight.cuts_s):
+        label = "line cut" if index == 0 else ""
+        panel.axvspan(start_s, end_s, color=ERASURE_COLOUR, alpha=0.12, linewidth=0, label=label)
+    for name, times_s, colour in (
+        ("rejoin", flight.rejoins_s, REJOIN_COLOUR),
+        ("desync", flight.desyncs_s, ERASURE_COLOUR),
+    ):
+        if times_s:
+            places = [0.04] * len(times_s)
+            across = panel.get_xaxis_transform()
+            style: dict[str, Any] = {
+                "color": colour,
+                "marker": "^",
+                "linestyle": "none",
+                "markersize": 5,
+            }
+            panel.plot(times_s, places, transform=across, clip_on=False, label=name, **style)
     panel.set_ylabel("pitch, rad")
     _legend_above(panel)
 
@@ -173,7 +216,10 @@ def _draw_symbols(panel: Axes, flight: _Flight) -> None:
     erasures_s = np.unique(flight.erasures_s[:: 1 + len(flight.erasures_s) // POINTS_PER_CURVE])
     if len(erasures_s):
         panel.vlines(erasures_s, -1.0, 1.0, color=ERASURE_COLOUR, linewidth=0.9, label="erased")
-        _legend_above(panel)
+    if flight.flips_s:
+        flips_s = flight.flips_s[:: 1 + len(flight.flips_s) // POINTS_PER_CURVE]
+        panel.vlines(flips_s, -1.0, 1.0, color=FLIP_COLOUR, linewidth=0.9, label="flipped")
+    _legend_above(panel)
     panel.set_ylim(-1.35, 1.35)
     panel.set_yticks([-1.0, 0.0, 1.0])
     panel.set_ylabel(label)
@@ -187,7 +233,7 @@ def _legend_above(panel: Axes) -> None:
             labels,
             loc="lower right",
             bbox_to_anchor=(1.0, 0.98),
-            ncols=4,
+            ncols=7,
             frameon=False,
             fontsize=8,
         )
@@ -219,7 +265,8 @@ def interrupt_gaps(times: Series, values: Series) -> tuple[Series, Series]:
 def decimate(times: Series, values: Series, points: int) -> tuple[Series, Series]:
     """Thin a curve to at most `points` points, keeping each bucket's lowest and highest.
 
-    A bucket without any value keeps a NaN, so that the curve stays interrupted there.
+    A bucket with a NaN keeps one, so that the curve stays interrupted there; such a bucket may have
+    three points.
     """
     if len(values) <= points:
         return times, values
@@ -230,7 +277,11 @@ def decimate(times: Series, values: Series, points: int) -> tuple[Series, Series
         if np.isnan(bucket).all():
             kept.append(int(start))
             continue
-        kept.extend(sorted({int(start + np.nanargmin(bucket)), int(start + np.nanargmax(bucket))}))
+        chosen = {int(start + np.nanargmin(bucket)), int(start + np.nanargmax(bucket))}
+        gaps = np.flatnonzero(np.isnan(bucket))
+        if len(gaps):
+            chosen.add(int(start + gaps[0]))
+        kept.extend(sorted(chosen))
     return times[kept], values[kept]
 
 

@@ -21,7 +21,19 @@ from channel.coders.static import StaticCoder, StaticParameters
 from channel.coders.timed import TimedCoder, TimedParameters
 from channel.coders.words import WordsCoder, WordsParameters
 from channel.coders.zoom import ZoomCoder, ZoomParameters
-from channel.frames import Bye, Commands, Desync, Echo, Frame, Hello, Refuse, Symbol, Welcome
+from channel.frames import (
+    Bye,
+    Commands,
+    Desync,
+    Echo,
+    Frame,
+    Hello,
+    Refuse,
+    Symbol,
+    Unknown,
+    Welcome,
+    Why,
+)
 from channel.limits import from_millivolts
 from channel.models.hold import HoldModel
 from channel.models.pitch import PitchModel, PitchParameters
@@ -57,7 +69,9 @@ def example_frames() -> list[Frame]:
     return [
         Hello(0xDEADBEEF, "0.1.0", bytes(range(16)), bytes(range(100, 108))),
         Hello(0, "", bytes(16), bytes(8)),
+        Hello(9, "1", bytes(16), bytes(8), 3, 0x01020304, 5, 77, Why.GAP),
         Welcome(0x01020304, 5, 6, 0xDEADBEEF),
+        Welcome(0x01020304, 5, 6, 0xDEADBEEF, 3, (1500, -1500), bytes(range(40))),
         Refuse(0xDEADBEEF, "versions differ: 1 and \u00b5", '{"rate_baud": 10.0}'),
         Symbol(0x01020304, 5, 0x0A0B0C0D, 1),
         Symbol(0xFFFFFFFF, 0xFFFF, 0xFFFFFFFF, 0xFF),
@@ -68,6 +82,7 @@ def example_frames() -> list[Frame]:
         Desync(0x01020304, 5, 0, 0, 1, b""),
         Bye(0x01020304, "done"),
         Bye(0, ""),
+        Unknown(0x01020304, 5),
     ]
 
 

@@ -95,14 +95,18 @@ def test_when_the_transmitter_speaks_another_wire_version_then_both_are_named() 
     assert session.phase is Phase.WAITING
 
 
-def test_when_a_second_transmitter_greets_then_it_is_refused_and_the_flight_goes_on() -> None:
+def test_when_a_second_transmitter_greets_then_it_is_refused_once_the_first_is_heard_again() -> None:
     session = flying()
     session.on_frame(symbol(0), 0)
-    (answer,) = session.on_frame(hello(PEER + 1), 0)
+    assert session.on_frame(hello(PEER + 1), 10 * MS) == []
+    for slot in (1, 2, 3):
+        assert word_numbers(session.on_frame(symbol(slot), 100 * slot * MS)) == [1]
+    (answer,) = session.on_frame(hello(PEER + 1), 310 * MS)
     assert answer == Refuse(PEER + 1, "this receiver is flying with another", "")
     assert session.phase is Phase.FLYING
     assert session.refusal is None
-    assert word_numbers(session.on_frame(symbol(1), 100 * MS)) == [1]
+    assert session.epoch == 0
+    assert word_numbers(session.on_frame(symbol(4), 400 * MS)) == [1]
 
 
 def test_when_a_second_transmitter_leaves_then_the_flight_goes_on() -> None:
@@ -141,18 +145,18 @@ def test_when_the_session_has_ended_then_a_greeting_is_refused_with_the_reason()
 # Ends
 
 
-def test_when_the_transmitter_reports_a_desync_then_the_flight_ends_with_both_digests() -> None:
+def test_when_the_transmitter_reports_a_desync_then_both_digests_are_told_and_its_state_sent() -> None:
     session = flying()
     session.on_frame(symbol(0), 0)
-    session.on_frame(Desync(SESSION + 1, 0, 0, 1, 2, b""), 0)
+    assert session.on_frame(Desync(SESSION + 1, 0, 0, 1, 2, b""), 0) == []
+    answer = Desync(SESSION, 0, 0, 0xABC, 0xDEF, CODEC.pack(session.state))
+    for _ in range(2):
+        assert session.on_frame(Desync(SESSION, 0, 0, 0xABC, 0xDEF, b""), 0) == [answer]
     assert session.phase is Phase.FLYING
-    session.on_frame(Desync(SESSION, 0, 0, 0xABC, 0xDEF, b""), 0)
-    assert session.phase is Phase.ENDED
     assert session.counts["desyncs"] == 1
     (event,) = [event for event in session.events if event.kind is EventKind.DESYNC]
     assert "0000000000000abc" in event.text
     assert "0000000000000def" in event.text
-    assert session.on_frame(symbol(1), 0) == []
 
 
 def test_when_the_transmitter_says_bye_then_the_flight_ends_with_its_reason() -> None:

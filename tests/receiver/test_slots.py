@@ -13,6 +13,7 @@ from channel.frames import (
     Frame,
     Refuse,
     Symbol,
+    Unknown,
     Welcome,
 )
 from channel.limits import CommandLimits, from_millivolts
@@ -97,7 +98,7 @@ def test_when_a_symbol_is_of_another_flight_then_it_is_dropped_and_counted(stale
 
 def test_when_a_slot_is_far_ahead_then_it_is_dropped_and_not_a_gap() -> None:
     session = flying()
-    assert session.on_frame(symbol(GAP_SAMPLES_MAX + 1), 0) == []
+    assert session.on_frame(symbol(GAP_SAMPLES_MAX + 1), 0) == [Unknown(SESSION, 0)]
     assert session.counts["stale_frames"] == 1
     assert kinds(session)[-1] is EventKind.STALE
     assert len(session.on_frame(symbol(GAP_SAMPLES_MAX), 0)) == GAP_SAMPLES_MAX + 1

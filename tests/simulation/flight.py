@@ -78,6 +78,7 @@ def assemble(
     window_start_tick: int = 0,
     safe_volts: Vector = (0.0, 0.0),
     counts_per_turn: int = COUNTS_PER_TURN,
+    stop_on_desync: bool = False,
     wire: Wire = DATAGRAM,
 ) -> Flight:
     """Join the two ends; `receiver_codec` is for a receiver that computes otherwise."""
@@ -86,7 +87,9 @@ def assemble(
     receiver = ReceiverSession(
         receiver_codec or codec, flight_terms, controller, identity, SESSION_NUMBER, received
     )
-    transmitter = TransmitterSession(codec, flight_terms, identity, INCARNATION, sent)
+    transmitter = TransmitterSession(
+        codec, flight_terms, identity, INCARNATION, sent, stop_on_desync=stop_on_desync
+    )
     encoders = tuple(Encoder(counts_per_turn) for _ in plant.measured_rad)
     scores = Scores(
         codec.model, window_start_tick, 64 * codec.ticks_per_sample, controller.reference_rad
@@ -118,6 +121,7 @@ def pitch_flight(
     downlink_line: Line | None = None,
     receiver_codec: Codec | None = None,
     window_start_s: float = 25.0,
+    stop_on_desync: bool = False,
     wire: Wire = DATAGRAM,
     **term_changes: Any,
 ) -> Flight:
@@ -136,6 +140,7 @@ def pitch_flight(
         uplink_line=uplink_line,
         downlink_line=downlink_line,
         window_start_tick=round(window_start_s / TICK_S),
+        stop_on_desync=stop_on_desync,
         wire=wire,
     )
 

@@ -27,6 +27,7 @@ class StreamLine:
         symbol_delay_ns: int = 0,
         spared: int = 1,
     ) -> None:
+        self.longest_delay_ns = symbol_delay_ns
         self.dropped: Counter[str] = Counter()
         self.bytes_carried = 0
         self.bytes_damaged = 0

@@ -179,7 +179,7 @@ def test_when_one_end_computes_a_sine_one_ulp_off_then_it_is_reported_and_ends_s
     codec = twin.receiver.codec
     wrong = WrongSine(codec, first_tick=3000)
     receiver_codec = Codec(wrong, codec.coder, codec.ticks_per_sample)
-    flight = pitch_flight(mismatch=0.1, receiver_codec=receiver_codec).fly(60.0)
+    flight = pitch_flight(mismatch=0.1, receiver_codec=receiver_codec, stop_on_desync=True).fly(60.0)
     twin.fly(60.0)
 
     report = flight.transmitter.desync
@@ -226,7 +226,7 @@ def test_when_command_frames_are_lost_within_the_repeats_then_nothing_is_missing
     assert flight.node.commands_late == 0
 
 
-def test_when_more_command_frames_are_lost_than_repeated_then_the_flight_ends_safe() -> None:
+def test_when_more_command_frames_are_lost_than_repeated_then_the_ends_rejoin() -> None:
     class Gap(Line):
         def __init__(self) -> None:
             super().__init__()
@@ -237,11 +237,12 @@ def test_when_more_command_frames_are_lost_than_repeated_then_the_flight_ends_sa
             return [Delivery(now_ns, None if 50 <= self.frames < 53 else data)]
 
     flight = pitch_flight(lead_ticks=33, downlink_line=Gap()).fly(20.0)
-    assert flight.transmitter.phase is Phase.ENDED
-    assert "never came" in flight.transmitter.end_reason
     assert flight.transmitter.counts["desyncs"] == 0
-    assert flight.node.latched
-    assert flight.node.guard.volts == (0.0, 0.0)
+    assert flight.transmitter.counts["rejoins"] == 1
+    assert flight.transmitter.epoch == flight.receiver.epoch == 1
+    assert any("never came" in event.text for event in flight.transmitter.events)
+    assert flight.ticks == 2000
+    assert flight.digests[-1] == flight.received.column("sample", "digest")[-1]
 
 
 def test_when_the_receivers_configuration_differs_then_no_symbol_leaves() -> None:

@@ -47,7 +47,7 @@ def test_when_one_ends_sine_changes_in_flight_then_the_first_sample_is_named(
         "--clock",
         clock,
         receiver={"code": wrong},
-        transmitter={"arguments": ["--duration", "30"]},
+        transmitter={"arguments": ["--duration", "30", "--on-desync", "stop"]},
     )
     assert (upper.code, lower.code) == (5, 5), upper.err + lower.err
     recording = Recording(tmp_path / "transmit-run" / "transmitter.mcap")

@@ -10,7 +10,19 @@ import pytest
 from channel.codec import Codec, CodecState, Vector
 from channel.coders.zoom import ZoomCoder
 from channel.events import EventKind
-from channel.frames import Bye, Commands, Desync, Echo, ForeignVersion, Frame, Refuse, Symbol, Welcome
+from channel.frames import (
+    Bye,
+    Commands,
+    Desync,
+    Echo,
+    ForeignVersion,
+    Frame,
+    Hello,
+    Refuse,
+    Symbol,
+    Welcome,
+    Why,
+)
 from channel.words import ERASED, WIRE_ERASED, Word
 from tests.channel.parts import identity_of, pitch_codec, terms
 from tests.channel.two_axes import TWO_AXES_ZOOM, TwoAxes
@@ -23,8 +35,10 @@ SESSION = 77
 VOLTS: Vector = (1.0, -1.0)
 
 
-def transmitter(**changes: Any) -> TransmitterSession:
-    return TransmitterSession(CODEC, terms(**changes), IDENTITY, INCARNATION)
+def transmitter(*, stop_on_desync: bool = False, **changes: Any) -> TransmitterSession:
+    return TransmitterSession(
+        CODEC, terms(**changes), IDENTITY, INCARNATION, stop_on_desync=stop_on_desync
+    )
 
 
 def flying(**changes: Any) -> TransmitterSession:
@@ -176,15 +190,19 @@ def test_when_the_first_tick_of_a_word_was_missed_then_none_of_its_symbols_leave
     assert session.counts["words_missed"] == 1
 
 
-def test_when_echoes_stay_away_then_slots_do_not_wait_until_the_session_is_given_up() -> None:
+def test_when_echoes_stay_away_then_slots_do_not_wait_until_a_rejoin_is_asked_for() -> None:
     session = flying(lead_ticks=13)
     sent = [symbol for tick in range(640) for symbol in session.on_measurement(tick, (1.0,))]
     assert [symbol.slot for symbol in sent] == list(range(64))
     for tick in range(640, 660):
         sent += session.on_measurement(tick, (1.0,))
-    assert session.phase is Phase.ENDED
-    assert f"no echo for {LAG_SAMPLES_MAX} samples" in session.end_reason
-    assert len(sent) <= LAG_SAMPLES_MAX + 1
+    assert session.phase is Phase.REJOINING
+    assert f"no echo for {LAG_SAMPLES_MAX} samples" in session.events[-1].text
+    symbols = [one for one in sent if isinstance(one, Symbol)]
+    assert len(symbols) <= LAG_SAMPLES_MAX + 1
+    requests = [one for one in sent if isinstance(one, Hello)]
+    assert requests
+    assert {request.why for request in requests} == {Why.LAG}
 
 
 def test_when_a_slot_is_known_to_be_erased_before_its_tick_then_no_stale_symbol_leaves() -> None:
@@ -233,15 +251,17 @@ def test_when_frames_repeat_samples_then_each_is_taken_once() -> None:
     assert session.copies.confirmed == far.state
 
 
-def test_when_a_sample_was_not_repeated_often_enough_then_the_session_ends() -> None:
+def test_when_a_sample_was_not_repeated_often_enough_then_a_rejoin_is_asked_for() -> None:
     session, far = flying(), Far()
     echoes = []
     for sample in range(4):
         session.on_measurement(10 * sample, (1.0,))
         echoes.append(far.echo())
-    assert session.on_frame(frame(*echoes[1:])) == []
-    assert session.phase is Phase.ENDED
-    assert "the echo of sample 0 never came (got 1)" in session.end_reason
+    (request,) = session.on_frame(frame(*echoes[1:]))
+    assert isinstance(request, Hello)
+    assert (request.why, request.sample, request.session, request.epoch) == (Why.GAP, 4, SESSION, 3)
+    assert session.phase is Phase.REJOINING
+    assert "the echo of sample 0 never came (got 1)" in session.events[-1].text
 
 
 def test_when_a_symbol_was_lost_then_the_copy_follows_what_was_received() -> None:
@@ -293,12 +313,13 @@ def test_when_a_word_is_echoed_that_was_never_sent_then_it_is_dropped() -> None:
     assert session.copies.confirmed == CODEC.initial()
 
 
-def test_when_the_digests_differ_then_it_reports_stops_and_keeps_both() -> None:
-    session, far = flying(), Far()
+def test_when_the_digests_differ_and_it_is_told_to_stop_then_it_reports_and_ends() -> None:
+    session, far = flying(stop_on_desync=True), Far()
     session.on_measurement(0, (1.0,))
     echo = far.echo()
     wrong = Echo(echo.sample, echo.word_number, echo.digest ^ 1, echo.millivolts)
-    (report,) = session.on_frame(frame(wrong))
+    report, goodbye = session.on_frame(frame(wrong))
+    assert isinstance(goodbye, Bye)
     assert report == Desync(SESSION, 3, 0, echo.digest, echo.digest ^ 1, CODEC.pack(far.state))
     assert session.desync == report
     assert session.phase is Phase.ENDED

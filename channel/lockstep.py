@@ -1,0 +1,91 @@
+"""What is kept for the day on which the two copies differ, and how it is written down.
+
+Each end keeps its last states and inputs. A failure is found at the transmitter up to one lag after
+it happened, so the ring of states is longer than any lag that is allowed.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import NamedTuple
+
+from channel.codec import Codec, CodecState
+from channel.recording import Field, RecordChannel
+from channel.words import Word
+
+HISTORY_SAMPLES = 64
+"""Bound on history: echoes may lag, and symbols may jump ahead, by this many samples; past it the
+ends rejoin instead of catching up."""
+
+STATES_KEPT = 2 * HISTORY_SAMPLES
+INPUTS_KEPT = 64
+
+LOCKSTEP_CHANNEL = RecordChannel(
+    "lockstep_failure",
+    (
+        Field("sample", "integer", "", "first sample after which the two copies differ"),
+        Field("epoch", "integer", "", "epoch of that sample"),
+        Field("digest", "string", "", "digest of this end's state after the sample"),
+        Field("peer_digest", "string", "", "digest of the other end's"),
+        Field("state", "numbers", "", "this end's model state after the sample"),
+        Field("coder", "numbers", "", "this end's coder state after the sample"),
+        Field("peer_state", "numbers", "", "the other end's model state; null: not known here yet"),
+        Field("peer_coder", "numbers", "", "the other end's coder state; null: not known here yet"),
+        Field("input_samples", "integers", "", "samples of the last inputs, oldest first"),
+        Field("input_words", "integers", "", "wire numbers of their words; 65535: erased"),
+    ),
+)
+
+
+class _Kept(NamedTuple):
+    epoch: int
+    word: Word
+    state: CodecState
+
+
+class History:
+    """The last samples of one copy: word consumed and state after it."""
+
+    def __init__(self, codec: Codec) -> None:
+        self._codec = codec
+        self._kept: deque[_Kept] = deque(maxlen=STATES_KEPT)
+
+    def add(self, epoch: int, word: Word, state: CodecState) -> None:
+        """Keep one sample; `state` is the one after it."""
+        self._kept.append(_Kept(epoch, word, state))
+
+    def state_after(self, sample: int) -> CodecState | None:
+        """Return the state after a sample, None when it is not kept (any more)."""
+        for kept in reversed(self._kept):
+            if kept.state.sample == sample + 1:
+                return kept.state
+        return None
+
+    def failure_row(
+        self, epoch: int, sample: int, digest: int, peer_digest: int, peer: bytes
+    ) -> tuple[object, ...]:
+        """Return the row of `LOCKSTEP_CHANNEL`; `peer` is the other end's packed state, or empty."""
+        own = self.state_after(sample)
+        theirs = unpacked(self._codec, peer)
+        inputs = [kept for kept in self._kept if kept.state.sample <= sample + 1][-INPUTS_KEPT:]
+        word_number = self._codec.coder.alphabet.word_number
+        return (
+            sample,
+            epoch,
+            f"{digest:016x}",
+            f"{peer_digest:016x}",
+            own and own.model,
+            own and own.coder,
+            theirs and theirs.model,
+            theirs and theirs.coder,
+            [kept.state.sample - 1 for kept in inputs],
+            [word_number(kept.word) for kept in inputs],
+        )
+
+
+def unpacked(codec: Codec, data: bytes) -> CodecState | None:
+    """Return the state in these bytes, None when they hold none of this codec."""
+    try:
+        return codec.unpack(data) if data else None
+    except ValueError:
+        return None

@@ -1,0 +1,164 @@
+"""Which request for a session gets which answer, and from which state the ends start again.
+
+* An unanswered request is repeated by the transmitter, so equal requests get equal answers for as
+  long as nothing was flown on them, unless the answer has grown too old to begin with.
+* A second transmitter is refused while the first one is heard. When the first has fallen silent, the
+  second is taken for the same rig started again.
+* The first sample is `max(own next sample, first sample that the transmitter can still send + m)`,
+  `m` being the command lead in whole samples. The request names a sample whose slot lies ahead of it,
+  and no symbol leaves while it is open, so no slot is used twice; symbols of the old epoch that are
+  still on the line are dropped by their epoch. The lead is as long as the round trip, so the answer
+  is there before the start, and the command to hold lasts until the first one decided. A start that
+  has passed all the same costs erasures, never lockstep.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from enum import Enum, auto
+from itertools import chain, repeat
+
+from channel.codec import Codec, CodecState, Vector
+from channel.errors import CodecDiverged
+from channel.frames import Desync, Hello, Welcome
+from channel.identity import Identity
+from channel.lockstep import HISTORY_SAMPLES, History
+from channel.terms import Terms
+from channel.words import ERASED
+
+ANSWER_AGE_SAMPLES_MAX = 4
+"""A start that lies further back than this is not offered again: the motors would have no command for
+so long."""
+
+SILENT_SLOTS = 2
+"""Slots missed in a row after which a transmitter may be taken for gone, if another one asks."""
+
+ALIVE_SYMBOLS = 3
+"""Symbols of the present transmitter, after another one asked, that prove it alive."""
+
+KEEP_CODER_SAMPLES = 10
+"""After a pause longer than this the coder starts from its initial range: the plant has moved on."""
+
+VERSION_SHOWN = 40
+"""Characters of a peer's version text that are quoted back."""
+
+
+class Verdict(Enum):
+    """What to do about a request."""
+
+    IGNORE = auto()
+    REPEAT = auto()
+    BUSY = auto()
+    REFUSE = auto()
+    BEGIN = auto()
+
+
+class Greeter:
+    """Judges requests; remembers who is flown with and what was answered."""
+
+    def __init__(self) -> None:
+        self.welcome: Welcome | None = None
+        """last answer given"""
+        self._stranger: int | None = None
+        self._symbols_since = 0
+
+    def judge(self, hello: Hello, identity: Identity, advanced: bool, silent_slots: int) -> Verdict:
+        """Return the verdict on a request to an end of this identity.
+
+        `advanced`: a symbol was received on the last answer. `silent_slots`: slots missed in a row.
+        """
+        last = self.welcome
+        if last is None:
+            return _admitted(hello, identity)
+        if hello.incarnation != last.incarnation:
+            return self._judge_stranger(hello, identity, advanced, silent_slots)
+        if hello.request < last.request or (hello.request == last.request and advanced):
+            return Verdict.IGNORE
+        if hello.request == last.request:
+            age = hello.sample - last.first_sample
+            return Verdict.REPEAT if age <= ANSWER_AGE_SAMPLES_MAX else Verdict.BEGIN
+        return _admitted(hello, identity)
+
+    def on_symbol(self) -> None:
+        """Note that the present transmitter is heard."""
+        self._symbols_since += 1
+
+    def _judge_stranger(
+        self, hello: Hello, identity: Identity, advanced: bool, silent_slots: int
+    ) -> Verdict:
+        if hello.incarnation != self._stranger:
+            self._stranger, self._symbols_since = hello.incarnation, 0
+        if self._symbols_since >= ALIVE_SYMBOLS:
+            return Verdict.BUSY
+        if advanced and silent_slots < SILENT_SLOTS:
+            return Verdict.IGNORE
+        return _admitted(hello, identity)
+
+
+def _admitted(hello: Hello, identity: Identity) -> Verdict:
+    return Verdict.BEGIN if difference(hello, identity) is None else Verdict.REFUSE
+
+
+def difference(hello: Hello, ours: Identity) -> str | None:
+    """Return in what a transmitter differs so that it cannot be flown with; None: in nothing."""
+    if hello.config_digest != ours.config_digest:
+        return (
+            "the shared configuration differs: transmitter "
+            f"{hello.config_digest.hex()[:12]}, receiver {ours.config_digest.hex()[:12]}"
+        )
+    if hello.version != ours.version:
+        return f"versions differ: transmitter {hello.version[:VERSION_SHOWN]}, receiver {ours.version}"
+    if hello.numerics_probe != ours.numerics_probe:
+        return (
+            "the numerics probe differs: transmitter "
+            f"{hello.numerics_probe.hex()}, receiver {ours.numerics_probe.hex()}; the "
+            "two machines do not compute alike, so their codecs would drift apart"
+        )
+    return None
+
+
+def first_sample(hello: Hello, own: int, terms: Terms, begun: bool) -> int:
+    """Return where a session or an epoch begins; `own` is this end's next sample.
+
+    At the very start of both there is no line to wait for: tick 0 has not come yet.
+    """
+    if not begun and hello.sample == 0:
+        return own
+    margin = -(-terms.lead_ticks // terms.ticks_per_sample)
+    return max(own, hello.sample + margin)
+
+
+def desync_answer(theirs: Desync, history: History, codec: Codec) -> Desync:
+    """Return the answer to the report of a lockstep failure: the same, with this end's state."""
+    own = history.state_after(theirs.sample)
+    return replace(theirs, state=b"" if own is None else codec.pack(own))
+
+
+def carried_to(
+    codec: Codec,
+    state: CodecState,
+    sample: int,
+    known: Sequence[Vector],
+    hold: Vector,
+    silent_samples: int,
+) -> CodecState:
+    """Return a state carried on without corrections to a later sample.
+
+    `known` are the commands of its first ticks, `hold` that of all others; `silent_samples` had no
+    symbol before. At most `HISTORY_SAMPLES` samples are computed; beyond, as for a state that
+    diverges, only the index moves on, and the initial state is what is left.
+    """
+    paused = sample - state.sample
+    if paused > HISTORY_SAMPLES:
+        return codec.initial()._replace(sample=sample)
+    commands = chain(known, repeat(hold))
+    try:
+        for _ in range(paused):
+            ticks = [next(commands) for _ in range(codec.ticks_per_sample)]
+            state = codec.step(state, ERASED, ticks)
+    except CodecDiverged:
+        return codec.initial()._replace(sample=sample)
+    if paused + silent_samples > KEEP_CODER_SAMPLES:
+        return state._replace(coder=codec.coder.initial())
+    return state

@@ -1,0 +1,98 @@
+"""Whole flights under everything that can go wrong at once, one seed each."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from channel.impairments import Impairments, LineFaults
+from channel.sabotage import Sabotage
+from tests.simulation.faults import Plan, draw
+from tests.simulation.soak import CANARY_SEED, fly_canary, fly_seed
+from tests.simulation.watch import SafetyViolation
+from tests.simulation.world import World
+from transmitter.session import TransmitterSession
+
+SEEDS = 24
+RECOVERY_SAMPLES_MAX = 20
+"""From the last fault to lockstep, a round trip of up to ten samples included."""
+
+
+@pytest.mark.parametrize("seed", range(SEEDS))
+def test_when_everything_goes_wrong_then_nothing_is_unsafe_and_it_comes_back(seed: int) -> None:
+    result = fly_seed(seed)
+    assert result.problem is None, result.problem
+    assert result.desyncs_missed == 0
+    assert result.recovery_samples is not None
+    assert result.recovery_samples <= RECOVERY_SAMPLES_MAX
+
+
+def test_when_the_same_seed_flies_twice_then_everything_is_the_same() -> None:
+    first, second = (World(draw(3)).fly() for _ in range(2))
+    assert first.watch.decided_digests == second.watch.decided_digests
+    assert len(first.watch.decided_digests) > 100
+    assert first.faults == second.faults
+
+
+def test_when_an_end_stays_silent_about_a_difference_then_the_harness_finds_out() -> None:
+    with pytest.raises(SafetyViolation, match="nobody said so"):
+        fly_canary(CANARY_SEED)
+
+
+def test_when_old_epochs_were_obeyed_then_the_harness_would_find_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    plan = _plan(up=Impairments(), down=Impairments(loss=0.3, delay_ns=300_000_000))
+    World(plan).fly()
+    monkeypatch.setattr(
+        TransmitterSession, "command", lambda _session, _tick: (0.123, -0.123), raising=True
+    )
+    with pytest.raises(SafetyViolation, match="decided"):
+        World(plan).fly()
+
+
+@pytest.mark.parametrize("end", ["transmitter", "receiver"])
+@pytest.mark.parametrize("delay_periods", [0, 1, 5])
+def test_when_one_end_is_spoilt_then_it_is_found_and_mended_in_time(
+    end: str, delay_periods: int
+) -> None:
+    delay_ns = delay_periods * 100_000_000 // 2
+    line = Impairments(delay_ns=delay_ns)
+    plan = replace(_plan(up=line, down=line), sabotage=((end, Sabotage(60, "coder", 0)),))
+    world = World(plan)
+    times: dict[str, int] = {}
+    original = world.watch.on_delivered
+
+    def on_delivered(node):  # type: ignore[no-untyped-def]
+        original(node)
+        if node.session.counts["desyncs"]:
+            times.setdefault("found", world.now_ns)
+        if node.session.counts["rejoins"]:
+            times.setdefault("rejoined", world.now_ns)
+
+    world.watch.on_delivered = on_delivered  # type: ignore[method-assign]
+    world.fly()
+    sample_ns, round_trip_ns = plan.terms.sample_ns, 2 * delay_ns
+    # The spoilt state is the one after sample 60, whose word leaves at its first tick; the clock
+    # of the flight begins a handshake after true time 0.
+    begun_ns = round_trip_ns + 10_000_000 + 60 * sample_ns
+    assert 0 <= times["found"] - begun_ns <= sample_ns + round_trip_ns
+    assert 0 <= times["rejoined"] - times["found"] <= 3 * sample_ns + round_trip_ns
+    assert world.watch.desyncs_raised == 1
+
+
+def _plan(up: Impairments, down: Impairments) -> Plan:
+    """Return a plan of the paper's flight with these lines and no other fault."""
+    base = draw(0)
+    delay_ns = up.delay_ns + up.jitter_ns + down.delay_ns + down.jitter_ns
+    terms = replace(
+        base.terms,
+        ticks_per_sample=10,
+        rate_baud=10.0,
+        delivery="start",
+        repeats=2,
+        deadline_allowance_ns=20_000_000,
+        lead_ticks=3 + delay_ns // 10_000_000,
+    )
+    return Plan(0, base.zoom, terms, up, down, LineFaults(), (), (), (), (), 0.1)

@@ -32,14 +32,15 @@ class CommandLimits:
 
     def apply(self, volts: Sequence[float], previous: Vector) -> Vector:
         """Return the voltages clamped, then moved at most one slew step away from `previous`."""
+        largest = self.volts_max
         step = self.slew_volts_per_tick
         limited = []
         for wanted, before in zip(volts, previous, strict=True):
             value = wanted
-            if value > self.volts_max:
-                value = self.volts_max
-            elif value < -self.volts_max:
-                value = -self.volts_max
+            if value > largest:
+                value = largest
+            elif value < -largest:
+                value = -largest
             if value > before + step:
                 value = before + step
             elif value < before - step:
@@ -50,9 +51,9 @@ class CommandLimits:
 
 def to_millivolts(volts: Sequence[float]) -> tuple[int, ...]:
     """Round voltages to the whole millivolts that a frame carries."""
-    return tuple(round(1000.0 * value) for value in volts)
+    return tuple([round(1000.0 * value) for value in volts])
 
 
 def from_millivolts(millivolts: Sequence[int]) -> Vector:
     """Return the voltages that both codecs use for a command of the wire."""
-    return tuple(value / 1000.0 for value in millivolts)
+    return tuple([value / 1000.0 for value in millivolts])

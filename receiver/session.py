@@ -344,8 +344,12 @@ class ReceiverSession:
         """Return what the controller wants; its last command where it fails or wants nonsense."""
         try:
             volts = self._controller.command(tick, state)
-            if len(volts) == len(self._last_command) and all(-1e6 < value < 1e6 for value in volts):
-                return volts
+            if len(volts) == len(self._last_command):
+                for value in volts:
+                    if not -1e6 < value < 1e6:
+                        break
+                else:
+                    return volts
             problem = f"wants {volts}"
         except Exception as error:  # a controller is the user's code; the flight goes on without it
             problem = f"failed: {type(error).__name__}: {error}"

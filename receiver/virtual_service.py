@@ -18,11 +18,12 @@ def serve_virtual(
     link: Link,
     peer_timeout_s: float,
     should_stop: Callable[[], bool] = lambda: False,
+    meanwhile: Callable[[], None] = lambda: None,
 ) -> None:
     """Serve steps until the session ends, or is refused and the transmitter has gone.
 
-    Raises LinkLost when no step comes for `peer_timeout_s` of wall-clock time, and ConfigMismatch
-    when the peer flies on the real clock.
+    `meanwhile` is called when a reply has been sent. Raises LinkLost when no step comes for
+    `peer_timeout_s` of wall-clock time, and ConfigMismatch when the peer flies on the real clock.
     """
     last_number = -1
     last_reply = b""
@@ -54,3 +55,4 @@ def serve_virtual(
             reply = endpoint.step(step.time_ns, step.data)
             last_number, last_reply = step.number, encode_reply(reply._replace(number=step.number))
         link.send(last_reply)
+        meanwhile()

@@ -104,8 +104,10 @@ class Guard:
 
     def apply(self, tick: int, command: Vector | None) -> Vector:
         """Return the voltages of this tick; `command` is None when none has come."""
-        if command is not None and not all(math.isfinite(value) for value in command):
-            self.trip(f"the command of tick {tick} is not a number: {command}")
+        if command is not None:
+            for value in command:
+                if not math.isfinite(value):
+                    self.trip(f"the command of tick {tick} is not a number: {command}")
         if not self.stopped:
             self._take(tick, command)
         if self.state is GuardState.RAMPING:

@@ -14,17 +14,22 @@ RETRY_S = 0.25
 
 
 class LinkPeer:
-    """Steps a receiver over a link; LinkLost when it stays silent for `peer_timeout_s`."""
+    """Steps a receiver over a link; LinkLost when it stays silent for `peer_timeout_s`.
+
+    `meanwhile` is called while a reply is on its way.
+    """
 
     def __init__(
         self,
         link: Link,
         peer_timeout_s: float,
         should_stop: Callable[[], bool] = lambda: False,
+        meanwhile: Callable[[], None] = lambda: None,
     ) -> None:
         self._link = link
         self._peer_timeout_s = peer_timeout_s
         self._should_stop = should_stop
+        self._meanwhile = meanwhile
         self._number = 0
 
     def step(self, time_ns: int, data: bytes | None) -> Reply:
@@ -33,6 +38,7 @@ class LinkPeer:
         message = encode_step(Step(self._number, time_ns, data))
         self._link.send(message)
         asked_at = time.monotonic()
+        self._meanwhile()
         while True:
             answer = self._link.receive(RETRY_S)
             if answer is not None and is_envelope(answer):

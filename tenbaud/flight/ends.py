@@ -69,7 +69,7 @@ def run_transmitter(
         with open_link(agreement, "transmitter", endpoints) as link:
             run = transmit.prepare(agreement, recorder, link.wire)
             with StatusReporter(lambda: transmitter_status(run), status):
-                outcome = _guarded(lambda: _fly(run, link, stop))
+                outcome = _guarded(lambda: _fly(run, link, stop, recorder))
         summary = transmitter_part(run, outcome) | link_part(link)
         return outcome, _with_recording(summary, recorder)
 
@@ -82,7 +82,9 @@ def run_receiver(
         with open_link(agreement, "receiver", endpoints) as link:
             endpoint = build_receiver(agreement, recorder, link.wire)
             with StatusReporter(lambda: receiver_status(agreement, endpoint), status):
-                outcome = _guarded(lambda: receive.serve(agreement, endpoint, link, stop))
+                outcome = _guarded(
+                    lambda: receive.serve(agreement, endpoint, link, stop, recorder.help_out)
+                )
         summary = receiver_part(agreement, endpoint, outcome) | link_part(link)
         return outcome, _with_recording(summary, recorder)
 
@@ -174,10 +176,10 @@ def _end(
         yield recorder, stop
 
 
-def _fly(run: transmit.TransmitterRun, link: Link, stop: StopFlag) -> Outcome:
+def _fly(run: transmit.TransmitterRun, link: Link, stop: StopFlag, recorder: McapRecorder) -> Outcome:
     if run.agreement.clock == "real":
         return transmit.fly_real(run, link, stop)
-    return transmit.fly_virtual(run, transmit.link_peer(run, link, stop), stop)
+    return transmit.fly_virtual(run, transmit.link_peer(run, link, stop, recorder.help_out), stop)
 
 
 def _guarded(fly: Callable[[], Outcome]) -> Outcome:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 from channel.clocks import SkewedClock
 from channel.errors import ConfigMismatch
@@ -18,14 +19,20 @@ from tenbaud.flight.transmit import Stop, desync_text
 from transmitter.node import STOPPED
 
 
-def serve(agreement: Agreement, endpoint: ReceiverEndpoint, link: Link, should_stop: Stop) -> Outcome:
+def serve(
+    agreement: Agreement,
+    endpoint: ReceiverEndpoint,
+    link: Link,
+    should_stop: Stop,
+    meanwhile: Callable[[], None],
+) -> Outcome:
     """Serve one flight; return how it ended. Raises ConfigMismatch and LinkLost."""
     session = endpoint.session
     timeout_s = agreement.config.link.peer_timeout_s
     try:
         if agreement.clock == "virtual":
             # There the transmitter's process holds both directions of the line.
-            serve_virtual(endpoint, link, timeout_s, should_stop)
+            serve_virtual(endpoint, link, timeout_s, should_stop, meanwhile)
         else:
             endpoint.downlink = build_line(agreement, "down", link.wire)
             clock = SkewedClock(agreement.faults, time.monotonic_ns())

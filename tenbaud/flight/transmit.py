@@ -112,9 +112,11 @@ def fly_real(run: TransmitterRun, link: Link, should_stop: Stop) -> Outcome:
     return outcome
 
 
-def link_peer(run: TransmitterRun, link: Link, should_stop: Stop) -> LinkPeer:
+def link_peer(
+    run: TransmitterRun, link: Link, should_stop: Stop, meanwhile: Callable[[], None]
+) -> LinkPeer:
     """Return the receiver at the other end of a link, for the virtual clock."""
-    return LinkPeer(link, run.agreement.config.link.peer_timeout_s, should_stop)
+    return LinkPeer(link, run.agreement.config.link.peer_timeout_s, should_stop, meanwhile)
 
 
 def _check_welcome(run: TransmitterRun) -> None:

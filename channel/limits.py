@@ -16,6 +16,9 @@ from channel.codec import Vector
 VOLTS_MAX = 32.0
 """Largest voltage that 16-bit millivolts carry with room to spare."""
 
+PLAUSIBLE_VOLTS_MAX = 1e6
+"""A law that wants more has lost its way; anything less is only clamped."""
+
 
 @dataclass(frozen=True, slots=True)
 class CommandLimits:
@@ -47,6 +50,14 @@ class CommandLimits:
                 value = before - step
             limited.append(value)
         return tuple(limited)
+
+
+def are_plausible(volts: Sequence[float]) -> bool:
+    """Return whether every voltage is a number, and not an absurd one."""
+    for value in volts:  # a loop: this runs at every tick, and `all` costs three times as much
+        if not -PLAUSIBLE_VOLTS_MAX < value < PLAUSIBLE_VOLTS_MAX:
+            return False
+    return True
 
 
 def to_millivolts(volts: Sequence[float]) -> tuple[int, ...]:

@@ -32,7 +32,7 @@ from channel.frames import (
 )
 from channel.identity import Identity
 from channel.lead import fly_sample
-from channel.limits import from_millivolts, to_millivolts
+from channel.limits import are_plausible, from_millivolts, to_millivolts
 from channel.lockstep import HISTORY_SAMPLES, LOCKSTEP_CHANNEL, History
 from channel.recording import NullRecorder, Recorder
 from channel.shaper import BaudMeter
@@ -344,12 +344,8 @@ class ReceiverSession:
         """Return what the controller wants; its last command where it fails or wants nonsense."""
         try:
             volts = self._controller.command(tick, state)
-            if len(volts) == len(self._last_command):
-                for value in volts:
-                    if not -1e6 < value < 1e6:
-                        break
-                else:
-                    return volts
+            if len(volts) == len(self._last_command) and are_plausible(volts):
+                return volts
             problem = f"wants {volts}"
         except Exception as error:  # a controller is the user's code; the flight goes on without it
             problem = f"failed: {type(error).__name__}: {error}"

@@ -134,9 +134,9 @@ Not flown for this page: the recordings were not at hand (`--data FOLDER`)."""
     return f"""## Recorded flights of real helicopters
 
 A Quanser 3-DOF helicopter under its own controller, pushed by hand (120 s, 50 Hz, 4096 counts a turn;
-time split: the first {real.HALF_S:g} s to learn from, the rest to be judged on). Every
-constant was fitted on the first half alone. The second half was not unseen, though: its shoves are harder,
-and that plain fits did badly on them led to fitting on made-up shoves, added to the first half, as well.
+time split: the first {real.HALF_S:g} s to learn from, the rest to be judged on). Every constant was
+fitted on the first half alone. The second half was not unseen, though: its shoves are harder, and that
+plain fits did badly on them led to fitting on made-up shoves, added to the first half, as well.
 
 ![Recorded flight](figures/recorded-flight.png)
 

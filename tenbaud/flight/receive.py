@@ -24,7 +24,7 @@ def serve(
     endpoint: ReceiverEndpoint,
     link: Link,
     should_stop: Stop,
-    meanwhile: Callable[[], None],
+    meanwhile: Callable[[], None] = lambda: None,
 ) -> Outcome:
     """Serve one flight; return how it ended. Raises ConfigMismatch and LinkLost."""
     session = endpoint.session

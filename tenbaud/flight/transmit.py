@@ -113,7 +113,10 @@ def fly_real(run: TransmitterRun, link: Link, should_stop: Stop) -> Outcome:
 
 
 def link_peer(
-    run: TransmitterRun, link: Link, should_stop: Stop, meanwhile: Callable[[], None]
+    run: TransmitterRun,
+    link: Link,
+    should_stop: Stop,
+    meanwhile: Callable[[], None] = lambda: None,
 ) -> LinkPeer:
     """Return the receiver at the other end of a link, for the virtual clock."""
     return LinkPeer(link, run.agreement.config.link.peer_timeout_s, should_stop, meanwhile)

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from tenbaud.serial_line import EmulatedLine
 from tests.tenbaud.processes import REPOSITORY
 
 PATIENCE_S = 30.0
@@ -73,12 +74,14 @@ class End:
 
 
 class Pair:
-    """Transmitter and receiver, with a way to replace either."""
+    """Transmitter and receiver, with a way to replace either.
 
-    def __init__(self, folder: Path, listen: str, connect: str | None = None, *arguments: str) -> None:
+    `links` are the arguments that lead each end to the other.
+    """
+
+    def __init__(self, folder: Path, links: dict[str, list[str]], *arguments: str) -> None:
         self.folder = folder
-        self.listen = listen
-        self.connect = connect or listen
+        self.links = links
         self.arguments = arguments
         self.count = 0
         self.receiver = self.start("receive")
@@ -86,12 +89,11 @@ class Pair:
 
     def start(self, verb: str) -> End:
         self.count += 1
-        link = ["--listen", self.listen] if verb == "receive" else ["--connect", self.connect]
         folder = self.folder / f"{self.count:02}-{verb}"
         more = ["--set", "link.peer_timeout_s=30", *self.arguments]
         if verb == "transmit":
             more += ["--duration", "3600"]
-        end = End(verb, link, folder, *more)
+        end = End(verb, self.links[verb], folder, *more)
         setattr(self, "receiver" if verb == "receive" else "transmitter", end)
         return end
 
@@ -114,6 +116,17 @@ class Pair:
         for end in (self.transmitter, self.receiver):
             if end.process.poll() is None:
                 end.kill()
+
+
+def over_zenoh(listen: str, connect: str | None = None) -> dict[str, list[str]]:
+    """Return the links of a pair over Zenoh; `connect` leads elsewhere when a relay stands between."""
+    return {"receive": ["--listen", listen], "transmit": ["--connect", connect or listen]}
+
+
+def over_serial(line: EmulatedLine) -> dict[str, list[str]]:
+    """Return the links of a pair over a serial line."""
+    ports = {"receive": line.receiver_port, "transmit": line.transmitter_port}
+    return {verb: ["--link", "serial", "--port", str(port)] for verb, port in ports.items()}
 
 
 def wait_for(met: Callable[[], bool], told: Callable[[], str]) -> None:

@@ -1,4 +1,4 @@
-"""Two real processes over Zenoh that are killed, stopped and cut off, and come back by themselves."""
+"""Two real processes that are killed, stopped and cut off, and come back by themselves."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ import pytest
 
 from channel.links.endpoints import free_endpoint
 from tenbaud.recording.reader import Recording
-from tests.tenbaud.ends import Pair, Relay
+from tenbaud.serial_line import EmulatedLine
+from tests.tenbaud.ends import Pair, Relay, over_serial, over_zenoh
 
 SEED = 20240619
 SAFE_VOLTS = [0.0, 0.0]
@@ -22,7 +23,7 @@ WATCHDOG_S = 0.5
 
 @pytest.fixture
 def pair(tmp_path: Path) -> Iterator[Pair]:
-    pair = Pair(tmp_path, free_endpoint())
+    pair = Pair(tmp_path, over_zenoh(free_endpoint()))
     yield pair
     pair.close()
 
@@ -79,6 +80,17 @@ def test_when_either_end_is_killed_and_started_again_then_the_flight_goes_on(pai
     restart_often(pair, 3)
 
 
+def test_when_an_end_on_a_serial_line_is_killed_and_started_again_then_the_flight_goes_on(
+    tmp_path: Path,
+) -> None:
+    with EmulatedLine(tmp_path, 115_200) as line:
+        pair = Pair(tmp_path, over_serial(line))
+        try:
+            restart_often(pair, 3)
+        finally:
+            pair.close()
+
+
 @pytest.mark.soak
 def test_when_the_ends_are_killed_twenty_times_then_the_flight_goes_on(pair: Pair) -> None:
     restart_often(pair, 20)
@@ -104,7 +116,7 @@ def test_when_an_end_is_stopped_for_a_while_then_the_flight_goes_on(pair: Pair, 
 def test_when_the_line_is_muted_or_cut_then_the_flight_goes_on(tmp_path: Path) -> None:
     endpoint = free_endpoint()
     relay = Relay(int(endpoint.rpartition(":")[2]))
-    pair = Pair(tmp_path, endpoint, f"tcp/127.0.0.1:{relay.port}")
+    pair = Pair(tmp_path, over_zenoh(endpoint, f"tcp/127.0.0.1:{relay.port}"))
     try:
         pair.wait_until_both_fly()
         for spoil, seconds in ((relay.mute, 1.0), (relay.cut, 3.0)):

@@ -10,9 +10,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 
-from channel.errors import ConfigMismatch, FrameError, LinkLost
+from channel.errors import ConfigMismatch, LinkLost
 from channel.events import EventKind
-from channel.frames import Commands, Frame, Symbol
+from channel.frames import Frame, Symbol
+from channel.inlet import Inlet
 from channel.links.base import Link
 from channel.outbox import Outbox
 from channel.uplink import Uplink
@@ -49,10 +50,7 @@ class RealFlight:
         """what was last told about the receiver: it is there"""
         self.lateness = LatenessMeter()
         self.ticks_missed = 0
-        self.wire_bytes_down = 0
-        self.control_bytes_down = 0
-        """of `wire_bytes_down`, those that carried no commands"""
-        self.malformed = 0
+        self.inlet = Inlet(uplink.wire, node.on_malformed)
 
     def greet(self, peer_timeout_s: float) -> None:
         """Ask for a session until there is one or a refusal; LinkLost when nobody answers."""
@@ -157,16 +155,9 @@ class RealFlight:
                 "the receiver flies on the virtual clock, this end on the real one; give both the "
                 "same --clock"
             )
-        self.wire_bytes_down += self._wire.size(data)
-        try:
-            frame = self._wire.decode(data)
-        except FrameError as error:
-            self.malformed += 1
-            self._node.tell(EventKind.MALFORMED, f"dropped a frame: {error}")
-            return
-        if not isinstance(frame, Commands):
-            self.control_bytes_down += self._wire.size(data)
-        self._offer(self._node.deliver(frame))
+        frame = self.inlet.take(data)
+        if frame is not None:
+            self._offer(self._node.deliver(frame))
 
     def _offer(self, frames: Sequence[Frame]) -> None:
         for frame in frames:

@@ -15,7 +15,9 @@ from channel.wire import DATAGRAM, Wire
 class Inlet:
     """Turns messages into frames. `on_malformed` is told why a message was dropped."""
 
-    def __init__(self, wire: Wire = DATAGRAM, on_malformed: Callable[[str], None] | None = None) -> None:
+    def __init__(
+        self, wire: Wire = DATAGRAM, on_malformed: Callable[[str], None] | None = None
+    ) -> None:
         self.wire = wire
         self.wire_bytes = 0
         self.control_bytes = 0

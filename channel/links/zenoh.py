@@ -22,8 +22,7 @@ import zenoh
 from channel.errors import LinkError
 from channel.links.base import LinkBase, Role
 from channel.links.endpoints import check_endpoints
-from channel.links.zenoh_inbox import ChannelInbox, Inbox, QueueInbox
-from channel.terms import Clock
+from channel.links.zenoh_inbox import ChannelInbox
 
 LEASE_MS = 2_000
 RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 2}
@@ -35,7 +34,7 @@ class ZenohLink(LinkBase):
     """One end of a session over Zenoh.
 
     `listen` and `connect` are Zenoh endpoints; one end listens, the other connects, either may start
-    first. On the virtual clock waits are kept to a tenth of a second, and messages are quicker.
+    first.
     `best_effort`: a symbol that the network cannot take at once is dropped, an erasure, instead of
     keeping the loop waiting; all else stays reliable. Raises LinkError for a name or endpoint that
     cannot be used.
@@ -53,7 +52,6 @@ class ZenohLink(LinkBase):
         scouting: bool = False,
         insecure: bool = False,
         best_effort: bool = False,
-        clock: Clock = "real",
     ) -> None:
         super().__init__()
         if not _NAME.fullmatch(session_name):
@@ -63,7 +61,7 @@ class ZenohLink(LinkBase):
         if not listen and not connect and not scouting:
             raise LinkError("a Zenoh link needs an endpoint to listen on or to connect to")
         check_endpoints(listen + connect, insecure)
-        self._inbox: Inbox | None = None
+        self._inbox: ChannelInbox | None = None
         self._peers: set[str] = set()
         self._closed = False
         try:
@@ -71,18 +69,14 @@ class ZenohLink(LinkBase):
         except zenoh.ZError as error:
             raise LinkError(f"Zenoh cannot use {', '.join(listen + connect)}: {error}") from error
         try:
-            self._declare(role, f"tenbaud/{session_name}", clock, best_effort)
+            self._declare(role, f"tenbaud/{session_name}", best_effort)
         except BaseException:
             self.close()
             raise
 
-    def _declare(self, role: Role, root: str, clock: Clock, best_effort: bool) -> None:
+    def _declare(self, role: Role, root: str, best_effort: bool) -> None:
         inbound, other = ("down", "receiver") if role == "transmitter" else ("up", "transmitter")
-        key = f"{root}/{inbound}/*"
-        if clock == "virtual":
-            self._inbox = ChannelInbox(self._session, key)
-        else:
-            self._inbox = QueueInbox(self._session, key, self.counts.dropped)
+        self._inbox = ChannelInbox(self._session, f"{root}/{inbound}/*")
         alive = self._session.liveliness()
         self._watch = alive.declare_subscriber(
             f"{root}/alive/{other}/*",

@@ -57,7 +57,6 @@ def _zenoh(agreement: Agreement, role: Role, endpoints: Endpoints) -> Link:
         connect=endpoints.connect,
         insecure=endpoints.insecure,
         best_effort=agreement.config.link.best_effort,
-        clock=agreement.clock,
     )
 
 

@@ -8,8 +8,8 @@ from channel.frames import Frame
 from channel.links.base import Link, LinkCounts, Role
 from channel.wire import Wire
 
-DOWNWARD_KINDS = (2, 3, 5)
-"""Frame kinds that only the receiver sends: welcome, refuse, commands."""
+DOWNWARD_KINDS = (2, 3, 5, 8, 9)
+"""Frame kinds that only the receiver sends: welcome, refuse, commands, unknown, claim."""
 
 
 class SplitWire:

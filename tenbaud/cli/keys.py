@@ -68,9 +68,7 @@ def add(
 
 
 @app.command()
-def renew(
-    name: Name, host: Hosts = None, days: Days = 365.0, folder: Folder = DEFAULT_FOLDER
-) -> None:
+def renew(name: Name, host: Hosts = None, days: Days = 365.0, folder: Folder = DEFAULT_FOLDER) -> None:
     """Make a node's key and certificate anew, before or after it expires; copy its folder again."""
     from tenbaud.keys.store import renew_node
 
@@ -81,16 +79,15 @@ def renew(
 
 @app.command()
 def show(
-    folder: Annotated[Path, typer.Argument(help="Folder of all keys, or of one node.")] = DEFAULT_FOLDER,
+    folder: Annotated[
+        Path, typer.Argument(help="Folder of all keys, or of one node.")
+    ] = DEFAULT_FOLDER,
 ) -> None:
     """List the nodes, until when they are valid, and the commands for the two machines."""
     from tenbaud.keys.hints import next_steps
     from tenbaud.keys.store import KeysError, expiry_warning, read_node, read_nodes
 
-    if (folder / "node.pem").exists():
-        nodes = [read_node(folder)]
-    else:
-        nodes = read_nodes(folder)
+    nodes = [read_node(folder)] if (folder / "node.pem").exists() else read_nodes(folder)
     if not nodes and not (folder / "authority").exists():
         raise KeysError(f"there are no keys in {folder}; `tenbaud keys init` makes an authority")
     for node in nodes:

@@ -210,7 +210,5 @@ def _pem(certificate: x509.Certificate, key: EllipticCurvePrivateKey) -> Pem:
     encoding = serialization.Encoding.PEM
     return Pem(
         certificate.public_bytes(encoding),
-        key.private_bytes(
-            encoding, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
-        ),
+        key.private_bytes(encoding, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()),
     )

@@ -23,9 +23,7 @@ def next_steps(nodes: Sequence[NodeKeys]) -> str:
     if transmitter is None:
         return "Next: tenbaud keys add rig --role transmitter"
     if receiver is None:
-        return (
-            "Next: tenbaud keys add desk --role receiver --host ADDRESS   (where the rig reaches it)"
-        )
+        return "Next: tenbaud keys add desk --role receiver --host ADDRESS   (where the rig reaches it)"
     rig, desk = transmitter.certified, receiver.certified
     at = endpoint_of(desk.hosts[0]) if desk.hosts else f"tls/ADDRESS:{PORT}"
     lines = [

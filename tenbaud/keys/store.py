@@ -96,9 +96,7 @@ def add_node(
     return read_node(keys / name)
 
 
-def renew_node(
-    keys: Path, name: str, hosts: tuple[str, ...] = (), days: float = NODE_DAYS
-) -> NodeKeys:
+def renew_node(keys: Path, name: str, hosts: tuple[str, ...] = (), days: float = NODE_DAYS) -> NodeKeys:
     """Replace key and certificate of a node, with other addresses if any are given."""
     old = read_node(keys / name)
     authority = _read_authority(keys)
@@ -189,9 +187,7 @@ def _issue(authority: Pem, name: str, role: NodeRole, hosts: tuple[str, ...], da
 def _read_authority(keys: Path) -> Pem:
     folder = keys / AUTHORITY
     try:
-        return Pem(
-            (folder / "authority.pem").read_bytes(), (folder / "authority.key").read_bytes()
-        )
+        return Pem((folder / "authority.pem").read_bytes(), (folder / "authority.key").read_bytes())
     except OSError as error:
         raise KeysError(
             f"there is no authority in {folder} ({error.strerror}); `tenbaud keys init` makes one, and "

@@ -31,7 +31,7 @@ from channel.frames import (
 )
 from channel.identity import Identity
 from channel.limits import to_millivolts
-from channel.lockstep import HISTORY_SAMPLES, LOCKSTEP_CHANNEL, History
+from channel.lockstep import HISTORY_SAMPLES, History
 from channel.recording import NullRecorder, Recorder
 from channel.shaper import BaudMeter
 from channel.terms import Terms
@@ -39,8 +39,10 @@ from channel.wire import WIRE_VERSION
 from channel.words import ERASED
 from receiver.commander import Commander
 from receiver.controllers.base import Controller
+from receiver.records import write_failure
 from receiver.rejoin import Greeter, Verdict, desync_answer, difference, first_sample
 from receiver.short_slots import SlotFinder
+from receiver.stranger import Stranger
 
 GAP_SAMPLES_MAX = HISTORY_SAMPLES
 """A symbol this far ahead is no gap any more; after as many erasures in a row none are counted on."""
@@ -60,7 +62,7 @@ class ReceiverSession:
     """Turns symbols into commands; see the module's text.
 
     `session_number` is drawn by the caller (32 bits, not zero), so that the session itself stays
-    deterministic.
+    deterministic. `take_over`: claim a flight that another receiver has.
     """
 
     def __init__(
@@ -71,6 +73,8 @@ class ReceiverSession:
         identity: Identity,
         session_number: int,
         recorder: Recorder | None = None,
+        *,
+        take_over: bool = False,
     ) -> None:
         self.codec = codec
         self.terms = terms
@@ -87,6 +91,7 @@ class ReceiverSession:
         self.desync: Desync | None = None
         self.events: deque[Event] = deque(maxlen=1000)
         self._greeter = Greeter()
+        self._stranger = Stranger(session_number, take_over)
         self._recorder = recorder or NullRecorder()
         self._commander = Commander(codec, terms, controller, self._recorder, self.counts, self._tell)
         self._slot = 0
@@ -126,6 +131,8 @@ class ReceiverSession:
                 return self._on_desync(frame)
             case Bye() if self._is_current(frame.session):
                 self._end(f"the transmitter ended the flight: {frame.reason}")
+            case Bye() if frame.session == 0 and self._stranger.asked and self.phase is Phase.WAITING:
+                self._end(frame.reason)
             case Bye() if self.refusal is not None and frame.session == 0:
                 self.refusal = f"{self.refusal}\n  as the transmitter sees it: {frame.reason}"
                 self._end("refused")
@@ -271,7 +278,7 @@ class ReceiverSession:
     def _on_foreign_symbol(self, symbol: Symbol) -> list[Frame]:
         """Answer a transmitter that flies in a session or an epoch that is not the present one."""
         if self.phase is Phase.WAITING and self.refusal is None:
-            return [Unknown(symbol.session, symbol.epoch)]
+            return self._stranger.on_symbol(symbol)
         welcome = self._greeter.welcome
         missed = self._is_current(symbol.session) and symbol.epoch < self.epoch
         if missed and not self._advanced and welcome is not None:
@@ -330,14 +337,7 @@ class ReceiverSession:
             f"{theirs.transmitter_digest:016x}, receiver {theirs.receiver_digest:016x}",
             theirs.sample,
         )
-        row = self.history.failure_row(
-            theirs.epoch,
-            theirs.sample,
-            theirs.receiver_digest,
-            theirs.transmitter_digest,
-            theirs.state,
-        )
-        self._recorder.write(LOCKSTEP_CHANNEL, theirs.sample * self.terms.sample_ns, row)
+        write_failure(self._recorder, self.terms, self.history, theirs)
         return [answer]
 
     def _is_current(self, session: int) -> bool:

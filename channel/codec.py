@@ -31,7 +31,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Sequence
+from collections.abc import MutableSequence, Sequence
 from hashlib import blake2b
 from typing import NamedTuple, Protocol
 
@@ -107,6 +107,20 @@ class OpenSample(NamedTuple):
     """Coder state for the next sample."""
 
 
+def add_correction(model: MutableSequence[float], correction: Sequence[float]) -> None:
+    """Add an impulse correction to the first model states."""
+    for axis in range(len(correction)):
+        model[axis] = model[axis] + correction[axis]
+
+
+def is_estimate(model: Sequence[float]) -> bool:
+    """Return whether a model state is finite and within `STATE_MAX`."""
+    for value in model:  # noqa: SIM110 (compiled by the studies, and faster than `all`)
+        if not -STATE_MAX < value < STATE_MAX:
+            return False
+    return True
+
+
 class Codec:
     """The state machine; immutable, so that one object serves any number of copies.
 
@@ -135,10 +149,8 @@ class Codec:
         correction, coder = self.coder.decode(state.coder, state.model, word)
         if not self.coder.impulse:
             return OpenSample(state.model, correction, coder)
-        corrected = [
-            value + correction[axis] if axis < self.model.correction_size else value
-            for axis, value in enumerate(state.model)
-        ]
+        corrected = list(state.model)
+        add_correction(corrected, correction)
         return OpenSample(tuple(corrected), self.nothing_held, coder)
 
     def close(self, state: CodecState, opened: OpenSample, model: Vector) -> CodecState:
@@ -146,12 +158,11 @@ class Codec:
 
         Raises CodecDiverged when a state is not finite or beyond `STATE_MAX`.
         """
-        for value in model:
-            if not -STATE_MAX < value < STATE_MAX:
-                raise CodecDiverged(
-                    f"the estimate diverged at sample {state.sample}: model state {model}; "
-                    "check the model's parameters and the units of the measurement"
-                )
+        if not is_estimate(model):
+            raise CodecDiverged(
+                f"the estimate diverged at sample {state.sample}: model state {model}; "
+                "check the model's parameters and the units of the measurement"
+            )
         return CodecState(state.sample + 1, model, opened.coder)
 
     def step(self, state: CodecState, word: Word, commands: Sequence[Vector]) -> CodecState:

@@ -1,6 +1,6 @@
 """The messages of the two sessions. How they look on a line is `channel.wire`'s affair.
 
-Uplink: Hello, Symbol, Desync, Bye. Downlink: Welcome, Refuse, Commands, Desync, Unknown, Bye.
+Uplink: Hello, Symbol, Desync, Bye. Downlink: Welcome, Refuse, Commands, Desync, Unknown, Claim, Bye.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ class Why(IntEnum):
     """the receiver does not know the session: it was restarted, or lost track"""
     GUARD = 5
     """commands stayed away until the watchdog took the voltage down"""
+    TAKEN_OVER = 6
+    """another receiver takes the flight over, on purpose"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,11 +154,22 @@ class Unknown:
 
 
 @dataclass(frozen=True, slots=True)
+class Claim:
+    """Another receiver takes this flight over, on purpose: ask for a new epoch, of its session."""
+
+    session: int
+    """that the transmitter flies in"""
+    epoch: int
+    by: int
+    """session of the receiver that takes over"""
+
+
+@dataclass(frozen=True, slots=True)
 class Bye:
     """The sender ends the session, and says why."""
 
     session: int
-    """0 before there is one"""
+    """0 before there is one, and to a second receiver that is refused"""
     reason: str
 
 
@@ -168,5 +181,15 @@ class ForeignVersion:
 
 
 Frame: TypeAlias = (
-    Hello | Welcome | Refuse | Symbol | ShortSymbol | Commands | Desync | Unknown | Bye | ForeignVersion
+    Hello
+    | Welcome
+    | Refuse
+    | Symbol
+    | ShortSymbol
+    | Commands
+    | Desync
+    | Unknown
+    | Claim
+    | Bye
+    | ForeignVersion
 )

@@ -37,19 +37,31 @@ class CommandLimits:
         """Return the voltages clamped, then moved at most one slew step away from `previous`."""
         largest = self.volts_max
         step = self.slew_volts_per_tick
-        limited = []
-        for wanted, before in zip(volts, previous, strict=True):
-            value = wanted
-            if value > largest:
-                value = largest
-            elif value < -largest:
-                value = -largest
-            if value > before + step:
-                value = before + step
-            elif value < before - step:
-                value = before - step
-            limited.append(value)
-        return tuple(limited)
+        return tuple(
+            [
+                limited(wanted, before, largest, step)
+                for wanted, before in zip(volts, previous, strict=True)
+            ]
+        )
+
+
+def limited(wanted: float, before: float, largest: float, step: float) -> float:
+    """Return one voltage within +-`largest`, at most `step` away from the one `before`."""
+    value = wanted
+    if value > largest:
+        value = largest
+    elif value < -largest:
+        value = -largest
+    if value > before + step:
+        value = before + step
+    elif value < before - step:
+        value = before - step
+    return value
+
+
+def as_carried(volts: float) -> float:
+    """Return what becomes of one voltage on the wire: `from_millivolts` of `to_millivolts`."""
+    return round(1000.0 * volts) / 1000.0
 
 
 def are_plausible(volts: Sequence[float]) -> bool:

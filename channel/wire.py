@@ -15,6 +15,7 @@ there. Bodies, by kind:
     6 desync    sample u32, digests u64 u64, state bytes
     7 bye       reason text
     8 unknown   nothing
+    9 claim     session that takes over u32
 
 A text is a u16 length and that many bytes of UTF-8.
 """
@@ -29,6 +30,7 @@ from typing import Protocol
 from channel.errors import FrameError
 from channel.frames import (
     Bye,
+    Claim,
     Commands,
     Desync,
     Echo,
@@ -146,6 +148,8 @@ def _encode_body(frame: Frame) -> tuple[int, int, int, bytes]:
             return 7, frame.session, 0, _text(frame.reason)
         case Unknown():
             return 8, frame.session, frame.epoch, b""
+        case Claim():
+            return 9, frame.session, frame.epoch, _NUMBER.pack(frame.by)
         case ForeignVersion() | ShortSymbol():
             raise ValueError(f"{frame} is only ever received")
 
@@ -247,6 +251,11 @@ def _decode_unknown(session: int, epoch: int, body: bytes) -> Unknown:
     return Unknown(session, epoch)
 
 
+def _decode_claim(session: int, epoch: int, body: bytes) -> Claim:
+    (by,) = _NUMBER.unpack(body)
+    return Claim(session, epoch, by)
+
+
 _READERS: dict[int, Callable[[int, int, bytes], Frame]] = {
     1: _decode_hello,
     2: _decode_welcome,
@@ -256,6 +265,7 @@ _READERS: dict[int, Callable[[int, int, bytes], Frame]] = {
     6: _decode_desync,
     7: _decode_bye,
     8: _decode_unknown,
+    9: _decode_claim,
 }
 
 

@@ -7,14 +7,17 @@ plant step. Every disturbance is a pure function of the step index, so steps may
 from __future__ import annotations
 
 import math
-from typing import Final, Protocol
+from typing import Final, Protocol, TypeAlias
 
+import numpy as np
 from numpy.random import PCG64, Generator, SeedSequence
 
 GRAMMAR: Final = (
     "comma-separated q=DENSITY (rad^2/s^3, at most once) and step=TORQUE@START[..END] "
     "(rad/s^2, seconds), for example q=2e-3,step=0.5@10..12"
 )
+
+Torques: TypeAlias = "np.ndarray[tuple[int], np.dtype[np.float64]]"
 
 # Numbers drawn at once: large enough that numpy's cost per call vanishes, small enough (128 kB as
 # Python floats) that the length of a run costs no memory.
@@ -30,6 +33,10 @@ class Disturbance(Protocol):
 
     def torque(self, step_index: int) -> float:
         """Angular acceleration (rad/s^2) held over step `step_index` (0 is the first)."""
+        ...
+
+    def torques(self, steps: int) -> Torques:
+        """The torques of steps `0 ... steps - 1` at once, to the last bit those of `torque`."""
         ...
 
 
@@ -64,11 +71,18 @@ class WhiteTorque:
         if block_index != self._block_index:
             if step_index < 0:
                 raise ValueError(f"step_index is {step_index}; it must be at least 0")
-            sequence = SeedSequence(self._seed, spawn_key=(block_index,))
-            normal = Generator(PCG64(sequence)).standard_normal(_BLOCK_STEPS)
-            self._block = (normal * self._deviation).tolist()
+            self._block = self._draw(block_index).tolist()
             self._block_index = block_index
         return self._block[offset]
+
+    def torques(self, steps: int) -> Torques:
+        """Torques of steps `0 ... steps - 1`."""
+        blocks = range(-(-steps // _BLOCK_STEPS))
+        return np.concatenate([np.empty(0), *(self._draw(index) for index in blocks)])[:steps]
+
+    def _draw(self, block_index: int) -> Torques:
+        sequence = SeedSequence(self._seed, spawn_key=(block_index,))
+        return Generator(PCG64(sequence)).standard_normal(_BLOCK_STEPS) * self._deviation
 
 
 class StepTorque:
@@ -102,6 +116,12 @@ class StepTorque:
             return 0.0
         return self._torque_rad_s2
 
+    def torques(self, steps: int) -> Torques:
+        """Torques of steps `0 ... steps - 1`."""
+        torques = np.zeros(steps)
+        torques[self._start_step : self._end_step] = self._torque_rad_s2
+        return torques
+
 
 class Sum:
     """Several disturbances at once."""
@@ -117,6 +137,13 @@ class Sum:
         total = 0.0
         for part in self._parts:
             total += part.torque(step_index)
+        return total
+
+    def torques(self, steps: int) -> Torques:
+        """Torques of steps `0 ... steps - 1`."""
+        total = np.zeros(steps)
+        for part in self._parts:
+            total += part.torques(steps)
         return total
 
 

@@ -7,6 +7,16 @@ from dataclasses import dataclass
 from typing import Final
 
 
+def counts_of(angle_rad: float, counts_per_turn: int, sign: int, zero_counts: int) -> int:
+    """Return the nearest count of a finite angle; see `Encoder.counts`."""
+    return sign * math.floor(angle_rad / math.tau * counts_per_turn + 0.5) + zero_counts
+
+
+def angle_of(counts: int, counts_per_turn: int, sign: int, zero_counts: int) -> float:
+    """Return the angle in the middle of those that read `counts`; see `Encoder.angle_rad`."""
+    return sign * (counts - zero_counts) * math.tau / counts_per_turn
+
+
 @dataclass(frozen=True, slots=True)
 class Encoder:
     """An encoder that counts without bound: several turns are several times `counts_per_turn`.
@@ -31,15 +41,13 @@ class Encoder:
 
         Raises ValueError when the angle is not finite.
         """
-        turns = angle_rad / math.tau
-        scaled = turns * self.counts_per_turn
-        if not math.isfinite(scaled):
+        if not math.isfinite(angle_rad / math.tau * self.counts_per_turn):
             raise ValueError(f"angle_rad is {angle_rad}; it must be finite")
-        return self.sign * math.floor(scaled + 0.5) + self.zero_counts
+        return counts_of(angle_rad, self.counts_per_turn, self.sign, self.zero_counts)
 
     def angle_rad(self, counts: int) -> float:
         """Return the angle in the middle of the range of angles that read `counts`."""
-        return self.sign * (counts - self.zero_counts) * math.tau / self.counts_per_turn
+        return angle_of(counts, self.counts_per_turn, self.sign, self.zero_counts)
 
 
 def angles_rad(encoders: tuple[Encoder, ...], counts: tuple[int, ...]) -> tuple[float, ...]:

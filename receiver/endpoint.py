@@ -5,8 +5,8 @@ Both drivers of the receiver, and a flight within one process, go through it.
 
 from __future__ import annotations
 
-from channel.errors import FrameError
 from channel.frames import Frame
+from channel.inlet import Inlet
 from channel.line import Line
 from channel.virtual import Reply
 from channel.wire import DATAGRAM, Wire
@@ -20,19 +20,14 @@ class ReceiverEndpoint:
         self.session = session
         self.wire = wire
         self.wire_bytes_down = 0
-        self.wire_bytes_up = 0
-        self.malformed = 0
+        self.inlet = Inlet(wire, session.on_malformed)
         self.downlink = Line()
         """this end's own way out, on a real clock"""
 
     def on_bytes(self, data: bytes, now_ns: int) -> list[bytes]:
         """Take one message that arrived at `now_ns`; return the messages to send."""
-        self.wire_bytes_up += self.wire.size(data)
-        try:
-            frame = self.wire.decode(data)
-        except FrameError as error:
-            self.malformed += 1
-            self.session.on_malformed(str(error))
+        frame = self.inlet.take(data)
+        if frame is None:
             return []
         return self._encode(self.session.on_frame(frame, now_ns))
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from channel.codec import CodecState, Vector
+from channel.frames import Desync
 from channel.lead import FlownSample
+from channel.lockstep import LOCKSTEP_CHANNEL, History
 from channel.recording import Field, RecordChannel, Recorder
 from channel.terms import Terms
 from channel.words import Word
@@ -57,3 +59,15 @@ def write_commands(
         row = (tick, controller.reference_rad(tick), believed, command)
         recorder.write(TICK_CHANNEL, tick * terms.tick_ns, row)
         tick += 1
+
+
+def write_failure(recorder: Recorder, terms: Terms, history: History, theirs: Desync) -> None:
+    """Write a lockstep failure down, as the transmitter reported it and as this end saw it."""
+    row = history.failure_row(
+        theirs.epoch,
+        theirs.sample,
+        theirs.receiver_digest,
+        theirs.transmitter_digest,
+        theirs.state,
+    )
+    recorder.write(LOCKSTEP_CHANNEL, theirs.sample * terms.sample_ns, row)

@@ -14,13 +14,12 @@ from __future__ import annotations
 from collections import Counter, deque
 from enum import Enum
 
-from channel.codec import Codec, Vector
+from channel.codec import Codec, CodecState
 from channel.events import EVENT_CHANNEL, Event, EventKind, event_row
 from channel.frames import (
     Bye,
     Commands,
     Desync,
-    Echo,
     ForeignVersion,
     Frame,
     Hello,
@@ -31,18 +30,19 @@ from channel.frames import (
     Welcome,
 )
 from channel.identity import Identity
-from channel.lead import fly_sample
-from channel.limits import are_plausible, from_millivolts, to_millivolts
-from channel.lockstep import HISTORY_SAMPLES, LOCKSTEP_CHANNEL, History
+from channel.limits import to_millivolts
+from channel.lockstep import HISTORY_SAMPLES, History
 from channel.recording import NullRecorder, Recorder
 from channel.shaper import BaudMeter
 from channel.terms import Terms
 from channel.wire import WIRE_VERSION
-from channel.words import ERASED, Word
+from channel.words import ERASED
+from receiver.commander import Commander
 from receiver.controllers.base import Controller
-from receiver.records import write_commands, write_sample
-from receiver.rejoin import Greeter, Verdict, carried_to, desync_answer, difference, first_sample
+from receiver.records import write_failure
+from receiver.rejoin import Greeter, Verdict, desync_answer, difference, first_sample
 from receiver.short_slots import SlotFinder
+from receiver.stranger import Stranger
 
 GAP_SAMPLES_MAX = HISTORY_SAMPLES
 """A symbol this far ahead is no gap any more; after as many erasures in a row none are counted on."""
@@ -62,7 +62,7 @@ class ReceiverSession:
     """Turns symbols into commands; see the module's text.
 
     `session_number` is drawn by the caller (32 bits, not zero), so that the session itself stays
-    deterministic.
+    deterministic. `take_over`: claim a flight that another receiver has.
     """
 
     def __init__(
@@ -73,6 +73,8 @@ class ReceiverSession:
         identity: Identity,
         session_number: int,
         recorder: Recorder | None = None,
+        *,
+        take_over: bool = False,
     ) -> None:
         self.codec = codec
         self.terms = terms
@@ -80,7 +82,6 @@ class ReceiverSession:
         self.session_number = session_number
         self.phase = Phase.WAITING
         self.epoch = 0
-        self.state = codec.initial()
         self.meter = BaudMeter()
         self.counts: Counter[str] = Counter()
         """erasures, symbols_late, symbols_misplaced, stale_frames, refused_hellos, bad_commands,
@@ -89,13 +90,10 @@ class ReceiverSession:
         self.refusal: str | None = None
         self.desync: Desync | None = None
         self.events: deque[Event] = deque(maxlen=1000)
-        self.history = History(codec)
         self._greeter = Greeter()
-        self._controller = controller
+        self._stranger = Stranger(session_number, take_over)
         self._recorder = recorder or NullRecorder()
-        self._commands: deque[Vector] = deque([terms.initial_command] * terms.lead_ticks)
-        self._last_command = terms.initial_command
-        self._echoes: deque[Echo] = deque(maxlen=terms.repeats + 1)
+        self._commander = Commander(codec, terms, controller, self._recorder, self.counts, self._tell)
         self._slot = 0
         self._word: list[int | None] = []
         self._anchor: tuple[int, int] | None = None
@@ -105,6 +103,16 @@ class ReceiverSession:
         self._silent_slots = 0
         self._reported: tuple[int, int] | None = None
         self._slots = SlotFinder(terms)
+
+    @property
+    def state(self) -> CodecState:
+        """Return the codec's state before the next sample."""
+        return self._commander.state
+
+    @property
+    def history(self) -> History:
+        """Return the last states, for a failure to be looked into."""
+        return self._commander.history
 
     # What arrives
 
@@ -123,6 +131,8 @@ class ReceiverSession:
                 return self._on_desync(frame)
             case Bye() if self._is_current(frame.session):
                 self._end(f"the transmitter ended the flight: {frame.reason}")
+            case Bye() if frame.session == 0 and self._stranger.asked and self.phase is Phase.WAITING:
+                self._end(frame.reason)
             case Bye() if self.refusal is not None and frame.session == 0:
                 self.refusal = f"{self.refusal}\n  as the transmitter sees it: {frame.reason}"
                 self._end("refused")
@@ -191,7 +201,6 @@ class ReceiverSession:
         """Begin a session, or a new epoch of it; return the answer."""
         last = self._greeter.welcome
         state = b""
-        hold = self.terms.initial_command
         own = self.state.sample + (1 if self._word else 0)
         first = first_sample(hello, own, self.terms, begun=last is not None)
         count = self.terms.symbols_per_word
@@ -201,7 +210,7 @@ class ReceiverSession:
         if last is None:
             self.phase = Phase.FLYING
             self.refusal = None
-            self.state = self.codec.initial()._replace(sample=first)
+            self._commander.restart(first)
         elif self.epoch >= EPOCH_MAX:
             self._end(f"{EPOCH_MAX} rejoins: something is wrong with this line")
             return [Bye(self.session_number, self.end_reason)]
@@ -209,22 +218,17 @@ class ReceiverSession:
             self.epoch += 1
             self.counts["rejoins"] += 1
             if hello.incarnation == last.incarnation:
-                hold = self._last_command
-                silent = self._silent_slots // self.terms.symbols_per_word
-                known = tuple(self._commands)
-                self.state = carried_to(self.codec, self.state, first, known, hold, silent)
+                self._commander.carry_on(first, self._silent_slots // count)
                 state = self.codec.pack(self.state)
             else:
                 # A rig that was started again is at rest, and so is what is known of it.
-                self.state = self.codec.initial()._replace(sample=first)
+                self._commander.restart(first)
         self._slot = first * count
         self._word = []
         self._anchor = None
         self._advanced = False
         self._silent_slots = 0
-        self._echoes.clear()
-        self._last_command = hold
-        self._commands = deque([hold] * self.terms.lead_ticks)
+        hold = self._commander.hold
         welcome = Welcome(
             self.session_number,
             self.epoch,
@@ -274,7 +278,7 @@ class ReceiverSession:
     def _on_foreign_symbol(self, symbol: Symbol) -> list[Frame]:
         """Answer a transmitter that flies in a session or an epoch that is not the present one."""
         if self.phase is Phase.WAITING and self.refusal is None:
-            return [Unknown(symbol.session, symbol.epoch)]
+            return self._stranger.on_symbol(symbol)
         welcome = self._greeter.welcome
         missed = self._is_current(symbol.session) and symbol.epoch < self.epoch
         if missed and not self._advanced and welcome is not None:
@@ -313,49 +317,9 @@ class ReceiverSession:
         symbols = [value for value in self._word if value is not None]
         whole = len(symbols) == len(self._word)
         self._word = []
-        return self._fly(tuple(symbols) if whole else ERASED, now_ns)
-
-    def _fly(self, word: Word, now_ns: int) -> list[Frame]:
-        before = self.state
-        lead = self.terms.lead_ticks
-        flown = fly_sample(self.codec, before, word, tuple(self._commands), self._decide)
-        self._commands.extend(flown.commands)
-        for _ in range(len(self._commands) - lead):
-            self._commands.popleft()
-        self.state = flown.state
-        self.history.add(self.epoch, word, self.state)
-        digest = self.codec.digest(self.state)
-        millivolts = [mv for command in flown.commands for mv in to_millivolts(command)]
-        number = self.codec.coder.alphabet.word_number(word)
-        self._echoes.append(Echo(before.sample, number, digest, tuple(millivolts)))
-        ranges = self.codec.coder.ranges(before.coder)
-        write_sample(self._recorder, self.terms, word, ranges, self.state, digest, now_ns)
-        write_commands(self._recorder, self.terms, before.sample, flown, self._controller)
-        return [Commands(self.session_number, self.epoch, tuple(self._echoes))]
-
-    def _decide(self, tick: int, state: Vector) -> Vector:
-        """Ask the controller, limit what it wants, and return it as the wire will carry it."""
-        volts = self._ask(tick, state)
-        limited = self.terms.limits.apply(volts, self._last_command)
-        self._last_command = from_millivolts(to_millivolts(limited))
-        return self._last_command
-
-    def _ask(self, tick: int, state: Vector) -> Vector:
-        """Return what the controller wants; its last command where it fails or wants nonsense."""
-        try:
-            volts = self._controller.command(tick, state)
-            if len(volts) == len(self._last_command) and are_plausible(volts):
-                return volts
-            problem = f"wants {volts}"
-        except Exception as error:  # a controller is the user's code; the flight goes on without it
-            problem = f"failed: {type(error).__name__}: {error}"
-        self.counts["bad_commands"] += 1
-        if self.counts["bad_commands"] == 1:
-            self._tell(
-                EventKind.CONTROLLER,
-                f"at tick {tick} the controller {problem}; its last command is kept",
-            )
-        return self._last_command
+        word = tuple(symbols) if whole else ERASED
+        echoes = self._commander.fly(word, self.epoch, now_ns)
+        return [Commands(self.session_number, self.epoch, echoes)]
 
     # Ends and reports
 
@@ -373,14 +337,7 @@ class ReceiverSession:
             f"{theirs.transmitter_digest:016x}, receiver {theirs.receiver_digest:016x}",
             theirs.sample,
         )
-        row = self.history.failure_row(
-            theirs.epoch,
-            theirs.sample,
-            theirs.receiver_digest,
-            theirs.transmitter_digest,
-            theirs.state,
-        )
-        self._recorder.write(LOCKSTEP_CHANNEL, theirs.sample * self.terms.sample_ns, row)
+        write_failure(self._recorder, self.terms, self.history, theirs)
         return [answer]
 
     def _is_current(self, session: int) -> bool:

@@ -83,8 +83,10 @@ def sabotaged(codec: Codec, text: str) -> Codec:
         raise ConfigError(str(error)) from error
 
 
-def build_receiver(agreement: Agreement, recorder: Recorder | None, wire: Wire) -> ReceiverEndpoint:
-    """Return the controller node of a configuration."""
+def build_receiver(
+    agreement: Agreement, recorder: Recorder | None, wire: Wire, take_over: bool = False
+) -> ReceiverEndpoint:
+    """Return the controller node of a configuration; `take_over` from another one, on purpose."""
     session = ReceiverSession(
         sabotaged(agreement.codec, agreement.config.receiver.sabotage),
         agreement.terms,
@@ -92,6 +94,7 @@ def build_receiver(agreement: Agreement, recorder: Recorder | None, wire: Wire) 
         agreement.identity,
         secrets.randbits(31) + 1,
         recorder,
+        take_over=take_over,
     )
     return ReceiverEndpoint(session, wire)
 

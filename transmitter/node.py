@@ -148,6 +148,10 @@ class TransmitterNode:
         self.session.events.append(event)
         self._recorder.write(EVENT_CHANNEL, time_ns, event_row(event))
 
+    def on_malformed(self, why: str) -> None:
+        """Report a message that came and was no frame."""
+        self.tell(EventKind.MALFORMED, f"dropped a frame: {why}")
+
     def _check(self, tick: int, reading: Reading) -> None:
         fault = reading.fault or self._watch.check(
             reading.counts, self._applied, self.session.copies.confirmed.model

@@ -10,9 +10,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 
-from channel.errors import ConfigMismatch, FrameError, LinkLost
+from channel.errors import ConfigMismatch, LinkLost
 from channel.events import EventKind
-from channel.frames import Commands, Frame, Symbol
+from channel.frames import Frame, Symbol
+from channel.inlet import Inlet
 from channel.links.base import Link
 from channel.outbox import Outbox
 from channel.uplink import Uplink
@@ -49,10 +50,7 @@ class RealFlight:
         """what was last told about the receiver: it is there"""
         self.lateness = LatenessMeter()
         self.ticks_missed = 0
-        self.wire_bytes_down = 0
-        self.control_bytes_down = 0
-        """of `wire_bytes_down`, those that carried no commands"""
-        self.malformed = 0
+        self.inlet = Inlet(uplink.wire, node.on_malformed)
 
     def greet(self, peer_timeout_s: float) -> None:
         """Ask for a session until there is one or a refusal; LinkLost when nobody answers."""
@@ -141,32 +139,41 @@ class RealFlight:
 
     def _wait_until(self, deadline_ns: int) -> None:
         while (left_ns := deadline_ns - self._now_ns()) > 0:
-            self._take_in(left_ns / 1e9)
+            if self._answer_due:
+                self._take_in(left_ns / 1e9)
+            elif not self._take_in(0.0):
+                # Nothing is on its way that could matter before the deadline, and a plain sleep
+                # keeps it better than waiting for a message that does not come.
+                due_ns = self._outbox.next_due_ns
+                wake_ns = deadline_ns if due_ns is None else min(deadline_ns, due_ns)
+                time.sleep(max(0.0, wake_ns - self._now_ns()) / 1e9)
 
-    def _take_in(self, timeout_s: float) -> None:
-        """Send what is due and take one message, waiting for either at most `timeout_s`."""
+    @property
+    def _answer_due(self) -> bool:
+        session = self._node.session
+        return session.phase is not Phase.FLYING or session.copies.lag_samples > 0
+
+    def _take_in(self, timeout_s: float) -> bool:
+        """Send what is due and take one message, waiting for either at most `timeout_s`.
+
+        Return whether a message came.
+        """
         self._send_due()
         due_ns = self._outbox.next_due_ns
         if due_ns is not None:
             timeout_s = max(0.0, min(timeout_s, (due_ns - self._now_ns()) / 1e9))
         data = self._link.receive(timeout_s)
         if data is None:
-            return
+            return False
         if is_envelope(data):
             raise ConfigMismatch(
                 "the receiver flies on the virtual clock, this end on the real one; give both the "
                 "same --clock"
             )
-        self.wire_bytes_down += self._wire.size(data)
-        try:
-            frame = self._wire.decode(data)
-        except FrameError as error:
-            self.malformed += 1
-            self._node.tell(EventKind.MALFORMED, f"dropped a frame: {error}")
-            return
-        if not isinstance(frame, Commands):
-            self.control_bytes_down += self._wire.size(data)
-        self._offer(self._node.deliver(frame))
+        frame = self.inlet.take(data)
+        if frame is not None:
+            self._offer(self._node.deliver(frame))
+        return True
 
     def _offer(self, frames: Sequence[Frame]) -> None:
         for frame in frames:

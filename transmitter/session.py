@@ -18,6 +18,7 @@ from channel.codec import Codec, Vector
 from channel.events import EVENT_CHANNEL, Event, EventKind, event_row
 from channel.frames import (
     Bye,
+    Claim,
     Commands,
     Desync,
     Echo,
@@ -37,6 +38,7 @@ from channel.recording import NullRecorder, Recorder
 from channel.terms import Terms
 from channel.wire import WIRE_VERSION
 from channel.words import ERASED
+from transmitter.claims import Claims
 from transmitter.copies import Confirmed, Copies
 from transmitter.records import ESTIMATE_CHANNEL, SAMPLE_CHANNEL
 from transmitter.rejoin import Asking, start_of
@@ -80,13 +82,14 @@ class TransmitterSession:
         self.epoch = 0
         self.copies = Copies(codec, terms)
         self.counts: Counter[str] = Counter()
-        """digest_checks, desyncs, rejoins, stale_frames, words_missed, erasures"""
+        """digest_checks, desyncs, rejoins, stale_frames, words_missed, erasures, claims_refused,
+        take_overs"""
         self.end_reason = ""
         self.refusal: str | None = None
         self.desync: Desync | None = None
         """the last one"""
         self.heard_tick = 0
-        """when the last frame of the present epoch came"""
+        """when the receiver last told something new in the present epoch"""
         self.epoch_tick = 0
         """first tick of the present epoch"""
         self.confirmed: deque[Confirmed] = deque(maxlen=2 * LAG_SAMPLES_MAX)
@@ -94,6 +97,7 @@ class TransmitterSession:
         self.events: deque[Event] = deque(maxlen=1000)
         self.history = History(codec)
         self._asking = Asking(identity, incarnation, terms)
+        self._claims = Claims(terms)
         self._stop_on_desync = stop_on_desync
         self._recorder = recorder or NullRecorder()
         self._due: deque[tuple[int, Vector]] = deque(
@@ -167,9 +171,11 @@ class TransmitterSession:
             case Commands() if self._is_current(frame.session) and frame.epoch == self.epoch:
                 return self._on_commands(frame)
             case Welcome() if self._asking.is_answered_by(frame):
-                self._on_welcome(frame)
+                return self._on_welcome(frame)
             case Unknown() if self._is_current(frame.session) and frame.epoch == self.epoch:
-                return self.rejoin(Why.UNKNOWN, "the receiver does not know this session (any more)")
+                return self._on_unknown()
+            case Claim() if self._is_current(frame.session) and frame.epoch == self.epoch:
+                return self._on_claim(frame)
             case Desync() if frame.session == self.session_number and self.desync is not None:
                 self._record_failure(self.desync, frame)
             case Refuse() if frame.incarnation == self.incarnation:
@@ -191,18 +197,43 @@ class TransmitterSession:
         self._end(reason)
         return [Bye(self.session_number, reason)] if had_session else []
 
-    def _on_welcome(self, welcome: Welcome) -> None:
+    def _on_unknown(self) -> list[Frame]:
+        """Believe it of a receiver that has stopped commanding; refuse it of a second one."""
+        if self._claims.is_lost(self._tick, self.heard_tick):
+            return self.rejoin(Why.UNKNOWN, "the receiver does not know this session (any more)")
+        if not self._claims.is_second():
+            return []
+        self.counts["claims_refused"] += 1
+        reason = (
+            "the transmitter flies with another receiver and stays with it; to take the flight over on "
+            "purpose: tenbaud receive --take-over"
+        )
+        self._tell(EventKind.REFUSED, "a second receiver asked for this flight: refused")
+        return [Bye(0, reason)]
+
+    def _on_claim(self, claim: Claim) -> list[Frame]:
+        self._claims.name_successor(claim.by, self._tick)
+        return self.rejoin(Why.TAKEN_OVER, f"receiver session {claim.by:08x} takes over on purpose")
+
+    def _on_welcome(self, welcome: Welcome) -> list[Frame]:
         newer = welcome.session == self.session_number and welcome.epoch > self.epoch
-        if self.phase is Phase.ENDED or (self.phase is Phase.FLYING and not newer):
+        successor = self._claims.successor(self._tick)
+        foreign = successor is not None and welcome.session != successor
+        if foreign or self.phase is Phase.ENDED or (self.phase is Phase.FLYING and not newer):
             self.counts["stale_frames"] += 1
-            return
+            return []
         try:
             state, hold = start_of(welcome, self.codec, self.terms)
         except ValueError as error:
             self.counts["stale_frames"] += 1
             self._tell(EventKind.STALE, f"dropped a welcome: {error}")
-            return
+            return []
         again = self.phase is not Phase.GREETING
+        farewell: list[Frame] = []
+        if successor is not None and welcome.session != self.session_number:
+            self.counts["take_overs"] += 1
+            farewell = [Bye(self.session_number, "another receiver has taken the flight over")]
+        self._claims.settle()
         self.session_number = welcome.session
         self.epoch = welcome.epoch
         self.heard_tick = self._tick
@@ -213,9 +244,15 @@ class TransmitterSession:
         self.counts["rejoins"] += again
         text = f"session {welcome.session:08x}, epoch {welcome.epoch}, begins at sample {state.sample}"
         self._tell(EventKind.REJOIN if again else EventKind.STARTED, text)
+        return farewell
 
     def _on_refuse(self, refuse: Refuse) -> list[Frame]:
         if self.phase not in (Phase.GREETING, Phase.REJOINING):
+            return []
+        if self._claims.successor(self._tick) is not None:
+            # The present receiver has been asked too, and goes on instead.
+            self._claims.settle()
+            self._tell(EventKind.REFUSED, f"the receiver that takes over refused: {refuse.reason}")
             return []
         lines = [refuse.reason]
         if refuse.config and refuse.config != self.identity.config:
@@ -227,7 +264,12 @@ class TransmitterSession:
         return [Bye(0, self.refusal)]
 
     def _on_commands(self, frame: Commands) -> list[Frame]:
+        if frame.echoes[-1].sample < self.copies.confirmed.sample:
+            # A copy, or a recording: it brings nothing, and proves nobody alive.
+            self.counts["stale_frames"] += 1
+            return []
         self.heard_tick = self._tick
+        self._claims.on_command()
         for echo in frame.echoes:
             expected = self.copies.confirmed.sample
             if echo.sample < expected:

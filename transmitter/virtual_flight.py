@@ -13,9 +13,8 @@ from collections.abc import Callable, Sequence
 from itertools import count
 from typing import NamedTuple
 
-from channel.errors import FrameError
-from channel.events import EventKind
-from channel.frames import Commands, Frame
+from channel.frames import Frame
+from channel.inlet import Inlet
 from channel.line import Delivery, Line
 from channel.uplink import Uplink
 from channel.virtual import Peer, Reply
@@ -45,10 +44,7 @@ class VirtualFlight:
         self._arrivals: list[_Arrival] = []
         self._order = count()
         self._deadline_ns: int | None = None
-        self.wire_bytes_down = 0
-        self.control_bytes_down = 0
-        """of `wire_bytes_down`, those that carried no commands"""
-        self.malformed = 0
+        self.inlet = Inlet(uplink.wire, node.on_malformed)
 
     def greet(self) -> None:
         """Carry the handshake out; the session then flies or holds a refusal, or nobody answered.
@@ -137,13 +133,6 @@ class VirtualFlight:
                 self._push(delivery, upward=False)
 
     def _take(self, data: bytes, now_ns: int) -> None:
-        self.wire_bytes_down += self._wire.size(data)
-        try:
-            frame = self._wire.decode(data)
-        except FrameError as error:
-            self.malformed += 1
-            self._node.tell(EventKind.MALFORMED, f"dropped a frame: {error}")
-            return
-        if not isinstance(frame, Commands):
-            self.control_bytes_down += self._wire.size(data)
-        self._offer(self._node.deliver(frame), now_ns)
+        frame = self.inlet.take(data)
+        if frame is not None:
+            self._offer(self._node.deliver(frame), now_ns)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from channel.codec import Vector
-from channel.words import ERASED, Word
+from channel.coders.base import Numbers, Results, SymbolResults, Symbols
 
 Gains = tuple[tuple[float, ...], ...]
 
@@ -16,24 +15,16 @@ def axes_of(gains: Gains) -> int:
     return axes
 
 
-def signs_of(predicted: Vector, measurement: Vector, axes: int) -> tuple[int, ...]:
-    """Return the sign of the estimation error of each axis (20); the sign of zero is +1."""
-    return tuple(1 if measurement[axis] >= predicted[axis] else -1 for axis in range(axes))
+def write_signs(predicted: Numbers, measurement: Numbers, symbols: SymbolResults) -> None:
+    """Write the sign of the estimation error of each axis (20); the sign of zero is +1."""
+    for axis in range(len(symbols)):
+        symbols[axis] = 1 if measurement[axis] >= predicted[axis] else -1
 
 
-def spread(errors: Vector, gains: Gains) -> Vector:
-    """Return the correction of each model state: its row of gains times the axes' errors."""
-    correction = []
-    for row in gains:
+def spread_signs(gains: Gains, ranges: Numbers, signs: Symbols, correction: Results) -> None:
+    """Write the correction of each model state: its row of gains times `M sigma` of each axis (21)."""
+    for row in range(len(gains)):
         total = 0.0
-        for axis in range(len(errors)):
-            total += row[axis] * errors[axis]
-        correction.append(total)
-    return tuple(correction)
-
-
-def scaled(ranges: Vector, word: Word) -> Vector:
-    """Return the errors that a word stands for (21); an erased word stands for none."""
-    if word is ERASED:
-        return (0.0,) * len(ranges)
-    return tuple(ranges[axis] * word[axis] for axis in range(len(ranges)))
+        for axis in range(len(signs)):
+            total += gains[row][axis] * (ranges[axis] * signs[axis])
+        correction[row] = total

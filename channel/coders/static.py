@@ -10,10 +10,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from channel.codec import Vector
-from channel.coders.signs import Gains, axes_of, spread
-from channel.words import ERASED, Alphabet, Word
+from channel.coders.base import (
+    CoderFunctions,
+    FunctionCoder,
+    Numbers,
+    Results,
+    SymbolResults,
+    Symbols,
+)
+from channel.coders.signs import Gains, axes_of
+from channel.words import Alphabet
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +38,49 @@ class StaticParameters:
     impulse: bool = False
 
 
-class StaticCoder:
+class StaticConstants(NamedTuple):
+    """What the functions below need."""
+
+    range: float
+    width: float
+    """of a cell"""
+    gains: Gains
+
+
+def static_encode(
+    constants: StaticConstants,
+    coder: Numbers,
+    predicted: Numbers,
+    measurement: Numbers,
+    symbols: SymbolResults,
+) -> None:
+    """Write the number of the measurement's cell; beyond the range, of the outermost one."""
+    cell = math.floor((measurement[0] + constants.range) / constants.width)
+    write_bits(cell, symbols)
+
+
+def static_decode(
+    constants: StaticConstants,
+    coder: Numbers,
+    model: Numbers,
+    symbols: Symbols,
+    erased: bool,
+    correction: Results,
+    after: Results,
+) -> None:
+    """Write the correction towards the middle of the cell; none for an erasure."""
+    error = 0.0
+    if not erased:
+        middle = (number_of(symbols) + 0.5) * constants.width - constants.range
+        error = middle - model[0]
+    for row in range(len(constants.gains)):
+        correction[row] = 0.0 + constants.gains[row][0] * error
+
+
+class StaticCoder(FunctionCoder):
     """`b` binary symbols per word, the most significant first. It has no state."""
+
+    functions = CoderFunctions(static_encode, static_decode)
 
     def __init__(self, parameters: StaticParameters) -> None:
         if axes_of(parameters.gains) != 1:
@@ -42,40 +92,27 @@ class StaticCoder:
         self.parameters = parameters
         self.impulse = parameters.impulse
         self.alphabet = Alphabet((0, 1), parameters.bits)
-        self._cells = 1 << parameters.bits
-        self._width = 2.0 * parameters.range / self._cells
-
-    def initial(self) -> Vector:
-        """Return nothing: this coder remembers nothing."""
-        return ()
-
-    def encode(self, coder: Vector, predicted: Vector, measurement: Vector) -> tuple[int, ...]:
-        """Return the number of the measurement's cell; beyond the range, of the outermost one."""
-        cell = math.floor((measurement[0] + self.parameters.range) / self._width)
-        return bits_of(cell, self.parameters.bits)
-
-    def decode(self, coder: Vector, state: Vector, word: Word) -> tuple[Vector, Vector]:
-        """Return the correction towards the middle of the cell; none for an erasure."""
-        if word is ERASED:
-            return (0.0,) * len(self.parameters.gains), ()
-        middle = (number_of(word) + 0.5) * self._width - self.parameters.range
-        return spread((middle - state[0],), self.parameters.gains), ()
+        self.correction_size = len(parameters.gains)
+        width = 2.0 * parameters.range / (1 << parameters.bits)
+        self.constants = StaticConstants(parameters.range, width, parameters.gains)
 
     def ranges(self, coder: Vector) -> Vector:
         """Return half the width of a cell, the largest error of a measurement within the range."""
-        return (0.5 * self._width,)
+        return (0.5 * self.constants.width,)
 
 
-def bits_of(number: int, bits: int) -> tuple[int, ...]:
-    """Return a whole number in `bits` binary symbols, clamped to what they can say."""
+def write_bits(number: int, symbols: SymbolResults) -> None:
+    """Write a whole number as binary symbols, clamped to what they can say."""
+    bits = len(symbols)
     largest = (1 << bits) - 1
     clamped = 0 if number < 0 else largest if number > largest else number
-    return tuple(clamped >> place & 1 for place in range(bits - 1, -1, -1))
+    for index in range(bits):
+        symbols[index] = clamped >> (bits - 1 - index) & 1
 
 
-def number_of(word: tuple[int, ...]) -> int:
+def number_of(word: Symbols) -> int:
     """Return the whole number that binary symbols stand for."""
     number = 0
-    for symbol in word:
-        number = 2 * number + symbol
+    for index in range(len(word)):
+        number = 2 * number + word[index]
     return number

@@ -13,10 +13,19 @@ what the adaptive rule (19) is for.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from channel.codec import Vector
-from channel.coders.signs import Gains, axes_of, scaled, signs_of, spread
-from channel.words import Alphabet, Word
+from channel.coders.base import (
+    CoderFunctions,
+    FunctionCoder,
+    Numbers,
+    Results,
+    SymbolResults,
+    Symbols,
+)
+from channel.coders.signs import Gains, axes_of, spread_signs, write_signs
+from channel.words import Alphabet
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +43,45 @@ class TimedParameters:
     impulse: bool = False
 
 
-class TimedCoder:
+class TimedConstants(NamedTuple):
+    """What the functions below need."""
+
+    decay: float
+    floor: float
+    """(1 - rho) M_min"""
+    gains: Gains
+
+
+def timed_encode(
+    constants: TimedConstants,
+    coder: Numbers,
+    predicted: Numbers,
+    measurement: Numbers,
+    symbols: SymbolResults,
+) -> None:
+    """Write the sign of the estimation error of each axis (20)."""
+    write_signs(predicted, measurement, symbols)
+
+
+def timed_decode(
+    constants: TimedConstants,
+    coder: Numbers,
+    model: Numbers,
+    symbols: Symbols,
+    erased: bool,
+    correction: Results,
+    after: Results,
+) -> None:
+    """Write the correction (21),(23) and the ranges of the next sample."""
+    spread_signs(constants.gains, coder, symbols, correction)
+    for axis in range(len(symbols)):
+        after[axis] = constants.floor + constants.decay * coder[axis]
+
+
+class TimedCoder(FunctionCoder):
     """A sign per axis, and ranges that shrink by the clock. Coder state: the ranges."""
+
+    functions = CoderFunctions(timed_encode, timed_decode)
 
     def __init__(self, parameters: TimedParameters) -> None:
         axes = axes_of(parameters.gains)
@@ -45,21 +91,13 @@ class TimedCoder:
         self.impulse = parameters.impulse
         self.axes = axes
         self.alphabet = Alphabet((-1, 1), axes)
-        self._floor = (1.0 - parameters.decay) * parameters.minimum_range
+        self.correction_size = len(parameters.gains)
+        floor = (1.0 - parameters.decay) * parameters.minimum_range
+        self.constants = TimedConstants(parameters.decay, floor, parameters.gains)
 
     def initial(self) -> Vector:
         """Return `M_0` for every axis."""
         return (self.parameters.initial_range,) * self.axes
-
-    def encode(self, coder: Vector, predicted: Vector, measurement: Vector) -> tuple[int, ...]:
-        """Return the sign of the estimation error of each axis (20)."""
-        return signs_of(predicted, measurement, self.axes)
-
-    def decode(self, coder: Vector, state: Vector, word: Word) -> tuple[Vector, Vector]:
-        """Return the correction (21),(23) and the ranges of the next sample."""
-        decay = self.parameters.decay
-        correction = spread(scaled(coder, word), self.parameters.gains)
-        return correction, tuple(self._floor + decay * one for one in coder)
 
     def ranges(self, coder: Vector) -> Vector:
         """Return the range `M_k` of each axis."""

@@ -13,10 +13,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from channel.codec import Vector
-from channel.coders.static import bits_of, number_of
-from channel.words import ERASED, Alphabet, Word
+from channel.coders.base import (
+    CoderFunctions,
+    FunctionCoder,
+    Numbers,
+    Results,
+    SymbolResults,
+    Symbols,
+)
+from channel.coders.static import number_of, write_bits
+from channel.words import Alphabet
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,13 +42,66 @@ class WordsParameters:
     """tau"""
 
 
-class WordsCoder:
+class WordsConstants(NamedTuple):
+    """What the functions below need."""
+
+    half: int
+    """number of the word for the angle zero"""
+    step: float
+    """between two neighbouring words"""
+    period_s: float
+    rate_filter_s: float
+
+
+def words_encode(
+    constants: WordsConstants,
+    coder: Numbers,
+    predicted: Numbers,
+    measurement: Numbers,
+    symbols: SymbolResults,
+) -> None:
+    """Write the nearest step of the angle; beyond the range, the outermost one."""
+    step = math.floor(measurement[0] / constants.step + 0.5)
+    write_bits(step + constants.half, symbols)
+
+
+def words_decode(
+    constants: WordsConstants,
+    coder: Numbers,
+    model: Numbers,
+    symbols: Symbols,
+    erased: bool,
+    correction: Results,
+    after: Results,
+) -> None:
+    """Write what brings (angle, rate) to the word and its difference; nothing if erased."""
+    last, age = coder[0], coder[1]
+    if erased:
+        correction[0] = correction[1] = 0.0
+        after[0] = last
+        after[1] = age + 1.0 if age > 0.0 else 0.0
+        return
+    angle = (number_of(symbols) - constants.half) * constants.step
+    turn = 0.0
+    if age > 0.0:
+        elapsed = age * constants.period_s
+        share = elapsed / (elapsed + constants.rate_filter_s)
+        turn = share * ((angle - last) / elapsed - model[1])
+    correction[0] = angle - model[0]
+    correction[1] = turn
+    after[0] = angle
+    after[1] = 1.0
+
+
+class WordsCoder(FunctionCoder):
     """`b` binary symbols per word. Coder state: the last angle and how many samples ago it was.
 
     An age of 0 says that there is none yet.
     """
 
+    functions = CoderFunctions(words_encode, words_decode)
     impulse = True
+    correction_size = 2
 
     def __init__(self, parameters: WordsParameters) -> None:
         if not 1 <= parameters.bits <= 15:
@@ -50,31 +112,15 @@ class WordsCoder:
             raise ValueError(f"rate_filter_s must be at least 0, got {parameters.rate_filter_s}")
         self.parameters = parameters
         self.alphabet = Alphabet((0, 1), parameters.bits)
-        self._half = 1 << (parameters.bits - 1)
-        self._step = parameters.range / self._half
+        half = 1 << (parameters.bits - 1)
+        self.constants = WordsConstants(
+            half, parameters.range / half, parameters.period_s, parameters.rate_filter_s
+        )
 
     def initial(self) -> Vector:
         """Return that no angle has come yet."""
         return (0.0, 0.0)
 
-    def encode(self, coder: Vector, predicted: Vector, measurement: Vector) -> tuple[int, ...]:
-        """Return the nearest step of the angle; beyond the range, the outermost one."""
-        step = math.floor(measurement[0] / self._step + 0.5)
-        return bits_of(step + self._half, self.parameters.bits)
-
-    def decode(self, coder: Vector, state: Vector, word: Word) -> tuple[Vector, Vector]:
-        """Return what brings (angle, rate) to the word and its difference; nothing if erased."""
-        last, age = coder
-        if word is ERASED:
-            return (0.0, 0.0), (last, age + 1.0 if age > 0.0 else 0.0)
-        angle = (number_of(word) - self._half) * self._step
-        turn = 0.0
-        if age > 0.0:
-            elapsed = age * self.parameters.period_s
-            share = elapsed / (elapsed + self.parameters.rate_filter_s)
-            turn = share * ((angle - last) / elapsed - state[1])
-        return (angle - state[0], turn), (angle, 1.0)
-
     def ranges(self, coder: Vector) -> Vector:
         """Return half a step, the largest error of an angle within the range."""
-        return (0.5 * self._step,)
+        return (0.5 * self.constants.step,)

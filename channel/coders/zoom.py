@@ -12,9 +12,19 @@ An erased word corrects nothing and enters the window as a zero.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from channel.codec import Vector
-from channel.words import ERASED, Alphabet, Word
+from channel.coders.base import (
+    CoderFunctions,
+    FunctionCoder,
+    Numbers,
+    Results,
+    SymbolResults,
+    Symbols,
+)
+from channel.coders.signs import Gains, axes_of, spread_signs, write_signs
+from channel.words import Alphabet
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,22 +39,72 @@ class ZoomParameters:
     """rho, in (0, 1]"""
     window: int = 2
     """how many signs `lambda_k` is the mean of; the paper's (19) has two"""
-    gains: tuple[tuple[float, ...], ...] = ((4.1,), (8.6,))
+    gains: Gains = ((4.1,), (8.6,))
     """a row per corrected model state, a column per measured axis: l1 and l2 of (23)"""
     impulse: bool = False
     """False: the correction is held over the sample as in (22); True: applied to the state at once"""
 
 
-class ZoomCoder:
+class ZoomConstants(NamedTuple):
+    """What the functions below need."""
+
+    window: int
+    decay: float
+    floor: float
+    """(1 - rho) M_min"""
+    gains: Gains
+
+
+def zoom_encode(
+    constants: ZoomConstants,
+    coder: Numbers,
+    predicted: Numbers,
+    measurement: Numbers,
+    symbols: SymbolResults,
+) -> None:
+    """Write the sign of the estimation error of each axis (20)."""
+    write_signs(predicted, measurement, symbols)
+
+
+def zoom_decode(
+    constants: ZoomConstants,
+    coder: Numbers,
+    model: Numbers,
+    symbols: Symbols,
+    erased: bool,
+    correction: Results,
+    after: Results,
+) -> None:
+    """Write the correction (21),(23) and the coder state after (19)."""
+    spread_signs(constants.gains, coder, symbols, correction)
+    axes = len(symbols)
+    older = constants.window - 1
+    for axis in range(axes):
+        start = axes + axis * older
+        total = 0.0 + symbols[axis]
+        for place in range(start, start + older):
+            total += coder[place]
+        for place in range(start + older - 1, start, -1):
+            after[place] = coder[place - 1]
+        if older > 0:
+            after[start] = 0.0 + symbols[axis]
+        # |lambda| <= 0.5 without a division: the signs are small whole numbers, so this is exact.
+        saturated = 2.0 * total > constants.window or 2.0 * total < -constants.window
+        decay = constants.decay
+        scaled = coder[axis] / decay if saturated else decay * coder[axis]
+        after[axis] = constants.floor + scaled
+
+
+class ZoomCoder(FunctionCoder):
     """One sign and one self-adjusting range per measured axis.
 
     Coder state: the ranges of all axes, then the last `window - 1` signs of each axis, newest first.
     """
 
+    functions = CoderFunctions(zoom_encode, zoom_decode)
+
     def __init__(self, parameters: ZoomParameters) -> None:
-        axes = len(parameters.gains[0]) if parameters.gains else 0
-        if axes < 1 or any(len(row) != axes for row in parameters.gains):
-            raise ValueError(f"gains need rows of equal, non-zero length, got {parameters.gains}")
+        axes = axes_of(parameters.gains)
         if not 0.0 < parameters.decay <= 1.0:
             raise ValueError(f"decay must be in (0, 1], got {parameters.decay}")
         if parameters.window < 1:
@@ -53,46 +113,19 @@ class ZoomCoder:
         self.impulse = parameters.impulse
         self.axes = axes
         self.alphabet = Alphabet((-1, 1), axes)
-        self._floor = (1.0 - parameters.decay) * parameters.minimum_range
+        self.correction_size = len(parameters.gains)
+        self.constants = ZoomConstants(
+            parameters.window,
+            parameters.decay,
+            (1.0 - parameters.decay) * parameters.minimum_range,
+            parameters.gains,
+        )
 
     def initial(self) -> Vector:
         """Return `M_0` for every axis and an empty (zero) sign history."""
         history = self.axes * (self.parameters.window - 1)
         return (self.parameters.initial_range,) * self.axes + (0.0,) * history
 
-    def encode(self, coder: Vector, predicted: Vector, measurement: Vector) -> tuple[int, ...]:
-        """Return the sign of the estimation error of each axis (20)."""
-        return tuple(1 if measurement[axis] >= predicted[axis] else -1 for axis in range(self.axes))
-
-    def decode(self, coder: Vector, state: Vector, word: Word) -> tuple[Vector, Vector]:
-        """Return the correction (21),(23) and the coder state after (19)."""
-        signs = (0,) * self.axes if word is ERASED else word
-        older = self.parameters.window - 1
-        ranges = []
-        history: list[float] = []
-        for axis in range(self.axes):
-            start = self.axes + axis * older
-            window = (float(signs[axis]), *coder[start : start + older])
-            ranges.append(self._next_range(coder[axis], window))
-            history.extend(window[:older])
-        errors = [coder[axis] * signs[axis] for axis in range(self.axes)]
-        correction = []
-        for row in self.parameters.gains:
-            total = 0.0
-            for axis in range(self.axes):
-                total += row[axis] * errors[axis]
-            correction.append(total)
-        return tuple(correction), (*ranges, *history)
-
     def ranges(self, coder: Vector) -> Vector:
         """Return the range `M_k` of each axis."""
         return coder[: self.axes]
-
-    def _next_range(self, current: float, window: tuple[float, ...]) -> float:
-        total = 0.0
-        for sign in window:
-            total += sign
-        # |lambda| <= 0.5 without a division: the signs are small whole numbers, so this is exact.
-        saturated = 2.0 * total > len(window) or 2.0 * total < -len(window)
-        decay = self.parameters.decay
-        return self._floor + (current / decay if saturated else decay * current)

@@ -25,6 +25,8 @@ class LinkCounts:
     bytes_in: int = 0
     dropped: Counter[str] = field(default_factory=Counter)
     """messages not taken, by reason"""
+    refused: Counter[str] = field(default_factory=Counter)
+    """connections that were turned away, by reason"""
     reconnects: int = 0
     """times that a line which had gone came back"""
     line_bytes_out: int = 0

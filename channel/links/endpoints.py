@@ -24,19 +24,49 @@ def is_loopback(endpoint: str) -> bool:
         return False
 
 
-def check_endpoints(endpoints: tuple[str, ...], insecure: bool) -> None:
-    """Refuse an endpoint that leaves this machine without protection, unless told to allow it."""
+def check_endpoints(
+    endpoints: tuple[str, ...], insecure: bool, secured: bool = False, scouting: bool = False
+) -> None:
+    """Refuse an endpoint that leaves this machine without protection, unless told to allow it.
+
+    `secured`: the end has a certificate, so that every endpoint has to be TLS. `scouting` looks for the
+    other end by multicast, which leaves this machine too.
+    """
     for endpoint in endpoints:
-        if "/" not in endpoint or ":" not in endpoint.partition("/")[2]:
+        protocol, slash, address = endpoint.partition("/")
+        if not slash or ":" not in address:
             raise LinkError(
                 f"{endpoint!r} is no endpoint; write PROTOCOL/HOST:PORT, such as {DEFAULT_ENDPOINT}"
             )
-        if not insecure and not is_loopback(endpoint):
+        if secured and protocol != "tls":
             raise LinkError(
-                f"{endpoint} leaves this machine, and the link would be open to anyone who reaches "
-                "it: no encryption, no check of who commands the motors. On a network that you "
-                "trust with that, add --insecure; otherwise keep to 127.0.0.1"
+                f"{endpoint}: with --keys everything goes over TLS; write tls/{address}, at both ends"
             )
+        if not secured and protocol in ("tls", "quic"):
+            raise LinkError(
+                f"{endpoint} needs this node's certificate; add --keys FOLDER and --peer NAME "
+                "(`tenbaud keys init` and `tenbaud keys add NAME` make them)"
+            )
+        if not insecure and not secured and not is_loopback(endpoint):
+            raise LinkError(_open_to_all(endpoint))
+    if scouting and not secured and not insecure:
+        raise LinkError(_open_to_all("--scout"))
+
+
+def with_protocol(endpoint: str, protocol: str) -> str:
+    """Return the endpoint over another protocol."""
+    return f"{protocol}/{endpoint.partition('/')[2]}"
+
+
+def _open_to_all(what: str) -> str:
+    return (
+        f"{what} leaves this machine, and the link would be open to anyone who reaches it: no "
+        "encryption, no check of who commands the motors. Make keys once, on one machine:\n"
+        "  tenbaud keys init\n"
+        "and a certificate for each of the two (`tenbaud keys add --help`), then give --keys and "
+        "--peer with tls/HOST:PORT. On a network that you trust with open motors, add --insecure; "
+        "otherwise keep to 127.0.0.1"
+    )
 
 
 def free_endpoint() -> str:

@@ -8,8 +8,8 @@ from channel.frames import Frame
 from channel.links.base import Link, LinkCounts, Role
 from channel.wire import Wire
 
-DOWNWARD_KINDS = (2, 3, 5)
-"""Frame kinds that only the receiver sends: welcome, refuse, commands."""
+DOWNWARD_KINDS = (2, 3, 5, 8, 9)
+"""Frame kinds that only the receiver sends: welcome, refuse, commands, unknown, claim."""
 
 
 class SplitWire:
@@ -51,6 +51,7 @@ class SplitLink:
             messages_in=come.messages_in,
             bytes_in=come.bytes_in,
             dropped=out.dropped + come.dropped,
+            refused=out.refused + come.refused,
             reconnects=out.reconnects + come.reconnects,
             line_bytes_out=out.line_bytes_out + come.line_bytes_out,
             line_bytes_in=out.line_bytes_in + come.line_bytes_in,

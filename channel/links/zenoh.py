@@ -13,20 +13,19 @@ Keys, `NAME` being the session's name:
 
 from __future__ import annotations
 
-import json
 import re
 import secrets
+from collections.abc import Callable
 
 import zenoh
 
 from channel.errors import LinkError
 from channel.links.base import LinkBase, Role
 from channel.links.endpoints import check_endpoints
-from channel.links.zenoh_inbox import ChannelInbox, Inbox, QueueInbox
-from channel.terms import Clock
-
-LEASE_MS = 2_000
-RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 2}
+from channel.links.security import KEY_ROOT, Security
+from channel.links.zenoh_config import open_session, zenoh_config
+from channel.links.zenoh_gate import Gate
+from channel.links.zenoh_inbox import ChannelInbox
 
 _NAME = re.compile(r"[A-Za-z0-9_.-]+(/[A-Za-z0-9_.-]+)*")
 
@@ -35,7 +34,10 @@ class ZenohLink(LinkBase):
     """One end of a session over Zenoh.
 
     `listen` and `connect` are Zenoh endpoints; one end listens, the other connects, either may start
-    first. On the virtual clock waits are kept to a tenth of a second, and messages are quicker.
+    first. `router` are endpoints of Zenoh routers instead, behind which the other end is; the first
+    that answers within `patience_s` is taken. `scouting` finds listening ends by multicast.
+    `security`: TLS, and only the invited; without it an address beyond this machine needs
+    `insecure`.
     `best_effort`: a symbol that the network cannot take at once is dropped, an erasure, instead of
     keeping the loop waiting; all else stays reliable. Raises LinkError for a name or endpoint that
     cannot be used.
@@ -50,39 +52,48 @@ class ZenohLink(LinkBase):
         *,
         listen: tuple[str, ...] = (),
         connect: tuple[str, ...] = (),
+        router: tuple[str, ...] = (),
         scouting: bool = False,
         insecure: bool = False,
+        security: Security | None = None,
         best_effort: bool = False,
-        clock: Clock = "real",
+        patience_s: float = 10.0,
+        should_stop: Callable[[], bool] = lambda: False,
     ) -> None:
         super().__init__()
         if not _NAME.fullmatch(session_name):
             raise LinkError(
                 f"session name {session_name!r}: letters, digits, '_', '-', '.', and '/' between parts"
             )
-        if not listen and not connect and not scouting:
+        if not listen and not connect and not router and not scouting:
             raise LinkError("a Zenoh link needs an endpoint to listen on or to connect to")
-        check_endpoints(listen + connect, insecure)
-        self._inbox: Inbox | None = None
+        if router and (listen or connect or scouting):
+            raise LinkError("behind a router an end neither listens nor connects elsewhere")
+        check_endpoints(listen + connect + router, insecure, security is not None, scouting)
+        self._inbox: ChannelInbox | None = None
+        self._gate: Gate | None = None
         self._peers: set[str] = set()
         self._closed = False
+        # Only clients hear each other through a router: what peers send it stays there.
+        config = zenoh_config(
+            "client" if router else "peer",
+            listen,
+            connect or router,
+            scouting=scouting,
+            security=security,
+        )
+        where = ", ".join(listen + connect + router)
+        self._session = open_session(config, where, patience_s if router else 0.0, should_stop)
         try:
-            self._session = zenoh.open(_config(listen, connect, scouting))
-        except zenoh.ZError as error:
-            raise LinkError(f"Zenoh cannot use {', '.join(listen + connect)}: {error}") from error
-        try:
-            self._declare(role, f"tenbaud/{session_name}", clock, best_effort)
+            self._gate = Gate(self._session, security, self.counts.refused)
+            self._declare(role, f"{KEY_ROOT}/{session_name}", best_effort)
         except BaseException:
             self.close()
             raise
 
-    def _declare(self, role: Role, root: str, clock: Clock, best_effort: bool) -> None:
+    def _declare(self, role: Role, root: str, best_effort: bool) -> None:
         inbound, other = ("down", "receiver") if role == "transmitter" else ("up", "transmitter")
-        key = f"{root}/{inbound}/*"
-        if clock == "virtual":
-            self._inbox = ChannelInbox(self._session, key)
-        else:
-            self._inbox = QueueInbox(self._session, key, self.counts.dropped)
+        self._inbox = ChannelInbox(self._session, f"{root}/{inbound}/*")
         alive = self._session.liveliness()
         self._watch = alive.declare_subscriber(
             f"{root}/alive/{other}/*",
@@ -133,6 +144,8 @@ class ZenohLink(LinkBase):
             self._closed = True
             if self._inbox is not None:
                 self._inbox.close()
+            if self._gate is not None:
+                self._gate.close()
             self._session.close()
 
     def _on_alive(self, sample: zenoh.Sample) -> None:
@@ -142,21 +155,3 @@ class ZenohLink(LinkBase):
             self._peers.add(key)
         else:
             self._peers.discard(key)
-
-
-def _config(listen: tuple[str, ...], connect: tuple[str, ...], scouting: bool) -> zenoh.Config:
-    config = zenoh.Config()
-    settings: dict[str, object] = {
-        "mode": "peer",
-        "listen/endpoints": list(listen),
-        "connect/endpoints": list(connect),
-        "connect/retry": RETRY,
-        "scouting/delay": 0,
-        "scouting/multicast/enabled": scouting,
-        "scouting/gossip/enabled": False,
-        "transport/link/tx/lease": LEASE_MS,
-        "transport/shared_memory/enabled": False,
-    }
-    for path, value in settings.items():
-        config.insert_json5(path, json.dumps(value))
-    return config

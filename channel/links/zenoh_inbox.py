@@ -1,96 +1,113 @@
-"""Two ways to take in what Zenoh delivers: the one waits to the millisecond, the other is quicker.
+"""Takes in what Zenoh delivers, in the loop's own thread and with a deadline.
 
-On the real clock a wait has a deadline. Zenoh's own channel cannot wait with one, so its thread hands
-every message to a queue that can. On the virtual clock an end waits for one message and nothing else:
-there the loop's thread takes it from Zenoh's channel itself, which saves a change of threads per
-message, and a local message ten times a second lets it look at the time.
+A loop takes its messages from Zenoh's channel itself: handing them over in a callback costs a change
+of threads per message, which is some 80 microseconds. That channel cannot wait with a deadline, so a
+second thread sleeps until the deadline and then puts a message of its own into the channel. It is left
+alone for as long as messages come in time: a deadline that moves on is noticed when the old one is
+reached, and only one that moves forward wakes the thread up.
+
+A full channel holds up the thread of Zenoh that fills it, and with it whoever sends.
 """
 
 from __future__ import annotations
 
+import math
 import threading
 import time
-from collections import Counter
-from queue import Empty, SimpleQueue
-from typing import Protocol
+from collections.abc import Callable
 
 import zenoh
 
-QUEUE_MESSAGES_MAX = 10_000
-WAKE_PERIOD_S = 0.1
-
-
-class Inbox(Protocol):
-    """Messages that have come in, in order."""
-
-    def get(self, timeout_s: float) -> bytes | None:
-        """Return the next message, or None after `timeout_s` seconds (0: only what is there)."""
-
-    def close(self) -> None:
-        """Stop taking messages; to be called before the Zenoh session is closed."""
-
-
-class QueueInbox:
-    """Waits with a deadline. A full queue drops the message and counts it."""
-
-    def __init__(self, session: zenoh.Session, key: str, dropped: Counter[str]) -> None:
-        self._dropped = dropped
-        self._queue: SimpleQueue[bytes] = SimpleQueue()
-        # Runs on a thread of Zenoh and calls nothing of Zenoh: it only hands over.
-        handler = zenoh.handlers.Callback(self._take, indirect=False)
-        self._subscriber = session.declare_subscriber(key, handler)
-
-    def get(self, timeout_s: float) -> bytes | None:
-        """Return the next message, or None after `timeout_s` seconds."""
-        try:
-            return self._queue.get(timeout_s > 0.0, timeout_s if timeout_s > 0.0 else None)
-        except Empty:
-            return None
-
-    def close(self) -> None:
-        """Stop taking messages."""
-        self._subscriber.undeclare()
-
-    def _take(self, sample: zenoh.Sample) -> None:
-        if self._queue.qsize() >= QUEUE_MESSAGES_MAX:
-            self._dropped["queue full"] += 1
-        else:
-            self._queue.put(sample.payload.to_bytes())
+CHANNEL_MESSAGES_MAX = 10_000
 
 
 class ChannelInbox:
-    """Quicker, with deadlines kept to a tenth of a second. A full channel holds the sender up."""
+    """Messages of a key expression, in order. Used by one thread; any thread may `wake` it."""
 
-    def __init__(self, session: zenoh.Session, key: str) -> None:
-        self._subscriber = session.declare_subscriber(
-            key, zenoh.handlers.FifoChannel(QUEUE_MESSAGES_MAX)
-        )
+    def __init__(
+        self, session: zenoh.Session, key: str, messages_max: int = CHANNEL_MESSAGES_MAX
+    ) -> None:
         self._session = session
         self._wake_key = key.replace("*", "wake")
-        self._stop = threading.Event()
-        self._waker = threading.Thread(target=self._wake, name="zenoh-wake", daemon=True)
-        self._waker.start()
+        self._subscriber = session.declare_subscriber(key, zenoh.handlers.FifoChannel(messages_max))
+        self._waker = _Waker(self.wake)
 
     def get(self, timeout_s: float) -> bytes | None:
-        """Return the next message, or None after `timeout_s` seconds or up to 0.1 s more."""
-        deadline_s = time.monotonic() + timeout_s
-        while True:
-            sample = self._subscriber.recv() if timeout_s > 0.0 else self._subscriber.try_recv()
-            if sample is None:
-                return None
-            data = sample.payload.to_bytes()
-            # Only our own wake-ups are empty: no frame and no envelope is.
-            if data or str(sample.key_expr) != self._wake_key:
-                return data
+        """Return the next message, or None after `timeout_s` seconds (0: only what is there)."""
+        sample = self.sample(timeout_s)
+        return None if sample is None else sample.payload.to_bytes()
+
+    def sample(self, timeout_s: float) -> zenoh.Sample | None:
+        """Return the next message as Zenoh has it: with its key."""
+        deadline_s = 0.0
+        while (sample := self._subscriber.try_recv()) is not None:
+            if not self._is_wake(sample):
+                return sample
+        while timeout_s > 0.0:
+            deadline_s = deadline_s or time.monotonic() + timeout_s
+            self._waker.arm(deadline_s)
+            sample = self._subscriber.recv()
+            if not self._is_wake(sample):
+                return sample
             if time.monotonic() >= deadline_s:
-                return None
+                break
+        return None
+
+    def wake(self) -> None:
+        """Let the loop that waits look at its deadline; it goes on waiting if that is not reached."""
+        self._session.put(self._wake_key, b"", allowed_destination=zenoh.Locality.SESSION_LOCAL)
 
     def close(self) -> None:
         """Stop taking messages. A channel left full would hang the closing session."""
-        self._stop.set()
-        self._waker.join()
+        self._waker.close()
         self._subscriber.undeclare()
 
-    def _wake(self) -> None:
-        while not self._stop.wait(WAKE_PERIOD_S):
-            self._session.put(self._wake_key, b"", allowed_destination=zenoh.Locality.SESSION_LOCAL)
+    def _is_wake(self, sample: zenoh.Sample) -> bool:
+        # Only our own wake-ups are empty: no frame and no envelope is.
+        return len(sample.payload) == 0 and str(sample.key_expr) == self._wake_key
+
+
+class _Waker:
+    """Calls `wake` at the last deadline that it was armed with."""
+
+    def __init__(self, wake: Callable[[], None]) -> None:
+        self._wake = wake
+        self._armed: tuple[float] = (math.inf,)
+        self._asleep_until_s = math.inf
+        self._changed = threading.Condition()
+        self._closed = False
+        self._thread = threading.Thread(target=self._run, name="zenoh-wake", daemon=True)
+        self._thread.start()
+
+    def arm(self, deadline_s: float) -> None:
+        """Set the deadline, on the monotonic clock, in place of the one before."""
+        self._armed = (deadline_s,)
+        if deadline_s < self._asleep_until_s:
+            self._notify()
+
+    def close(self) -> None:
+        self._closed = True
+        self._notify()
+        self._thread.join()
+
+    def _notify(self) -> None:
+        with self._changed:
+            self._changed.notify()
+
+    def _run(self) -> None:
+        done: tuple[float] | None = None
+        while not self._closed:
+            armed = self._armed
+            if armed is not done and armed[0] <= time.monotonic():
+                done = armed
+                self._wake()
+            with self._changed:
+                # Whoever arms from here on finds a later time and notifies, which has to wait for
+                # the lock, hence for this thread to sleep.
+                self._asleep_until_s = math.inf
+                armed = self._armed
+                until_s = math.inf if armed is done else armed[0]
+                self._asleep_until_s = until_s
+                if not self._closed:
+                    left_s = until_s - time.monotonic()
+                    self._changed.wait(None if left_s == math.inf else max(0.0, left_s))

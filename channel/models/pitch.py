@@ -90,6 +90,7 @@ class PitchModel:
     state_size = 4
     correction_size = 2
     input_size = 2
+    tick_function = staticmethod(pitch_tick)
 
     def __init__(self, parameters: PitchParameters, tick_s: float) -> None:
         self.parameters = parameters

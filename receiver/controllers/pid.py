@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, Literal, get_args
+from typing import Final, Literal, NamedTuple, get_args
 
 from receiver.references import Reference
 
@@ -40,6 +40,50 @@ class PidGains:
 PAPER_GAINS: Final = PidGains(proportional=0.1, integral=0.053, derivative=0.12, unit="V/deg")
 
 
+class PidConstants(NamedTuple):
+    """What the functions below need; volts and radians."""
+
+    proportional: float
+    integral_per_tick: float
+    derivative: float
+    volts_max: float
+    normal_force_volts: float
+    conditional: bool
+    """whether the integral rests while more of it would change no motor"""
+
+
+def pid_volts(
+    constants: PidConstants, integral_volts: float, error_rad: float, rate_rad_s: float
+) -> float:
+    """Return u of (24)."""
+    return constants.proportional * error_rad + integral_volts - constants.derivative * rate_rad_s
+
+
+def pid_integral(
+    constants: PidConstants, integral_volts: float, error_rad: float, pitch_volts: float
+) -> float:
+    """Return the integral term of the next tick.
+
+    It winds up when more of it would change no motor: both stand at their limit already. One saturated
+    motor is not enough: with a large w one always is, the other still steers, and an integral frozen
+    there would leave a lasting error.
+    """
+    if constants.conditional:
+        shared = abs(constants.normal_force_volts)
+        saturated = abs(pitch_volts) - shared >= 2.0 * constants.volts_max
+        if saturated and error_rad * pitch_volts > 0.0:
+            return integral_volts
+    return integral_volts + constants.integral_per_tick * error_rad
+
+
+def motor_volts(constants: PidConstants, pitch_volts: float) -> tuple[float, float]:
+    """Return (front, rear) of (1), each within its limit."""
+    largest = constants.volts_max
+    front = (constants.normal_force_volts + pitch_volts) / 2.0
+    rear = (constants.normal_force_volts - pitch_volts) / 2.0
+    return min(max(front, -largest), largest), min(max(rear, -largest), largest)
+
+
 class Pid:
     """A `Controller`: u = kP eps + kI int(eps) - kD rate, then one voltage per motor.
 
@@ -70,13 +114,15 @@ class Pid:
         if anti_windup not in get_args(AntiWindup):
             raise ValueError(f"anti_windup is '{anti_windup}'; it must be 'conditional' or 'none'")
         per_rad = math.degrees(1.0) if gains.unit == "V/deg" else 1.0
-        self._proportional = gains.proportional * per_rad
-        self._integral_per_tick = gains.integral * per_rad * tick_s
-        self._derivative = gains.derivative * per_rad
+        self.constants = PidConstants(
+            gains.proportional * per_rad,
+            gains.integral * per_rad * tick_s,
+            gains.derivative * per_rad,
+            float(volts_max),
+            float(normal_force_volts),
+            anti_windup == "conditional",
+        )
         self._reference = reference
-        self._volts_max = float(volts_max)
-        self._normal_force_volts = float(normal_force_volts)
-        self._conditional = anti_windup == "conditional"
         self._integral_volts = 0.0
         self._last_tick: int | None = None
 
@@ -99,27 +145,11 @@ class Pid:
         if self._last_tick is not None and tick <= self._last_tick:
             raise ValueError(f"tick is {tick}; it must be above the last one, {self._last_tick}")
         error_rad = self._reference.angle_rad(tick) - state[0]
-        pitch_volts = (
-            self._proportional * error_rad + self._integral_volts - self._derivative * state[1]
-        )
+        pitch_volts = pid_volts(self.constants, self._integral_volts, error_rad, state[1])
         if not math.isfinite(pitch_volts):
             raise ValueError(f"state at tick {tick} is {state[:2]}; it must be finite")
         self._last_tick = tick
-        if not (self._conditional and self._winds_up(error_rad, pitch_volts)):
-            self._integral_volts += self._integral_per_tick * error_rad
-        front = (self._normal_force_volts + pitch_volts) / 2.0
-        rear = (self._normal_force_volts - pitch_volts) / 2.0
-        return (self._clamped(front), self._clamped(rear))
-
-    def _winds_up(self, error_rad: float, pitch_volts: float) -> bool:
-        """Whether more integral would change no motor: both stand at their limit already.
-
-        One saturated motor is not enough: with a large w one always is, the other still steers,
-        and an integral frozen there would leave a lasting error.
-        """
-        shared = abs(self._normal_force_volts)
-        saturated = abs(pitch_volts) - shared >= 2.0 * self._volts_max
-        return saturated and error_rad * pitch_volts > 0.0
-
-    def _clamped(self, volts: float) -> float:
-        return min(max(volts, -self._volts_max), self._volts_max)
+        self._integral_volts = pid_integral(
+            self.constants, self._integral_volts, error_rad, pitch_volts
+        )
+        return motor_volts(self.constants, pitch_volts)

@@ -2,54 +2,32 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tenbaud.cli import options
+from tenbaud.cli.spread import spread
 
 if TYPE_CHECKING:
     from channel.links.base import Role
-
-RunFolderOption = Annotated[
-    Path | None, typer.Option("--run-folder", hidden=True, help="Existing folder of the run.")
-]
-StatusOption = Annotated[str, typer.Option(hidden=True, help="auto, lines or none.")]
+    from tenbaud.config.schema import FlightConfig
+    from tenbaud.flight.ends import Endpoints
 
 
+@spread
 def transmit(
-    preset: options.Preset = None,
-    config: options.ConfigFile = None,
-    listen: options.Listen = None,
-    connect: options.Connect = None,
-    session: options.Session = None,
-    link: options.Link = None,
-    port: options.Port = None,
-    line_rate: options.LineRate = None,
-    downlink: options.Downlink = None,
-    clock: options.Clock = options.ClockOption.REAL,
+    node: options.NodeOptions,
+    addresses: options.Addresses,
     duration: options.Duration = None,
     seed: options.Seed = None,
-    lead: options.Lead = None,
-    delivery: options.Delivery = None,
     rig: Annotated[str | None, typer.Option(help=options.RIG_HELP)] = None,
     dry_run: options.DryRun = False,
     mismatch: Annotated[
         float | None, typer.Option(help="Simulated plant off the codec's model, 0.1 for 10 %.")
     ] = None,
-    disturbance: Annotated[
-        str | None, typer.Option(help='Torque on the plant, such as "q=2e-3,step=0.5@30".')
-    ] = None,
-    impair: options.Impair = None,
+    disturbance: options.Disturbance = None,
     on_desync: options.OnDesync = None,
-    sabotage: options.Sabotage = None,
-    settings: options.Settings = None,
-    insecure: options.Insecure = False,
-    out: options.Out = None,
-    json: options.AsJson = False,
-    run_folder: RunFolderOption = None,
-    status: StatusOption = "auto",
 ) -> None:
     """Run the sensor node: the rig, and one bit per sample to the receiver.
 
@@ -57,56 +35,31 @@ def transmit(
 
     [dim]tenbaud transmit --connect tcp/127.0.0.1:7447 --clock virtual --json[/dim]
 
+    [dim]tenbaud transmit --keys keys/rig --peer desk --connect tls/10.0.0.2:7447[/dim]
+
     [dim]tenbaud transmit --link serial --port /dev/ttyUSB0[/dim]
     """
-    changed = options.overrides(
+    changed = node.changes(
         duration=duration,
         seed=seed,
-        lead=lead,
-        delivery=delivery,
-        session=session,
-        link=link,
-        port=port,
-        line_rate=line_rate,
-        downlink=downlink,
         rig=rig,
         dry_run=dry_run,
         mismatch=mismatch,
         disturbance=disturbance,
-        impair=impair,
         on_desync=on_desync,
-        sabotage=sabotage,
-        settings=settings,
     )
-    endpoints = (tuple(listen or ()), tuple(connect or ()), insecure)
-    _run("transmitter", preset, config, changed, clock, endpoints, out, run_folder, json, status)
+    _run("transmitter", node, addresses, changed)
 
 
+@spread
 def receive(
-    preset: options.Preset = None,
-    config: options.ConfigFile = None,
-    listen: options.Listen = None,
-    connect: options.Connect = None,
-    session: options.Session = None,
-    link: options.Link = None,
-    port: options.Port = None,
-    line_rate: options.LineRate = None,
-    downlink: options.Downlink = None,
-    clock: options.Clock = options.ClockOption.REAL,
-    lead: options.Lead = None,
-    delivery: options.Delivery = None,
+    node: options.NodeOptions,
+    addresses: options.Addresses,
     rig: Annotated[
         str | None,
         typer.Option(help="replay:FILE when the transmitter replays: its voltages are used."),
     ] = None,
-    impair: options.Impair = None,
-    sabotage: options.Sabotage = None,
-    settings: options.Settings = None,
-    insecure: options.Insecure = False,
-    out: options.Out = None,
-    json: options.AsJson = False,
-    run_folder: RunFolderOption = None,
-    status: StatusOption = "auto",
+    take_over: options.TakeOver = False,
 ) -> None:
     """Run the controller node: estimates from the bits, commands back to the motors.
 
@@ -114,79 +67,41 @@ def receive(
 
     [dim]tenbaud receive --listen tcp/127.0.0.1:7447 --clock virtual --json[/dim]
 
+    [dim]tenbaud receive --keys keys/desk --peer rig --listen tls/10.0.0.2:7447[/dim]
+
     [dim]tenbaud receive --link serial --port /dev/ttyUSB1[/dim]
     """
-    changed = options.overrides(
-        lead=lead,
-        delivery=delivery,
-        session=session,
-        link=link,
-        port=port,
-        line_rate=line_rate,
-        downlink=downlink,
-        rig=rig,
-        impair=impair,
-        sabotage=sabotage,
-        sabotaged_end="receiver",
-        settings=settings,
-    )
-    endpoints = (tuple(listen or ()), tuple(connect or ()), insecure)
-    _run("receiver", preset, config, changed, clock, endpoints, out, run_folder, json, status)
+    changed = node.changes(rig=rig, sabotaged_end="receiver")
+    _run("receiver", node, addresses, changed, take_over)
 
 
 def _run(
     role: Role,
-    preset: str | None,
-    path: Path | None,
+    node: options.NodeOptions,
+    addresses: options.Addresses,
     changed: dict[str, Any],
-    clock: options.ClockOption,
-    addresses: tuple[tuple[str, ...], tuple[str, ...], bool],
-    out: Path | None,
-    run_folder: Path | None,
-    as_json: bool,
-    status: str,
+    take_over: bool = False,
 ) -> None:
-    from channel.links.endpoints import DEFAULT_ENDPOINT, check_endpoints
     from tenbaud.build import agree
     from tenbaud.build_ends import check_parts
+    from tenbaud.cli.addresses import endpoints_of
     from tenbaud.config.load import dump_config, load_config
     from tenbaud.flight import ends
     from tenbaud.flight.outcome import ExitCode
     from tenbaud.recording.folder import RunFolder, create_run_folder
 
-    config = load_config(preset, path, changed)
-    agreement = agree(config, clock.value)
-    listen, connect, insecure = addresses
-    serial = config.link.kind == "serial"
-    if serial and config.link.downlink != "zenoh":
-        if listen or connect:
-            raise typer.BadParameter("--listen and --connect are Zenoh's; a serial line has --port")
-    elif not listen and not connect:
-        # Without any address both ends meet on this machine: the receiver listens.
-        listen = (DEFAULT_ENDPOINT,) if role == "receiver" else ()
-        connect = () if role == "receiver" else (DEFAULT_ENDPOINT,)
-    check_endpoints(listen + connect, insecure)
+    config = load_config(node.preset, node.config, changed)
+    agreement = agree(config, node.clock.value)
+    endpoints = endpoints_of(role, addresses, config, take_over)
     check_parts(config)
-    if insecure:
-        typer.echo(
-            "tenbaud: --insecure: whoever reaches this address can read the symbols and command "
-            "the motors; nothing is encrypted or authenticated",
-            err=True,
-        )
-    whole = run_folder is None
-    folder = RunFolder(run_folder or create_run_folder(None, f"{role}-{config.preset}", out))
+    whole = node.run_folder is None
+    folder = RunFolder(node.run_folder or create_run_folder(None, f"{role}-{config.preset}", node.out))
     if whole:
         folder.config.write_text(dump_config(config))
-        ports = tuple(filter(None, (config.link.port, config.link.downlink))) if serial else ()
-        _introduce(role, agreement.identity, config.seed, ports + listen + connect, folder.path)
+        _introduce(role, agreement.identity, config, endpoints, folder)
     run_end = ends.run_transmitter if role == "transmitter" else ends.run_receiver
-    mode = status if status in ("lines", "none") else "auto"
-    outcome, summary = run_end(
-        agreement,
-        ends.Endpoints(listen, connect, insecure),
-        folder,
-        mode,  # type: ignore[arg-type]
-    )
+    mode = node.status if node.status in ("lines", "none") else "auto"
+    outcome, summary = run_end(agreement, endpoints, folder, mode)  # type: ignore[arg-type]
     if whole:
         from tenbaud.flight.report import draw_run, figure_title, write_summary
 
@@ -195,7 +110,7 @@ def _run(
             problem = draw_run(folder, figure_title(config, summary))
             if problem is not None:
                 typer.echo(problem, err=True)
-    if as_json:
+    if node.json:
         ends.write_json(summary)
     elif whole and summary["samples"]:
         from tenbaud.flight.report import show_summary
@@ -206,10 +121,17 @@ def _run(
         raise typer.Exit(int(outcome.code))
 
 
-def _introduce(role: Role, identity: Any, seed: int, addresses: tuple[str, ...], path: Path) -> None:
+def _introduce(
+    role: Role, identity: Any, config: FlightConfig, endpoints: Endpoints, folder: Any
+) -> None:
+    link = config.link
+    ports = tuple(filter(None, (link.port, link.downlink))) if link.kind == "serial" else ()
+    places = [*ports, *endpoints.listen, *endpoints.connect, *endpoints.router]
+    if endpoints.scouting:
+        places.append("whatever answers in this network")
     typer.echo(
         f"tenbaud {identity.version} {role}  config {identity.config_digest.hex()[:12]}  "
-        f"numerics {identity.numerics_probe.hex()}  seed {seed}\n"
-        f"  at {', '.join(addresses)}, recording into {path}",
+        f"numerics {identity.numerics_probe.hex()}  seed {config.seed}\n"
+        f"  at {', '.join(places)}, recording into {folder.path}",
         err=True,
     )

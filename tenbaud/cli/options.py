@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -120,13 +121,99 @@ OnDesync = Annotated[
 ]
 Insecure = Annotated[
     bool,
-    typer.Option(help="Allow addresses beyond this machine without encryption or authentication."),
+    typer.Option(
+        "--insecure",
+        help="Allow addresses beyond this machine without encryption or authentication.",
+    ),
 ]
-
-
+Keys = Annotated[
+    Path | None,
+    typer.Option(help="This node's key folder (`tenbaud keys`): TLS, and only named peers."),
+]
+Peer = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="With --keys: who may be at the other end, by the name in its certificate; behind a "
+        "router the router's name. Repeatable."
+    ),
+]
+Viewer = Annotated[
+    list[str] | None, typer.Option(help="With --keys: who may listen, and send nothing. Repeatable.")
+]
+Router = Annotated[
+    list[str] | None,
+    typer.Option(help="Zenoh router behind which the other end is, instead of --listen and --connect."),
+]
+Scout = Annotated[
+    bool, typer.Option("--scout", help="Look for the other end by multicast in this network.")
+]
+TakeOver = Annotated[
+    bool,
+    typer.Option(
+        "--take-over",
+        help="Take a flight over from the receiver that has it: on purpose, while it flies.",
+    ),
+]
+RunFolder = Annotated[
+    Path | None, typer.Option("--run-folder", hidden=True, help="Existing folder of the run.")
+]
+Status = Annotated[str, typer.Option(hidden=True, help="auto, lines or none.")]
 DryRun = Annotated[
     bool, typer.Option("--dry-run", help="Read the rig and never drive it: no command is sent.")
 ]
+
+
+@dataclass(frozen=True, slots=True)
+class Addresses:
+    """Where the other end is, and who may be there."""
+
+    listen: Listen = None
+    connect: Connect = None
+    router: Router = None
+    scout: Scout = False
+    keys: Keys = None
+    peer: Peer = None
+    viewer: Viewer = None
+    insecure: Insecure = False
+
+
+@dataclass(frozen=True, slots=True)
+class NodeOptions:
+    """What `transmit` and `receive` have in common, addresses aside."""
+
+    preset: Preset = None
+    config: ConfigFile = None
+    session: Session = None
+    link: Link = None
+    port: Port = None
+    line_rate: LineRate = None
+    downlink: Downlink = None
+    clock: Clock = ClockOption.REAL
+    lead: Lead = None
+    delivery: Delivery = None
+    impair: Impair = None
+    sabotage: Sabotage = None
+    settings: Settings = None
+    out: Out = None
+    json: AsJson = False
+    run_folder: RunFolder = None
+    status: Status = "auto"
+
+    def changes(self, **own: Any) -> dict[str, Any]:
+        """Return the configuration that these options, and the command's own, set."""
+        return overrides(
+            session=self.session,
+            link=self.link,
+            port=self.port,
+            line_rate=self.line_rate,
+            downlink=self.downlink,
+            lead=self.lead,
+            delivery=self.delivery,
+            impair=self.impair,
+            sabotage=self.sabotage,
+            settings=self.settings,
+            **own,
+        )
 
 
 def overrides(

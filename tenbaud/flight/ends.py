@@ -5,12 +5,14 @@ from __future__ import annotations
 import gc
 import json
 import sys
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from channel.links.base import Link, Role
+from channel.links.security import Security
 from channel.wire import DATAGRAM
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build import Agreement
@@ -23,6 +25,7 @@ from tenbaud.flight.summary import Summary, link_part, receiver_part, transmitte
 from tenbaud.recording.folder import RunFolder
 from tenbaud.recording.writer import McapRecorder
 
+Stop = Callable[[], bool]
 SWITCH_INTERVAL_S = 0.0002
 """A busy recorder thread may keep the loop waiting this long; Python's default is 5 ms."""
 
@@ -34,20 +37,29 @@ class Endpoints:
     listen: tuple[str, ...] = ()
     connect: tuple[str, ...] = ()
     insecure: bool = False
+    router: tuple[str, ...] = ()
+    """Zenoh routers behind which the other end is, instead of the two before"""
+    scouting: bool = False
+    security: Security | None = None
+    """TLS, and who is let in; None: plain"""
+    take_over: bool = False
+    """receiver: take a flight over from the receiver that has it"""
 
 
-def open_link(agreement: Agreement, role: Role, endpoints: Endpoints) -> Link:
+def open_link(
+    agreement: Agreement, role: Role, endpoints: Endpoints, stop: Stop = lambda: False
+) -> Link:
     """Return an open link for one end: over a serial line if it is configured so, else over Zenoh."""
     if agreement.config.link.kind == "serial":
         from tenbaud.serial_terms import open_serial
 
         return open_serial(
-            agreement, role, endpoints.insecure, lambda: _zenoh(agreement, role, endpoints)
+            agreement, role, endpoints.insecure, lambda: _zenoh(agreement, role, endpoints, stop)
         )
-    return _zenoh(agreement, role, endpoints)
+    return _zenoh(agreement, role, endpoints, stop)
 
 
-def _zenoh(agreement: Agreement, role: Role, endpoints: Endpoints) -> Link:
+def _zenoh(agreement: Agreement, role: Role, endpoints: Endpoints, stop: Stop) -> Link:
     from channel.links.zenoh import ZenohLink
 
     return ZenohLink(
@@ -55,9 +67,13 @@ def _zenoh(agreement: Agreement, role: Role, endpoints: Endpoints) -> Link:
         agreement.config.link.session,
         listen=endpoints.listen,
         connect=endpoints.connect,
+        router=endpoints.router,
+        scouting=endpoints.scouting,
         insecure=endpoints.insecure,
+        security=endpoints.security,
         best_effort=agreement.config.link.best_effort,
-        clock=agreement.clock,
+        patience_s=agreement.config.link.peer_timeout_s,
+        should_stop=stop,
     )
 
 
@@ -66,11 +82,11 @@ def run_transmitter(
 ) -> tuple[Outcome, Summary]:
     """Fly one flight as the transmitter; the outcome says how it ended."""
     with _end(agreement, "transmitter", folder) as (recorder, stop):
-        with open_link(agreement, "transmitter", endpoints) as link:
+        with knocks(endpoints) as refused, open_link(agreement, "transmitter", endpoints, stop) as link:
             run = transmit.prepare(agreement, recorder, link.wire)
             with StatusReporter(lambda: transmitter_status(run), status):
                 outcome = _guarded(lambda: _fly(run, link, stop, recorder))
-        summary = transmitter_part(run, outcome) | link_part(link)
+        summary = transmitter_part(run, outcome) | link_part(link, refused)
         return outcome, _with_recording(summary, recorder)
 
 
@@ -79,14 +95,26 @@ def run_receiver(
 ) -> tuple[Outcome, Summary]:
     """Serve one flight as the receiver; the outcome says how it ended."""
     with _end(agreement, "receiver", folder) as (recorder, stop):
-        with open_link(agreement, "receiver", endpoints) as link:
-            endpoint = build_receiver(agreement, recorder, link.wire)
+        with knocks(endpoints) as refused, open_link(agreement, "receiver", endpoints, stop) as link:
+            endpoint = build_receiver(agreement, recorder, link.wire, endpoints.take_over)
             with StatusReporter(lambda: receiver_status(agreement, endpoint), status):
                 outcome = _guarded(
                     lambda: receive.serve(agreement, endpoint, link, stop, recorder.help_out)
                 )
-        summary = receiver_part(agreement, endpoint, outcome) | link_part(link)
+        summary = receiver_part(agreement, endpoint, outcome) | link_part(link, refused)
         return outcome, _with_recording(summary, recorder)
+
+
+@contextmanager
+def knocks(endpoints: Endpoints) -> Iterator[Counter[str]]:
+    """Within a `with`, connections that fail to prove who they are get counted by reason."""
+    if endpoints.security is None or not endpoints.listen:
+        yield Counter()
+        return
+    from channel.links.zenoh_gate import HandshakeLog
+
+    with HandshakeLog() as log:
+        yield log.refused
 
 
 def run_in_memory(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -66,24 +67,28 @@ def receiver_part(agreement: Agreement, endpoint: ReceiverEndpoint, outcome: Out
         **_common(agreement, outcome),
         "samples": session.state.sample,
         "baud_measured": session.meter.baud,
-        "wire_bytes_up": endpoint.wire_bytes_up,
+        "wire_bytes_up": endpoint.inlet.wire_bytes,
         "wire_bytes_down": endpoint.wire_bytes_down,
         "erasures": session.counts["erasures"],
         "symbols_late": session.counts["symbols_late"],
         "symbols_misplaced": session.counts["symbols_misplaced"],
         "stale_frames": session.counts["stale_frames"],
         "bad_commands": session.counts["bad_commands"],
-        "malformed": endpoint.malformed,
+        "malformed": endpoint.inlet.malformed,
         "desyncs": session.counts["desyncs"],
         "rejoins": session.counts["rejoins"],
         "impaired_down": impaired(endpoint.downlink),
     }
 
 
-def link_part(link: Link) -> Summary:
-    """Return what an end's link saw of its line: what it dropped and why, and its own bytes if any."""
+def link_part(link: Link, refused: Counter[str] | None = None) -> Summary:
+    """Return what an end's link saw of its line: what it dropped and why, and its own bytes if any.
+
+    `refused` are connections that were turned away before the link knew of them.
+    """
     counts = link.counts
     return {
+        "connections_refused": dict(counts.refused + (refused or Counter())),
         "link_dropped": dict(counts.dropped),
         "reconnects": counts.reconnects,
         "line_bytes_out": counts.line_bytes_out,
@@ -100,6 +105,10 @@ def joined(transmitter: Summary, receiver: Summary) -> Summary:
     both = {
         "link_dropped": dropped,
         "reconnects": transmitter.get("reconnects", 0) + receiver.get("reconnects", 0),
+        "connections_refused": {
+            **transmitter.get("connections_refused", {}),
+            **receiver.get("connections_refused", {}),
+        },
     }
     if receiver.get("impaired_down"):
         both["impaired_down"] = receiver["impaired_down"]

@@ -75,8 +75,8 @@ def fly_virtual(run: TransmitterRun, peer: Peer, should_stop: Stop) -> Outcome:
             flight.finish(end, _farewell(outcome))
         finally:
             run.flight_s = time.perf_counter() - started
-            run.wire_bytes_down = flight.wire_bytes_down
-            run.extra["malformed"] = flight.malformed
+            run.wire_bytes_down = flight.inlet.wire_bytes
+            run.extra["malformed"] = flight.inlet.malformed
     return outcome
 
 
@@ -98,12 +98,12 @@ def fly_real(run: TransmitterRun, link: Link, should_stop: Stop) -> Outcome:
             flight.finish(_farewell(outcome), run.ticks)
         finally:
             run.flight_s = time.perf_counter() - started
-            run.wire_bytes_down = flight.wire_bytes_down
+            run.wire_bytes_down = flight.inlet.wire_bytes
             if figures := run.node.rig.figures():
                 run.extra["rig"] = figures
             lateness = flight.lateness
             run.extra |= {
-                "malformed": flight.malformed,
+                "malformed": flight.inlet.malformed,
                 "ticks_missed": flight.ticks_missed,
                 "loop_late_ms_p50": lateness.percentile_ms(50.0),
                 "loop_late_ms_p99": lateness.percentile_ms(99.0),
@@ -131,7 +131,7 @@ def _check_welcome(run: TransmitterRun) -> None:
 
 
 def _control_bytes(run: TransmitterRun, flight: VirtualFlight | RealFlight) -> int:
-    return run.uplink.meter.control_bytes + flight.control_bytes_down
+    return run.uplink.meter.control_bytes + flight.inlet.control_bytes
 
 
 def _farewell(outcome: Outcome) -> str:

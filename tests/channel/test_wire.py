@@ -81,7 +81,7 @@ def test_when_the_examples_are_encoded_then_the_bytes_are_as_written() -> None:
 def test_when_the_pinned_bytes_are_decoded_then_they_are_the_examples() -> None:
     assert [wire.decode(bytes.fromhex(data)) for _, data in GOLDEN] == example_frames()
     assert {kind for kind, _ in GOLDEN} == {
-        "Hello", "Welcome", "Refuse", "Symbol", "Commands", "Desync", "Bye", "Unknown"
+        "Hello", "Welcome", "Refuse", "Symbol", "Commands", "Desync", "Bye", "Unknown", "Claim"
     }  # fmt: skip
 
 

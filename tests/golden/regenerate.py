@@ -23,6 +23,7 @@ from channel.coders.words import WordsCoder, WordsParameters
 from channel.coders.zoom import ZoomCoder, ZoomParameters
 from channel.frames import (
     Bye,
+    Claim,
     Commands,
     Desync,
     Echo,
@@ -83,6 +84,7 @@ def example_frames() -> list[Frame]:
         Bye(0x01020304, "done"),
         Bye(0, ""),
         Unknown(0x01020304, 5),
+        Claim(0x01020304, 5, 0x0A0B0C0D),
     ]
 
 

@@ -29,16 +29,16 @@ def greeted() -> ReceiverEndpoint:
 def test_when_bytes_are_garbage_then_they_are_counted_and_nothing_is_answered() -> None:
     end = endpoint()
     assert end.on_bytes(b"garbage", 0) == []
-    assert end.malformed == end.session.counts["malformed"] == 1
-    assert end.wire_bytes_up == 7
+    assert end.inlet.malformed == end.session.counts["malformed"] == 1
+    assert end.inlet.wire_bytes == 7
 
 
 def test_when_messages_pass_then_wire_bytes_of_both_ways_are_counted() -> None:
     end = greeted()
     data = wire.encode(Symbol(77, 0, 0, 1))
-    up, down = end.wire_bytes_up, end.wire_bytes_down
+    up, down = end.inlet.wire_bytes, end.wire_bytes_down
     (answer,) = end.on_bytes(data, 0)
-    assert end.wire_bytes_up - up == len(data)
+    assert end.inlet.wire_bytes - up == len(data)
     assert end.wire_bytes_down - down == len(answer)
 
 

@@ -32,7 +32,7 @@ LAZY = ("zenoh", "channel.links.zenoh")
 """Imported inside functions only, except by the adapter: a memory or serial flight needs no Zenoh,
 and loading it takes time and starts threads."""
 
-WITHOUT_ARRAYS = ("channel/*", "receiver/session*", "receiver/driver*")
+WITHOUT_ARRAYS = ("channel/*", "receiver/session*", "receiver/commander*", "receiver/driver*")
 """What must agree to the last bit, or run every tick, does without numpy and scipy."""
 
 

@@ -51,8 +51,8 @@ def test_when_ten_baud_are_flown_then_one_bit_per_sample_is_paid_and_measured() 
     meter = flight.virtual._uplink.meter
     assert meter.coder_bits == 300
     assert flight.receiver.meter.baud == pytest.approx(10.0)
-    assert flight.endpoint.wire_bytes_up == meter.wire_bytes
-    assert flight.endpoint.wire_bytes_down == flight.virtual.wire_bytes_down
+    assert flight.endpoint.inlet.wire_bytes == meter.wire_bytes
+    assert flight.endpoint.wire_bytes_down == flight.virtual.inlet.wire_bytes
     assert flight.virtual._uplink.shaper.refused == 0
 
 

@@ -114,9 +114,9 @@ def test_when_a_flight_is_flown_in_real_time_then_every_sample_is_checked() -> N
     assert meter.symbols == end.session.meter.symbols <= TICKS // 4
     assert meter.symbols + session.counts["words_missed"] + flight._uplink.shaper.refused >= TICKS // 4
     assert flight.lateness.count == TICKS - flight.ticks_missed
-    assert flight.wire_bytes_down == end.wire_bytes_down
-    assert end.wire_bytes_up == meter.wire_bytes + len_of_bye(flight)
-    assert flight.malformed == end.malformed == 0
+    assert flight.inlet.wire_bytes == end.wire_bytes_down
+    assert end.inlet.wire_bytes == meter.wire_bytes + len_of_bye(flight)
+    assert flight.inlet.malformed == end.inlet.malformed == 0
     assert not node.latched
 
 
@@ -172,5 +172,5 @@ def test_when_garbage_comes_in_greeting_then_it_is_counted_and_the_greeting_goes
     with Service(end, far):
         flight.greet(peer_timeout_s=10.0)
         flight.finish("enough")
-    assert flight.malformed == 1
+    assert flight.inlet.malformed == 1
     assert end.session.phase is ReceiverPhase.ENDED

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from channel.coders.static import StaticCoder, StaticParameters, bits_of, number_of
+from channel.coders.static import StaticCoder, StaticParameters, number_of, write_bits
 from channel.words import ERASED
 
 
@@ -43,8 +43,12 @@ def test_when_the_word_is_erased_then_nothing_is_corrected() -> None:
 
 
 def test_when_numbers_become_bits_then_they_come_back() -> None:
-    assert [number_of(bits_of(number, 5)) for number in range(32)] == list(range(32))
-    assert bits_of(2, 3) == (0, 1, 0), "the most significant symbol is the first"
+    five, three = [0] * 5, [0] * 3
+    for number in range(32):
+        write_bits(number, five)
+        assert number_of(five) == number
+    write_bits(2, three)
+    assert three == [0, 1, 0], "the most significant symbol is the first"
 
 
 @pytest.mark.parametrize(

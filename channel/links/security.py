@@ -1,0 +1,147 @@
+"""Who an end is and whom it lets in, as settings of Zenoh: TLS with client certificates, access rules.
+
+TLS proves who is at the other end of a connection: both sides show a certificate of the same private
+authority, and the side that connects checks that the listener's certificate names the address. That
+alone would let every node of the authority in. So each end also denies everything by default and
+allows named nodes (common names) what their part needs, on the keys of their own session:
+
+    part         may send                                  may be sent
+    transmitter  up/*, its liveliness                      down/command, the receiver's liveliness
+    receiver     down/command, its liveliness              up/*, the transmitter's liveliness
+    viewer       nothing                                   up/*, down/*, both livelinesses
+
+"Send" and "be sent" are seen from the invited node. A subscription is a message too and goes the other
+way; its key must be allowed exactly as it is declared, since a rule has to include the key of the
+message, not merely meet it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+Part = Literal["transmitter", "receiver", "viewer"]
+Rule = dict[str, object]
+
+KEY_ROOT = "tenbaud"
+
+
+@dataclass(frozen=True, slots=True)
+class Credentials:
+    """The three files by which an end proves who it is."""
+
+    name: str
+    """common name in its certificate"""
+    authority: Path
+    certificate: Path
+    private_key: Path
+
+
+@dataclass(frozen=True, slots=True)
+class Invited:
+    """A node that is let in, for one part of one session.
+
+    A router that stands between is invited in the part of the end behind it. `session` may be a key
+    expression that covers several sessions, such as `lab/*`.
+    """
+
+    name: str
+    part: Part
+    session: str
+
+
+@dataclass(frozen=True, slots=True)
+class Security:
+    """Credentials of this end, and everyone whom it lets in."""
+
+    credentials: Credentials
+    invited: tuple[Invited, ...]
+
+
+def security_settings(security: Security) -> dict[str, object]:
+    """Return the Zenoh settings, by path, that admit the invited over TLS and nobody else."""
+    credentials = security.credentials
+    certificate, key = str(credentials.certificate), str(credentials.private_key)
+    tls: dict[str, object] = {
+        "root_ca_certificate": str(credentials.authority),
+        "listen_certificate": certificate,
+        "listen_private_key": key,
+        "connect_certificate": certificate,
+        "connect_private_key": key,
+        "enable_mtls": True,
+        "verify_name_on_connect": True,
+        "close_link_on_expiration": True,
+    }
+    settings = {f"transport/link/tls/{name}": value for name, value in tls.items()}
+    settings["transport/link/protocols"] = ["tls"]
+    settings["access_control"] = access_rules(security.invited)
+    return settings
+
+
+def access_rules(invited: Sequence[Invited]) -> dict[str, object]:
+    """Return Zenoh's `access_control` section: deny all, allow the invited what their part needs."""
+    rules: list[Rule] = []
+    subjects: list[Rule] = []
+    policies: list[Rule] = []
+    for number, one in enumerate(invited):
+        subject = f"{number} {one.name}"
+        subjects.append({"id": subject, "cert_common_names": [one.name]})
+        own = _rules_of(one, f"{subject} {one.part} {one.session}")
+        rules += own
+        policies.append({"rules": [rule["id"] for rule in own], "subjects": [subject]})
+    section: dict[str, object] = {"enabled": True, "default_permission": "deny"}
+    # Zenoh refuses empty lists; without them the default, which denies, is all there is.
+    if rules:
+        section |= {"rules": rules, "subjects": subjects, "policies": policies}
+    return section
+
+
+def _rules_of(invited: Invited, prefix: str) -> list[Rule]:
+    root = f"{KEY_ROOT}/{invited.session}"
+    rules: list[Rule] = []
+
+    def allow(flow: str, messages: Sequence[str], *keys: str) -> None:
+        rules.append(
+            {
+                "id": f"{prefix} {len(rules)}",
+                "permission": "allow",
+                "flows": [flow],
+                "messages": list(messages),
+                "key_exprs": [f"{root}/{key}" for key in keys],
+            }
+        )
+
+    def may_send(*keys: str) -> None:
+        allow("ingress", ["put"], *keys)
+        allow("egress", ["declare_subscriber"], *keys)
+
+    def may_be_sent(*keys: str) -> None:
+        allow("egress", ["put"], *keys)
+        allow("ingress", ["declare_subscriber"], *keys)
+
+    def may_be_alive(part: str) -> None:
+        allow("ingress", ["liveliness_token"], f"alive/{part}/*")
+        allow("egress", ["declare_liveliness_subscriber", "liveliness_query"], f"alive/{part}/*")
+
+    def may_see_alive(part: str) -> None:
+        allow("egress", ["liveliness_token"], f"alive/{part}/*")
+        allow("ingress", ["declare_liveliness_subscriber", "liveliness_query"], f"alive/{part}/*")
+
+    match invited.part:
+        case "transmitter":
+            may_send("up/*")
+            may_be_sent("down/*")
+            may_be_alive("transmitter")
+            may_see_alive("receiver")
+        case "receiver":
+            may_send("down/*")
+            may_be_sent("up/*")
+            may_be_alive("receiver")
+            may_see_alive("transmitter")
+        case "viewer":
+            may_be_sent("up/*", "down/*")
+            may_see_alive("transmitter")
+            may_see_alive("receiver")
+    return rules

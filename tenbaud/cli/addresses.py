@@ -1,0 +1,81 @@
+"""From the address options of a command to endpoints: what is missing is filled in, or refused."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import typer
+
+from tenbaud.cli import options
+
+if TYPE_CHECKING:
+    from channel.links.base import Role
+    from channel.links.security import Part, Security
+    from tenbaud.config.schema import FlightConfig
+    from tenbaud.flight.ends import Endpoints
+
+INSECURE = (
+    "tenbaud: --insecure: whoever reaches this address can read the symbols, command the motors and "
+    "stop the flight; nothing is encrypted and nobody is checked"
+)
+
+
+def endpoints_of(
+    role: Role, addresses: options.Addresses, config: FlightConfig, take_over: bool = False
+) -> Endpoints:
+    """Return where an end listens and connects; LinkError or KeysError where that is refused."""
+    from channel.links.endpoints import DEFAULT_ENDPOINT, check_endpoints, with_protocol
+    from tenbaud.flight.ends import Endpoints
+
+    listen, connect = tuple(addresses.listen or ()), tuple(addresses.connect or ())
+    router = tuple(addresses.router or ())
+    security = security_of(role, addresses, config.link.session)
+    if config.link.kind == "serial" and config.link.downlink != "zenoh":
+        if listen or connect or router or addresses.scout:
+            raise typer.BadParameter(
+                "--listen, --connect, --router and --scout are Zenoh's; a serial line has --port"
+            )
+    elif not listen and not connect and not router and not addresses.scout:
+        # Without any address both ends meet on this machine: the receiver listens.
+        here = DEFAULT_ENDPOINT if security is None else with_protocol(DEFAULT_ENDPOINT, "tls")
+        listen = (here,) if role == "receiver" else ()
+        connect = () if role == "receiver" else (here,)
+    if router and (listen or connect or addresses.scout):
+        raise typer.BadParameter("behind a --router there is nothing else to listen on or connect to")
+    secured = security is not None
+    check_endpoints(listen + connect + router, addresses.insecure, secured, addresses.scout)
+    if addresses.insecure and not secured:
+        typer.echo(INSECURE, err=True)
+    return Endpoints(
+        listen,
+        connect,
+        addresses.insecure,
+        router=router,
+        scouting=addresses.scout,
+        security=security,
+        take_over=take_over,
+    )
+
+
+def security_of(role: Role, addresses: options.Addresses, session: str) -> Security | None:
+    """Return the credentials of `--keys` with all who are invited, or None without keys."""
+    from channel.links.security import Invited, Security
+    from tenbaud.keys.authority import NodeRole
+    from tenbaud.keys.store import expiry_warning, usable
+
+    if addresses.keys is None:
+        if addresses.peer or addresses.viewer:
+            raise typer.BadParameter("--peer and --viewer name certificates; they need --keys")
+        return None
+    other: Part = "receiver" if role == "transmitter" else "transmitter"
+    if not addresses.peer:
+        raise typer.BadParameter(
+            f"--keys without --peer lets nobody in; name the {other}'s certificate: --peer NAME"
+        )
+    node = usable(addresses.keys, NodeRole(role))
+    warning = expiry_warning(node)
+    if warning is not None:
+        typer.echo(f"tenbaud: warning: {warning}", err=True)
+    invited = [Invited(name, other, session) for name in addresses.peer]
+    invited += [Invited(name, "viewer", session) for name in addresses.viewer or ()]
+    return Security(node.credentials, tuple(invited))

@@ -1,0 +1,108 @@
+"""`tenbaud keys`: a private authority, and a certificate for every node of a lab."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from tenbaud.keys.store import NodeKeys
+
+app = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    help="""Keys for a flight between two machines.
+
+    [dim]tenbaud keys init[/dim]
+
+    [dim]tenbaud keys add rig --role transmitter[/dim]
+
+    [dim]tenbaud keys add desk --role receiver --host 10.0.0.2[/dim]
+    """,
+)
+
+Folder = Annotated[Path, typer.Option("--folder", help="Where the authority and the nodes are.")]
+Hosts = Annotated[
+    list[str] | None,
+    typer.Option("--host", help="Address or name at which others connect to it; repeatable."),
+]
+Days = Annotated[float, typer.Option(help="How long the certificate is valid.", min=0.01)]
+Name = Annotated[str, typer.Argument(help="Name of the node, such as rig.")]
+DEFAULT_FOLDER = Path("keys")
+
+
+@app.command()
+def init(folder: Folder = DEFAULT_FOLDER) -> None:
+    """Make the authority that signs the nodes' certificates; once, on one machine."""
+    from tenbaud.keys.hints import next_steps
+    from tenbaud.keys.store import create_authority
+
+    made = create_authority(folder)
+    typer.echo(f"{made}: the authority, valid for ten years. It never leaves this machine.")
+    typer.echo(next_steps(()))
+
+
+@app.command()
+def add(
+    name: Name,
+    role: Annotated[
+        str | None, typer.Option(help="transmitter, receiver, router or viewer.", show_default=False)
+    ] = None,
+    host: Hosts = None,
+    days: Days = 365.0,
+    folder: Folder = DEFAULT_FOLDER,
+) -> None:
+    """Make key and certificate of one node, and print the commands for the two machines."""
+    from tenbaud.keys.authority import NodeRole
+    from tenbaud.keys.hints import next_steps
+    from tenbaud.keys.store import add_node, read_nodes
+
+    if role not in list(NodeRole):
+        known = ", ".join(NodeRole)
+        raise typer.BadParameter(f"--role says what {name} is for: {known}", param_hint="--role")
+    node = add_node(folder, name, NodeRole(role), tuple(host or ()), days)
+    typer.echo(_line(node))
+    typer.echo(next_steps(read_nodes(folder)))
+
+
+@app.command()
+def renew(name: Name, host: Hosts = None, days: Days = 365.0, folder: Folder = DEFAULT_FOLDER) -> None:
+    """Make a node's key and certificate anew, before or after it expires; copy its folder again."""
+    from tenbaud.keys.store import renew_node
+
+    node = renew_node(folder, name, tuple(host or ()), days)
+    typer.echo(_line(node))
+    typer.echo(f"Copy {node.folder} to its machine again, and start its end again there.")
+
+
+@app.command()
+def show(
+    folder: Annotated[
+        Path, typer.Argument(help="Folder of all keys, or of one node.")
+    ] = DEFAULT_FOLDER,
+) -> None:
+    """List the nodes, until when they are valid, and the commands for the two machines."""
+    from tenbaud.keys.hints import next_steps
+    from tenbaud.keys.store import KeysError, expiry_warning, read_node, read_nodes
+
+    nodes = [read_node(folder)] if (folder / "node.pem").exists() else read_nodes(folder)
+    if not nodes and not (folder / "authority").exists():
+        raise KeysError(f"there are no keys in {folder}; `tenbaud keys init` makes an authority")
+    for node in nodes:
+        typer.echo(_line(node))
+        warning = expiry_warning(node)
+        if warning is not None:
+            typer.echo(f"  warning: {warning}", err=True)
+    if (folder / "authority").exists():
+        typer.echo(next_steps(nodes))
+
+
+def _line(node: NodeKeys) -> str:
+    certified = node.certified
+    at = f", reached at {', '.join(certified.hosts)}" if certified.hosts else ""
+    return (
+        f"{node.folder}: {certified.name}, {certified.role}, valid until "
+        f"{certified.expires:%Y-%m-%d} ({certified.days_left():.0f} days){at}"
+    )

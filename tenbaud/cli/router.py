@@ -1,0 +1,96 @@
+"""`tenbaud router`: a Zenoh router in this process, for small labs and tests."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tenbaud.cli import options
+
+if TYPE_CHECKING:
+    from channel.links.security import Invited
+    from channel.links.zenoh_router import ZenohRouter
+
+POLL_S = 0.2
+TELL_S = 1.0
+
+
+def router(
+    listen: options.Listen = None,
+    flight: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="With --keys: SESSION=TRANSMITTER,RECEIVER[,VIEWER ...] by the names in their "
+            "certificates; repeatable."
+        ),
+    ] = None,
+    keys: Annotated[Path | None, typer.Option(help="This router's key folder.")] = None,
+    insecure: options.Insecure = False,
+) -> None:
+    """Route between two ends that cannot reach each other but both reach this machine.
+
+    [dim]tenbaud router --keys keys/hub --listen tls/10.0.0.9:7447 --flight helicopter=rig,desk[/dim]
+
+    The ends connect with `--router tls/10.0.0.9:7447 --peer hub`.
+    """
+    from channel.links.endpoints import DEFAULT_ENDPOINT, with_protocol
+    from channel.links.security import Security
+    from channel.links.zenoh_gate import HandshakeLog
+    from channel.links.zenoh_router import ZenohRouter
+    from tenbaud.cli.addresses import INSECURE
+    from tenbaud.flight.stop import StopFlag
+    from tenbaud.keys.authority import NodeRole
+    from tenbaud.keys.store import usable
+
+    security = None
+    if keys is not None:
+        if not flight:
+            raise typer.BadParameter(
+                "--keys without --flight lets nobody in: --flight SESSION=TRANSMITTER,RECEIVER"
+            )
+        node = usable(keys, NodeRole.ROUTER)
+        security = Security(node.credentials, tuple(one for text in flight for one in _invited(text)))
+    elif flight:
+        raise typer.BadParameter("--flight names certificates; it needs --keys")
+    protocol = "tcp" if security is None else "tls"
+    addresses = tuple(listen or [with_protocol(DEFAULT_ENDPOINT, protocol)])
+    if insecure and security is None:
+        typer.echo(INSECURE, err=True)
+    with (
+        StopFlag() as stop,
+        HandshakeLog() as log,
+        ZenohRouter(addresses, security=security, insecure=insecure) as running,
+    ):
+        typer.echo(f"tenbaud router at {', '.join(addresses)}", err=True)
+        _tell_until(stop, running)
+        refused = running.refused + log.refused
+    told = ", ".join(f"{count} {reason}" for reason, count in refused.items())
+    typer.echo(f"tenbaud router: stopped; connections refused: {told or 'none'}", err=True)
+
+
+def _tell_until(stop: Callable[[], bool], running: ZenohRouter) -> None:
+    told, next_s = -1, 0.0
+    while not stop():
+        time.sleep(POLL_S)
+        if time.monotonic() >= next_s:
+            next_s = time.monotonic() + TELL_S
+            count = running.connected
+            if count != told:
+                told = count
+                typer.echo(f"tenbaud router: {count} connected", err=True)
+
+
+def _invited(text: str) -> list[Invited]:
+    from channel.links.security import Invited
+
+    session, equals, names = text.partition("=")
+    parts = [name.strip() for name in names.split(",")]
+    if not equals or not session or len(parts) < 2 or not all(parts):
+        raise typer.BadParameter(f"--flight {text}: write SESSION=TRANSMITTER,RECEIVER[,VIEWER ...]")
+    transmitter, receiver, *viewers = parts
+    invited = [Invited(transmitter, "transmitter", session), Invited(receiver, "receiver", session)]
+    return invited + [Invited(viewer, "viewer", session) for viewer in viewers]

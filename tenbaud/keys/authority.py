@@ -1,0 +1,214 @@
+"""A small private certificate authority: one certificate per node, signed by a key that stays home.
+
+A certificate says who a node is (its common name), what it is for (its role, as organisational unit)
+and at which addresses it may be listened for (subject alternative names). Keys are ECDSA P-256.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from enum import StrEnum
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from cryptography import x509
+    from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePrivateKey
+
+ORGANISATION = "tenbaud"
+AUTHORITY_DAYS = 3650
+NODE_DAYS = 365
+CLOCK_SLACK = timedelta(minutes=10)
+"""A node whose clock is behind by so much takes a fresh certificate all the same."""
+LOCAL_HOSTS = ("localhost", "127.0.0.1", "::1")
+"""In every certificate, so that both ends can be tried on one machine."""
+
+
+class NodeRole(StrEnum):
+    """What a certificate is for."""
+
+    TRANSMITTER = "transmitter"
+    RECEIVER = "receiver"
+    ROUTER = "router"
+    VIEWER = "viewer"
+
+
+@dataclass(frozen=True, slots=True)
+class Certified:
+    """What a node's certificate says."""
+
+    name: str
+    role: NodeRole
+    hosts: tuple[str, ...]
+    """addresses that it may be listened for at, this machine's own left out"""
+    begins: datetime
+    expires: datetime
+
+    def days_left(self, now: datetime | None = None) -> float:
+        """Return the days until it expires; negative afterwards."""
+        return (self.expires - (now or datetime.now(UTC))).total_seconds() / 86_400.0
+
+
+@dataclass(frozen=True, slots=True)
+class Pem:
+    """A certificate and its private key, both as PEM."""
+
+    certificate: bytes
+    private_key: bytes
+
+
+def new_authority(name: str, days: float = AUTHORITY_DAYS) -> Pem:
+    """Return a fresh authority of this name, valid for so many days."""
+    from cryptography import x509
+    from cryptography.hazmat.primitives import hashes
+
+    key = _new_key()
+    subject = _name(name, None)
+    usage = _usage(signs_certificates=True)
+    certificate = (
+        _builder(subject, subject, key, days)
+        .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
+        .add_extension(usage, critical=True)
+        .sign(key, hashes.SHA256())
+    )
+    return _pem(certificate, key)
+
+
+def issue(
+    authority: Pem, name: str, role: NodeRole, hosts: tuple[str, ...], days: float = NODE_DAYS
+) -> Pem:
+    """Return a fresh key and certificate for a node; it never outlives its authority."""
+    from cryptography import x509
+    from cryptography.hazmat.primitives import hashes
+    from cryptography.hazmat.primitives.serialization import load_pem_private_key
+    from cryptography.x509.oid import ExtendedKeyUsageOID
+
+    root = x509.load_pem_x509_certificate(authority.certificate)
+    root_key = load_pem_private_key(authority.private_key, None)
+    key = _new_key()
+    names = [_general_name(host) for host in dict.fromkeys((*hosts, *LOCAL_HOSTS))]
+    both_sides = [ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH]
+    certificate = (
+        _builder(_name(name, role), root.subject, key, days, root.not_valid_after_utc)
+        .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+        .add_extension(_usage(signs_certificates=False), critical=True)
+        .add_extension(x509.ExtendedKeyUsage(both_sides), critical=False)
+        .add_extension(x509.SubjectAlternativeName(names), critical=False)
+        .sign(root_key, hashes.SHA256())  # type: ignore[arg-type]
+    )
+    return _pem(certificate, key)
+
+
+def read_certificate(pem: bytes) -> Certified:
+    """Return what a node's certificate says; ValueError for anything that is not one of ours."""
+    from cryptography import x509
+    from cryptography.x509.oid import NameOID
+
+    certificate = x509.load_pem_x509_certificate(pem)
+    names = certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
+    roles = certificate.subject.get_attributes_for_oid(NameOID.ORGANIZATIONAL_UNIT_NAME)
+    if not names or not roles:
+        raise ValueError("the certificate names no node and no role")
+    alternative = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    hosts = [*map(str, alternative.get_values_for_type(x509.IPAddress))]
+    hosts += alternative.get_values_for_type(x509.DNSName)
+    return Certified(
+        str(names[0].value),
+        NodeRole(str(roles[0].value)),
+        tuple(host for host in hosts if host not in LOCAL_HOSTS),
+        certificate.not_valid_before_utc,
+        certificate.not_valid_after_utc,
+    )
+
+
+def is_signed_by(certificate_pem: bytes, authority_pem: bytes) -> bool:
+    """Return whether a certificate comes from this authority."""
+    from cryptography import x509
+    from cryptography.exceptions import InvalidSignature
+
+    certificate = x509.load_pem_x509_certificate(certificate_pem)
+    authority = x509.load_pem_x509_certificate(authority_pem)
+    try:
+        certificate.verify_directly_issued_by(authority)
+    except (ValueError, TypeError, InvalidSignature):
+        return False
+    return True
+
+
+def _new_key() -> EllipticCurvePrivateKey:
+    from cryptography.hazmat.primitives.asymmetric import ec
+
+    return ec.generate_private_key(ec.SECP256R1())
+
+
+def _name(common_name: str, role: NodeRole | None) -> x509.Name:
+    from cryptography import x509
+    from cryptography.x509.oid import NameOID
+
+    parts = [x509.NameAttribute(NameOID.ORGANIZATION_NAME, ORGANISATION)]
+    if role is not None:
+        parts.append(x509.NameAttribute(NameOID.ORGANIZATIONAL_UNIT_NAME, role.value))
+    parts.append(x509.NameAttribute(NameOID.COMMON_NAME, common_name))
+    return x509.Name(parts)
+
+
+def _builder(
+    subject: x509.Name,
+    issuer: x509.Name,
+    key: EllipticCurvePrivateKey,
+    days: float,
+    latest: datetime | None = None,
+) -> x509.CertificateBuilder:
+    from cryptography import x509
+
+    now = datetime.now(UTC)
+    expires = now + timedelta(days=days)
+    if latest is not None:
+        expires = min(expires, latest)
+    # A certificate that is made expired, for tests, still ends after it begins.
+    begins = min(now - CLOCK_SLACK, expires - CLOCK_SLACK)
+    return (
+        x509.CertificateBuilder()
+        .subject_name(subject)
+        .issuer_name(issuer)
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(begins)
+        .not_valid_after(expires)
+    )
+
+
+def _usage(signs_certificates: bool) -> x509.KeyUsage:
+    from cryptography import x509
+
+    return x509.KeyUsage(
+        digital_signature=not signs_certificates,
+        key_cert_sign=signs_certificates,
+        crl_sign=signs_certificates,
+        content_commitment=False,
+        key_encipherment=False,
+        data_encipherment=False,
+        key_agreement=False,
+        encipher_only=False,
+        decipher_only=False,
+    )
+
+
+def _general_name(host: str) -> x509.GeneralName:
+    from cryptography import x509
+
+    try:
+        return x509.IPAddress(ipaddress.ip_address(host))
+    except ValueError:
+        return x509.DNSName(host)
+
+
+def _pem(certificate: x509.Certificate, key: EllipticCurvePrivateKey) -> Pem:
+    from cryptography.hazmat.primitives import serialization
+
+    encoding = serialization.Encoding.PEM
+    return Pem(
+        certificate.public_bytes(encoding),
+        key.private_bytes(encoding, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()),
+    )

@@ -1,0 +1,215 @@
+"""Keys on disk: a folder for the authority, and one for each node that is copied to its machine.
+
+    keys/authority/authority.pem   certificate of the authority
+    keys/authority/authority.key   its private key; stays on the machine where nodes are added
+    keys/NAME/authority.pem        what a node trusts
+    keys/NAME/node.pem             who the node is
+    keys/NAME/node.key             its private key
+
+Private keys have mode 0600 and their folders 0700; a key that others may read is refused.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from channel.errors import TenbaudError
+from channel.links.security import Credentials
+from tenbaud.keys.authority import (
+    NODE_DAYS,
+    Certified,
+    NodeRole,
+    Pem,
+    is_signed_by,
+    issue,
+    new_authority,
+    read_certificate,
+)
+
+AUTHORITY = "authority"
+AUTHORITY_NAME = "tenbaud authority"
+WARN_DAYS = 30.0
+"""Before a certificate expires by so much, every start says so."""
+
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,62}")
+_OTHERS = stat.S_IRWXG | stat.S_IRWXO
+
+
+class KeysError(TenbaudError):
+    """Keys that are missing, unreadable, expired or open to others; the text says what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class NodeKeys:
+    """A node's folder, read."""
+
+    folder: Path
+    certified: Certified
+
+    @property
+    def credentials(self) -> Credentials:
+        """Return the three files, with absolute paths."""
+        folder = self.folder.resolve()
+        return Credentials(
+            self.certified.name, folder / "authority.pem", folder / "node.pem", folder / "node.key"
+        )
+
+
+def create_authority(keys: Path) -> Path:
+    """Make the authority below a folder; return its own folder."""
+    folder = keys / AUTHORITY
+    if folder.exists():
+        raise KeysError(
+            f"{folder} exists already; add nodes with `tenbaud keys add NAME`, or name another folder "
+            "with --folder"
+        )
+    pem = new_authority(AUTHORITY_NAME)
+    _make_private(keys)
+    _make_private(folder)
+    _write(folder / "authority.key", pem.private_key, 0o600)
+    _write(folder / "authority.pem", pem.certificate, 0o644)
+    return folder
+
+
+def add_node(
+    keys: Path, name: str, role: NodeRole, hosts: tuple[str, ...], days: float = NODE_DAYS
+) -> NodeKeys:
+    """Make key and certificate of a node; KeysError if there is one of this name already."""
+    if not _NAME.fullmatch(name) or name == AUTHORITY:
+        raise KeysError(f"node name {name!r}: letters, digits, '_', '-' and '.', and not 'authority'")
+    if (keys / name).exists():
+        raise KeysError(f"{keys / name} exists already; `tenbaud keys renew {name}` renews it")
+    if role in (NodeRole.RECEIVER, NodeRole.ROUTER) and not hosts:
+        raise KeysError(
+            f"a {role} is connected to: say where with --host ADDRESS, repeatable; the other end "
+            "checks that the certificate names the address it connects to"
+        )
+    authority = _read_authority(keys)
+    pem = _issue(authority, name, role, hosts, days)
+    _make_private(keys / name)
+    _write_node(keys / name, authority, pem)
+    return read_node(keys / name)
+
+
+def renew_node(keys: Path, name: str, hosts: tuple[str, ...] = (), days: float = NODE_DAYS) -> NodeKeys:
+    """Replace key and certificate of a node, with other addresses if any are given."""
+    old = read_node(keys / name)
+    authority = _read_authority(keys)
+    certified = old.certified
+    pem = _issue(authority, name, certified.role, hosts or certified.hosts, days)
+    _write_node(keys / name, authority, pem)
+    return read_node(keys / name)
+
+
+def read_node(folder: Path) -> NodeKeys:
+    """Read a node's folder; KeysError if something in it is missing, foreign or open to others."""
+    try:
+        certificate = (folder / "node.pem").read_bytes()
+        authority = (folder / "authority.pem").read_bytes()
+        mode = (folder / "node.key").stat().st_mode
+        with (folder / "node.key").open("rb"):
+            pass
+    except OSError as error:
+        raise KeysError(
+            f"{folder} is no node's key folder ({error.strerror}: {error.filename}); make one with "
+            "`tenbaud keys add NAME` and copy it whole"
+        ) from error
+    if mode & _OTHERS:
+        raise KeysError(
+            f"{folder / 'node.key'} can be read by others (mode {stat.S_IMODE(mode):04o}); take that "
+            f"away: chmod 600 {folder / 'node.key'}"
+        )
+    try:
+        certified = read_certificate(certificate)
+        signed = is_signed_by(certificate, authority)
+    except ValueError as error:
+        raise KeysError(f"{folder / 'node.pem'} cannot be used: {error}") from error
+    if not signed:
+        raise KeysError(
+            f"{folder / 'node.pem'} was not signed by the authority beside it; copy the folder of one "
+            "authority whole"
+        )
+    return NodeKeys(folder, certified)
+
+
+def usable(folder: Path, role: NodeRole | None) -> NodeKeys:
+    """Read a node's folder for use now, in this role; KeysError when expired or for another role."""
+    node = read_node(folder)
+    certified = node.certified
+    if role is not None and certified.role is not role:
+        raise KeysError(
+            f"{folder} is the certificate of a {certified.role}, and this is a {role}; make one with "
+            f"`tenbaud keys add NAME --role {role}`"
+        )
+    left = certified.days_left()
+    if left <= 0.0:
+        raise KeysError(
+            f"the certificate in {folder} expired on {certified.expires:%Y-%m-%d}; where the authority "
+            f"is: `tenbaud keys renew {certified.name}`, then copy the folder again"
+        )
+    if certified.begins > datetime.now(UTC):
+        raise KeysError(
+            f"the certificate in {folder} is valid from {certified.begins:%Y-%m-%d %H:%M} UTC on; is "
+            "this machine's clock right?"
+        )
+    return node
+
+
+def expiry_warning(node: NodeKeys) -> str | None:
+    """Return what to say about a certificate that expires soon."""
+    left = node.certified.days_left()
+    if left > WARN_DAYS:
+        return None
+    return (
+        f"the certificate in {node.folder} expires in {left:.0f} days; renew it where the authority "
+        f"is: tenbaud keys renew {node.certified.name}"
+    )
+
+
+def read_nodes(keys: Path) -> list[NodeKeys]:
+    """Return all nodes below a folder, by name."""
+    found = sorted(keys.glob("*/node.pem"))
+    return [read_node(path.parent) for path in found]
+
+
+def _issue(authority: Pem, name: str, role: NodeRole, hosts: tuple[str, ...], days: float) -> Pem:
+    try:
+        return issue(authority, name, role, hosts, days)
+    except ValueError as error:
+        raise KeysError(f"no certificate for {name} at {', '.join(hosts)}: {error}") from error
+
+
+def _read_authority(keys: Path) -> Pem:
+    folder = keys / AUTHORITY
+    try:
+        return Pem((folder / "authority.pem").read_bytes(), (folder / "authority.key").read_bytes())
+    except OSError as error:
+        raise KeysError(
+            f"there is no authority in {folder} ({error.strerror}); `tenbaud keys init` makes one, and "
+            "--folder names another place"
+        ) from error
+
+
+def _write_node(folder: Path, authority: Pem, pem: Pem) -> None:
+    _write(folder / "node.key", pem.private_key, 0o600)
+    _write(folder / "node.pem", pem.certificate, 0o644)
+    _write(folder / "authority.pem", authority.certificate, 0o644)
+
+
+def _make_private(folder: Path) -> None:
+    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+
+
+def _write(path: Path, data: bytes, mode: int) -> None:
+    """Write a whole file at once; at no moment can it be read by more than its mode says."""
+    fresh = path.with_name(path.name + ".new")
+    fresh.unlink(missing_ok=True)
+    number = os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
+    with os.fdopen(number, "wb") as stream:
+        stream.write(data)
+    os.replace(fresh, path)

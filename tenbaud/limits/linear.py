@@ -1,0 +1,140 @@
+"""Linear models driven by white noise, and the rate without which they cannot be followed at all."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import expm
+
+Matrix: TypeAlias = NDArray[np.float64]
+
+RANK_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class LinearModel:
+    """`dx = A x dt + dw`, `E dw dw' = Q dt`, of which `c' x` is to be known.
+
+    States that no noise reaches do not belong in it: both ends know them from the commands.
+    """
+
+    dynamics: Matrix
+    """A, 1/s"""
+    noise: Matrix
+    """Q, two-sided spectral density"""
+    output: Matrix
+    """c"""
+
+    @property
+    def states(self) -> int:
+        """Return how many states there are."""
+        return len(self.output)
+
+
+def linear_model(dynamics: ArrayLike, noise: ArrayLike, output: ArrayLike) -> LinearModel:
+    """Return a checked model; ValueError says what is wrong with it.
+
+    Every state must be driven by the noise and seen in the output: otherwise the floor is that of a
+    smaller model, and which one is for the caller to say.
+    """
+    a = np.atleast_2d(np.asarray(dynamics, dtype=float))
+    q = np.atleast_2d(np.asarray(noise, dtype=float))
+    c = np.atleast_1d(np.asarray(output, dtype=float))
+    states = len(c)
+    if a.shape != (states, states) or q.shape != (states, states):
+        raise ValueError(
+            f"the output has {states} entries, so dynamics and noise must be {states} x {states}; "
+            f"they are {a.shape} and {q.shape}"
+        )
+    if not (np.isfinite(a).all() and np.isfinite(q).all() and np.isfinite(c).all()):
+        raise ValueError("the model has an entry that is not finite")
+    if not np.allclose(q, q.T) or np.linalg.eigvalsh(q).min() < -1e-12 * max(1.0, np.abs(q).max()):
+        raise ValueError("the noise density must be symmetric and not negative")
+    if _rank_of_powers(a, q) < states:
+        raise ValueError(
+            "the noise does not reach every state: leave out those it does not, both ends know them"
+        )
+    if _rank_of_powers(a.T, c[:, None]) < states:
+        raise ValueError(
+            "the output does not see every state (the pair is not observable): no rate bounds a state "
+            "that never shows; leave it out, or choose an output that sees it"
+        )
+    return LinearModel(a, q, c)
+
+
+def _rank_of_powers(a: Matrix, columns: Matrix) -> int:
+    """Return the rank of [B, AB, A^2 B, ...], each block scaled so that a fast A does not hide it."""
+    block = columns / (np.abs(columns).max() or 1.0)
+    blocks = [block]
+    speed = np.abs(a).max() or 1.0
+    for _ in range(len(a) - 1):
+        block = a @ block / speed
+        blocks.append(block)
+    return int(np.linalg.matrix_rank(np.hstack(blocks), tol=RANK_TOLERANCE))
+
+
+def integrators(count: int, density: float) -> LinearModel:
+    """Return a chain of integrators behind white noise of this density, its last one observed.
+
+    One: the Wiener process. Two: an angle under white torque of `density` rad^2/s^3.
+    """
+    a = np.diag(np.ones(count - 1), 1)
+    q = np.zeros((count, count))
+    q[-1, -1] = density
+    return linear_model(a, q, np.eye(count)[0])
+
+
+def pitch(
+    density_rad2_s3: float,
+    *,
+    rate_damping_per_s: float = 0.1,
+    stiffness_per_s2: float = 0.5,
+    angle_from_rest_rad: float = 0.0,
+) -> LinearModel:
+    """Return (2) linearised at an angle, under white torque; the lagging voltages are known, not noisy.
+
+    theta'' = -a_w theta' - a_th cos(theta - theta_0) theta + w
+    """
+    stiffness = stiffness_per_s2 * math.cos(angle_from_rest_rad)
+    return linear_model(
+        [[0.0, 1.0], [-stiffness, -rate_damping_per_s]],
+        [[0.0, 0.0], [0.0, density_rad2_s3]],
+        [1.0, 0.0],
+    )
+
+
+def rate_needed(dynamics: ArrayLike) -> float:
+    """Return the bit/s that a plant needs to be followed at all: the data-rate theorem.
+
+    Sum of `Re lambda / ln 2` over the eigenvalues in the right half plane (Nair and Evans, SIAM J.
+    Control Optim. 43, 2004; Tatikonda and Mitter, IEEE TAC 49, 2004). Below it the error grows without
+    bound, whatever the code; the rate must be *above* it.
+    """
+    a = np.atleast_2d(np.asarray(dynamics, dtype=float))
+    growth = np.linalg.eigvals(a).real
+    # A defective zero eigenvalue, as of a chain of integrators, is found with an error of about
+    # eps^(1/n); it is no growth.
+    slack = 1e-7 * max(1.0, float(np.abs(a).max()))
+    return float(growth[growth > slack].sum()) / math.log(2.0)
+
+
+def bits_needed_per_sample(dynamics: ArrayLike, sample_s: float) -> float:
+    """Return the bits that a word must have on average: `sum log2 |lambda|` of the sampled plant."""
+    return rate_needed(dynamics) * sample_s
+
+
+def sampled(model: LinearModel, period_s: float) -> tuple[Matrix, Matrix]:
+    """Return transition matrix and noise covariance over a period (Van Loan, IEEE TAC 23, 1978)."""
+    states = model.states
+    block = np.zeros((2 * states, 2 * states))
+    block[:states, :states] = -model.dynamics
+    block[:states, states:] = model.noise
+    block[states:, states:] = model.dynamics.T
+    exponential = expm(block * period_s)
+    transition = exponential[states:, states:].T
+    covariance = transition @ exponential[:states, states:]
+    return transition, 0.5 * (covariance + covariance.T)

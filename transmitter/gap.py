@@ -17,9 +17,10 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 from channel.codec import Codec, Vector
+from channel.recording import Field, RecordChannel
 from transmitter.copies import Confirmed
 
 SPAN_S = 0.5
@@ -28,6 +29,19 @@ MEMORY_S = 20.0
 """Time constant with which the running figures forget."""
 ENCODER_SHARE_MAX = 0.5
 """Where the encoder's steps make more of the bend than this, nothing pushes that it could tell."""
+ANGLES_MAX = 1024
+"""Samples whose echo may be on its way."""
+
+GAP_CHANNEL = RecordChannel(
+    "gap",
+    (
+        Field("sample", "integer", "", "index of the sample"),
+        Field("strength_rad2_per_s3", "number", "rad^2/s^3", "density q of the disturbing torque"),
+        Field("rms_over_floor", "number", "", "running rms of the live error over the least possible"),
+        Field("ideal_bits", "number", "bit", "that an ideal code would have needed for that error"),
+    ),
+)
+GAP_EVERY_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,15 +141,27 @@ class StrengthMeter:
 class GapGauge:
     """Compares the live error with the floor for the disturbance that there is."""
 
-    def __init__(self, limit: Limit, strength: StrengthMeter, tick_s: float) -> None:
+    def __init__(self, limit: Limit, strength: StrengthMeter, ticks_per_sample: int, tick_s: float):
         self._limit = limit
         self._strength = strength
+        self._ticks_per_sample = ticks_per_sample
         self._tick_s = tick_s
         self._errors = Running(tick_s)
+        self._angles: deque[tuple[int, float]] = deque(maxlen=ANGLES_MAX)
 
-    def on_sample(self, done: Confirmed, angle_rad: float) -> None:
-        """Take a confirmed sample and the encoder's angle at its first tick."""
-        self._strength.add(done, angle_rad)
+    def on_angle(self, tick: int, angle_rad: float) -> None:
+        """Take the encoder's angle at a tick."""
+        sample, within = divmod(tick, self._ticks_per_sample)
+        if within == 0:
+            self._angles.append((sample, angle_rad))
+
+    def on_confirmed(self, done: Confirmed) -> None:
+        """Take a confirmed sample; its angle has been taken before."""
+        angles = self._angles
+        while angles and angles[0][0] < done.sample:
+            angles.popleft()
+        if angles and angles[0][0] == done.sample:
+            self._strength.add(done, angles.popleft()[1])
 
     def on_error(self, error_rad: float) -> None:
         """Take the live error of a tick."""
@@ -151,8 +177,13 @@ class GapGauge:
         """Return the gauge over all that was flown."""
         return self._gap(self._strength.whole, self._errors.whole)
 
+    def row(self, sample: int) -> tuple[object, ...]:
+        """Return the row of `GAP_CHANNEL`."""
+        gap = self.now
+        return (sample, None, None, None) if gap is None else (sample, *astuple(gap))
+
     def _gap(self, strength: float | None, mean_square: float | None) -> Gap | None:
-        if strength is None or mean_square is None:
+        if strength is None or not mean_square:
             return None
         per_density = mean_square / strength
         flown_s = self._errors.count * self._tick_s

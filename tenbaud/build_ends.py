@@ -20,6 +20,7 @@ from receiver.endpoint import ReceiverEndpoint
 from receiver.references import Constant, Csv, Reference, Sine, Square, Step
 from receiver.session import ReceiverSession
 from tenbaud.build import Agreement, read_flight_log, ticks_of
+from tenbaud.build_gauge import build_gauge
 from tenbaud.build_rig import build_rig
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
@@ -41,17 +42,19 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
         stop_on_desync=config.transmitter.on_desync == "stop",
     )
     reference = build_reference(config)
+    gauge = build_gauge(agreement)
     scores = Scores(
         agreement.codec.model,
         agreement.window_start_tick,
         (LAG_SAMPLES_MAX + 2) * terms.ticks_per_sample,
         reference.angle_rad if config.receiver.controller == "pid" else lambda _tick: None,
+        gauge.on_error if gauge is not None else lambda _error: None,
     )
     # Only a rig that hurts nobody is armed again by itself.
     rearm_s = config.link.peer_timeout_s if config.transmitter.rig == "simulated" else None
     rearm_ticks = None if rearm_s is None else ticks_of(rearm_s, config)
     return TransmitterNode(
-        session, build_rig(config), build_guard(agreement), scores, recorder, rearm_ticks
+        session, build_rig(config), build_guard(agreement), scores, recorder, rearm_ticks, gauge
     )
 
 

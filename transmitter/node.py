@@ -10,7 +10,9 @@ from channel.codec import Vector
 from channel.events import EVENT_CHANNEL, Event, EventKind, event_row
 from channel.frames import Frame, Why
 from channel.recording import NullRecorder, Recorder
+from transmitter.copies import Confirmed
 from transmitter.encoder_watch import EncoderWatch
+from transmitter.gap import GAP_CHANNEL, GAP_EVERY_S, GapGauge
 from transmitter.guard import Guard, GuardState
 from transmitter.records import DEVICE_CHANNEL, TICK_CHANNEL, device_row
 from transmitter.rigs.base import Reading, Rig
@@ -36,16 +38,19 @@ class TransmitterNode:
         scores: Scores,
         recorder: Recorder | None = None,
         rearm_ticks: int | None = None,
+        gauge: GapGauge | None = None,
     ) -> None:
         self.session = session
         self.rig = rig
         self.guard = guard
         self.scores = scores
+        self.gauge = gauge
         self.commands_late = 0
         self.sensor_fault: str | None = None
         self.tick = 0
         self.rearmed = 0
         self._rearm_ticks = rearm_ticks
+        self._gauge_samples = max(1, round(GAP_EVERY_S * 1e9 / session.terms.sample_ns))
         self._recorder = recorder or NullRecorder()
         self._reading: Reading | None = None
         self._watch = EncoderWatch(session.codec, session.terms.tick_ns / 1e9)
@@ -64,6 +69,8 @@ class TransmitterNode:
             self._recorder.write(DEVICE_CHANNEL, time_ns, device_row(tick, reading.device))
         self._check(tick, reading)
         self.scores.on_angles(tick, reading.true_rad or reading.measured_rad)
+        if self.gauge is not None:
+            self.gauge.on_angle(tick, reading.measured_rad[0])
         asking: list[Frame] = []
         if self.guard.stopped:
             if not self._may_rearm:
@@ -80,10 +87,18 @@ class TransmitterNode:
             pairs = zip(done.flown.coded, done.live, strict=True)
             for tick, (coded, live) in enumerate(pairs, done.sample * first):
                 self.scores.on_estimate(tick, coded, live)
+            if self.gauge is not None:
+                self._gauge(self.gauge, done)
         if self.guard.stopped and self._may_rearm and self.session.phase is Phase.FLYING:
             self.guard.rearm()
             self.rearmed += 1
         return answers
+
+    def _gauge(self, gauge: GapGauge, done: Confirmed) -> None:
+        gauge.on_confirmed(done)
+        if (done.sample + 1) % self._gauge_samples == 0:
+            time_ns = done.sample * self.session.terms.sample_ns
+            self._recorder.write(GAP_CHANNEL, time_ns, gauge.row(done.sample))
 
     def actuate(self, tick: int, lateness_ns: int = 0) -> Vector:
         """Put the tick's voltages on the motors; return them."""

@@ -42,10 +42,16 @@ class Scores:
     """Collects the errors of a flight from tick `window_start_tick` on.
 
     `span_ticks` bounds how long an angle waits for its estimate; older ones are forgotten.
+    `on_live_error` is told every live error of the window, rad.
     """
 
     def __init__(
-        self, model: Model, window_start_tick: int, span_ticks: int, reference: Reference
+        self,
+        model: Model,
+        window_start_tick: int,
+        span_ticks: int,
+        reference: Reference,
+        on_live_error: Callable[[float], None] = lambda _: None,
     ) -> None:
         self.window_start_tick = window_start_tick
         self.coded = ErrorMeter()
@@ -57,6 +63,7 @@ class Scores:
         self.last_angle_rad: float | None = None
         self._model = model
         self._reference = reference
+        self._on_live_error = on_live_error
         # An estimate may come before its angle (the echo of a sample's first tick speaks of all its
         # ticks) or long after it; each waits for the other.
         self._angles: deque[tuple[int, float]] = deque(maxlen=span_ticks)
@@ -98,6 +105,7 @@ class Scores:
             self.coded.add(angle - coded)
             if live is not None:
                 self.live.add(angle - live)
+                self._on_live_error(angle - live)
 
 
 class LatenessMeter:

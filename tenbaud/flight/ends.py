@@ -21,7 +21,7 @@ from tenbaud.flight import receive, transmit
 from tenbaud.flight.outcome import Outcome, outcome_of
 from tenbaud.flight.status import Status, StatusMode, StatusReporter
 from tenbaud.flight.stop import StopFlag
-from tenbaud.flight.summary import Summary, link_part, receiver_part, transmitter_part
+from tenbaud.flight.summary import Summary, gap_part, link_part, receiver_part, transmitter_part
 from tenbaud.recording.folder import RunFolder
 from tenbaud.recording.writer import McapRecorder
 
@@ -169,6 +169,7 @@ def transmitter_status(run: transmit.TransmitterRun) -> Status:
         "erasures": node.session.counts["erasures"],
         "desyncs": node.session.counts["desyncs"],
         "guard": node.guard.state.value,
+        **gap_part(node.gauge.now if node.gauge is not None else None),
     }
 
 

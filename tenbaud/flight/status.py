@@ -61,6 +61,7 @@ def status_line(status: Status) -> str:
         ("pitch_rad", "pitch", "{:+.3f} rad"),
         ("error_rad", "error", "{:+.4f} rad"),
         ("range_rad", "M", "{:.3f}"),
+        ("rms_over_floor", "floor x", "{:.1f}"),
         ("erasures", "erased", "{}"),
         ("guard", "guard", "{}"),
     ):

@@ -14,6 +14,7 @@ from tenbaud.build import Agreement
 from tenbaud.config.schema import TransmitterSection
 from tenbaud.flight.outcome import Outcome
 from tenbaud.flight.transmit import TransmitterRun
+from transmitter.gap import Gap
 from transmitter.scores import ErrorMeter
 
 Summary = dict[str, Any]
@@ -48,6 +49,7 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         **_errors("error_coded", scores.coded, scores.angle_max_rad, scores.reference_max_rad),
         **_errors("error_live", scores.live, scores.angle_max_rad, scores.reference_max_rad),
         "tracking_rms_rad": scores.tracking.rms,
+        **gap_part(node.gauge.whole if node.gauge is not None else None),
         "commands_late": node.commands_late,
         "symbols_refused": run.uplink.shaper.refused,
         "words_missed": session.counts["words_missed"],
@@ -57,6 +59,15 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         "loop_late_ms_max": None,
         "realtime_factor": flown_s / run.flight_s if run.flight_s else None,
         **run.extra,
+    }
+
+
+def gap_part(gap: Gap | None) -> Summary:
+    """Return the gap gauge, with nothing in it where there is nothing to compare."""
+    return {
+        "disturbance_rad2_per_s3": gap and gap.strength_rad2_per_s3,
+        "rms_over_floor": gap and gap.rms_over_floor,
+        "ideal_bits": gap and gap.ideal_bits,
     }
 
 

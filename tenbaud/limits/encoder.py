@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from tenbaud.limits.floor import DOUBLE_INTEGRATOR, rate_for
+from tenbaud.limits.closed import DOUBLE_INTEGRATOR
+from tenbaud.limits.floor import rate_for
 from tenbaud.limits.linear import LinearModel
 
 

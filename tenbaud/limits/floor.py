@@ -6,8 +6,7 @@ For a linear model under white noise, an estimate that rests on R bit/s without 
     tr A + 1/2 tr(Q P^-1) <= R ln 2,     A P + P A' + Q >= 0
 
 (Duncan, SIAM J. Appl. Math. 19, 1970, with the sequential rate-distortion problem of Tanaka et al.).
-The least `c' P c` under these is the floor. Two cases have a closed form: the Wiener process,
-`q / (2 R ln 2)` (Gorbunov and Pinsker 1974), and the double integrator, `(8/27) q / (R ln 2)^3`.
+The least `c' P c` under these is the floor; `closed.py` has the two cases with a closed form.
 A controller that hears no more than these bits cannot track better either: its error is the sum of the
 estimation error and something that does not correlate with it.
 
@@ -24,14 +23,9 @@ import numpy as np
 from scipy.linalg import solve_continuous_are
 from scipy.optimize import brentq
 
+from tenbaud.limits.closed import LN2
 from tenbaud.limits.convex import Value, log_determinant, minimise, traces
 from tenbaud.limits.linear import LinearModel, Matrix, rate_needed, sampled
-
-LN2 = math.log(2.0)
-WIENER = 1.0 / (2.0 * LN2)
-"""0.721: mean square error of the Wiener process times R/q"""
-DOUBLE_INTEGRATOR = 8.0 / 27.0 / LN2**3
-"""0.890: that of the double integrator times R^3/q"""
 
 QUADRATURE_POINTS = 12
 RATE_LIMITS = (1e-6, 1e7)
@@ -40,16 +34,6 @@ RATE_LIMITS = (1e-6, 1e7)
 
 class RateTooLow(ValueError):
     """A rate at which no code can follow the plant; the text says which one can."""
-
-
-def wiener_floor(density: float, rate_bit_s: float) -> float:
-    """Return the mean square error floor of the Wiener process, q / (2 R ln 2)."""
-    return WIENER * density / rate_bit_s
-
-
-def double_integrator_floor(density: float, rate_bit_s: float) -> float:
-    """Return that of an angle under white torque, (8/27) q / (R ln 2)^3, in rad^2."""
-    return DOUBLE_INTEGRATOR * density / rate_bit_s**3
 
 
 def floor(model: LinearModel, rate_bit_s: float, erased: float = 0.0) -> float:

@@ -7,14 +7,17 @@ import math
 import numpy as np
 import pytest
 
-from tenbaud.limits.floor import (
+from tenbaud.limits.closed import (
     DOUBLE_INTEGRATOR,
     WIENER,
-    RateTooLow,
     double_integrator_floor,
+    double_integrator_rate,
+    wiener_floor,
+)
+from tenbaud.limits.floor import (
+    RateTooLow,
     floor,
     rate_for,
-    wiener_floor,
     word_floor,
 )
 from tenbaud.limits.linear import LinearModel, integrators, linear_model, pitch, sampled
@@ -25,6 +28,7 @@ PENDULUM = linear_model([[0.0, 1.0], [7.3198**2, 0.0]], [[0.0, 0.0], [0.0, 1e-3]
 def test_the_constants_are_those_of_the_literature() -> None:
     assert round(WIENER, 3) == 0.721
     assert round(DOUBLE_INTEGRATOR, 3) == 0.890
+    assert double_integrator_rate(2e-3, double_integrator_floor(2e-3, 17.0)) == pytest.approx(17.0)
 
 
 @pytest.mark.parametrize("rate", [0.5, 10.0, 400.0])

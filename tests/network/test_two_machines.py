@@ -89,7 +89,15 @@ def test_the_ends_find_each_other_by_scouting(lab: Lab, tmp_path: Path) -> None:
     keys = make_keys(tmp_path)
     links = {
         "rig_link": ["--keys", str(keys / "rig"), "--peer", "desk", "--scout"],
-        "desk_link": ["--keys", str(keys / "desk"), "--peer", "rig", "--listen", at(DESK_AT), "--scout"],
+        "desk_link": [
+            "--keys",
+            str(keys / "desk"),
+            "--peer",
+            "rig",
+            "--listen",
+            at(DESK_AT),
+            "--scout",
+        ],
     }
     with Flight(tmp_path, rig, desk, **links, duration_s=2.0) as flight:
         upper, _ = flight.ended()

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from channel.errors import TenbaudError
+from channel.links.endpoints import free_endpoint
+from tenbaud.cli.app import app
+from tenbaud.flight.outcome import outcome_of
 from tenbaud.keys.authority import NodeRole
 from tenbaud.keys.store import add_node, create_authority
 from tests.tenbaud.processes import run
@@ -21,13 +28,36 @@ def keys(tmp_path: Path) -> Path:
     return tmp_path / "keys"
 
 
-def refused(cwd: Path, *arguments: str) -> str:
-    ended = run(*arguments, cwd=cwd)
-    assert ended.code == 2, ended.err
-    assert "Traceback" not in ended.err
-    assert not (cwd / "runs").exists(), "a refused command left a run folder behind"
-    # As one line, without the frame that errors of usage are drawn in.
-    return " ".join(ended.err.replace("│", " ").split())
+@dataclass
+class Said:
+    """How a command ended that was run within this process."""
+
+    code: int
+    text: str
+    """as one line, without the frame that errors of usage are drawn in"""
+
+
+@pytest.fixture
+def tenbaud(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Said]:
+    monkeypatch.chdir(tmp_path)
+
+    def command(*arguments: str) -> Said:
+        ended = CliRunner().invoke(app, arguments)
+        text = ended.output
+        code = ended.exit_code
+        if isinstance(ended.exception, TenbaudError):
+            text += str(ended.exception)
+            code = int(outcome_of(ended.exception).code)
+        return Said(code, " ".join(text.replace("│", " ").split()))
+
+    return command
+
+
+def refused(tenbaud: Callable[..., Said], *arguments: str) -> str:
+    ended = tenbaud(*arguments)
+    assert ended.code == 2, ended.text
+    assert not Path("runs").exists(), "a refused command left a run folder behind"
+    return ended.text
 
 
 @pytest.mark.parametrize(
@@ -42,9 +72,9 @@ def refused(cwd: Path, *arguments: str) -> str:
     ids=" ".join,
 )
 def test_without_keys_an_address_beyond_this_machine_is_refused(
-    tmp_path: Path, arguments: tuple[str, ...]
+    tenbaud: Callable[..., Said], arguments: tuple[str, ...]
 ) -> None:
-    said = refused(tmp_path, *arguments)
+    said = refused(tenbaud, *arguments)
     assert "no encryption" in said
     assert "tenbaud keys init" in said
     assert "--insecure" in said
@@ -63,43 +93,38 @@ def test_without_keys_an_address_beyond_this_machine_is_refused(
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )
+@pytest.mark.usefixtures("keys")
 def test_what_is_missing_is_named_with_the_next_command(
-    keys: Path, arguments: tuple[str, ...], hint: str
+    tenbaud: Callable[..., Said], arguments: tuple[str, ...], hint: str
 ) -> None:
-    assert hint in refused(keys.parent, "transmit", *arguments)
+    assert hint in refused(tenbaud, "transmit", *arguments)
 
 
-def test_a_certificate_of_the_other_role_is_refused(keys: Path) -> None:
-    said = refused(keys.parent, "receive", "--keys", "keys/rig", "--peer", "x")
+@pytest.mark.usefixtures("keys")
+def test_a_certificate_of_the_other_role_is_refused(tenbaud: Callable[..., Said]) -> None:
+    said = refused(tenbaud, "receive", "--keys", "keys/rig", "--peer", "x")
     assert "certificate of a transmitter" in said
 
 
 def test_insecure_says_what_is_given_up(tmp_path: Path) -> None:
-    ended = run(
-        "receive",
-        "--insecure",
-        "--listen",
-        "tcp/127.0.0.1:0",
-        "--set",
-        "link.peer_timeout_s=0.1",
-        cwd=tmp_path,
-    )
+    arguments = ("--insecure", "--listen", free_endpoint(), "--set", "link.peer_timeout_s=0.1")
+    ended = run("receive", *arguments, cwd=tmp_path)
     assert ended.code == 4
     assert "command the motors" in ended.err
     assert "nothing is encrypted" in ended.err
 
 
-def test_the_keys_commands_lead_from_one_to_the_next(tmp_path: Path) -> None:
-    assert "tenbaud keys add rig --role transmitter" in run("keys", "init", cwd=tmp_path).out
-    added = run("keys", "add", "rig", "--role", "transmitter", cwd=tmp_path).out
+def test_the_keys_commands_lead_from_one_to_the_next(tenbaud: Callable[..., Said]) -> None:
+    assert "tenbaud keys add rig --role transmitter" in tenbaud("keys", "init").text
+    added = tenbaud("keys", "add", "rig", "--role", "transmitter").text
     assert "tenbaud keys add desk --role receiver --host" in added
     add_desk = ("keys", "add", "desk", "--role", "receiver", "--host", "fd00::2", "--days", "9")
-    both = run(*add_desk, cwd=tmp_path)
-    assert "tenbaud receive --keys keys/desk --peer rig --listen tls/[fd00::2]:7447" in both.out
-    assert "tenbaud transmit --keys keys/rig --peer desk --connect tls/[fd00::2]:7447" in both.out
-    shown = run("keys", "show", cwd=tmp_path)
-    assert "desk, receiver" in shown.out
-    assert "expires in 9 days" in shown.err
-    assert run("keys", "renew", "desk", cwd=tmp_path).code == 0
-    assert "warning" not in run("keys", "show", cwd=tmp_path).err
-    assert "--role says what" in run("keys", "add", "x", cwd=tmp_path).err
+    both = tenbaud(*add_desk).text
+    assert "tenbaud receive --keys keys/desk --peer rig --listen tls/[fd00::2]:7447" in both
+    assert "tenbaud transmit --keys keys/rig --peer desk --connect tls/[fd00::2]:7447" in both
+    shown = tenbaud("keys", "show").text
+    assert "desk, receiver" in shown
+    assert "expires in 9 days" in shown
+    assert tenbaud("keys", "renew", "desk").code == 0
+    assert "warning" not in tenbaud("keys", "show").text
+    assert "--role says what" in refused(tenbaud, "keys", "add", "x")

@@ -15,8 +15,9 @@ SILENT_SAMPLES = 2
 """No command for so long: the receiver has lost the session, and whoever says so is believed."""
 ALIVE_COMMANDS = 3
 """So many commands since somebody else asked prove that the receiver still flies."""
-SUCCESSOR_SAMPLES = 10
-"""How long a receiver that takes over has for its answer."""
+SUCCESSOR_SAMPLES = 3
+"""How long a receiver that takes over has for its answer, beside the command lead, which is as long as
+a round trip: short enough that the present one can go on before the watchdog has had enough."""
 
 
 class Claims:
@@ -50,7 +51,8 @@ class Claims:
     def name_successor(self, session: int, tick: int) -> None:
         """From now on only this session's answer counts, for a while."""
         self._successor = session
-        self._until_tick = tick + SUCCESSOR_SAMPLES * self._terms.ticks_per_sample
+        patience = SUCCESSOR_SAMPLES * self._terms.ticks_per_sample + self._terms.lead_ticks
+        self._until_tick = tick + patience
 
     def successor(self, tick: int) -> int | None:
         """Return the session that is taking over, if one is."""

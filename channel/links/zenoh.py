@@ -23,7 +23,7 @@ from channel.errors import LinkError
 from channel.links.base import LinkBase, Role
 from channel.links.endpoints import check_endpoints
 from channel.links.security import KEY_ROOT, Security
-from channel.links.zenoh_config import open_session, zenoh_config
+from channel.links.zenoh_config import open_session, zenoh_config, zenoh_settings
 from channel.links.zenoh_gate import Gate
 from channel.links.zenoh_inbox import ChannelInbox
 
@@ -75,7 +75,7 @@ class ZenohLink(LinkBase):
         self._peers: set[str] = set()
         self._closed = False
         # Only clients hear each other through a router: what peers send it stays there.
-        config = zenoh_config(
+        settings = zenoh_settings(
             "client" if router else "peer",
             listen,
             connect or router,
@@ -83,7 +83,9 @@ class ZenohLink(LinkBase):
             security=security,
         )
         where = ", ".join(listen + connect + router)
-        self._session = open_session(config, where, patience_s if router else 0.0, should_stop)
+        self._session = open_session(
+            zenoh_config(settings), where, patience_s if router else 0.0, should_stop
+        )
         try:
             self._gate = Gate(self._session, security, self.counts.refused)
             self._declare(role, f"{KEY_ROOT}/{session_name}", best_effort)

@@ -21,15 +21,15 @@ OPEN_AGAIN_S = 0.2
 Mode = Literal["peer", "client", "router"]
 
 
-def zenoh_config(
+def zenoh_settings(
     mode: Mode,
     listen: tuple[str, ...],
     connect: tuple[str, ...],
     *,
     scouting: bool = False,
     security: Security | None = None,
-) -> zenoh.Config:
-    """Return the configuration of a node; LinkError where Zenoh does not take it."""
+) -> dict[str, object]:
+    """Return every setting of a node that matters, by its path."""
     settings: dict[str, object] = {
         "mode": mode,
         "listen/endpoints": list(listen),
@@ -43,8 +43,11 @@ def zenoh_config(
         "transport/unicast/max_sessions": SESSIONS_MAX,
         "adminspace/enabled": False,
     }
-    if security is not None:
-        settings |= security_settings(security)
+    return settings if security is None else settings | security_settings(security)
+
+
+def zenoh_config(settings: dict[str, object]) -> zenoh.Config:
+    """Return the configuration with these settings; LinkError where Zenoh does not take one."""
     config = zenoh.Config()
     for path, value in settings.items():
         try:
@@ -52,6 +55,18 @@ def zenoh_config(
         except zenoh.ZError as error:
             raise LinkError(f"Zenoh does not take {path} = {value}: {error}") from error
     return config
+
+
+def as_file(settings: dict[str, object]) -> str:
+    """Return settings as a file that Zenoh's own router reads."""
+    nested: dict[str, object] = {}
+    for path, value in settings.items():
+        *sections, name = path.split("/")
+        place = nested
+        for section in sections:
+            place = place.setdefault(section, {})  # type: ignore[assignment]
+        place[name] = value
+    return json.dumps(nested, indent=2) + "\n"
 
 
 def open_session(

@@ -12,8 +12,13 @@ from typing import Self
 from channel.errors import LinkError
 from channel.links.endpoints import check_endpoints
 from channel.links.security import Security
-from channel.links.zenoh_config import open_session, zenoh_config
+from channel.links.zenoh_config import as_file, open_session, zenoh_config, zenoh_settings
 from channel.links.zenoh_gate import Gate
+
+
+def router_file(listen: tuple[str, ...], security: Security | None) -> str:
+    """Return the settings of such a router as a file for a stand-alone one."""
+    return as_file(zenoh_settings("router", listen, (), security=security))
 
 
 class ZenohRouter:
@@ -27,8 +32,8 @@ class ZenohRouter:
         check_endpoints(listen, insecure, security is not None)
         self.refused: Counter[str] = Counter()
         """nodes turned away, by reason"""
-        config = zenoh_config("router", listen, (), security=security)
-        self._session = open_session(config, ", ".join(listen))
+        settings = zenoh_settings("router", listen, (), security=security)
+        self._session = open_session(zenoh_config(settings), ", ".join(listen))
         self._gate = Gate(self._session, security, self.refused)
         self._closed = False
 

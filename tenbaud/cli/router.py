@@ -12,7 +12,7 @@ import typer
 from tenbaud.cli import options
 
 if TYPE_CHECKING:
-    from channel.links.security import Invited
+    from channel.links.security import Invited, Security
     from channel.links.zenoh_router import ZenohRouter
 
 POLL_S = 0.2
@@ -30,6 +30,10 @@ def router(
     ] = None,
     keys: Annotated[Path | None, typer.Option(help="This router's key folder.")] = None,
     insecure: options.Insecure = False,
+    print_config: Annotated[
+        bool,
+        typer.Option("--print-config", help="Do not route: print the settings for a zenohd that does."),
+    ] = False,
 ) -> None:
     """Route between two ends that cannot reach each other but both reach this machine.
 
@@ -37,29 +41,47 @@ def router(
 
     The ends connect with `--router tls/10.0.0.9:7447 --peer hub`.
     """
-    from channel.links.endpoints import DEFAULT_ENDPOINT, with_protocol
-    from channel.links.security import Security
-    from channel.links.zenoh_gate import HandshakeLog
-    from channel.links.zenoh_router import ZenohRouter
+    from channel.links.endpoints import DEFAULT_ENDPOINT, check_endpoints, with_protocol
+    from channel.links.zenoh_router import router_file
     from tenbaud.cli.addresses import INSECURE
-    from tenbaud.flight.stop import StopFlag
-    from tenbaud.keys.authority import NodeRole
-    from tenbaud.keys.store import usable
 
-    security = None
-    if keys is not None:
-        if not flight:
-            raise typer.BadParameter(
-                "--keys without --flight lets nobody in: --flight SESSION=TRANSMITTER,RECEIVER"
-            )
-        node = usable(keys, NodeRole.ROUTER)
-        security = Security(node.credentials, tuple(one for text in flight for one in _invited(text)))
-    elif flight:
-        raise typer.BadParameter("--flight names certificates; it needs --keys")
+    security = _security(keys, flight or [])
     protocol = "tcp" if security is None else "tls"
     addresses = tuple(listen or [with_protocol(DEFAULT_ENDPOINT, protocol)])
+    check_endpoints(addresses, insecure, security is not None)
     if insecure and security is None:
         typer.echo(INSECURE, err=True)
+    if print_config:
+        typer.echo(router_file(addresses, security), nl=False)
+        return
+    _route(addresses, security, insecure)
+
+
+def _security(keys: Path | None, flights: list[str]) -> Security | None:
+    from channel.links.security import Security
+    from tenbaud.keys.authority import NodeRole
+    from tenbaud.keys.store import expiry_warning, usable
+
+    if keys is None:
+        if flights:
+            raise typer.BadParameter("--flight names certificates; it needs --keys")
+        return None
+    if not flights:
+        raise typer.BadParameter(
+            "--keys without --flight lets nobody in: --flight SESSION=TRANSMITTER,RECEIVER"
+        )
+    node = usable(keys, NodeRole.ROUTER)
+    warning = expiry_warning(node)
+    if warning is not None:
+        typer.echo(f"tenbaud: warning: {warning}", err=True)
+    return Security(node.credentials, tuple(one for text in flights for one in _invited(text)))
+
+
+def _route(addresses: tuple[str, ...], security: Security | None, insecure: bool) -> None:
+    from channel.links.zenoh_gate import HandshakeLog
+    from channel.links.zenoh_router import ZenohRouter
+    from tenbaud.flight.stop import StopFlag
+
     with (
         StopFlag() as stop,
         HandshakeLog() as log,

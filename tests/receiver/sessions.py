@@ -30,9 +30,11 @@ def hello(incarnation: int = PEER, **changes: Any) -> Hello:
     return Hello(incarnation, identity.version, identity.config_digest, identity.numerics_probe)
 
 
-def receiver(*volts: float, codec: Codec = CODEC, **changes: Any) -> ReceiverSession:
+def receiver(
+    *volts: float, codec: Codec = CODEC, take_over: bool = False, **changes: Any
+) -> ReceiverSession:
     controller = ConstantController(*(volts or (1.0, -1.0)))
-    return ReceiverSession(codec, terms(**changes), controller, IDENTITY, SESSION)
+    return ReceiverSession(codec, terms(**changes), controller, IDENTITY, SESSION, take_over=take_over)
 
 
 def flying(*volts: float, **changes: Any) -> ReceiverSession:

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +24,23 @@ PATIENCE_S = 30.0
 class End:
     """One end on the real clock; its status lines are read as they come."""
 
-    def __init__(self, verb: str, link: list[str], folder: Path, *arguments: str) -> None:
+    def __init__(
+        self,
+        verb: str,
+        link: list[str],
+        folder: Path,
+        *arguments: str,
+        prefix: Sequence[str] = (),
+        draws: bool = True,
+    ) -> None:
         self.verb = verb
         self.folder = folder
         self.status: dict[str, Any] = {}
         self.said: list[str] = []
-        command = [sys.executable, "-m", "tenbaud", verb, *link, "--clock", "real", "--json"]
-        command += ["--status", "lines", "--out", str(folder), *arguments]
+        command = [*prefix, sys.executable, "-m", "tenbaud", verb, *link, "--clock", "real", "--json"]
+        if not draws:
+            folder.mkdir()
+        command += ["--status", "lines", "--out" if draws else "--run-folder", str(folder), *arguments]
         path = os.pathsep.join([str(REPOSITORY), os.environ.get("PYTHONPATH", "")])
         self.process = subprocess.Popen(
             command,

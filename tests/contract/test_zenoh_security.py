@@ -1,0 +1,194 @@
+"""TLS and access rules of the Zenoh link: who is let in, to what, and who is not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import pytest
+
+from channel.errors import LinkError
+from channel.links.security import Security, access_rules
+from channel.links.zenoh import ZenohLink
+from channel.links.zenoh_gate import reason_of
+from channel.links.zenoh_router import ZenohRouter
+from tests.contract.security import SESSION, credentials, free_tls_endpoint, security
+from tests.contract.test_links import PATIENCE_S, SILENCE_S, Pair, until
+
+RIG = security("rig", ("desk", "receiver"))
+DESK = security("desk", ("rig", "transmitter"))
+DESK_WITH_VIEWER = security("desk", ("rig", "transmitter"), ("page", "viewer"))
+
+
+@pytest.fixture
+def endpoint() -> str:
+    return free_tls_endpoint()
+
+
+@pytest.fixture
+def pair(endpoint: str) -> Iterator[Pair]:
+    with (
+        ZenohLink("receiver", SESSION, listen=(endpoint,), security=DESK_WITH_VIEWER) as desk,
+        ZenohLink("transmitter", SESSION, connect=(endpoint,), security=RIG) as rig,
+    ):
+        assert until(desk.peer_present)
+        assert until(rig.peer_present)
+        yield rig, desk
+
+
+def check_both_ways(rig: ZenohLink, desk: ZenohLink) -> None:
+    rig.send(b"symbol", is_symbol=True)
+    assert desk.receive(PATIENCE_S) == b"symbol"
+    rig.send(b"control")
+    assert desk.receive(PATIENCE_S) == b"control"
+    desk.send(b"command")
+    assert rig.receive(PATIENCE_S) == b"command"
+
+
+def test_when_both_are_invited_then_they_talk_both_ways(pair: Pair) -> None:
+    check_both_ways(*pair)  # type: ignore[arg-type]
+
+
+def test_when_a_valid_node_is_not_invited_then_it_neither_hears_nor_is_heard(
+    pair: Pair, endpoint: str
+) -> None:
+    rig, desk = pair
+    as_rig = security("intern", ("desk", "receiver"))
+    as_desk = security("intern", ("desk", "transmitter"))
+    with ZenohLink("transmitter", SESSION, connect=(endpoint,), security=as_rig) as intern:
+        intern.send(b"symbol of a stranger", is_symbol=True)
+        intern.send(b"hello of a stranger")
+        assert desk.receive(SILENCE_S) is None
+        assert not intern.peer_present()
+    with ZenohLink("receiver", SESSION, connect=(endpoint,), security=as_desk) as intern:
+        rig.send(b"symbol", is_symbol=True)
+        assert desk.receive(PATIENCE_S) == b"symbol"
+        assert intern.receive(SILENCE_S) is None
+        intern.send(b"command of a stranger")
+        assert rig.receive(SILENCE_S) is None
+    assert desk.counts.refused == {"uninvited certificate intern": 2}
+    check_both_ways(rig, desk)  # type: ignore[arg-type]
+
+
+def test_when_the_invited_rig_plays_the_receiver_then_its_commands_go_nowhere(endpoint: str) -> None:
+    other = security("rig", ("desk", "transmitter"))
+    with (
+        ZenohLink("transmitter", SESSION, listen=(endpoint,), security=DESK) as desk,
+        ZenohLink("receiver", SESSION, connect=(endpoint,), security=other) as rig,
+    ):
+        rig.send(b"command")
+        assert desk.receive(SILENCE_S) is None
+        assert not desk.peer_present()
+
+
+def test_when_an_invited_node_flies_in_another_session_then_it_stays_out(endpoint: str) -> None:
+    with (
+        ZenohLink("receiver", SESSION, listen=(endpoint,), security=DESK) as desk,
+        ZenohLink(
+            "transmitter",
+            SESSION + "/other",
+            connect=(endpoint,),
+            security=security("rig", ("desk", "receiver"), session=SESSION + "/other"),
+        ) as rig,
+    ):
+        rig.send(b"symbol")
+        assert desk.receive(SILENCE_S) is None
+        assert not rig.peer_present()
+
+
+def test_when_a_viewer_is_invited_then_it_sees_and_cannot_send(pair: Pair, endpoint: str) -> None:
+    rig, desk = pair
+    watching = security("page", ("desk", "receiver"))
+    with ZenohLink("transmitter", SESSION, connect=(endpoint,), security=watching) as page:
+        assert until(page.peer_present)
+        desk.send(b"command")
+        assert page.receive(PATIENCE_S) == b"command"
+        assert rig.receive(PATIENCE_S) == b"command"
+        page.send(b"symbol of a viewer", is_symbol=True)
+        page.send(b"hello of a viewer")
+        assert desk.receive(SILENCE_S) is None
+
+
+def test_when_the_address_is_not_in_the_certificate_then_the_listener_is_not_believed(
+    endpoint: str,
+) -> None:
+    foreign = endpoint.replace("127.0.0.1", "127.0.0.2")
+    with ZenohLink("receiver", SESSION, listen=(foreign,), security=DESK) as desk:
+        with ZenohLink("transmitter", SESSION, connect=(foreign,), security=RIG) as rig:
+            assert not until_briefly(rig)
+        assert not desk.peer_present()
+
+
+@pytest.mark.soak  # Zenoh waits for ten seconds before it gives such a listener up
+def test_when_the_listener_has_no_tls_then_the_connecting_end_sends_it_nothing(endpoint: str) -> None:
+    plain = endpoint.replace("tls/", "tcp/")
+    with (
+        ZenohLink("receiver", SESSION, listen=(plain,)) as desk,
+        ZenohLink("transmitter", SESSION, connect=(endpoint,), security=RIG) as rig,
+    ):
+        rig.send(b"symbol")
+        assert desk.receive(SILENCE_S) is None
+        assert not until_briefly(rig)
+
+
+def test_when_everybody_is_behind_a_router_then_they_talk_and_the_uninvited_do_not(
+    endpoint: str,
+) -> None:
+    hub = security("hub", ("rig", "transmitter"), ("desk", "receiver"))
+    at_rig, at_desk = security("rig", ("hub", "receiver")), security("desk", ("hub", "transmitter"))
+    stranger = security("intern", ("hub", "receiver"))
+    with (
+        ZenohRouter((endpoint,), security=hub) as router,
+        ZenohLink("receiver", SESSION, router=(endpoint,), security=at_desk) as desk,
+        ZenohLink("transmitter", SESSION, router=(endpoint,), security=at_rig) as rig,
+        ZenohLink("transmitter", SESSION, router=(endpoint,), security=stranger) as intern,
+    ):
+        assert until(desk.peer_present)
+        assert until(rig.peer_present)
+        check_both_ways(rig, desk)
+        intern.send(b"symbol", is_symbol=True)
+        assert desk.receive(SILENCE_S) is None
+        assert not intern.peer_present()
+        assert router.refused == {"uninvited certificate intern": 1}
+
+
+def test_when_there_is_no_router_then_the_error_says_where_it_should_be(endpoint: str) -> None:
+    at_rig = security("rig", ("hub", "receiver"))
+    with pytest.raises(LinkError, match=endpoint):
+        ZenohLink("transmitter", SESSION, router=(endpoint,), security=at_rig, patience_s=0.3)
+
+
+def test_when_a_file_is_missing_then_it_is_a_link_error(endpoint: str) -> None:
+    own = credentials("desk")
+    broken = Security(replace(own, private_key=own.private_key.with_name("gone")), DESK.invited)
+    with pytest.raises(LinkError):
+        ZenohLink("receiver", SESSION, listen=(endpoint,), security=broken)
+
+
+def test_when_nobody_is_invited_then_everything_is_denied() -> None:
+    assert access_rules(()) == {"enabled": True, "default_permission": "deny"}
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("peer sent no certificates", "no certificate"),
+        ("invalid peer certificate: UnknownIssuer", "another authority's certificate"),
+        ("invalid peer certificate: certificate expired: verification time 1", "expired certificate"),
+        ("invalid peer certificate: BadEncoding", "wrong certificate"),
+        ("received corrupt message of type InvalidContentType", "no TLS"),
+        ("tls handshake eof", "no TLS"),
+        ("something new", "failed handshake"),
+    ],
+)
+def test_when_a_handshake_fails_then_its_reason_has_a_name(text: str, reason: str) -> None:
+    assert reason_of(text) == reason
+
+
+def until_briefly(link: ZenohLink) -> bool:
+    """Return whether the peer appears while a connection would long have been made."""
+    for _ in range(10):
+        if link.peer_present():
+            return True
+        link.receive(SILENCE_S)
+    return False

@@ -58,6 +58,7 @@ def serve_real(
             messages += endpoint.on_bytes(data, shown(now_ns))
         messages += endpoint.on_time(shown(now_ns))
         way_out.send(messages, now_ns)
+        session.rest()
         quiet_s = (now_ns - heard_ns) / 1e9
         if session.refusal is not None and quiet_s > REFUSAL_LINGER_S:
             return

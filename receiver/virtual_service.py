@@ -55,4 +55,5 @@ def serve_virtual(
             reply = endpoint.step(step.time_ns, step.data)
             last_number, last_reply = step.number, encode_reply(reply._replace(number=step.number))
         link.send(last_reply)
+        endpoint.session.rest()
         meanwhile()

@@ -100,6 +100,7 @@ class RealFlight:
             self._offer(frames)
             self._send_due()
             node.actuate(tick, lateness_ns)
+            node.rest()
             self._watch_peer()
             tick += 1
         return tick
@@ -127,6 +128,7 @@ class RealFlight:
                 break
             landing.step(self._now_ns())
             self._take_in((min(until_ns, landing.next_ns) - self._now_ns()) / 1e9)
+        self._node.rest()
         # The farewell is spared the line's delay: this process is about to end.
         for frame in self._node.session.bye(reason):
             self._link.send(self._wire.encode(frame))

@@ -69,6 +69,7 @@ def run_transmitter(
             run = transmit.prepare(agreement, recorder, link.wire)
             with StatusReporter(lambda: transmitter_status(run), status):
                 outcome = _guarded(lambda: _fly(run, link, stop, recorder))
+            run.node.rest()
         summary = transmitter_part(run, outcome) | link_part(link)
         return outcome, _with_recording(summary, recorder)
 
@@ -84,6 +85,7 @@ def run_receiver(
                 outcome = _guarded(
                     lambda: receive.serve(agreement, endpoint, link, stop, recorder.help_out)
                 )
+            endpoint.session.rest()
         summary = receiver_part(agreement, endpoint, outcome) | link_part(link)
         return outcome, _with_recording(summary, recorder)
 
@@ -100,6 +102,8 @@ def run_in_memory(
         endpoint = build_receiver(agreement, receiver_recorder, DATAGRAM)
         with StatusReporter(lambda: transmitter_status(run), status):
             outcome = _guarded(lambda: transmit.fly_virtual(run, endpoint, stop))
+        run.node.rest()
+        endpoint.session.rest()
         upper = transmitter_part(run, outcome)
         lower = receiver_part(agreement, endpoint, outcome)
         return outcome, _with_recording(upper, recorder), lower
@@ -178,7 +182,12 @@ def _end(
 def _fly(run: transmit.TransmitterRun, link: Link, stop: StopFlag, recorder: McapRecorder) -> Outcome:
     if run.agreement.clock == "real":
         return transmit.fly_real(run, link, stop)
-    return transmit.fly_virtual(run, transmit.link_peer(run, link, stop, recorder.help_out), stop)
+
+    def meanwhile() -> None:
+        run.node.rest()
+        recorder.help_out()
+
+    return transmit.fly_virtual(run, transmit.link_peer(run, link, stop, meanwhile), stop)
 
 
 def _guarded(fly: Callable[[], Outcome]) -> Outcome:

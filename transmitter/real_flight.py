@@ -14,13 +14,13 @@ from channel.errors import ConfigMismatch, LinkLost
 from channel.events import EventKind
 from channel.frames import Frame, Symbol
 from channel.inlet import Inlet
+from channel.lateness import LatenessMeter
 from channel.links.base import Link
 from channel.outbox import Outbox
 from channel.uplink import Uplink
 from channel.virtual import is_envelope
 from transmitter.landing import Landing
 from transmitter.node import STOPPED, TransmitterNode
-from transmitter.scores import LatenessMeter
 from transmitter.session import Phase
 
 HELLO_PERIOD_S = 0.2

@@ -58,16 +58,10 @@ class ZenohLink(LinkBase):
             raise LinkError(
                 f"session name {session_name!r}: letters, digits, '_', '-', '.', and '/' between parts"
             )
-        if not listen and not connect and not scouting:
-            raise LinkError("a Zenoh link needs an endpoint to listen on or to connect to")
-        check_endpoints(listen + connect, insecure)
         self._inbox: ChannelInbox | None = None
         self._peers: set[str] = set()
         self._closed = False
-        try:
-            self._session = zenoh.open(_config(listen, connect, scouting))
-        except zenoh.ZError as error:
-            raise LinkError(f"Zenoh cannot use {', '.join(listen + connect)}: {error}") from error
+        self._session = open_session(listen, connect, scouting=scouting, insecure=insecure)
         try:
             self._declare(role, f"tenbaud/{session_name}", best_effort)
         except BaseException:
@@ -136,6 +130,19 @@ class ZenohLink(LinkBase):
             self._peers.add(key)
         else:
             self._peers.discard(key)
+
+
+def open_session(
+    listen: tuple[str, ...], connect: tuple[str, ...], *, scouting: bool, insecure: bool
+) -> zenoh.Session:
+    """Return an open Zenoh session; LinkError where the endpoints cannot be used."""
+    if not listen and not connect and not scouting:
+        raise LinkError("a Zenoh link needs an endpoint to listen on or to connect to")
+    check_endpoints(listen + connect, insecure)
+    try:
+        return zenoh.open(_config(listen, connect, scouting))
+    except zenoh.ZError as error:
+        raise LinkError(f"Zenoh cannot use {', '.join(listen + connect)}: {error}") from error
 
 
 def _config(listen: tuple[str, ...], connect: tuple[str, ...], scouting: bool) -> zenoh.Config:

@@ -107,6 +107,10 @@ def receive(
     json: options.AsJson = False,
     run_folder: RunFolderOption = None,
     status: StatusOption = "auto",
+    sessions: options.Sessions = None,
+    configs: options.Configs = None,
+    rigs_max: options.RigsMax = 100,
+    flights: options.Flights = None,
 ) -> None:
     """Run the controller node: estimates from the bits, commands back to the motors.
 
@@ -115,6 +119,8 @@ def receive(
     [dim]tenbaud receive --listen tcp/127.0.0.1:7447 --clock virtual --json[/dim]
 
     [dim]tenbaud receive --link serial --port /dev/ttyUSB1[/dim]
+
+    [dim]tenbaud receive --sessions 'rig/*' --configs rigs/[/dim]
     """
     changed = options.overrides(
         lead=lead,
@@ -131,6 +137,25 @@ def receive(
         settings=settings,
     )
     endpoints = (tuple(listen or ()), tuple(connect or ()), insecure)
+    if sessions is not None:
+        from tenbaud.cli import many
+
+        if session is not None:
+            raise typer.BadParameter("give --session for one rig or --sessions for many, not both")
+        many.serve(
+            sessions,
+            preset,
+            config,
+            configs,
+            changed,
+            clock.value,
+            endpoints,
+            out,
+            rigs_max,
+            flights,
+            json,
+        )
+        return
     _run("receiver", preset, config, changed, clock, endpoints, out, run_folder, json, status)
 
 

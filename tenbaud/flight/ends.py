@@ -21,6 +21,7 @@ from tenbaud.flight.status import Status, StatusMode, StatusReporter
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, link_part, receiver_part, transmitter_part
 from tenbaud.recording.folder import RunFolder
+from tenbaud.recording.shared import SharedWriter
 from tenbaud.recording.writer import McapRecorder
 
 SWITCH_INTERVAL_S = 0.0002
@@ -109,8 +110,13 @@ def run_in_memory(
         return outcome, _with_recording(upper, recorder), lower
 
 
-def open_recorder(agreement: Agreement, role: Role, path: Path) -> McapRecorder:
-    """Return a recorder for one end, its file headed by what was flown."""
+def open_recorder(
+    agreement: Agreement, role: Role, path: Path, writer: SharedWriter | None = None
+) -> McapRecorder:
+    """Return a recorder for one end, its file headed by what was flown.
+
+    `writer`: a thread that it shares with others, instead of one of its own.
+    """
     metadata = {
         "role": role,
         "preset": agreement.config.preset,
@@ -124,7 +130,7 @@ def open_recorder(agreement: Agreement, role: Role, path: Path) -> McapRecorder:
         "impairments": agreement.config.link.impairments,
     }
     # Virtual time can outrun the disk and is not disturbed by waiting for it.
-    return McapRecorder(path, metadata, wait_when_full=agreement.clock == "virtual")
+    return McapRecorder(path, metadata, wait_when_full=agreement.clock == "virtual", shared=writer)
 
 
 def transmitter_status(run: transmit.TransmitterRun) -> Status:

@@ -1,0 +1,145 @@
+"""`tenbaud receive --sessions 'rig/*'`: one process that serves every rig whose name matches."""
+
+from __future__ import annotations
+
+import gc
+import json
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from tenbaud.build import Agreement
+    from tenbaud.flight.many import ManyHost
+    from tenbaud.flight.summary import Summary
+
+
+def serve(
+    sessions: str,
+    preset: str | None,
+    path: Path | None,
+    configs: Path | None,
+    changed: dict[str, Any],
+    clock: str,
+    addresses: tuple[tuple[str, ...], tuple[str, ...], bool],
+    out: Path | None,
+    rigs_max: int,
+    flights: int | None,
+    as_json: bool,
+) -> None:
+    """Serve until interrupted, or until so many flights have ended; see `docs/many-rigs.md`."""
+    from channel.links.endpoints import DEFAULT_ENDPOINT
+    from channel.links.zenoh_hub import ZenohHub
+    from receiver.many_service import ManyService
+    from tenbaud.build_ends import check_parts
+    from tenbaud.flight.ends import SWITCH_INTERVAL_S
+    from tenbaud.flight.many import ManyHost
+    from tenbaud.flight.many_status import ManyStatus
+    from tenbaud.flight.stop import StopFlag
+    from tenbaud.recording.folder import create_run_folder
+
+    agreement_of = agreements(preset, path, configs, changed, clock)
+    common = agreement_of("")
+    if common.config.link.kind != "zenoh":
+        raise typer.BadParameter("--sessions needs Zenoh; a serial line has one rig at its other end")
+    check_parts(common.config)
+    listen, connect, insecure = addresses
+    if not listen and not connect:
+        listen = (DEFAULT_ENDPOINT,)
+    root = create_run_folder(None, "receiver-many", out)
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
+    with (
+        StopFlag() as stop,
+        ZenohHub(sessions, listen=listen, connect=connect, insecure=insecure) as hub,
+    ):
+        lines: list[Callable[[str], None]] = [lambda text: typer.echo(text, err=True)]
+        host = ManyHost(hub, agreement_of, root, rigs_max, lambda text: lines[-1](text))
+        service = ManyService(hub, host)
+        lines[-1](
+            f"tenbaud {common.identity.version} receiver of {sessions}  config "
+            f"{common.identity.config_digest.hex()[:12]}  numerics "
+            f"{common.identity.numerics_probe.hex()}\n"
+            f"  at {', '.join(listen + connect)}, recording below {root}"
+        )
+        # What was built so far stays; the collector need not look at it in flight.
+        gc.collect()
+        gc.freeze()
+        try:
+            with ManyStatus(service, sessions, shown=not as_json) as status:
+                lines.append(status.tell)
+                service.run(lambda: stop() or _enough(host, flights))
+        finally:
+            lines[1:] = []
+            host.close()
+    summary = _summary(host, service.lateness.percentile_ms, sessions)
+    (root / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    if as_json:
+        sys.stdout.write(json.dumps(summary, indent=2) + "\n")
+    else:
+        _show(host.summaries, root)
+
+
+def agreements(
+    preset: str | None, path: Path | None, configs: Path | None, changed: dict[str, Any], clock: str
+) -> Callable[[str], Agreement]:
+    """Return what gives the agreement for a session name; "" for that without a file of its own.
+
+    A file is read anew when it has changed.
+    """
+    from tenbaud.build import agree
+    from tenbaud.build_ends import check_parts
+    from tenbaud.config.load import load_config
+
+    known: dict[Path | None, tuple[float, Agreement]] = {}
+
+    def agreement_of(name: str) -> Agreement:
+        own = None if configs is None or not name else configs / f"{name}.toml"
+        if own is not None and not own.is_file():
+            own = None
+        changed_s = 0.0 if own is None else own.stat().st_mtime
+        if own not in known or known[own][0] != changed_s:
+            config = load_config(preset if own is None else None, own or path, changed)
+            if own is not None:
+                check_parts(config)
+            known[own] = (changed_s, agree(config, clock))  # type: ignore[arg-type]
+        return replace(known[own][1])
+
+    return agreement_of
+
+
+def _enough(host: ManyHost, flights: int | None) -> bool:
+    return flights is not None and len(host.summaries) >= flights
+
+
+def _summary(host: ManyHost, late_ms: Callable[[float], float | None], sessions: str) -> Summary:
+    return {
+        "sessions": sessions,
+        "flights": host.summaries,
+        "refused": host.counts["refused"],
+        "strays": host.counts["strays"],
+        "loop_late_ms_p50": late_ms(50.0),
+        "loop_late_ms_p99": late_ms(99.0),
+    }
+
+
+def _show(summaries: list[Summary], root: Path) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=f"{len(summaries)} flights, in {root}", title_justify="left")
+    for name in ("session", "samples", "baud", "erased", "rejoins", "desyncs", "outcome"):
+        table.add_column(name, justify="left" if name in ("session", "outcome") else "right")
+    for one in summaries:
+        baud = one["baud_measured"]
+        table.add_row(
+            one["session"],
+            str(one["samples"]),
+            "" if baud is None else f"{baud:.3f}",
+            *(str(one[name]) for name in ("erasures", "rejoins", "desyncs")),
+            one["outcome"],
+        )
+    Console().print(table)

@@ -38,6 +38,7 @@ class RealService:
         self.endpoint = endpoint
         self._peer_timeout_s = peer_timeout_s
         self._line = line or Line()
+        self._at_once = self._line.at_once
         self._clock = clock
         self._outbox = Outbox()
         self._line_start_ns: int | None = None
@@ -88,6 +89,8 @@ class RealService:
 
     def _on_line(self, messages: list[bytes], now_ns: int) -> list[bytes]:
         """Put messages on the line; return those that it has delivered by now."""
+        if self._at_once:
+            return messages
         if messages and self._line_start_ns is None:
             self._line_start_ns = now_ns
         start_ns = self._line_start_ns or 0

@@ -10,8 +10,11 @@ from rich.console import Console
 from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from benchmarks.codec import codec_figures
+from benchmarks.fastest import fastest_figures
 from benchmarks.figures import Figure, show, write
 from benchmarks.flights import cold_start_figures, memory_figures, real_figures, virtual_figures
+from benchmarks.latency import latency_figures
+from benchmarks.load import load_figures
 
 BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
     "codec": codec_figures,
@@ -19,6 +22,9 @@ BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
     "virtual": virtual_figures,
     "real": real_figures,
     "memory": memory_figures,
+    "latency": latency_figures,
+    "fastest": fastest_figures,
+    "load": load_figures,
 }
 
 

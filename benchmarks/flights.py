@@ -19,7 +19,7 @@ WARM_UP_FRACTION = 0.15
 
 def virtual_figures(rounds: int = 5) -> list[Figure]:
     """Return how many times faster than real time a recorded 100 s flight at 10 baud goes."""
-    factors = sorted(_demo("--mismatch", "0.1")["realtime_factor"] for _ in range(rounds))
+    factors = sorted(demo_summary("--mismatch", "0.1")["realtime_factor"] for _ in range(rounds))
     return [
         Figure("virtual_realtime_factor", factors[len(factors) // 2], "times", "at least 100"),
         Figure("virtual_realtime_factor_best", factors[-1], "times", ""),
@@ -28,7 +28,7 @@ def virtual_figures(rounds: int = 5) -> list[Figure]:
 
 def real_figures(duration_s: float = 20.0) -> list[Figure]:
     """Return the lateness of a 100 Hz loop and the baud rate on the receiver's clock."""
-    summary = _demo("--clock", "real", "--duration", str(duration_s))
+    summary = demo_summary("--clock", "real", "--duration", str(duration_s))
     asked = {"p50": "", "p99": "at most 2", "max": ""}
     lateness = [
         Figure(f"loop_late_ms_{name}", summary[f"loop_late_ms_{name}"], "ms", asked[name])
@@ -85,7 +85,8 @@ def cold_start_figures(rounds: int = 7) -> list[Figure]:
     return [Figure("cold_start_help_s", sorted(times)[rounds // 2], "s", "at most 0.5")]
 
 
-def _demo(*arguments: str) -> dict[str, Any]:
+def demo_summary(*arguments: str) -> dict[str, Any]:
+    """Fly `tenbaud demo` with these arguments; return its summary."""
     with tempfile.TemporaryDirectory() as folder:
         ended = _start(folder, "demo", "--out", "run", *arguments, clock=None)
         out, err = ended.communicate()

@@ -28,6 +28,11 @@ class Line:
         """Return how long a message may be under way."""
         return max(self._symbol_delay_ns, self._delay_ns)
 
+    @property
+    def at_once(self) -> bool:
+        """Return whether every message arrives, as it is, when it is sent."""
+        return type(self) is Line and self.longest_delay_ns == 0
+
     def carry(self, data: bytes, is_symbol: bool, now_ns: int) -> list[Delivery]:
         """Return the arrivals of a message put on the line at flight time `now_ns`."""
         delay = self._symbol_delay_ns if is_symbol else self._delay_ns

@@ -25,6 +25,7 @@ from __future__ import annotations
 import struct
 from binascii import crc_hqx
 from collections.abc import Callable
+from functools import cache
 from typing import Protocol
 
 from channel.errors import FrameError
@@ -177,16 +178,22 @@ def _encode_welcome(frame: Welcome) -> bytes:
 def _encode_commands(frame: Commands) -> bytes:
     if not frame.echoes:
         raise ValueError("a command frame has at least one echo")
-    last = frame.echoes[-1].sample
-    shape = [(last + 1 - len(frame.echoes) + index) for index in range(len(frame.echoes))]
-    volts = {len(echo.millivolts) for echo in frame.echoes}
-    if [echo.sample for echo in frame.echoes] != shape or len(volts) > 1:
-        raise ValueError("the echoes of a command frame are consecutive and equally long")
-    parts = [_COMMANDS.pack(last, len(frame.echoes))]
+    newest = frame.echoes[-1]
+    volts = len(newest.millivolts)
+    layout = _echo_layout(volts)
+    parts = [_COMMANDS.pack(newest.sample, len(frame.echoes))]
+    sample = newest.sample + 1 - len(frame.echoes)
     for echo in frame.echoes:
-        parts.append(_ECHO.pack(echo.word_number, echo.digest))
-        parts.append(struct.pack(f"<{len(echo.millivolts)}h", *echo.millivolts))
+        if echo.sample != sample or len(echo.millivolts) != volts:
+            raise ValueError("the echoes of a command frame are consecutive and equally long")
+        parts.append(layout.pack(echo.word_number, echo.digest, *echo.millivolts))
+        sample += 1
     return b"".join(parts)
+
+
+@cache
+def _echo_layout(volts: int) -> struct.Struct:
+    return struct.Struct(f"<HQ{volts}h")
 
 
 def _decode_commands(session: int, epoch: int, body: bytes) -> Commands:
@@ -196,11 +203,10 @@ def _decode_commands(session: int, epoch: int, body: bytes) -> Commands:
     if rest or odd or volts < 0 or last + 1 < count:
         raise FrameError(f"malformed commands: {count} echoes in {len(body)} bytes")
     echoes = []
+    layout = _echo_layout(volts)
     for index in range(count):
-        offset = _COMMANDS.size + index * size
-        word_number, digest = _ECHO.unpack_from(body, offset)
-        millivolts = struct.unpack_from(f"<{volts}h", body, offset + _ECHO.size)
-        echoes.append(Echo(last + 1 - count + index, word_number, digest, millivolts))
+        word_number, digest, *millivolts = layout.unpack_from(body, _COMMANDS.size + index * size)
+        echoes.append(Echo(last + 1 - count + index, word_number, digest, tuple(millivolts)))
     return Commands(session, epoch, tuple(echoes))
 
 

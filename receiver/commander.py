@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Callable
+from typing import NamedTuple
 
-from channel.codec import Codec, Vector
+from channel.codec import Codec, CodecState, Vector
 from channel.events import EventKind
 from channel.frames import Echo
-from channel.lead import fly_sample
+from channel.lead import FlownSample, fly_sample
 from channel.limits import are_plausible, from_millivolts, to_millivolts
 from channel.lockstep import History
 from channel.recording import Recorder
@@ -24,6 +25,17 @@ from receiver.records import write_commands, write_sample
 from receiver.rejoin import carried_to
 
 Tell = Callable[[EventKind, str], None]
+
+UNWRITTEN_MAX = 32
+"""Samples that may be flown before they are recorded even if nobody finds the time."""
+
+
+class _Flown(NamedTuple):
+    before: CodecState
+    word: Word
+    flown: FlownSample
+    digest: int
+    now_ns: int
 
 
 class Commander:
@@ -54,6 +66,7 @@ class Commander:
         self._commands: deque[Vector] = deque([self.hold] * terms.lead_ticks)
         """of the next `D` ticks"""
         self._echoes: deque[Echo] = deque(maxlen=terms.repeats + 1)
+        self._unwritten: list[_Flown] = []
 
     def restart(self, sample: int) -> None:
         """Begin afresh at a sample, from the codec's initial state and command."""
@@ -87,10 +100,18 @@ class Commander:
         millivolts = [mv for command in flown.commands for mv in to_millivolts(command)]
         number = self.codec.coder.alphabet.word_number(word)
         self._echoes.append(Echo(before.sample, number, digest, tuple(millivolts)))
-        ranges = self.codec.coder.ranges(before.coder)
-        write_sample(self._recorder, self.terms, word, ranges, self.state, digest, now_ns)
-        write_commands(self._recorder, self.terms, before.sample, flown, self._controller)
+        self._unwritten.append(_Flown(before, word, flown, digest, now_ns))
+        if len(self._unwritten) >= UNWRITTEN_MAX:
+            self.write_down()
         return tuple(self._echoes)
+
+    def write_down(self) -> None:
+        """Record what was flown since the last call. It can wait until the commands have left."""
+        for before, word, flown, digest, now_ns in self._unwritten:
+            ranges = self.codec.coder.ranges(before.coder)
+            write_sample(self._recorder, self.terms, word, ranges, flown.state, digest, now_ns)
+            write_commands(self._recorder, self.terms, before.sample, flown, self._controller)
+        self._unwritten.clear()
 
     def _decide(self, tick: int, state: Vector) -> Vector:
         """Ask the controller, limit what it wants, and return it as the wire will carry it."""

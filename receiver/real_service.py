@@ -21,6 +21,86 @@ REFUSAL_LINGER_S = 1.0
 """How long a refused transmitter has to say in which fields it differs."""
 
 
+class RealService:
+    """Serves one flight, without a link: messages and times in, messages out.
+
+    `line` is the downlink, whose flight time begins with the first message sent; `clock` what this
+    end takes for the time. All times are of the monotonic clock.
+    """
+
+    def __init__(
+        self,
+        endpoint: ReceiverEndpoint,
+        peer_timeout_s: float,
+        line: Line | None = None,
+        clock: SkewedClock | None = None,
+    ) -> None:
+        self.endpoint = endpoint
+        self._peer_timeout_s = peer_timeout_s
+        self._line = line or Line()
+        self._at_once = self._line.at_once
+        self._clock = clock
+        self._outbox = Outbox()
+        self._line_start_ns: int | None = None
+        self._heard_ns = time.monotonic_ns()
+
+    def next_due_ns(self, now_ns: int) -> int | None:
+        """Return when there is something to do without a message; None: nothing is planned."""
+        due_ns = self.endpoint.session.next_deadline()
+        if due_ns is not None and self._clock is not None:
+            due_ns = self._clock.reached(due_ns, now_ns)
+        sending_ns = self._outbox.next_due_ns
+        if due_ns is None or sending_ns is None:
+            return sending_ns if due_ns is None else due_ns
+        return min(due_ns, sending_ns)
+
+    def take(self, data: bytes | None, now_ns: int) -> list[bytes]:
+        """Take a message, or none, and let time pass to `now_ns`; return what is to be sent now.
+
+        Raises ConfigMismatch when the peer flies on the virtual clock.
+        """
+        shown_ns = now_ns if self._clock is None else self._clock.shown(now_ns)
+        messages: list[bytes] = []
+        if data is not None:
+            self._heard_ns = now_ns
+            if is_envelope(data):
+                raise ConfigMismatch(
+                    "the transmitter flies on the virtual clock, this end on the real one; give "
+                    "both the same --clock"
+                )
+            messages += self.endpoint.on_bytes(data, shown_ns)
+        messages += self.endpoint.on_time(shown_ns)
+        return self._on_line(messages, now_ns)
+
+    def over(self, now_ns: int) -> bool:
+        """Return whether the flight is over; LinkLost when nothing came for too long."""
+        session = self.endpoint.session
+        quiet_s = (now_ns - self._heard_ns) / 1e9
+        if session.phase is Phase.ENDED:
+            return True
+        if session.refusal is not None and quiet_s > REFUSAL_LINGER_S:
+            return True
+        if quiet_s > self._peer_timeout_s:
+            raise LinkLost(
+                f"nothing came from a transmitter for {self._peer_timeout_s:g} s; is it running, with "
+                "the same session name and the other end of this endpoint?"
+            )
+        return False
+
+    def _on_line(self, messages: list[bytes], now_ns: int) -> list[bytes]:
+        """Put messages on the line; return those that it has delivered by now."""
+        if self._at_once:
+            return messages
+        if messages and self._line_start_ns is None:
+            self._line_start_ns = now_ns
+        start_ns = self._line_start_ns or 0
+        for message in messages:
+            deliveries = self._line.carry(message, False, now_ns - start_ns)
+            absolute = [one._replace(arrival_ns=one.arrival_ns + start_ns) for one in deliveries]
+            self._outbox.put(absolute, False)
+        return [data for data, _ in self._outbox.take(now_ns)]
+
+
 def serve_real(
     endpoint: ReceiverEndpoint,
     link: Link,
@@ -31,70 +111,18 @@ def serve_real(
 ) -> None:
     """Serve one flight: take symbols as they come, erase slots as their deadlines pass.
 
-    `line` is the downlink, whose flight time begins with the first message sent; `clock` what this
-    end takes for the time.
-
     Raises LinkLost when nothing comes for `peer_timeout_s`, and ConfigMismatch when the peer flies
     on the virtual clock.
     """
-    session = endpoint.session
-    way_out = _WayOut(line or Line(), link)
-    shown = clock.shown if clock is not None else lambda true_ns: true_ns
-    reached = clock.reached if clock is not None else lambda shown_ns, _now_ns: shown_ns
-    heard_ns = time.monotonic_ns()
-    while session.phase is not Phase.ENDED and not should_stop():
-        deadline_ns = session.next_deadline()
-        due_ns = None if deadline_ns is None else reached(deadline_ns, time.monotonic_ns())
-        data = link.receive(_patience_s(due_ns, way_out.next_due_ns))
+    service = RealService(endpoint, peer_timeout_s, line, clock)
+    while endpoint.session.phase is not Phase.ENDED and not should_stop():
         now_ns = time.monotonic_ns()
-        messages: list[bytes] = []
-        if data is not None:
-            heard_ns = now_ns
-            if is_envelope(data):
-                raise ConfigMismatch(
-                    "the transmitter flies on the virtual clock, this end on the real one; give "
-                    "both the same --clock"
-                )
-            messages += endpoint.on_bytes(data, shown(now_ns))
-        messages += endpoint.on_time(shown(now_ns))
-        way_out.send(messages, now_ns)
-        quiet_s = (now_ns - heard_ns) / 1e9
-        if session.refusal is not None and quiet_s > REFUSAL_LINGER_S:
+        due_ns = service.next_due_ns(now_ns)
+        patience_s = POLL_S if due_ns is None else min(POLL_S, max(0.0, (due_ns - now_ns) / 1e9))
+        data = link.receive(patience_s)
+        now_ns = time.monotonic_ns()
+        for message in service.take(data, now_ns):
+            link.send(message)
+        endpoint.session.rest()
+        if service.over(now_ns):
             return
-        if quiet_s > peer_timeout_s:
-            raise LinkLost(
-                f"nothing came from a transmitter for {peer_timeout_s:g} s; is it running, with "
-                "the same session name and the other end of this endpoint?"
-            )
-
-
-class _WayOut:
-    """The downlink: messages wait here until the line would have delivered them."""
-
-    def __init__(self, line: Line, link: Link) -> None:
-        self._line = line
-        self._link = link
-        self._outbox = Outbox()
-        self._start_ns: int | None = None
-
-    @property
-    def next_due_ns(self) -> int | None:
-        return self._outbox.next_due_ns
-
-    def send(self, messages: list[bytes], now_ns: int) -> None:
-        """Put messages on the line, and on the link what is due."""
-        if messages and self._start_ns is None:
-            self._start_ns = now_ns
-        start_ns = self._start_ns or 0
-        for message in messages:
-            deliveries = self._line.carry(message, False, now_ns - start_ns)
-            absolute = [one._replace(arrival_ns=one.arrival_ns + start_ns) for one in deliveries]
-            self._outbox.put(absolute, False)
-        for data, _ in self._outbox.take(now_ns):
-            self._link.send(data)
-
-
-def _patience_s(*due_ns: int | None) -> float:
-    now_ns = time.monotonic_ns()
-    waits = [(due - now_ns) / 1e9 for due in due_ns if due is not None]
-    return min([POLL_S, *(max(0.0, wait) for wait in waits)])

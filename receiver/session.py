@@ -177,6 +177,10 @@ class ReceiverSession:
         self.counts["malformed"] += 1
         self._tell(EventKind.MALFORMED, f"dropped a message: {why}")
 
+    def rest(self) -> None:
+        """Do what can wait until the frames are on their way: the recording."""
+        self._commander.write_down()
+
     # The handshake
 
     def _on_hello(self, hello: Hello) -> list[Frame]:
@@ -347,6 +351,7 @@ class ReceiverSession:
         if self.phase is not Phase.ENDED:
             self.phase = Phase.ENDED
             self.end_reason = reason
+            self.rest()
             self._tell(EventKind.ENDED, reason)
 
     def _tell(self, kind: EventKind, text: str, sample: int | None = None) -> None:

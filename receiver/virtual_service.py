@@ -13,6 +13,60 @@ from receiver.real_service import POLL_S, REFUSAL_LINGER_S
 from receiver.session import Phase
 
 
+class VirtualService:
+    """Serves one flight, without a link: steps in, replies out. Times are of the monotonic clock."""
+
+    def __init__(self, endpoint: ReceiverEndpoint, peer_timeout_s: float) -> None:
+        self.endpoint = endpoint
+        self._peer_timeout_s = peer_timeout_s
+        self._last_number = -1
+        self._last_reply = b""
+        self._heard_ns = time.monotonic_ns()
+
+    def next_due_ns(self, now_ns: int) -> int | None:
+        """Return None: the transmitter's process keeps the time."""
+        return None
+
+    def take(self, data: bytes | None, now_ns: int) -> list[bytes]:
+        """Take one step, or none; return its reply. A repeated step gets the same one.
+
+        Raises ConfigMismatch when the peer flies on the real clock.
+        """
+        if data is None:
+            return []
+        self._heard_ns = now_ns
+        if not is_envelope(data):
+            raise ConfigMismatch(
+                "the transmitter flies on the real clock, this end on the virtual one; give both "
+                "the same --clock"
+            )
+        try:
+            step = decode_step(data)
+        except FrameError as error:
+            self.endpoint.session.on_malformed(str(error))
+            return []
+        if step.number != self._last_number:
+            reply = self.endpoint.step(step.time_ns, step.data)
+            self._last_number = step.number
+            self._last_reply = encode_reply(reply._replace(number=step.number))
+        return [self._last_reply]
+
+    def over(self, now_ns: int) -> bool:
+        """Return whether the flight is over; LinkLost when no step came for too long."""
+        session = self.endpoint.session
+        quiet_s = (now_ns - self._heard_ns) / 1e9
+        if session.phase is Phase.ENDED:
+            return True
+        if session.refusal is not None and quiet_s > REFUSAL_LINGER_S:
+            return True
+        if quiet_s > self._peer_timeout_s:
+            raise LinkLost(
+                f"no message from a transmitter for {self._peer_timeout_s:g} s; is it running, with "
+                "the same session name and the other end of this endpoint?"
+            )
+        return False
+
+
 def serve_virtual(
     endpoint: ReceiverEndpoint,
     link: Link,
@@ -25,34 +79,12 @@ def serve_virtual(
     `meanwhile` is called when a reply has been sent. Raises LinkLost when no step comes for
     `peer_timeout_s` of wall-clock time, and ConfigMismatch when the peer flies on the real clock.
     """
-    last_number = -1
-    last_reply = b""
-    quiet_since = time.monotonic()
+    service = VirtualService(endpoint, peer_timeout_s)
     while endpoint.session.phase is not Phase.ENDED and not should_stop():
         data = link.receive(POLL_S)
-        if data is None:
-            quiet_s = time.monotonic() - quiet_since
-            if endpoint.session.refusal is not None and quiet_s > REFUSAL_LINGER_S:
-                return
-            if quiet_s > peer_timeout_s:
-                raise LinkLost(
-                    f"no message from a transmitter for {peer_timeout_s:g} s; is it running, with "
-                    "the same session name and the other end of this endpoint?"
-                )
-            continue
-        quiet_since = time.monotonic()
-        if not is_envelope(data):
-            raise ConfigMismatch(
-                "the transmitter flies on the real clock, this end on the virtual one; give both "
-                "the same --clock"
-            )
-        try:
-            step = decode_step(data)
-        except FrameError as error:
-            endpoint.session.on_malformed(str(error))
-            continue
-        if step.number != last_number:
-            reply = endpoint.step(step.time_ns, step.data)
-            last_number, last_reply = step.number, encode_reply(reply._replace(number=step.number))
-        link.send(last_reply)
+        for message in service.take(data, time.monotonic_ns()):
+            link.send(message)
+        endpoint.session.rest()
         meanwhile()
+        if data is None and service.over(time.monotonic_ns()):
+            return

@@ -21,6 +21,9 @@ from transmitter.session import Phase, TransmitterSession
 
 STOPPED = "stopped by the user"
 
+RESTLESS_SAMPLES_MAX = 32
+"""Samples that may be confirmed before they are scored even if no driver finds the time."""
+
 
 class TransmitterNode:
     """Everything of the sensor node but time and transport.
@@ -79,20 +82,26 @@ class TransmitterNode:
         return asking + self.session.on_measurement(tick, reading.measured_rad)
 
     def deliver(self, frame: Frame) -> list[Frame]:
-        """Hand an arrived frame to the session and score what it confirmed; return the answers."""
+        """Hand an arrived frame to the session; return the answers. `rest` has what it confirmed."""
         answers = self.session.on_frame(frame)
+        if len(self.session.confirmed) >= RESTLESS_SAMPLES_MAX:
+            self.rest()
+        if self.guard.stopped and self._may_rearm and self.session.phase is Phase.FLYING:
+            self.guard.rearm()
+            self.rearmed += 1
+        return answers
+
+    def rest(self) -> None:
+        """Score and record what was confirmed: work for when the next symbol is on its way."""
+        if not self.session.confirmed:
+            return
         first = self.session.terms.ticks_per_sample
-        while self.session.confirmed:
-            done = self.session.confirmed.popleft()
+        for done in self.session.take_confirmed():
             pairs = zip(done.flown.coded, done.live, strict=True)
             for tick, (coded, live) in enumerate(pairs, done.sample * first):
                 self.scores.on_estimate(tick, coded, live)
             if self.gauge is not None:
                 self._gauge(self.gauge, done)
-        if self.guard.stopped and self._may_rearm and self.session.phase is Phase.FLYING:
-            self.guard.rearm()
-            self.rearmed += 1
-        return answers
 
     def _gauge(self, gauge: GapGauge, done: Confirmed) -> None:
         gauge.on_confirmed(done)

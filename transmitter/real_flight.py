@@ -14,13 +14,13 @@ from channel.errors import ConfigMismatch, LinkLost
 from channel.events import EventKind
 from channel.frames import Frame, Symbol
 from channel.inlet import Inlet
+from channel.lateness import LatenessMeter
 from channel.links.base import Link
 from channel.outbox import Outbox
 from channel.uplink import Uplink
 from channel.virtual import is_envelope
 from transmitter.landing import Landing
 from transmitter.node import STOPPED, TransmitterNode
-from transmitter.scores import LatenessMeter
 from transmitter.session import Phase
 
 HELLO_PERIOD_S = 0.2
@@ -100,6 +100,7 @@ class RealFlight:
             self._offer(frames)
             self._send_due()
             node.actuate(tick, lateness_ns)
+            node.rest()
             self._watch_peer()
             tick += 1
         return tick
@@ -127,6 +128,7 @@ class RealFlight:
                 break
             landing.step(self._now_ns())
             self._take_in((min(until_ns, landing.next_ns) - self._now_ns()) / 1e9)
+        self._node.rest()
         # The farewell is spared the line's delay: this process is about to end.
         for frame in self._node.session.bye(reason):
             self._link.send(self._wire.encode(frame))

@@ -106,32 +106,3 @@ class Scores:
             if live is not None:
                 self.live.add(angle - live)
                 self._on_live_error(angle - live)
-
-
-class LatenessMeter:
-    """Percentiles of how late the ticks began, in bins of 10 microseconds up to 50 ms."""
-
-    BIN_NS = 10_000
-    BINS = 5_000
-
-    def __init__(self) -> None:
-        self.count = 0
-        self.largest_ns = 0
-        self._bins = [0] * (self.BINS + 1)
-
-    def add(self, lateness_ns: int) -> None:
-        """Take one lateness."""
-        self.count += 1
-        self.largest_ns = max(self.largest_ns, lateness_ns)
-        self._bins[min(max(lateness_ns, 0) // self.BIN_NS, self.BINS)] += 1
-
-    def percentile_ms(self, percent: float) -> float | None:
-        """Return the lateness that this percentage of ticks did not exceed; None without ticks."""
-        if self.count == 0:
-            return None
-        left = percent / 100.0 * self.count
-        for index, number in enumerate(self._bins):
-            left -= number
-            if left <= 0.0 and index < self.BINS:
-                return min((index + 1) * self.BIN_NS, self.largest_ns) / 1e6
-        return self.largest_ns / 1e6

@@ -93,7 +93,7 @@ class TransmitterSession:
         self.epoch_tick = 0
         """first tick of the present epoch"""
         self.confirmed: deque[Confirmed] = deque(maxlen=2 * LAG_SAMPLES_MAX)
-        """samples confirmed and not yet looked at by the node"""
+        """samples confirmed and not yet written down (`take_confirmed`)"""
         self.events: deque[Event] = deque(maxlen=1000)
         self.history = History(codec)
         self._asking = Asking(identity, incarnation, terms)
@@ -162,6 +162,17 @@ class TransmitterSession:
         while self._due and self._due[0][0] < tick:
             self._due.popleft()
         return self._due[0][1] if self._due and self._due[0][0] == tick else None
+
+    def take_confirmed(self) -> list[Confirmed]:
+        """Write the samples down that were confirmed since the last call, and return them.
+
+        It can wait until the next symbol has left.
+        """
+        taken = list(self.confirmed)
+        self.confirmed.clear()
+        for done in taken:
+            self._record(done)
+        return taken
 
     # What arrives
 
@@ -310,7 +321,6 @@ class TransmitterSession:
         self.history.add(self.epoch, word, done.flown.state)
         self.counts["digest_checks"] += 1
         self.counts["erasures"] += word is ERASED
-        self._record(done)
         return [] if done.digest == echo.digest else self._on_desync(done)
 
     def _on_desync(self, done: Confirmed) -> list[Frame]:

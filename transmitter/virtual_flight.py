@@ -92,6 +92,7 @@ class VirtualFlight:
         linger_ns = terms.uplink_delivery_ns + terms.symbol_delay_ns + terms.downlink_budget_ns
         linger_ns += self._uplink.line.longest_delay_ns + self._downlink.longest_delay_ns
         self._pass_to(now_ns + linger_ns, deadlines=False)
+        self._node.rest()
         # The farewell is spared what goes wrong on the line: the receiver's process must hear it.
         for frame in self._node.session.bye(reason):
             data = self._wire.encode(frame)
@@ -127,6 +128,8 @@ class VirtualFlight:
 
     def _step(self, time_ns: int, data: bytes | None) -> None:
         reply: Reply = self._peer.step(time_ns, data)
+        # A peer in another process had it done while it was waited for.
+        self._node.rest()
         self._deadline_ns = reply.deadline_ns
         for frame in reply.frames:
             for delivery in self._downlink.carry(frame, False, time_ns):

@@ -21,11 +21,10 @@ import zenoh
 
 from channel.errors import LinkError
 from channel.links.base import LinkBase, Role
-from channel.links.endpoints import check_endpoints
 from channel.links.security import KEY_ROOT, Security
-from channel.links.zenoh_config import open_session, zenoh_config, zenoh_settings
 from channel.links.zenoh_gate import Gate
 from channel.links.zenoh_inbox import ChannelInbox
+from channel.links.zenoh_node import open_node
 
 _NAME = re.compile(r"[A-Za-z0-9_.-]+(/[A-Za-z0-9_.-]+)*")
 
@@ -33,11 +32,8 @@ _NAME = re.compile(r"[A-Za-z0-9_.-]+(/[A-Za-z0-9_.-]+)*")
 class ZenohLink(LinkBase):
     """One end of a session over Zenoh.
 
-    `listen` and `connect` are Zenoh endpoints; one end listens, the other connects, either may start
-    first. `router` are endpoints of Zenoh routers instead, behind which the other end is; the first
-    that answers within `patience_s` is taken. `scouting` finds listening ends by multicast.
-    `security`: TLS, and only the invited; without it an address beyond this machine needs
-    `insecure`.
+    Where it listens and connects, and who is let in: see `open_node`. One end listens, the other
+    connects; either may start first.
     `best_effort`: a symbol that the network cannot take at once is dropped, an erasure, instead of
     keeping the loop waiting; all else stays reliable. Raises LinkError for a name or endpoint that
     cannot be used.
@@ -65,26 +61,19 @@ class ZenohLink(LinkBase):
             raise LinkError(
                 f"session name {session_name!r}: letters, digits, '_', '-', '.', and '/' between parts"
             )
-        if not listen and not connect and not router and not scouting:
-            raise LinkError("a Zenoh link needs an endpoint to listen on or to connect to")
-        if router and (listen or connect or scouting):
-            raise LinkError("behind a router an end neither listens nor connects elsewhere")
-        check_endpoints(listen + connect + router, insecure, security is not None, scouting)
         self._inbox: ChannelInbox | None = None
         self._gate: Gate | None = None
         self._peers: set[str] = set()
         self._closed = False
-        # Only clients hear each other through a router: what peers send it stays there.
-        settings = zenoh_settings(
-            "client" if router else "peer",
+        self._session = open_node(
             listen,
-            connect or router,
+            connect,
+            router,
             scouting=scouting,
+            insecure=insecure,
             security=security,
-        )
-        where = ", ".join(listen + connect + router)
-        self._session = open_session(
-            zenoh_config(settings), where, patience_s if router else 0.0, should_stop
+            patience_s=patience_s,
+            should_stop=should_stop,
         )
         try:
             self._gate = Gate(self._session, security, self.counts.refused)

@@ -28,6 +28,7 @@ def zenoh_settings(
     *,
     scouting: bool = False,
     security: Security | None = None,
+    connections_max: int = SESSIONS_MAX,
 ) -> dict[str, object]:
     """Return every setting of a node that matters, by its path."""
     settings: dict[str, object] = {
@@ -40,7 +41,7 @@ def zenoh_settings(
         "scouting/gossip/enabled": False,
         "transport/link/tx/lease": LEASE_MS,
         "transport/shared_memory/enabled": False,
-        "transport/unicast/max_sessions": SESSIONS_MAX,
+        "transport/unicast/max_sessions": connections_max,
         "adminspace/enabled": False,
     }
     return settings if security is None else settings | security_settings(security)

@@ -30,6 +30,7 @@ class ChannelInbox:
         self._session = session
         self._wake_key = key.replace("*", "wake")
         self._subscriber = session.declare_subscriber(key, zenoh.handlers.FifoChannel(messages_max))
+        self._interrupted = False
         self._waker = _Waker(self.wake)
 
     def get(self, timeout_s: float) -> bytes | None:
@@ -49,9 +50,15 @@ class ChannelInbox:
             sample = self._subscriber.recv()
             if not self._is_wake(sample):
                 return sample
-            if time.monotonic() >= deadline_s:
+            if self._interrupted or time.monotonic() >= deadline_s:
+                self._interrupted = False
                 break
         return None
+
+    def interrupt(self) -> None:
+        """End the wait that is going on, or the next one, as if its deadline were reached."""
+        self._interrupted = True
+        self.wake()
 
     def wake(self) -> None:
         """Let the loop that waits look at its deadline; it goes on waiting if that is not reached."""

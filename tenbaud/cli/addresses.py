@@ -21,15 +21,22 @@ INSECURE = (
 
 
 def endpoints_of(
-    role: Role, addresses: options.Addresses, config: FlightConfig, take_over: bool = False
+    role: Role,
+    addresses: options.Addresses,
+    config: FlightConfig,
+    take_over: bool = False,
+    sessions: str | None = None,
 ) -> Endpoints:
-    """Return where an end listens and connects; LinkError or KeysError where that is refused."""
+    """Return where an end listens and connects; LinkError or KeysError where that is refused.
+
+    `sessions` is the pattern of session names of an end that serves many.
+    """
     from channel.links.endpoints import DEFAULT_ENDPOINT, check_endpoints, with_protocol
     from tenbaud.flight.ends import Endpoints
 
     listen, connect = tuple(addresses.listen or ()), tuple(addresses.connect or ())
     router = tuple(addresses.router or ())
-    security = security_of(role, addresses, config.link.session)
+    security = security_of(role, addresses, sessions or config.link.session)
     if config.link.kind == "serial" and config.link.downlink != "zenoh":
         if listen or connect or router or addresses.scout:
             raise typer.BadParameter(
@@ -76,6 +83,9 @@ def security_of(role: Role, addresses: options.Addresses, session: str) -> Secur
     warning = expiry_warning(node)
     if warning is not None:
         typer.echo(f"tenbaud: warning: {warning}", err=True)
-    invited = [Invited(name, other, session) for name in addresses.peer]
+    invited = []
+    for peer in addresses.peer:
+        name, _, own = peer.partition("=")
+        invited.append(Invited(name, other, own or session))
     invited += [Invited(name, "viewer", session) for name in addresses.viewer or ()]
     return Security(node.credentials, tuple(invited))

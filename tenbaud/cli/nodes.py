@@ -60,6 +60,10 @@ def receive(
         typer.Option(help="replay:FILE when the transmitter replays: its voltages are used."),
     ] = None,
     take_over: options.TakeOver = False,
+    sessions: options.Sessions = None,
+    configs: options.Configs = None,
+    rigs_max: options.RigsMax = 100,
+    flights: options.Flights = None,
 ) -> None:
     """Run the controller node: estimates from the bits, commands back to the motors.
 
@@ -70,9 +74,20 @@ def receive(
     [dim]tenbaud receive --keys keys/desk --peer rig --listen tls/10.0.0.2:7447[/dim]
 
     [dim]tenbaud receive --link serial --port /dev/ttyUSB1[/dim]
+
+    [dim]tenbaud receive --sessions 'rig/*' --configs rigs/[/dim]
     """
     changed = node.changes(rig=rig, sabotaged_end="receiver")
-    _run("receiver", node, addresses, changed, take_over)
+    if sessions is None:
+        _run("receiver", node, addresses, changed, take_over)
+        return
+    from tenbaud.cli import many
+
+    if node.session is not None:
+        raise typer.BadParameter("give --session for one rig or --sessions for many, not both")
+    if take_over:
+        raise typer.BadParameter("--take-over is for one rig's flight; give its --session")
+    many.serve(many.Many(sessions, configs, rigs_max, flights), node, addresses, changed)
 
 
 def _run(

@@ -52,6 +52,25 @@ Settings = Annotated[
 Session = Annotated[
     str | None, typer.Option(help="Session name; the same at both ends.", show_default=False)
 ]
+Sessions = Annotated[
+    str | None,
+    typer.Option(
+        help="Serve every session whose name matches, such as 'rig/*', in this one process.",
+        show_default=False,
+    ),
+]
+Configs = Annotated[
+    Path | None,
+    typer.Option(
+        help="With --sessions: folder of files for single sessions, rig/7.toml for rig/7.",
+        show_default=False,
+    ),
+]
+RigsMax = Annotated[int, typer.Option(help="With --sessions: flights at a time, at most.", min=1)]
+Flights = Annotated[
+    int | None,
+    typer.Option(help="With --sessions: end after so many flights.", min=1, show_default=False),
+]
 Listen = Annotated[list[str] | None, typer.Option(help="Zenoh endpoint to listen on; repeatable.")]
 Connect = Annotated[list[str] | None, typer.Option(help="Zenoh endpoint to connect to; repeatable.")]
 Mismatches = Annotated[
@@ -134,7 +153,7 @@ Peer = Annotated[
     list[str] | None,
     typer.Option(
         help="With --keys: who may be at the other end, by the name in its certificate; behind a "
-        "router the router's name. Repeatable."
+        "router the router's name. Repeatable. Among many --sessions, NAME=SESSION for its own alone."
     ),
 ]
 Viewer = Annotated[

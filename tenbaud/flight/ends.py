@@ -23,6 +23,7 @@ from tenbaud.flight.status import Status, StatusMode, StatusReporter
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, gap_part, link_part, receiver_part, transmitter_part
 from tenbaud.recording.folder import RunFolder
+from tenbaud.recording.shared import SharedWriter
 from tenbaud.recording.writer import McapRecorder
 
 Stop = Callable[[], bool]
@@ -86,6 +87,7 @@ def run_transmitter(
             run = transmit.prepare(agreement, recorder, link.wire)
             with StatusReporter(lambda: transmitter_status(run), status):
                 outcome = _guarded(lambda: _fly(run, link, stop, recorder))
+            run.node.rest()
         summary = transmitter_part(run, outcome) | link_part(link, refused)
         return outcome, _with_recording(summary, recorder)
 
@@ -101,6 +103,7 @@ def run_receiver(
                 outcome = _guarded(
                     lambda: receive.serve(agreement, endpoint, link, stop, recorder.help_out)
                 )
+            endpoint.session.rest()
         summary = receiver_part(agreement, endpoint, outcome) | link_part(link, refused)
         return outcome, _with_recording(summary, recorder)
 
@@ -129,13 +132,20 @@ def run_in_memory(
         endpoint = build_receiver(agreement, receiver_recorder, DATAGRAM)
         with StatusReporter(lambda: transmitter_status(run), status):
             outcome = _guarded(lambda: transmit.fly_virtual(run, endpoint, stop))
+        run.node.rest()
+        endpoint.session.rest()
         upper = transmitter_part(run, outcome)
         lower = receiver_part(agreement, endpoint, outcome)
         return outcome, _with_recording(upper, recorder), lower
 
 
-def open_recorder(agreement: Agreement, role: Role, path: Path) -> McapRecorder:
-    """Return a recorder for one end, its file headed by what was flown."""
+def open_recorder(
+    agreement: Agreement, role: Role, path: Path, writer: SharedWriter | None = None
+) -> McapRecorder:
+    """Return a recorder for one end, its file headed by what was flown.
+
+    `writer`: a thread that it shares with others, instead of one of its own.
+    """
     metadata = {
         "role": role,
         "preset": agreement.config.preset,
@@ -149,7 +159,7 @@ def open_recorder(agreement: Agreement, role: Role, path: Path) -> McapRecorder:
         "impairments": agreement.config.link.impairments,
     }
     # Virtual time can outrun the disk and is not disturbed by waiting for it.
-    return McapRecorder(path, metadata, wait_when_full=agreement.clock == "virtual")
+    return McapRecorder(path, metadata, wait_when_full=agreement.clock == "virtual", shared=writer)
 
 
 def transmitter_status(run: transmit.TransmitterRun) -> Status:
@@ -208,7 +218,12 @@ def _end(
 def _fly(run: transmit.TransmitterRun, link: Link, stop: StopFlag, recorder: McapRecorder) -> Outcome:
     if run.agreement.clock == "real":
         return transmit.fly_real(run, link, stop)
-    return transmit.fly_virtual(run, transmit.link_peer(run, link, stop, recorder.help_out), stop)
+
+    def meanwhile() -> None:
+        run.node.rest()
+        recorder.help_out()
+
+    return transmit.fly_virtual(run, transmit.link_peer(run, link, stop, meanwhile), stop)
 
 
 def _guarded(fly: Callable[[], Outcome]) -> Outcome:

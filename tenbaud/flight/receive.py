@@ -10,7 +10,7 @@ from channel.errors import ConfigMismatch
 from channel.links.base import Link
 from receiver.endpoint import ReceiverEndpoint
 from receiver.real_service import serve_real
-from receiver.session import Phase
+from receiver.session import Phase, ReceiverSession
 from receiver.virtual_service import serve_virtual
 from tenbaud.build import Agreement
 from tenbaud.build_ends import build_line
@@ -45,6 +45,11 @@ def serve(
         raise ConfigMismatch(f"refused the transmitter: {session.refusal}")
     if should_stop():
         return Outcome(ExitCode.INTERRUPTED, STOPPED)
+    return ended_outcome(session)
+
+
+def ended_outcome(session: ReceiverSession) -> Outcome:
+    """Return the outcome of a session that has ended."""
     if session.desync is not None and not session.end_reason.endswith(FLIGHT_OVER):
         return Outcome(ExitCode.DESYNC, desync_text(session.desync))
     over = session.end_reason.endswith((FLIGHT_OVER, STOPPED))

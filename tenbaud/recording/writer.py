@@ -20,6 +20,7 @@ from mcap.writer import CompressionType, Writer
 from channel.recording import RecordChannel
 from tenbaud.recording.encoding import channel_schema, row_encoder
 from tenbaud.recording.folder import open_new_recording
+from tenbaud.recording.shared import SharedWriter
 
 PROFILE = "tenbaud"
 RUN_METADATA = "run"
@@ -52,11 +53,13 @@ class McapRecorder:
         metadata: dict[str, str],
         queue_limit: int = 65536,
         wait_when_full: bool = False,
+        shared: SharedWriter | None = None,
     ) -> None:
         """Create the file; raises RecordingError if that is impossible or it holds data.
 
         `wait_when_full` is for flights in virtual time only, which a wait does not disturb and
         which can outrun the disk: `write` then waits for room instead of dropping the row.
+        `shared` is a thread that writes for many recorders, in place of one of its own.
         """
         self.path = path
         self._queue: deque[tuple[RecordChannel, int, Sequence[object]]] = deque()
@@ -79,8 +82,12 @@ class McapRecorder:
         self._closing = threading.Event()
         self._writing = threading.Lock()
         self._open = False
-        self._thread = threading.Thread(target=self._run, name=f"record {path.name}", daemon=True)
-        self._thread.start()
+        self._finished = threading.Event()
+        if shared is not None:
+            shared.add(self)
+        else:
+            name = f"record {path.name}"
+            threading.Thread(target=self._run, name=name, daemon=True).start()
 
     @property
     def rows_written(self) -> int:
@@ -120,13 +127,16 @@ class McapRecorder:
             finally:
                 self._writing.release()
 
-    def close(self) -> None:
-        """Write what is queued, finish the file and stop the thread. May be called again."""
+    def finish_soon(self) -> None:
+        """Take no more rows, and have the file finished by the thread."""
         # Later rows meet a full queue, so that they are counted and the thread can finish.
         self._queue_limit = 0
         self._closing.set()
-        self._thread.join(CLOSE_TIMEOUT_S)
-        if self._thread.is_alive():
+
+    def close(self) -> None:
+        """Write what is queued, finish the file and stop the thread. May be called again."""
+        self.finish_soon()
+        if not self._finished.wait(CLOSE_TIMEOUT_S):
             self._note(
                 f"The recording {self.path} was not finished within {CLOSE_TIMEOUT_S:g} s; the "
                 "disk does not answer. What was written before can still be read."
@@ -144,7 +154,7 @@ class McapRecorder:
         self.close()
 
     def _wait_for_room(self) -> bool:
-        while self._wait_when_full and self._thread.is_alive() and not self._closing.is_set():
+        while self._wait_when_full and not self._finished.is_set() and not self._closing.is_set():
             time.sleep(FULL_PAUSE_S)
             if len(self._queue) < self._queue_limit:
                 return True
@@ -153,14 +163,22 @@ class McapRecorder:
     # Everything below runs in the thread, but for batches that the loop writes itself.
 
     def _run(self) -> None:
-        self._guard(self._write_head)
-        self._open = True
-        while not self._closing.wait(POLL_PERIOD_S):
-            self._drain()
+        while self.attend():
+            self._closing.wait(POLL_PERIOD_S)
+
+    def attend(self) -> bool:
+        """Write what is queued, from the thread that writes; return False once it has finished."""
+        if not self._open:
+            self._guard(self._write_head)
+            self._open = True
+        closing = self._closing.is_set()
         self._drain()
-        with self._writing:
-            self._open = False
-            self._finish()
+        if closing:
+            with self._writing:
+                self._open = False
+                self._finish()
+            self._finished.set()
+        return not closing
 
     def _write_head(self) -> None:
         self._writer.start(profile=PROFILE, library="tenbaud")

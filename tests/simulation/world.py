@@ -240,6 +240,7 @@ class World:
             self.faults["downlink frames dropped by their check"] += 1
             return
         answers = node.deliver(frame)
+        node.rest()
         self.watch.on_delivered(node)
         if not self._greeted and node.session.phase is Phase.FLYING:
             self._begin()
@@ -253,6 +254,7 @@ class World:
         shown_ns = self.clock.shown(self.now_ns)
         messages = self.endpoint.on_bytes(data, shown_ns) if data is not None else []
         messages += self.endpoint.on_time(shown_ns)
+        self.endpoint.session.rest()
         for message in messages:
             for arrival_ns, out in self.down.carry(message, False, self.now_ns):
                 if out is not None:

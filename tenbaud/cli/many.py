@@ -1,0 +1,159 @@
+"""`tenbaud receive --sessions 'rig/*'`: one process that serves every rig whose name matches."""
+
+from __future__ import annotations
+
+import gc
+import json
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from tenbaud.cli import options
+
+if TYPE_CHECKING:
+    from tenbaud.build import Agreement
+    from tenbaud.flight.many import ManyHost
+    from tenbaud.flight.summary import Summary
+
+
+@dataclass(frozen=True, slots=True)
+class Many:
+    """What `--sessions` and the options that go with it say."""
+
+    sessions: str
+    configs: Path | None
+    rigs_max: int
+    flights: int | None
+
+
+def serve(
+    many: Many, node: options.NodeOptions, addresses: options.Addresses, changed: dict[str, Any]
+) -> None:
+    """Serve until interrupted, or until so many flights have ended; see `docs/many-rigs.md`."""
+    from channel.links.zenoh_config import SESSIONS_MAX
+    from channel.links.zenoh_hub import ZenohHub
+    from receiver.many_service import ManyService
+    from tenbaud.build_ends import check_parts
+    from tenbaud.cli.addresses import endpoints_of
+    from tenbaud.flight.ends import SWITCH_INTERVAL_S, knocks
+    from tenbaud.flight.many import ManyHost
+    from tenbaud.flight.many_status import ManyStatus
+    from tenbaud.flight.stop import StopFlag
+    from tenbaud.recording.folder import create_run_folder
+
+    agreement_of = agreements(node.preset, node.config, many.configs, changed, node.clock.value)
+    common = agreement_of("")
+    if common.config.link.kind != "zenoh":
+        raise typer.BadParameter("--sessions needs Zenoh; a serial line has one rig at its other end")
+    check_parts(common.config)
+    where = endpoints_of("receiver", addresses, common.config, sessions=many.sessions)
+    places = ", ".join(where.listen + where.connect + where.router)
+    root = create_run_folder(None, "receiver-many", node.out)
+    sys.setswitchinterval(SWITCH_INTERVAL_S)
+    with (
+        StopFlag() as stop,
+        knocks(where) as refused,
+        ZenohHub(
+            many.sessions,
+            listen=where.listen,
+            connect=where.connect,
+            router=where.router,
+            scouting=where.scouting,
+            insecure=where.insecure,
+            security=where.security,
+            connections_max=max(SESSIONS_MAX, 2 * many.rigs_max),
+            should_stop=stop,
+        ) as hub,
+    ):
+        lines: list[Callable[[str], None]] = [lambda text: typer.echo(text, err=True)]
+        host = ManyHost(hub, agreement_of, root, many.rigs_max, lambda text: lines[-1](text))
+        service = ManyService(hub, host)
+        lines[-1](
+            f"tenbaud {common.identity.version} receiver of {many.sessions}  config "
+            f"{common.identity.config_digest.hex()[:12]}  numerics "
+            f"{common.identity.numerics_probe.hex()}\n"
+            f"  at {places}, recording below {root}"
+        )
+        # What was built so far stays; the collector need not look at it in flight.
+        gc.collect()
+        gc.freeze()
+        try:
+            with ManyStatus(service, many.sessions, shown=not node.json) as status:
+                lines.append(status.tell)
+                service.run(lambda: stop() or _enough(host, many.flights))
+        finally:
+            lines[1:] = []
+            host.close()
+    summary = _summary(host, service.lateness.percentile_ms, many.sessions)
+    summary["turned_away"] = dict(refused + hub.counts.refused)
+    (root / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    if node.json:
+        sys.stdout.write(json.dumps(summary, indent=2) + "\n")
+    else:
+        _show(host.summaries, root)
+
+
+def agreements(
+    preset: str | None, path: Path | None, configs: Path | None, changed: dict[str, Any], clock: str
+) -> Callable[[str], Agreement]:
+    """Return what gives the agreement for a session name; "" for that without a file of its own.
+
+    A file is read anew when it has changed.
+    """
+    from tenbaud.build import agree
+    from tenbaud.build_ends import check_parts
+    from tenbaud.config.load import load_config
+
+    known: dict[Path | None, tuple[float, Agreement]] = {}
+
+    def agreement_of(name: str) -> Agreement:
+        own = None if configs is None or not name else configs / f"{name}.toml"
+        if own is not None and not own.is_file():
+            own = None
+        changed_s = 0.0 if own is None else own.stat().st_mtime
+        if own not in known or known[own][0] != changed_s:
+            config = load_config(preset if own is None else None, own or path, changed)
+            if own is not None:
+                check_parts(config)
+            known[own] = (changed_s, agree(config, clock))  # type: ignore[arg-type]
+        return replace(known[own][1])
+
+    return agreement_of
+
+
+def _enough(host: ManyHost, flights: int | None) -> bool:
+    return flights is not None and len(host.summaries) >= flights
+
+
+def _summary(host: ManyHost, late_ms: Callable[[float], float | None], sessions: str) -> Summary:
+    return {
+        "sessions": sessions,
+        "flights": host.summaries,
+        "refused": host.counts["refused"],
+        "strays": host.counts["strays"],
+        "loop_late_ms_p50": late_ms(50.0),
+        "loop_late_ms_p99": late_ms(99.0),
+    }
+
+
+def _show(summaries: list[Summary], root: Path) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=f"{len(summaries)} flights, in {root}", title_justify="left")
+    for name in ("session", "samples", "baud", "erased", "rejoins", "desyncs", "outcome"):
+        table.add_column(name, justify="left" if name in ("session", "outcome") else "right")
+    for one in summaries:
+        baud = one["baud_measured"]
+        table.add_row(
+            one["session"],
+            str(one["samples"]),
+            "" if baud is None else f"{baud:.3f}",
+            *(str(one[name]) for name in ("erasures", "rejoins", "desyncs")),
+            one["outcome"],
+        )
+    Console().print(table)

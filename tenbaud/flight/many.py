@@ -1,0 +1,258 @@
+"""One receiver process for many rigs: sessions are opened as transmitters ask, and closed one by one.
+
+Each flight has a run folder of its own, with configuration, recording and summary. All files are
+written by a thread beside the loop; it hands over what is ready and rings.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from channel.clocks import SkewedClock
+from channel.errors import FrameError, LinkLost
+from channel.frames import Bye, Frame, Hello, Refuse, Symbol, Unknown
+from channel.links.zenoh_hub import ZenohHub
+from channel.virtual import Reply, decode_step, encode_reply, is_envelope
+from channel.wire import DATAGRAM, decode, encode
+from receiver.many_service import SURPLUS, Served
+from receiver.real_service import RealService
+from receiver.rejoin import difference
+from receiver.virtual_service import VirtualService
+from tenbaud.build import Agreement
+from tenbaud.build_ends import build_line, build_receiver
+from tenbaud.config.load import dump_config
+from tenbaud.flight.ends import open_recorder
+from tenbaud.flight.outcome import ExitCode, Outcome, outcome_of
+from tenbaud.flight.receive import ended_outcome
+from tenbaud.flight.report import write_summary
+from tenbaud.flight.summary import Summary, receiver_part
+from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.folder import RunFolder
+from tenbaud.recording.shared import SharedWriter
+from tenbaud.recording.writer import McapRecorder
+
+Tell = Callable[[str], None]
+AgreementOf = Callable[[str], Agreement]
+"""Session name -> what its flights are agreed on; raises TenbaudError where there is no such."""
+
+STOPPED = "the receiver was stopped"
+TOLD_MAX = 1000
+"""Refusals remembered, so that a transmitter that keeps asking is told of once."""
+
+
+@dataclass(slots=True)
+class Flight:
+    """One flight of one rig."""
+
+    name: str
+    agreement: Agreement
+    folder: RunFolder
+    recorder: McapRecorder
+    summary: Summary = field(default_factory=dict)
+
+
+class ManyHost:
+    """Opens and closes the services of `receiver.many_service`; see the module's text.
+
+    `root` is the folder for the run folders; at most `rigs_max` flights at a time.
+    """
+
+    def __init__(
+        self,
+        hub: ZenohHub,
+        agreement_of: AgreementOf,
+        root: Path,
+        rigs_max: int,
+        tell: Tell,
+    ) -> None:
+        self._hub = hub
+        self._agreement_of = agreement_of
+        self._root = root
+        self._rigs_max = rigs_max
+        self._tell = tell
+        self._writer = SharedWriter()
+        self._worker = ThreadPoolExecutor(1, "files")
+        self._ready: deque[tuple[str, Served]] = deque()
+        self._opening: set[str] = set()
+        self._open: dict[str, Flight] = {}
+        self._refused: deque[tuple[str, int]] = deque(maxlen=TOLD_MAX)
+        self.summaries: list[Summary] = []
+        """of the flights that have ended"""
+        self.counts: Counter[str] = Counter()
+        """flights, refused, strays (messages that belonged to no flight), messages_dropped"""
+
+    # In the loop's thread
+
+    def knock(self, name: str, data: bytes) -> list[bytes]:
+        """Take a message of a session that has no service; return what to answer.
+
+        A request for a session opens one. A symbol is answered as a restarted receiver does, so that
+        its transmitter asks.
+        """
+        if name in self._opening:
+            return []
+        try:
+            frame, number = _opened(data)
+        except FrameError:
+            frame, number = None, None
+        answer: Frame | None = None
+        match frame:
+            case Hello() if len(self._open.keys() | self._opening) >= self._rigs_max:
+                text = f"this receiver serves {self._rigs_max} rigs already, which is its limit"
+                answer = self._refusal(name, frame, text, "")
+            case Hello():
+                self._opening.add(name)
+                self._worker.submit(self._begin, name, frame, data, number)
+            case Symbol():
+                answer = Unknown(frame.session, frame.epoch)
+            case Bye() if frame.session == 0:
+                self._tell(f"{name}: as its transmitter sees it: {frame.reason}")
+            case _:
+                self.counts["strays"] += 1
+        return [] if answer is None else [_closed(answer, number)]
+
+    def ready(self) -> Iterable[tuple[str, Served]]:
+        """Return the services that have become ready since the last call."""
+        while self._ready:
+            name, served = self._ready.popleft()
+            self._opening.discard(name)
+            yield name, served
+
+    def ended(self, served: Served, error: Exception | None) -> None:
+        """End a flight: tell its transmitter now, and have its files finished."""
+        session = served.service.endpoint.session
+        if not isinstance(served.service, VirtualService):
+            reason = STOPPED if error is None else "the receiver failed"
+            if isinstance(error, LinkLost):
+                reason = "no word from the transmitter"
+            for message in served.service.endpoint.bye(reason):
+                self._hub.send(served.name, message)
+        session.rest()
+        self.counts["messages_dropped"] += served.dropped
+        flight = self._open[served.name]
+        flight.recorder.finish_soon()
+        # Until its files are finished the name stays taken, and a new flight waits.
+        self._opening.add(served.name)
+        self._worker.submit(self._finish, flight, served, error)
+
+    def close(self) -> None:
+        """Wait until all files are finished."""
+        self._worker.shutdown()
+        self._writer.close()
+
+    # In the worker's thread
+
+    def _begin(self, name: str, hello: Hello, data: bytes, number: int | None) -> None:
+        try:
+            agreement = self._agreement_of(name)
+            problem = difference(hello, agreement.identity)
+            if problem is not None:
+                self._turn_away(name, hello, problem, agreement.identity.config, number)
+                return
+            self._ready.append((name, self._serve(name, agreement, data)))
+        except Exception as error:  # whatever it is, it concerns this session alone
+            text = outcome_of(error).text
+            self._turn_away(name, hello, f"the receiver cannot serve {name}: {text}", "", number)
+        self._hub.wake()
+
+    def _turn_away(
+        self, name: str, hello: Hello, problem: str, config: str, number: int | None
+    ) -> None:
+        self._hub.send(name, _closed(self._refusal(name, hello, problem, config), number))
+        self._opening.discard(name)
+
+    def _refusal(self, name: str, hello: Hello, problem: str, config: str) -> Refuse:
+        if (name, hello.incarnation) not in self._refused:
+            self._refused.append((name, hello.incarnation))
+            self.counts["refused"] += 1
+            self._tell(f"{name}: refused: {problem}")
+        return Refuse(hello.incarnation, problem, config)
+
+    def _serve(self, name: str, agreement: Agreement, data: bytes) -> Served:
+        folder = RunFolder(_new_folder(self._root, name))
+        link = agreement.config.link.model_copy(update={"session": name})
+        folder.config.write_text(dump_config(agreement.config.model_copy(update={"link": link})))
+        recorder = open_recorder(agreement, "receiver", folder.receiver, self._writer)
+        endpoint = build_receiver(agreement, recorder, DATAGRAM)
+        timeout_s = link.peer_timeout_s
+        self._hub.join(name)
+        self._open[name] = Flight(name, agreement, folder, recorder)
+        self.counts["flights"] += 1
+        self._tell(f"{name}: a flight begins, recording into {folder.path}")
+        if agreement.clock == "virtual":
+            return Served(name, VirtualService(endpoint, timeout_s), None, data)
+        endpoint.downlink = build_line(agreement, "down", DATAGRAM)
+        faults = agreement.faults
+        clock = None
+        if faults.skew_ppm or faults.clock_steps:
+            clock = SkewedClock(faults, time.monotonic_ns())
+        service = RealService(endpoint, timeout_s, endpoint.downlink, clock)
+        symbols_per_s = 1e9 * agreement.terms.symbols_per_word / agreement.terms.sample_ns
+        return Served(name, service, SURPLUS * symbols_per_s, data)
+
+    def _finish(self, flight: Flight, served: Served, error: Exception | None) -> None:
+        try:
+            endpoint = served.service.endpoint
+            outcome = _outcome(endpoint.session.end_reason, served, error)
+            flight.recorder.close()
+            flight.summary = {
+                "session": flight.name,
+                "folder": str(flight.folder.path),
+                **receiver_part(flight.agreement, endpoint, outcome),
+                "messages_dropped": served.dropped,
+                "recording_rows": flight.recorder.rows_written,
+                "recording_rows_lost": flight.recorder.rows_dropped,
+                "recording_error": flight.recorder.error,
+            }
+            write_summary(flight.folder, flight.summary)
+            self.summaries.append(flight.summary)
+            self._tell(
+                f"{flight.name}: ended after {flight.summary['samples']} samples: {outcome.text}"
+            )
+        finally:
+            self._open.pop(flight.name, None)
+            self._hub.leave(flight.name)
+            self._opening.discard(flight.name)
+
+
+def _outcome(end_reason: str, served: Served, error: Exception | None) -> Outcome:
+    if error is not None:
+        return outcome_of(error)
+    if end_reason == STOPPED:
+        return Outcome(ExitCode.INTERRUPTED, end_reason)
+    return ended_outcome(served.service.endpoint.session)
+
+
+def _new_folder(root: Path, name: str) -> Path:
+    """Make a folder for a flight: the session's name, and a number if it has flown before."""
+    plain = name.replace("/", "-")
+    number = 1
+    while True:
+        path = root / (plain if number == 1 else f"{plain}-{number}")
+        try:
+            path.mkdir(parents=True)
+        except FileExistsError:
+            number += 1
+        except OSError as error:
+            raise RecordingError(f"The run folder {path} cannot be made: {error.strerror}.") from error
+        else:
+            return path
+
+
+def _opened(data: bytes) -> tuple[Frame | None, int | None]:
+    """Return the frame of a message, and the number of the step that it came in, if in one."""
+    if not is_envelope(data):
+        return decode(data), None
+    step = decode_step(data)
+    return (None if step.data is None else decode(step.data)), step.number
+
+
+def _closed(frame: Frame, number: int | None) -> bytes:
+    """Return the message that answers with a frame: by itself, or as the reply to a step."""
+    message = encode(frame)
+    return message if number is None else encode_reply(Reply(number, None, (message,)))

@@ -1,0 +1,93 @@
+"""What a person wants to see of a receiver that serves many rigs: what needs attention, and a table.
+
+On a terminal the table is redrawn once a second; what begins, ends or is refused is a line of its own
+everywhere.
+"""
+
+from __future__ import annotations
+
+import threading
+from typing import Self
+
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.table import Table
+
+from receiver.many_service import ManyService, Served
+from receiver.session import Phase
+
+PERIOD_S = 1.0
+LINES_AROUND = 6
+"""Lines of the terminal that the table leaves free."""
+
+
+class ManyStatus:
+    """Within a `with`, shows the sessions of a service on standard error; `tell` prints a line."""
+
+    def __init__(self, service: ManyService, pattern: str, shown: bool = True) -> None:
+        self._service = service
+        self._pattern = pattern
+        self._console = Console(stderr=True)
+        self._live: Live | None = None
+        if shown and self._console.is_terminal:
+            self._live = Live(self.table(), console=self._console, auto_refresh=False, transient=True)
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="status", daemon=True)
+
+    def __enter__(self) -> Self:
+        if self._live is not None:
+            self._live.start()
+            self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        if self._live is not None:
+            self._thread.join()
+            self._live.stop()
+
+    def tell(self, text: str) -> None:
+        """Print one line, above the table if there is one."""
+        self._console.print(text, markup=False, highlight=False, soft_wrap=True)
+
+    def table(self) -> RenderableType:
+        """Return one row per session, those in trouble first, as many as the terminal has room for."""
+        served = sorted(self._service.served, key=_calmness)
+        room = max(3, self._console.height - LINES_AROUND)
+        table = Table(box=None, pad_edge=False)
+        for name in ("session", "phase", "time", "pitch", "M", "baud", "erased", "rejoins", "dropped"):
+            table.add_column(name, justify="left" if name in ("session", "phase") else "right")
+        for one in served[:room]:
+            table.add_row(*_row(one))
+        late = self._service.lateness.percentile_ms(99.0)
+        loop = "" if late is None else f", loop late p99 {late:.2f} ms"
+        hidden = f", {len(served) - room} not shown" if len(served) > room else ""
+        return Group(f"{len(served)} rigs of {self._pattern}{loop}{hidden}", table)
+
+    def _run(self) -> None:
+        while not self._stop.wait(PERIOD_S):
+            if self._live is not None:
+                self._live.update(self.table(), refresh=True)
+
+
+def _calmness(served: Served) -> tuple[bool, int, str]:
+    session = served.service.endpoint.session
+    trouble = session.counts["desyncs"] + session.counts["rejoins"] + served.dropped
+    return session.phase is Phase.FLYING, -trouble, served.name
+
+
+def _row(served: Served) -> tuple[str, ...]:
+    session = served.service.endpoint.session
+    baud = session.meter.baud
+    state = session.state
+    return (
+        served.name,
+        session.phase.value,
+        f"{state.sample * session.terms.sample_ns / 1e9:.1f} s",
+        f"{state.model[0]:+.3f} rad",
+        f"{session.codec.coder.ranges(state.coder)[0]:.3f}",
+        "" if baud is None else f"{baud:.2f}",
+        str(session.counts["erasures"]),
+        str(session.counts["rejoins"]),
+        str(served.dropped),
+    )

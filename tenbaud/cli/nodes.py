@@ -46,6 +46,9 @@ def transmit(
     sabotage: options.Sabotage = None,
     settings: options.Settings = None,
     insecure: options.Insecure = False,
+    telemetry: options.Telemetry = "",
+    allow_control: options.AllowControl = False,
+    pace: options.Pace = None,
     out: options.Out = None,
     json: options.AsJson = False,
     run_folder: RunFolderOption = None,
@@ -79,7 +82,8 @@ def transmit(
         settings=settings,
     )
     endpoints = (tuple(listen or ()), tuple(connect or ()), insecure)
-    _run("transmitter", preset, config, changed, clock, endpoints, out, run_folder, json, status)
+    wish = (telemetry, allow_control, pace)
+    _run("transmitter", preset, config, changed, clock, endpoints, out, run_folder, json, status, wish)
 
 
 def receive(
@@ -103,6 +107,8 @@ def receive(
     sabotage: options.Sabotage = None,
     settings: options.Settings = None,
     insecure: options.Insecure = False,
+    telemetry: options.Telemetry = "",
+    allow_control: options.AllowControl = False,
     out: options.Out = None,
     json: options.AsJson = False,
     run_folder: RunFolderOption = None,
@@ -131,7 +137,8 @@ def receive(
         settings=settings,
     )
     endpoints = (tuple(listen or ()), tuple(connect or ()), insecure)
-    _run("receiver", preset, config, changed, clock, endpoints, out, run_folder, json, status)
+    wish = (telemetry, allow_control, None)
+    _run("receiver", preset, config, changed, clock, endpoints, out, run_folder, json, status, wish)
 
 
 def _run(
@@ -145,7 +152,10 @@ def _run(
     run_folder: Path | None,
     as_json: bool,
     status: str,
+    telemetry: tuple[str, bool, float | None],
 ) -> None:
+    from dataclasses import replace
+
     from channel.links.endpoints import DEFAULT_ENDPOINT, check_endpoints
     from tenbaud.build import agree
     from tenbaud.build_ends import check_parts
@@ -153,9 +163,11 @@ def _run(
     from tenbaud.flight import ends
     from tenbaud.flight.outcome import ExitCode
     from tenbaud.recording.folder import RunFolder, create_run_folder
+    from tenbaud.telemetry.station import Wish
 
     config = load_config(preset, path, changed)
-    agreement = agree(config, clock.value)
+    wish = Wish(*telemetry)
+    agreement = replace(agree(config, clock.value), live=wish.control)
     listen, connect, insecure = addresses
     serial = config.link.kind == "serial"
     if serial and config.link.downlink != "zenoh":
@@ -183,7 +195,7 @@ def _run(
     mode = status if status in ("lines", "none") else "auto"
     outcome, summary = run_end(
         agreement,
-        ends.Endpoints(listen, connect, insecure),
+        ends.Endpoints(listen, connect, insecure, wish),
         folder,
         mode,  # type: ignore[arg-type]
     )

@@ -122,7 +122,25 @@ Insecure = Annotated[
     bool,
     typer.Option(help="Allow addresses beyond this machine without encryption or authentication."),
 ]
-
+Telemetry = Annotated[
+    str,
+    typer.Option(
+        help="For viewers: on, off, or a Zenoh endpoint to listen on. Not given: on, on a socket that "
+        "only this user can open; off beside an insecure link that leaves this machine.",
+        show_default=False,
+    ),
+]
+AllowControl = Annotated[
+    bool,
+    typer.Option(
+        "--allow-control",
+        help="Let viewers change set-point, line and codec in flight; every change is recorded.",
+    ),
+]
+Pace = Annotated[
+    float | None,
+    typer.Option(min=0.05, help="Virtual clock: at most so many times real time.", show_default=False),
+]
 
 DryRun = Annotated[
     bool, typer.Option("--dry-run", help="Read the rig and never drive it: no command is sent.")

@@ -22,6 +22,9 @@ from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, link_part, receiver_part, transmitter_part
 from tenbaud.recording.folder import RunFolder
 from tenbaud.recording.writer import McapRecorder
+from tenbaud.telemetry.compose import ReceiverComposer, TransmitterComposer
+from tenbaud.telemetry.live import LiveTransmitter
+from tenbaud.telemetry.station import NO_WISH, Station, Wish, open_station
 
 SWITCH_INTERVAL_S = 0.0002
 """A busy recorder thread may keep the loop waiting this long; Python's default is 5 ms."""
@@ -34,6 +37,7 @@ class Endpoints:
     listen: tuple[str, ...] = ()
     connect: tuple[str, ...] = ()
     insecure: bool = False
+    telemetry: Wish = NO_WISH
 
 
 def open_link(agreement: Agreement, role: Role, endpoints: Endpoints) -> Link:
@@ -66,11 +70,16 @@ def run_transmitter(
 ) -> tuple[Outcome, Summary]:
     """Fly one flight as the transmitter; the outcome says how it ended."""
     with _end(agreement, "transmitter", folder) as (recorder, stop):
+        station = _station(agreement, "transmitter", recorder, endpoints)
         with open_link(agreement, "transmitter", endpoints) as link:
-            run = transmit.prepare(agreement, recorder, link.wire)
-            with StatusReporter(lambda: transmitter_status(run), status):
-                outcome = _guarded(lambda: _fly(run, link, stop, recorder))
-        summary = transmitter_part(run, outcome) | link_part(link)
+            run = transmit.prepare(agreement, station.recorder, link.wire)
+            live = station.fly_transmitter(run, stop)
+            with (
+                station.publishing(lambda tap: TransmitterComposer(run, tap, live)),
+                StatusReporter(lambda: transmitter_status(run), status),
+            ):
+                outcome = _guarded(lambda: _fly(run, link, stop, recorder, live))
+        summary = transmitter_part(run, outcome) | link_part(link) | station.summary()
         return outcome, _with_recording(summary, recorder)
 
 
@@ -79,13 +88,18 @@ def run_receiver(
 ) -> tuple[Outcome, Summary]:
     """Serve one flight as the receiver; the outcome says how it ended."""
     with _end(agreement, "receiver", folder) as (recorder, stop):
+        station = _station(agreement, "receiver", recorder, endpoints)
         with open_link(agreement, "receiver", endpoints) as link:
-            endpoint = build_receiver(agreement, recorder, link.wire)
-            with StatusReporter(lambda: receiver_status(agreement, endpoint), status):
+            endpoint = build_receiver(agreement, station.recorder, link.wire, station.steering)
+            live = station.fly_receiver(endpoint, stop)
+            with (
+                station.publishing(lambda tap: ReceiverComposer(agreement, endpoint, tap, live)),
+                StatusReporter(lambda: receiver_status(agreement, endpoint), status),
+            ):
                 outcome = _guarded(
-                    lambda: receive.serve(agreement, endpoint, link, stop, recorder.help_out)
+                    lambda: receive.serve(agreement, endpoint, link, live, recorder.help_out)
                 )
-        summary = receiver_part(agreement, endpoint, outcome) | link_part(link)
+        summary = receiver_part(agreement, endpoint, outcome) | link_part(link) | station.summary()
         return outcome, _with_recording(summary, recorder)
 
 
@@ -176,10 +190,23 @@ def _end(
         yield recorder, stop
 
 
-def _fly(run: transmit.TransmitterRun, link: Link, stop: StopFlag, recorder: McapRecorder) -> Outcome:
+def _station(agreement: Agreement, role: Role, recorder: McapRecorder, endpoints: Endpoints) -> Station:
+    addresses = endpoints.listen + endpoints.connect
+    return open_station(agreement, role, recorder, endpoints.telemetry, addresses, endpoints.insecure)
+
+
+def _fly(
+    run: transmit.TransmitterRun,
+    link: Link,
+    stop: StopFlag,
+    recorder: McapRecorder,
+    live: LiveTransmitter,
+) -> Outcome:
     if run.agreement.clock == "real":
         return transmit.fly_real(run, link, stop)
-    return transmit.fly_virtual(run, transmit.link_peer(run, link, stop, recorder.help_out), stop)
+    peer = transmit.link_peer(run, link, stop, recorder.help_out)
+    live.keep_alive = peer.keep_alive
+    return transmit.fly_virtual(run, peer, stop)
 
 
 def _guarded(fly: Callable[[], Outcome]) -> Outcome:

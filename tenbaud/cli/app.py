@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tenbaud.cli import demo, doctor, figures, identify, nodes, rig, runs
+from tenbaud.cli import demo, doctor, figures, identify, nodes, rig, runs, view
 from tenbaud.flight.outcome import ExitCode, outcome_of
 
 app = typer.Typer(
@@ -44,6 +44,7 @@ def _root(
 app.command()(demo.demo)
 app.command()(nodes.transmit)
 app.command()(nodes.receive)
+app.command()(view.view)
 app.command()(identify.identify)
 app.command()(figures.figures)
 app.command()(runs.inspect)

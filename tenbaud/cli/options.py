@@ -141,6 +141,20 @@ Pace = Annotated[
     float | None,
     typer.Option(min=0.05, help="Virtual clock: at most so many times real time.", show_default=False),
 ]
+View = Annotated[
+    bool,
+    typer.Option(
+        "--view",
+        help="Serve a live page of the flight, from which it can be steered and broken. It flies in "
+        "real time (--pace for other speeds) for an hour, or --duration, or until Ctrl-C.",
+    ),
+]
+ViewPort = Annotated[
+    int, typer.Option(min=0, max=65535, help="Port of the live page; 0: any free one.")
+]
+OpenBrowser = Annotated[
+    bool, typer.Option("--open", help="Open the live page in the browser of this machine.")
+]
 
 DryRun = Annotated[
     bool, typer.Option("--dry-run", help="Read the rig and never drive it: no command is sent.")

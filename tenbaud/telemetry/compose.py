@@ -211,7 +211,7 @@ class ReceiverComposer(_Composer):
     def compose(self) -> dict[str, Any]:
         """Return the message of this moment."""
         session, terms = self._endpoint.session, self.agreement.terms
-        rows: list[tuple[str, Row]] = self.tap.take()  # type: ignore[assignment]
+        rows: list[tuple[str, Row]] = self.tap.take()
         stride = self._stride
         points = [
             {

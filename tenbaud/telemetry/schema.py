@@ -190,7 +190,7 @@ def schema_json() -> dict[str, Any]:
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "tenbaud telemetry",
-        "description": "Keys: tenbaud/NAME/telemetry/ROLE for the one, tenbaud/NAME/control for the other",
+        "description": "Keys tenbaud/NAME/telemetry/ROLE and tenbaud/NAME/control",
         "version": SCHEMA_VERSION,
         "properties": parts,
         "$defs": definitions,

@@ -1,0 +1,202 @@
+"""The page: instruments drawn by its own script, and controls that ask something of the flight."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from nicegui import ui
+
+from tenbaud.view.board import Board
+from tenbaud.view.feed import Feed
+
+REFRESH_S = 0.25
+SET_POINT_STEP_DEG = 5
+PACES = {0.25: "slow", 1.0: "real time", 5.0: "5 times", 25.0: "25 times"}
+
+Send = Callable[..., None]
+
+
+def build_page(board: Board, feed: Feed) -> None:
+    """Build the page for one browser."""
+    from tenbaud.view.server import STATIC
+
+    ui.add_head_html('<link rel="stylesheet" href="/view/view.css">')
+    ui.add_body_html((STATIC / "instruments.html").read_text(encoding="utf-8"))
+    ui.dark_mode(value=None)
+
+    def send(**command: object) -> None:
+        head = board.heads.get("transmitter") or board.heads.get("receiver")
+        if head is not None and head["takes_commands"]:
+            feed.send(head["session"], command)
+
+    with ui.element("section").classes("controls").props('aria-label="Controls"'):
+        note = ui.label().classes("controls-note").props('role="status"')
+        with ui.element("div").classes("controls-grid"):
+            panels = [_SetPoint(send), _Clock(send), _Line(send), _Break(send)]
+
+    def refresh() -> None:
+        upper, lower = board.heads.get("transmitter"), board.heads.get("receiver")
+        note.set_text(_why_not(upper or lower))
+        note.set_visibility(bool(note.text))
+        allowed = not note.text
+        for panel in panels:
+            panel.refresh(allowed, upper or {}, lower or {})
+
+    refresh()
+    ui.timer(REFRESH_S, refresh)
+
+
+def _why_not(head: dict[str, Any] | None) -> str:
+    if head is None:
+        return "The controls wait for a flight."
+    if head["phase"] == "ended":
+        return "The flight is over."
+    if not head["takes_commands"]:
+        return "This flight takes no commands: start both its ends with --allow-control to steer it."
+    return ""
+
+
+class _Panel:
+    """A titled group of controls."""
+
+    def __init__(self, title: str, text: str) -> None:
+        self.box = ui.element("fieldset").classes("panel")
+        self._enabled: bool | None = None
+        self.controls: list[Any] = []
+        with self.box:
+            ui.element("legend").add_slot("default", f"{title}")
+            ui.label(text).classes("hint")
+
+    def enable(self, enabled: bool) -> None:
+        if enabled is not self._enabled:
+            self._enabled = enabled
+            for control in self.controls:
+                control.set_enabled(enabled)
+
+    def refresh(self, allowed: bool, upper: dict[str, Any], lower: dict[str, Any]) -> None:
+        """Follow the newest messages of both ends; `allowed`: the flight may be steered."""
+        self.enable(allowed)
+
+    def button(self, text: str, act: Callable[[], None], label: str = "") -> Any:
+        button = ui.button(text, on_click=act, color=None).props("unelevated no-caps")
+        if label:
+            button.props(f'aria-label="{label}"')
+        self.controls.append(button)
+        return button
+
+    def slider(
+        self,
+        name: str,
+        most: float,
+        step: float,
+        unit: str,
+        changed: Callable[[], None],
+        least: float = 0,
+    ) -> Any:
+        form = "+.0f" if least < 0 else ".0f"
+        with ui.element("div").classes("slider"):
+            ui.label(name).classes("slider-name")
+            slider = ui.slider(min=least, max=most, step=step, value=0).props(f'aria-label="{name}"')
+            ui.label().classes("slider-value").bind_text_from(
+                slider,
+                "value",
+                lambda value: f"{value:+.0f}{unit}" if least < 0 else f"{value:.0f}{unit}",
+            )
+        # Once when it is let go, or at each key, rather than for every step of a drag.
+        slider.on("change", changed)
+        self.controls.append(slider)
+        return slider
+
+
+class _SetPoint(_Panel):
+    def __init__(self, send: Send) -> None:
+        super().__init__("Set-point", "Where the controller steers the pitch.")
+        with self.box:
+            self.angle = self.slider(
+                "Set-point",
+                90,
+                SET_POINT_STEP_DEG,
+                "°",
+                lambda: send(kind="set_point", angle_rad=math.radians(self.angle.value)),
+                least=-90,
+            )
+            self.button("Follow the programme", lambda: send(kind="set_point", angle_rad=None))
+
+    def refresh(self, allowed: bool, upper: dict[str, Any], lower: dict[str, Any]) -> None:
+        self.enable(allowed and bool(lower.get("steerable")))
+
+
+class _Clock(_Panel):
+    def __init__(self, send: Send) -> None:
+        super().__init__("Clock", "The virtual clock can stand still, step, or run faster.")
+        self._paused = False
+        with self.box:
+            with ui.element("div").classes("row-of-buttons"):
+                self.pause = self.button("Pause", lambda: send(kind="pause", paused=not self._paused))
+                self.step = self.button(
+                    "One bit", lambda: send(kind="step", samples=1), "Step: let one bit pass"
+                )
+            self.pace = ui.toggle(PACES, on_change=lambda event: self._asked(send, event.value)).props(
+                'unelevated no-caps aria-label="Pace: times real time"'
+            )
+            self.controls.append(self.pace)
+
+    def _asked(self, send: Send, pace: float | None) -> None:
+        if pace is not None and pace != self._told:
+            self._told = pace
+            send(kind="pace", factor=pace)
+
+    _told: float | None = None
+
+    def refresh(self, allowed: bool, upper: dict[str, Any], lower: dict[str, Any]) -> None:
+        self.enable(allowed and upper.get("clock") == "virtual")
+        paused = bool(upper.get("paused"))
+        if paused is not self._paused:
+            self._paused = paused
+            self.pause.set_text("Go on" if paused else "Pause")
+        told = upper.get("pace")
+        if told in PACES and told != self._told:
+            self._told = told
+            self.pace.set_value(told)
+
+
+class _Line(_Panel):
+    def __init__(self, send: Send) -> None:
+        super().__init__("The wire", "What goes wrong between the two ends.")
+        self._send = send
+        with self.box:
+            self.loss = self.slider("Bits lost", 90, 5, " %", self._changed)
+            self.flips = self.slider("Bits flipped", 50, 1, " %", self._changed)
+            self.delay = self.slider("Delay each way", 300, 10, " ms", self._changed)
+            self.button("Mend the wire", self._mend)
+
+    def _changed(self) -> None:
+        parts = []
+        if self.loss.value:
+            parts.append(f"up:loss={self.loss.value / 100:g}")
+        if self.flips.value:
+            parts.append(f"up:flip={self.flips.value / 100:g}")
+        if self.delay.value:
+            parts.append(f"delay={self.delay.value:g}ms")
+        self._send(kind="impair", text=",".join(parts))
+
+    def _mend(self) -> None:
+        for slider in (self.loss, self.flips, self.delay):
+            slider.set_value(0)
+        self._changed()
+
+
+class _Break(_Panel):
+    def __init__(self, send: Send) -> None:
+        super().__init__("Break it", "Change one bit in one end's codec, and watch it be found out.")
+        with self.box, ui.element("div").classes("row-of-buttons"):
+            for end, name in (("transmitter", "sensor"), ("receiver", "controller")):
+                self.button(
+                    f"Spoil the {name}",
+                    lambda end=end: send(kind="spoil", end=end, field="range"),  # type: ignore[misc]
+                ).classes("danger")
+
+    def refresh(self, allowed: bool, upper: dict[str, Any], lower: dict[str, Any]) -> None:
+        self.enable(allowed and upper.get("phase") == "flying")

@@ -1,0 +1,153 @@
+"""The page's server: NiceGUI for the page and its controls, one stream of telemetry beside it.
+
+It listens on this machine unless told otherwise, answers only to its own names, and asks nothing of
+the internet: every script, style and font comes from the installed packages.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import sys
+import time
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from channel.errors import TenbaudError
+from channel.links.endpoints import is_loopback
+from tenbaud.view.board import Board
+from tenbaud.view.feed import Feed
+
+STREAM_PERIOD_S = 0.05
+IDLE_PERIOD_S = 0.5
+STATIC = Path(__file__).parent / "static"
+
+
+class PageUnavailable(TenbaudError):
+    """The page cannot be served; the text says what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Address:
+    """Where the page is served."""
+
+    host: str = "127.0.0.1"
+    port: int = 8710
+    insecure: bool = False
+
+    @property
+    def is_local(self) -> bool:
+        """Return whether only this machine can reach it."""
+        return is_loopback(f"tcp/{self.host}:{self.port}")
+
+    @property
+    def url(self) -> str:
+        """Return what to type into a browser on this machine."""
+        return f"http://{self.host if self.is_local else '127.0.0.1'}:{self.port}"
+
+    def check(self) -> None:
+        """Refuse an address that is taken, or that others can reach unless told to allow it."""
+        if not self.is_local and not self.insecure:
+            raise PageUnavailable(
+                f"{self.host} is reachable from other machines, and the page has no password: whoever "
+                "opens it sees the flight, and steers it if it takes commands. On a network that you "
+                "trust with that, add --insecure"
+            )
+        try:
+            with socket.socket() as probe:
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                probe.bind((self.host, self.port))
+        except OSError as error:
+            raise PageUnavailable(
+                f"the page cannot be served at {self.host}:{self.port}: {error.strerror}; give another "
+                "--port (--view-port of `tenbaud demo`), or 0 for any free one"
+            ) from error
+
+
+def require_nicegui() -> None:
+    """Raise PageUnavailable, with what to install, when the page's extra is missing."""
+    try:
+        import nicegui  # noqa: F401
+    except ImportError as error:
+        raise PageUnavailable(
+            f"the live page needs the extra `page` ({error}): pip install 'tenbaud[page]'"
+        ) from error
+
+
+def serve(feed: Feed, address: Address, *, open_browser: bool = False) -> None:
+    """Serve the page until the process is asked to stop. Raises PageUnavailable."""
+    require_nicegui()
+    address.check()
+    from nicegui import app, ui
+    from starlette.middleware.trustedhost import TrustedHostMiddleware
+
+    from tenbaud.view.page import build_page
+
+    board = Board()
+    if address.is_local:
+        names = ["127.0.0.1", "localhost", address.host]
+        app.add_middleware(TrustedHostMiddleware, allowed_hosts=names)
+    app.add_static_files("/view", STATIC, max_cache_age=0)
+    _add_stream(app, feed, board)
+    ui.page("/", title="tenbaud", favicon=STATIC / "favicon.svg")(lambda: build_page(board, feed))
+    app.on_startup(lambda: sys.stderr.write(f"tenbaud view: {address.url}\n"))
+    with ExitStack() as stack:
+        stack.enter_context(feed)
+        ui.run(
+            host=address.host,
+            port=address.port,
+            reload=False,
+            show=open_browser,
+            tailwind=False,
+            show_welcome_message=False,
+            reconnect_timeout=5.0,
+        )
+
+
+def _add_stream(app: object, feed: Feed, board: Board) -> None:
+    from fastapi import WebSocket, WebSocketDisconnect
+
+    async def drain() -> None:
+        while True:
+            board.take(feed.take(), time.monotonic())
+            await asyncio.sleep(STREAM_PERIOD_S)
+
+    async def stream(browser: WebSocket) -> None:
+        if not _same_origin(browser.headers.get("origin"), browser.headers.get("host")):
+            await browser.close(1008)
+            return
+        await browser.accept()
+        index, told_s = 0, 0.0
+        try:
+            while True:
+                index, messages = board.since(index)
+                for message in messages:
+                    await browser.send_text(message.decode())
+                now_s = time.monotonic()
+                if messages:
+                    told_s = now_s
+                elif now_s - told_s >= IDLE_PERIOD_S:
+                    told_s = now_s
+                    await browser.send_json({"silent_s": board.silent_s(now_s)})
+                await asyncio.sleep(STREAM_PERIOD_S)
+        except (WebSocketDisconnect, RuntimeError):
+            return
+
+    # Annotations are strings here and WebSocket is a local name, which FastAPI could not look up.
+    stream.__annotations__["browser"] = WebSocket
+    app.on_startup(drain)  # type: ignore[attr-defined]
+    app.websocket("/stream")(stream)  # type: ignore[attr-defined]
+
+
+def _same_origin(origin: str | None, host: str | None) -> bool:
+    """Return whether a browser asks from this very page; other sites may not listen in."""
+    return origin is None or urlsplit(origin).netloc == host
+
+
+def free_port(host: str) -> int:
+    """Return a port that was free at this address a moment ago."""
+    with socket.socket() as probe:
+        probe.bind((host, 0))
+        return int(probe.getsockname()[1])

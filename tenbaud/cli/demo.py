@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -153,26 +152,9 @@ def _fly_all(
 
 
 def _fly_shown(agreement: Agreement, folder: RunFolder, wish: ViewWish | None) -> DemoResult:
-    """Fly once, with a progress bar where there is a terminal to see it."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
+    """Fly once, and show how it goes."""
     from tenbaud.flight.demo import fly_demo
-    from tenbaud.flight.status import Status
+    from tenbaud.flight.status import StatusDisplay
 
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as bar:
-        task = bar.add_task("starting", total=agreement.flight_ticks)
-
-        def on_status(status: Status) -> None:
-            if status["role"] == "transmitter":
-                bar.update(task, completed=status["tick"], description=_line(status))
-
-        return fly_demo(agreement, folder, on_status, view=wish)
-
-
-def _line(status: dict[str, object]) -> str:
-    from tenbaud.flight.status import status_line
-
-    return status_line(status)
+    with StatusDisplay() as display:
+        return fly_demo(agreement, folder, display.show, view=wish)

@@ -136,7 +136,9 @@ def _wait(ends: tuple[_Child, _Child], stop: StopFlag) -> None:
                 continue
         if stop() and not passed_on:
             passed_on = True
-            for end in ends:
+            # Where the transmitter owns the time it also ends the receiver's part, by its farewell.
+            own_time = ends[0].agreement.clock == "virtual"
+            for end in ends[:1] if own_time else ends:
                 end.signal(signal.SIGINT)
         if passed_on or any(end.process.poll() is not None for end in ends):
             patience_s -= 0.1

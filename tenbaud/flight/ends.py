@@ -29,6 +29,8 @@ from tenbaud.telemetry.station import NO_WISH, Station, Wish, open_station
 SWITCH_INTERVAL_S = 0.0002
 """A busy recorder thread may keep the loop waiting this long; Python's default is 5 ms."""
 
+WORDS_SHOWN = 48
+
 
 @dataclass(frozen=True, slots=True)
 class Endpoints:
@@ -154,6 +156,9 @@ def transmitter_status(run: transmit.TransmitterRun) -> Status:
         "range_rad": coder.ranges(node.session.copies.confirmed.coder)[0],
         "erasures": node.session.counts["erasures"],
         "desyncs": node.session.counts["desyncs"],
+        "digest_checks": node.session.counts["digest_checks"],
+        "rejoins": node.session.counts["rejoins"],
+        "words": node.session.history.last_words(WORDS_SHOWN),
         "guard": node.guard.state.value,
     }
 
@@ -168,6 +173,7 @@ def receiver_status(agreement: Agreement, endpoint: ReceiverEndpoint) -> Status:
         "pitch_rad": session.state.model[0],
         "range_rad": agreement.codec.coder.ranges(session.state.coder)[0],
         "erasures": session.counts["erasures"],
+        "words": session.history.last_words(WORDS_SHOWN),
         "baud": session.meter.baud,
     }
 

@@ -65,7 +65,7 @@ class LiveTransmitter:
             return
         if self._pause_tick is not None:
             self._stand_still(tick)
-        if self.pace is not None:
+        if self.pace is not None and not self._should_stop():
             self._keep_pace(tick, self.pace)
 
     def _obey(self, tick: int) -> None:
@@ -110,7 +110,7 @@ class LiveTransmitter:
             _set_faults(self._run.downlink, faults.down)
         if faults.up.raw or faults.down.raw:
             self._run.desyncs_asked = math.inf
-        return f"line impaired by {text!r}"
+        return line_text(text)
 
     def _confirmed_sample(self) -> int:
         return self._run.node.session.copies.confirmed.sample
@@ -183,7 +183,7 @@ class LiveReceiver:
                 self.impairments = text
                 if isinstance(self._endpoint.downlink, ImpairedLine):
                     _set_faults(self._endpoint.downlink, parse_impairments(text).down)
-                    return f"line impaired by {text!r}"
+                    return line_text(text)
             case Spoil(end="receiver", field=field):
                 return spoil(session, field, session.state.sample)
         return None
@@ -204,6 +204,11 @@ def spoil(session: object, field: str, sample: int) -> str:
         return "this codec cannot be spoilt: ignored"
     codec.arm(parse_sabotage(f"sample={sample},field={field}"))
     return f"one bit of this codec's {field} spoilt after sample {sample}"
+
+
+def line_text(text: str) -> str:
+    """Return the words for what the line suffers from now on."""
+    return f"the line suffers {text}" if text else "the line is clean"
 
 
 def _set_faults(line: object, impairments: object) -> None:

@@ -13,7 +13,7 @@ from tenbaud.view.feed import Feed
 
 REFRESH_S = 0.25
 SET_POINT_STEP_DEG = 5
-PACES = {0.25: "slow", 1.0: "real time", 5.0: "5 times", 25.0: "25 times"}
+PACES = {0.25: "¼", 1.0: "1", 5.0: "5", 25.0: "25"}
 
 Send = Callable[..., None]
 
@@ -87,27 +87,56 @@ class _Panel:
         return button
 
     def slider(
-        self,
-        name: str,
-        most: float,
-        step: float,
-        unit: str,
-        changed: Callable[[], None],
-        least: float = 0,
-    ) -> Any:
-        form = "+.0f" if least < 0 else ".0f"
-        with ui.element("div").classes("slider"):
-            ui.label(name).classes("slider-name")
-            slider = ui.slider(min=least, max=most, step=step, value=0).props(f'aria-label="{name}"')
-            ui.label().classes("slider-value").bind_text_from(
-                slider,
-                "value",
-                lambda value: f"{value:+.0f}{unit}" if least < 0 else f"{value:.0f}{unit}",
-            )
-        # Once when it is let go, or at each key, rather than for every step of a drag.
-        slider.on("change", changed)
+        self, name: str, least: int, most: int, step: int, unit: str, moved: Callable[[], None]
+    ) -> _Slider:
+        slider = _Slider(name, (least, most, step), unit, moved)
         self.controls.append(slider)
         return slider
+
+
+class _Slider:
+    """The browser's own slider, which every keyboard and screen reader knows how to use.
+
+    `moved` is called once when it is let go, or at each key, rather than for every step of a drag.
+    """
+
+    def __init__(
+        self, name: str, spread: tuple[int, int, int], unit: str, moved: Callable[[], None]
+    ) -> None:
+        self.value = 0.0
+        self._moved = moved
+        self._form, self._unit = "+.0f" if spread[0] < 0 else ".0f", unit
+        with ui.element("label").classes("slider"):
+            ui.label(name).classes("slider-name")
+            self._shown = ui.label(self._text()).classes("slider-value")
+            self._input = ui.element("input").props(
+                f'type=range min={spread[0]} max={spread[1]} step={spread[2]} value=0 aria-label="{name}"'
+            )
+        take_number = "(event) => emit(Number(event.target.value))"
+        self._input.on("input", lambda event: self._show(event.args), js_handler=take_number)
+        self._input.on("change", lambda event: self._take(event.args), js_handler=take_number)
+
+    def set(self, value: float) -> None:
+        """Put the slider somewhere, without a command."""
+        self._show(value)
+        self._input.update()
+
+    def set_enabled(self, enabled: bool) -> None:
+        """Let it be moved, or not."""
+        self._input.props(remove="disabled") if enabled else self._input.props("disabled")
+
+    def _take(self, value: float) -> None:
+        self._show(value)
+        self._moved()
+
+    def _show(self, value: float) -> None:
+        self.value = value
+        # What the server believes the browser shows; no update is sent for it.
+        self._input.props["value"] = value
+        self._shown.set_text(self._text())
+
+    def _text(self) -> str:
+        return f"{self.value:{self._form}}{self._unit}"
 
 
 class _SetPoint(_Panel):
@@ -116,11 +145,11 @@ class _SetPoint(_Panel):
         with self.box:
             self.angle = self.slider(
                 "Set-point",
+                -90,
                 90,
                 SET_POINT_STEP_DEG,
                 "°",
                 lambda: send(kind="set_point", angle_rad=math.radians(self.angle.value)),
-                least=-90,
             )
             self.button("Follow the programme", lambda: send(kind="set_point", angle_rad=None))
 
@@ -138,6 +167,7 @@ class _Clock(_Panel):
                 self.step = self.button(
                     "One bit", lambda: send(kind="step", samples=1), "Step: let one bit pass"
                 )
+            ui.label("Times real time")
             self.pace = ui.toggle(PACES, on_change=lambda event: self._asked(send, event.value)).props(
                 'unelevated no-caps aria-label="Pace: times real time"'
             )
@@ -167,9 +197,9 @@ class _Line(_Panel):
         super().__init__("The wire", "What goes wrong between the two ends.")
         self._send = send
         with self.box:
-            self.loss = self.slider("Bits lost", 90, 5, " %", self._changed)
-            self.flips = self.slider("Bits flipped", 50, 1, " %", self._changed)
-            self.delay = self.slider("Delay each way", 300, 10, " ms", self._changed)
+            self.loss = self.slider("Bits lost", 0, 90, 5, " %", self._changed)
+            self.flips = self.slider("Bits flipped", 0, 50, 1, " %", self._changed)
+            self.delay = self.slider("Delay each way", 0, 300, 10, " ms", self._changed)
             self.button("Mend the wire", self._mend)
 
     def _changed(self) -> None:
@@ -184,7 +214,7 @@ class _Line(_Panel):
 
     def _mend(self) -> None:
         for slider in (self.loss, self.flips, self.delay):
-            slider.set_value(0)
+            slider.set(0.0)
         self._changed()
 
 

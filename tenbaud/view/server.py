@@ -10,10 +10,11 @@ import asyncio
 import socket
 import sys
 import time
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import urlsplit
+from urllib.request import urlopen
 
 from channel.errors import TenbaudError
 from channel.links.endpoints import is_loopback
@@ -22,6 +23,7 @@ from tenbaud.view.feed import Feed
 
 STREAM_PERIOD_S = 0.05
 IDLE_PERIOD_S = 0.5
+FIRST_LOOKS = 100
 STATIC = Path(__file__).parent / "static"
 
 
@@ -92,7 +94,7 @@ def serve(feed: Feed, address: Address, *, open_browser: bool = False) -> None:
     app.add_static_files("/view", STATIC, max_cache_age=0)
     _add_stream(app, feed, board)
     ui.page("/", title="tenbaud", favicon=STATIC / "favicon.svg")(lambda: build_page(board, feed))
-    app.on_startup(lambda: sys.stderr.write(f"tenbaud view: {address.url}\n"))
+    app.on_startup(lambda: _first_look(address.url))
     with ExitStack() as stack:
         stack.enter_context(feed)
         ui.run(
@@ -102,6 +104,7 @@ def serve(feed: Feed, address: Address, *, open_browser: bool = False) -> None:
             show=open_browser,
             tailwind=False,
             show_welcome_message=False,
+            gzip_middleware_factory=None,  # packing half a megabyte takes longer than loopback does
             reconnect_timeout=5.0,
         )
 
@@ -139,6 +142,17 @@ def _add_stream(app: object, feed: Feed, board: Board) -> None:
     stream.__annotations__["browser"] = WebSocket
     app.on_startup(drain)  # type: ignore[attr-defined]
     app.websocket("/stream")(stream)  # type: ignore[attr-defined]
+
+
+async def _first_look(url: str) -> None:
+    """Fetch the page once, so that the first visitor does not wait for what is only made once."""
+    for _ in range(FIRST_LOOKS):
+        with suppress(OSError):
+            await asyncio.to_thread(lambda: urlopen(url, timeout=5.0).read())
+            break
+        await asyncio.sleep(0.05)
+    sys.stderr.write(f"tenbaud view: {url}\n")
+    sys.stderr.flush()
 
 
 def _same_origin(origin: str | None, host: str | None) -> bool:

@@ -90,8 +90,8 @@ export function drawPitch(canvas, now, rows, decisions, ink) {
   const chart = frame(canvas, 210, now, -most, most, most > 60 ? 45 : 15, ink);
   band(chart, rows, (row) => (row[2] + row[3]) * DEGREES, (row) => (row[2] - row[3]) * DEGREES, ink.tube);
   line(chart, decisions, (row) => (row[1] === null ? null : row[1] * DEGREES), ink.reference, 1.5, true);
-  line(chart, rows, (row) => row[1] * DEGREES, ink.ink, 2);
-  line(chart, rows, (row) => row[2] * DEGREES, ink.estimate, 1.5);
+  line(chart, rows, (row) => row[2] * DEGREES, ink.estimate, 3);
+  line(chart, rows, (row) => row[1] * DEGREES, ink.ink, 1.2);
   chart.context.restore();
 }
 

@@ -10,7 +10,7 @@ const SIGNS = { waiting: "M12 7v6M12 16.5v.5", silent: "M7 12h10", lockstep: "M7
 const at = (id) => document.getElementById(id);
 const memory = { heads: {}, points: [], decisions: [], samples: new Map(), events: [] };
 let ink = colours();
-let connected = false, heardAt = 0, everHeard = false, brokenAt = -1e9, brokenText = "", mended = "", textAt = 0, dirty = true;
+let connected = false, heardAt = 0, everHeard = false, brokenAt = -1e9, brokenText = "", broken = null, mended = "", textAt = 0, dirty = true;
 
 // ---- the stream
 
@@ -43,14 +43,18 @@ function happened(event, old) {
   const [role, time, kind, text] = event;
   if (role === "transmitter" && kind === "desync") {
     if (!old) brokenAt = performance.now();
-    brokenText = text;
+    brokenText = text.split(": transmitter")[0];
+    broken = text.match(/transmitter ([0-9a-f]{16}), receiver ([0-9a-f]{16})/);
     memory.brokenTime = time;
     mended = "";
   }
   if (role === "transmitter" && kind === "rejoin" && text.startsWith("session") && memory.brokenTime !== undefined) {
-    mended = `broke at ${memory.brokenTime.toFixed(1)} s, common state again after ${(time - memory.brokenTime).toFixed(1)} s of flight`;
+    const sample = text.match(/sample (\d+)/)?.[1];
+    mended = `${brokenText} (${memory.brokenTime.toFixed(1)} s); a common state was found, and they are equal again from sample ${sample}`;
   }
-  if (kind === "erased" || kind === "late_symbol") return;
+  // Left out: what the tape shows, what passes by itself, and what the other end has told already.
+  if (kind === "erased" || kind === "late_symbol" || text === "guard holding") return;
+  if (role === "receiver" && ["desync", "rejoin", "ended"].includes(kind)) return;
   const last = memory.events[0];
   if (last && last[2] === kind && last[3] === text) return;
   memory.events.unshift(event);
@@ -82,8 +86,8 @@ function drawScale() {
   const parts = [];
   for (const degrees of [-90, -45, 0, 45, 90]) {
     const a = -degrees / DEGREES, cos = Math.cos(a), sin = Math.sin(a);
-    parts.push(`<path d="M${160 + 106 * cos} ${122 + 106 * sin}L${160 + 114 * cos} ${122 + 114 * sin}"/>`);
-    if (degrees) parts.push(`<text x="${160 + 98 * cos * (degrees % 90 ? 1.3 : 1)}" y="${126 + 98 * sin * (degrees % 90 ? 1.3 : 1)}">${degrees}°</text>`);
+    parts.push(`<path d="M${160 + 112 * cos} ${122 + 112 * sin}L${160 + 119 * cos} ${122 + 119 * sin}"/>`);
+    if (degrees > -90) parts.push(`<text x="${160 + 146 * cos}" y="${126 + 148 * sin}">${degrees}°</text>`);
   }
   at("scale").innerHTML = parts.join("");
 }
@@ -128,8 +132,7 @@ function showLight(now) {
   set("light-title", title);
   set("light-text", text);
   if (name === "broken") {
-    const found = brokenText.match(/transmitter ([0-9a-f]{16}), receiver ([0-9a-f]{16})/);
-    if (found) { set("digest-up", found[1]); set("digest-down", found[2]); return; }
+    if (broken) { set("digest-up", broken[1]); set("digest-down", broken[2]); return; }
   }
   const sample = lastCompared();
   set("digest-up", sample ? sample[3] : "–");
@@ -159,14 +162,16 @@ function showText(now) {
     set("f-error", degrees(point[1] - point[2], 2));
     set("f-range", degrees(point[3], 2).slice(1));
   }
-  const rows = memory.events.map(([, time, kind, text]) => [time, kind === "desync" || kind === "refused", text]);
+  const rows = memory.events.map(([role, time, kind, text]) =>
+    [role === "transmitter" ? "sensor" : "controller", time, kind === "desync" || kind === "refused", text]);
   const key = JSON.stringify(rows);
   if (rows.length && at("events").dataset.key !== key) {
     at("events").dataset.key = key;
-    at("events").replaceChildren(...rows.map(([time, bad, text]) => {
-      const item = document.createElement("li"), when = document.createElement("time");
+    at("events").replaceChildren(...rows.map(([who, time, bad, text]) => {
+      const [item, when, teller] = ["li", "time", "span"].map((name) => document.createElement(name));
       when.textContent = `${time.toFixed(1)} s`;
-      item.append(when, text);
+      teller.textContent = who;
+      item.append(when, teller, text);
       if (bad) item.className = "bad";
       return item;
     }));

@@ -98,10 +98,12 @@ def served(folder: Path, *arguments: str) -> Iterator[Served]:
     """Within the `with`, `tenbaud` with these arguments serves a page; they name a port of 0."""
     top = Path(__file__).parents[1]
     path = os.pathsep.join([str(top), os.environ.get("PYTHONPATH", "")])
+    # NiceGUI behaves differently in a process that it takes for a test.
+    own = {name: value for name, value in os.environ.items() if name != "PYTEST_CURRENT_TEST"}
     process = subprocess.Popen(
         [sys.executable, "-m", "tenbaud", *arguments],
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": path},
+        env={**own, "PYTHONPATH": path},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

@@ -109,8 +109,9 @@ class _Slider:
         with ui.element("label").classes("slider"):
             ui.label(name).classes("slider-name")
             self._shown = ui.label(self._text()).classes("slider-value")
+            least, most, step = spread
             self._input = ui.element("input").props(
-                f'type=range min={spread[0]} max={spread[1]} step={spread[2]} value=0 aria-label="{name}"'
+                f'type=range min={least} max={most} step={step} value=0 aria-label="{name}"'
             )
         take_number = "(event) => emit(Number(event.target.value))"
         self._input.on("input", lambda event: self._show(event.args), js_handler=take_number)

@@ -106,6 +106,7 @@ def serve(feed: Feed, address: Address, *, open_browser: bool = False) -> None:
             show_welcome_message=False,
             gzip_middleware_factory=None,  # packing half a megabyte takes longer than loopback does
             reconnect_timeout=5.0,
+            timeout_graceful_shutdown=1,  # an open page would otherwise hold the server up
         )
 
 

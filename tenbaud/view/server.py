@@ -113,29 +113,34 @@ def serve(feed: Feed, address: Address, *, open_browser: bool = False) -> None:
 def _add_stream(app: object, feed: Feed, board: Board) -> None:
     from fastapi import WebSocket, WebSocketDisconnect
 
+    fresh = asyncio.Condition()
+
     async def drain() -> None:
+        due_s = time.monotonic()
         while True:
-            board.take(feed.take(), time.monotonic())
-            await asyncio.sleep(STREAM_PERIOD_S)
+            if board.take(feed.take(), time.monotonic()):
+                async with fresh:
+                    fresh.notify_all()
+            # By the clock, not after a pause, so that twenty a second are twenty.
+            due_s = max(due_s + STREAM_PERIOD_S, time.monotonic())
+            await asyncio.sleep(due_s - time.monotonic())
 
     async def stream(browser: WebSocket) -> None:
         if not _same_origin(browser.headers.get("origin"), browser.headers.get("host")):
             await browser.close(1008)
             return
         await browser.accept()
-        index, told_s = 0, 0.0
+        index = 0
         try:
             while True:
                 index, messages = board.since(index)
                 for message in messages:
                     await browser.send_text(message.decode())
-                now_s = time.monotonic()
-                if messages:
-                    told_s = now_s
-                elif now_s - told_s >= IDLE_PERIOD_S:
-                    told_s = now_s
-                    await browser.send_json({"silent_s": board.silent_s(now_s)})
-                await asyncio.sleep(STREAM_PERIOD_S)
+                try:
+                    async with asyncio.timeout(IDLE_PERIOD_S), fresh:
+                        await fresh.wait()
+                except TimeoutError:
+                    await browser.send_json({"silent_s": board.silent_s(time.monotonic())})
         except (WebSocketDisconnect, RuntimeError):
             return
 

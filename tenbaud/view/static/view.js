@@ -10,7 +10,7 @@ const SIGNS = { waiting: "M12 7v6M12 16.5v.5", silent: "M7 12h10", lockstep: "M7
 const at = (id) => document.getElementById(id);
 const memory = { heads: {}, points: [], decisions: [], samples: new Map(), events: [] };
 let ink = colours();
-let connected = false, heardAt = 0, everHeard = false, brokenAt = -1e9, brokenText = "", broken = null, mended = "", textAt = 0, dirty = true;
+let connected = false, heardAt = 0, everHeard = false, brokenAt = -1e9, brokenText = "", broken = null, mended = "", asked = false, dirty = true, tapeDirty = true;
 
 // ---- the stream
 
@@ -34,9 +34,11 @@ function take(news) {
   memory.decisions.push(...news.decisions);
   for (const sample of news.samples) memory.samples.set(sample[0], sample);
   while (memory.samples.size > SAMPLES_KEPT) memory.samples.delete(memory.samples.keys().next().value);
+  tapeDirty ||= news.samples.length > 0 || Boolean(news.reset);
   for (const event of news.events) happened(event, news.reset);
   if (live) { heardAt = performance.now(); everHeard = true; }
   dirty = true;
+  if (!asked) { asked = true; requestAnimationFrame(draw); }
 }
 
 function happened(event, old) {
@@ -205,15 +207,16 @@ function forget() {
 }
 
 function draw() {
-  const now = performance.now();
-  if (now - textAt >= TEXT_MS) { textAt = now; showText(now); }
+  asked = false;
   if (!dirty || document.hidden) return;
   dirty = false;
   const time = forget();
   drawPicture();
   drawPitch(at("pitch-curve"), time, memory.points, memory.decisions, ink);
   drawError(at("error-curve"), time, memory.points, ink);
-  drawTape(at("tape"), [...memory.samples.values()].sort((a, b) => a[0] - b[0]), ink);
+  // The tape changes with the bits, half as often as the curves.
+  if (tapeDirty) drawTape(at("tape"), [...memory.samples.values()].sort((a, b) => a[0] - b[0]), ink);
+  tapeDirty = false;
 }
 
 // ---- colours: the system's, or the visitor's own
@@ -230,7 +233,7 @@ function paint() {
   set("theme", `Colours: ${choice}`);
   at("theme").setAttribute("aria-label", `Colours: ${choice}. Press to change`);
   ink = colours();
-  dirty = true;
+  dirty = tapeDirty = true;
 }
 
 at("theme").addEventListener("click", () => {
@@ -239,7 +242,7 @@ at("theme").addEventListener("click", () => {
   paint();
 });
 system.addEventListener("change", paint);
-addEventListener("resize", () => { dirty = true; });
+addEventListener("resize", () => { dirty = tapeDirty = true; });
 
 // NiceGUI sets its own idea of the colours when it has loaded; ours are put back.
 new MutationObserver(() => {
@@ -250,5 +253,7 @@ new MutationObserver(() => {
 drawScale();
 paint();
 listen();
-setInterval(draw, 50);
+// Figures five times a second: what changes faster cannot be read. It also draws what no news asked for.
+setInterval(() => { showText(performance.now()); draw(); }, TEXT_MS);
+showText(0);
 draw();

@@ -11,6 +11,8 @@ from tenbaud.cli import options
 
 if TYPE_CHECKING:
     from channel.links.base import Role
+    from tenbaud.config.schema import FlightConfig
+    from tenbaud.recording.folder import RunFolder
 
 RunFolderOption = Annotated[
     Path | None, typer.Option("--run-folder", hidden=True, help="Existing folder of the run.")
@@ -179,6 +181,7 @@ def _run(
         connect = () if role == "receiver" else (DEFAULT_ENDPOINT,)
     check_endpoints(listen + connect, insecure)
     check_parts(config)
+    wish.check(role, insecure)
     if insecure:
         typer.echo(
             "tenbaud: --insecure: whoever reaches this address can read the symbols and command "
@@ -200,13 +203,7 @@ def _run(
         mode,  # type: ignore[arg-type]
     )
     if whole:
-        from tenbaud.flight.report import draw_run, figure_title, write_summary
-
-        write_summary(folder, summary)
-        if role == "transmitter" and summary["samples"]:
-            problem = draw_run(folder, figure_title(config, summary))
-            if problem is not None:
-                typer.echo(problem, err=True)
+        _write_up(role, config, folder, summary)
     if as_json:
         ends.write_json(summary)
     elif whole and summary["samples"]:
@@ -216,6 +213,16 @@ def _run(
     if outcome.code is not ExitCode.OK:
         typer.echo(f"tenbaud {role}: {outcome.text}", err=True)
         raise typer.Exit(int(outcome.code))
+
+
+def _write_up(role: Role, config: FlightConfig, folder: RunFolder, summary: dict[str, Any]) -> None:
+    from tenbaud.flight.report import draw_run, figure_title, write_summary
+
+    write_summary(folder, summary)
+    if role == "transmitter" and summary["samples"]:
+        problem = draw_run(folder, figure_title(config, summary))
+        if problem is not None:
+            typer.echo(problem, err=True)
 
 
 def _introduce(role: Role, identity: Any, seed: int, addresses: tuple[str, ...], path: Path) -> None:

@@ -34,6 +34,11 @@ class Wish:
     pace: float | None = None
     """virtual seconds per second at most"""
 
+    def check(self, role: Role, insecure: bool) -> None:
+        """Raise LinkError for an endpoint that cannot be used, before anything starts."""
+        if self.endpoint:
+            endpoint_for(self.endpoint, role, (), insecure)
+
 
 NO_WISH = Wish()
 

@@ -123,7 +123,6 @@ def _counts(status: Status) -> str:
     for name, form in (
         ("baud", "{:.2f} baud"),
         ("erasures", "{} erased"),
-        ("late_ms_p99", "loop late {:.2f} ms (p99)"),
         ("guard", "guard {}"),
     ):
         if status.get(name) is not None:

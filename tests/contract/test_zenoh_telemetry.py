@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +13,7 @@ import pytest
 
 from channel.errors import LinkError
 from channel.links.zenoh_telemetry import TelemetryFeed, TelemetryPort
+from tests.tenbaud.processes import REPOSITORY
 
 
 def wait_until(met: Callable[[], object]) -> None:
@@ -49,6 +53,43 @@ def test_messages_reach_every_viewer_and_commands_come_back(tmp_path: Path) -> N
         port.close()
         wait_until(lambda: not viewers[1].is_connected)
         viewers[1].close()
+
+
+STANDS_STILL = """
+import os, signal, sys
+from channel.links.zenoh_telemetry import TelemetryFeed
+feed = TelemetryFeed(sys.argv[1], "lab", lambda data: None)
+print("ready", flush=True)
+os.kill(os.getpid(), signal.SIGSTOP)
+"""
+
+
+def test_when_a_viewer_stands_still_then_the_other_still_sees_and_nothing_waits_for_it(
+    tmp_path: Path,
+) -> None:
+    seen: list[bytes] = []
+    port = TelemetryPort("transmitter", "lab", endpoint_in(tmp_path))
+    still = subprocess.Popen(
+        [sys.executable, "-c", STANDS_STILL, endpoint_in(tmp_path)],
+        env={**os.environ, "PYTHONPATH": str(REPOSITORY)},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    viewer = None
+    try:
+        assert still.stdout is not None
+        assert still.stdout.readline() == "ready\n"
+        viewer = TelemetryFeed(endpoint_in(tmp_path), "lab", seen.append)
+        # More by far than every buffer on the way to the one that stands still can hold.
+        for number in range(500):
+            port.publish(number.to_bytes(4, "little") + bytes(20_000))
+        wait_until(lambda: port.publish(b"last") or b"last" in seen)
+    finally:
+        still.kill()
+        still.communicate()
+        if viewer is not None:
+            viewer.close()
+        port.close()
 
 
 def test_when_nobody_watches_then_publishing_costs_nothing_and_raises_nothing(tmp_path: Path) -> None:

@@ -123,9 +123,12 @@ def test_when_a_flight_is_watched_and_could_be_steered_then_it_is_the_same_fligh
 ) -> None:
     flown = ("--clock", "virtual", "--lead", "3")
     alone = ("--duration", "20", "--mismatch", "0.1", "--disturbance", "q=2e-3")
-    with watched(tmp_path, *flown, "--allow-control", transmitter=alone) as pair:
+    # Paced, so that it still goes on when the viewer has found it.
+    paced = (*alone, "--pace", "4")
+    with watched(tmp_path, *flown, "--allow-control", transmitter=paced) as pair:
         upper, lower = pair.ended()
         assert (upper.code, lower.code) == (0, 0)
+        assert pair.received
     unwatched = run(
         *("demo", *flown, *alone, "--out", "alone", "--json", "--link", "memory"), cwd=tmp_path
     )

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from benchmarks.browser import Served, browser, served, state_is, why_no_browser
+from tenbaud.telemetry.schema import TELEMETRY
 
 pytestmark = pytest.mark.skipif(why_no_browser() is not None, reason=str(why_no_browser()))
 
@@ -179,6 +180,36 @@ def test_without_a_flight_it_says_so(chromium: Any, tmp_path: Path) -> None:
         assert page.get_by_role("button", name="Spoil the sensor").is_disabled()
         state_is(page, "waiting")
         page.close()
+
+
+def test_the_gap_to_the_limit_is_shown_when_there_is_one(chromium: Any, tmp_path: Path) -> None:
+    from channel.links.zenoh_telemetry import TelemetryPort
+
+    place = f"unixsock-stream/{tmp_path}/t.sock"
+    message = {
+        "role": "transmitter", "version": 1, "session": "lab", "flight": 5, "number": 1,
+        "phase": "flying", "clock": "real", "takes_commands": False, "time_s": 1.0, "epoch": 0,
+        "impairments": "", "counts": {"erasures": 0, "desyncs": 0, "rejoins": 0, "digest_checks": 1},
+        "events": [], "dropped": 0, "preset": "x", "tick_s": 0.01, "symbol_period_s": 0.1,
+        "baud_configured": 10.0, "duration_s": 100.0, "points": [], "samples": [],
+        "guard": "running", "volts": None, "paused": False, "pace": None,
+        "lateness": {"p50_ms": 0.1, "p99_ms": 0.25, "max_ms": 1.0}, "gap_to_floor": 1.42,
+    }  # fmt: skip
+    TELEMETRY.validate_python(message)
+    port = TelemetryPort("transmitter", "lab", place)
+    with served(tmp_path, "view", "--port", "0", "--connect", place) as one:
+        page = chromium.new_page()
+        page.goto(one.url)
+        for _ in range(100):
+            port.publish(json.dumps(message).encode())
+            page.wait_for_timeout(100.0)
+            if page.locator("#f-gap").is_visible():
+                break
+        assert number(page, "#f-gap") == 1.42
+        assert number(page, "#f-late") == 0.25
+        page.get_by_text("takes no commands").wait_for()
+        page.close()
+    port.close()
 
 
 def test_when_the_flight_falls_silent_or_ends_then_it_says_so(chromium: Any, tmp_path: Path) -> None:

@@ -12,11 +12,11 @@ PYTHON ?= $(shell for candidate in python3.11 python3.12 python3.13 python3.14 p
 	>/dev/null 2>&1; then echo $$candidate; break; fi; done)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check bench soak clean
+.PHONY: help demo test check bench soak chromium screenshots clean
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /|/' \
-	| awk -F'|' '{ printf "  make %-7s %s\n", $$1, $$2 }'
+	| awk -F'|' '{ printf "  make %-11s %s\n", $$1, $$2 }'
 
 demo: $(STAMP) ## fly: both processes on this machine, the plant simulated
 	$(BIN)/tenbaud demo
@@ -36,6 +36,16 @@ bench: $(STAMP) ## measure speed, and write bench.json
 soak: $(STAMP) ## fly seeds under faults for MINUTES=n (10) into soak.json, then the long tests
 	$(BIN)/python -m tests.simulation.soak --minutes $(MINUTES)
 	MINUTES=$(MINUTES) $(BIN)/python -m pytest -m soak
+
+# The page's tests drive Debian's Chromium; where it is missing and cannot be installed, they skip.
+chromium: ## install Debian's Chromium if it is missing and this is root's machine to change
+	@command -v chromium >/dev/null 2>&1 || { \
+		test "$$(id -u)" = 0 && command -v apt-get >/dev/null 2>&1 && \
+		apt-get -qq update && apt-get -qq install --yes --no-install-recommends chromium; } || \
+		echo "no Chromium and no way to install it here: the tests of the page will skip" >&2
+
+screenshots: $(STAMP) ## fly with the live page, and make its pictures in docs/figures
+	$(BIN)/python -m benchmarks.screenshots
 
 clean: ## remove the environment and everything that was generated
 	rm -rf $(VENV) runs dist bench.json soak.json .pytest_cache .mypy_cache .ruff_cache .hypothesis

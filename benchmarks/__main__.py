@@ -15,6 +15,7 @@ from benchmarks.figures import Figure, show, write
 from benchmarks.flights import cold_start_figures, memory_figures, real_figures, virtual_figures
 from benchmarks.latency import latency_figures
 from benchmarks.load import load_figures
+from benchmarks.page import page_figures
 
 BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
     "codec": codec_figures,
@@ -25,6 +26,7 @@ BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
     "latency": latency_figures,
     "fastest": fastest_figures,
     "load": load_figures,
+    "page": page_figures,
 }
 
 

@@ -26,6 +26,7 @@ class EventKind(StrEnum):
     CONTROLLER = "controller"
     PEER = "peer"
     RECORDING = "recording"
+    CONTROL = "control"
 
 
 @dataclass(frozen=True, slots=True)

@@ -61,6 +61,11 @@ class History:
                 return kept.state
         return None
 
+    def last_words(self, count: int) -> list[Word]:
+        """Return the words of the last samples, oldest first; may be called from another thread."""
+        # Copied in one go: the flight's thread may add to it meanwhile.
+        return [kept.word for kept in tuple(self._kept)[-count:]]
+
     def failure_row(
         self, epoch: int, sample: int, digest: int, peer_digest: int, peer: bytes
     ) -> tuple[object, ...]:

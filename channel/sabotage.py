@@ -35,11 +35,17 @@ def parse_sabotage(text: str) -> Sabotage:
 
 
 class SabotagedCodec(Codec):
-    """A codec that makes one small mistake."""
+    """A codec that makes one small mistake; without a `sabotage`, none until it is armed."""
 
-    def __init__(self, codec: Codec, sabotage: Sabotage) -> None:
+    def __init__(self, codec: Codec, sabotage: Sabotage | None = None) -> None:
         super().__init__(codec.model, codec.coder, codec.ticks_per_sample)
-        size = len(getattr(codec.initial(), sabotage.part))
+        self._sabotage: Sabotage | None = None
+        if sabotage is not None:
+            self.arm(sabotage)
+
+    def arm(self, sabotage: Sabotage) -> None:
+        """Make this mistake from now on, and no other; ValueError for a field that does not exist."""
+        size = len(getattr(self.initial(), sabotage.part))
         if sabotage.index >= size:
             raise ValueError(
                 f"sabotage: {sabotage.part}.{sabotage.index} does not exist; the codec's "
@@ -50,11 +56,11 @@ class SabotagedCodec(Codec):
     def close(self, state: CodecState, opened: OpenSample, model: Vector) -> CodecState:
         """Return the state after the sample, wrong in one bit after the one named."""
         closed = super().close(state, opened, model)
-        if state.sample != self._sabotage.sample:
+        sabotage = self._sabotage
+        if sabotage is None or state.sample != sabotage.sample:
             return closed
-        values = list(getattr(closed, self._sabotage.part))
-        index = self._sabotage.index
-        values[index] = math.nextafter(values[index], math.inf)
-        if self._sabotage.part == "model":
+        values = list(getattr(closed, sabotage.part))
+        values[sabotage.index] = math.nextafter(values[sabotage.index], math.inf)
+        if sabotage.part == "model":
             return closed._replace(model=tuple(values))
         return closed._replace(coder=tuple(values))

@@ -41,6 +41,8 @@ class Agreement:
     codec: Codec
     terms: Terms
     identity: Identity
+    live: bool = False
+    """whether line, codec and set-point may be changed in flight, by hand"""
 
     @property
     def flight_ticks(self) -> int:

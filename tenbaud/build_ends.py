@@ -34,7 +34,7 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
     """Return the sensor node of a configuration."""
     config, terms = agreement.config, agreement.terms
     session = TransmitterSession(
-        sabotaged(agreement.codec, config.transmitter.sabotage),
+        sabotaged(agreement.codec, config.transmitter.sabotage, agreement.live),
         terms,
         agreement.identity,
         secrets.randbits(32),
@@ -70,16 +70,16 @@ def build_line(agreement: Agreement, direction: Direction, wire: Wire) -> Line:
     """Return one direction of the line, with what goes wrong on it."""
     one = agreement.faults.up if direction == "up" else agreement.faults.down
     delay_ns = agreement.terms.symbol_delay_ns if direction == "up" else 0
-    if not one.any:
+    if not one.any and not agreement.live:
         return Line(delay_ns)
     alphabet = agreement.codec.coder.alphabet
     return ImpairedLine(one, alphabet, f"{agreement.config.seed} {direction}", wire, delay_ns)
 
 
-def sabotaged(codec: Codec, text: str) -> Codec:
-    """Return the codec, spoilt as the configuration asks."""
+def sabotaged(codec: Codec, text: str, live: bool = False) -> Codec:
+    """Return the codec, spoilt as the configuration asks; `live`: ready to be spoilt in flight."""
     if not text:
-        return codec
+        return SabotagedCodec(codec) if live else codec
     try:
         return SabotagedCodec(codec, parse_sabotage(text))
     except ValueError as error:
@@ -87,13 +87,20 @@ def sabotaged(codec: Codec, text: str) -> Codec:
 
 
 def build_receiver(
-    agreement: Agreement, recorder: Recorder | None, wire: Wire, take_over: bool = False
+    agreement: Agreement,
+    recorder: Recorder | None,
+    wire: Wire,
+    take_over: bool = False,
+    reference: Reference | None = None,
 ) -> ReceiverEndpoint:
-    """Return the controller node of a configuration; `take_over` from another one, on purpose."""
+    """Return the controller node of a configuration.
+
+    `take_over` from another one, on purpose; it follows `reference` if one is given.
+    """
     session = ReceiverSession(
-        sabotaged(agreement.codec, agreement.config.receiver.sabotage),
+        sabotaged(agreement.codec, agreement.config.receiver.sabotage, agreement.live),
         agreement.terms,
-        build_controller(agreement.config),
+        build_controller(agreement.config, reference),
         agreement.identity,
         secrets.randbits(31) + 1,
         recorder,
@@ -124,15 +131,15 @@ def build_guard(agreement: Agreement) -> Guard:
     return Guard(terms.limits, settings)
 
 
-def build_controller(config: FlightConfig) -> Controller:
-    """Return the controller."""
+def build_controller(config: FlightConfig, reference: Reference | None = None) -> Controller:
+    """Return the controller; it follows `reference` instead of the configured one if it is given."""
     section = config.receiver
     if section.controller == "recorded":
         return RecordedController(read_flight_log(config))
     pid = section.pid
     return Pid(
         PidGains(pid.proportional, pid.integral, pid.derivative, pid.unit),
-        build_reference(config),
+        reference or build_reference(config),
         config.timing.tick_s,
         volts_max=config.limits.volts_max,
         normal_force_volts=pid.normal_force_volts,

@@ -6,6 +6,8 @@ and calls `actuate`. Nothing here knows which driver it is.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from channel.codec import Vector
 from channel.events import EVENT_CHANNEL, Event, EventKind, event_row
 from channel.frames import Frame, Why
@@ -52,6 +54,8 @@ class TransmitterNode:
         self.sensor_fault: str | None = None
         self.tick = 0
         self.rearmed = 0
+        self.at_tick: Callable[[int], None] | None = None
+        """called before every tick: where a person's commands take hold"""
         self._rearm_ticks = rearm_ticks
         self._gauge_samples = max(1, round(GAP_EVERY_S * 1e9 / session.terms.sample_ns))
         self._recorder = recorder or NullRecorder()
@@ -63,6 +67,8 @@ class TransmitterNode:
     def measure(self, tick: int) -> list[Frame] | None:
         """Read the rig; return the frames to send, or None when the rig has no more to read."""
         self.tick = tick
+        if self.at_tick is not None:
+            self.at_tick(tick)
         reading = self.rig.read(tick)
         if reading is None:
             return None

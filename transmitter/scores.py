@@ -69,6 +69,10 @@ class Scores:
         self._angles: deque[tuple[int, float]] = deque(maxlen=span_ticks)
         self._estimates: deque[tuple[int, float, float | None]] = deque(maxlen=span_ticks)
 
+    def forget_reference(self) -> None:
+        """Score no more tracking: the set-point is no longer the one that is known here."""
+        self._reference = lambda _tick: None
+
     def on_angles(self, tick: int, angles_rad: Vector) -> None:
         """Note the angles of a tick; ticks come in order."""
         angle = angles_rad[0]

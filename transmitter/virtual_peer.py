@@ -31,11 +31,17 @@ class LinkPeer:
         self._should_stop = should_stop
         self._meanwhile = meanwhile
         self._number = 0
+        self._message = b""
+
+    def keep_alive(self) -> None:
+        """Repeat the last step, which changes nothing, so that a paused flight is not given up."""
+        if self._message:
+            self._link.send(self._message)
 
     def step(self, time_ns: int, data: bytes | None) -> Reply:
         """Send one step and wait for its reply."""
         self._number += 1
-        message = encode_step(Step(self._number, time_ns, data))
+        message = self._message = encode_step(Step(self._number, time_ns, data))
         self._link.send(message)
         asked_at = time.monotonic()
         self._meanwhile()

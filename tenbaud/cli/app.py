@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tenbaud.cli import demo, doctor, figures, identify, keys, nodes, rig, router, runs
+from tenbaud.cli import demo, doctor, figures, identify, keys, nodes, rig, router, runs, view
 from tenbaud.flight.outcome import ExitCode, outcome_of
 
 app = typer.Typer(
@@ -44,6 +44,7 @@ def _root(
 app.command()(demo.demo)
 app.command()(nodes.transmit)
 app.command()(nodes.receive)
+app.command()(view.view)
 app.command()(router.router)
 app.add_typer(keys.app, name="keys")
 app.command()(identify.identify)

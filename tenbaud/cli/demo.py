@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +12,12 @@ from tenbaud.cli import options
 if TYPE_CHECKING:
     from tenbaud.build import Agreement
     from tenbaud.flight.demo import DemoResult
+    from tenbaud.flight.viewing import ViewWish
     from tenbaud.recording.folder import RunFolder
 
 DEFAULT_MISMATCHES = (0.0, 0.1)
+VIEW_DURATION_S = 3600.0
+"""A flight that is looked at lasts until somebody stops it, or this long."""
 
 
 def demo(
@@ -37,6 +39,10 @@ def demo(
     on_desync: options.OnDesync = None,
     sabotage: options.Sabotage = None,
     settings: options.Settings = None,
+    view: options.View = False,
+    view_port: options.ViewPort = 8710,
+    open_browser: options.OpenBrowser = False,
+    pace: options.Pace = None,
     out: options.Out = None,
     json: options.AsJson = False,
 ) -> None:
@@ -46,12 +52,16 @@ def demo(
 
     [dim]tenbaud demo --preset tuned-10baud --clock real --duration 20 --mismatch 0.1[/dim]
 
+    [dim]tenbaud demo --view[/dim]
+
     [dim]tenbaud demo --impair "loss=0.3,up:flip=0.02" --sabotage sample=700,field=range[/dim]
     """
+    if view and duration is None and config is None:
+        duration = VIEW_DURATION_S
     replayed = rig is not None and rig.startswith("replay")
     flights: list[float | None] = list(mismatch or ())
     if not flights:
-        single = json or config is not None or (rig or "simulated") != "simulated"
+        single = json or view or config is not None or (rig or "simulated") != "simulated"
         flights = [None] if single else list(DEFAULT_MISMATCHES)
     if preset is None and config is None and replayed:
         preset = "uiuc-10baud"
@@ -76,7 +86,24 @@ def demo(
         for off in flights
     ]
     agreements = _agree_all(preset, config, changes, clock)
-    raise typer.Exit(_fly_all(agreements, out, json))
+    wish = _view_wish(agreements, view_port, pace, open_browser) if view else None
+    raise typer.Exit(_fly_all(agreements, out, json, wish))
+
+
+def _view_wish(
+    agreements: list[Agreement], port: int, pace: float | None, open_browser: bool
+) -> ViewWish:
+    """Return how the flight is to be looked at, checked before anything starts."""
+    from tenbaud.flight.viewing import ViewWish
+    from tenbaud.view.server import Address, free_port, require_nicegui
+
+    if len(agreements) > 1 or agreements[0].config.link.kind == "memory":
+        raise typer.BadParameter("--view shows one flight of two processes: one --mismatch, no memory")
+    require_nicegui()
+    address = Address(port=port or free_port("127.0.0.1"))
+    address.check()
+    virtual = agreements[0].clock == "virtual"
+    return ViewWish(address.port, (pace or 1.0) if virtual else None, open_browser)
 
 
 def _agree_all(
@@ -96,7 +123,9 @@ def _agree_all(
     return agreements
 
 
-def _fly_all(agreements: list[Agreement], out: options.Out, as_json: bool) -> int:
+def _fly_all(
+    agreements: list[Agreement], out: options.Out, as_json: bool, wish: ViewWish | None
+) -> int:
     from tenbaud.flight.ends import write_json
     from tenbaud.flight.report import show_summaries
     from tenbaud.recording.folder import RunFolder, create_run_folder
@@ -108,7 +137,7 @@ def _fly_all(agreements: list[Agreement], out: options.Out, as_json: bool) -> in
         if out is not None and index:
             explicit = out.with_name(f"{out.name}-{index + 1}")
         folder = RunFolder(create_run_folder(None, agreement.config.preset, explicit))
-        result = _fly_shown(agreement, folder)
+        result = _fly_shown(agreement, folder, wish)
         results.append(result)
         folders.append(folder)
         if as_json:
@@ -122,27 +151,10 @@ def _fly_all(agreements: list[Agreement], out: options.Out, as_json: bool) -> in
     return int(results[-1].code)
 
 
-def _fly_shown(agreement: Agreement, folder: RunFolder) -> DemoResult:
-    """Fly once, with a progress bar where there is a terminal to see it."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
+def _fly_shown(agreement: Agreement, folder: RunFolder, wish: ViewWish | None) -> DemoResult:
+    """Fly once, and show how it goes."""
     from tenbaud.flight.demo import fly_demo
-    from tenbaud.flight.status import Status
+    from tenbaud.flight.status import StatusDisplay
 
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as bar:
-        task = bar.add_task("starting", total=agreement.flight_ticks)
-
-        def on_status(status: Status) -> None:
-            if status["role"] == "transmitter":
-                bar.update(task, completed=status["tick"], description=_line(status))
-
-        return fly_demo(agreement, folder, on_status)
-
-
-def _line(status: dict[str, object]) -> str:
-    from tenbaud.flight.status import status_line
-
-    return status_line(status)
+    with StatusDisplay() as display:
+        return fly_demo(agreement, folder, display.show, view=wish)

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from channel.links.base import Role
     from tenbaud.config.schema import FlightConfig
     from tenbaud.flight.ends import Endpoints
+    from tenbaud.recording.folder import RunFolder
 
 
 @spread
@@ -28,6 +29,7 @@ def transmit(
     ] = None,
     disturbance: options.Disturbance = None,
     on_desync: options.OnDesync = None,
+    pace: options.Pace = None,
 ) -> None:
     """Run the sensor node: the rig, and one bit per sample to the receiver.
 
@@ -48,7 +50,7 @@ def transmit(
         disturbance=disturbance,
         on_desync=on_desync,
     )
-    _run("transmitter", node, addresses, changed)
+    _run("transmitter", node, addresses, changed, pace=pace)
 
 
 @spread
@@ -79,7 +81,7 @@ def receive(
     """
     changed = node.changes(rig=rig, sabotaged_end="receiver")
     if sessions is None:
-        _run("receiver", node, addresses, changed, take_over)
+        _run("receiver", node, addresses, changed, take_over=take_over)
         return
     from tenbaud.cli import many
 
@@ -95,8 +97,12 @@ def _run(
     node: options.NodeOptions,
     addresses: options.Addresses,
     changed: dict[str, Any],
+    *,
     take_over: bool = False,
+    pace: float | None = None,
 ) -> None:
+    from dataclasses import replace
+
     from tenbaud.build import agree
     from tenbaud.build_ends import check_parts
     from tenbaud.cli.addresses import endpoints_of
@@ -104,11 +110,14 @@ def _run(
     from tenbaud.flight import ends
     from tenbaud.flight.outcome import ExitCode
     from tenbaud.recording.folder import RunFolder, create_run_folder
+    from tenbaud.telemetry.station import Wish
 
     config = load_config(node.preset, node.config, changed)
-    agreement = agree(config, node.clock.value)
-    endpoints = endpoints_of(role, addresses, config, take_over)
+    wish = Wish(node.telemetry, node.allow_control, pace)
+    agreement = replace(agree(config, node.clock.value), live=wish.control)
+    endpoints = replace(endpoints_of(role, addresses, config, take_over), telemetry=wish)
     check_parts(config)
+    wish.check(role, endpoints.insecure)
     whole = node.run_folder is None
     folder = RunFolder(node.run_folder or create_run_folder(None, f"{role}-{config.preset}", node.out))
     if whole:
@@ -118,13 +127,7 @@ def _run(
     mode = node.status if node.status in ("lines", "none") else "auto"
     outcome, summary = run_end(agreement, endpoints, folder, mode)  # type: ignore[arg-type]
     if whole:
-        from tenbaud.flight.report import draw_run, figure_title, write_summary
-
-        write_summary(folder, summary)
-        if role == "transmitter" and summary["samples"]:
-            problem = draw_run(folder, figure_title(config, summary))
-            if problem is not None:
-                typer.echo(problem, err=True)
+        _write_up(role, config, folder, summary)
     if node.json:
         ends.write_json(summary)
     elif whole and summary["samples"]:
@@ -136,8 +139,18 @@ def _run(
         raise typer.Exit(int(outcome.code))
 
 
+def _write_up(role: Role, config: FlightConfig, folder: RunFolder, summary: dict[str, Any]) -> None:
+    from tenbaud.flight.report import draw_run, figure_title, write_summary
+
+    write_summary(folder, summary)
+    if role == "transmitter" and summary["samples"]:
+        problem = draw_run(folder, figure_title(config, summary))
+        if problem is not None:
+            typer.echo(problem, err=True)
+
+
 def _introduce(
-    role: Role, identity: Any, config: FlightConfig, endpoints: Endpoints, folder: Any
+    role: Role, identity: Any, config: FlightConfig, endpoints: Endpoints, folder: RunFolder
 ) -> None:
     link = config.link
     ports = tuple(filter(None, (link.port, link.downlink))) if link.kind == "serial" else ()

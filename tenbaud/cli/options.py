@@ -176,6 +176,39 @@ TakeOver = Annotated[
 RunFolder = Annotated[
     Path | None, typer.Option("--run-folder", hidden=True, help="Existing folder of the run.")
 ]
+Telemetry = Annotated[
+    str,
+    typer.Option(
+        help="For viewers: on, off, or a Zenoh endpoint to listen on. Not given: on, on a socket that "
+        "only this user can open; off beside an insecure link that leaves this machine.",
+        show_default=False,
+    ),
+]
+AllowControl = Annotated[
+    bool,
+    typer.Option(
+        "--allow-control",
+        help="Let viewers change set-point, line and codec in flight; every change is recorded.",
+    ),
+]
+Pace = Annotated[
+    float | None,
+    typer.Option(min=0.05, help="Virtual clock: at most so many times real time.", show_default=False),
+]
+View = Annotated[
+    bool,
+    typer.Option(
+        "--view",
+        help="Serve a live page of the flight, from which it can be steered and broken. It flies in "
+        "real time (--pace for other speeds) for an hour, or --duration, or until Ctrl-C.",
+    ),
+]
+ViewPort = Annotated[
+    int, typer.Option(min=0, max=65535, help="Port of the live page; 0: any free one.")
+]
+OpenBrowser = Annotated[
+    bool, typer.Option("--open", help="Open the live page in the browser of this machine.")
+]
 Status = Annotated[str, typer.Option(hidden=True, help="auto, lines or none.")]
 DryRun = Annotated[
     bool, typer.Option("--dry-run", help="Read the rig and never drive it: no command is sent.")
@@ -213,6 +246,8 @@ class NodeOptions:
     impair: Impair = None
     sabotage: Sabotage = None
     settings: Settings = None
+    telemetry: Telemetry = ""
+    allow_control: AllowControl = False
     out: Out = None
     json: AsJson = False
     run_folder: RunFolder = None

@@ -302,6 +302,13 @@ class LinkSection(Section):
         return value
 
 
+class TelemetrySection(Section):
+    """What viewers are told while the flight goes on."""
+
+    rate_hz: Annotated[float, Field(gt=0.0, le=100.0)] = 20.0
+    """messages per second of each end"""
+
+
 class FlightConfig(Section):
     """Everything about a flight."""
 
@@ -319,6 +326,7 @@ class FlightConfig(Section):
     receiver: ReceiverSection = ReceiverSection()
     flight_log: FlightLogSection = FlightLogSection()
     link: LinkSection = LinkSection()
+    telemetry: TelemetrySection = TelemetrySection()
 
     def shared_json(self, lead_ticks: int) -> str:
         """Return the shared part as canonical JSON, with the command lead that was chosen."""

@@ -28,6 +28,7 @@ from tenbaud.flight.report import draw_run, figure_title, write_summary
 from tenbaud.flight.status import Status
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, joined
+from tenbaud.flight.viewing import Viewing, ViewWish, page_beside
 from tenbaud.recording.folder import RunFolder
 from tenbaud.serial_line import EmulatedLine
 
@@ -46,16 +47,25 @@ class DemoResult:
 
 
 def fly_demo(
-    agreement: Agreement, folder: RunFolder, on_status: OnStatus, *, draw: bool = True
+    agreement: Agreement,
+    folder: RunFolder,
+    on_status: OnStatus,
+    *,
+    draw: bool = True,
+    view: ViewWish | None = None,
 ) -> DemoResult:
-    """Fly once into an existing, empty run folder; write summary and, if wished, figure there."""
+    """Fly once into an existing, empty run folder; write summary and, if wished, figure there.
+
+    `view`: serve the live page beside the flight, which may then be steered from it.
+    """
     folder.config.write_text(dump_config(agreement.config))
     if agreement.config.link.kind == "memory":
         outcome, upper, lower = run_in_memory(agreement, folder, "auto")
         messages = [] if outcome.code is ExitCode.OK else [outcome.text]
         result = DemoResult(joined(upper, lower), outcome.code, messages)
     else:
-        result = _fly_processes(agreement, folder, on_status)
+        with page_beside(view) as viewing:
+            result = _fly_processes(agreement, folder, on_status, viewing)
     write_summary(folder, result.summary)
     problem = draw_run(folder, figure_title(agreement.config, result.summary)) if draw else None
     if problem is not None:
@@ -63,8 +73,11 @@ def fly_demo(
     return result
 
 
-def _fly_processes(agreement: Agreement, folder: RunFolder, on_status: OnStatus) -> DemoResult:
+def _fly_processes(
+    agreement: Agreement, folder: RunFolder, on_status: OnStatus, viewing: Viewing
+) -> DemoResult:
     with StopFlag() as stop, _meeting_place(agreement) as (up, down):
+        down, up = down + viewing.receiver, up + viewing.transmitter
         receiver = _Child("receiver", agreement, folder, down, on_status)
         transmitter = _Child("transmitter", agreement, folder, up, on_status)
         ends = (transmitter, receiver)
@@ -123,7 +136,9 @@ def _wait(ends: tuple[_Child, _Child], stop: StopFlag) -> None:
                 continue
         if stop() and not passed_on:
             passed_on = True
-            for end in ends:
+            # Where the transmitter owns the time it also ends the receiver's part, by its farewell.
+            own_time = ends[0].agreement.clock == "virtual"
+            for end in ends[:1] if own_time else ends:
                 end.signal(signal.SIGINT)
         if passed_on or any(end.process.poll() is not None for end in ends):
             patience_s -= 0.1

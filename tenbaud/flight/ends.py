@@ -25,10 +25,15 @@ from tenbaud.flight.summary import Summary, gap_part, link_part, receiver_part, 
 from tenbaud.recording.folder import RunFolder
 from tenbaud.recording.shared import SharedWriter
 from tenbaud.recording.writer import McapRecorder
+from tenbaud.telemetry.compose import ReceiverComposer, TransmitterComposer
+from tenbaud.telemetry.live import LiveTransmitter
+from tenbaud.telemetry.station import NO_WISH, Station, Wish, open_station
 
 Stop = Callable[[], bool]
 SWITCH_INTERVAL_S = 0.0002
 """A busy recorder thread may keep the loop waiting this long; Python's default is 5 ms."""
+
+WORDS_SHOWN = 48
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +50,7 @@ class Endpoints:
     """TLS, and who is let in; None: plain"""
     take_over: bool = False
     """receiver: take a flight over from the receiver that has it"""
+    telemetry: Wish = NO_WISH
 
 
 def open_link(
@@ -83,12 +89,17 @@ def run_transmitter(
 ) -> tuple[Outcome, Summary]:
     """Fly one flight as the transmitter; the outcome says how it ended."""
     with _end(agreement, "transmitter", folder) as (recorder, stop):
+        station = _station(agreement, "transmitter", recorder, endpoints)
         with knocks(endpoints) as refused, open_link(agreement, "transmitter", endpoints, stop) as link:
-            run = transmit.prepare(agreement, recorder, link.wire)
-            with StatusReporter(lambda: transmitter_status(run), status):
-                outcome = _guarded(lambda: _fly(run, link, stop, recorder))
+            run = transmit.prepare(agreement, station.recorder, link.wire)
+            live = station.fly_transmitter(run, stop)
+            with (
+                station.publishing(lambda tap: TransmitterComposer(run, tap, live)),
+                StatusReporter(lambda: transmitter_status(run), status),
+            ):
+                outcome = _guarded(lambda: _fly(run, link, stop, recorder, live))
             run.node.rest()
-        summary = transmitter_part(run, outcome) | link_part(link, refused)
+        summary = transmitter_part(run, outcome) | link_part(link, refused) | station.summary()
         return outcome, _with_recording(summary, recorder)
 
 
@@ -97,14 +108,22 @@ def run_receiver(
 ) -> tuple[Outcome, Summary]:
     """Serve one flight as the receiver; the outcome says how it ended."""
     with _end(agreement, "receiver", folder) as (recorder, stop):
+        station = _station(agreement, "receiver", recorder, endpoints)
         with knocks(endpoints) as refused, open_link(agreement, "receiver", endpoints, stop) as link:
-            endpoint = build_receiver(agreement, recorder, link.wire, endpoints.take_over)
-            with StatusReporter(lambda: receiver_status(agreement, endpoint), status):
+            endpoint = build_receiver(
+                agreement, station.recorder, link.wire, endpoints.take_over, station.steering
+            )
+            live = station.fly_receiver(endpoint, stop)
+            with (
+                station.publishing(lambda tap: ReceiverComposer(agreement, endpoint, tap, live)),
+                StatusReporter(lambda: receiver_status(agreement, endpoint), status),
+            ):
                 outcome = _guarded(
-                    lambda: receive.serve(agreement, endpoint, link, stop, recorder.help_out)
+                    lambda: receive.serve(agreement, endpoint, link, live, recorder.help_out)
                 )
             endpoint.session.rest()
         summary = receiver_part(agreement, endpoint, outcome) | link_part(link, refused)
+        summary |= station.summary()
         return outcome, _with_recording(summary, recorder)
 
 
@@ -178,6 +197,9 @@ def transmitter_status(run: transmit.TransmitterRun) -> Status:
         "range_rad": coder.ranges(node.session.copies.confirmed.coder)[0],
         "erasures": node.session.counts["erasures"],
         "desyncs": node.session.counts["desyncs"],
+        "digest_checks": node.session.counts["digest_checks"],
+        "rejoins": node.session.counts["rejoins"],
+        "words": node.session.history.last_words(WORDS_SHOWN),
         "guard": node.guard.state.value,
         **gap_part(node.gauge.now if node.gauge is not None else None),
     }
@@ -193,6 +215,7 @@ def receiver_status(agreement: Agreement, endpoint: ReceiverEndpoint) -> Status:
         "pitch_rad": session.state.model[0],
         "range_rad": agreement.codec.coder.ranges(session.state.coder)[0],
         "erasures": session.counts["erasures"],
+        "words": session.history.last_words(WORDS_SHOWN),
         "baud": session.meter.baud,
     }
 
@@ -215,7 +238,18 @@ def _end(
         yield recorder, stop
 
 
-def _fly(run: transmit.TransmitterRun, link: Link, stop: StopFlag, recorder: McapRecorder) -> Outcome:
+def _station(agreement: Agreement, role: Role, recorder: McapRecorder, endpoints: Endpoints) -> Station:
+    addresses = endpoints.listen + endpoints.connect
+    return open_station(agreement, role, recorder, endpoints.telemetry, addresses, endpoints.insecure)
+
+
+def _fly(
+    run: transmit.TransmitterRun,
+    link: Link,
+    stop: StopFlag,
+    recorder: McapRecorder,
+    live: LiveTransmitter,
+) -> Outcome:
     if run.agreement.clock == "real":
         return transmit.fly_real(run, link, stop)
 
@@ -223,7 +257,9 @@ def _fly(run: transmit.TransmitterRun, link: Link, stop: StopFlag, recorder: Mca
         run.node.rest()
         recorder.help_out()
 
-    return transmit.fly_virtual(run, transmit.link_peer(run, link, stop, meanwhile), stop)
+    peer = transmit.link_peer(run, link, stop, meanwhile)
+    live.keep_alive = peer.keep_alive
+    return transmit.fly_virtual(run, peer, stop)
 
 
 def _guarded(fly: Callable[[], Outcome]) -> Outcome:

@@ -44,6 +44,8 @@ class TransmitterRun:
     flight_s: float = 0.0
     """wall-clock time of the flight itself"""
     wire_bytes_down: int = 0
+    desyncs_asked: float = 0.0
+    """lockstep failures that were asked for while the flight went on"""
     extra: dict[str, Any] = field(default_factory=dict)
     """figures of the clock that was flown on"""
 
@@ -161,7 +163,8 @@ def _outcome(run: TransmitterRun, peer_present: bool) -> Outcome:
             ExitCode.LINK_LOST, "the flight ended while the transmitter was asking for a common state"
         )
     desyncs = session.counts["desyncs"]
-    if session.desync is not None and desyncs > run.agreement.desyncs_expected:
+    expected = run.agreement.desyncs_expected + run.desyncs_asked
+    if session.desync is not None and desyncs > expected:
         return Outcome(
             ExitCode.DESYNC,
             f"the copies of the codec differed {desyncs} time(s) and nobody asked for it; the flight "

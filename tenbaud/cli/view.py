@@ -1,0 +1,51 @@
+"""`tenbaud view`: a live page of a flight in the browser."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+
+def view(
+    connect: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Where an end was told to listen with --telemetry; repeatable. Not given: flights of "
+            "this user on this machine are found.",
+            show_default=False,
+        ),
+    ] = None,
+    session: Annotated[str, typer.Option(help="Session name; any if not given.")] = "**",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Of the page; 0: any free one.")] = 8710,
+    host: Annotated[
+        str, typer.Option(help="Address of the page; one beyond this machine needs --insecure.")
+    ] = "127.0.0.1",
+    open_browser: Annotated[
+        bool, typer.Option("--open", help="Open the page in the browser of this machine.")
+    ] = False,
+    insecure: Annotated[
+        bool, typer.Option(help="Allow other machines to reach the page; it has no password.")
+    ] = False,
+    schema: Annotated[
+        bool, typer.Option("--schema", help="Print the JSON schema of the telemetry and end.")
+    ] = False,
+) -> None:
+    """Serve a live page of a flight, for the browser: picture, curves, bits, lockstep, controls.
+
+    [dim]tenbaud demo --view[/dim]
+
+    [dim]tenbaud view --connect tcp/127.0.0.1:7448 --connect tcp/127.0.0.1:7449[/dim]
+    """
+    if schema:
+        import json
+
+        from tenbaud.telemetry.schema import schema_json
+
+        typer.echo(json.dumps(schema_json(), indent=2))
+        return
+    from tenbaud.view.feed import Feed
+    from tenbaud.view.server import Address, free_port, serve
+
+    address = Address(host, port or free_port(host), insecure)
+    serve(Feed(tuple(connect or ()), session), address, open_browser=open_browser)

@@ -1,0 +1,39 @@
+"""What a person asks of a running flight: read on the network's thread, taken by the loop's.
+
+The loop takes commands at its own boundaries, so that each has an exact place in the flight, and
+writes every one down as an event. A flight that nobody steers is the same as one that allows none.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+from pydantic import ValidationError
+
+from tenbaud.telemetry.schema import COMMAND, Command
+
+WAITING_MAX = 64
+
+
+class CommandQueue:
+    """A bounded queue; commands that make no sense, or come while it is full, are counted and gone."""
+
+    def __init__(self) -> None:
+        self.refused = 0
+        self._waiting: deque[Command] = deque()
+
+    def offer(self, data: bytes) -> None:
+        """Take the bytes of one command; called by a thread of the network."""
+        try:
+            command = COMMAND.validate_json(data)
+        except ValidationError:
+            self.refused += 1
+            return
+        if len(self._waiting) >= WAITING_MAX:
+            self.refused += 1
+        else:
+            self._waiting.append(command)
+
+    def take(self) -> Command | None:
+        """Return the next command, None when none waits; called by the loop, at its boundaries."""
+        return self._waiting.popleft() if self._waiting else None

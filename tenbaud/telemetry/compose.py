@@ -1,0 +1,261 @@
+"""From the rows that the loop left to one message: done by the telemetry's own thread."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from channel.codec import Vector
+from channel.recording import RecordChannel
+from receiver.endpoint import ReceiverEndpoint
+from receiver.records import SAMPLE_CHANNEL as TAKEN
+from receiver.records import TICK_CHANNEL as DECIDED
+from tenbaud.build import Agreement
+from tenbaud.flight.transmit import TransmitterRun
+from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
+from tenbaud.telemetry.schema import SCHEMA_VERSION
+from tenbaud.telemetry.tap import Tap
+from transmitter.records import ESTIMATE_CHANNEL, SAMPLE_CHANNEL, TICK_CHANNEL
+
+POINT_PERIOD_S = 0.05
+POINTS_MAX = 16
+SAMPLES_MAX = 64
+EVENTS_MAX = 20
+TICKS_WAITING_MAX = 512
+LATENESS_TICKS = 1000
+EVENT_TEXT_MAX = 300
+
+Row = Any
+"""a row as its channel describes it; the values are read by position, which `_at` gives"""
+
+
+def _at(channel: RecordChannel, *names: str) -> list[int]:
+    known = [field.name for field in channel.fields]
+    return [known.index(name) for name in names]
+
+
+T_TICK, T_TIME, T_MEASURED, T_TRUE, T_APPLIED, T_LATE_MS = _at(
+    TICK_CHANNEL, "tick", "time_s", "measured_rad", "true_rad", "applied_volts", "lateness_ms"
+)
+E_TICK, E_CODED, E_LIVE = _at(ESTIMATE_CHANNEL, "tick", "coded_state", "live_state")
+S_SAMPLE, S_SENT, S_WORD, S_RANGE, S_DIGEST, S_PEER = _at(
+    SAMPLE_CHANNEL, "sample", "word_sent", "word", "range", "digest", "peer_digest"
+)
+D_TICK, D_REFERENCE, D_LIVE = _at(DECIDED, "tick", "reference_rad", "live_state")
+R_SAMPLE, R_WORD, R_DIGEST = _at(TAKEN, "sample", "word", "digest")
+
+
+class _Composer:
+    """What both ends' messages have in common."""
+
+    def __init__(self, agreement: Agreement, tap: Tap) -> None:
+        self.agreement = agreement
+        self.tap = tap
+        self.skipped = 0
+        """messages that were not sent, because their time had passed or the network refused"""
+        self._number = 0
+        self._measured = agreement.codec.model.measured
+        self._stride = max(1, round(POINT_PERIOD_S / (agreement.terms.tick_ns / 1e9)))
+
+    def _common(self, session: Any, impairments: str, rows: list[tuple[str, Row]]) -> dict[str, Any]:
+        self._number += 1
+        events = [row for topic, row in rows if topic == "event"][-EVENTS_MAX:]
+        return {
+            "version": SCHEMA_VERSION,
+            "session": self.agreement.config.link.session,
+            "flight": session.session_number,
+            "number": self._number,
+            "phase": session.phase.value,
+            "clock": self.agreement.clock,
+            "takes_commands": self.agreement.live,
+            "epoch": session.epoch,
+            "impairments": impairments,
+            "events": [
+                {"time_s": time_s, "kind": kind, "sample": sample, "text": text[:EVENT_TEXT_MAX]}
+                for time_s, kind, sample, text in events
+            ],
+            "dropped": self.tap.dropped + self.skipped,
+        }
+
+    def _angle(self, state: Vector | None) -> float | None:
+        return None if state is None else self._measured(state)[0]
+
+
+class TransmitterComposer(_Composer):
+    """Composes the transmitter's messages. `gap` gives the gap to the limit where it is known."""
+
+    def __init__(
+        self,
+        run: TransmitterRun,
+        tap: Tap,
+        live: LiveTransmitter,
+        gap: Callable[[], float | None] = lambda: None,
+    ) -> None:
+        super().__init__(run.agreement, tap)
+        self._run = run
+        self._live = live
+        self._gap = gap
+        self._range = 0.0
+        self._angles: dict[int, tuple[float, float, float | None]] = {}
+        self._estimates: dict[int, tuple[float, float | None, float]] = {}
+        self._lateness_ms: deque[float] = deque(maxlen=LATENESS_TICKS)
+        self._volts: list[float] | None = None
+
+    def compose(self) -> dict[str, Any]:
+        """Return the message of this moment."""
+        run, config, terms = self._run, self.agreement.config, self.agreement.terms
+        node, session = run.node, run.node.session
+        rows = self.tap.take()
+        points, samples = self._read(rows)
+        gap = self._gap()
+        return {
+            "role": "transmitter",
+            **self._common(session, self._live.impairments, rows),
+            "time_s": node.tick * terms.tick_ns / 1e9,
+            "counts": {
+                **{name: session.counts[name] for name in COUNTED_UP},
+                "commands_late": node.commands_late,
+                "commands_refused": self._live.queue.refused if self._live.queue else 0,
+            },
+            "preset": config.preset,
+            "tick_s": terms.tick_ns / 1e9,
+            "symbol_period_s": terms.sample_ns / 1e9 / terms.symbols_per_word,
+            "baud_configured": config.channel.rate_baud,
+            "duration_s": self.agreement.flight_ticks * terms.tick_ns / 1e9,
+            "points": _thinned(points, POINTS_MAX),
+            "samples": samples[-SAMPLES_MAX:],
+            "guard": node.guard.state.value,
+            "volts": self._volts,
+            "lateness": self._lateness(),
+            "paused": self._live.paused,
+            "pace": self._live.pace if self.agreement.clock == "virtual" else None,
+            **({} if gap is None else {"gap_to_floor": gap}),
+        }
+
+    def _read(self, rows: list[tuple[str, Row]]) -> tuple[list[Any], list[Any]]:
+        points: list[Any] = []
+        samples: list[Any] = []
+        stride, real = self._stride, self.agreement.clock == "real"
+        for topic, row in rows:
+            if topic == "tick":
+                if real:
+                    self._lateness_ms.append(row[T_LATE_MS])
+                if row[T_TICK] % stride == 0:
+                    true = row[T_TRUE]
+                    angles = (row[T_TIME], row[T_MEASURED][0], None if true is None else true[0])
+                    self._angles[row[T_TICK]] = angles
+                    self._volts = list(row[T_APPLIED])
+                    self._join(row[T_TICK], points)
+            elif topic == "estimate":
+                if row[E_TICK] % stride == 0:
+                    coded = self._measured(row[E_CODED])[0]
+                    self._estimates[row[E_TICK]] = (coded, self._angle(row[E_LIVE]), self._range)
+                    self._join(row[E_TICK], points)
+            elif topic == "sample":
+                self._range = row[S_RANGE][0]
+                samples.append(
+                    {
+                        "sample": row[S_SAMPLE],
+                        "word_sent": _word(row[S_SENT]),
+                        "word": _word(row[S_WORD]),
+                        "digest": row[S_DIGEST],
+                        "peer_digest": row[S_PEER],
+                    }
+                )
+        for waiting in (self._angles, self._estimates):
+            while len(waiting) > TICKS_WAITING_MAX:
+                del waiting[next(iter(waiting))]
+        return points, samples
+
+    def _join(self, tick: int, points: list[Any]) -> None:
+        """Make a point of a tick as soon as both its angle and its estimate are known."""
+        angles, estimates = self._angles.get(tick), self._estimates.get(tick)
+        if angles is None or estimates is None:
+            return
+        del self._angles[tick], self._estimates[tick]
+        (time_s, measured, true), (coded, live, width) = angles, estimates
+        points.append(
+            {
+                "time_s": time_s,
+                "measured_rad": measured,
+                "true_rad": true,
+                "coded_rad": coded,
+                "live_rad": live,
+                "range_rad": width,
+            }
+        )
+
+    def _lateness(self) -> dict[str, float] | None:
+        if not self._lateness_ms:
+            return None
+        ordered = sorted(self._lateness_ms)
+        last = len(ordered) - 1
+        return {
+            "p50_ms": ordered[last // 2],
+            "p99_ms": ordered[round(0.99 * last)],
+            "max_ms": ordered[last],
+        }
+
+
+class ReceiverComposer(_Composer):
+    """Composes the receiver's messages."""
+
+    def __init__(
+        self, agreement: Agreement, endpoint: ReceiverEndpoint, tap: Tap, live: LiveReceiver
+    ) -> None:
+        super().__init__(agreement, tap)
+        self._endpoint = endpoint
+        self._live = live
+
+    def compose(self) -> dict[str, Any]:
+        """Return the message of this moment."""
+        session, terms = self._endpoint.session, self.agreement.terms
+        rows: list[tuple[str, Row]] = self.tap.take()
+        stride = self._stride
+        points = [
+            {
+                "time_s": row[D_TICK] * terms.tick_ns / 1e9,
+                "reference_rad": row[D_REFERENCE],
+                "live_rad": self._measured(row[D_LIVE])[0],
+            }
+            for topic, row in rows
+            if topic == "tick" and row[D_TICK] % stride == 0
+        ]
+        samples = [
+            {"sample": row[R_SAMPLE], "word": _word(row[R_WORD]), "digest": row[R_DIGEST]}
+            for topic, row in rows
+            if topic == "sample"
+        ]
+        steering = self._live.steering
+        return {
+            "role": "receiver",
+            **self._common(session, self._live.impairments, rows),
+            "time_s": session.state.sample * terms.sample_ns / 1e9,
+            "counts": {
+                **{name: session.counts[name] for name in COUNTED_DOWN},
+                "commands_refused": self._live.queue.refused if self._live.queue else 0,
+            },
+            "baud_measured": session.meter.baud,
+            "points": _thinned(points, POINTS_MAX),
+            "samples": samples[-SAMPLES_MAX:],
+            "set_point_rad": None if steering is None else steering.by_hand_rad,
+            "steerable": steering is not None,
+        }
+
+
+COUNTED_UP = ("erasures", "desyncs", "rejoins", "digest_checks", "words_missed", "stale_frames")
+COUNTED_DOWN = ("erasures", "desyncs", "rejoins", "symbols_late", "stale_frames")
+
+
+def _word(word: object) -> list[int] | None:
+    """Return a recorded word as the schema has it: null for an erased one."""
+    return list(word) if isinstance(word, tuple | list) else None
+
+
+def _thinned(points: list[Any], most: int) -> list[Any]:
+    """Return at most so many of the points, the last one included."""
+    if len(points) <= most:
+        return points
+    every = -(-len(points) // most)
+    return points[(len(points) - 1) % every :: every]

@@ -1,0 +1,216 @@
+"""Commands from outside, applied by the loop between two ticks or two messages, and written down.
+
+The recording of a steered flight holds every command as an event, with the sample before which it
+took hold. Which of them were obeyed where:
+
+    set_point      receiver
+    pause, step, pace   transmitter, on the virtual clock, whose time is its own
+    impair         whoever holds the line: the transmitter both ways on the virtual clock, else each end
+                   what it sends
+    spoil          the end named; the transmitter also notes that a difference is now expected
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+
+from channel.events import EVENT_CHANNEL, Event, EventKind, event_row
+from channel.impairments import ImpairedLine, parse_impairments
+from channel.recording import Recorder
+from channel.sabotage import SabotagedCodec, parse_sabotage
+from receiver.endpoint import ReceiverEndpoint
+from receiver.steered import SteeredReference
+from tenbaud.flight.transmit import Stop, TransmitterRun
+from tenbaud.telemetry.commands import CommandQueue
+from tenbaud.telemetry.schema import Command, Impair, Pace, Pause, SetPoint, Spoil, Step
+
+PAUSE_POLL_S = 0.02
+KEEP_ALIVE_S = 0.5
+"""How often a paused flight tells the receiver that it is still there."""
+
+
+class LiveTransmitter:
+    """What is asked of the sensor node; `at_tick` is called by its loop before every tick.
+
+    `pace`: virtual seconds per second at most, None for no limit. `keep_alive` is called now and then
+    while the flight is paused.
+    """
+
+    def __init__(
+        self,
+        run: TransmitterRun,
+        queue: CommandQueue | None,
+        should_stop: Stop,
+        pace: float | None = None,
+        keep_alive: Callable[[], None] = lambda: None,
+    ) -> None:
+        self.queue = queue
+        self.pace = pace
+        self.impairments = run.agreement.config.link.impairments
+        self.keep_alive = keep_alive
+        self._run = run
+        self._should_stop = should_stop
+        self._virtual = run.agreement.clock == "virtual"
+        self._pause_tick: int | None = None
+        self._anchor: tuple[int, float] | None = None
+        """tick and wall-clock time that the pace counts from"""
+        self.paused = False
+
+    def at_tick(self, tick: int) -> None:
+        """Obey what has been asked, and wait as long as the pace or a pause wants."""
+        self._obey(tick)
+        if not self._virtual:
+            return
+        if self._pause_tick is not None:
+            self._stand_still(tick)
+        if self.pace is not None and not self._should_stop():
+            self._keep_pace(tick, self.pace)
+
+    def _obey(self, tick: int) -> None:
+        while self.queue is not None and (command := self.queue.take()) is not None:
+            told = self._one(command, tick)
+            if told:
+                self._run.node.tell(EventKind.CONTROL, f"by hand, before tick {tick}: {told}")
+
+    def _one(self, command: Command, tick: int) -> str | None:
+        """Obey one command; return what to write down, None where it is the other end's alone."""
+        match command:
+            case Pause() | Step() | Pace() if not self._virtual:
+                return "a real clock can be neither stopped nor paced: ignored"
+            case Pause(paused=True):
+                self._pause_tick = self._next_sample_tick(tick)
+                return f"pause before tick {self._pause_tick}"
+            case Pause():
+                self._pause_tick = None
+                return "go on"
+            case Step(samples=samples):
+                per_sample = self._run.agreement.terms.ticks_per_sample
+                self._pause_tick = self._next_sample_tick(tick) + samples * per_sample
+                return f"pause before tick {self._pause_tick}"
+            case Pace(factor=factor):
+                self.pace, self._anchor = factor, None
+                return f"{factor!r} times real time"
+            case Impair(text=text):
+                return self._impair(text)
+            case Spoil(end=end, field=field):
+                self._run.desyncs_asked += 1
+                if end == "transmitter":
+                    return spoil(self._run.node.session, field, self._confirmed_sample())
+            case SetPoint():
+                self._run.node.scores.forget_reference()
+        return None
+
+    def _impair(self, text: str) -> str:
+        faults = parse_impairments(text)
+        self.impairments = text
+        _set_faults(self._run.uplink.line, faults.up)
+        if self._virtual:
+            _set_faults(self._run.downlink, faults.down)
+        if faults.up.raw or faults.down.raw:
+            self._run.desyncs_asked = math.inf
+        return line_text(text)
+
+    def _confirmed_sample(self) -> int:
+        return self._run.node.session.copies.confirmed.sample
+
+    def _next_sample_tick(self, tick: int) -> int:
+        per_sample = self._run.agreement.terms.ticks_per_sample
+        return -(-tick // per_sample) * per_sample
+
+    def _stand_still(self, tick: int) -> None:
+        told_at = time.monotonic()
+        while self._pause_tick is not None and tick >= self._pause_tick and not self._should_stop():
+            self.paused = True
+            time.sleep(PAUSE_POLL_S)
+            if time.monotonic() - told_at >= KEEP_ALIVE_S:
+                told_at = time.monotonic()
+                self.keep_alive()
+            self._obey(tick)
+        if self.paused:
+            self.paused, self._anchor = False, None
+
+    def _keep_pace(self, tick: int, pace: float) -> None:
+        now_s = time.monotonic()
+        if self._anchor is None:
+            self._anchor = (tick, now_s)
+        first, since_s = self._anchor
+        due_s = since_s + (tick - first) * self._run.agreement.terms.tick_ns / 1e9 / pace
+        if now_s < due_s:
+            time.sleep(due_s - now_s)
+        elif now_s - due_s > 0.5:
+            # Held up: go on from here instead of rushing after the time that was lost.
+            self._anchor = (tick, now_s)
+
+
+class LiveReceiver:
+    """What is asked of the controller node; called by its loop between messages (`should_stop`)."""
+
+    def __init__(
+        self,
+        endpoint: ReceiverEndpoint,
+        queue: CommandQueue | None,
+        should_stop: Stop,
+        recorder: Recorder,
+        steering: SteeredReference | None,
+        impairments: str,
+    ) -> None:
+        self.queue = queue
+        self.steering = steering
+        self.impairments = impairments
+        self._endpoint = endpoint
+        self._should_stop = should_stop
+        self._recorder = recorder
+
+    def __call__(self) -> bool:
+        """Obey what has been asked; return whether the flight was asked to stop."""
+        while self.queue is not None and (command := self.queue.take()) is not None:
+            told = self._one(command)
+            if told:
+                self._tell(told)
+        return self._should_stop()
+
+    def _one(self, command: Command) -> str | None:
+        session = self._endpoint.session
+        match command:
+            case SetPoint(angle_rad=angle_rad):
+                if self.steering is None:
+                    return "this controller has no set-point: ignored"
+                self.steering.by_hand_rad = angle_rad
+                return "follow the reference" if angle_rad is None else f"set-point {angle_rad!r} rad"
+            case Impair(text=text):
+                self.impairments = text
+                if isinstance(self._endpoint.downlink, ImpairedLine):
+                    _set_faults(self._endpoint.downlink, parse_impairments(text).down)
+                    return line_text(text)
+            case Spoil(end="receiver", field=field):
+                return spoil(session, field, session.state.sample)
+        return None
+
+    def _tell(self, text: str) -> None:
+        session = self._endpoint.session
+        sample = session.state.sample
+        time_ns = sample * session.terms.sample_ns
+        event = Event(EventKind.CONTROL, time_ns, sample, f"by hand, before sample {sample}: {text}")
+        session.events.append(event)
+        self._recorder.write(EVENT_CHANNEL, time_ns, event_row(event))
+
+
+def spoil(session: object, field: str, sample: int) -> str:
+    """Spoil one field of a session's codec in one bit after a sample; return the words for it."""
+    codec = getattr(session, "codec", None)
+    if not isinstance(codec, SabotagedCodec):
+        return "this codec cannot be spoilt: ignored"
+    codec.arm(parse_sabotage(f"sample={sample},field={field}"))
+    return f"one bit of this codec's {field} spoilt after sample {sample}"
+
+
+def line_text(text: str) -> str:
+    """Return the words for what the line suffers from now on."""
+    return f"the line suffers {text}" if text else "the line is clean"
+
+
+def _set_faults(line: object, impairments: object) -> None:
+    if isinstance(line, ImpairedLine):
+        line.impairments = impairments  # type: ignore[assignment]

@@ -1,0 +1,90 @@
+"""The thread that sends telemetry: at a set rate, never the loop's own, and dropping what is late."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from typing import Protocol, Self
+
+import orjson
+
+from channel.errors import LinkError
+
+
+class Port(Protocol):
+    """Where messages go."""
+
+    def publish(self, data: bytes) -> None:
+        """Send one message; LinkError when it cannot be."""
+
+    def close(self) -> None:
+        """Give everything back."""
+
+
+class Composer(Protocol):
+    """What makes the messages."""
+
+    skipped: int
+
+    def compose(self) -> dict[str, object]:
+        """Return the message of this moment."""
+
+
+class Publisher:
+    """Within a `with`, publishes `rate_hz` times a second. It has one last word when it ends.
+
+    A period that passed unused, because the machine or the network held the thread up, is counted in
+    the composer's `skipped`. An error ends the telemetry and nothing else; `error` then says why.
+    """
+
+    def __init__(self, composer: Composer, port: Port, rate_hz: float) -> None:
+        self.sent = 0
+        self.error: str | None = None
+        self._composer = composer
+        self._port = port
+        self._period_s = 1.0 / rate_hz
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="telemetry", daemon=True)
+
+    @property
+    def skipped(self) -> int:
+        """Return how many messages were left out."""
+        return self._composer.skipped
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ending.set()
+        self._thread.join()
+        self._port.close()
+
+    def _run(self) -> None:
+        due_s = time.monotonic()
+        ending = False
+        while not ending and self.error is None:
+            due_s += self._period_s
+            late_s = time.monotonic() - due_s
+            if late_s > self._period_s:
+                missed = int(late_s / self._period_s)
+                self._composer.skipped += missed
+                due_s += missed * self._period_s
+            ending = self._ending.wait(max(0.0, due_s - time.monotonic()))
+            self._guard(self._send)
+
+    def _send(self) -> None:
+        message = orjson.dumps(self._composer.compose())
+        try:
+            self._port.publish(message)
+        except LinkError:
+            self._composer.skipped += 1
+        else:
+            self.sent += 1
+
+    def _guard(self, do: Callable[[], None]) -> None:
+        try:
+            do()
+        except Exception as error:  # telemetry must never be a flight's end
+            self.error = f"telemetry ended: {type(error).__name__}: {error}"

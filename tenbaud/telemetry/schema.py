@@ -1,0 +1,197 @@
+"""What goes over the telemetry keys, described once: the ends keep to it and tests check each message.
+
+`tenbaud view --schema` prints it as JSON schema; `docs/telemetry.schema.json` is that file.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, field_validator
+
+from channel.impairments import parse_impairments
+
+SCHEMA_VERSION = 1
+ANGLE_MAX_RAD = 1.6
+
+
+class _Message(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Point(_Message):
+    """One tick as both the rig and the codec know it."""
+
+    time_s: float = Field(description="flight time")
+    measured_rad: float = Field(description="angle as the encoder gives it")
+    true_rad: float | None = Field(description="true angle, where the rig knows it")
+    coded_rad: float = Field(description="the codec's estimate of that tick")
+    live_rad: float | None = Field(description="what the receiver believed of it in advance")
+    range_rad: float = Field(description="range M of the coder at that tick")
+
+
+class Decision(_Message):
+    """One tick as the receiver decided it."""
+
+    time_s: float = Field(description="flight time")
+    reference_rad: float | None = Field(description="set-point of the controller")
+    live_rad: float = Field(description="estimate that the command was decided with")
+
+
+class SentSample(_Message):
+    """One sample that the receiver's echo has confirmed."""
+
+    sample: int
+    word_sent: list[int] | None = Field(description="symbols sent; null: none")
+    word: list[int] | None = Field(description="symbols as the receiver consumed them; null: erased")
+    digest: str = Field(description="64-bit digest of the transmitter's copy after the sample")
+    peer_digest: str = Field(description="the receiver's digest of the same sample")
+
+
+class TakenSample(_Message):
+    """One sample as the receiver consumed it."""
+
+    sample: int
+    word: list[int] | None = Field(description="symbols consumed; null: erased")
+    digest: str = Field(description="64-bit digest of the receiver's copy after the sample")
+
+
+class Happening(_Message):
+    """An event of the flight."""
+
+    time_s: float
+    kind: str
+    sample: int | None
+    text: str
+
+
+class Lateness(_Message):
+    """How late the last ticks of the loop began."""
+
+    p50_ms: float
+    p99_ms: float
+    max_ms: float
+
+
+class _EndMessage(_Message):
+    version: Literal[1] = Field(description="of this schema")
+    session: str = Field(description="name of the session")
+    flight: int = Field(description="number of the session, 0 while there is none")
+    number: int = Field(description="counts the messages of this end")
+    phase: str = Field(description="where the session stands, in words")
+    clock: Literal["real", "virtual"]
+    takes_commands: bool = Field(description="whether the flight was started with control allowed")
+    time_s: float = Field(description="flight time reached")
+    epoch: int
+    impairments: str = Field(description="what goes wrong on the line, on purpose, at present")
+    counts: dict[str, int] = Field(description="erasures, desyncs, rejoins and others, so far")
+    events: list[Happening] = Field(description="since the message before")
+    dropped: int = Field(description="messages and rows of telemetry left out so far")
+
+
+class TransmitterTelemetry(_EndMessage):
+    """What the sensor node tells."""
+
+    role: Literal["transmitter"]
+    preset: str
+    tick_s: float
+    symbol_period_s: float
+    baud_configured: float
+    duration_s: float = Field(description="of the whole flight as configured")
+    points: list[Point] = Field(description="ticks since the message before, some left out")
+    samples: list[SentSample] = Field(description="confirmed since the message before")
+    guard: str = Field(description="state of the guard beside the motors")
+    volts: list[float] | None = Field(description="voltages put on the motors last")
+    lateness: Lateness | None = Field(description="null on the virtual clock")
+    paused: bool = Field(description="the virtual clock stands still")
+    pace: float | None = Field(description="virtual seconds per second at most; null: unlimited")
+    gap_to_floor: float | None = Field(
+        default=None, description="estimation error over the least that any coder could reach"
+    )
+
+
+class ReceiverTelemetry(_EndMessage):
+    """What the controller node tells."""
+
+    role: Literal["receiver"]
+    baud_measured: float | None = Field(description="symbols per second on this end's clock")
+    points: list[Decision] = Field(description="ticks since the message before, some left out")
+    samples: list[TakenSample] = Field(description="consumed since the message before")
+    set_point_rad: float | None = Field(description="given by hand; null: the reference is followed")
+    steerable: bool = Field(description="whether the controller has a set-point at all")
+
+
+class SetPoint(_Message):
+    """Steer to an angle, or (null) follow the configured reference again."""
+
+    kind: Literal["set_point"]
+    angle_rad: Annotated[float, Field(ge=-ANGLE_MAX_RAD, le=ANGLE_MAX_RAD)] | None
+
+
+class Pause(_Message):
+    """Stop the virtual clock at the next sample, or let it go on."""
+
+    kind: Literal["pause"]
+    paused: bool
+
+
+class Step(_Message):
+    """Let so many samples pass on the virtual clock, then pause."""
+
+    kind: Literal["step"]
+    samples: Annotated[int, Field(ge=1, le=1000)] = 1
+
+
+class Pace(_Message):
+    """Virtual seconds per second, at most."""
+
+    kind: Literal["pace"]
+    factor: Annotated[float, Field(ge=0.05, le=1000.0)]
+
+
+class Impair(_Message):
+    """What goes wrong on the line from now on, all of it; an empty text for a clean line."""
+
+    kind: Literal["impair"]
+    text: Annotated[str, Field(max_length=300)]
+
+    @field_validator("text")
+    @classmethod
+    def _readable(cls, value: str) -> str:
+        faults = parse_impairments(value)
+        if faults.skew_ppm or faults.clock_steps:
+            raise ValueError("the receiver's clock cannot be changed in flight")
+        return value
+
+
+class Spoil(_Message):
+    """Spoil the codec of one end in one bit, at its next sample."""
+
+    kind: Literal["spoil"]
+    end: Literal["transmitter", "receiver"]
+    field: Annotated[str, Field(pattern=r"^(range|angle|rate)$")] = "range"
+
+
+Telemetry = TransmitterTelemetry | ReceiverTelemetry
+Command = SetPoint | Pause | Step | Pace | Impair | Spoil
+
+TELEMETRY: TypeAdapter[Telemetry] = TypeAdapter(Annotated[Telemetry, Field(discriminator="role")])
+COMMAND: TypeAdapter[Command] = TypeAdapter(Annotated[Command, Field(discriminator="kind")])
+
+
+def schema_json() -> dict[str, Any]:
+    """Return the JSON schema of both kinds of message."""
+    definitions: dict[str, Any] = {}
+    parts = {}
+    for name, adapter in (("telemetry", TELEMETRY), ("control", COMMAND)):
+        schema = adapter.json_schema(ref_template="#/$defs/{model}")
+        definitions |= schema.pop("$defs", {})
+        parts[name] = schema
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "tenbaud telemetry",
+        "description": "Keys tenbaud/NAME/telemetry/ROLE and tenbaud/NAME/control",
+        "version": SCHEMA_VERSION,
+        "properties": parts,
+        "$defs": definitions,
+    }

@@ -1,0 +1,139 @@
+"""One end's telemetry, put together: tap, port, commands and publisher."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+from channel.errors import LinkError
+from channel.links.base import Role
+from channel.recording import Recorder
+from receiver.endpoint import ReceiverEndpoint
+from receiver.steered import SteeredReference
+from tenbaud.build import Agreement
+from tenbaud.build_ends import build_reference
+from tenbaud.flight.transmit import Stop, TransmitterRun
+from tenbaud.telemetry.commands import CommandQueue
+from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
+from tenbaud.telemetry.place import endpoint_for
+from tenbaud.telemetry.publisher import Composer, Publisher
+from tenbaud.telemetry.tap import Tap
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What was asked for on the command line."""
+
+    endpoint: str = ""
+    """"" as usual, "on", "off" or a Zenoh endpoint to listen on"""
+    control: bool = False
+    """whether the flight may be steered from outside"""
+    pace: float | None = None
+    """virtual seconds per second at most"""
+
+    def check(self, role: Role, insecure: bool) -> None:
+        """Raise LinkError for an endpoint that cannot be used, before anything starts."""
+        if self.endpoint:
+            endpoint_for(self.endpoint, role, (), insecure)
+
+
+NO_WISH = Wish()
+
+
+@dataclass(slots=True)
+class Station:
+    """The telemetry of one end, from before its parts are built until after its flight."""
+
+    agreement: Agreement
+    role: Role
+    recorder: Recorder
+    """what the end records into: the tap, where there is one"""
+    endpoint: str | None
+    queue: CommandQueue | None
+    steering: SteeredReference | None
+    pace: float | None
+    tap: Tap | None
+    publisher: Publisher | None = field(default=None)
+
+    def fly_transmitter(self, run: TransmitterRun, stop: Stop) -> LiveTransmitter:
+        """Return what obeys commands for this transmitter, hung into its loop where it has work."""
+        live = LiveTransmitter(run, self.queue, stop, self.pace)
+        if self.queue is not None or self.pace is not None:
+            run.node.at_tick = live.at_tick
+        return live
+
+    def fly_receiver(self, endpoint: ReceiverEndpoint, stop: Stop) -> LiveReceiver:
+        """Return what obeys commands for this receiver: its loop asks it whether to stop."""
+        text = self.agreement.config.link.impairments
+        return LiveReceiver(endpoint, self.queue, stop, self.recorder, self.steering, text)
+
+    @contextmanager
+    def publishing(self, composer: Callable[[Tap], Composer]) -> Iterator[None]:
+        """Within the `with`, telemetry goes out, if this flight has any."""
+        port = self._port()
+        if port is None or self.tap is None:
+            yield
+            return
+        rate_hz = self.agreement.config.telemetry.rate_hz
+        self.publisher = Publisher(composer(self.tap), port, rate_hz)
+        with self.publisher:
+            yield
+
+    def summary(self) -> dict[str, Any]:
+        """Return what became of the telemetry, for the summary."""
+        if self.publisher is None or self.tap is None:
+            return {"telemetry": "off"}
+        told = {
+            "telemetry": self.publisher.error or "on",
+            "telemetry_sent": self.publisher.sent,
+            "telemetry_dropped": self.publisher.skipped,
+            "telemetry_rows_dropped": self.tap.dropped,
+        }
+        if self.queue is not None:
+            told["commands_refused"] = self.queue.refused
+        return told
+
+    def _port(self) -> Any:
+        if self.endpoint is None:
+            return None
+        from channel.links.zenoh_telemetry import TelemetryPort
+
+        on_command = None if self.queue is None else self.queue.offer
+        return TelemetryPort(self.role, self.agreement.config.link.session, self.endpoint, on_command)
+
+
+def open_station(
+    agreement: Agreement,
+    role: Role,
+    recorder: Recorder,
+    wish: Wish,
+    addresses: tuple[str, ...] = (),
+    insecure: bool = False,
+) -> Station:
+    """Return the telemetry of one end; without an own wish, trouble with it only means none.
+
+    `addresses` and `insecure` are those of the flight's link. Raises LinkError for an endpoint that
+    was asked for and cannot be used.
+    """
+    try:
+        endpoint = endpoint_for(wish.endpoint, role, addresses, insecure)
+    except LinkError as error:
+        if wish.endpoint:
+            raise
+        sys.stderr.write(f"tenbaud: no telemetry: {error}\n")
+        endpoint = None
+    tap = Tap(recorder) if endpoint is not None else None
+    steerable = agreement.live and agreement.config.receiver.controller == "pid"
+    return Station(
+        agreement,
+        role,
+        tap or recorder,
+        endpoint,
+        CommandQueue() if agreement.live and endpoint is not None else None,
+        SteeredReference(build_reference(agreement.config)) if steerable else None,
+        wish.pace if agreement.clock == "virtual" else None,
+        tap,
+    )

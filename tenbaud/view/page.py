@@ -1,0 +1,233 @@
+"""The page: instruments drawn by its own script, and controls that ask something of the flight."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from nicegui import ui
+
+from tenbaud.view.board import Board
+from tenbaud.view.feed import Feed
+
+REFRESH_S = 0.25
+SET_POINT_STEP_DEG = 5
+PACES = {0.25: "¼", 1.0: "1", 5.0: "5", 25.0: "25"}
+
+Send = Callable[..., None]
+
+
+def build_page(board: Board, feed: Feed) -> None:
+    """Build the page for one browser."""
+    from tenbaud.view.server import STATIC
+
+    ui.add_head_html('<link rel="stylesheet" href="/view/view.css">')
+    ui.add_body_html((STATIC / "instruments.html").read_text(encoding="utf-8"))
+    ui.dark_mode(value=None)
+
+    def send(**command: object) -> None:
+        head = board.heads.get("transmitter") or board.heads.get("receiver")
+        if head is not None and head["takes_commands"]:
+            feed.send(head["session"], command)
+
+    with ui.element("section").classes("controls").props('aria-label="Controls"'):
+        note = ui.label().classes("controls-note").props('role="status"')
+        with ui.element("div").classes("controls-grid"):
+            panels = [_SetPoint(send), _Clock(send), _Line(send), _Break(send)]
+
+    def refresh() -> None:
+        upper, lower = board.heads.get("transmitter"), board.heads.get("receiver")
+        note.set_text(_why_not(upper or lower))
+        note.set_visibility(bool(note.text))
+        allowed = not note.text
+        for panel in panels:
+            panel.refresh(allowed, upper or {}, lower or {})
+
+    refresh()
+    ui.timer(REFRESH_S, refresh)
+
+
+def _why_not(head: dict[str, Any] | None) -> str:
+    if head is None:
+        return "The controls wait for a flight."
+    if head["phase"] == "ended":
+        return "The flight is over."
+    if not head["takes_commands"]:
+        return "This flight takes no commands: start both its ends with --allow-control to steer it."
+    return ""
+
+
+class _Panel:
+    """A titled group of controls."""
+
+    def __init__(self, title: str, text: str) -> None:
+        self.box = ui.element("fieldset").classes("panel")
+        self._enabled: bool | None = None
+        self.controls: list[Any] = []
+        with self.box:
+            ui.element("legend").add_slot("default", f"{title}")
+            ui.label(text).classes("hint")
+
+    def enable(self, enabled: bool) -> None:
+        if enabled is not self._enabled:
+            self._enabled = enabled
+            for control in self.controls:
+                control.set_enabled(enabled)
+
+    def refresh(self, allowed: bool, upper: dict[str, Any], lower: dict[str, Any]) -> None:
+        """Follow the newest messages of both ends; `allowed`: the flight may be steered."""
+        self.enable(allowed)
+
+    def button(self, text: str, act: Callable[[], None], label: str = "") -> Any:
+        button = ui.button(text, on_click=act, color=None).props("unelevated no-caps")
+        if label:
+            button.props(f'aria-label="{label}"')
+        self.controls.append(button)
+        return button
+
+    def slider(
+        self, name: str, least: int, most: int, step: int, unit: str, moved: Callable[[], None]
+    ) -> _Slider:
+        slider = _Slider(name, (least, most, step), unit, moved)
+        self.controls.append(slider)
+        return slider
+
+
+class _Slider:
+    """The browser's own slider, which every keyboard and screen reader knows how to use.
+
+    `moved` is called once when it is let go, or at each key, rather than for every step of a drag.
+    """
+
+    def __init__(
+        self, name: str, spread: tuple[int, int, int], unit: str, moved: Callable[[], None]
+    ) -> None:
+        self.value = 0.0
+        self._moved = moved
+        self._form, self._unit = "+.0f" if spread[0] < 0 else ".0f", unit
+        with ui.element("label").classes("slider"):
+            ui.label(name).classes("slider-name")
+            self._shown = ui.label(self._text()).classes("slider-value")
+            least, most, step = spread
+            self._input = ui.element("input").props(
+                f'type=range min={least} max={most} step={step} value=0 aria-label="{name}"'
+            )
+        take_number = "(event) => emit(Number(event.target.value))"
+        self._input.on("input", lambda event: self._show(event.args), js_handler=take_number)
+        self._input.on("change", lambda event: self._take(event.args), js_handler=take_number)
+
+    def set(self, value: float) -> None:
+        """Put the slider somewhere, without a command."""
+        self._show(value)
+        self._input.update()
+
+    def set_enabled(self, enabled: bool) -> None:
+        """Let it be moved, or not."""
+        self._input.props(remove="disabled") if enabled else self._input.props("disabled")
+
+    def _take(self, value: float) -> None:
+        self._show(value)
+        self._moved()
+
+    def _show(self, value: float) -> None:
+        self.value = value
+        # What the server believes the browser shows; no update is sent for it.
+        self._input.props["value"] = value
+        self._shown.set_text(self._text())
+
+    def _text(self) -> str:
+        return f"{self.value:{self._form}}{self._unit}"
+
+
+class _SetPoint(_Panel):
+    def __init__(self, send: Send) -> None:
+        super().__init__("Set-point", "Where the controller steers the pitch.")
+        with self.box:
+            self.angle = self.slider(
+                "Set-point",
+                -90,
+                90,
+                SET_POINT_STEP_DEG,
+                "°",
+                lambda: send(kind="set_point", angle_rad=math.radians(self.angle.value)),
+            )
+            self.button("Follow the programme", lambda: send(kind="set_point", angle_rad=None))
+
+    def refresh(self, allowed: bool, upper: dict[str, Any], lower: dict[str, Any]) -> None:
+        self.enable(allowed and bool(lower.get("steerable")))
+
+
+class _Clock(_Panel):
+    def __init__(self, send: Send) -> None:
+        super().__init__("Clock", "The virtual clock can stand still, step, or run faster.")
+        self._paused = False
+        with self.box:
+            with ui.element("div").classes("row-of-buttons"):
+                self.pause = self.button("Pause", lambda: send(kind="pause", paused=not self._paused))
+                self.step = self.button(
+                    "One bit", lambda: send(kind="step", samples=1), "Step: let one bit pass"
+                )
+            ui.label("Times real time")
+            self.pace = ui.toggle(PACES, on_change=lambda event: self._asked(send, event.value)).props(
+                'unelevated no-caps aria-label="Pace: times real time"'
+            )
+            self.controls.append(self.pace)
+
+    def _asked(self, send: Send, pace: float | None) -> None:
+        if pace is not None and pace != self._told:
+            self._told = pace
+            send(kind="pace", factor=pace)
+
+    _told: float | None = None
+
+    def refresh(self, allowed: bool, upper: dict[str, Any], lower: dict[str, Any]) -> None:
+        self.enable(allowed and upper.get("clock") == "virtual")
+        paused = bool(upper.get("paused"))
+        if paused is not self._paused:
+            self._paused = paused
+            self.pause.set_text("Go on" if paused else "Pause")
+        told = upper.get("pace")
+        if told in PACES and told != self._told:
+            self._told = told
+            self.pace.set_value(told)
+
+
+class _Line(_Panel):
+    def __init__(self, send: Send) -> None:
+        super().__init__("The wire", "What goes wrong between the two ends.")
+        self._send = send
+        with self.box:
+            self.loss = self.slider("Bits lost", 0, 90, 5, " %", self._changed)
+            self.flips = self.slider("Bits flipped", 0, 50, 1, " %", self._changed)
+            self.delay = self.slider("Delay each way", 0, 300, 10, " ms", self._changed)
+            self.button("Mend the wire", self._mend)
+
+    def _changed(self) -> None:
+        parts = []
+        if self.loss.value:
+            parts.append(f"up:loss={self.loss.value / 100:g}")
+        if self.flips.value:
+            parts.append(f"up:flip={self.flips.value / 100:g}")
+        if self.delay.value:
+            parts.append(f"delay={self.delay.value:g}ms")
+        self._send(kind="impair", text=",".join(parts))
+
+    def _mend(self) -> None:
+        for slider in (self.loss, self.flips, self.delay):
+            slider.set(0.0)
+        self._changed()
+
+
+class _Break(_Panel):
+    def __init__(self, send: Send) -> None:
+        super().__init__("Break it", "Change one bit in one end's codec, and watch it be found out.")
+        with self.box, ui.element("div").classes("row-of-buttons"):
+            for end, name in (("transmitter", "sensor"), ("receiver", "controller")):
+                self.button(
+                    f"Spoil the {name}",
+                    lambda end=end: send(kind="spoil", end=end, field="range"),  # type: ignore[misc]
+                ).classes("danger")
+
+    def refresh(self, allowed: bool, upper: dict[str, Any], lower: dict[str, Any]) -> None:
+        self.enable(allowed and upper.get("phase") == "flying")

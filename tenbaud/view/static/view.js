@@ -1,0 +1,259 @@
+// The page's own script: takes the stream in, keeps the last thirty seconds, and draws them.
+
+import { colours, drawError, drawPitch, drawTape } from "/view/draw.js";
+
+const KEPT_S = 32, SAMPLES_KEPT = 160, EVENTS_SHOWN = 7, STALE_MS = 1500, BROKEN_SHOWN_MS = 1500, TEXT_MS = 200;
+const DEGREES = 180 / Math.PI;
+const SIGNS = { waiting: "M12 7v6M12 16.5v.5", silent: "M7 12h10", lockstep: "M7 12.5l3.5 3.5L17 8.5",
+  broken: "M8 8l8 8M16 8l-8 8", rejoining: "M16.5 9a5.5 5.5 0 1 0 .8 5M17 5.5V9.4h-3.8" };
+
+const at = (id) => document.getElementById(id);
+const memory = { heads: {}, points: [], decisions: [], samples: new Map(), events: [] };
+let ink = colours();
+let connected = false, heardAt = 0, everHeard = false, brokenAt = -1e9, brokenText = "", broken = null, mended = "", asked = false, dirty = true, tapeDirty = true;
+
+// ---- the stream
+
+function listen() {
+  const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/stream`);
+  socket.onopen = () => { connected = true; dirty = true; };
+  socket.onmessage = (event) => take(JSON.parse(event.data));
+  socket.onclose = () => { connected = false; dirty = true; setTimeout(listen, 1000); };
+}
+
+function take(news) {
+  if (!news.heads) return;
+  const live = Object.keys(news.heads).length > 0;
+  if (news.reset) {
+    Object.assign(memory, { heads: {}, points: [], decisions: [], events: [] });
+    memory.samples.clear();
+    mended = ""; brokenAt = -1e9;
+  }
+  Object.assign(memory.heads, news.heads);
+  memory.points.push(...news.points);
+  memory.decisions.push(...news.decisions);
+  for (const sample of news.samples) memory.samples.set(sample[0], sample);
+  while (memory.samples.size > SAMPLES_KEPT) memory.samples.delete(memory.samples.keys().next().value);
+  tapeDirty ||= news.samples.length > 0 || Boolean(news.reset);
+  for (const event of news.events) happened(event, news.reset);
+  if (live) { heardAt = performance.now(); everHeard = true; }
+  dirty = true;
+  if (!asked) { asked = true; requestAnimationFrame(draw); }
+}
+
+function happened(event, old) {
+  const [role, time, kind, text] = event;
+  if (role === "transmitter" && kind === "desync") {
+    if (!old) brokenAt = performance.now();
+    brokenText = text.split(": transmitter")[0];
+    broken = text.match(/transmitter ([0-9a-f]{16}), receiver ([0-9a-f]{16})/);
+    memory.brokenTime = time;
+    mended = "";
+  }
+  if (role === "transmitter" && kind === "rejoin" && text.startsWith("session") && memory.brokenTime !== undefined) {
+    const sample = text.match(/sample (\d+)/)?.[1];
+    mended = `${brokenText} (${memory.brokenTime.toFixed(1)} s); a common state was found, and they are equal again from sample ${sample}`;
+  }
+  // Left out: what the tape shows, what passes by itself, and what the other end has told already.
+  if (kind === "erased" || kind === "late_symbol" || text === "guard holding") return;
+  if (role === "receiver" && ["desync", "rejoin", "ended"].includes(kind)) return;
+  const last = memory.events[0];
+  if (last && last[2] === kind && last[3] === text) return;
+  memory.events.unshift(event);
+  memory.events.length = Math.min(memory.events.length, EVENTS_SHOWN);
+}
+
+// ---- the picture
+
+function turn(id, angle) {
+  at(id).setAttribute("transform", `rotate(${(-angle * DEGREES).toFixed(2)} 160 122)`);
+}
+
+function drawPicture() {
+  const point = memory.points.at(-1), decision = memory.decisions.at(-1), volts = memory.heads.transmitter?.volts;
+  if (!point) return;
+  turn("body", point[1]);
+  turn("estimate", point[2]);
+  at("reference").style.display = decision && decision[1] !== null ? "" : "none";
+  if (decision && decision[1] !== null) turn("reference", decision[1]);
+  if (volts) {
+    // The front rotor lifts the front: it is drawn at the right, where the nose is.
+    const arrow = (x, volt) => `M${x} 98v${(-volt * 6).toFixed(1)}`;
+    at("thrust-front").setAttribute("d", Math.abs(volts[0]) > 0.05 ? arrow(254, volts[0]) : "");
+    at("thrust-rear").setAttribute("d", Math.abs(volts[1]) > 0.05 ? arrow(66, volts[1]) : "");
+  }
+}
+
+function drawScale() {
+  const parts = [];
+  for (const degrees of [-90, -45, 0, 45, 90]) {
+    const a = -degrees / DEGREES, cos = Math.cos(a), sin = Math.sin(a);
+    parts.push(`<path d="M${160 + 112 * cos} ${122 + 112 * sin}L${160 + 119 * cos} ${122 + 119 * sin}"/>`);
+    if (degrees > -90) parts.push(`<text x="${160 + 146 * cos}" y="${126 + 148 * sin}">${degrees}°</text>`);
+  }
+  at("scale").innerHTML = parts.join("");
+}
+
+// ---- words and figures
+
+function set(id, text) {
+  const element = at(id);
+  if (element.textContent !== text) element.textContent = text;
+}
+
+const degrees = (radians, digits = 1) => `${radians < 0 ? "−" : "+"}${Math.abs(radians * DEGREES).toFixed(digits)}°`;
+
+function state(now) {
+  const head = memory.heads.transmitter;
+  if (!head) return ["waiting", "Waiting", "for a sensor node"];
+  const silent = now - heardAt > STALE_MS;
+  if (silent && head.phase !== "ended") return ["silent", "Not known", "nothing is heard of this flight"];
+  if (now - brokenAt < BROKEN_SHOWN_MS) return ["broken", "Lockstep broken", brokenText];
+  if (head.phase.startsWith("asking")) return ["rejoining", "Finding a common state", `epoch ${head.epoch} is over; no bit counts until both ends have started anew`];
+  if (head.phase === "ended") return ["waiting", "The flight is over", `${head.counts.digest_checks} digests compared, ${head.counts.desyncs} differed`];
+  const sample = lastCompared();
+  if (!sample) return ["waiting", "Waiting", "for the first digests"];
+  if (sample[3] !== sample[4]) return ["broken", "Lockstep broken", brokenText];
+  const text = mended || `${head.counts.digest_checks} digests compared, ${head.counts.desyncs} differed`;
+  return ["lockstep", "In lockstep", text];
+}
+
+function lastCompared() {
+  let found = null;
+  for (const sample of memory.samples.values()) if (sample[3] && sample[4] && (!found || sample[0] > found[0])) found = sample;
+  return found;
+}
+
+function showLight(now) {
+  const [name, title, text] = state(now);
+  const light = at("light");
+  if (light.dataset.state !== name) {
+    light.dataset.state = name;
+    at("light-sign").setAttribute("d", SIGNS[name]);
+  }
+  set("light-title", title);
+  set("light-text", text);
+  if (name === "broken") {
+    if (broken) { set("digest-up", broken[1]); set("digest-down", broken[2]); return; }
+  }
+  const sample = lastCompared();
+  set("digest-up", sample ? sample[3] : "–");
+  set("digest-down", sample ? sample[4] : "–");
+}
+
+function showText(now) {
+  const up = memory.heads.transmitter, down = memory.heads.receiver, point = memory.points.at(-1);
+  showLight(now);
+  showBanner(now);
+  if (up) {
+    set("flight", `${up.preset}, ${up.clock} clock${up.paused ? ", paused" : up.pace ? `, ${up.pace} × real time` : ""}${up.impairments ? `, wire impaired: ${up.impairments}` : ""}`);
+    set("f-time", `${up.time_s.toFixed(1)} s`);
+    set("f-late", up.lateness ? `${up.lateness.p99_ms.toFixed(2)} ms` : "virtual");
+    set("f-guard", up.guard);
+    set("f-rejoins", `${up.counts.desyncs}, ${up.counts.rejoins}`);
+    set("tape-text", `one every ${up.symbol_period_s.toFixed(3).replace(/0+$/, "").replace(/\.$/, "")} s of flight, as the controller takes them`);
+    at("gap-box").hidden = up.gap_to_floor === undefined || up.gap_to_floor === null;
+    if (!at("gap-box").hidden) set("f-gap", `${up.gap_to_floor.toFixed(2)} ×`);
+    const baud = down && down.baud_measured !== null ? down.baud_measured.toFixed(2) : "–";
+    set("f-baud", `${baud} of ${up.baud_configured}`);
+  }
+  const counts = (up || down)?.counts;
+  if (counts) set("f-erasures", String(counts.erasures));
+  if (point) {
+    set("pitch", degrees(point[1]));
+    set("f-error", degrees(point[1] - point[2], 2));
+    set("f-range", degrees(point[3], 2).slice(1));
+  }
+  const rows = memory.events.map(([role, time, kind, text]) =>
+    [role === "transmitter" ? "sensor" : "controller", time, kind === "desync" || kind === "refused", text]);
+  const key = JSON.stringify(rows);
+  if (rows.length && at("events").dataset.key !== key) {
+    at("events").dataset.key = key;
+    at("events").replaceChildren(...rows.map(([who, time, bad, text]) => {
+      const [item, when, teller] = ["li", "time", "span"].map((name) => document.createElement(name));
+      when.textContent = `${time.toFixed(1)} s`;
+      teller.textContent = who;
+      item.append(when, teller, text);
+      if (bad) item.className = "bad";
+      return item;
+    }));
+  }
+}
+
+function showBanner(now) {
+  const ended = Object.values(memory.heads).some((head) => head.phase === "ended");
+  let text = "";
+  if (!connected && everHeard) text = ended ? "The flight is over, and its page's server has gone." : "The page's server does not answer. Trying again every second.";
+  else if (!connected) text = "Connecting to the page's server.";
+  else if (!everHeard) text = "No flight is heard. Start one with <code>tenbaud demo --view</code>, or with <code>tenbaud receive</code> and <code>tenbaud transmit</code>.";
+  else if (ended) text = "The flight is over. What is shown is its end.";
+  else if (now - heardAt > STALE_MS) text = `Nothing heard for ${((now - heardAt) / 1000).toFixed(0)} s: what is shown is old.`;
+  const banner = at("banner");
+  if (banner.innerHTML !== text) banner.innerHTML = text;
+  banner.hidden = !text;
+  document.body.classList.toggle("silent", Boolean(text) && everHeard && !ended);
+}
+
+// ---- drawing, at the stream's pace and never faster
+
+function forget() {
+  const now = memory.points.at(-1)?.[0] ?? 0;
+  for (const rows of [memory.points, memory.decisions]) {
+    let old = 0;
+    while (old < rows.length && rows[old][0] < now - KEPT_S) old++;
+    if (old > 20) rows.splice(0, old);
+  }
+  return now;
+}
+
+function draw() {
+  asked = false;
+  if (!dirty || document.hidden) return;
+  dirty = false;
+  const time = forget();
+  drawPicture();
+  drawPitch(at("pitch-curve"), time, memory.points, memory.decisions, ink);
+  drawError(at("error-curve"), time, memory.points, ink);
+  // The tape changes with the bits, half as often as the curves.
+  if (tapeDirty) drawTape(at("tape"), [...memory.samples.values()].sort((a, b) => a[0] - b[0]), ink);
+  tapeDirty = false;
+}
+
+// ---- colours: the system's, or the visitor's own
+
+const CHOICES = ["system", "dark", "light"];
+const system = matchMedia("(prefers-color-scheme: dark)");
+let choice = "system";
+try { choice = localStorage.getItem("tenbaud-colours") || "system"; } catch { /* private mode */ }
+
+function paint() {
+  const dark = choice === "dark" || (choice === "system" && system.matches);
+  document.body.classList.toggle("body--dark", dark);
+  document.body.classList.toggle("body--light", !dark);
+  set("theme", `Colours: ${choice}`);
+  at("theme").setAttribute("aria-label", `Colours: ${choice}. Press to change`);
+  ink = colours();
+  dirty = tapeDirty = true;
+}
+
+at("theme").addEventListener("click", () => {
+  choice = CHOICES[(CHOICES.indexOf(choice) + 1) % CHOICES.length];
+  try { localStorage.setItem("tenbaud-colours", choice); } catch { /* private mode */ }
+  paint();
+});
+system.addEventListener("change", paint);
+addEventListener("resize", () => { dirty = tapeDirty = true; });
+
+// NiceGUI sets its own idea of the colours when it has loaded; ours are put back.
+new MutationObserver(() => {
+  const dark = choice === "dark" || (choice === "system" && system.matches);
+  if (document.body.classList.contains("body--dark") !== dark) paint();
+}).observe(document.body, { attributes: true, attributeFilter: ["class"] });
+
+drawScale();
+paint();
+listen();
+// Figures five times a second: what changes faster cannot be read. It also draws what no news asked for.
+setInterval(() => { showText(performance.now()); draw(); }, TEXT_MS);
+showText(0);
+draw();

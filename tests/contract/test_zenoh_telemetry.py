@@ -1,0 +1,125 @@
+"""The telemetry's Zenoh session: what it carries, and what it does when nobody is there."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from channel.errors import LinkError
+from channel.links.zenoh_telemetry import TelemetryFeed, TelemetryPort
+from tests.tenbaud.processes import REPOSITORY
+
+
+def wait_until(met: Callable[[], object]) -> None:
+    until_s = time.monotonic() + 10.0
+    while not met():
+        assert time.monotonic() < until_s
+        time.sleep(0.01)
+
+
+def endpoint_in(folder: Path) -> str:
+    return f"unixsock-stream/{folder}/t.sock"
+
+
+def test_messages_reach_every_viewer_and_commands_come_back(tmp_path: Path) -> None:
+    commands: list[bytes] = []
+    seen: list[list[bytes]] = [[], []]
+    port = TelemetryPort("receiver", "lab/one", endpoint_in(tmp_path), commands.append)
+    viewers = [
+        TelemetryFeed(endpoint_in(tmp_path), name, take.append)
+        for name, take in zip(("**", "lab/one"), seen, strict=True)
+    ]
+    try:
+
+        def told() -> bool:
+            port.publish(b"state")
+            return all(seen)
+
+        wait_until(told)
+        viewers[0].send("lab/two", b"not for this flight")
+        viewers[1].send("lab/one", b"up")
+        wait_until(lambda: commands)
+        assert commands == [b"up"]
+        viewers[0].close()
+        wait_until(lambda: port.publish(b"more") or seen[1][-1] == b"more")
+        assert viewers[1].is_connected
+    finally:
+        port.close()
+        wait_until(lambda: not viewers[1].is_connected)
+        viewers[1].close()
+
+
+STANDS_STILL = """
+import os, signal, sys
+from channel.links.zenoh_telemetry import TelemetryFeed
+feed = TelemetryFeed(sys.argv[1], "lab", lambda data: None)
+print("ready", flush=True)
+os.kill(os.getpid(), signal.SIGSTOP)
+"""
+
+
+def test_when_a_viewer_stands_still_then_the_other_still_sees_and_nothing_waits_for_it(
+    tmp_path: Path,
+) -> None:
+    seen: list[bytes] = []
+    port = TelemetryPort("transmitter", "lab", endpoint_in(tmp_path))
+    still = subprocess.Popen(
+        [sys.executable, "-c", STANDS_STILL, endpoint_in(tmp_path)],
+        env={**os.environ, "PYTHONPATH": str(REPOSITORY)},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    viewer = None
+    try:
+        assert still.stdout is not None
+        assert still.stdout.readline() == "ready\n"
+        viewer = TelemetryFeed(endpoint_in(tmp_path), "lab", seen.append)
+        # More by far than every buffer on the way to the one that stands still can hold.
+        for number in range(500):
+            port.publish(number.to_bytes(4, "little") + bytes(20_000))
+        wait_until(lambda: port.publish(b"last") or b"last" in seen)
+    finally:
+        still.kill()
+        still.communicate()
+        if viewer is not None:
+            viewer.close()
+        port.close()
+
+
+def test_when_nobody_watches_then_publishing_costs_nothing_and_raises_nothing(tmp_path: Path) -> None:
+    port = TelemetryPort("transmitter", "lab", endpoint_in(tmp_path))
+    try:
+        for _ in range(1000):
+            port.publish(bytes(2000))
+    finally:
+        port.close()
+
+
+def test_when_an_end_allows_no_control_then_it_hears_no_command(tmp_path: Path) -> None:
+    port = TelemetryPort("transmitter", "lab", endpoint_in(tmp_path))
+    viewer = TelemetryFeed(endpoint_in(tmp_path), "lab", lambda data: None)
+    try:
+        viewer.send("lab", b"up")
+    finally:
+        viewer.close()
+        port.close()
+
+
+def test_when_nobody_listens_then_the_viewer_is_told(tmp_path: Path) -> None:
+    with pytest.raises(LinkError, match="telemetry cannot use"):
+        TelemetryFeed(endpoint_in(tmp_path), "lab", lambda data: None)
+
+
+def test_when_the_place_is_taken_then_the_end_is_told(tmp_path: Path) -> None:
+    port = TelemetryPort("transmitter", "lab", endpoint_in(tmp_path))
+    try:
+        with pytest.raises(LinkError, match="telemetry cannot use"):
+            TelemetryPort("transmitter", "lab", endpoint_in(tmp_path))
+    finally:
+        port.close()

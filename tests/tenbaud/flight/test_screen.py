@@ -1,0 +1,126 @@
+"""What a terminal shows, and what everything that is no terminal gets."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import pty
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from tenbaud.flight.screen import Screen, unicode_fits
+from tests.tenbaud.processes import REPOSITORY, run
+
+STATUS: dict[str, Any] = {
+    "role": "transmitter", "phase": "flying", "tick": 500, "of_ticks": 1000, "time_s": 5.0,
+    "pitch_rad": 0.5, "error_rad": -0.01, "range_rad": 0.05, "erasures": 3, "desyncs": 1,
+    "digest_checks": 50, "rejoins": 1, "words": [(1,), None, (-1,)], "guard": "running",
+}  # fmt: skip
+
+
+def drawn(screen: Screen, **how: Any) -> str:
+    console = Console(file=io.StringIO(), width=100, force_terminal=True, **how)
+    console.print(screen)
+    text: str = console.file.getvalue()  # type: ignore[attr-defined]
+    return text
+
+
+def test_it_says_all_that_matters() -> None:
+    screen = Screen()
+    assert "starting" in drawn(screen)
+    screen.update(STATUS)
+    screen.update({"role": "receiver", "phase": "flying", "pitch_rad": 0.4, "baud": 9.98})
+    text = drawn(screen, color_system=None)
+    for words in ("5.0 s", "50 %", "+28.6 deg", "-0.57 deg", "50 digests", "1 differed", "3 erased"):
+        assert words in text
+    assert "receiver" in text
+    assert "9.98 baud" in text
+    assert "▀×▄" in text  # noqa: RUF001
+
+
+def test_without_unicode_it_is_plain_ascii() -> None:
+    screen = Screen(unicode=False)
+    screen.update(STATUS)
+    text = drawn(screen, color_system=None)
+    assert text.isascii()
+    assert "'x." in text
+    assert not unicode_fits(Console(file=io.TextIOWrapper(io.BytesIO(), encoding="ascii")))
+
+
+def test_no_color_leaves_no_colour(monkeypatch: pytest.MonkeyPatch) -> None:
+    screen = Screen()
+    screen.update(STATUS)
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    assert "\x1b[31m" in drawn(screen, color_system="standard")
+    monkeypatch.setenv("NO_COLOR", "1")
+    plain = drawn(screen, color_system="standard")
+    assert "\x1b[3" not in plain
+    assert "1 differed" in plain
+
+
+def test_a_pitch_beyond_the_gauge_stays_on_it() -> None:
+    screen = Screen()
+    for angle in (-9.0, 0.0, 9.0):
+        screen.update({**STATUS, "pitch_rad": angle})
+        assert drawn(screen).count("●") == 1
+
+
+def in_terminal(folder: Path, *arguments: str, **environment: str) -> str:
+    """Run the command with standard error on a terminal; return what the terminal got."""
+    ours, theirs = pty.openpty()
+    path = os.pathsep.join([str(REPOSITORY), os.environ.get("PYTHONPATH", "")])
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tenbaud", *arguments],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": path, "TERM": "xterm", "PYTHONUTF8": "1", **environment},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=theirs,
+    )
+    os.close(theirs)
+    got: list[bytes] = []
+
+    def read() -> None:
+        try:
+            while data := os.read(ours, 4096):
+                got.append(data)
+        except OSError:
+            pass  # the terminal is gone with its last writer
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    out, _ = process.communicate(timeout=60.0)
+    reader.join(10.0)
+    os.close(ours)
+    assert process.returncode == 0
+    assert json.loads(out)["outcome"] == "the flight is over"
+    return b"".join(got).decode()
+
+
+FLIGHT = ("demo", "--clock", "real", "--duration", "2", "--json", "--out")
+
+
+def test_on_a_terminal_the_view_is_drawn_and_cleared(tmp_path: Path) -> None:
+    shown = in_terminal(tmp_path, *FLIGHT, "a")
+    assert "digests" in shown
+    assert "\x1b[3" in shown
+    without = in_terminal(tmp_path, *FLIGHT, "b", NO_COLOR="1")
+    assert "digests" in without
+    assert "\x1b[3" not in without
+
+
+def test_elsewhere_there_are_plain_lines(tmp_path: Path) -> None:
+    ended = run("demo", "--clock", "real", "--duration", "4", "--json", "--out", "r", cwd=tmp_path)
+    assert ended.code == 0, ended.err
+    lines = ended.err.splitlines()
+    assert 1 <= len(lines) <= 6
+    assert any(line.startswith(("transmitter: flying", "receiver: flying")) for line in lines)
+    assert "\x1b" not in ended.err
+    assert "\r" not in ended.err

@@ -1,0 +1,255 @@
+"""The page in a real browser, beside a real flight: what a visitor sees and does."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from benchmarks.browser import Served, browser, served, state_is, why_no_browser
+from tenbaud.telemetry.schema import TELEMETRY
+
+pytestmark = pytest.mark.skipif(why_no_browser() is not None, reason=str(why_no_browser()))
+
+FLIGHT = ("--preset", "tuned-10baud", "--mismatch", "0.1")
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    with browser() as one:
+        yield one
+
+
+@pytest.fixture(scope="module")
+def flight(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    folder = tmp_path_factory.mktemp("flight")
+    with served(folder, "demo", "--view", "--view-port", "0", *FLIGHT, "--out", "run") as one:
+        yield one
+
+
+@pytest.fixture
+def page(chromium: Any, flight: Served) -> Iterator[Any]:
+    context = chromium.new_context(viewport={"width": 1200, "height": 900})
+    page = context.new_page()
+    page.told = []
+    page.asked = []
+    page.on("pageerror", lambda error: page.told.append(str(error)))
+    page.on("console", lambda line: page.told.append(line.text) if line.type == "error" else None)
+    page.on("request", lambda request: page.asked.append(request.url))
+    page.on("websocket", lambda socket: page.asked.append(socket.url))
+    page.goto(flight.url)
+    state_is(page, "lockstep")
+    page.get_by_role("button", name="Spoil the sensor").wait_for()
+    yield page
+    assert page.told == []
+    context.close()
+
+
+def number(page: Any, element: str) -> float:
+    text = page.locator(element).inner_text().replace("\u2212", "-")
+    return float(re.findall(r"[-+]?\d+\.?\d*", text)[0])
+
+
+def wait(page: Any, expression: str, argument: object = None, seconds: float = 20.0) -> None:
+    page.wait_for_function(expression, arg=argument, timeout=seconds * 1000.0)
+
+
+TEXT_IS_NOT = "([id, old]) => document.getElementById(id).textContent !== old"
+NUMBER = "parseFloat(document.getElementById('{}').textContent.replace('\\u2212', '-'))"
+
+
+def test_it_loads_and_goes_on_by_itself_without_any_request_beyond_loopback(
+    page: Any, flight: Served
+) -> None:
+    for element in ("f-time", "pitch", "digest-up"):
+        old = page.locator(f"#{element}").inner_text()
+        wait(page, TEXT_IS_NOT, [element, old])
+    picture = page.locator("#body").get_attribute("transform")
+    wait(page, "(old) => document.getElementById('body').getAttribute('transform') !== old", picture)
+    assert page.locator("#digest-up").inner_text() != "\u2013"
+    assert number(page, "#f-baud") == pytest.approx(10.0, abs=0.5)
+    for canvas in ("#pitch-curve", "#error-curve", "#tape"):
+        drawn = page.locator(canvas).evaluate(
+            "(c) => c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some((v) => v > 0)"
+        )
+        assert drawn, canvas
+    assert page.locator("#banner").is_hidden()
+    host = flight.url.removeprefix("http://")
+    own = (f"http://{host}/", f"ws://{host}/", "data:")
+    assert [url for url in page.asked if not url.startswith(own)] == []
+    assert len(page.asked) > 5
+
+
+def test_the_set_point_steers_the_flight_from_the_keyboard_alone(page: Any) -> None:
+    page.keyboard.press("Tab")
+    for _ in range(10):
+        if page.evaluate("document.activeElement.getAttribute('aria-label')") == "Set-point":
+            break
+        page.keyboard.press("Tab")
+    else:
+        raise AssertionError("the set-point is not reached by Tab")
+    for _ in range(4):
+        page.keyboard.press("ArrowRight")
+    page.get_by_text("set-point 0.349").first.wait_for()
+    page.get_by_role("button", name="25", exact=True).click()
+    wait(page, f"() => Math.abs({NUMBER.format('pitch')} - 20) < 4 && {NUMBER.format('f-time')} > 40")
+    page.get_by_role("button", name="1", exact=True).click()
+    page.get_by_role("button", name="Follow the programme").click()
+    page.get_by_text("follow the reference").first.wait_for()
+
+
+def test_a_spoilt_end_turns_the_light_and_the_flight_recovers(page: Any) -> None:
+    before = page.locator("#f-rejoins").inner_text()
+    for name in ("Spoil the sensor", "Spoil the controller"):
+        page.get_by_role("button", name=name).click()
+        state_is(page, "broken")
+        up, down = (page.locator(f"#digest-{way}").inner_text() for way in ("up", "down"))
+        assert up != down
+        assert "differ after sample" in page.locator("#light-text").inner_text()
+        state_is(page, "lockstep")
+        page.get_by_text("equal again from sample").wait_for()
+    desyncs, rejoins = map(int, before.split(", "))
+    wait(page, TEXT_IS_NOT, ["f-rejoins", before])
+    assert page.locator("#f-rejoins").inner_text() == f"{desyncs + 2}, {rejoins + 2}"
+
+
+def test_the_clock_stands_still_steps_and_goes_on(page: Any) -> None:
+    page.get_by_role("button", name="Pause").click()
+    page.get_by_role("button", name="Go on").wait_for()
+    page.wait_for_timeout(500.0)
+    stood = number(page, "#f-time")
+    page.wait_for_timeout(1200.0)
+    assert number(page, "#f-time") == stood
+    assert page.locator("#banner").is_hidden()
+    page.get_by_role("button", name="Step: let one bit pass").click()
+    wait(page, f"(old) => {NUMBER.format('f-time')} > old", stood)
+    assert number(page, "#f-time") == pytest.approx(stood + 0.1)
+    page.get_by_role("button", name="Go on").click()
+    wait(page, f"(old) => {NUMBER.format('f-time')} > old + 0.5", stood)
+
+
+def test_a_bad_wire_is_seen_and_mended(page: Any) -> None:
+    erased = number(page, "#f-erasures")
+    slider = page.get_by_role("slider", name="Bits lost")
+    slider.focus()
+    for _ in range(10):
+        page.keyboard.press("ArrowRight")
+    wait(page, "() => document.getElementById('flight').textContent.includes('up:loss=0.5')")
+    wait(page, f"(old) => {NUMBER.format('f-erasures')} > old + 2", erased)
+    page.get_by_role("button", name="Mend the wire").click()
+    wait(page, "() => !document.getElementById('flight').textContent.includes('impaired')")
+    assert slider.input_value() == "0"
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_narrow_screen_shows_everything_without_scrolling_sideways(
+    chromium: Any, flight: Served, scheme: str
+) -> None:
+    context = chromium.new_context(
+        viewport={"width": 360, "height": 740}, color_scheme=scheme, has_touch=True, is_mobile=True
+    )
+    page = context.new_page()
+    page.goto(flight.url)
+    state_is(page, "lockstep")
+    page.get_by_role("button", name="Mend the wire").wait_for()
+    assert page.evaluate("document.documentElement.scrollWidth") <= 360
+    for element in ("#helicopter", "#pitch-curve", "#tape", "#figures", ".panel >> nth=3"):
+        box = page.locator(element).bounding_box()
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= 360
+    paper = page.evaluate("getComputedStyle(document.body).backgroundColor")
+    light = sum(int(part) for part in re.findall(r"\d+", paper)[:3]) > 384
+    assert light is (scheme == "light")
+    page.get_by_role("button", name="Colours").click()
+    page.wait_for_timeout(200.0)
+    assert page.evaluate("document.body.classList.contains('body--dark')")
+    context.close()
+
+
+def test_without_a_flight_it_says_so(chromium: Any, tmp_path: Path) -> None:
+    nowhere = f"unixsock-stream/{tmp_path}/nobody.sock"
+    with served(tmp_path, "view", "--port", "0", "--connect", nowhere) as one:
+        page = chromium.new_page()
+        page.goto(one.url)
+        page.get_by_text("No flight is heard").wait_for()
+        assert page.get_by_role("button", name="Spoil the sensor").is_disabled()
+        state_is(page, "waiting")
+        page.close()
+
+
+def test_the_gap_to_the_limit_is_shown_when_there_is_one(chromium: Any, tmp_path: Path) -> None:
+    from channel.links.zenoh_telemetry import TelemetryPort
+
+    place = f"unixsock-stream/{tmp_path}/t.sock"
+    message = {
+        "role": "transmitter", "version": 1, "session": "lab", "flight": 5, "number": 1,
+        "phase": "flying", "clock": "real", "takes_commands": False, "time_s": 1.0, "epoch": 0,
+        "impairments": "", "counts": {"erasures": 0, "desyncs": 0, "rejoins": 0, "digest_checks": 1},
+        "events": [], "dropped": 0, "preset": "x", "tick_s": 0.01, "symbol_period_s": 0.1,
+        "baud_configured": 10.0, "duration_s": 100.0, "points": [], "samples": [],
+        "guard": "running", "volts": None, "paused": False, "pace": None,
+        "lateness": {"p50_ms": 0.1, "p99_ms": 0.25, "max_ms": 1.0}, "gap_to_floor": 1.42,
+    }  # fmt: skip
+    TELEMETRY.validate_python(message)
+    port = TelemetryPort("transmitter", "lab", place)
+    with served(tmp_path, "view", "--port", "0", "--connect", place) as one:
+        page = chromium.new_page()
+        page.goto(one.url)
+        for _ in range(100):
+            port.publish(json.dumps(message).encode())
+            page.wait_for_timeout(100.0)
+            if page.locator("#f-gap").is_visible():
+                break
+        assert number(page, "#f-gap") == 1.42
+        assert number(page, "#f-late") == 0.25
+        page.get_by_text("takes no commands").wait_for()
+        page.close()
+    port.close()
+
+
+def test_when_the_flight_falls_silent_or_ends_then_it_says_so(chromium: Any, tmp_path: Path) -> None:
+    arguments = ("demo", "--view", "--view-port", "0", "--duration", "600", "--out", "run")
+    with served(tmp_path, *arguments) as one:
+        page = chromium.new_page()
+        page.goto(one.url)
+        state_is(page, "lockstep")
+        ends = _children(one.process.pid, "transmit", "receive")
+        for pid in ends:
+            _signal(pid, signal.SIGSTOP)
+        page.get_by_text("what is shown is old").wait_for()
+        state_is(page, "silent")
+        for pid in ends:
+            _signal(pid, signal.SIGCONT)
+        state_is(page, "lockstep")
+        one.process.send_signal(signal.SIGINT)
+        page.get_by_text("The flight is over").first.wait_for()
+        one.process.wait(20.0)
+        page.close()
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert summary["outcome"] == "stopped by the user"
+    assert summary["duration_s"] > 0.0
+
+
+def _children(parent: int, *verbs: str) -> list[int]:
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = path.read_text().rpartition(")")[2].split()
+            words = (path.parent / "cmdline").read_text().split("\0")
+        except OSError:
+            continue
+        if int(fields[1]) == parent and set(words) & set(verbs):
+            found.append(int(path.parent.name))
+    assert len(found) == len(verbs)
+    return found
+
+
+def _signal(pid: int, number: int) -> None:
+    import os
+
+    os.kill(pid, number)

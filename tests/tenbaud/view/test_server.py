@@ -1,0 +1,72 @@
+"""Who may open the page, and what is said when it cannot be served."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tenbaud.view.server import Address, PageUnavailable, _same_origin, free_port
+from tests.tenbaud.processes import run
+
+WITHOUT_NICEGUI = """
+import sys
+sys.modules["nicegui"] = None
+from tenbaud.cli.app import main
+main()
+"""
+
+
+def test_an_address_that_others_reach_needs_insecure() -> None:
+    with pytest.raises(PageUnavailable, match="no password"):
+        Address("0.0.0.0", 0).check()
+    Address("0.0.0.0", 0, insecure=True).check()
+    Address("127.0.0.1", 0).check()
+
+
+def test_a_port_that_is_taken_is_named() -> None:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        with pytest.raises(PageUnavailable, match=f"{port}.*another --port"):
+            Address(port=port).check()
+    Address(port=free_port("127.0.0.1")).check()
+
+
+@pytest.mark.parametrize(
+    ("origin", "host", "allowed"),
+    [
+        (None, "127.0.0.1:8710", True),
+        ("http://127.0.0.1:8710", "127.0.0.1:8710", True),
+        ("http://127.0.0.1:9999", "127.0.0.1:8710", False),
+        ("https://example.org", "127.0.0.1:8710", False),
+        ("null", "127.0.0.1:8710", False),
+    ],
+)
+def test_other_sites_may_not_listen_in(origin: str | None, host: str, allowed: bool) -> None:
+    assert _same_origin(origin, host) is allowed
+
+
+@pytest.mark.parametrize("arguments", [("view",), ("demo", "--view")])
+def test_without_the_extra_the_command_says_what_to_install(
+    tmp_path: Path, arguments: tuple[str, ...]
+) -> None:
+    ended = run(*arguments, cwd=tmp_path, code=WITHOUT_NICEGUI)
+    assert ended.code == 2
+    assert "pip install 'tenbaud[page]'" in ended.err
+    assert not (tmp_path / "runs").exists()
+
+
+def test_a_flight_in_memory_has_no_page(tmp_path: Path) -> None:
+    ended = run("demo", "--view", "--link", "memory", cwd=tmp_path)
+    assert ended.code == 2
+    assert "--view" in ended.err
+
+
+def test_nothing_of_the_page_is_loaded_by_a_flight() -> None:
+    source = "import sys, tenbaud.flight.demo, tenbaud.cli.app; sys.exit('nicegui' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", source], check=False).returncode == 0

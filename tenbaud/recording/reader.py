@@ -15,12 +15,13 @@ from typing import Any
 
 import orjson
 from mcap.exceptions import McapError
-from mcap.records import Channel, Footer, McapRecord, Message, Metadata, Schema
+from mcap.records import Channel, Chunk, Footer, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
 from zstandard import ZstdError
 
 from channel.recording import RecordChannel
+from tenbaud.recording.chunks import RawMessage, records_of
 from tenbaud.recording.encoding import channel_from_schema
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.writer import RUN_METADATA
@@ -59,10 +60,15 @@ class MessageStream:
         """The same messages as the bytes in the file: for counting, where decoding is wasted."""
         schemas: dict[int, Schema] = {}
         topics: dict[int, str] = {}
+        wanted = self._topic
         for record in self._records():
-            if isinstance(record, Message):
+            if isinstance(record, tuple):
+                topic = topics[record[0]]
+                if wanted is None or wanted == topic:
+                    yield topic, record[1], record[2]
+            elif isinstance(record, Message):
                 topic = topics[record.channel_id]
-                if self._topic in (None, topic):
+                if wanted is None or wanted == topic:
                     yield topic, record.log_time, record.data
             elif isinstance(record, Schema):
                 schemas[record.id] = record
@@ -72,20 +78,22 @@ class MessageStream:
             elif isinstance(record, Metadata):
                 self.metadata[record.name] = dict(record.metadata)
 
-    def _records(self) -> Iterator[McapRecord]:
+    def _records(self) -> Iterator[McapRecord | RawMessage]:
         with self.path.open("rb") as stream:
-            records = iter(StreamReader(stream, validate_crcs=True).records)
+            reader = StreamReader(stream, emit_chunks=True, validate_crcs=True)
+            records = iter(reader.records)
             footer_seen = False
             while True:
                 try:
                     record = next(records)
+                    inner = records_of(record) if isinstance(record, Chunk) else [record]
                 except StopIteration:
                     self.complete = footer_seen
                     return
                 except _CUT_ERRORS:
                     return
                 footer_seen = footer_seen or isinstance(record, Footer)
-                yield record
+                yield from inner
 
     def _channel(self, record: Channel, schemas: dict[int, Schema]) -> RecordChannel:
         try:

@@ -73,7 +73,7 @@ class Run:
     @property
     def time_s(self) -> Series:
         """Flight time of every tick, in seconds from tick 0: what all signals are over."""
-        return self.base.ticks * self.base.tick_s
+        return np.asarray(self.base.ticks * self.base.tick_s, dtype=np.float64)
 
     @property
     def names(self) -> list[str]:

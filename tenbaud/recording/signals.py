@@ -178,8 +178,13 @@ SIGNALS: tuple[tuple[str, str, str, Maker], ...] = (
     ("measured", "rad", "angle as the encoder gives it", _ticks("transmitter", "tick", "measured_rad")),
     ("estimate", "rad", "the codec's estimate of the angle", lambda source: _estimate(source, 0)),
     ("estimate_live", "rad", "what the receiver believed of the tick, in advance", _live),
-    ("rate_estimate", "rad/s", "the codec's estimate of the rate", lambda source: _estimate(source, 1)),
-    ("error", "rad", "pitch less estimate", lambda source: _less(_pitch(source), _estimate(source, 0))),
+    ("estimate_rate", "rad/s", "the codec's estimate of the rate", lambda source: _estimate(source, 1)),
+    (
+        "error_coded",
+        "rad",
+        "pitch less estimate",
+        lambda source: _less(_pitch(source), _estimate(source, 0)),
+    ),
     (
         "error_live",
         "rad",

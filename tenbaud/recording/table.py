@@ -33,6 +33,7 @@ class Table:
         self.channel = channel
         self.times_ns = times_ns
         self._texts = texts
+        self._columns: dict[str, NDArray[Any]] = {}
 
     @cached_property
     def rows(self) -> list[Row]:
@@ -57,7 +58,9 @@ class Table:
         return {one.name: one.unit for one in self.channel.fields}
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        return column(self.rows, self._field(name))
+        if name not in self._columns:
+            self._columns[name] = column(self.rows, self._field(name))
+        return self._columns[name]
 
     def _field(self, name: str) -> Field:
         for one in self.channel.fields:
@@ -78,16 +81,16 @@ def column(rows: list[Row], one: Field) -> NDArray[Any]:
 
 
 def _lists(values: list[Any]) -> Series:
-    width = max((len(value) for value in values if value is not None), default=0)
-    nothing = [np.nan] * width
-    if any(value is None or len(value) != width or None in value for value in values):
-        values = [_padded(value, width) if value is not None else nothing for value in values]
-    return np.array(values, dtype=np.float64).reshape(len(values), width)
-
-
-def _padded(value: list[Any], width: int) -> list[float]:
-    known = [np.nan if one is None else one for one in value]
-    return known + [np.nan] * (width - len(known))
+    """Return lists of numbers as the rows of an array, NaN where there is none."""
+    try:
+        whole = np.array(values, dtype=np.float64)
+    except ValueError:  # some rows are null or shorter than others
+        width = max((len(value) for value in values if value is not None), default=0)
+        whole = np.full((len(values), width), np.nan)
+        for index, value in enumerate(values):
+            if value is not None:
+                whole[index, : len(value)] = value
+    return whole if whole.ndim == 2 else np.full((len(values), 0), np.nan)
 
 
 @dataclass(slots=True)

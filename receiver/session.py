@@ -40,7 +40,7 @@ from channel.terms import Terms
 from channel.wire import WIRE_VERSION
 from channel.words import ERASED, Word
 from receiver.controllers.base import Controller
-from receiver.records import write_commands, write_sample
+from receiver.records import write_commands, write_epoch, write_sample, write_symbol
 from receiver.rejoin import Greeter, Verdict, carried_to, desync_answer, difference, first_sample
 from receiver.short_slots import SlotFinder
 
@@ -217,11 +217,8 @@ class ReceiverSession:
             else:
                 # A rig that was started again is at rest, and so is what is known of it.
                 self.state = self.codec.initial()._replace(sample=first)
-        self._slot = first * count
-        self._word = []
-        self._anchor = None
-        self._advanced = False
-        self._silent_slots = 0
+        self._slot, self._word, self._anchor = first * count, [], None
+        self._advanced, self._silent_slots = False, 0
         self._echoes.clear()
         self._last_command = hold
         self._commands = deque([hold] * self.terms.lead_ticks)
@@ -235,6 +232,7 @@ class ReceiverSession:
             state,
         )
         self._greeter.welcome = welcome
+        write_epoch(self._recorder, self.terms, self.epoch, self.state, hold)
         text = f"session {self.session_number:08x}, epoch {self.epoch}, begins at sample {first}"
         self._tell(EventKind.STARTED if last is None else EventKind.REJOIN, text)
         return [welcome]
@@ -255,6 +253,7 @@ class ReceiverSession:
             return self._on_foreign_symbol(symbol)
         if ahead < 0:
             self.counts["symbols_late"] += 1
+            write_symbol(self._recorder, self.terms, symbol, now_ns, taken=False)
             self._tell(EventKind.LATE_SYMBOL, f"slot {symbol.slot} was settled already: dropped")
             return []
         if ahead > GAP_SAMPLES_MAX * self.terms.symbols_per_word:
@@ -269,6 +268,7 @@ class ReceiverSession:
             frames += self._settle(None, now_ns)
         self._anchor = (symbol.slot, now_ns)
         self.meter.on_symbol(now_ns)
+        write_symbol(self._recorder, self.terms, symbol, now_ns, taken=True)
         return frames + self._settle(value, now_ns)
 
     def _on_foreign_symbol(self, symbol: Symbol) -> list[Frame]:

@@ -55,12 +55,12 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
     )
 
 
-def build_uplink(agreement: Agreement, wire: Wire) -> Uplink:
+def build_uplink(agreement: Agreement, wire: Wire, recorder: Recorder | None = None) -> Uplink:
     """Return the transmitter's way out onto a line: grid, delivery delay and meter."""
     terms = agreement.terms
     alphabet = agreement.codec.coder.alphabet
     line = build_line(agreement, "up", wire)
-    return Uplink(SlotShaper(terms), line, UplinkMeter(alphabet), wire)
+    return Uplink(SlotShaper(terms), line, UplinkMeter(alphabet), wire, recorder)
 
 
 def build_line(agreement: Agreement, direction: Direction, wire: Wire) -> Line:
@@ -118,15 +118,15 @@ def build_guard(agreement: Agreement) -> Guard:
     return Guard(terms.limits, settings)
 
 
-def build_controller(config: FlightConfig) -> Controller:
-    """Return the controller."""
+def build_controller(config: FlightConfig, reference: Reference | None = None) -> Controller:
+    """Return the controller; `reference` takes the place of the configured one."""
     section = config.receiver
     if section.controller == "recorded":
         return RecordedController(read_flight_log(config))
     pid = section.pid
     return Pid(
         PidGains(pid.proportional, pid.integral, pid.derivative, pid.unit),
-        build_reference(config),
+        reference or build_reference(config),
         config.timing.tick_s,
         volts_max=config.limits.volts_max,
         normal_force_volts=pid.normal_force_volts,

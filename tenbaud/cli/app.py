@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tenbaud.cli import demo, doctor, figures, files, identify, nodes, rig, runs
+from tenbaud.cli import demo, doctor, figures, files, identify, nodes, replays, rig, runs
 from tenbaud.flight.outcome import ExitCode, outcome_of
 
 app = typer.Typer(
@@ -48,6 +48,8 @@ app.command()(identify.identify)
 app.command()(figures.figures)
 app.command()(runs.inspect)
 app.command()(runs.diff)
+app.command()(replays.replay)
+app.command()(replays.audit)
 app.command()(files.convert)
 app.command()(files.recover)
 app.command()(runs.presets)

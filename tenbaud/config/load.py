@@ -117,7 +117,10 @@ def _describe(detail: ErrorDetails) -> tuple[str, str]:
         return name, f"unknown field{_nearest(place, kind)}"
     if detail["type"] == "union_tag_invalid":
         tag = detail["ctx"]["tag"]
-        return f"{name}.kind", f"known are {', '.join(KINDS[name])}, got {tag!r}"
+        known = [kind for kind in KINDS[name] if kind != "plugin"]
+        return f"{name}.kind", f"known are {', '.join(known)} and module:Class, got {tag!r}"
+    if detail["type"] == "string_pattern_mismatch" and place[-1] in ("controller", "kind"):
+        return f"{name} = {detail['input']!r}", "a class from outside is written module:Class"
     message = detail["msg"].removeprefix("Value error, ")
     if isinstance(detail["input"], dict | FlightConfig):
         return name, message

@@ -19,6 +19,7 @@ from channel.errors import TenbaudError
 from receiver.controllers.base import Controller
 from receiver.rejoin import carried_to
 from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.recover import RECOVERED_NOTE
 from tenbaud.replay.control import controller_of, recorded_commands, steps_by_hand
 from tenbaud.replay.record import Epoch, FlightRecord, epochs_of, load_record
 from tenbaud.replay.refly import Reflown
@@ -74,6 +75,8 @@ def _check_whole(record: FlightRecord, result: Audit) -> None:
             result.gaps.append(f"the {end}'s recorder dropped {dropped} rows")
         if not tables.end:
             result.notes.append(f"the {end}'s recording was cut: audited up to the cut")
+        if RECOVERED_NOTE in tables.end:
+            result.notes.append(f"the {end}'s recording was recovered: audited up to the cut")
     for end, section in (
         ("transmitter", record.agreement.config.transmitter),
         ("receiver", record.agreement.config.receiver),

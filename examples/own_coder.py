@@ -1,12 +1,8 @@
-"""A coder of your own: a word of `bits` bits of the estimation error, over a range that adjusts itself.
+"""A coder of your own: `bits` bits of the estimation error, over a range that adjusts itself.
 
 It runs at both ends and must give both the same bits, so it keeps to + - * /, comparisons and whole
-numbers: no numpy, no `math.sin`.
-
-    python examples/own_coder.py
+numbers: no numpy, no `math.sin`.    python examples/own_coder.py
 """
-
-from __future__ import annotations
 
 import numpy as np
 
@@ -22,9 +18,7 @@ class Cells:
 
     impulse = True
 
-    def __init__(
-        self, context: CoderContext, bits: int = 2, gain: float = 0.9, rate: float = 1.0
-    ) -> None:
+    def __init__(self, context: CoderContext, bits: int = 2, gain: float = 0.9, rate: float = 1.0):
         self.bits, self.cells = bits, 1 << bits
         self.gains = (gain, rate)  # of the correction: angle, rate (1/s)
         self.alphabet = Alphabet((0, 1), bits)
@@ -43,8 +37,7 @@ class Cells:
             return (0.0, 0.0), (coder[0] * 1.2,)
         cell = sum(bit << place for place, bit in enumerate(word))
         error = coder[0] * ((2 * cell + 1) / self.cells - 1.0)
-        outer = cell in (0, self.cells - 1)
-        width = coder[0] * (1.6 if outer else 0.7)
+        width = coder[0] * (1.6 if cell in (0, self.cells - 1) else 0.7)
         return (self.gains[0] * error, self.gains[1] * error), (max(width, 0.004),)
 
     def ranges(self, coder: Vector) -> Vector:
@@ -53,7 +46,7 @@ class Cells:
 
 if __name__ == "__main__":
     for bits in (2, 3, 4):  # all at 20 bit/s: more bits per word, fewer words
-        settings = {"coder.kind": "own_coder:Cells", "coder.options.bits": bits}
+        settings = {"coder.kind": "own_coder:Cells", "coder.options.bits": bits, "duration_s": 60.0}
         settings |= {"channel.rate_baud": 20.0, "timing.symbol_period_s": bits / 20.0}
         run = fly("tuned-20baud", settings=settings | {"transmitter.plant.mismatch": 0.1})
         print(f"{bits} bits per word: rms error {np.sqrt(np.mean(run.error_coded**2)):.4f} rad")

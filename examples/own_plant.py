@@ -45,6 +45,7 @@ class Gusty(PitchPlant):
 if __name__ == "__main__":
     for strength in (0.0, 3.0, 10.0):
         settings = {
+            "duration_s": 60.0,
             "transmitter.plant.kind": "own_plant:Gusty",
             "transmitter.plant.options.strength": strength,
         }

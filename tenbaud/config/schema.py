@@ -183,18 +183,19 @@ CoderSection: TypeAlias = Annotated[
 ]
 
 KINDS: dict[str, dict[str, type[Section]]] = {
-    "model": {"pitch": PitchModelSection, "hold": HoldModelSection, "plugin": PluginModelSection},
+    "model": {"pitch": PitchModelSection, "hold": HoldModelSection},
     "coder": {
         "zoom": ZoomCoderSection,
         "fixed": FixedCoderSection,
         "timed": TimedCoderSection,
         "static": StaticCoderSection,
         "words": WordsCoderSection,
-        "plugin": PluginCoderSection,
     },
 }
-"""Sections that come in kinds; the first kind is what a section without `kind` is, and "plugin" stands
-for every class from outside."""
+"""Sections that come in kinds; the first kind is what a section without `kind` is."""
+
+PLUGIN_SECTIONS: dict[str, type[Section]] = {"model": PluginModelSection, "coder": PluginCoderSection}
+"""The same sections where `kind` names a class from outside; their tag is "plugin"."""
 
 
 class Limits(Section):

@@ -16,6 +16,7 @@ from benchmarks.flights import cold_start_figures, memory_figures, real_figures,
 from benchmarks.latency import latency_figures
 from benchmarks.load import load_figures
 from benchmarks.page import page_figures
+from benchmarks.recordings import recording_figures
 
 BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
     "codec": codec_figures,
@@ -27,6 +28,7 @@ BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
     "fastest": fastest_figures,
     "load": load_figures,
     "page": page_figures,
+    "recordings": recording_figures,
 }
 
 

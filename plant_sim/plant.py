@@ -2,7 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol
+
+from plant_sim.disturbance import Disturbance
+
+
+@dataclass(frozen=True, slots=True)
+class PlantContext:
+    """What a plant from outside is given when it is built."""
+
+    step_s: float
+    """what one call of `advance` simulates"""
+    seed: int
+    """of everything random"""
+    volts_max: float
+    """where each motor's voltage is clamped"""
+    mismatch: float | tuple[float, ...]
+    """fraction by which the plant is to be off the codec's model"""
+    disturbance: Disturbance | None
+    """configured torque: `disturbance.torque(step)`, rad/s^2"""
+    initial_angle_rad: float
 
 
 class Plant(Protocol):

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from channel.audit_trail import ARRIVED_CHANNEL, EPOCH_CHANNEL, epoch_row
 from channel.codec import CodecState, Vector
-from channel.frames import Desync
+from channel.frames import Desync, Symbol
 from channel.lead import FlownSample
 from channel.lockstep import LOCKSTEP_CHANNEL, History
 from channel.recording import Field, RecordChannel, Recorder
@@ -71,3 +72,14 @@ def write_failure(recorder: Recorder, terms: Terms, history: History, theirs: De
         theirs.state,
     )
     recorder.write(LOCKSTEP_CHANNEL, theirs.sample * terms.sample_ns, row)
+
+
+def write_symbol(recorder: Recorder, terms: Terms, symbol: Symbol, now_ns: int, *, taken: bool) -> None:
+    """Write down a symbol that came for a slot, in time or for a slot that was settled already."""
+    row = (symbol.slot, symbol.number, now_ns, taken)
+    recorder.write(ARRIVED_CHANNEL, terms.slot_ns(symbol.slot), row)
+
+
+def write_epoch(recorder: Recorder, terms: Terms, epoch: int, start: CodecState, hold: Vector) -> None:
+    """Write down from what state an epoch starts."""
+    recorder.write(EPOCH_CHANNEL, start.sample * terms.sample_ns, epoch_row(epoch, start, hold))

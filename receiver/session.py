@@ -39,7 +39,7 @@ from channel.wire import WIRE_VERSION
 from channel.words import ERASED
 from receiver.commander import Commander
 from receiver.controllers.base import Controller
-from receiver.records import write_failure
+from receiver.records import write_epoch, write_failure, write_symbol
 from receiver.rejoin import Greeter, Verdict, desync_answer, difference, first_sample
 from receiver.short_slots import SlotFinder
 from receiver.stranger import Stranger
@@ -227,11 +227,8 @@ class ReceiverSession:
             else:
                 # A rig that was started again is at rest, and so is what is known of it.
                 self._commander.restart(first)
-        self._slot = first * count
-        self._word = []
-        self._anchor = None
-        self._advanced = False
-        self._silent_slots = 0
+        self._slot, self._word, self._anchor = first * count, [], None
+        self._advanced, self._silent_slots = False, 0
         hold = self._commander.hold
         welcome = Welcome(
             self.session_number,
@@ -243,6 +240,8 @@ class ReceiverSession:
             state,
         )
         self._greeter.welcome = welcome
+        self._commander.write_down()
+        write_epoch(self._recorder, self.terms, self.epoch, self.state, hold)
         text = f"session {self.session_number:08x}, epoch {self.epoch}, begins at sample {first}"
         self._tell(EventKind.STARTED if last is None else EventKind.REJOIN, text)
         return [welcome]
@@ -263,6 +262,7 @@ class ReceiverSession:
             return self._on_foreign_symbol(symbol)
         if ahead < 0:
             self.counts["symbols_late"] += 1
+            write_symbol(self._recorder, self.terms, symbol, now_ns, taken=False)
             self._tell(EventKind.LATE_SYMBOL, f"slot {symbol.slot} was settled already: dropped")
             return []
         if ahead > GAP_SAMPLES_MAX * self.terms.symbols_per_word:
@@ -277,6 +277,7 @@ class ReceiverSession:
             frames += self._settle(None, now_ns)
         self._anchor = (symbol.slot, now_ns)
         self.meter.on_symbol(now_ns)
+        write_symbol(self._recorder, self.terms, symbol, now_ns, taken=True)
         return frames + self._settle(value, now_ns)
 
     def _on_foreign_symbol(self, symbol: Symbol) -> list[Frame]:

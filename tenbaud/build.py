@@ -74,7 +74,10 @@ class Agreement:
         A flight that is over by then, or that has no periodic reference, counts from its beginning.
         """
         reference = self.config.receiver.reference
-        periodic = self.config.receiver.controller == "pid" and reference.kind in ("square", "sine")
+        periodic = self.config.receiver.controller != "recorded" and reference.kind in (
+            "square",
+            "sine",
+        )
         start = round(reference.period_s * 1e9) // self.terms.tick_ns if periodic else 0
         return start if start < self.flight_ticks else 0
 

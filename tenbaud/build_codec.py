@@ -15,30 +15,82 @@ from channel.coders.words import WordsCoder, WordsParameters
 from channel.coders.zoom import ZoomCoder, ZoomParameters
 from channel.models.hold import HoldModel
 from channel.models.pitch import PitchModel, PitchParameters
+from channel.plugin_context import CoderContext, ModelContext
+from channel.words import ERASED
 from tenbaud.config.schema import (
     FixedCoderSection,
     FlightConfig,
     HoldModelSection,
     PitchModelSection,
+    PluginCoderSection,
+    PluginModelSection,
     StaticCoderSection,
     TimedCoderSection,
     WordsCoderSection,
     ZoomCoderSection,
 )
+from tenbaud.plugins import CODER, MODEL, PluginError, build_plugin
 
 
 def build_codec(config: FlightConfig) -> Codec:
     """Return the codec of a configuration; ValueError where its parts do not fit each other."""
     ticks = round(config.timing.symbol_period_s / config.timing.tick_s)
-    model = MODELS[config.model.kind](config.model, config)
-    coder = CODERS[config.coder.kind](config.coder, config)
+    model = _build_model(config)
+    coder = _build_coder(config, model)
     needs_hold = isinstance(coder, WordsCoder)
     if needs_hold != isinstance(model, HoldModel):
         raise ValueError(
             f"coder.kind = {config.coder.kind!r} and model.kind = {config.model.kind!r} do not go "
             "together: the coder 'words' sets angle and rate of the model 'hold', and no other"
         )
-    return Codec(model, coder, ticks)
+    codec = Codec(model, coder, ticks)
+    if isinstance(config.model, PluginModelSection) or isinstance(config.coder, PluginCoderSection):
+        _try_out(codec, config)
+    return codec
+
+
+def _build_model(config: FlightConfig) -> Model:
+    section = config.model
+    if not isinstance(section, PluginModelSection):
+        return MODELS[section.kind](section, config)
+    context = ModelContext(config.timing.tick_s, config.timing.symbol_period_s)
+    model: Model = build_plugin("model.kind", section.kind, context, section.options, MODEL)
+    return model
+
+
+def _build_coder(config: FlightConfig, model: Model) -> Coder:
+    section = config.coder
+    if not isinstance(section, PluginCoderSection):
+        return CODERS[section.kind](section, config)
+    context = CoderContext(config.timing.tick_s, config.timing.symbol_period_s, model)
+    coder: Coder = build_plugin("coder.kind", section.kind, context, section.options, CODER)
+    return coder
+
+
+def _try_out(codec: Codec, config: FlightConfig) -> None:
+    """Run parts from outside through a sample and an erasure, so that what does not fit is told now."""
+    command = config.limits.initial_volts
+    try:
+        if codec.model.input_size != len(command):
+            raise ValueError(
+                f"the model's input_size is {codec.model.input_size}, and a command has {len(command)} "
+                "motor voltages"
+            )
+        state = codec.initial()
+        word = codec.encode(state, codec.model.measured(state.model))
+        codec.coder.alphabet.word_number(word)
+        for consumed in (word, ERASED):
+            before = len(state.model), len(state.coder)
+            state = codec.step(state, consumed, [command] * codec.ticks_per_sample)
+            if (len(state.model), len(state.coder)) != before:
+                raise ValueError("the number of states changed within a sample")
+            codec.pack(state)
+        codec.coder.ranges(state.coder)[0]
+    except Exception as error:  # it is the user's code, and anything may be wrong in it
+        raise PluginError(
+            f"model.kind = {config.model.kind!r} with coder.kind = {config.coder.kind!r} cannot run "
+            f"one sample: {type(error).__name__}: {error}"
+        ) from error
 
 
 def model_parameters(section: PitchModelSection) -> PitchParameters:

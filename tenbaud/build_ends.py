@@ -13,7 +13,7 @@ from channel.sabotage import SabotagedCodec, parse_sabotage
 from channel.shaper import SlotShaper, UplinkMeter
 from channel.uplink import Uplink
 from channel.wire import Wire
-from receiver.controllers.base import Controller
+from receiver.controllers.base import Controller, ControllerContext
 from receiver.controllers.pid import Pid, PidGains
 from receiver.controllers.recorded import RecordedController
 from receiver.endpoint import ReceiverEndpoint
@@ -24,6 +24,7 @@ from tenbaud.build_gauge import build_gauge
 from tenbaud.build_rig import build_rig
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
+from tenbaud.plugins import CONTROLLER, build_plugin, is_plugin
 from transmitter.guard import Guard, GuardSettings
 from transmitter.node import TransmitterNode
 from transmitter.scores import Scores
@@ -47,7 +48,7 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
         agreement.codec.model,
         agreement.window_start_tick,
         (LAG_SAMPLES_MAX + 2) * terms.ticks_per_sample,
-        reference.angle_rad if config.receiver.controller == "pid" else lambda _tick: None,
+        (lambda _tick: None) if config.receiver.controller == "recorded" else reference.angle_rad,
         gauge.on_error if gauge is not None else lambda _error: None,
     )
     # Only a rig that hurts nobody is armed again by itself.
@@ -58,12 +59,12 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
     )
 
 
-def build_uplink(agreement: Agreement, wire: Wire) -> Uplink:
+def build_uplink(agreement: Agreement, wire: Wire, recorder: Recorder | None = None) -> Uplink:
     """Return the transmitter's way out onto a line: grid, delivery delay and meter."""
     terms = agreement.terms
     alphabet = agreement.codec.coder.alphabet
     line = build_line(agreement, "up", wire)
-    return Uplink(SlotShaper(terms), line, UplinkMeter(alphabet), wire)
+    return Uplink(SlotShaper(terms), line, UplinkMeter(alphabet), wire, recorder)
 
 
 def build_line(agreement: Agreement, direction: Direction, wire: Wire) -> Line:
@@ -136,6 +137,21 @@ def build_controller(config: FlightConfig, reference: Reference | None = None) -
     section = config.receiver
     if section.controller == "recorded":
         return RecordedController(read_flight_log(config))
+    if is_plugin(section.controller):
+        context = ControllerContext(
+            config.timing.tick_s,
+            reference or build_reference(config),
+            config.limits.volts_max,
+            config.limits.initial_volts,
+        )
+        plugin: Controller = build_plugin(
+            "receiver.controller",
+            section.controller,
+            context,
+            section.controller_options,
+            CONTROLLER,
+        )
+        return plugin
     pid = section.pid
     return Pid(
         PidGains(pid.proportional, pid.integral, pid.derivative, pid.unit),

@@ -5,10 +5,12 @@ from __future__ import annotations
 from plant_sim.disturbance import parse_disturbance
 from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters, PitchPlant
+from plant_sim.plant import Plant, PlantContext
 from tenbaud.build import REAL_RIGS, read_flight_log
 from tenbaud.config.load import ConfigError
 from tenbaud.config.rig_schema import AxisSection
 from tenbaud.config.schema import FlightConfig, PitchModelSection
+from tenbaud.plugins import PLANT, build_plugin, is_plugin
 from transmitter.rigs.axes import Axis, Motors
 from transmitter.rigs.base import Rig
 from transmitter.rigs.device import DeviceRig, DeviceSettings
@@ -55,18 +57,30 @@ def build_device(config: FlightConfig, output: bool) -> DeviceRig:
     )
 
 
-def build_plant(config: FlightConfig, step_s: float) -> PitchPlant:
-    """Return the simulated plant, off the codec's model by the configured mismatch."""
+def build_plant(config: FlightConfig, step_s: float) -> Plant:
+    """Return the simulated plant, off the codec's model by the mismatch, or one from outside."""
     section = config.transmitter.plant
-    nominal = nominal_plant(config)
     disturbance = None
     if section.disturbance:
         try:
             disturbance = parse_disturbance(section.disturbance, step_s, config.seed)
         except ValueError as error:
             raise ConfigError(f"transmitter.plant.disturbance: {error}") from error
+    if is_plugin(section.kind):
+        context = PlantContext(
+            step_s,
+            config.seed,
+            config.limits.volts_max,
+            section.mismatch,
+            disturbance,
+            section.initial_angle_rad,
+        )
+        plugin: Plant = build_plugin(
+            "transmitter.plant.kind", section.kind, context, section.options, PLANT
+        )
+        return plugin
     return PitchPlant(
-        nominal.mismatched(section.mismatch),
+        nominal_plant(config).mismatched(section.mismatch),
         step_s,
         disturbance,
         initial_angle_rad=section.initial_angle_rad,

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections import Counter, deque
 from enum import Enum
 
+from channel.audit_trail import EPOCH_CHANNEL, epoch_row
 from channel.codec import Codec, Vector
 from channel.events import EVENT_CHANNEL, Event, EventKind, event_row
 from channel.frames import (
@@ -252,6 +253,8 @@ class TransmitterSession:
         self.epoch_tick = state.sample * self.terms.ticks_per_sample
         self._due = deque(enumerate([hold] * self.terms.lead_ticks, self.epoch_tick))
         self.phase = Phase.FLYING
+        begins_ns = state.sample * self.terms.sample_ns
+        self._recorder.write(EPOCH_CHANNEL, begins_ns, epoch_row(self.epoch, state, hold))
         self.counts["rejoins"] += again
         text = f"session {welcome.session:08x}, epoch {welcome.epoch}, begins at sample {state.sample}"
         self._tell(EventKind.REJOIN if again else EventKind.STARTED, text)

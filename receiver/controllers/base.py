@@ -2,7 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol
+
+from receiver.references import Reference
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerContext:
+    """What a controller from outside is given when it is built."""
+
+    tick_s: float
+    """time between two commands"""
+    reference: Reference
+    """the configured set-point: `reference.angle_rad(tick)`"""
+    volts_max: float
+    """where each motor's voltage is clamped"""
+    initial_command: tuple[float, ...]
+    """motor voltages before the first command; a command has as many"""
 
 
 class Controller(Protocol):

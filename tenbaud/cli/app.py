@@ -7,7 +7,20 @@ from typing import Annotated
 
 import typer
 
-from tenbaud.cli import demo, doctor, figures, identify, keys, nodes, rig, router, runs, view
+from tenbaud.cli import (
+    demo,
+    doctor,
+    figures,
+    files,
+    identify,
+    keys,
+    nodes,
+    replays,
+    rig,
+    router,
+    runs,
+    view,
+)
 from tenbaud.flight.outcome import ExitCode, outcome_of
 
 app = typer.Typer(
@@ -51,6 +64,10 @@ app.command()(identify.identify)
 app.command()(figures.figures)
 app.command()(runs.inspect)
 app.command()(runs.diff)
+app.command()(replays.replay)
+app.command()(replays.audit)
+app.command()(files.convert)
+app.command()(files.recover)
 app.command()(runs.presets)
 app.command()(doctor.doctor)
 app.command()(rig.rig)

@@ -12,13 +12,19 @@ from tenbaud.flight.outcome import ExitCode
 
 def inspect(
     run: Annotated[Path, typer.Argument(help="Folder of a run, or one recording.")],
+    json: Annotated[bool, typer.Option("--json", help="The same as JSON.")] = False,
 ) -> None:
     """Show what a run's recordings hold: channels, units, spans, events.
 
     [dim]tenbaud inspect runs/2026-11-23T10-00-00_paper-10baud[/dim]
     """
-    from tenbaud.recording.inspect import describe_text
+    from tenbaud.recording.inspect import describe_json, describe_text
 
+    if json:
+        import json as json_module
+
+        typer.echo(json_module.dumps(describe_json(run), indent=2))
+        return
     typer.echo(describe_text(run))
 
 

@@ -12,7 +12,8 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from channel.errors import TenbaudError
-from tenbaud.config.schema import KINDS, FlightConfig
+from tenbaud.config.schema import KINDS, PLUGIN_SECTIONS, FlightConfig
+from tenbaud.config.section import Section
 
 DEFAULT_PRESET = "paper-10baud"
 
@@ -111,24 +112,32 @@ def _describe(detail: ErrorDetails) -> tuple[str, str]:
     # The names of a union's branches ("int", "literal['auto']") are no part of the field's name.
     branches = ("literal[", "int", "float", "constrained", "tuple[", "function-", "str")
     place = [str(part) for part in detail["loc"] if not str(part).startswith(branches)]
-    kind = place.pop(1) if len(place) > 1 and place[1] in KINDS.get(place[0], {}) else None
+    kind = place.pop(1) if len(place) > 1 and place[1] in _kinds(place[0]) else None
     name = ".".join(place) or "(whole file)"
     if detail["type"] == "extra_forbidden":
         return name, f"unknown field{_nearest(place, kind)}"
     if detail["type"] == "union_tag_invalid":
         tag = detail["ctx"]["tag"]
-        return f"{name}.kind", f"known are {', '.join(KINDS[name])}, got {tag!r}"
+        return f"{name}.kind", f"known are {', '.join(KINDS[name])} and module:Class, got {tag!r}"
+    if detail["type"] == "string_pattern_mismatch" and place[-1] in ("controller", "kind"):
+        return f"{name} = {detail['input']!r}", "a class from outside is written module:Class"
     message = detail["msg"].removeprefix("Value error, ")
     if isinstance(detail["input"], dict | FlightConfig):
         return name, message
     return f"{name} = {detail['input']!r}", message
 
 
+def _kinds(section: str) -> dict[str, type[Section]]:
+    """Return what a section may be, by the tag that its errors carry."""
+    plugin = {"plugin": PLUGIN_SECTIONS[section]} if section in PLUGIN_SECTIONS else {}
+    return KINDS.get(section, {}) | plugin
+
+
 def _nearest(place: list[str], kind: str | None) -> str:
     fields: Any = FlightConfig.model_fields
     sections = place[:-1]
     if kind is not None:
-        fields = KINDS[place[0]][kind].model_fields
+        fields = _kinds(place[0])[kind].model_fields
         sections = place[1:-1]
     for part in sections:
         section = fields[part].annotation if part in fields else None

@@ -15,7 +15,7 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator,
 from channel.impairments import parse_impairments
 from channel.sabotage import parse_sabotage
 from tenbaud.config.rig_schema import BridgeSection, HilSection, QuarcSection, SerialSection
-from tenbaud.config.section import NotNegative, Positive, Section
+from tenbaud.config.section import NotNegative, Options, PluginName, Positive, Section
 
 
 def _checked_sabotage(text: str) -> str:
@@ -82,6 +82,15 @@ class HoldModelSection(Section):
     kind: Literal["hold"] = "hold"
 
 
+class PluginModelSection(Section):
+    """A model from outside."""
+
+    kind: PluginName
+    """module:Class"""
+    options: Options = Field(default_factory=dict)
+    """what the class is built with"""
+
+
 class ZoomCoderSection(Section):
     """The paper's coder (16)-(22) and the observer gains."""
 
@@ -138,18 +147,29 @@ class WordsCoderSection(Section):
     """tau of a low-pass behind the differentiator; 0: none"""
 
 
+class PluginCoderSection(Section):
+    """A coder from outside."""
+
+    kind: PluginName
+    """module:Class"""
+    options: Options = Field(default_factory=dict)
+    """what the class is built with"""
+
+
 def _kind_or(default: str) -> Callable[[Any], str]:
     """Return the discriminator of a section whose `kind` may be left out."""
 
     def kind(value: Any) -> str:
         named = value.get("kind", default) if isinstance(value, dict) else value.kind
-        return str(named)
+        return "plugin" if ":" in str(named) else str(named)
 
     return kind
 
 
 ModelSection: TypeAlias = Annotated[
-    Annotated[PitchModelSection, Tag("pitch")] | Annotated[HoldModelSection, Tag("hold")],
+    Annotated[PitchModelSection, Tag("pitch")]
+    | Annotated[HoldModelSection, Tag("hold")]
+    | Annotated[PluginModelSection, Tag("plugin")],
     Discriminator(_kind_or("pitch")),
 ]
 CoderSection: TypeAlias = Annotated[
@@ -157,7 +177,8 @@ CoderSection: TypeAlias = Annotated[
     | Annotated[FixedCoderSection, Tag("fixed")]
     | Annotated[TimedCoderSection, Tag("timed")]
     | Annotated[StaticCoderSection, Tag("static")]
-    | Annotated[WordsCoderSection, Tag("words")],
+    | Annotated[WordsCoderSection, Tag("words")]
+    | Annotated[PluginCoderSection, Tag("plugin")],
     Discriminator(_kind_or("zoom")),
 ]
 
@@ -173,6 +194,9 @@ KINDS: dict[str, dict[str, type[Section]]] = {
 }
 """Sections that come in kinds; the first kind is what a section without `kind` is."""
 
+PLUGIN_SECTIONS: dict[str, type[Section]] = {"model": PluginModelSection, "coder": PluginCoderSection}
+"""The same sections where `kind` names a class from outside; their tag is "plugin"."""
+
 
 class Limits(Section):
     """What a command may be; the receiver keeps to it and the guard beside the motors checks it."""
@@ -186,6 +210,10 @@ class Limits(Section):
 class PlantSection(Section):
     """The simulated plant, relative to the codec's model."""
 
+    kind: Literal["pitch"] | PluginName = "pitch"
+    """the pitch axis, or module:Class"""
+    options: Options = Field(default_factory=dict)
+    """what a class from outside is built with"""
     pitch: PitchModelSection = PitchModelSection()
     """what the plant is relative to when the codec's model is no pitch model"""
     mismatch: float | tuple[float, float, float] = 0.0
@@ -258,7 +286,10 @@ class ReferenceSection(Section):
 class ReceiverSection(Section):
     """The controller node."""
 
-    controller: Literal["pid", "recorded"] = "pid"
+    controller: Literal["pid", "recorded"] | PluginName = "pid"
+    """the PID law, the voltages of a recorded flight, or module:Class"""
+    controller_options: Options = Field(default_factory=dict)
+    """what a class from outside is built with"""
     pid: PidSection = PidSection()
     reference: ReferenceSection = ReferenceSection()
     sabotage: SabotageText = ""

@@ -157,6 +157,8 @@ def _plant_name(agreement: Agreement) -> str:
         return f"replay of {Path(agreement.config.flight_log.file).name}"
     if section.rig != "simulated":
         return real_rig_name(section)
+    if section.plant.kind != "pitch":
+        return section.plant.kind
     mismatch = section.plant.mismatch
     off = mismatch if isinstance(mismatch, tuple) else (mismatch,)
     name = "pitch"

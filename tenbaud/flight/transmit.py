@@ -54,7 +54,7 @@ def prepare(agreement: Agreement, recorder: Recorder | None, wire: Wire) -> Tran
     """Return a transmitter that is ready to fly."""
     node = build_transmitter(agreement, recorder)
     downlink = build_line(agreement, "down", wire)
-    return TransmitterRun(agreement, node, build_uplink(agreement, wire), downlink)
+    return TransmitterRun(agreement, node, build_uplink(agreement, wire, recorder), downlink)
 
 
 def fly_virtual(run: TransmitterRun, peer: Peer, should_stop: Stop) -> Outcome:

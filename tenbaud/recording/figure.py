@@ -16,6 +16,7 @@ from tenbaud.recording.reader import Recording
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Series = NDArray[np.float64]
 
@@ -72,8 +73,18 @@ def draw_flight(transmitter: Path, receiver: Path | None, output: Path, title: s
     from it. The receiver's recording adds the reference. Raises RecordingError if the
     transmitter's recording holds no flight.
     """
+    draw_run(transmitter, receiver, title).savefig(output, dpi=150, format="png")
+
+
+def draw_run(transmitter: Path | None, receiver: Path | None, title: str) -> Figure:
+    """Return the same as a matplotlib figure. Raises RecordingError without a transmitter's file."""
     from matplotlib.figure import Figure  # takes half a second, which other commands need not pay
 
+    if transmitter is None:
+        raise RecordingError(
+            "There is no transmitter's recording here, and the pitch is recorded there. Give the "
+            "folder of the transmitter's run."
+        )
     flight = _read_flight(transmitter, receiver)
     figure = Figure(figsize=(9.0, 9.0), layout="constrained")
     panels = figure.subplots(4, 1, sharex=True, height_ratios=[3.0, 2.0, 1.6, 1.0])
@@ -90,7 +101,7 @@ def draw_flight(transmitter: Path, receiver: Path | None, output: Path, title: s
     panels[-1].set_xlabel("time, s")
     figure.suptitle(title, fontsize=11)
     figure.align_ylabels(panels)
-    figure.savefig(output, dpi=150, format="png")
+    return figure
 
 
 def _read_flight(transmitter: Path, receiver: Path | None) -> _Flight:

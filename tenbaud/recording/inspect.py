@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import json
+from dataclasses import asdict, dataclass
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 from channel.recording import Field, RecordChannel
-from tenbaud.recording.folder import find_recordings
+from tenbaud.recording.folder import RunFolder, find_recordings
 from tenbaud.recording.reader import Recording, Row, TopicSummary
 from tenbaud.recording.writer import END_METADATA
 
@@ -39,8 +41,55 @@ def describe(path: Path) -> list[Description]:
 
 
 def describe_text(path: Path) -> str:
-    """The same for a person, as plain text."""
-    return "\n\n".join(_text(description) for description in describe(path))
+    """The same for a person, as plain text; for a run folder headed by the run's figures."""
+    described = describe(path)
+    parts = [_headline(path), *(_text(description) for description in described)]
+    cut = [description.path for description in described if not description.complete]
+    if cut:
+        parts.append(f"`tenbaud recover {path}` makes whole files of what was cut")
+    return "\n\n".join(part for part in parts if part)
+
+
+def describe_json(path: Path) -> list[dict[str, Any]]:
+    """The same for a program: plain dictionaries."""
+    return [_plain(description) for description in describe(path)]
+
+
+def _headline(path: Path) -> str:
+    """Return what `summary.json` says in one line; empty without it."""
+    try:
+        summary = json.loads(RunFolder(path).summary.read_text())
+    except (OSError, ValueError):
+        return ""
+    parts = [
+        f"{summary.get('preset')}: {summary.get('outcome')}",
+        f"{summary['duration_s']:g} s" if "duration_s" in summary else "",
+        f"{summary['coder_bits_up']:g} bits up" if "coder_bits_up" in summary else "",
+        f"{summary['erasures']} erasures" if summary.get("erasures") else "",
+        f"{summary['desyncs']} desyncs" if summary.get("desyncs") else "",
+    ]
+    return ", ".join(part for part in parts if part)
+
+
+def _plain(description: Description) -> dict[str, Any]:
+    return {
+        "path": str(description.path),
+        "size_bytes": description.size_bytes,
+        "complete": description.complete,
+        "rows_dropped": description.rows_dropped,
+        "error": description.error,
+        "metadata": description.metadata,
+        "topics": {
+            topic: {
+                "rows": summary.rows,
+                "first_time_s": summary.first_time_ns / 1e9,
+                "last_time_s": summary.last_time_ns / 1e9,
+                "fields": [asdict(field) for field in summary.channel.fields],
+            }
+            for topic, summary in description.topics.items()
+        },
+        "events": description.events,
+    }
 
 
 def _describe_file(path: Path) -> Description:
@@ -65,7 +114,8 @@ def _text(description: Description) -> str:
         lines.append(f"  {description.rows_dropped} rows were dropped")
     if description.error is not None:
         lines.append(f"  {description.error}")
-    lines.extend(f"  {name} = {value}" for name, value in description.metadata.items())
+    for name, value in description.metadata.items():
+        lines.extend(_metadata_lines(name, value))
     for topic, summary in description.topics.items():
         lines.append("")
         lines.append(f"  {topic}: {_span(summary)}")
@@ -77,6 +127,21 @@ def _text(description: Description) -> str:
         lines.append("  events" if shown == total else f"  the first {shown} of {total} events")
         lines.extend(f"    {_event_line(row)}" for row in description.events)
     return "\n".join(lines)
+
+
+def _metadata_lines(name: str, value: str) -> list[str]:
+    """Return one line; for a configuration, which is JSON, one per section."""
+    try:
+        sections = json.loads(value) if value.startswith("{") else None
+    except ValueError:
+        sections = None
+    if not isinstance(sections, dict):
+        return [f"  {name} = {value}"]
+    lines = [f"  {name}"]
+    for section, fields in sections.items():
+        told = ", ".join(f"{field} {json.dumps(one)}" for field, one in fields.items())
+        lines.append(f"    {section}: {told}")
+    return lines
 
 
 def _span(summary: TopicSummary) -> str:

@@ -1,7 +1,7 @@
 """Reads recordings, whole ones and those cut by a crash.
 
-The streaming reader of the `mcap` package is the only one of its readers that gets anything out of
-a file without an end, so it is used for every file.
+Every file is read from its beginning: of one without an end, a reader that starts from the index at
+the end gets nothing.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from typing import Any
 
 import orjson
 from mcap.exceptions import McapError
-from mcap.records import Channel, Footer, McapRecord, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader
+from mcap.records import Channel, Footer, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 from zstandard import ZstdError
 
 from channel.recording import RecordChannel
+from tenbaud.recording.chunks import Record, records_of_file
 from tenbaud.recording.encoding import channel_from_schema
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.writer import RUN_METADATA
@@ -59,11 +59,12 @@ class MessageStream:
         """The same messages as the bytes in the file: for counting, where decoding is wasted."""
         schemas: dict[int, Schema] = {}
         topics: dict[int, str] = {}
+        wanted = self._topic
         for record in self._records():
-            if isinstance(record, Message):
-                topic = topics[record.channel_id]
-                if self._topic in (None, topic):
-                    yield topic, record.log_time, record.data
+            if isinstance(record, tuple):
+                topic = topics[record[0]]
+                if wanted is None or wanted == topic:
+                    yield topic, record[1], record[2]
             elif isinstance(record, Schema):
                 schemas[record.id] = record
             elif isinstance(record, Channel):
@@ -72,20 +73,16 @@ class MessageStream:
             elif isinstance(record, Metadata):
                 self.metadata[record.name] = dict(record.metadata)
 
-    def _records(self) -> Iterator[McapRecord]:
+    def _records(self) -> Iterator[Record]:
+        footer_seen = False
         with self.path.open("rb") as stream:
-            records = iter(StreamReader(stream, validate_crcs=True).records)
-            footer_seen = False
-            while True:
-                try:
-                    record = next(records)
-                except StopIteration:
-                    self.complete = footer_seen
-                    return
-                except _CUT_ERRORS:
-                    return
-                footer_seen = footer_seen or isinstance(record, Footer)
-                yield record
+            try:
+                for record in records_of_file(stream, self.path.stat().st_size):
+                    footer_seen = footer_seen or isinstance(record, Footer)
+                    yield record
+            except _CUT_ERRORS:
+                return
+        self.complete = footer_seen
 
     def _channel(self, record: Channel, schemas: dict[int, Schema]) -> RecordChannel:
         try:

@@ -1,9 +1,11 @@
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
-from tenbaud.recording.inspect import describe, describe_text
+from tenbaud.recording.inspect import describe, describe_json, describe_text
+from tests.tenbaud.flown import flown
 from tests.tenbaud.recording.rows import EVENT, Rows
 
 
@@ -25,12 +27,26 @@ def test_run_folder_is_described_file_by_file(tmp_path: Path, fly: Callable[...,
         assert words in text
 
 
+def test_a_real_run_is_headed_by_its_figures_and_its_configuration_is_readable(tmp_path: Path) -> None:
+    run = flown(tmp_path / "run", duration_s=3.0)
+    text = describe_text(run.path)
+    assert text.startswith("tuned-10baud: the flight is over, 3 s, 30 bits up")
+    assert "    timing: lead_ticks 0, symbol_period_s 0.1, tick_s 0.01" in text
+    assert "recover" not in text
+    described = json.loads(json.dumps(describe_json(run.path)))
+    assert [one["complete"] for one in described] == [True, True]
+    fields = described[0]["topics"]["tick"]["fields"]
+    assert {"measured_rad", "applied_volts"} <= {field["name"] for field in fields}
+    assert described[0]["topics"]["tick"]["rows"] == 300
+
+
 def test_cut_file_is_called_cut(tmp_path: Path, fly: Callable[..., Path]) -> None:
     path = fly(tmp_path / "run", ticks=100) / "transmitter.mcap"
     path.write_bytes(path.read_bytes()[:-100])
     [description] = describe(path)
     assert not description.complete
     assert "cut: these are the rows up to the cut" in describe_text(path)
+    assert f"`tenbaud recover {path}`" in describe_text(path)
 
 
 def test_only_the_first_twenty_events_are_listed(

@@ -1,0 +1,137 @@
+"""A flight of ten minutes at 100 Hz: how large it is, how long its files take to convert and to open.
+
+The flight has a command lead and the noise of a real line, as its recording is then largest. Converting
+is timed with the start of Python, opening with the imports that it needs.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from benchmarks.figures import Figure
+from channel.links.endpoints import free_endpoint
+from tenbaud import Run
+from tenbaud.recording.convert import FORMS
+
+MINUTES = 10
+KILLED_AFTER_S = 6.0
+TOP = Path(__file__).parents[1]
+
+OPEN = """
+import sys, time
+started = time.perf_counter()
+from tenbaud import Run
+run = Run(sys.argv[1])
+run.pitch
+opened = time.perf_counter()
+run.signals
+print(opened - started, time.perf_counter() - started)
+"""
+
+
+def recording_figures() -> list[Figure]:
+    """Return sizes and times of a ten-minute run, and what a killed pair of processes lost."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        seconds = str(60 * MINUTES)
+        _tenbaud(
+            folder,
+            *("demo", "--json", "--duration", seconds, "--delivery", "end", "--out", "run"),
+            *("--mismatch", "0.1", "--disturbance", "q=2e-3"),
+        )
+        run = folder / "run"
+        sizes = {end: (run / f"{end}.mcap").stat().st_size / 1e6 for end in ("transmitter", "receiver")}
+        figures = [Figure(f"recording_{end}_mb", size, "MB", "") for end, size in sizes.items()]
+        total = sum(sizes.values())
+        figures.append(Figure("recording_both_ends_mb", total, "MB", "below 15"))
+        figures += [_conversion(folder, form) for form in FORMS]
+        opened, everything = _opening(folder)
+        figures.append(Figure("run_opens_s", opened, "s", "below 1"))
+        figures.append(Figure("run_all_signals_s", everything, "s", ""))
+        figures.append(_timed(folder, "replay_s", "replay", "run"))
+        figures.append(_timed(folder, "audit_s", "audit", "run"))
+        return figures + _killed(folder)
+
+
+def _conversion(folder: Path, form: str) -> Figure:
+    return _timed(folder, f"convert_{form}_s", "convert", "run", "--to", form, asked="below 10")
+
+
+def _timed(folder: Path, name: str, *arguments: str, asked: str = "") -> Figure:
+    started = time.perf_counter()
+    _tenbaud(folder, *arguments)
+    return Figure(name, time.perf_counter() - started, "s", asked)
+
+
+def _opening(folder: Path, rounds: int = 3) -> tuple[float, float]:
+    """Return the best of some rounds: until the first signal is there, and until all are."""
+    times = []
+    for _ in range(rounds):
+        done = subprocess.run(
+            [sys.executable, "-c", OPEN, "run"],
+            cwd=folder,
+            env=_environment(),
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        opened, everything = map(float, done.stdout.split())
+        times.append((opened, everything))
+    return min(times)
+
+
+def _killed(folder: Path) -> list[Figure]:
+    """Kill both ends of a flight on the real clock; return how much of it each had not written."""
+    endpoint = free_endpoint()
+    shared = ("--clock", "real", "--status", "none")
+    commands = {
+        "receiver": ("receive", "--listen", endpoint, "--out", "lower", *shared),
+        "transmitter": (
+            *("transmit", "--connect", endpoint, "--out", "upper", "--duration", "3600"),
+            *shared,
+        ),
+    }
+    ends = {
+        role: subprocess.Popen(
+            [sys.executable, "-m", "tenbaud", *arguments],
+            cwd=folder,
+            env=_environment(),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        for role, arguments in commands.items()
+    }
+    time.sleep(KILLED_AFTER_S)
+    killed_s = time.time()
+    for process in ends.values():
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    figures = []
+    for role, place in (("transmitter", "upper"), ("receiver", "lower")):
+        # The last row reached the file when the file was last written; ticks are 10 ms apart.
+        run = Run(folder / place)
+        written_s = (folder / place / f"{role}.mcap").stat().st_mtime
+        assert len(run.time_s) > 100, f"the {role} had not flown yet"
+        figures.append(Figure(f"killed_{role}_loses_s", killed_s - written_s, "s", "at most 1"))
+    return figures
+
+
+def _tenbaud(folder: Path, *arguments: str) -> None:
+    subprocess.run(
+        [sys.executable, "-m", "tenbaud", *arguments],
+        cwd=folder,
+        env=_environment(),
+        check=True,
+        capture_output=True,
+    )
+
+
+def _environment() -> dict[str, str]:
+    path = os.pathsep.join([str(TOP), os.environ.get("PYTHONPATH", "")])
+    return {**os.environ, "PYTHONPATH": path}

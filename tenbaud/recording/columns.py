@@ -1,0 +1,86 @@
+"""A run as three tables of plain columns, which is what the files of other tools can hold.
+
+`flight` has a row per tick and a column per signal, `samples` a row per sample, `events` a row per
+thing that was reported.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from channel.recording import Field
+from tenbaud.recording.run import Run
+from tenbaud.recording.table import Table
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One column: float64 values (NaN where there is none), whole numbers, or texts."""
+
+    name: str
+    values: NDArray[Any]
+    unit: str = ""
+    description: str = ""
+
+    @property
+    def is_text(self) -> bool:
+        """Whether the values are texts or None."""
+        return self.values.dtype == object
+
+
+def flight_columns(run: Run) -> list[Column]:
+    """Return tick, time and every signal of the run."""
+    columns = [
+        Column("tick", run.base.ticks, "", "index of the tick"),
+        Column("time_s", run.time_s, "s", "flight time"),
+    ]
+    signals = run.signals.values()
+    return columns + [Column(one.column, one.values, one.unit, one.description) for one in signals]
+
+
+def sample_columns(run: Run) -> list[Column]:
+    """Return what was recorded per sample, lists spread over numbered columns; [] without any."""
+    for end in run.ends:
+        if "sample" in run.topics(end):
+            table = run.table(end, "sample")
+            time_s = np.array(table.times_ns, dtype=np.float64) / 1e9
+            columns = [column for one in table.channel.fields for column in _spread(table, one)]
+            return [columns[0], Column("time_s", time_s, "s", "flight time"), *columns[1:]]
+    return []
+
+
+def _spread(table: Table, one: Field) -> list[Column]:
+    values = table[one.name]
+    if values.ndim == 1:
+        if one.type == "integer" and not np.isnan(values).any():
+            values = values.astype(np.int64)
+        return [Column(one.name, values, one.unit, one.description)]
+    return [
+        Column(f"{one.name}_{axis}", values[:, axis], one.unit, one.description)
+        for axis in range(values.shape[1])
+    ]
+
+
+def event_columns(run: Run) -> list[Column]:
+    """Return the events of both ends."""
+    events = run.events
+    numbers = ("time_s", "sample")
+    columns = []
+    for name, unit in (("end", ""), ("time_s", "s"), ("kind", ""), ("sample", ""), ("text", "")):
+        told = [event.get(name) for event in events]
+        columns.append(Column(name, np.array(told, dtype=float if name in numbers else object), unit))
+    return columns
+
+
+def all_columns(run: Run) -> dict[str, list[Column]]:
+    """Return the three tables by name; one without rows is left out."""
+    tables = {
+        "flight": flight_columns(run),
+        "samples": sample_columns(run),
+        "events": event_columns(run),
+    }
+    return {name: columns for name, columns in tables.items() if columns and len(columns[0].values)}

@@ -1,0 +1,199 @@
+"""A run for other tools: CSV, MATLAB, Parquet, JSON, and one MCAP file for the viewers."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import orjson
+
+from channel.recording import Field, RecordChannel
+from tenbaud.recording.columns import Column, all_columns, flight_columns
+from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.layouts import flight_layouts
+from tenbaud.recording.run import Run
+
+
+def convert(run: Run, form: str, output: Path | None = None, overwrite: bool = False) -> list[Path]:
+    """Write a run in another form; return the files that were written.
+
+    Without `output` it goes into the folder of the run: `csv/` and `parquet/` have a file per table,
+    the other forms are one file, `flight.mat`, `flight.json` or `flight.mcap`. What exists already is
+    replaced only with `overwrite`. Raises RecordingError for an unknown form, a run that cannot be
+    read and a place that cannot be written.
+    """
+    if form not in FORMS:
+        raise RecordingError(f"A run cannot become {form!r}. Known: {', '.join(FORMS)}.")
+    default, write = FORMS[form]
+    target = output or run.folder.path / default
+    if target.exists() and not overwrite:
+        raise RecordingError(
+            f"{target} exists already and is not overwritten. Add --force, or choose another place "
+            "with --out."
+        )
+    # Whoever is interrupted leaves no half of a file behind under the name of a whole one.
+    unfinished = target.with_name(f".{target.name}.unfinished")
+    _remove(unfinished)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        write(run, unfinished)
+        _remove(target)
+        unfinished.replace(target)
+    except OSError as error:
+        raise RecordingError(
+            f"{target} cannot be written: {error.strerror or error}. Choose another place with --out."
+        ) from error
+    finally:
+        _remove(unfinished)
+    written = sorted(target.iterdir()) if target.is_dir() else [target]
+    if form == "mcap":
+        written += flight_layouts(run, target)
+    return written
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _write_csv(run: Run, folder: Path) -> None:
+    """A line of names, then a line per row; numbers read back to the same bits, nothing for NaN."""
+    folder.mkdir()
+    for name, columns in all_columns(run).items():
+        cells = [_csv_cells(column) for column in columns]
+        with (folder / f"{name}.csv").open("w", encoding="utf-8", newline="") as stream:
+            stream.write(",".join(column.name for column in columns) + "\r\n")
+            stream.writelines(",".join(row) + "\r\n" for row in zip(*cells, strict=True))
+
+
+def _csv_cells(column: Column) -> list[str]:
+    values = column.values.tolist()
+    if column.is_text:
+        return ["" if value is None else _quoted(value) for value in values]
+    if column.values.dtype == np.float64:
+        return ["" if value != value else repr(value) for value in values]  # NaN is unlike itself
+    return [str(value) for value in values]
+
+
+def _quoted(text: str) -> str:
+    if not any(mark in text for mark in ',"\r\n'):
+        return text
+    doubled = text.replace('"', '""')
+    return f'"{doubled}"'
+
+
+def _write_mat(run: Run, path: Path) -> None:
+    """One struct per signal with `time`, `value`, `unit` and `description`; all beside `run`."""
+    from scipy.io import savemat
+
+    contents: dict[str, Any] = {
+        signal.name: {
+            "time": run.time_s,
+            "value": signal.values,
+            "unit": signal.unit,
+            "description": signal.description,
+        }
+        for signal in run.signals.values()
+    }
+    tables = all_columns(run)
+    for name in ("samples", "events"):
+        if name in tables:
+            contents[name] = {column.name: _matlab_cells(column) for column in tables[name]}
+    contents["run"] = {**run.metadata, "path": str(run.path), "tick_s": run.base.tick_s}
+    savemat(str(path), contents, appendmat=False, do_compression=True, oned_as="column")
+
+
+def _matlab_cells(column: Column) -> Any:
+    if not column.is_text:
+        return column.values
+    return np.array(["" if value is None else value for value in column.values], dtype=object)
+
+
+def _write_parquet(run: Run, folder: Path) -> None:
+    """A file per table; units and meanings are metadata of the fields."""
+    try:
+        import pyarrow
+        from pyarrow import parquet
+    except ImportError as error:
+        raise RecordingError(
+            "Parquet needs pyarrow, which is not installed: pip install 'tenbaud[parquet]'."
+        ) from error
+    folder.mkdir()
+    for name, columns in all_columns(run).items():
+        arrays, fields = [], []
+        for column in columns:
+            values = column.values.tolist() if column.is_text else column.values
+            # NaN stands for "not recorded"; other tools call that null.
+            array = pyarrow.array(values, from_pandas=not column.is_text)
+            arrays.append(array)
+            about = {"unit": column.unit, "description": column.description}
+            fields.append(pyarrow.field(column.name, array.type, metadata=about))
+        schema = pyarrow.schema(fields, metadata=run.metadata)
+        table = pyarrow.Table.from_arrays(arrays, schema=schema)
+        parquet.write_table(table, folder / f"{name}.parquet", compression="zstd")
+
+
+def _write_json(run: Run, path: Path) -> None:
+    """The signals by name with unit, description and values; null where there is no value."""
+    tables = all_columns(run)
+    document = {
+        "run": {**run.metadata, "path": str(run.path), "tick_s": run.base.tick_s},
+        "time_s": run.time_s,
+        "signals": {
+            signal.name: {
+                "unit": signal.unit,
+                "description": signal.description,
+                "values": signal.values,
+            }
+            for signal in run.signals.values()
+        },
+        "samples": {
+            column.name: column.values.tolist()
+            if column.is_text
+            else np.ascontiguousarray(column.values)
+            for column in tables.get("samples", [])
+        },
+        "events": run.events,
+    }
+    path.write_bytes(orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY))
+
+
+def _write_mcap(run: Run, path: Path) -> None:
+    """One topic `flight` whose fields are the signals: a viewer needs no list and no second file."""
+    from tenbaud.recording.writer import McapRecorder
+
+    columns = flight_columns(run)
+    channel = RecordChannel(
+        "flight",
+        tuple(
+            Field(
+                column.name,
+                "integer" if column.name == "tick" else "number",
+                column.unit,
+                column.description,
+            )
+            for column in columns
+        ),
+    )
+    rows = zip(*(column.values.tolist() for column in columns), strict=True)
+    tick_ns = run.base.tick_s * 1e9
+    with McapRecorder(path, run.metadata, wait_when_full=True) as recorder:
+        for row in rows:
+            recorder.write(channel, round(row[0] * tick_ns), row)
+    if recorder.error is not None:
+        raise RecordingError(recorder.error)
+
+
+FORMS: dict[str, tuple[str, Callable[[Run, Path], None]]] = {
+    "csv": ("csv", _write_csv),
+    "mat": ("flight.mat", _write_mat),
+    "parquet": ("parquet", _write_parquet),
+    "json": ("flight.json", _write_json),
+    "mcap": ("flight.mcap", _write_mcap),
+}
+"""Each form: where it goes in the folder of a run, and what writes it."""

@@ -1,0 +1,234 @@
+"""A recorded run, read back for work in Python.
+
+from tenbaud import Run
+
+run = Run("runs/2026-11-23T10-00-00_paper-10baud")
+run.pitch          # rad, one value per tick
+run.time_s         # the common time base
+run.plot()
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.folder import RECEIVER_NAME, TRANSMITTER_NAME, RunFolder, find_recordings
+from tenbaud.recording.signals import SIGNALS, Signal, Source, TimeBase
+from tenbaud.recording.table import Series, Table, Tables, read_tables
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from tenbaud.config.schema import FlightConfig
+
+ENDS = ("transmitter", "receiver")
+
+
+class Run:
+    """One flight: its signals as numpy arrays on a common time base, and everything beside them.
+
+    Every name in `signals` is an attribute: `run.pitch`, `run.reference`, `run.symbol`. A file is
+    read when something in it is first asked for. A recording that was cut by a crash is read up to
+    the cut (`run.complete` is then False).
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        """`path` is the folder of a run, or one recording; RecordingError if there is none."""
+        self.path = Path(path)
+        found = find_recordings(self.path)
+        self.folder = RunFolder(self.path if self.path.is_dir() else self.path.parent)
+        names = {TRANSMITTER_NAME: "transmitter", RECEIVER_NAME: "receiver"}
+        self._files = {names.get(file.name) or self._role(file): file for file in found}
+        self._read: dict[str, Tables] = {}
+        self._made: dict[str, Signal | None] = {}
+
+    @staticmethod
+    def _role(file: Path) -> str:
+        from tenbaud.recording.reader import Recording
+
+        role = Recording(file).metadata.get("role", "")
+        if role not in ENDS:
+            raise RecordingError(
+                f"{file} does not say which end recorded it. Give the folder of a run, or its "
+                f"{TRANSMITTER_NAME} or {RECEIVER_NAME}."
+            )
+        return role
+
+    def __repr__(self) -> str:
+        base = self.base
+        return (
+            f"<Run {self.path}: {len(base.ticks)} ticks of {base.tick_s:g} s, "
+            f"{' and '.join(self._files)}{'' if self.complete else ', cut'}>"
+        )
+
+    # Signals
+
+    @property
+    def time_s(self) -> Series:
+        """Flight time of every tick, in seconds from tick 0: what all signals are over."""
+        return np.asarray(self.base.ticks * self.base.tick_s, dtype=np.float64)
+
+    @property
+    def names(self) -> list[str]:
+        """The signals that this run has."""
+        return list(self.signals)
+
+    @cached_property
+    def signals(self) -> dict[str, Signal]:
+        """All signals of this run, with units and meanings."""
+        found = {name: self.signal(name) for name, _, _, _ in SIGNALS}
+        return {name: signal for name, signal in found.items() if signal is not None}
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of every signal; empty where it has none."""
+        return {name: signal.unit for name, signal in self.signals.items()}
+
+    def signal(self, name: str) -> Signal | None:
+        """Return one signal; None if this run did not record it. KeyError for an unknown name."""
+        if name not in self._made:
+            unit, meaning, make = {row[0]: row[1:] for row in SIGNALS}[name]
+            values = make(Source(self.base, self._end("transmitter"), self._end("receiver")))
+            if values is not None and np.isnan(values).all():
+                values = None
+            self._made[name] = None if values is None else Signal(name, values, unit, meaning)
+        return self._made[name]
+
+    def __getattr__(self, name: str) -> Series:
+        known = [row[0] for row in SIGNALS]
+        if name.startswith("_") or name not in known:
+            raise AttributeError(f"a run has no {name!r}; its signals are {', '.join(known)}")
+        signal = self.signal(name)
+        if signal is None:
+            raise AttributeError(
+                f"this run has no {name!r}: {self._why_missing()}; it has {', '.join(self.names)}"
+            )
+        return signal.values
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *(row[0] for row in SIGNALS)]
+
+    def _why_missing(self) -> str:
+        absent = [end for end in ENDS if end not in self._files]
+        return f"the {absent[0]}'s recording is not here" if absent else "it was not recorded"
+
+    # What else was recorded
+
+    def table(self, end: str, topic: str) -> Table:
+        """Return the rows of one topic as they were recorded, `run.table("transmitter", "sample")`."""
+        tables = self._end(end)
+        if tables is None:
+            raise RecordingError(f"{self.path} holds no recording of the {end}.")
+        return tables.topic(topic)
+
+    def topics(self, end: str) -> list[str]:
+        """Return the topics that an end recorded."""
+        tables = self._end(end)
+        return [] if tables is None else list(tables.topics)
+
+    @property
+    def ends(self) -> list[str]:
+        """The ends whose recordings are here."""
+        return [end for end in ENDS if end in self._files]
+
+    @property
+    def events(self) -> list[dict[str, Any]]:
+        """What both ends reported, in order of flight time; each with its `end`."""
+        told = [
+            {"end": end, **row}
+            for end in self.ends
+            for row in (self.table(end, "event").rows if "event" in self.topics(end) else [])
+        ]
+        return sorted(told, key=lambda event: event.get("time_s") or 0.0)
+
+    @property
+    def metadata(self) -> dict[str, str]:
+        """What the run said about itself when it began."""
+        return self.tables(self.ends[0]).metadata
+
+    @property
+    def complete(self) -> bool:
+        """False if a recording was cut; what it held up to the cut is here."""
+        return all(self.tables(end).complete for end in self.ends)
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """The figures in `summary.json`; empty without it."""
+        try:
+            summary: dict[str, Any] = json.loads(self.folder.summary.read_text())
+        except (OSError, ValueError):
+            return {}
+        return summary
+
+    @cached_property
+    def config(self) -> FlightConfig:
+        """The configuration that was flown, checked anew."""
+        from tenbaud.config.load import load_config
+
+        if not self.folder.config.is_file():
+            raise RecordingError(f"{self.folder.path} holds no {self.folder.config.name}.")
+        return load_config(path=self.folder.config)
+
+    # Pictures
+
+    def plot(self, output: str | Path | None = None) -> Figure:
+        """Draw the flight as `flight.png` shows it; also into the file `output`, if given."""
+        from tenbaud.recording.figure import draw_run
+
+        figure = draw_run(self._files.get("transmitter"), self._files.get("receiver"), self._title())
+        if output is not None:
+            figure.savefig(output, dpi=150)
+        return figure
+
+    def _title(self) -> str:
+        plant = self.summary.get("plant")
+        return ": ".join(part for part in (self.metadata.get("preset"), plant) if part)
+
+    # Reading
+
+    def tables(self, end: str) -> Tables:
+        """Return all topics of an end; RecordingError if it was not recorded here."""
+        tables = self._end(end)
+        if tables is None:
+            raise RecordingError(f"{self.path} holds no recording of the {end}.")
+        return tables
+
+    def _end(self, end: str) -> Tables | None:
+        if end not in self._files:
+            return None
+        if end not in self._read:
+            self._read[end] = read_tables(self._files[end])
+        return self._read[end]
+
+    @cached_property
+    def base(self) -> TimeBase:
+        """The ticks of this run."""
+        for end in self.ends:
+            tables = self.tables(end)
+            if "tick" in tables.topics:
+                break
+        else:
+            raise RecordingError(f"{self.path} holds no ticks: the run ended before it flew.")
+        known = tables.topics["tick"]["tick"].astype(np.int64)
+        tick_s, per_sample = _timing(tables.metadata, self.folder.config)
+        return TimeBase(np.arange(known.min(), known.max() + 1), tick_s, per_sample)
+
+
+def _timing(metadata: dict[str, str], config: Path) -> tuple[float, int]:
+    """Return tick and ticks per sample, from the recording's own head or the folder's file."""
+    try:
+        timing = json.loads(metadata["shared_config"])["timing"]
+    except (KeyError, ValueError):
+        try:
+            timing = tomllib.loads(config.read_text())["timing"]
+        except (OSError, KeyError, ValueError):
+            timing = {"tick_s": float(metadata.get("tick_s", 0.01)), "symbol_period_s": 0.1}
+    tick_s = float(timing["tick_s"])
+    return tick_s, max(1, round(float(timing["symbol_period_s"]) / tick_s))

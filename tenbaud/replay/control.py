@@ -1,0 +1,100 @@
+"""The controller of a flight that is flown again: built as then, or repeating what it commanded."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from receiver.controllers.base import Controller
+from receiver.references import Reference
+from tenbaud.build_ends import build_controller, build_reference
+from tenbaud.config.schema import FlightConfig
+from tenbaud.recording.table import Tables
+from tenbaud.replay.record import FlightRecord, by_key
+
+
+class RecordedCommands:
+    """A `Controller` that repeats recorded commands; a tick without one keeps the last."""
+
+    def __init__(self, commands: Mapping[int, tuple[float, ...]], initial: tuple[float, ...]) -> None:
+        self._commands = commands
+        self._last = initial
+
+    def command(self, tick: int, state: tuple[float, ...]) -> tuple[float, ...]:
+        """Return the command that was recorded for `tick`."""
+        self._last = self._commands.get(tick, self._last)
+        return self._last
+
+    def reference_rad(self, tick: int) -> None:
+        """Return None: what the controller followed is not asked again."""
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class SteppedReference:
+    """The set-point of the configuration, with what was set by hand over it: (tick, angle) steps."""
+
+    configured: Reference
+    steps: tuple[tuple[int, float], ...]
+
+    def angle_rad(self, tick: int) -> float:
+        """Return the set-point at `tick`."""
+        angle = self.configured.angle_rad(tick)
+        for start, value in self.steps:
+            if tick < start:
+                break
+            angle = value
+        return angle
+
+
+def steps_by_hand(record: FlightRecord) -> tuple[tuple[int, float], ...]:
+    """Return the set-points that were recorded and are not the configuration's, as steps.
+
+    () where the flight followed its configuration, as it does unless somebody moved the set-point.
+    """
+    receiver = record.receiver
+    if receiver is None or "tick" not in receiver.topics:
+        return ()
+    reference = build_reference(record.agreement.config)
+    rows = receiver.topics["tick"].rows
+    told = [(row["tick"], row["reference_rad"]) for row in rows if row["reference_rad"] is not None]
+    first = next(
+        (index for index, (tick, angle) in enumerate(told) if angle != reference.angle_rad(tick)), None
+    )
+    if first is None:
+        return ()
+    steps: list[tuple[int, float]] = []
+    for tick, angle in told[first:]:
+        if not steps or steps[-1][1] != angle:
+            steps.append((tick, angle))
+    return tuple(steps)
+
+
+def controller_of(config: FlightConfig, steps: tuple[tuple[int, float], ...] = ()) -> Controller:
+    """Return the controller that was flown, with the set-points that it was given by hand."""
+    if not steps:
+        return build_controller(config)
+    return build_controller(config, SteppedReference(build_reference(config), steps))
+
+
+def recorded_commands(record: FlightRecord) -> RecordedCommands | None:
+    """Return the commands as they were recorded; None if not all of them were."""
+    initial = record.agreement.terms.initial_command
+    if record.receiver is not None and "tick" in record.receiver.topics:
+        rows = by_key(record.receiver.topics["tick"])
+        return RecordedCommands(
+            {tick: tuple(row["command_volts"]) for tick, row in rows.items()}, initial
+        )
+    return _commands_at_plant(record.transmitter, initial)
+
+
+def _commands_at_plant(tables: Tables | None, initial: tuple[float, ...]) -> RecordedCommands | None:
+    if tables is None or "tick" not in tables.topics:
+        return None
+    rows = by_key(tables.topics["tick"])
+    commands = {
+        tick: tuple(row["commanded_volts"])
+        for tick, row in rows.items()
+        if row["commanded_volts"] is not None
+    }
+    return RecordedCommands(commands, initial) if len(commands) == len(rows) else None

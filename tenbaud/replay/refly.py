@@ -1,0 +1,125 @@
+"""The receiver's own session flown again: symbols in, states and commands out.
+
+Nothing here knows what was recorded but the words, the state that each epoch starts from and the
+controller. Symbols arrive when they are due, or later by what the caller says; as long as that is
+within their deadlines, it must not matter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from channel.codec import Codec, CodecState, Vector
+from channel.frames import Hello, Symbol, Welcome
+from channel.recording import RecordChannel
+from channel.words import Word
+from receiver.controllers.base import Controller
+from receiver.records import SAMPLE_CHANNEL, TICK_CHANNEL
+from receiver.session import ReceiverSession
+from tenbaud.build import Agreement
+from tenbaud.replay.record import Epoch
+
+Delay = Callable[[int], int]
+"""slot -> how long after its due time the symbol comes, in ns, from 0 to the deadline allowance"""
+
+
+class Reflown(NamedTuple):
+    """One sample, flown again."""
+
+    epoch: int
+    sample: int
+    word: Word
+    model: Vector
+    coder: Vector
+    digest: str
+    ticks: list[tuple[int, float | None, Vector, Vector]]
+    """(tick, reference, live state, command) of the ticks decided with it"""
+
+
+def refly(
+    agreement: Agreement,
+    controller: Controller,
+    epochs: Sequence[Epoch],
+    delay: Delay = lambda _slot: 0,
+) -> Iterator[Reflown]:
+    """Yield the samples of a flight, flown again from the words of its epochs."""
+    for epoch in epochs:
+        yield from _refly_epoch(agreement, controller, epoch, delay)
+
+
+class _Starting(Codec):
+    """The same codec, but for the state that it starts from."""
+
+    def __init__(self, codec: Codec, start: CodecState) -> None:
+        super().__init__(codec.model, codec.coder, codec.ticks_per_sample)
+        self._start = start
+
+    def initial(self) -> CodecState:
+        """Return the state that the epoch starts from."""
+        return self._start
+
+
+class _Rows:
+    """A recorder that keeps what one sample brings."""
+
+    def __init__(self) -> None:
+        self.samples: list[Sequence[object]] = []
+        self.ticks: list[tuple[int, float | None, Vector, Vector]] = []
+
+    def write(self, channel: RecordChannel, time_ns: int, row: Sequence[object]) -> None:
+        """Keep samples and ticks."""
+        if channel is SAMPLE_CHANNEL:
+            self.samples.append(row)
+        elif channel is TICK_CHANNEL:
+            self.ticks.append(tuple(row))  # type: ignore[arg-type]
+
+
+def _refly_epoch(
+    agreement: Agreement, controller: Controller, epoch: Epoch, delay: Delay
+) -> Iterator[Reflown]:
+    terms = replace(agreement.terms, initial_command=epoch.hold)
+    codec = _Starting(agreement.codec, epoch.start)
+    rows = _Rows()
+    session = ReceiverSession(codec, terms, controller, agreement.identity, 1, rows)
+    identity = agreement.identity
+    hello = Hello(1, identity.version, identity.config_digest, identity.numerics_probe)
+    (welcome,) = session.on_frame(hello, 0)
+    if not isinstance(welcome, Welcome):
+        raise AssertionError(f"a session refused its own identity: {welcome}")
+    alphabet = codec.coder.alphabet
+    count = terms.symbols_per_word
+    last = epoch.start.sample + len(epoch.words)
+    now_ns = 0
+    for sample, word in enumerate(epoch.words, epoch.start.sample):
+        for place, symbol in enumerate(word or ()):
+            slot = sample * count + place
+            due_ns = terms.slot_ns(slot) + terms.symbol_delay_ns + terms.uplink_line_ns
+            now_ns = max(now_ns, due_ns + delay(slot))
+            _let_deadlines_pass(session, now_ns)
+            frame = Symbol(welcome.session, welcome.epoch, slot, alphabet.symbol_number(symbol))
+            session.on_frame(frame, now_ns)
+            yield from _taken(rows, epoch.number)
+    # Erasures after the last symbol: their deadlines pass one by one.
+    deadline = session.next_deadline()
+    while session.state.sample < last and deadline is not None:
+        session.on_deadline(deadline)
+        yield from _taken(rows, epoch.number)
+        deadline = session.next_deadline()
+
+
+def _let_deadlines_pass(session: ReceiverSession, now_ns: int) -> None:
+    deadline = session.next_deadline()
+    if deadline is not None and deadline < now_ns:
+        session.on_deadline(now_ns - 1)
+
+
+def _taken(rows: _Rows, epoch: int) -> Iterator[Reflown]:
+    per_sample = len(rows.ticks) // len(rows.samples) if rows.samples else 0
+    for index, row in enumerate(rows.samples):
+        sample, word, _, model, coder, digest, _ = row
+        ticks = rows.ticks[index * per_sample : (index + 1) * per_sample]
+        yield Reflown(epoch, sample, word, model, coder, digest, ticks)  # type: ignore[arg-type]
+    rows.samples.clear()
+    rows.ticks.clear()

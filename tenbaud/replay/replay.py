@@ -1,0 +1,155 @@
+"""A recorded flight flown again from its symbols alone, and compared with what was recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from receiver.controllers.base import Controller
+from tenbaud.recording.table import Tables
+from tenbaud.replay.control import controller_of, steps_by_hand
+from tenbaud.replay.record import Epoch, FlightRecord, by_key, epochs_of
+from tenbaud.replay.refly import Delay, Reflown, refly
+from tenbaud.replay.symbols import Packed, Unpacked, pack
+
+
+@dataclass(frozen=True, slots=True)
+class Replayed:
+    """What came of a replay."""
+
+    samples: int
+    digests_compared: int
+    """samples of either end whose digest was compared"""
+    differences: list[str]
+    """what differs, the first of each end and topic; empty: nothing"""
+    packed: Packed
+    erased: int
+    epochs: int
+    steps: tuple[tuple[int, float], ...]
+    bits_sent: float
+    """that the words consumed were worth"""
+
+    @property
+    def equal(self) -> bool:
+        """Whether every state and every command is equal to the recording, to the last bit."""
+        return not self.differences and self.digests_compared > 0
+
+
+def replay(record: FlightRecord) -> Replayed:
+    """Fly a recorded flight again from its symbols and compare."""
+    from math import log2
+
+    agreement = record.agreement
+    epochs = epochs_of(record.consumer, agreement)
+    steps = steps_by_hand(record)
+    flown = list(refly(agreement, controller_of(agreement.config, steps), epochs))
+    differences, compared = compare(record, flown)
+    words = [word for epoch in epochs for word in epoch.words]
+    if len(flown) != len(words):
+        differences.append(f"{len(words)} samples were recorded, {len(flown)} came of their symbols")
+    alphabet = agreement.codec.coder.alphabet
+    last = flown[-1].digest if flown else ""
+    erased = sum(word is None for word in words)
+    bits = (len(words) - erased) * alphabet.symbols_per_word * log2(len(alphabet.symbols))
+    return Replayed(
+        len(flown),
+        compared,
+        differences,
+        pack(agreement, epochs, steps, last),
+        erased,
+        len(epochs),
+        steps,
+        bits,
+    )
+
+
+def replay_symbols(unpacked: Unpacked) -> tuple[int, str]:
+    """Fly a symbols file; return the number of samples and the digest after the last one."""
+    controller = controller_of(unpacked.agreement.config, unpacked.steps)
+    samples, digest = 0, ""
+    for one in refly(unpacked.agreement, controller, unpacked.epochs):
+        samples += 1
+        digest = one.digest
+    return samples, digest
+
+
+def fly_again(
+    record: FlightRecord, controller: Controller, epochs: Sequence[Epoch], delay: Delay
+) -> list[Reflown]:
+    """Fly again with a given controller and given arrival times."""
+    return list(refly(record.agreement, controller, epochs, delay))
+
+
+def compare(record: FlightRecord, flown: Sequence[Reflown]) -> tuple[list[str], int]:
+    """Return what differs from the recordings, and how many digests were compared."""
+    differences: list[str] = []
+    compared = 0
+    for end, tables in record.ends():
+        found, count = _compare_samples(end, tables, flown)
+        compared += count
+        differences += found
+    if record.receiver is not None and "tick" in record.receiver.topics:
+        differences += _compare_commands(record.receiver, flown)
+    return differences, compared
+
+
+def _compare_samples(end: str, tables: Tables, flown: Sequence[Reflown]) -> tuple[list[str], int]:
+    rows = by_key(tables.topic("sample"))
+    unlike = 0
+    first = ""
+    compared = 0
+    for one in flown:
+        row = rows.get(one.sample)
+        if row is None:
+            continue
+        compared += 1
+        field = _unlike_field(row, one)
+        if field is not None:
+            unlike += 1
+            first = first or f"sample {one.sample}, {field}"
+    if not unlike:
+        return [], compared
+    noun = "state differs" if unlike == 1 else "states differ"
+    return [f"{end}: {unlike} {noun} from what the symbols give, first at {first}"], compared
+
+
+def _unlike_field(row: dict[str, Any], one: Reflown) -> str | None:
+    """Return the first field in which a recorded sample differs, with both values."""
+    word = None if one.word is None else list(one.word)
+    pairs = (
+        ("word", row.get("word"), word),
+        ("state", row.get("state"), list(one.model)),
+        ("coder", row.get("coder"), list(one.coder)),
+        ("digest", row.get("digest"), one.digest),
+    )
+    for name, recorded, computed in pairs:
+        if recorded != computed:
+            return f"field {name}: recorded {recorded}, computed {computed}"
+    return None
+
+
+def _compare_commands(tables: Tables, flown: Sequence[Reflown]) -> list[str]:
+    rows = by_key(tables.topic("tick"))
+    unlike, first = 0, ""
+    for one in flown:
+        for tick, _, live, command in one.ticks:
+            row = rows.get(tick)
+            if row is None:
+                continue
+            same = row["command_volts"] == list(command) and row["live_state"] == list(live)
+            if not same:
+                unlike += 1
+                first = first or (
+                    f"tick {tick}: recorded {row['command_volts']} V, computed {list(command)} V"
+                )
+    if not unlike:
+        return []
+    return [f"receiver: {unlike} commands differ from what the states give, first at {first}"]
+
+
+def save_symbols(replayed: Replayed, path: Path) -> None:
+    """Write the packed flight; the file must not exist yet."""
+    with path.open("xb") as stream:
+        stream.write(replayed.packed.data)

@@ -1,0 +1,163 @@
+"""A whole flight in as many bits as were sent: its words, packed.
+
+What both ends know beforehand stands in the head of the file: the configuration. What a rejoin sent
+down the link, the start states of later epochs, stands there too, and set-points given by hand.
+
+    "tenbaud symbols 1" and a line feed | head length u32 | head, JSON in zlib | symbols | erasures
+
+A symbol takes the smallest whole number of bits that its alphabet needs, the first one the lowest
+bits; an erased word counts as the alphabet's first symbols. The erasures are one bit per word, and
+left out when there is none.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from channel.codec import Codec, CodecState
+from channel.words import ERASED, Alphabet, Word
+from tenbaud.build import Agreement, agree
+from tenbaud.config.schema import FlightConfig
+from tenbaud.recording.errors import RecordingError
+from tenbaud.replay.record import Epoch
+
+MAGIC = b"tenbaud symbols 1\n"
+_LENGTH = struct.Struct("<I")
+
+
+@dataclass(frozen=True, slots=True)
+class Packed:
+    """A flight as bytes, and how many of them are what."""
+
+    head: bytes
+    symbols: bytes
+    erasures: bytes
+    start_bytes: int
+    """of the head: start states of epochs after the first, before compression"""
+
+    @property
+    def data(self) -> bytes:
+        """The whole file."""
+        return MAGIC + _LENGTH.pack(len(self.head)) + self.head + self.symbols + self.erasures
+
+
+@dataclass(frozen=True, slots=True)
+class Unpacked:
+    """What a symbols file holds."""
+
+    agreement: Agreement
+    epochs: list[Epoch]
+    steps: tuple[tuple[int, float], ...]
+    last_digest: str
+
+
+def pack(
+    agreement: Agreement,
+    epochs: list[Epoch],
+    steps: tuple[tuple[int, float], ...],
+    last_digest: str,
+) -> Packed:
+    """Return the flight as bytes."""
+    codec = agreement.codec
+    starts = [_start_hex(codec, epoch) for epoch in epochs]
+    head = {
+        "config": agreement.config.model_dump(mode="json"),
+        "clock": agreement.clock,
+        "epochs": [
+            [epoch.number, epoch.start.sample, len(epoch.words), list(epoch.hold), start]
+            for epoch, start in zip(epochs, starts, strict=True)
+        ],
+        "set_points": [list(step) for step in steps],
+        "last_digest": last_digest,
+    }
+    words = [word for epoch in epochs for word in epoch.words]
+    alphabet = codec.coder.alphabet
+    width = _width(alphabet)
+    symbols = [_digit(alphabet, word, place) for word in words for place in range(_per_word(alphabet))]
+    erased = [int(word is ERASED) for word in words]
+    return Packed(
+        zlib.compress(json.dumps(head).encode(), 9),
+        _to_bits(symbols, width),
+        _to_bits(erased, 1) if any(erased) else b"",
+        sum(len(start) // 2 for start in starts if start is not None),
+    )
+
+
+def unpack(path: Path) -> Unpacked:
+    """Read a symbols file; RecordingError for a file that is none, or not a whole one."""
+    try:
+        data = path.read_bytes()
+        head_at = len(MAGIC) + _LENGTH.size
+        if not data.startswith(MAGIC):
+            raise ValueError("it begins otherwise")
+        (length,) = _LENGTH.unpack_from(data, len(MAGIC))
+        head: dict[str, Any] = json.loads(zlib.decompress(data[head_at : head_at + length]))
+        config = FlightConfig.model_validate(head["config"])
+        clock: Literal["real", "virtual"] = "real" if head["clock"] == "real" else "virtual"
+        agreement = agree(config, clock)
+        epochs = _epochs(head["epochs"], data[head_at + length :], agreement.codec)
+    except (OSError, ValueError, KeyError, struct.error, zlib.error) as error:
+        raise RecordingError(f"{path} is no symbols file of a flight: {error}.") from error
+    steps = tuple((int(tick), float(angle)) for tick, angle in head["set_points"])
+    return Unpacked(agreement, epochs, steps, head["last_digest"])
+
+
+def _epochs(described: list[list[Any]], data: bytes, codec: Codec) -> list[Epoch]:
+    alphabet = codec.coder.alphabet
+    count, width = _per_word(alphabet), _width(alphabet)
+    total = sum(row[2] for row in described)
+    size = -(-total * count * width // 8)
+    erasures_size = -(-total // 8)
+    if len(data) not in (size, size + erasures_size):
+        raise ValueError(f"{total} words need {size} bytes, {len(data)} are there")
+    digits = _from_bits(data[:size], width, total * count)
+    erased = _from_bits(data[size:], 1, total) if len(data) > size else [0] * total
+    epochs, at = [], 0
+    for number, first, words, hold, start in described:
+        state = codec.initial()._replace(sample=first)
+        if start is not None:
+            state = codec.unpack(bytes.fromhex(start))
+        epoch = Epoch(number, state, tuple(hold))
+        for index in range(at, at + words):
+            word = tuple(
+                alphabet.symbols[digit] for digit in digits[index * count : (index + 1) * count]
+            )
+            epoch.words.append(ERASED if erased[index] else word)
+        at += words
+        epochs.append(epoch)
+    return epochs
+
+
+def _start_hex(codec: Codec, epoch: Epoch) -> str | None:
+    """Return the start state of an epoch as text, None where it is the initial one."""
+    initial: CodecState = codec.initial()._replace(sample=epoch.start.sample)
+    return None if epoch.start == initial else codec.pack(epoch.start).hex()
+
+
+def _per_word(alphabet: Alphabet) -> int:
+    return alphabet.symbols_per_word
+
+
+def _width(alphabet: Alphabet) -> int:
+    return (len(alphabet.symbols) - 1).bit_length()
+
+
+def _digit(alphabet: Alphabet, word: Word, place: int) -> int:
+    return 0 if word is ERASED else alphabet.symbol_number(word[place])
+
+
+def _to_bits(values: list[int], width: int) -> bytes:
+    # By way of text: shifting a number of a million bits a million times takes minutes.
+    text = "".join(format(value, f"0{width}b") for value in reversed(values))
+    return int(text or "0", 2).to_bytes(-(-len(values) * width // 8), "little")
+
+
+def _from_bits(data: bytes, width: int, count: int) -> list[int]:
+    text = format(int.from_bytes(data, "little"), f"0{count * width}b")
+    end = len(text)
+    return [int(text[end - (index + 1) * width : end - index * width], 2) for index in range(count)]

@@ -38,7 +38,7 @@ def require(*modules: str) -> None:
 
 
 @cache
-def compiled(function: Callable[..., Any]) -> Any:
+def compiled(function: Callable[..., Any], inline: bool = False) -> Any:
     """Return a function of this project, compiled, with all of ours that it calls."""
     from numba import njit
 
@@ -48,12 +48,13 @@ def compiled(function: Callable[..., Any]) -> Any:
     for name in function.__code__.co_names:
         value = function.__globals__.get(name)
         if isinstance(value, FunctionType) and value.__module__.split(".")[0] in PACKAGES:
-            names[name] = compiled(value)
+            # Arrays are counted references, and counting them at every call costs more than the call.
+            names[name] = compiled(value, value.__module__.startswith("tenbaud.studies"))
     scope = {**function.__globals__, **names}
     copy = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
     copy.__module__ = function.__module__
     copy.__qualname__ = function.__qualname__
-    return njit(**OPTIONS)(copy)
+    return njit(**OPTIONS, inline="always" if inline else "never", forceinline=True)(copy)
 
 
 @cache

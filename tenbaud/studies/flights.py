@@ -31,7 +31,8 @@ from transmitter.encoder_watch import WINDOW_S
 
 Engine = Literal["auto", "compiled", "plain"]
 
-NOTHING = np.zeros((0, 2))
+NOTHING = np.zeros(0)
+NO_PAIRS = np.zeros((0, 2))
 
 
 class FlightFigures(NamedTuple):
@@ -112,7 +113,7 @@ class CompiledPoint:
             pid,
         )
         self._reference = (
-            NOTHING[:, 0]
+            NOTHING
             if replay
             else _reference(
                 config.receiver.reference.model_dump_json(), config.timing.tick_s, self._ahead
@@ -250,14 +251,13 @@ def _reference(section: str, tick_s: float, ticks: int) -> Any:
     """Return the set-point of every tick; the section as JSON, so that it can be remembered."""
     reference = reference_of(ReferenceSection.model_validate_json(section), tick_s)
     values = np.array([reference.angle_rad(tick) for tick in range(ticks)])
-    values.flags.writeable = False
     return values
 
 
 def _torque(config: FlightConfig, ticks: int) -> Any:
     text = config.transmitter.plant.disturbance
     if not text or config.transmitter.rig == "replay":
-        return NOTHING[:, 0]
+        return NOTHING
     try:
         return parse_disturbance(text, config.timing.tick_s, config.seed).torques(ticks)
     except ValueError as error:
@@ -267,7 +267,7 @@ def _torque(config: FlightConfig, ticks: int) -> Any:
 def _recorded(log: FlightLog | None, ahead: int) -> tuple[Any, Any, Any]:
     """Return counts, commands and applied voltages of a recording; empty without one."""
     if log is None:
-        return NOTHING[:, 0].astype(np.int64), NOTHING, NOTHING
+        return NOTHING.astype(np.int64), NO_PAIRS, NO_PAIRS
     counts = np.array([row[0] for row in log.counts], dtype=np.int64)
     controller = RecordedController(log)
     commands = np.array([controller.command(tick, ()) for tick in range(ahead)])

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tenbaud.cli import demo, doctor, figures, identify, nodes, rig, runs
+from tenbaud.cli import demo, doctor, figures, identify, nodes, rig, runs, sweep
 from tenbaud.flight.outcome import ExitCode, outcome_of
 
 app = typer.Typer(
@@ -46,6 +46,7 @@ app.command()(nodes.transmit)
 app.command()(nodes.receive)
 app.command()(identify.identify)
 app.command()(figures.figures)
+app.command()(sweep.sweep)
 app.command()(runs.inspect)
 app.command()(runs.diff)
 app.command()(runs.presets)

@@ -5,52 +5,31 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any, Literal, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from channel.codec import Codec
 from channel.coders.base import FunctionCoder
 from channel.flight_log import FlightLog
-from channel.identity import Identity
 from plant_sim.disturbance import parse_disturbance
 from plant_sim.pitch import pitch_constants
 from receiver.controllers.pid import Pid, PidConstants
 from receiver.controllers.recorded import RecordedController
-from tenbaud.build import Agreement, build_terms, read_flight_log
-from tenbaud.build_codec import build_codec
+from tenbaud.build import Agreement, read_flight_log
 from tenbaud.build_ends import build_controller, guard_settings, reference_of
 from tenbaud.build_rig import nominal_plant
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig, ReferenceSection
 from tenbaud.studies.compiled import compiled, reader
+from tenbaud.studies.figures import FlightFigures, shared_parts
 from tenbaud.studies.flight_data import DONE, Errors, Given, Motion, Numbers, Work
 from tenbaud.studies.kernel import fly
 from tenbaud.studies.schedule import Uncommon, schedule_of
 from transmitter.encoder_watch import WINDOW_S
 
-Engine = Literal["auto", "compiled", "plain"]
-
 NOTHING = np.zeros(0)
 NO_PAIRS = np.zeros((0, 2))
-
-
-class FlightFigures(NamedTuple):
-    """What a study keeps of one flight. Errors in rad; not a number where there is none."""
-
-    outcome: str
-    """ok, or why the flight has no figures"""
-    engine: str
-    """compiled, or plain: flown by the nodes themselves"""
-    error_coded_rms: float
-    error_coded_max: float
-    error_live_rms: float
-    error_live_max: float
-    tracking_rms: float
-    pitch_amplitude: float
-    erasures: int
-    commands_late: int
-    samples: int
 
 
 @dataclass(slots=True)
@@ -63,17 +42,6 @@ class Trace:
     live: Any
     front: Any
     rear: Any
-
-
-def shared_parts(config: FlightConfig) -> Agreement:
-    """Return what both ends would agree on, without the handshake's identity; ConfigError."""
-    try:
-        codec = build_codec(config)
-        terms = build_terms(config, codec, "virtual")
-        terms.check("virtual")
-    except ValueError as error:
-        raise ConfigError(str(error)) from error
-    return Agreement(config, "virtual", codec, terms, Identity("", "", b""))
 
 
 @dataclass(slots=True)
@@ -152,9 +120,9 @@ class CompiledPoint:
             _torque(agreement.config, self._numbers.ticks),
             *_recorded(self._log, self._ahead),
         )
-        functions = _functions(agreement.codec)
+        flight = _compiled_flight(agreement.codec)
         try:
-            status, motion, errors = functions(self._numbers, self._constants, given, work)
+            status, motion, errors = flight(self._numbers, self._constants, given, work)
         except ValueError as error:
             raise Uncommon(str(error)) from error
         if status != DONE:
@@ -163,18 +131,17 @@ class CompiledPoint:
         return figures, Trace(work.models, work.coders, work.coded, work.live, work.front, work.rear)
 
 
-def _functions(codec: Codec) -> Any:
+def _compiled_flight(codec: Codec) -> Any:
     """Return the compiled flight for a codec's kinds of model and coder."""
-    tick = compiled(codec.model.tick_function)  # type: ignore[attr-defined]
-    encode, decode = (compiled(one) for one in codec.coder.functions)  # type: ignore[attr-defined]
-    state_of, held_of = reader(codec.model.state_size), reader(codec.model.correction_size)
-    flight = compiled(fly)
-
-    def run(*rest: Any) -> tuple[int, Motion, Errors]:
-        found: tuple[int, Motion, Errors] = flight(tick, encode, decode, state_of, held_of, *rest)
-        return found
-
-    return run
+    encode, decode = codec.coder.functions  # type: ignore[attr-defined]
+    parts = (
+        ("tick", compiled(codec.model.tick_function)),  # type: ignore[attr-defined]
+        ("encode", compiled(encode)),
+        ("decode", compiled(decode)),
+        ("state_of", reader(codec.model.state_size)),
+        ("held_of", reader(codec.model.correction_size)),
+    )
+    return compiled(fly, parts)
 
 
 def _require_ordinary(config: FlightConfig, codec: Codec) -> None:

@@ -7,8 +7,8 @@ tests compare it with ordinary flights, bit by bit. A flight that leaves the ord
 that steps in or an estimate that diverges, is not followed: it comes back with the status `LEFT`, and
 whoever asked flies it with the nodes themselves.
 
-The functions that depend on the kinds of model and coder come as arguments: `tick`, `encode`, `decode`,
-and `state_of`, `held_of`, which read a model state and a correction out of an array.
+The functions that depend on the kinds of model and coder are placeholders here (`parts`) and given
+when the flight is compiled.
 """
 
 from __future__ import annotations
@@ -22,15 +22,11 @@ from plant_sim.pitch import pitch_step
 from receiver.controllers.pid import motor_volts, pid_integral, pid_volts
 from tenbaud.studies.bare import bare
 from tenbaud.studies.flight_data import DONE, LEFT, Errors, Given, Motion, Numbers, Work
+from tenbaud.studies.parts import decode, encode, held_of, state_of, tick
 from tenbaud.studies.sensor_side import act, angle_at, count_at, guess, score
 
 
 def fly(
-    tick: Any,
-    encode: Any,
-    decode: Any,
-    state_of: Any,
-    held_of: Any,
     numbers: Numbers,
     constants: Any,
     given: Given,
@@ -84,10 +80,6 @@ def fly(
         good = True
         if known < sample:
             good = guess(
-                tick,
-                decode,
-                state_of,
-                held_of,
                 sample,
                 numbers,
                 model_constants,
@@ -96,13 +88,10 @@ def fly(
                 work,
             )
         counts = given.counts[first] if numbers.replay else count_at(plant[0], numbers)
-        _send(encode, sample, angle_at(counts, numbers), coder_constants, work)
+        _send(sample, angle_at(counts, numbers), coder_constants, work)
         erased = _receive(sample, given, work)
-        held = _open(decode, held_of, sample, erased, numbers, coder_constants, work)
+        held = _open(sample, erased, numbers, coder_constants, work)
         answered, integral = _answer(
-            tick,
-            state_of,
-            held_of,
             sample,
             held,
             integral,
@@ -116,9 +105,6 @@ def fly(
             return LEFT, motion, errors
         for at in range(first, min(first + numbers.per_sample, numbers.ticks)):
             good, motion = act(
-                tick,
-                state_of,
-                held_of,
                 at,
                 plant[0],
                 motion,
@@ -138,7 +124,7 @@ def fly(
     return DONE, motion, errors
 
 
-def _send(encode: Any, sample: int, angle: float, coder_constants: Any, work: Work) -> None:
+def _send(sample: int, angle: float, coder_constants: Any, work: Work) -> None:
     """Form the word of a sample on the transmitter's copy, which `work.model` and `coder` hold."""
     size = work.word.shape[0]
     word = work.sent[sample * size : (sample + 1) * size]
@@ -165,8 +151,6 @@ def _receive(sample: int, given: Given, work: Work) -> bool:
 
 
 def _open(
-    decode: Any,
-    held_of: Any,
     sample: int,
     erased: bool,
     numbers: Numbers,
@@ -192,9 +176,6 @@ def _open(
 
 
 def _answer(
-    tick: Any,
-    state_of: Any,
-    held_of: Any,
     sample: int,
     held: Any,
     integral: float,

@@ -11,7 +11,7 @@ from tenbaud.build_ends import build_receiver
 from tenbaud.config.schema import FlightConfig
 from tenbaud.flight import transmit
 from tenbaud.flight.outcome import ExitCode, outcome_of
-from tenbaud.studies.flights import FlightFigures
+from tenbaud.studies.figures import FlightFigures
 from transmitter.scores import ErrorMeter
 
 

@@ -8,6 +8,7 @@ from channel.codec import add_correction, is_estimate
 from channel.limits import limited
 from plant_sim.encoder import angle_of, counts_of
 from tenbaud.studies.flight_data import Errors, Given, Motion, Numbers, Work
+from tenbaud.studies.parts import decode, held_of, state_of, tick
 from transmitter.encoder_watch import MOTION_RAD
 
 
@@ -22,10 +23,6 @@ def angle_at(counts: int, numbers: Numbers) -> float:
 
 
 def guess(
-    tick: Any,
-    decode: Any,
-    state_of: Any,
-    held_of: Any,
     sample: int,
     numbers: Numbers,
     model_constants: Any,
@@ -63,9 +60,6 @@ def guess(
 
 
 def act(
-    tick: Any,
-    state_of: Any,
-    held_of: Any,
     at: int,
     angle: float,
     motion: Motion,
@@ -81,7 +75,7 @@ def act(
     counts = given.counts[at] if numbers.replay else count_at(angle, numbers)
     still = motion.still + 1 if at > 0 and counts == motion.counts else 0
     window_over = still > 0 and still % numbers.watch == 0
-    if window_over and _stuck(tick, state_of, held_of, at, numbers, model_constants, given, work):
+    if window_over and _stuck(at, numbers, model_constants, given, work):
         return False, motion
     measured = angle_at(counts, numbers)
     if not -numbers.soft_limit <= measured <= numbers.soft_limit:
@@ -107,9 +101,6 @@ def act(
 
 
 def _stuck(
-    tick: Any,
-    state_of: Any,
-    held_of: Any,
     at: int,
     numbers: Numbers,
     model_constants: Any,

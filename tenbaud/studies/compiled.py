@@ -28,6 +28,9 @@ PACKAGES = ("channel", "plant_sim", "receiver", "transmitter", "tenbaud")
 OPTIONS = {"fastmath": False, "error_model": "python", "nogil": True}
 """How everything is compiled: divisions by zero are errors and nothing is reordered, as in Python."""
 
+BESIDE = ("plots.py", "run.py", "table.py", "tune.py", "tuning.py", "study.py", "settings.py")
+"""Modules of the studies that no figure of a flight depends on."""
+
 Parts = tuple[tuple[str, Any], ...]
 """What stands for the placeholders of the flight: (name, compiled function)."""
 
@@ -100,7 +103,8 @@ def sources_digest() -> str:
         spec = find_spec(package)
         for place in (spec and spec.submodule_search_locations) or ():
             for path in sorted(Path(place).rglob("*.py")):
-                digest.update(path.read_bytes())
+                if path.name not in BESIDE:
+                    digest.update(path.read_bytes())
     return digest.hexdigest()
 
 

@@ -1,6 +1,7 @@
 """Running a study: in this process, in a pool of processes, or on a Dask cluster.
 
-Whoever flies, the figures of a chunk come back here and are kept at once. What is kept stays kept: after a kill, or when workers vanish for good, the same command goes on with what is missing.
+Whoever flies, the figures of a chunk come back here and are kept at once. What is kept stays kept:
+after a kill, or when workers vanish for good, the same command goes on with what is missing.
 """
 
 from __future__ import annotations

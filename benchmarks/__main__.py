@@ -12,6 +12,7 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from benchmarks.codec import codec_figures
 from benchmarks.figures import Figure, show, write
 from benchmarks.flights import cold_start_figures, memory_figures, real_figures, virtual_figures
+from benchmarks.studies import studies_figures
 
 BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
     "codec": codec_figures,
@@ -19,6 +20,7 @@ BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
     "virtual": virtual_figures,
     "real": real_figures,
     "memory": memory_figures,
+    "studies": studies_figures,
 }
 
 

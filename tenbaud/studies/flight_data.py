@@ -48,8 +48,8 @@ class Given(NamedTuple):
     """per slot: what is added to the symbol's number on the way; -1: the slot is erased"""
     known: Any
     """per tick: samples whose echo has come before its measurement"""
-    available: Any
-    """per sample: first tick that its commands are in time for"""
+    late: Any
+    """per tick: whether its command has not come by then"""
     scored: Any
     """per sample: whether its echo came before the flight was over"""
     reference: Any

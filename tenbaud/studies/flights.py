@@ -53,11 +53,12 @@ class CompiledPoint:
 
     config: FlightConfig
     agreement: Agreement = field(init=False)
-    _numbers: Numbers = field(init=False)
-    _constants: Any = field(init=False)
+    numbers: Numbers = field(init=False)
+    constants: Any = field(init=False)
     _log: FlightLog | None = field(init=False, default=None)
-    _reference: Any = field(init=False)
+    reference: Any = field(init=False)
     _clean: Any = field(init=False, default=None)
+    _work: Work = field(init=False)
 
     def __post_init__(self) -> None:
         """Build all that does not depend on the seed."""
@@ -69,18 +70,18 @@ class CompiledPoint:
         if replay:
             self._log = read_flight_log(config)
             ticks = min(ticks, len(self._log))
-        self._numbers = _numbers(self.agreement, ticks, replay)
+        self.numbers = _numbers(self.agreement, ticks, replay)
         controller = build_controller(config)
         pid = controller.constants if isinstance(controller, Pid) else _no_pid()
         plant = nominal_plant(config).mismatched(config.transmitter.plant.mismatch)
         codec = self.agreement.codec
-        self._constants = (
+        self.constants = (
             codec.model.constants,  # type: ignore[attr-defined]
             codec.coder.constants,  # type: ignore[attr-defined]
             pitch_constants(plant, config.timing.tick_s),
             pid,
         )
-        self._reference = (
+        self.reference = (
             NOTHING
             if replay
             else _reference(
@@ -88,17 +89,22 @@ class CompiledPoint:
             )
         )
 
+        self._work = _work(codec, self._samples, ticks, self._ahead)
+
     @property
     def _samples(self) -> int:
-        return -(-self._numbers.ticks // self._numbers.per_sample)
+        return -(-self.numbers.ticks // self.numbers.per_sample)
 
     @property
     def _ahead(self) -> int:
         """Return how many ticks have a command."""
-        return self._samples * self._numbers.per_sample + self._numbers.lead
+        return self._samples * self.numbers.per_sample + self.numbers.lead
 
     def fly(self, seed: int) -> tuple[FlightFigures, Trace]:
-        """Fly with one seed; Uncommon when the flight leaves the ordinary course."""
+        """Fly with one seed; Uncommon when the flight leaves the ordinary course.
+
+        The trace holds until the next flight of this point.
+        """
         agreement = self.agreement
         if seed != self.config.seed:
             config = self.config.model_copy(update={"seed": seed})
@@ -106,23 +112,23 @@ class CompiledPoint:
                 config, "virtual", agreement.codec, agreement.terms, agreement.identity
             )
         if self._clean is None or agreement.faults.any:
-            self._clean = schedule_of(agreement, self._samples, self._numbers.ticks)
+            self._clean = schedule_of(agreement, self._samples, self.numbers.ticks)
         schedule = self._clean
-        work = _work(agreement.codec, self._samples, self._numbers.ticks, self._ahead)
+        work = self._work
         given = Given(
             np.array([self.config.transmitter.plant.initial_angle_rad, 0.0]),
             np.array(agreement.codec.coder.alphabet.symbols, dtype=np.int64),
             schedule.shifts,
             schedule.known,
-            schedule.available,
+            schedule.late,
             schedule.scored,
-            self._reference,
-            _torque(agreement.config, self._numbers.ticks),
+            self.reference,
+            _torque(agreement.config, self.numbers.ticks),
             *_recorded(self._log, self._ahead),
         )
         flight = _compiled_flight(agreement.codec)
         try:
-            status, motion, errors = flight(self._numbers, self._constants, given, work)
+            status, motion, errors = flight(self.numbers, self.constants, given, work)
         except ValueError as error:
             raise Uncommon(str(error)) from error
         if status != DONE:

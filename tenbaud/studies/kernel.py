@@ -42,7 +42,7 @@ def fly(
         bare(given.alphabet),
         bare(given.shifts),
         bare(given.known),
-        bare(given.available),
+        bare(given.late),
         bare(given.scored),
         bare(given.reference),
         bare(given.torque),
@@ -72,7 +72,7 @@ def fly(
     errors = Errors(0, 0.0, 0.0, 0, 0.0, 0.0, 0, 0.0, 0.0)
     work.front[: numbers.lead] = numbers.initial_front
     work.rear[: numbers.lead] = numbers.initial_rear
-    for sample in range(given.available.shape[0]):
+    for sample in range(given.scored.shape[0]):
         first = sample * numbers.per_sample
         known = given.known[first]
         work.model[:] = work.models[known]

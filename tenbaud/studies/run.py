@@ -52,7 +52,7 @@ def run_study(
     if scheduler is not None:
         flying = _on_cluster(list(tasks), scheduler)
     elif workers > 1 and len(missing) > 1:
-        flying = _in_pool(list(tasks), min(workers, len(missing)))
+        flying = flying_in_pool(list(tasks), min(workers, len(missing)))
     else:
         flying = (fly_chunk(task) for task in tasks)
     for result in flying:
@@ -62,7 +62,8 @@ def run_study(
     return results.join()
 
 
-def _in_pool(tasks: list[ChunkTask], workers: int) -> Iterator[ChunkResult]:
+def flying_in_pool(tasks: list[ChunkTask], workers: int) -> Iterator[ChunkResult]:
+    """Fly chunks in a pool of processes, in the order of completion; a killed process is replaced."""
     left = {task.chunk: task for task in tasks}
     for _ in range(POOLS_MAX):
         try:

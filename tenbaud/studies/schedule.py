@@ -30,7 +30,7 @@ class Schedule(NamedTuple):
 
     shifts: IntArray
     known: IntArray
-    available: IntArray
+    late: IntArray
     scored: IntArray
     erasures: int
     """words erased, as far as the transmitter heard of them"""
@@ -75,8 +75,10 @@ def _arrays(
         raise Uncommon("echoes lag by more than the ends allow")
     scored = echo_ns <= ticks * tick_ns + _linger_ns(agreement)
     erased = (shifts.reshape(-1, terms.symbols_per_word) < 0).any(axis=1)
+    frames = np.maximum(at - terms.lead_ticks, 0) // per_sample
+    late = ((-(-echo_ns // tick_ns))[frames] > at) & (at >= terms.lead_ticks)
     heard = int(np.count_nonzero(erased & scored))
-    return Schedule(shifts, known, -(-echo_ns // tick_ns), scored, heard)
+    return Schedule(shifts, known, late, scored, heard)
 
 
 def _linger_ns(agreement: Agreement) -> int:

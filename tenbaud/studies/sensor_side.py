@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from channel.codec import add_correction, is_estimate
@@ -77,12 +78,10 @@ def act(
     window_over = still > 0 and still % numbers.watch == 0
     if window_over and _stuck(at, numbers, model_constants, given, work):
         return False, motion
-    measured = angle_at(counts, numbers)
-    if not -numbers.soft_limit <= measured <= numbers.soft_limit:
+    if numbers.soft_limit < math.inf and abs(angle_at(counts, numbers)) > numbers.soft_limit:
         return False, motion
     front, rear, age, late = motion.front, motion.rear, motion.age, motion.late
-    frame = (at - numbers.lead) // numbers.per_sample
-    if at < numbers.lead or given.available[frame] <= at:
+    if not given.late[at]:
         front = limited(work.front[at], front, numbers.volts_max, numbers.slew)
         rear = limited(work.rear[at], rear, numbers.volts_max, numbers.slew)
         age = 0

@@ -1,8 +1,8 @@
 """How fast a study flies: against python-control, against a plain C loop, and with two workers.
 
 All three fly the same flight: preset paper-10baud, 100 s, 10,000 ticks, one bit every 0.1 s. The errors
-of all three agree to the last bit. Times are of the processor, so that others on the machine count less;
-two workers are timed by the clock, which needs two idle cores.
+of all three agree to the last bit. Times are of the processor, so that others on the machine count
+less; two workers are timed by the clock, which needs two idle cores.
 """
 
 from __future__ import annotations

@@ -91,6 +91,10 @@ class CompiledPoint:
 
         self._work = _work(codec, self._samples, ticks, self._ahead)
 
+    def machine_code(self) -> list[str]:
+        """Return what the flight was compiled to, for whoever wants to read it."""
+        return list(_compiled_flight(self.agreement.codec).inspect_asm().values())
+
     @property
     def _samples(self) -> int:
         return -(-self.numbers.ticks // self.numbers.per_sample)

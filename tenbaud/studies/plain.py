@@ -25,6 +25,9 @@ def fly_plain(config: FlightConfig) -> FlightFigures:
     except (TenbaudError, ValueError) as error:
         outcome = outcome_of(error)
     node = run.node
+    # While the line rests at the end, the receiver may erase samples that were never flown.
+    heard = node.session.copies.next_sample
+    flown = min(heard, -(-run.ticks // agreement.terms.ticks_per_sample))
     scores = node.scores
     return FlightFigures(
         outcome="ok" if outcome.code is ExitCode.OK else outcome.text,
@@ -35,9 +38,9 @@ def fly_plain(config: FlightConfig) -> FlightFigures:
         error_live_max=scores.live.largest,
         tracking_rms=_rms(scores.tracking),
         pitch_amplitude=scores.angle_max_rad,
-        erasures=node.session.counts["erasures"],
+        erasures=node.session.counts["erasures"] - (heard - flown),
         commands_late=node.commands_late,
-        samples=node.session.copies.next_sample,
+        samples=flown,
     )
 
 

@@ -17,6 +17,7 @@ from benchmarks.latency import latency_figures
 from benchmarks.load import load_figures
 from benchmarks.page import page_figures
 from benchmarks.recordings import recording_figures
+from benchmarks.studies import studies_figures
 
 BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
     "codec": codec_figures,
@@ -29,6 +30,7 @@ BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
     "load": load_figures,
     "page": page_figures,
     "recordings": recording_figures,
+    "studies": studies_figures,
 }
 
 

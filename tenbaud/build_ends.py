@@ -23,7 +23,7 @@ from tenbaud.build import Agreement, read_flight_log, ticks_of
 from tenbaud.build_gauge import build_gauge
 from tenbaud.build_rig import build_rig
 from tenbaud.config.load import ConfigError
-from tenbaud.config.schema import FlightConfig
+from tenbaud.config.schema import FlightConfig, ReferenceSection
 from tenbaud.plugins import CONTROLLER, build_plugin, is_plugin
 from transmitter.guard import Guard, GuardSettings
 from transmitter.node import TransmitterNode
@@ -118,18 +118,22 @@ def check_parts(config: FlightConfig) -> None:
 
 def build_guard(agreement: Agreement) -> Guard:
     """Return limiter and watchdog beside the motors."""
+    return Guard(agreement.terms.limits, guard_settings(agreement))
+
+
+def guard_settings(agreement: Agreement) -> GuardSettings:
+    """Return when the guard steps in, and how."""
     section = agreement.config.transmitter
     terms = agreement.terms
     wanted_s = section.watchdog_s
     timeout_s = max(5 * terms.sample_ns / 1e9, 0.1) if wanted_s == "auto" else wanted_s
     soft = () if section.soft_limit_rad is None else (section.soft_limit_rad,)
-    settings = GuardSettings(
+    return GuardSettings(
         timeout_ticks=ticks_of(timeout_s, agreement.config),
         ramp_ticks=ticks_of(section.ramp_s, agreement.config),
         safe_volts=section.safe_volts,
         soft_limits_rad=soft,
     )
-    return Guard(terms.limits, settings)
 
 
 def build_controller(config: FlightConfig, reference: Reference | None = None) -> Controller:
@@ -165,8 +169,11 @@ def build_controller(config: FlightConfig, reference: Reference | None = None) -
 
 def build_reference(config: FlightConfig) -> Reference:
     """Return the set-point over the ticks."""
-    section = config.receiver.reference
-    tick_s = config.timing.tick_s
+    return reference_of(config.receiver.reference, config.timing.tick_s)
+
+
+def reference_of(section: ReferenceSection, tick_s: float) -> Reference:
+    """Return the set-point that a section describes."""
     match section.kind:
         case "square":
             return Square(section.amplitude_rad, section.period_s, tick_s)

@@ -19,6 +19,7 @@ from tenbaud.cli import (
     rig,
     router,
     runs,
+    sweep,
     view,
 )
 from tenbaud.flight.outcome import ExitCode, outcome_of
@@ -62,6 +63,7 @@ app.command()(router.router)
 app.add_typer(keys.app, name="keys")
 app.command()(identify.identify)
 app.command()(figures.figures)
+app.command()(sweep.sweep)
 app.command()(runs.inspect)
 app.command()(runs.diff)
 app.command()(replays.replay)

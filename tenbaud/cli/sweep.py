@@ -1,0 +1,107 @@
+"""`tenbaud sweep`: fly a study and draw it."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def sweep(
+    study: Annotated[
+        Path, typer.Argument(help="Study file (TOML); docs/studies.md says what is in it.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the results; studies/<name> if not given. Resumes what is there."),
+    ] = None,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            min=1, help="Processes on this machine; all cores if not given.", show_default=False
+        ),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(help="Dask scheduler to fly on, such as tcp://HOST:8786.", show_default=False),
+    ] = None,
+    seeds: Annotated[
+        int | None, typer.Option(min=1, help="Seeds of each point, instead of the study's.")
+    ] = None,
+    plots: Annotated[bool, typer.Option(help="Draw the plots.")] = True,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Summary on standard output as JSON, nothing else there.")
+    ] = False,
+) -> None:
+    """Fly a study: settings swept on a grid or sampled, many seeds, results as Parquet and plots."""
+    from tenbaud.studies.run import run_study
+    from tenbaud.studies.settings import StudyError
+    from tenbaud.studies.study import read_study
+    from tenbaud.studies.table import Results
+
+    if scheduler is not None and workers is not None:
+        raise StudyError("--workers is of this machine and --scheduler of a cluster: give one of them")
+    what = read_study(study, seeds)
+    folder = out or Path("studies") / what.file.name
+    results = Results(what, folder)
+    with _Bar(what.file.name) as bar:
+        table = run_study(what, results, bar.update, workers or os.cpu_count() or 1, scheduler)
+    drawn = []
+    if plots:
+        from tenbaud.studies.plots import draw_study
+
+        drawn = draw_study(table, what.names, what.file.description or what.file.name, folder)
+    outcomes = table["outcome"].to_pylist()
+    summary = {
+        "study": what.file.name,
+        "points": len(what.points),
+        "seeds": len(what.seeds),
+        "flights": what.flights,
+        "flights_without_figures": sum(outcome != "ok" for outcome in outcomes),
+        "flights_compiled": sum(one == "compiled" for one in table["engine"].to_pylist()),
+        "results": str(results.table_path),
+        "plots": [str(path) for path in drawn],
+    }
+    if as_json:
+        typer.echo(json.dumps(summary, indent=2))
+        return
+    typer.echo(
+        f"{summary['flights']} flights ({summary['points']} points, {summary['seeds']} seeds each), "
+        f"{summary['flights_compiled']} of them compiled: {results.table_path}"
+    )
+    if summary["flights_without_figures"]:
+        typer.echo(f"{summary['flights_without_figures']} have no figures; see the column outcome")
+    for path in drawn:
+        typer.echo(f"  {path}")
+
+
+class _Bar:
+    """A progress bar on standard error."""
+
+    def __init__(self, name: str) -> None:
+        from rich.console import Console
+        from rich.progress import (
+            BarColumn,
+            MofNCompleteColumn,
+            Progress,
+            TextColumn,
+            TimeRemainingColumn,
+        )
+
+        columns = (TextColumn(name), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        self._progress = Progress(*columns, console=Console(stderr=True))
+        self._task = self._progress.add_task(name, total=None)
+
+    def __enter__(self) -> _Bar:
+        self._progress.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._progress.stop()
+
+    def update(self, done: int, total: int) -> None:
+        """Show how far it is."""
+        self._progress.update(self._task, completed=done, total=total)

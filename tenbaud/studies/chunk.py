@@ -1,0 +1,80 @@
+"""A chunk: the flights of a study that one worker flies in one go."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from tenbaud.config.schema import FlightConfig
+from tenbaud.studies.compiled import sources_digest
+from tenbaud.studies.figures import FlightFigures
+from tenbaud.studies.settings import StudyError
+from tenbaud.studies.study import Study
+
+
+class ChunkTask(NamedTuple):
+    """What a worker is told; it needs no file of the study."""
+
+    chunk: int
+    engine: str
+    points: tuple[tuple[str, tuple[int, ...]], ...]
+    """(configuration as JSON, seeds), in the order of the flights"""
+    sources: str
+    """digest of the sources that the others run"""
+
+
+class ChunkResult(NamedTuple):
+    """What a worker returns."""
+
+    chunk: int
+    figures: list[FlightFigures]
+
+
+def task_of(study: Study, index: int) -> ChunkTask:
+    """Return the task of a chunk."""
+    by_point: dict[int, list[int]] = {}
+    for number in study.chunk(index):
+        point, seed = study.flight(number)
+        by_point.setdefault(point, []).append(seed)
+    points = tuple(
+        (study.configs[point].model_dump_json(), tuple(seeds)) for point, seeds in by_point.items()
+    )
+    return ChunkTask(index, study.file.engine, points, sources_digest())
+
+
+def fly_chunk(task: ChunkTask) -> ChunkResult:
+    """Fly a chunk. StudyError when this process runs other sources than the one that asked."""
+    if task.sources != sources_digest():
+        raise StudyError(
+            "a worker runs another version of tenbaud than this process; install the same on all of "
+            "them: their figures could differ"
+        )
+    figures: list[FlightFigures] = []
+    for text, seeds in task.points:
+        figures += _fly_point(FlightConfig.model_validate_json(text), seeds, task.engine)
+    return ChunkResult(task.chunk, figures)
+
+
+def _fly_point(config: FlightConfig, seeds: tuple[int, ...], engine: str) -> list[FlightFigures]:
+    from tenbaud.studies.plain import fly_plain
+
+    point: Any = None
+    if engine != "plain":
+        from tenbaud.studies.flights import CompiledPoint
+        from tenbaud.studies.schedule import Uncommon
+
+        try:
+            point = CompiledPoint(config)
+        except Uncommon as error:
+            if engine == "compiled":
+                raise StudyError(f'engine = "compiled" cannot fly {error}; use auto') from error
+    figures = []
+    for seed in seeds:
+        flown = None
+        if point is not None:
+            try:
+                flown = point.fly(seed)[0]
+            except Uncommon:
+                # Some flights leave the common course: the nodes themselves fly them, slowly.
+                flown = None
+        figures.append(flown or fly_plain(config.model_copy(update={"seed": seed})))
+    return figures

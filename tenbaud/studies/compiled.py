@@ -1,0 +1,120 @@
+"""The nodes' own functions, compiled: one text for each formula.
+
+`compiled` takes a plain function of this project and returns what numba makes of it. The functions that
+it calls, wherever in the project they are defined, are compiled with it; nothing is rewritten. Neither
+`fastmath` nor fused multiply-adds are allowed, so the bits stay those of plain Python.
+
+Machine code is kept in the user's cache folder under a digest of all sources that could matter, so that
+a second study, or a second worker, does not compile again and no stale code is ever found.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from functools import cache
+from hashlib import blake2b
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from types import FunctionType
+from typing import Any
+
+from channel.errors import TenbaudError
+
+PACKAGES = ("channel", "plant_sim", "receiver", "transmitter", "tenbaud")
+
+OPTIONS = {"fastmath": False, "error_model": "python", "nogil": True}
+"""How everything is compiled: divisions by zero are errors and nothing is reordered, as in Python."""
+
+BESIDE = ("plots.py", "run.py", "table.py", "tune.py", "tuning.py", "study.py", "settings.py")
+"""Modules of the studies that no figure of a flight depends on."""
+
+Parts = tuple[tuple[str, Any], ...]
+"""What stands for the placeholders of the flight: (name, compiled function)."""
+
+
+class StudiesMissing(TenbaudError):
+    """The libraries that studies need are not installed."""
+
+
+def require(*modules: str) -> None:
+    """Raise StudiesMissing, naming the extras, unless these modules can be imported."""
+    missing = [name for name in modules if name not in sys.modules and find_spec(name) is None]
+    if missing:
+        raise StudiesMissing(
+            f"studies need {' and '.join(missing)}, not installed here: "
+            "pip install 'tenbaud[studies,parquet]'"
+        )
+
+
+@cache
+def compiled(function: Callable[..., Any], parts: Parts = (), inline: bool = False) -> Any:
+    """Return a function of this project, compiled, with all of ours that it calls.
+
+    `parts` replace names in functions of the studies, which are put into their caller (`inline`).
+    """
+    if not isinstance(function, FunctionType):
+        raise TypeError(f"{function!r} is no plain function and cannot be compiled")
+    names = dict(parts)
+    for name in function.__code__.co_names:
+        value = function.__globals__.get(name)
+        if name in names or not isinstance(value, FunctionType):
+            continue
+        package, _, rest = value.__module__.partition(".")
+        if package in PACKAGES:
+            ours = rest.startswith("studies")
+            names[name] = compiled(value, parts if ours else (), ours)
+    scope = {**function.__globals__, **names}
+    copy = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
+    copy.__module__ = function.__module__
+    # The cache knows a function by its name: with other parts it is another function.
+    own = "_".join([function.__qualname__, *(part.__name__ for _, part in parts)])
+    copy.__qualname__ = copy.__name__ = own
+    return _jit(copy, inline="always" if inline else "never", forceinline=True)
+
+
+@cache
+def reader(size: int) -> Any:
+    """Return a compiled function that makes a tuple of an array's `size` values."""
+    to_fixed_tuple: Any = import_module("numba.np.unsafe.ndarray").to_fixed_tuple
+
+    def read(values: Any) -> Any:
+        return to_fixed_tuple(values, size)
+
+    read.__qualname__ = read.__name__ = f"read_{size}"
+    return _jit(read, forceinline=True)
+
+
+def _jit(function: Callable[..., Any], **more: Any) -> Any:
+    numba: Any = import_module("numba")
+    folder = _cache_folder()
+    if folder is not None:
+        numba.config.CACHE_DIR = str(folder)
+    return numba.njit(**OPTIONS, **more, cache=folder is not None)(function)
+
+
+@cache
+def sources_digest() -> str:
+    """Return what stands for all sources that the figures of a flight depend on."""
+    digest = blake2b(digest_size=12)
+    for package in (*PACKAGES[:-1], "tenbaud.studies"):
+        spec = find_spec(package)
+        for place in (spec and spec.submodule_search_locations) or ():
+            for path in sorted(Path(place).rglob("*.py")):
+                if path.name not in BESIDE:
+                    digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+@cache
+def _cache_folder() -> Path | None:
+    """Return where machine code is kept, None when that cannot be written."""
+    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    folder = Path(base) / "tenbaud" / sources_digest()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return None
+    return folder if os.access(folder, os.W_OK) else None

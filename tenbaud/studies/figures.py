@@ -1,0 +1,40 @@
+"""What a study keeps of a flight, and what it checks of one before flying it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from channel.identity import Identity
+from tenbaud.build import Agreement, build_terms
+from tenbaud.build_codec import build_codec
+from tenbaud.config.load import ConfigError
+from tenbaud.config.schema import FlightConfig
+
+
+class FlightFigures(NamedTuple):
+    """What a study keeps of one flight. Errors in rad; not a number where there is none."""
+
+    outcome: str
+    """ok, or why the flight has no figures"""
+    engine: str
+    """compiled, or plain: flown by the nodes themselves"""
+    error_coded_rms: float
+    error_coded_max: float
+    error_live_rms: float
+    error_live_max: float
+    tracking_rms: float
+    pitch_amplitude: float
+    erasures: int
+    commands_late: int
+    samples: int
+
+
+def shared_parts(config: FlightConfig) -> Agreement:
+    """Return what both ends would agree on, without the handshake's identity; ConfigError."""
+    try:
+        codec = build_codec(config)
+        terms = build_terms(config, codec, "virtual")
+        terms.check("virtual")
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+    return Agreement(config, "virtual", codec, terms, Identity("", "", b""))

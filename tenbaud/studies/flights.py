@@ -1,0 +1,271 @@
+"""Flying one point of a study: compiled where that is possible, with the nodes themselves where not."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from channel.codec import Codec
+from channel.coders.base import FunctionCoder
+from channel.flight_log import FlightLog
+from plant_sim.disturbance import parse_disturbance
+from plant_sim.pitch import pitch_constants
+from receiver.controllers.pid import Pid, PidConstants
+from receiver.controllers.recorded import RecordedController
+from tenbaud.build import Agreement, read_flight_log
+from tenbaud.build_ends import build_controller, guard_settings, reference_of
+from tenbaud.build_rig import nominal_plant
+from tenbaud.config.load import ConfigError
+from tenbaud.config.schema import FlightConfig, ReferenceSection
+from tenbaud.studies.compiled import compiled, reader
+from tenbaud.studies.figures import FlightFigures, shared_parts
+from tenbaud.studies.flight_data import DONE, Errors, Given, Motion, Numbers, Work
+from tenbaud.studies.kernel import fly
+from tenbaud.studies.schedule import Uncommon, schedule_of
+from transmitter.encoder_watch import WINDOW_S
+
+NOTHING = np.zeros(0)
+NO_PAIRS = np.zeros((0, 2))
+
+
+@dataclass(slots=True)
+class Trace:
+    """States of a compiled flight, for whoever wants to compare them."""
+
+    models: Any
+    coders: Any
+    coded: Any
+    live: Any
+    front: Any
+    rear: Any
+
+
+@dataclass(slots=True)
+class CompiledPoint:
+    """One configuration, ready to be flown with any seed.
+
+    Building it raises Uncommon where only the nodes can fly it, ConfigError where nobody can.
+    """
+
+    config: FlightConfig
+    agreement: Agreement = field(init=False)
+    numbers: Numbers = field(init=False)
+    constants: Any = field(init=False)
+    _log: FlightLog | None = field(init=False, default=None)
+    reference: Any = field(init=False)
+    _clean: Any = field(init=False, default=None)
+    _work: Work = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Build all that does not depend on the seed."""
+        config = self.config
+        self.agreement = shared_parts(config)
+        _require_ordinary(config, self.agreement.codec)
+        replay = config.transmitter.rig == "replay"
+        ticks = self.agreement.flight_ticks
+        if replay:
+            self._log = read_flight_log(config)
+            ticks = min(ticks, len(self._log))
+        self.numbers = _numbers(self.agreement, ticks, replay)
+        controller = build_controller(config)
+        pid = controller.constants if isinstance(controller, Pid) else _no_pid()
+        plant = nominal_plant(config).mismatched(config.transmitter.plant.mismatch)
+        codec = self.agreement.codec
+        self.constants = (
+            codec.model.constants,  # type: ignore[attr-defined]
+            codec.coder.constants,  # type: ignore[attr-defined]
+            pitch_constants(plant, config.timing.tick_s),
+            pid,
+        )
+        self.reference = (
+            NOTHING
+            if replay
+            else _reference(
+                config.receiver.reference.model_dump_json(), config.timing.tick_s, self._ahead
+            )
+        )
+
+        self._work = _work(codec, self._samples, ticks, self._ahead)
+
+    def machine_code(self) -> list[str]:
+        """Return what the flight was compiled to, for whoever wants to read it."""
+        return list(_compiled_flight(self.agreement.codec).inspect_asm().values())
+
+    @property
+    def _samples(self) -> int:
+        return -(-self.numbers.ticks // self.numbers.per_sample)
+
+    @property
+    def _ahead(self) -> int:
+        """Return how many ticks have a command."""
+        return self._samples * self.numbers.per_sample + self.numbers.lead
+
+    def fly(self, seed: int) -> tuple[FlightFigures, Trace]:
+        """Fly with one seed; Uncommon when the flight leaves the ordinary course.
+
+        The trace holds until the next flight of this point.
+        """
+        agreement = self.agreement
+        if seed != self.config.seed:
+            config = self.config.model_copy(update={"seed": seed})
+            agreement = Agreement(
+                config, "virtual", agreement.codec, agreement.terms, agreement.identity
+            )
+        if self._clean is None or agreement.faults.any:
+            self._clean = schedule_of(agreement, self._samples, self.numbers.ticks)
+        schedule = self._clean
+        work = self._work
+        given = Given(
+            np.array([self.config.transmitter.plant.initial_angle_rad, 0.0]),
+            np.array(agreement.codec.coder.alphabet.symbols, dtype=np.int64),
+            schedule.shifts,
+            schedule.known,
+            schedule.late,
+            schedule.scored,
+            self.reference,
+            _torque(agreement.config, self.numbers.ticks),
+            *_recorded(self._log, self._ahead),
+        )
+        flight = _compiled_flight(agreement.codec)
+        try:
+            status, motion, errors = flight(self.numbers, self.constants, given, work)
+        except ValueError as error:
+            raise Uncommon(str(error)) from error
+        if status != DONE:
+            raise Uncommon("the flight left its ordinary course")
+        figures = _figures(errors, motion, schedule.erasures, self._samples)
+        return figures, Trace(work.models, work.coders, work.coded, work.live, work.front, work.rear)
+
+
+def _compiled_flight(codec: Codec) -> Any:
+    """Return the compiled flight for a codec's kinds of model and coder."""
+    encode, decode = codec.coder.functions  # type: ignore[attr-defined]
+    parts = (
+        ("tick", compiled(codec.model.tick_function)),  # type: ignore[attr-defined]
+        ("encode", compiled(encode)),
+        ("decode", compiled(decode)),
+        ("state_of", reader(codec.model.state_size)),
+        ("held_of", reader(codec.model.correction_size)),
+    )
+    return compiled(fly, parts)
+
+
+def _require_ordinary(config: FlightConfig, codec: Codec) -> None:
+    """Raise Uncommon where parts are configured that only the nodes have."""
+    rig, controller = config.transmitter.rig, config.receiver.controller
+    if (rig, controller) not in (("simulated", "pid"), ("replay", "recorded")):
+        raise Uncommon(f"the rig {rig} with the controller {controller}")
+    if config.transmitter.sabotage or config.receiver.sabotage or config.transmitter.dry_run:
+        raise Uncommon("sabotage and dry runs")
+    if config.link.kind == "serial":
+        raise Uncommon("serial lines")
+    model, coder = codec.model, codec.coder
+    if not (hasattr(model, "tick_function") and isinstance(coder, FunctionCoder)):
+        raise Uncommon("a model or coder that is not written as functions")
+
+
+def _numbers(agreement: Agreement, ticks: int, replay: bool) -> Numbers:
+    config, terms = agreement.config, agreement.terms
+    section = config.transmitter
+    soft = section.soft_limit_rad
+    return Numbers(
+        ticks=ticks,
+        per_sample=terms.ticks_per_sample,
+        lead=terms.lead_ticks,
+        window_start=agreement.window_start_tick,
+        impulse=agreement.codec.coder.impulse,
+        replay=replay,
+        volts_max=float(terms.limits.volts_max),
+        slew=float(terms.limits.slew_volts_per_tick),
+        initial_front=float(terms.initial_command[0]),
+        initial_rear=float(terms.initial_command[1]),
+        safe_front=float(section.safe_volts[0]),
+        safe_rear=float(section.safe_volts[1]),
+        guard_timeout=guard_settings(agreement).timeout_ticks,
+        soft_limit=math.inf if soft is None else float(soft),
+        watch=max(1, round(WINDOW_S * 1e9 / terms.tick_ns)),
+        counts_per_turn=section.encoder_counts_per_turn,
+        sign=section.encoder_sign,
+        zero_counts=section.encoder_zero_counts,
+    )
+
+
+def _no_pid() -> PidConstants:
+    return PidConstants(0.0, 0.0, 0.0, 1.0, 0.0, False)
+
+
+def _work(codec: Codec, samples: int, ticks: int, ahead: int) -> Work:
+    states, coder = codec.model.state_size, codec.initial().coder
+    models = np.empty((samples + 1, states))
+    coders = np.empty((samples + 1, len(coder)))
+    models[0] = codec.model.initial()
+    coders[0] = coder
+    per_word = codec.coder.alphabet.symbols_per_word
+    return Work(
+        models=models,
+        coders=coders,
+        sent=np.zeros(samples * per_word, dtype=np.int64),
+        word=np.zeros(per_word, dtype=np.int64),
+        model=np.empty(states),
+        coder=np.empty(len(coder)),
+        spare=np.empty(len(coder)),
+        correction=np.empty(codec.model.correction_size),
+        nothing=np.zeros(codec.model.correction_size),
+        coded=np.empty(ahead),
+        live=np.empty(ahead),
+        front=np.empty(ahead),
+        rear=np.empty(ahead),
+        applied=np.empty((ticks, 2)),
+    )
+
+
+@lru_cache(maxsize=64)
+def _reference(section: str, tick_s: float, ticks: int) -> Any:
+    """Return the set-point of every tick; the section as JSON, so that it can be remembered."""
+    reference = reference_of(ReferenceSection.model_validate_json(section), tick_s)
+    values = np.array([reference.angle_rad(tick) for tick in range(ticks)])
+    return values
+
+
+def _torque(config: FlightConfig, ticks: int) -> Any:
+    text = config.transmitter.plant.disturbance
+    if not text or config.transmitter.rig == "replay":
+        return NOTHING
+    try:
+        return parse_disturbance(text, config.timing.tick_s, config.seed).torques(ticks)
+    except ValueError as error:
+        raise ConfigError(f"transmitter.plant.disturbance: {error}") from error
+
+
+def _recorded(log: FlightLog | None, ahead: int) -> tuple[Any, Any, Any]:
+    """Return counts, commands and applied voltages of a recording; empty without one."""
+    if log is None:
+        return NOTHING.astype(np.int64), NO_PAIRS, NO_PAIRS
+    counts = np.array([row[0] for row in log.counts], dtype=np.int64)
+    controller = RecordedController(log)
+    commands = np.array([controller.command(tick, ()) for tick in range(ahead)])
+    return counts, commands, np.array(log.volts, dtype=float)
+
+
+def _figures(errors: Errors, motion: Motion, erasures: int, samples: int) -> FlightFigures:
+    return FlightFigures(
+        outcome="ok",
+        engine="compiled",
+        error_coded_rms=_rms(errors.coded_squares, errors.coded_count),
+        error_coded_max=errors.coded_max,
+        error_live_rms=_rms(errors.live_squares, errors.live_count),
+        error_live_max=errors.live_max,
+        tracking_rms=_rms(errors.tracking_squares, errors.tracking_count),
+        pitch_amplitude=errors.angle_max,
+        erasures=erasures,
+        commands_late=motion.late,
+        samples=samples,
+    )
+
+
+def _rms(squares: float, count: int) -> float:
+    return math.sqrt(squares / count) if count else math.nan

@@ -1,0 +1,245 @@
+"""A whole flight as one function, to be compiled.
+
+What the two sessions, the guard and the rig do one message at a time is done here sample by sample, in
+the order of cause and effect: the transmitter's word, what the receiver made of it, its commands, the
+plant under them. All arithmetic is that of the nodes, imported; only the sequence is written anew, and
+tests compare it with ordinary flights, bit by bit. A flight that leaves the ordinary course, by a guard
+that steps in or an estimate that diverges, is not followed: it comes back with the status `LEFT`, and
+whoever asked flies it with the nodes themselves.
+
+The functions that depend on the kinds of model and coder are placeholders here (`parts`) and given
+when the flight is compiled.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from channel.codec import add_correction, is_estimate
+from channel.limits import as_carried, limited
+from plant_sim.pitch import pitch_step
+from receiver.controllers.pid import motor_volts, pid_integral, pid_volts
+from tenbaud.studies.bare import bare
+from tenbaud.studies.flight_data import DONE, LEFT, Errors, Given, Motion, Numbers, Work
+from tenbaud.studies.parts import decode, encode, held_of, state_of, tick
+from tenbaud.studies.sensor_side import act, angle_at, count_at, guess, score
+
+
+def fly(
+    numbers: Numbers,
+    constants: Any,
+    given: Given,
+    work: Work,
+) -> tuple[int, Motion, Errors]:
+    """Fly; return status, what the sensor node's side ended with, and the errors.
+
+    `constants` are those of (model, coder, plant, PID).
+    """
+    model_constants, coder_constants, plant_constants, pid_constants = constants
+    given = Given(
+        bare(given.start),
+        bare(given.alphabet),
+        bare(given.shifts),
+        bare(given.known),
+        bare(given.late),
+        bare(given.scored),
+        bare(given.reference),
+        bare(given.torque),
+        bare(given.counts),
+        bare(given.commands),
+        bare(given.applied),
+    )
+    work = Work(
+        bare(work.models),
+        bare(work.coders),
+        bare(work.sent),
+        bare(work.word),
+        bare(work.model),
+        bare(work.coder),
+        bare(work.spare),
+        bare(work.correction),
+        bare(work.nothing),
+        bare(work.coded),
+        bare(work.live),
+        bare(work.front),
+        bare(work.rear),
+        bare(work.applied),
+    )
+    integral = 0.0
+    plant = (given.start[0], given.start[1], 0.0, 0.0)
+    motion = Motion(numbers.safe_front, numbers.safe_rear, 0, 0, 0, 0)
+    errors = Errors(0, 0.0, 0.0, 0, 0.0, 0.0, 0, 0.0, 0.0)
+    work.front[: numbers.lead] = numbers.initial_front
+    work.rear[: numbers.lead] = numbers.initial_rear
+    for sample in range(given.scored.shape[0]):
+        first = sample * numbers.per_sample
+        known = given.known[first]
+        work.model[:] = work.models[known]
+        work.coder[:] = work.coders[known]
+        good = True
+        if known < sample:
+            good = guess(
+                sample,
+                numbers,
+                model_constants,
+                coder_constants,
+                given,
+                work,
+            )
+        counts = given.counts[first] if numbers.replay else count_at(plant[0], numbers)
+        _send(sample, angle_at(counts, numbers), coder_constants, work)
+        erased = _receive(sample, given, work)
+        held = _open(sample, erased, numbers, coder_constants, work)
+        answered, integral = _answer(
+            sample,
+            held,
+            integral,
+            numbers,
+            model_constants,
+            pid_constants,
+            given,
+            work,
+        )
+        if not (good and answered):
+            return LEFT, motion, errors
+        for at in range(first, min(first + numbers.per_sample, numbers.ticks)):
+            good, motion = act(
+                at,
+                plant[0],
+                motion,
+                numbers,
+                model_constants,
+                given,
+                work,
+            )
+            if not good:
+                return LEFT, motion, errors
+            if at >= numbers.window_start:
+                angle = angle_at(motion.counts, numbers) if numbers.replay else plant[0]
+                errors = score(at, sample, angle, errors, numbers, given, work)
+            if not numbers.replay:
+                torque = given.torque[at] if given.torque.shape[0] > 0 else 0.0
+                plant = pitch_step(plant, (motion.front, motion.rear), torque, plant_constants)
+    return DONE, motion, errors
+
+
+def _send(sample: int, angle: float, coder_constants: Any, work: Work) -> None:
+    """Form the word of a sample on the transmitter's copy, which `work.model` and `coder` hold."""
+    size = work.word.shape[0]
+    word = work.sent[sample * size : (sample + 1) * size]
+    encode(coder_constants, work.coder, work.model, (angle,), word)
+
+
+def _receive(sample: int, given: Given, work: Work) -> bool:
+    """Make `work.word` what comes out of the line; return whether it is erased."""
+    size = work.word.shape[0]
+    kinds = given.alphabet.shape[0]
+    for place in range(size):
+        shift = given.shifts[sample * size + place]
+        symbol = work.sent[sample * size + place]
+        if shift < 0:
+            work.word[:] = 0
+            return True
+        if shift > 0:
+            number = 0
+            while given.alphabet[number] != symbol:
+                number += 1
+            symbol = given.alphabet[(number + shift) % kinds]
+        work.word[place] = symbol
+    return False
+
+
+def _open(
+    sample: int,
+    erased: bool,
+    numbers: Numbers,
+    coder_constants: Any,
+    work: Work,
+) -> Any:
+    """Consume a word on the receiver's copy; return the correction to hold (`Codec.open`)."""
+    model = work.models[sample]
+    decode(
+        coder_constants,
+        work.coders[sample],
+        model,
+        work.word,
+        erased,
+        work.correction,
+        work.coders[sample + 1],
+    )
+    work.model[:] = model
+    if numbers.impulse:
+        add_correction(work.model, work.correction)
+        return held_of(work.nothing)
+    return held_of(work.correction)
+
+
+def _answer(
+    sample: int,
+    held: Any,
+    integral: float,
+    numbers: Numbers,
+    model_constants: Any,
+    pid_constants: Any,
+    given: Given,
+    work: Work,
+) -> tuple[bool, float]:
+    """Fly the opened sample and decide its commands, as `channel.lead.fly_sample` does.
+
+    Return whether all is well, and the controller's integral.
+    """
+    first = sample * numbers.per_sample
+    state = state_of(work.model)
+    good = True
+    for at in range(first, first + numbers.per_sample + numbers.lead):
+        if at == first + numbers.per_sample:
+            good = good and _close(sample, state, work)
+            held = held_of(work.nothing)
+        if at < first + numbers.per_sample:
+            work.coded[at] = state[0]
+        if at >= first + numbers.lead:
+            work.live[at] = state[0]
+            decided, integral = _decide(
+                at, state[0], state[1], integral, numbers, pid_constants, given, work
+            )
+            good = good and decided
+        state = tick(state, (work.front[at], work.rear[at]), held, model_constants)
+    if numbers.lead == 0:
+        good = good and _close(sample, state, work)
+    return good, integral
+
+
+def _close(sample: int, state: Any, work: Work) -> bool:
+    """Keep the state after a sample; return whether it is an estimate (`Codec.close`)."""
+    row = work.models[sample + 1]
+    for index in range(len(state)):
+        row[index] = state[index]
+    return is_estimate(state)
+
+
+def _decide(
+    at: int,
+    angle: float,
+    rate: float,
+    integral: float,
+    numbers: Numbers,
+    pid_constants: Any,
+    given: Given,
+    work: Work,
+) -> tuple[bool, float]:
+    """Decide the command of a tick as the receiver's session does; return (well, integral)."""
+    if numbers.replay:
+        front, rear = given.commands[at, 0], given.commands[at, 1]
+    else:
+        error = given.reference[at] - angle
+        volts = pid_volts(pid_constants, integral, error, rate)
+        if not math.isfinite(volts):
+            return False, integral
+        integral = pid_integral(pid_constants, integral, error, volts)
+        front, rear = motor_volts(pid_constants, volts)
+    front_before = work.front[at - 1] if at > 0 else numbers.initial_front
+    rear_before = work.rear[at - 1] if at > 0 else numbers.initial_rear
+    work.front[at] = as_carried(limited(front, front_before, numbers.volts_max, numbers.slew))
+    work.rear[at] = as_carried(limited(rear, rear_before, numbers.volts_max, numbers.slew))
+    return True, integral

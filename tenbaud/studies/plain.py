@@ -1,0 +1,48 @@
+"""One flight of a study, flown by the nodes themselves: both sessions in this process."""
+
+from __future__ import annotations
+
+import math
+
+from channel.errors import TenbaudError
+from channel.wire import DATAGRAM
+from tenbaud.build import agree
+from tenbaud.build_ends import build_receiver
+from tenbaud.config.schema import FlightConfig
+from tenbaud.flight import transmit
+from tenbaud.flight.outcome import ExitCode, outcome_of
+from tenbaud.studies.figures import FlightFigures
+from transmitter.scores import ErrorMeter
+
+
+def fly_plain(config: FlightConfig) -> FlightFigures:
+    """Fly a configuration as `tenbaud demo --link memory` does, and return its figures."""
+    agreement = agree(config, "virtual")
+    run = transmit.prepare(agreement, None, DATAGRAM)
+    endpoint = build_receiver(agreement, None, DATAGRAM)
+    try:
+        outcome = transmit.fly_virtual(run, endpoint, lambda: False)
+    except (TenbaudError, ValueError) as error:
+        outcome = outcome_of(error)
+    node = run.node
+    # While the line rests at the end, the receiver may erase samples that were never flown.
+    heard = node.session.copies.next_sample
+    flown = min(heard, -(-run.ticks // agreement.terms.ticks_per_sample))
+    scores = node.scores
+    return FlightFigures(
+        outcome="ok" if outcome.code is ExitCode.OK else outcome.text,
+        engine="plain",
+        error_coded_rms=_rms(scores.coded),
+        error_coded_max=scores.coded.largest,
+        error_live_rms=_rms(scores.live),
+        error_live_max=scores.live.largest,
+        tracking_rms=_rms(scores.tracking),
+        pitch_amplitude=scores.angle_max_rad,
+        erasures=node.session.counts["erasures"] - (heard - flown),
+        commands_late=node.commands_late,
+        samples=flown,
+    )
+
+
+def _rms(meter: ErrorMeter) -> float:
+    return math.nan if meter.rms is None else meter.rms

@@ -1,0 +1,250 @@
+"""What becomes of every symbol and every echo of a flight, and when, before anything is computed.
+
+Loss, delay and erasure do not depend on what a symbol says. So the line is flown once on its own, in
+the order of events of the virtual clock (`transmitter.virtual_flight`) and with the receiver's rule
+for what was received in time (`receiver.session`), over the very lines that an ordinary flight would
+use and with their seeds. What comes out are arrays that a compiled flight reads.
+"""
+
+from __future__ import annotations
+
+import heapq
+from itertools import count
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from channel.errors import FrameError
+from channel.frames import Frame, Symbol
+from channel.line import Delivery
+from channel.lockstep import HISTORY_SAMPLES
+from tenbaud.build import Agreement
+from tenbaud.build_ends import build_line
+from transmitter.virtual_flight import GREETINGS_MAX
+
+IntArray = Any
+
+
+class Schedule(NamedTuple):
+    """Fates of a flight's symbols and echoes; see `flight_data.Given`."""
+
+    shifts: IntArray
+    known: IntArray
+    late: IntArray
+    scored: IntArray
+    erasures: int
+    """words erased, as far as the transmitter heard of them"""
+
+
+class Uncommon(Exception):
+    """The line does something that only the nodes themselves follow, such as a rejoin."""
+
+
+def schedule_of(agreement: Agreement, samples: int, ticks: int) -> Schedule:
+    """Return the schedule of a flight; Uncommon when it has none."""
+    faults = agreement.faults
+    if faults.skew_ppm or faults.clock_steps or faults.up.raw or faults.down.raw:
+        raise Uncommon("clock errors and inverted bits are flown by the nodes themselves")
+    terms = agreement.terms
+    if faults.any:
+        line = _LineFlight(agreement, samples, ticks)
+        line.fly()
+        return _arrays(agreement, ticks, line.shifts, line.echo_ns, line.known_first)
+    per_word = terms.symbols_per_word
+    last_slots = [terms.slot_ns((sample + 1) * per_word - 1) for sample in range(samples)]
+    echo_ns = np.array(last_slots, dtype=np.int64) + terms.symbol_delay_ns
+    shifts = np.zeros(samples * per_word, dtype=np.int64)
+    # What a sample's first symbol brings about comes after the measurement, be it in no time.
+    known = np.searchsorted(echo_ns, np.arange(samples) * terms.sample_ns, side="right")
+    return _arrays(agreement, ticks, shifts, echo_ns, np.minimum(known, np.arange(samples)))
+
+
+def _arrays(
+    agreement: Agreement, ticks: int, shifts: IntArray, echo_ns: IntArray, known_first: IntArray
+) -> Schedule:
+    """Turn the times at which echoes come (ns, rising; beyond all time: never) into arrays.
+
+    `known_first`: per sample, echoes that had come before the measurement of its first tick.
+    """
+    terms = agreement.terms
+    tick_ns, per_sample = terms.tick_ns, terms.ticks_per_sample
+    at = np.arange(ticks, dtype=np.int64)
+    known = np.searchsorted(echo_ns, at * tick_ns, side="right").astype(np.int64)
+    known[::per_sample] = known_first
+    if np.any(np.arange(len(echo_ns)) - known_first > HISTORY_SAMPLES):
+        raise Uncommon("echoes lag by more than the ends allow")
+    scored = echo_ns <= ticks * tick_ns + _linger_ns(agreement)
+    erased = (shifts.reshape(-1, terms.symbols_per_word) < 0).any(axis=1)
+    frames = np.maximum(at - terms.lead_ticks, 0) // per_sample
+    late = ((-(-echo_ns // tick_ns))[frames] > at) & (at >= terms.lead_ticks)
+    heard = int(np.count_nonzero(erased & scored))
+    return Schedule(shifts, known, late, scored, heard)
+
+
+def _linger_ns(agreement: Agreement) -> int:
+    """Return how long echoes are waited for after the last tick, as `VirtualFlight.finish` does."""
+    terms = agreement.terms
+    linger_ns = terms.uplink_delivery_ns + terms.symbol_delay_ns + terms.downlink_budget_ns
+    lines = (build_line(agreement, "up", _WIRE), build_line(agreement, "down", _WIRE))
+    return linger_ns + sum(line.longest_delay_ns for line in lines)
+
+
+class _NumberWire:
+    """A wire whose symbols are their numbers: enough for a line to flip one."""
+
+    def encode(self, frame: Frame) -> bytes:
+        """Return a symbol's number."""
+        if not isinstance(frame, Symbol):
+            raise ValueError(f"{frame} is no symbol")
+        return bytes((frame.number,))
+
+    def decode(self, data: bytes) -> Frame:
+        """Return the symbol of a number."""
+        if len(data) != 1:
+            raise FrameError("no symbol")
+        return Symbol(0, 0, 0, data[0])
+
+    def size(self, data: bytes) -> int:
+        """Return the length."""
+        return len(data)
+
+
+_WIRE = _NumberWire()
+_NEVER_NS = 2**62
+_LOST = -2
+"""the shift of a symbol that is lost: time passes at the receiver, and nothing else"""
+
+
+class _Arrival(NamedTuple):
+    time_ns: int
+    order: int
+    slot: int
+    """of a symbol that goes up; -1: an echo that comes down"""
+    sample: int
+    shift: int
+
+
+class _LineFlight:
+    """The line's share of one flight."""
+
+    def __init__(self, agreement: Agreement, samples: int, ticks: int) -> None:
+        terms = agreement.terms
+        self.shifts = np.full(samples * terms.symbols_per_word, -1, dtype=np.int64)
+        self.echo_ns = np.full(samples, _NEVER_NS, dtype=np.int64)
+        self.known_first = np.zeros(samples, dtype=np.int64)
+        self._agreement = agreement
+        self._terms = terms
+        self._samples = samples
+        self._ticks = ticks
+        self._up = build_line(agreement, "up", _WIRE)
+        self._down = build_line(agreement, "down", _WIRE)
+        self._arrivals: list[_Arrival] = []
+        self._order = count()
+        self._slot = 0
+        self._silent = 0
+        self._anchor: tuple[int, int] | None = None
+        self._expected = 0
+        """sample whose echo is due at the transmitter"""
+
+    def fly(self) -> None:
+        """Let the whole flight pass."""
+        self._greet()
+        terms = self._terms
+        for sample in range(self._samples):
+            now_ns = sample * terms.sample_ns
+            self._pass_to(now_ns)
+            self.known_first[sample] = min(self._expected, self._samples)
+            first = sample * terms.symbols_per_word
+            for slot in range(first, first + terms.symbols_per_word):
+                leaves_ns = max(terms.slot_ns(slot), now_ns)
+                self._push_all(self._up.carry(b"\0", True, leaves_ns), slot, 0)
+            self._pass_to(now_ns)
+        self._pass_to((self._ticks - 1) * terms.tick_ns)
+        last_ns = self._ticks * terms.tick_ns + _linger_ns(self._agreement)
+        self._pass_to(last_ns, deadlines=False)
+
+    def _greet(self) -> None:
+        """Draw the chances of the handshake, which goes over the same lines."""
+        for _ in range(GREETINGS_MAX):
+            pending = [
+                (one.arrival_ns, True) for one in self._up.carry(b"", False, 0) if one.data is not None
+            ]
+            met = False
+            while pending:
+                pending.sort()
+                time_ns, upward = pending.pop(0)
+                if upward:
+                    answers = self._down.carry(b"", False, time_ns)
+                    pending += [(one.arrival_ns, False) for one in answers if one.data is not None]
+                else:
+                    met = True
+            if met:
+                return
+        raise Uncommon("no handshake gets through this line")
+
+    def _push_all(self, deliveries: list[Delivery], slot: int, sample: int) -> None:
+        for one in deliveries:
+            if one.data is None and slot < 0:
+                continue
+            shift = _LOST if one.data is None else one.data[0] if slot >= 0 else 0
+            arrival = _Arrival(one.arrival_ns, next(self._order), slot, sample, shift)
+            heapq.heappush(self._arrivals, arrival)
+
+    def _pass_to(self, now_ns: int, deadlines: bool = True) -> None:
+        while True:
+            arrival_ns = self._arrivals[0].time_ns if self._arrivals else _NEVER_NS
+            deadline_ns = self._deadline_ns() if deadlines else _NEVER_NS
+            if min(arrival_ns, deadline_ns) > now_ns:
+                return
+            if deadline_ns < arrival_ns:
+                self._on_deadline(deadline_ns)
+                continue
+            arrival = heapq.heappop(self._arrivals)
+            if arrival.slot < 0:
+                self._on_echo(arrival)
+            else:
+                if arrival.shift != _LOST:
+                    self._on_symbol(arrival)
+                self._on_deadline(arrival.time_ns)
+
+    def _deadline_ns(self) -> int:
+        if self._anchor is None:
+            return _NEVER_NS
+        slot, anchor_ns = self._anchor
+        due_ns = self._terms.slot_ns(self._slot) - self._terms.slot_ns(slot)
+        return anchor_ns + due_ns + self._terms.deadline_allowance_ns
+
+    def _on_deadline(self, now_ns: int) -> None:
+        while self._deadline_ns() <= now_ns:
+            self._silent += 1
+            self._settle(-1, now_ns)
+            if self._silent >= HISTORY_SAMPLES * self._terms.symbols_per_word:
+                raise Uncommon("the line is silent for longer than the receiver waits")
+
+    def _on_symbol(self, arrival: _Arrival) -> None:
+        if arrival.slot < self._slot:
+            return
+        if arrival.slot - self._slot > HISTORY_SAMPLES * self._terms.symbols_per_word:
+            raise Uncommon("a gap that is longer than the receiver bridges")
+        self._silent = 0
+        while self._slot < arrival.slot:
+            self._settle(-1, arrival.time_ns)
+        self._anchor = (arrival.slot, arrival.time_ns)
+        self._settle(arrival.shift, arrival.time_ns)
+
+    def _settle(self, shift: int, now_ns: int) -> None:
+        if self._slot < len(self.shifts):
+            self.shifts[self._slot] = shift
+        self._slot += 1
+        sample, left = divmod(self._slot, self._terms.symbols_per_word)
+        if left == 0:
+            self._push_all(self._down.carry(b"", False, now_ns), -1, sample - 1)
+
+    def _on_echo(self, arrival: _Arrival) -> None:
+        """Take a frame of echoes up to `arrival.sample`; the older ones in it are repeats."""
+        if arrival.sample - self._terms.repeats > self._expected:
+            raise Uncommon("more frames in a row were lost than are repeated: a rejoin")
+        while self._expected <= arrival.sample:
+            if self._expected < self._samples:
+                self.echo_ns[self._expected] = arrival.time_ns
+            self._expected += 1

@@ -1,0 +1,157 @@
+"""The rest of a compiled flight: the transmitter's second copy, guard, encoder watch and scores."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from channel.codec import add_correction, is_estimate
+from channel.limits import limited
+from plant_sim.encoder import angle_of, counts_of
+from tenbaud.studies.flight_data import Errors, Given, Motion, Numbers, Work
+from tenbaud.studies.parts import decode, held_of, state_of, tick
+from transmitter.encoder_watch import MOTION_RAD
+
+
+def count_at(angle: float, numbers: Numbers) -> int:
+    """Return what the encoder reads."""
+    return counts_of(angle, numbers.counts_per_turn, numbers.sign, numbers.zero_counts)
+
+
+def angle_at(counts: int, numbers: Numbers) -> float:
+    """Return the angle that counts stand for."""
+    return angle_of(counts, numbers.counts_per_turn, numbers.sign, numbers.zero_counts)
+
+
+def guess(
+    sample: int,
+    numbers: Numbers,
+    model_constants: Any,
+    coder_constants: Any,
+    given: Given,
+    work: Work,
+) -> bool:
+    """Carry `work.model` and `work.coder` from the confirmed copy to a sample's beginning.
+
+    The words are those sent, the commands those known, a missing one the last (`transmitter.copies`).
+    Return whether the estimate is one.
+    """
+    size = work.word.shape[0]
+    known = given.known[sample * numbers.per_sample]
+    commands = known * numbers.per_sample + numbers.lead
+    good = True
+    for one in range(known, sample):
+        word = work.sent[one * size : (one + 1) * size]
+        decode(coder_constants, work.coder, work.model, word, False, work.correction, work.spare)
+        work.coder[:] = work.spare
+        if numbers.impulse:
+            add_correction(work.model, work.correction)
+        held = held_of(work.nothing) if numbers.impulse else held_of(work.correction)
+        state = state_of(work.model)
+        first = one * numbers.per_sample
+        for at in range(first, first + numbers.per_sample):
+            last = min(at, commands - 1)
+            front = work.front[last] if last >= 0 else numbers.initial_front
+            rear = work.rear[last] if last >= 0 else numbers.initial_rear
+            state = tick(state, (front, rear), held, model_constants)
+        good = good and is_estimate(state)
+        for index in range(len(state)):
+            work.model[index] = state[index]
+    return good
+
+
+def act(
+    at: int,
+    angle: float,
+    motion: Motion,
+    numbers: Numbers,
+    model_constants: Any,
+    given: Given,
+    work: Work,
+) -> tuple[bool, Motion]:
+    """Read the encoder and put the tick's command on the motors, as node and guard do.
+
+    Return whether nothing tripped, and what is carried on.
+    """
+    counts = given.counts[at] if numbers.replay else count_at(angle, numbers)
+    still = motion.still + 1 if at > 0 and counts == motion.counts else 0
+    window_over = still > 0 and still % numbers.watch == 0
+    if window_over and _stuck(at, numbers, model_constants, given, work):
+        return False, motion
+    if numbers.soft_limit < math.inf and abs(angle_at(counts, numbers)) > numbers.soft_limit:
+        return False, motion
+    front, rear, age, late = motion.front, motion.rear, motion.age, motion.late
+    if not given.late[at]:
+        front = limited(work.front[at], front, numbers.volts_max, numbers.slew)
+        rear = limited(work.rear[at], rear, numbers.volts_max, numbers.slew)
+        age = 0
+    else:
+        age += 1
+        late += 1
+        if age > numbers.guard_timeout:
+            return False, motion
+    if given.applied.shape[0] > 0:
+        work.applied[at, 0] = given.applied[at, 0]
+        work.applied[at, 1] = given.applied[at, 1]
+    else:
+        work.applied[at, 0] = front
+        work.applied[at, 1] = rear
+    return True, Motion(front, rear, counts, still, age, late)
+
+
+def _stuck(
+    at: int,
+    numbers: Numbers,
+    model_constants: Any,
+    given: Given,
+    work: Work,
+) -> bool:
+    """Return whether the encoder watch would take the encoder for stuck at the end of a window."""
+    start = at - numbers.watch + 1
+    held = held_of(work.nothing)
+    state = state_of(work.models[given.known[start]])
+    angle = state[0]
+    for one in range(start, at + 1):
+        volts = (work.applied[one - 1, 0], work.applied[one - 1, 1])
+        state = tick(state, volts, held, model_constants)
+    return not -MOTION_RAD < state[0] - angle < MOTION_RAD
+
+
+def score(
+    at: int,
+    sample: int,
+    angle: float,
+    errors: Errors,
+    numbers: Numbers,
+    given: Given,
+    work: Work,
+) -> Errors:
+    """Add the errors of one tick, in the order in which `transmitter.scores` adds them."""
+    coded_count, coded_squares, coded_max = errors[0], errors[1], errors[2]
+    live_count, live_squares, live_max = errors[3], errors[4], errors[5]
+    tracking_count, tracking_squares = errors[6], errors[7]
+    if given.scored[sample]:
+        error = angle - work.coded[at]
+        coded_count += 1
+        coded_squares += error * error
+        coded_max = max(coded_max, abs(error))
+        if at >= numbers.lead:
+            error = angle - work.live[at]
+            live_count += 1
+            live_squares += error * error
+            live_max = max(live_max, abs(error))
+    if given.reference.shape[0] > 0:
+        error = given.reference[at] - angle
+        tracking_count += 1
+        tracking_squares += error * error
+    return Errors(
+        coded_count,
+        coded_squares,
+        coded_max,
+        live_count,
+        live_squares,
+        live_max,
+        tracking_count,
+        tracking_squares,
+        max(errors[8], abs(angle)),
+    )

@@ -12,11 +12,11 @@ PYTHON ?= $(shell for candidate in python3.11 python3.12 python3.13 python3.14 p
 	>/dev/null 2>&1; then echo $$candidate; break; fi; done)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check bench soak clean
+.PHONY: help demo test check bench soak docs reference clean
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /|/' \
-	| awk -F'|' '{ printf "  make %-7s %s\n", $$1, $$2 }'
+	| awk -F'|' '{ printf "  make %-9s %s\n", $$1, $$2 }'
 
 demo: $(STAMP) ## fly: both processes on this machine, the plant simulated
 	$(BIN)/tenbaud demo
@@ -37,8 +37,16 @@ soak: $(STAMP) ## fly seeds under faults for MINUTES=n (10) into soak.json, then
 	$(BIN)/python -m tests.simulation.soak --minutes $(MINUTES)
 	MINUTES=$(MINUTES) $(BIN)/python -m pytest -m soak
 
+# Material for MkDocs advertises its successor at every start; nothing else is silenced.
+docs: reference ## build the documentation into site/, strictly
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	@echo "written to site/; read it: $(BIN)/python -m http.server --directory site --bind 127.0.0.1"
+
+reference: $(STAMP) ## write the pages in docs/reference that follow from the code
+	$(BIN)/python docs/tools/reference.py
+
 clean: ## remove the environment and everything that was generated
-	rm -rf $(VENV) runs dist bench.json soak.json .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) runs dist site bench.json soak.json .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # The environment is built again whenever pyproject.toml changes.

@@ -27,6 +27,11 @@ standard error; with `--json` a command writes one JSON object and nothing else.
 |---|---|
 """
 
+SKIPPED = (
+    "<!-- test: skip, examples of the help, with addresses and files of their own; "
+    "the pages fly each of these commands -->"
+)
+
 EXIT_MEANINGS = {
     ExitCode.OK: "all went well",
     ExitCode.FAILED: "something failed, or a check found a difference",
@@ -62,7 +67,7 @@ def _command(name: str, callback: Callable[..., Any]) -> Iterator[str]:
     yield f"{text}\n"
     if examples:
         yield "For example:\n"
-        yield "\n".join(["```text", *examples, "```"]) + "\n"
+        yield "\n".join([SKIPPED, "```sh", *examples, "```"]) + "\n"
     rows = [row for row in _rows(callback) if row]
     if rows:
         yield "| argument or option | default | meaning |"

@@ -28,7 +28,7 @@ standard error; with `--json` a command writes one JSON object and nothing else.
 """
 
 SKIPPED = (
-    "<!-- test: skip, examples of the help, with addresses and files of their own; "
+    "<!-- test: skip, examples of the help, with addresses and files of their own: "
     "the pages fly each of these commands -->"
 )
 
@@ -38,7 +38,7 @@ EXIT_MEANINGS = {
     ExitCode.USAGE: "the command line or the configuration cannot be used",
     ExitCode.MISMATCH: "the two ends differ in version, configuration or arithmetic",
     ExitCode.LINK_LOST: "the other end is not there, or was lost",
-    ExitCode.DESYNC: "the two codecs differed and nobody had asked for it to be mended",
+    ExitCode.DESYNC: "the two codecs differed, and nobody had spoilt them on purpose; or `--on-desync stop`",
     ExitCode.SAFETY_STOP: "the rig or the guard beside the motors ended the flight",
     ExitCode.INTERRUPTED: "Ctrl-C",
 }

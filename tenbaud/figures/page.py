@@ -23,7 +23,7 @@ def _head() -> str:
 *Estimation and control under information constraints for LAAS Helicopter Benchmark*, each of its
 results beside ours. This page and its pictures are written by
 
-<!-- test: skip, minutes of flights and recorded data that are no part of the repository; a long test runs it -->
+<!-- test: skip, minutes of flights and recorded data that are no part of the repository -->
 ```sh
 tenbaud figures all --docs docs --data ../shared/data
 ```

@@ -22,7 +22,7 @@ from tests.rules.sources import TOP
 RUN_LANGUAGES = ("sh", "console")
 NOTE = re.compile(r"^\s*<!--\s*test:\s*(.*?)\s*-->\s*$")
 FENCE = re.compile(r"^(?P<indent>\s*)```(?P<language>[\w-]*)\s*$")
-COMMAND = re.compile(r"^\s*(?:\$ )?(?:tenbaud|make|python3? -m|pip|uvx?|pytest|sudo)(?:\s|$)")
+COMMAND = re.compile(r"^\s*(?:\$ )?(?:tenbaud|make|python3? -m|pip|uvx?|pytest|sudo)(?:\s+[\w.'\"-]|$)")
 """What looks like a command, wherever it stands."""
 
 

@@ -82,7 +82,9 @@ def _rows(callback: Callable[..., Any]) -> Iterator[str]:
         kind, info = _declared(hints[name])
         if info is None or info.hidden:
             continue
-        names = _argument(name, parameter) if isinstance(info, ArgumentInfo) else _option(name, info, kind)
+        names = (
+            _argument(name, parameter) if isinstance(info, ArgumentInfo) else _option(name, info, kind)
+        )
         default = parameter.default
         if isinstance(default, Enum):
             default = default.value

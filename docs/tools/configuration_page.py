@@ -58,7 +58,7 @@ def _section(name: str, model: type[BaseModel], kind: str = "") -> Iterator[str]
     """Yield a section and, behind it, the sections within it."""
     title = f"`[{name}]`" if name else "Top level"
     if kind:
-        title += f" with `kind = \"{kind}\"`"
+        title += f' with `kind = "{kind}"`'
     yield f"## {title}\n"
     yield f"{inspect.getdoc(model)}\n"
     meanings = _meanings(model)
@@ -89,7 +89,13 @@ def _section(name: str, model: type[BaseModel], kind: str = "") -> Iterator[str]
 
 def _row(field: str, info: FieldInfo, meaning: str) -> str:
     unit = next((text for ending, text in UNITS if field.endswith(ending)), "")
-    cells = [f"`{field}`", unit, _default(info.default), _allowed(info.annotation, info.metadata), meaning]
+    cells = [
+        f"`{field}`",
+        unit,
+        _default(info.default),
+        _allowed(info.annotation, info.metadata),
+        meaning,
+    ]
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
@@ -119,7 +125,13 @@ def _allowed(annotation: Any, metadata: list[Any]) -> str:
         return ", ".join(f"`{_plain(value)}`" for value in get_args(annotation))
     if get_origin(annotation) is tuple:
         return _allowed_list(get_args(annotation))
-    names = {float: "number", int: "whole number", str: "text", bool: "`true`, `false`", NoneType: "none"}
+    names = {
+        float: "number",
+        int: "whole number",
+        str: "text",
+        bool: "`true`, `false`",
+        NoneType: "none",
+    }
     return (names.get(annotation, str(annotation)) + " " + _bounds(metadata)).strip()
 
 

@@ -11,7 +11,19 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from channel.frames import Bye, Commands, Desync, Echo, Frame, Hello, Refuse, Symbol, Unknown, Welcome, Why
+from channel.frames import (
+    Bye,
+    Commands,
+    Desync,
+    Echo,
+    Frame,
+    Hello,
+    Refuse,
+    Symbol,
+    Unknown,
+    Welcome,
+    Why,
+)
 from channel.serial_wire import SerialWire, stuff
 from channel.virtual import Reply, Step, encode_reply, encode_step
 from channel.wire import encode
@@ -45,7 +57,11 @@ FRAMES: dict[str, tuple[Frame, tuple[Field, ...]]] = {
         Symbol(SESSION, EPOCH, 700, 1),
         (
             Field("slot", "u32", "counted from the first symbol of sample 0"),
-            Field("number", "u8", "place of the symbol in the alphabet; of the paper's, 0 is -1 and 1 is +1"),
+            Field(
+                "number",
+                "u8",
+                "place of the symbol in the alphabet; of the paper's, 0 is -1 and 1 is +1",
+            ),
         ),
     ),
     "commands": (
@@ -137,7 +153,9 @@ def _table(message: bytes, fields: tuple[Field, ...]) -> Iterator[str]:
         yield f"| {offset} | `{_hex(part)}` | {field.name} | {field.type} | {value} | {field.meaning} |"
         offset += size
     if offset != len(message):
-        raise ValueError(f"the fields cover {offset} of {len(message)} bytes: {[f.name for f in fields]}")
+        raise ValueError(
+            f"the fields cover {offset} of {len(message)} bytes: {[f.name for f in fields]}"
+        )
 
 
 NUMBERS = {"u8": "<B", "u16": "<H", "u32": "<I", "u64": "<Q", "s16": "<h", "s64": "<q"}
@@ -156,7 +174,9 @@ def _size(field: Field, message: bytes, offset: int) -> int:
 def _value(field: Field, part: bytes) -> str:
     if field.type in NUMBERS:
         number = struct.unpack(NUMBERS[field.type], part)[0]
-        large = field.name in ("session", "incarnation", "digest", "CRC") or field.name.endswith("_digest")
+        large = field.name in ("session", "incarnation", "digest", "CRC") or field.name.endswith(
+            "_digest"
+        )
         return f"0x{number:0{2 * len(part)}X}" if large else str(number)
     if field.type == "text":
         return f"`{part[2:].decode()}`"

@@ -97,7 +97,9 @@ def parse(text: str, page: str) -> list[Block]:
         elif (fence := FENCE.match(line)) is not None:
             end = _end(lines, index, page)
             indent = len(fence["indent"])
-            content = [one[indent:] if one[:indent].isspace() else one for one in lines[index + 1 : end]]
+            content = [
+                one[indent:] if one[:indent].isspace() else one for one in lines[index + 1 : end]
+            ]
             found.append(
                 Block(page, index + 2, fence["language"], "\n".join(content), **_settings(note, page))
             )

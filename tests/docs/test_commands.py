@@ -28,18 +28,24 @@ def type_in(blocks: list[Block], folder: Path, timeout_s: float) -> None:
 
 
 @pytest.mark.parametrize("page", NORMAL)
-def test_when_a_page_is_typed_in_then_every_command_does_what_it_says(page: str, tmp_path: Path) -> None:
+def test_when_a_page_is_typed_in_then_every_command_does_what_it_says(
+    page: str, tmp_path: Path
+) -> None:
     type_in([block for block in RUN[page] if not (block.skip or block.soak)], tmp_path, 150.0)
 
 
 @pytest.mark.soak
 @pytest.mark.parametrize("page", LONG)
-def test_when_a_page_is_typed_in_whole_then_its_long_commands_work_too(page: str, tmp_path: Path) -> None:
+def test_when_a_page_is_typed_in_whole_then_its_long_commands_work_too(
+    page: str, tmp_path: Path
+) -> None:
     type_in([block for block in RUN[page] if not block.skip], tmp_path, 3600.0)
 
 
 @pytest.mark.parametrize("block", NOT_RUN, ids=lambda block: block.name)
-def test_when_a_block_cannot_be_run_here_then_its_options_exist_and_it_is_reported(block: Block) -> None:
+def test_when_a_block_cannot_be_run_here_then_its_options_exist_and_it_is_reported(
+    block: Block,
+) -> None:
     problems = unknown_words(block)
     assert not problems, problems
     pytest.skip(f"{block.name}: {block.skip}")
@@ -141,5 +147,8 @@ def test_when_a_block_fails_or_says_something_else_then_the_page_fails(tmp_path:
 
 
 def test_when_a_block_takes_too_long_then_it_is_ended(tmp_path: Path) -> None:
-    with Sandbox(tmp_path, timeout_s=0.5) as sandbox, pytest.raises(BlockFailed, match=r"longer than 0\.5 s"):
+    with (
+        Sandbox(tmp_path, timeout_s=0.5) as sandbox,
+        pytest.raises(BlockFailed, match=r"longer than 0\.5 s"),
+    ):
         sandbox.run(block_of("```sh\nsleep 60\n```"))

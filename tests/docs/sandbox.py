@@ -89,7 +89,7 @@ class Sandbox:
             if not _ends(process, ENDED_WITHIN_S):
                 raise BlockFailed(f"{block.name} does not end at Ctrl-C\n{output.read_text()}")
             code = process.returncode
-            if not (interrupted and code in (130, -signal.SIGINT)):
+            if not (interrupted and code in (130, -signal.SIGINT, -signal.SIGTERM)):
                 self._check(block, code, output.read_text())
 
     def _start(self, block: Block, script: str) -> None:
@@ -128,6 +128,7 @@ class Sandbox:
         )
 
     def _check(self, block: Block, code: int, said: str) -> None:
+        code = code if code >= 0 else 128 - code  # as a shell tells a signal
         if code != block.exit_code:
             raise BlockFailed(
                 f"{block.name} ended with {code}, expected {block.exit_code}:\n{block.script}\n\n{said}"

@@ -19,8 +19,8 @@ INTRODUCTION = """# Commands
 
 <!-- Written by `make reference` from the command line itself. Change that, not this page. -->
 
-`tenbaud COMMAND --help` says the same in the terminal. Results go to standard output, everything else to
-standard error; with `--json` a command writes one JSON object and nothing else. An option that is
+`tenbaud COMMAND --help` says the same in the terminal. Results go to standard output, everything else
+to standard error; with `--json` a command writes one JSON object and nothing else. An option that is
 *repeatable* may be given several times.
 
 | exit code | meaning |
@@ -28,8 +28,8 @@ standard error; with `--json` a command writes one JSON object and nothing else.
 """
 
 SKIPPED = (
-    "<!-- test: skip, examples of the help, with addresses and files of their own: "
-    "the pages fly each of these commands -->"
+    "<!-- test: skip, forms of the command from its help, with addresses and files as examples: "
+    "their words are checked -->"
 )
 
 EXIT_MEANINGS = {
@@ -38,7 +38,7 @@ EXIT_MEANINGS = {
     ExitCode.USAGE: "the command line or the configuration cannot be used",
     ExitCode.MISMATCH: "the two ends differ in version, configuration or arithmetic",
     ExitCode.LINK_LOST: "the other end is not there, or was lost",
-    ExitCode.DESYNC: "the two codecs differed, and nobody had spoilt them on purpose; or `--on-desync stop`",
+    ExitCode.DESYNC: "the codecs differed and nobody had spoilt them on purpose; or `--on-desync stop`",
     ExitCode.SAFETY_STOP: "the rig or the guard beside the motors ended the flight",
     ExitCode.INTERRUPTED: "Ctrl-C",
 }

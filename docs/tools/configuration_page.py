@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import itertools
 import textwrap
 from collections.abc import Iterator
 from types import NoneType, UnionType
@@ -39,8 +40,8 @@ INTRODUCTION = """# Configuration
 <!-- Written by `make reference` from the schema. Change the schema, not this page. -->
 
 One TOML file holds everything about a flight; both ends read the same one. Give it with `--config`, set
-single fields with `--set SECTION.FIELD=VALUE`, or start from a preset (`tenbaud presets` lists them). Later
-wins: preset, then file, then command line. Every run writes the complete result to its `config.toml`.
+single fields with `--set SECTION.FIELD=VALUE`, or start from a preset (`tenbaud presets` lists them).
+Later wins: preset, then file, then command line. Every run writes the complete result to its `config.toml`.
 
 The sections {shared} are *shared*: the two ends compare a digest of them in their handshake and do
 not fly when it differs. An unknown field or a value out of its range is refused, by name.
@@ -178,8 +179,8 @@ def _meanings(model: type[BaseModel]) -> dict[str, str]:
             continue
         tree = ast.parse(textwrap.dedent(inspect.getsource(owner)))
         body = tree.body[0].body  # type: ignore[attr-defined]
-        for field, text in zip(body, body[1:], strict=False):
-            if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
-                if isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant):
-                    found[field.target.id] = " ".join(str(text.value.value).split())
+        for field, text in itertools.pairwise(body):
+            named = isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)
+            if named and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant):
+                found[field.target.id] = " ".join(str(text.value.value).split())
     return found

@@ -4,8 +4,8 @@ The pages are read in two places, on the site and in the repository. They are wr
 repository (relative links, `$...$` for equations) and this makes them right on the site:
 
 * an equation becomes MathML while the site is built, which browsers draw by themselves;
-* a link to a file outside docs/, such as `../CONTRIBUTING.md`, takes that file along: Markdown as a page
-  of its own below `project/`, anything else as a plain file below `source/`.
+* a link to a file outside docs/, such as `../CONTRIBUTING.md`, takes that file along: Markdown as a
+  page of its own below `project/`, anything else as a plain file below `source/`.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ def figures(
     which: Annotated[
         list[str] | None,
         typer.Argument(
-            help="3, 4, 5, 6, 7, 8 or all; several may be given. Of the documentation: theory, animation."
+            help="3, 4, 5, 6, 7, 8 or all; several may be given. For the pages: theory, animation."
         ),
     ] = None,
     docs: Annotated[

@@ -5,7 +5,7 @@ commands, the others what they say). A comment right above the fence may say how
 
     <!-- test: skip, needs a serial port -->      not here, for this reason
     <!-- test: soak, ten minutes of flights -->   with the long tests only
-    <!-- test: background -->                     goes on while the next blocks run, as in another terminal
+    <!-- test: background -->                     goes on while the next blocks run, in another terminal
     <!-- test: exit=5 -->                         is to end with this exit code
 
 Several may be given, between semicolons. `skip` and `soak` need a reason.
@@ -72,7 +72,7 @@ class Block:
 
 def pages() -> list[str]:
     """Return every Markdown page that people read, from the top folder."""
-    found = [path for path in sorted(TOP.glob("*.md"))]
+    found = list(sorted(TOP.glob("*.md")))
     for folder in ("docs", "examples"):
         found += sorted((TOP / folder).rglob("*.md"))
     names = [path.relative_to(TOP).as_posix() for path in found]
@@ -121,9 +121,8 @@ def stray_commands(text: str, page: str) -> list[str]:
             inside = (fence["language"] if fence else "") if inside is None else None
         elif inside in (*RUN_LANGUAGES, "toml", "yaml") or "      " in line.split("#")[0].strip():
             continue  # what is run, what is no shell, and drawings
-        elif COMMAND.match(line):
-            if inside is not None or line.startswith("    "):
-                found.append(f"{page}:{number}: {line.strip()}")
+        elif COMMAND.match(line) and (inside is not None or line.startswith("    ")):
+            found.append(f"{page}:{number}: {line.strip()}")
     return found
 
 

@@ -1,9 +1,9 @@
 """A place to type a page's commands into: a copy of the repository, with its commands on the path.
 
-The commands stand in the pages as people type them. What makes them safe to run in a test is here: the
-copy's default port, and every loopback port of a page, are exchanged for free ones, the environment that
-`make` would build is there already, and the home folder is an empty one. pytest only collects in it: the
-tests that type in `make test` must not run themselves.
+The commands stand in the pages as people type them. What makes them safe to run in a test is here:
+the copy's default port, and every loopback port of a page, are exchanged for free ones, the environment
+that `make` would build is there already, and the home folder is an empty one. pytest only collects in
+it: the tests that type in `make test` must not run themselves.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ class Sandbox:
             )
         rest = _squeezed(said)
         for line in block.promised:
-            before, found, rest = rest.partition(_squeezed(line))
+            _before, found, rest = rest.partition(_squeezed(line))
             if not found:
                 raise BlockFailed(f"{block.name} does not say, or not there: {line.strip()}\n\n{said}")
 

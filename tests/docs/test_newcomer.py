@@ -97,7 +97,9 @@ def test_when_the_flight_is_broken_then_it_came_back_and_the_difference_is_named
     assert "coder[0]" in said["tenbaud diff broken"]
 
 
-def test_when_a_recording_is_opened_then_it_holds_the_flight(walked: tuple[Path, dict[str, str]]) -> None:
+def test_when_a_recording_is_opened_then_it_holds_the_flight(
+    walked: tuple[Path, dict[str, str]],
+) -> None:
     top, said = walked
     shown = next(text for first, text in said.items() if "--out first" in first)
     assert "sample: 1000 rows" in shown, "inspect says so on the screen"

@@ -1,8 +1,8 @@
 """The wire format's page is decoded byte by byte, from its own tables and nothing else.
 
-Each table is read as a stranger would: the bytes are taken from the page, the field's value is worked out
-by the type that the page gives, and the frame that the code makes of them must have that value. Then each
-field is changed alone, with a new checksum: that field of the frame changes and no other.
+Each table is read as a stranger would: the bytes are taken from the page, the field's value is worked
+out by the type that the page gives, and the frame that the code makes of them must have that value. Then
+each field is changed alone, with a new checksum: that field of the frame changes and no other.
 """
 
 from __future__ import annotations
@@ -157,7 +157,7 @@ def test_when_the_symbol_byte_is_split_as_the_page_says_then_slot_and_number_com
     for smallest, check, slot, number in table:
         codec = SerialWire(int(smallest))
         places = [bits(cell.split("(")[0]) for cell in (check, slot, number)]
-        assert sorted(sum(places, [])) == list(range(7))
+        assert sorted(bit for place in places for bit in place) == list(range(7))
         assert codec.slot_modulus == 2 ** len(places[1])
         for low in range(codec.slot_modulus):
             for symbol in range(int(smallest)):
@@ -165,7 +165,8 @@ def test_when_the_symbol_byte_is_split_as_the_page_says_then_slot_and_number_com
                 assert byte >> 7 == 1
                 assert taken(byte, places[1]) == low
                 assert taken(byte, places[2]) == symbol
-                assert taken(byte, places[0]) == remainder(low << len(places[2]) | symbol, len(places[0]))
+                content = low << len(places[2]) | symbol
+                assert taken(byte, places[0]) == remainder(content, len(places[0]))
 
 
 def taken(byte: int, places: list[int]) -> int:
@@ -192,16 +193,17 @@ def test_when_the_examples_of_symbol_bytes_are_decoded_then_they_are_right() -> 
         symbol = SerialWire(int(size)).symbol(int(byte, 16))
         assert symbol is not None
         assert (symbol.slot_low, symbol.number) == (int(slot), int(number))
-    for slot, number, written in re.findall(r"^\| (\d) \| (\d) \| `([01 ]+)` = 0x", SERIAL_PAGE, re.MULTILINE):
+    others = re.findall(r"^\| (\d) \| (\d) \| `([01 ]+)` = 0x", SERIAL_PAGE, re.MULTILINE)
+    assert len(others) == 4
+    for slot, number, written in others:
         symbol = SerialWire(2).symbol(int(written.replace(" ", ""), 2))
         assert symbol is not None
         assert (symbol.slot_low, symbol.number) == (int(slot), int(number))
 
 
 def test_when_the_framed_example_is_unstuffed_then_it_is_the_frame_above_it() -> None:
-    plain, framed = (
-        bytes.fromhex(one) for one in re.findall(r"```text\n([0-9a-f ]+)\n```", section("On a serial line"))
-    )
+    shown_bytes = re.findall(r"```text\n([0-9a-f ]+)\n```", section("On a serial line"))
+    plain, framed = (bytes.fromhex(one) for one in shown_bytes)
     assert framed[0] == framed[-1] == 0
     assert framed[1] < 0x80
     assert unstuff(framed[1:-1]) == (False, plain)

@@ -12,7 +12,7 @@ PYTHON ?= $(shell for candidate in python3.11 python3.12 python3.13 python3.14 p
 	>/dev/null 2>&1; then echo $$candidate; break; fi; done)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check bench soak chromium screenshots clean
+.PHONY: help demo test check bench soak docs reference chromium screenshots clean
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /|/' \
@@ -47,8 +47,16 @@ chromium: ## install Debian's Chromium if it is missing and this is root's machi
 screenshots: $(STAMP) ## fly with the live page, and make its pictures in docs/figures
 	$(BIN)/python -m benchmarks.screenshots
 
+# Material for MkDocs advertises its successor at every start; nothing else is silenced.
+docs: reference ## build the documentation into site/, strictly
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	@echo "written to site/; read it: $(BIN)/python -m http.server --directory site --bind 127.0.0.1"
+
+reference: $(STAMP) ## write the pages in docs/reference that follow from the code
+	$(BIN)/python docs/tools/reference.py
+
 clean: ## remove the environment and everything that was generated
-	rm -rf $(VENV) runs dist bench.json soak.json .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) runs dist site bench.json soak.json .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # The environment is built again whenever pyproject.toml changes.

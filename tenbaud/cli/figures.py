@@ -10,12 +10,16 @@ import typer
 
 from tenbaud.cli import options
 
+DRAWINGS = ("theory", "animation")
 DATA_VARIABLE = "TENBAUD_FLIGHT_DATA"
 
 
 def figures(
     which: Annotated[
-        list[str] | None, typer.Argument(help="3, 4, 5, 6, 7, 8 or all; several may be given.")
+        list[str] | None,
+        typer.Argument(
+            help="3, 4, 5, 6, 7, 8 or all; several may be given. For the pages: theory, animation."
+        ),
     ] = None,
     docs: Annotated[
         Path | None,
@@ -40,6 +44,8 @@ def figures(
     [dim]tenbaud figures 7[/dim]
 
     [dim]tenbaud figures all --docs docs --data ../shared/data[/dim]
+
+    [dim]tenbaud figures theory animation --docs docs[/dim]
     """
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -47,11 +53,16 @@ def figures(
     from tenbaud.figures.make import NUMBERS, make_figures
     from tenbaud.recording.folder import create_run_folder
 
-    wanted = _wanted(which or ["all"], NUMBERS)
+    drawings = [name for name in which or () if name in DRAWINGS]
+    wanted = _wanted([name for name in which or ["all"] if name not in drawings], NUMBERS)
     found = _data(data)
     folder = create_run_folder(None, "figures", out)
     pictures = (docs or folder) / "figures"
     pictures.mkdir(parents=True, exist_ok=True)
+    if drawings:
+        _draw_documentation(drawings, pictures)
+    if not wanted:
+        return
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as bar:
@@ -77,10 +88,25 @@ def figures(
         )
 
 
+def _draw_documentation(drawings: list[str], pictures: Path) -> None:
+    """Draw what belongs to no figure of the paper."""
+    from tenbaud.figures.animation import draw_animation
+    from tenbaud.figures.theory import draw_theory
+
+    if "theory" in drawings:
+        for path in draw_theory(pictures, lambda name: typer.echo(f"drawing {name}", err=True)):
+            typer.echo(str(path))
+    if "animation" in drawings:
+        path = pictures / "tenbaud.gif"
+        typer.echo(f"{path}, {draw_animation(path) / 1e6:.2f} MB")
+
+
 def _wanted(names: list[str], known: tuple[str, ...]) -> set[str]:
     for name in names:
         if name not in (*known, "all"):
-            raise typer.BadParameter(f"'{name}': known are {', '.join(known)} and all")
+            raise typer.BadParameter(
+                f"'{name}': known are {', '.join(known)} and all; {', '.join(DRAWINGS)}"
+            )
     return set(known) if "all" in names else set(names)
 
 

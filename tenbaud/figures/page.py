@@ -23,7 +23,8 @@ def _head() -> str:
 *Estimation and control under information constraints for LAAS Helicopter Benchmark*, each of its
 results beside ours. This page and its pictures are written by
 
-```
+<!-- test: skip, minutes of flights and recorded data that are no part of the repository -->
+```sh
 tenbaud figures all --docs docs --data ../shared/data
 ```
 

@@ -1,0 +1,197 @@
+"""The page of the wire format: its prose is here, its tables come from frames that the code encodes.
+
+What follows from the code alone (bytes, offsets, values) is computed; what a field is called and meant
+for is written down. `tests/docs/test_wire_page.py` decodes the page again, byte by byte.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from channel.frames import (
+    Bye,
+    Commands,
+    Desync,
+    Echo,
+    Frame,
+    Hello,
+    Refuse,
+    Symbol,
+    Unknown,
+    Welcome,
+    Why,
+)
+from channel.serial_wire import SerialWire, stuff
+from channel.virtual import Reply, Step, encode_reply, encode_step
+from channel.wire import encode
+
+TEXT = Path(__file__).with_name("wire_page.md")
+
+SESSION, EPOCH = 0x1A2B3C4D, 2
+DIGEST = 0x1122334455667788
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One row of a table: `type` is u8, u16, u32, u64, s16, s64, `bytes N`, `text` or `rest`."""
+
+    name: str
+    type: str
+    meaning: str
+
+
+HEAD = (
+    Field("version", "u8", "of the wire format"),
+    Field("kind", "u8", "of the frame"),
+    Field("session", "u32", "drawn by the receiver; 0: none yet"),
+    Field("epoch", "u16", "counts the rejoins of a session"),
+)
+TAIL = (Field("CRC", "u16", "CRC-16/CCITT-FALSE of all bytes before it"),)
+
+DIGESTS = "of the codec state after the sample"
+FRAMES: dict[str, tuple[Frame, tuple[Field, ...]]] = {
+    "symbol": (
+        Symbol(SESSION, EPOCH, 700, 1),
+        (
+            Field("slot", "u32", "counted from the first symbol of sample 0"),
+            Field(
+                "number",
+                "u8",
+                "place of the symbol in the alphabet; of the paper's, 0 is -1 and 1 is +1",
+            ),
+        ),
+    ),
+    "commands": (
+        Commands(
+            SESSION,
+            EPOCH,
+            (Echo(699, 0xFFFF, 5, (1500, -1500)), Echo(700, 1, DIGEST, (1480, -1480))),
+        ),
+        (
+            Field("sample", "u32", "that the last echo is of; the others are of the samples before it"),
+            Field("echoes", "u8", "how many follow, oldest first"),
+            Field("word_number", "u16", "the word consumed for the sample; 65535: it was erased"),
+            Field("digest", "u64", DIGESTS),
+            Field("millivolts", "s16", "front motor, first tick"),
+            Field("millivolts", "s16", "rear motor, first tick; then the next tick, `N` in all"),
+            Field("word_number", "u16", "the next echo"),
+            Field("digest", "u64", DIGESTS),
+            Field("millivolts", "s16", "front"),
+            Field("millivolts", "s16", "rear"),
+        ),
+    ),
+    "hello": (
+        Hello(0xA1B2C3D4, "0.1", bytes(range(16)), bytes(range(8)), 3, SESSION, EPOCH, 710, Why.DESYNC),
+        (
+            Field("incarnation", "u32", "drawn anew by every process"),
+            Field("request", "u32", "counts the times that this process asked"),
+            Field("sample", "u32", "first one that the transmitter could still send"),
+            Field("why", "u8", "see below"),
+            Field("config_digest", "bytes 16", "of the shared configuration"),
+            Field("numerics_probe", "bytes 8", "of the codec run over fixed vectors"),
+            Field("version", "text", "of the software, for people"),
+        ),
+    ),
+    "welcome": (
+        Welcome(SESSION, EPOCH, 713, 0xA1B2C3D4, 3, (1480, -1480), bytes((1, 2, 3, 4))),
+        (
+            Field("incarnation", "u32", "of the greeting that is answered"),
+            Field("request", "u32", "of the greeting that is answered"),
+            Field("first_sample", "u32", "symbols start with it"),
+            Field("motors", "u8", "how many voltages follow; 0: hold the initial command"),
+            Field("hold_millivolts", "s16", "front motor, until the first command decided"),
+            Field("hold_millivolts", "s16", "rear motor"),
+            Field("state", "rest", "codec state before `first_sample`; empty: the initial one"),
+        ),
+    ),
+    "refuse": (
+        Refuse(0xA1B2C3D4, "no", "{}"),
+        (
+            Field("incarnation", "u32", "of the greeting that is answered"),
+            Field("reason", "text", "for people"),
+            Field("config", "text", "the receiver's shared configuration as JSON"),
+        ),
+    ),
+    "desync": (
+        Desync(SESSION, EPOCH, 700, DIGEST, DIGEST + 1, bytes((1, 2, 3, 4))),
+        (
+            Field("sample", "u32", "after which the copies differed"),
+            Field("transmitter_digest", "u64", ""),
+            Field("receiver_digest", "u64", ""),
+            Field("state", "rest", "the sender's state after the sample; empty: not kept"),
+        ),
+    ),
+    "bye": (Bye(SESSION, "over"), (Field("reason", "text", "for people"),)),
+    "unknown": (Unknown(SESSION, EPOCH), ()),
+}
+
+
+def wire_page() -> str:
+    """Return the whole page."""
+    text = TEXT.read_text(encoding="utf-8")
+    for name, (frame, fields) in FRAMES.items():
+        table = "\n".join(_table(encode(frame), (*HEAD, *fields, *TAIL)))
+        text = text.replace(f"{{{{{name}}}}}", table)
+    text = text.replace("{{symbols}}", "\n".join(_symbols()))
+    text = text.replace("{{stuffed}}", _hex(stuff(encode(FRAMES["unknown"][0]))))
+    text = text.replace("{{unstuffed}}", _hex(encode(FRAMES["unknown"][0])))
+    text = text.replace("{{step}}", _hex(encode_step(Step(5, 700_000_000, b"\x01"))))
+    return text.replace("{{reply}}", _hex(encode_reply(Reply(5, 820_000_000, (b"\x01\x02",)))))
+
+
+def _table(message: bytes, fields: tuple[Field, ...]) -> Iterator[str]:
+    yield "| offset | bytes | field | type | value | |"
+    yield "|---|---|---|---|---|---|"
+    offset = 0
+    for field in fields:
+        size = _size(field, message, offset)
+        part = message[offset : offset + size]
+        value = _value(field, part)
+        yield f"| {offset} | `{_hex(part)}` | {field.name} | {field.type} | {value} | {field.meaning} |"
+        offset += size
+    if offset != len(message):
+        raise ValueError(
+            f"the fields cover {offset} of {len(message)} bytes: {[f.name for f in fields]}"
+        )
+
+
+NUMBERS = {"u8": "<B", "u16": "<H", "u32": "<I", "u64": "<Q", "s16": "<h", "s64": "<q"}
+
+
+def _size(field: Field, message: bytes, offset: int) -> int:
+    if field.type in NUMBERS:
+        return struct.calcsize(NUMBERS[field.type])
+    if field.type == "text":
+        return 2 + int.from_bytes(message[offset : offset + 2], "little")
+    if field.type == "rest":
+        return len(message) - 2 - offset
+    return int(field.type.split()[1])
+
+
+def _value(field: Field, part: bytes) -> str:
+    if field.type in NUMBERS:
+        number = struct.unpack(NUMBERS[field.type], part)[0]
+        large = field.name in ("session", "incarnation", "digest", "CRC") or field.name.endswith(
+            "_digest"
+        )
+        return f"0x{number:0{2 * len(part)}X}" if large else str(number)
+    if field.type == "text":
+        return f"`{part[2:].decode()}`"
+    return f"{len(part)} bytes"
+
+
+def _symbols() -> Iterator[str]:
+    yield "| alphabet | slot | number | byte |"
+    yield "|---|---|---|---|"
+    for size, cases in ((2, ((0, 0), (0, 1), (1, 0), (7, 1))), (4, ((5, 2),)), (8, ((3, 6),))):
+        wire = SerialWire(size)
+        for slot, number in cases:
+            byte = wire.encode(Symbol(SESSION, EPOCH, slot, number))[0]
+            yield f"| {size} | {slot} | {number} | `0x{byte:02X}` |"
+
+
+def _hex(data: bytes) -> str:
+    return data.hex(" ")

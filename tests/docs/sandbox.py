@@ -1,0 +1,169 @@
+"""A place to type a page's commands into: a copy of the repository, with its commands on the path.
+
+The commands stand in the pages as people type them. What makes them safe to run in a test is here:
+the copy's default port, and every loopback port of a page, are exchanged for free ones, the environment
+that `make` would build is there already, and the home folder is an empty one. pytest only collects in
+it: the tests that type in `make test` must not run themselves.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tests.docs.blocks import Block
+from tests.rules.sources import TOP
+
+LEFT_OUT = (".git", ".venv", "runs", "site", "dist", "build", "*.egg-info", ".*_cache", ".hypothesis")
+COMMANDS = {"tenbaud": "-m tenbaud", "python": "", "python3": "", "pytest": "-m pytest"}
+COMMANDS |= {name: f"-m {name}" for name in ("ruff", "mypy", "mkdocs")}
+LOOPBACK_PORT = re.compile(r"(?<=127\.0\.0\.1:)(\d+)\b|(?<=localhost:)(\d+)\b")
+BLOCK_TIMEOUT_S = 150.0
+STARTED_WITHIN_S = 20.0
+ENDED_WITHIN_S = 15.0
+
+
+class BlockFailed(AssertionError):
+    """A block did not do what its page says."""
+
+
+@dataclass
+class Sandbox:
+    """One page's place; use it in a `with`."""
+
+    folder: Path
+    timeout_s: float = BLOCK_TIMEOUT_S
+    ports: dict[str, str] = field(default_factory=dict)
+    _background: list[tuple[Block, subprocess.Popen[str], Path]] = field(default_factory=list)
+
+    def __enter__(self) -> Sandbox:
+        self.top = self.folder / "tenbaud"
+        shutil.copytree(TOP, self.top, ignore=shutil.ignore_patterns(*LEFT_OUT), symlinks=True)
+        (self.folder / "home").mkdir()
+        self._exchange_default_port()
+        programs = self.top / ".venv" / "bin"
+        programs.mkdir(parents=True)
+        for name, how in COMMANDS.items():
+            program = programs / name
+            program.write_text(f'#!/bin/sh\nexec "{sys.executable}" {how} "$@"\n')
+            program.chmod(0o755)
+        (programs / "activate").write_text(f'PATH="{programs}:$PATH"\n')
+        (self.top / ".venv" / ".installed").touch()
+        return self
+
+    def __exit__(self, *problem: object) -> None:
+        for _, process, _ in self._background:
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
+
+    def run(self, block: Block) -> str:
+        """Type a block in; return what it says. BlockFailed if it is not what the page says."""
+        script = LOOPBACK_PORT.sub(self._free_port, block.script)
+        if block.background:
+            self._start(block, script)
+            return ""
+        process = self._popen(script, subprocess.PIPE)
+        try:
+            said, _ = process.communicate(timeout=self.timeout_s)
+        except subprocess.TimeoutExpired:
+            os.killpg(process.pid, signal.SIGKILL)
+            said, _ = process.communicate()
+            raise BlockFailed(f"{block.name} took longer than {self.timeout_s:g} s\n{said}") from None
+        self._check(block, process.returncode, said)
+        return said
+
+    def end(self) -> None:
+        """Wait for what runs in the background, then press Ctrl-C; BlockFailed if that went wrong."""
+        for block, process, output in self._background:
+            interrupted = not _ends(process, 3.0)
+            if interrupted:
+                os.killpg(process.pid, signal.SIGINT)
+            if not _ends(process, ENDED_WITHIN_S):
+                raise BlockFailed(f"{block.name} does not end at Ctrl-C\n{output.read_text()}")
+            code = process.returncode
+            if not (interrupted and code in (130, -signal.SIGINT, -signal.SIGTERM)):
+                self._check(block, code, output.read_text())
+
+    def _start(self, block: Block, script: str) -> None:
+        for _, earlier, _ in self._background:
+            _ends(earlier, 3.0)
+        output = self.folder / f"background-{len(self._background)}.txt"
+        with output.open("w") as stream:
+            process = self._popen(script, stream)
+        self._background.append((block, process, output))
+        until = time.monotonic() + STARTED_WITHIN_S
+        while not output.read_text() and process.poll() is None and time.monotonic() < until:
+            time.sleep(0.05)
+
+    def _popen(self, script: str, output: object) -> subprocess.Popen[str]:
+        import matplotlib
+
+        environment = {
+            **{name: value for name, value in os.environ.items() if not name.startswith("PYTEST")},
+            "PATH": os.pathsep.join([str(self.top / ".venv" / "bin"), os.environ.get("PATH", "")]),
+            "PYTHONPATH": str(self.top),
+            "HOME": str(self.folder / "home"),
+            "MPLCONFIGDIR": matplotlib.get_configdir(),
+            "COLUMNS": "200",
+            "PYTEST_ADDOPTS": "--collect-only",
+            "NO_COLOR": "1",
+        }
+        return subprocess.Popen(
+            ["bash", "-euo", "pipefail", "-c", script],
+            cwd=self.top,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=output,  # type: ignore[call-overload]
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+        )
+
+    def _check(self, block: Block, code: int, said: str) -> None:
+        code = code if code >= 0 else 128 - code  # as a shell tells a signal
+        if code != block.exit_code:
+            raise BlockFailed(
+                f"{block.name} ended with {code}, expected {block.exit_code}:\n{block.script}\n\n{said}"
+            )
+        rest = _squeezed(said)
+        for line in block.promised:
+            _before, found, rest = rest.partition(_squeezed(line))
+            if not found:
+                raise BlockFailed(f"{block.name} does not say, or not there: {line.strip()}\n\n{said}")
+
+    def _free_port(self, match: re.Match[str]) -> str:
+        port = match[0]
+        if port != "0" and port not in self.ports:
+            from channel.links.endpoints import free_endpoint
+
+            self.ports[port] = free_endpoint().rpartition(":")[2]
+        return self.ports.get(port, port)
+
+    def _exchange_default_port(self) -> None:
+        from channel.links.endpoints import DEFAULT_ENDPOINT
+
+        path = self.top / "channel" / "links" / "endpoints.py"
+        text = path.read_text()
+        assert DEFAULT_ENDPOINT in text
+        path.write_text(LOOPBACK_PORT.sub(self._free_port, text))
+
+
+def _ends(process: subprocess.Popen[str], within_s: float) -> bool:
+    try:
+        process.wait(within_s)
+    except subprocess.TimeoutExpired:
+        return False
+    return True
+
+
+def _squeezed(text: str) -> str:
+    """Return the text with every stretch of space and table lines as one space."""
+    return " ".join(re.sub(r"[│┃|]", " ", text).split())

@@ -1,0 +1,160 @@
+"""Every command block of every page is typed in, in order, in a copy of the repository.
+
+What is not run says why above it, and is reported as skipped with that reason: `pytest -rs tests/docs`.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from docs.tools.commands_page import commands_page
+from tests.docs.blocks import COMMAND, Block, NoteError, blocks_of, needed, pages, parse, stray_commands
+from tests.docs.sandbox import BlockFailed, Sandbox
+
+ELSEWHERE = ("README.md",)
+"""Walked by `test_newcomer.py`, which looks at what comes of it as well."""
+RUN = {page: [block for block in blocks_of(page) if block.runs] for page in pages()}
+NORMAL = [
+    page
+    for page, blocks in RUN.items()
+    if page not in ELSEWHERE and any(not (one.skip or one.soak) for one in blocks)
+]
+LONG = [page for page, blocks in RUN.items() if any(one.soak and not one.skip for one in blocks)]
+NOT_RUN = [block for blocks in RUN.values() for block in blocks if block.skip]
+
+
+def type_in(blocks: list[Block], folder: Path, timeout_s: float) -> None:
+    with Sandbox(folder, timeout_s) as sandbox:
+        for block in blocks:
+            sandbox.run(block)
+        sandbox.end()
+
+
+@pytest.mark.parametrize("page", NORMAL)
+def test_when_a_page_is_typed_in_then_every_command_does_what_it_says(
+    page: str, tmp_path: Path
+) -> None:
+    type_in([block for block in RUN[page] if not (block.skip or block.soak)], tmp_path, 150.0)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("page", LONG)
+def test_when_a_page_is_typed_in_whole_then_its_long_commands_work_too(
+    page: str, tmp_path: Path
+) -> None:
+    type_in([block for block in RUN[page] if not block.skip], tmp_path, 3600.0)
+
+
+@pytest.mark.parametrize("block", NOT_RUN, ids=lambda block: block.name)
+def test_when_a_block_cannot_be_run_here_then_its_options_exist_and_it_is_reported(
+    block: Block,
+) -> None:
+    problems = unknown_words(block)
+    assert not problems, problems
+    pytest.skip(f"{block.name}: {block.skip}")
+
+
+@pytest.mark.parametrize("page", pages())
+def test_when_a_page_shows_a_command_then_it_is_in_a_block_that_is_run(page: str) -> None:
+    found = stray_commands(needed(page).read_text(encoding="utf-8"), page)
+    assert not found, "fence these as sh or console:\n" + "\n".join(found)
+
+
+def test_when_the_pages_are_collected_then_the_readme_and_the_docs_are_among_them() -> None:
+    assert {"README.md", "CONTRIBUTING.md", "docs/serial.md", "docs/rigs/emulator.md"} <= set(RUN)
+    assert sum(len(blocks) for blocks in RUN.values()) > 30
+
+
+def unknown_words(block: Block) -> list[str]:
+    """Return the verbs and options of a block that `tenbaud` does not know."""
+    page = commands_page()
+    problems = []
+    for line in re.sub(r"\\\n", " ", block.script).splitlines():
+        words = line.split("#")[0].split()
+        if not words or words[0] != "tenbaud" or len(words) == 1:
+            continue
+        verbs = [verb for verb in (" ".join(words[:3]), " ".join(words[:2])) if f"## `{verb}`" in page]
+        if not verbs:
+            problems.append(f"{block.name}: no such command: {line.strip()}")
+            continue
+        section = page.split(f"## `{verbs[0]}`", 1)[1].split("\n## ", 1)[0]
+        problems += [
+            f"{block.name}: {verbs[0]} has no {word}: {line.strip()}"
+            for word in words
+            if word.startswith("--") and f"`{word.partition('=')[0]}`" not in section
+        ]
+    return problems
+
+
+def block_of(text: str) -> Block:
+    (block,) = parse(text, "a.md")
+    return block
+
+
+@pytest.mark.parametrize(
+    ("text", "settings"),
+    [
+        ("```sh\ntrue\n```", {}),
+        ("<!-- test: skip, needs a rig -->\n```sh\ntrue\n```", {"skip": "needs a rig"}),
+        ("<!-- test: soak, an hour -->\n\n```sh\ntrue\n```", {"soak": "an hour"}),
+        ("<!-- test: background; exit=5 -->\n```sh\ntrue\n```", {"background": True, "exit_code": 5}),
+    ],
+)
+def test_when_a_note_stands_above_a_block_then_it_is_understood(
+    text: str, settings: dict[str, object]
+) -> None:
+    block = block_of(text)
+    assert {name: getattr(block, name) for name in settings} == settings
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "<!-- test: skip -->\n```sh\ntrue\n```",
+        "<!-- test: sometimes -->\n```sh\ntrue\n```",
+        "<!-- test: soak, long -->\n\nSome text.\n\n```sh\ntrue\n```",
+        "```sh\ntrue\n",
+    ],
+)
+def test_when_a_note_or_a_fence_is_wrong_then_it_is_told(text: str) -> None:
+    with pytest.raises(NoteError):
+        parse(text, "a.md")
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["```\ntenbaud demo\n```", "Text:\n\n    tenbaud demo\n", "```text\nmake test\n```"],
+)
+def test_when_a_command_stands_where_nobody_runs_it_then_it_is_told(text: str) -> None:
+    assert stray_commands(text, "a.md")
+    assert COMMAND.match(text.splitlines()[1]) or "demo" in text
+
+
+@pytest.mark.parametrize("script", ["tenbaud fly", "tenbaud demo --fly", "tenbaud demo \\\n  --fly=1"])
+def test_when_a_command_that_is_not_run_has_an_unknown_word_then_it_is_told(script: str) -> None:
+    assert unknown_words(block_of(f"```sh\n{script}\n```"))
+
+
+def test_when_a_block_fails_or_says_something_else_then_the_page_fails(tmp_path: Path) -> None:
+    with Sandbox(tmp_path) as sandbox:
+        sandbox.run(block_of("```console\n$ echo one; echo two\n...\ntwo\n```"))
+        for text in (
+            "```sh\nfalse\ntrue\n```",
+            "<!-- test: exit=3 -->\n```sh\ntrue\n```",
+            "```console\n$ echo one\ntwo\n```",
+        ):
+            with pytest.raises(BlockFailed):
+                sandbox.run(block_of(text))
+        sandbox.run(block_of("<!-- test: background -->\n```sh\necho here; sleep 60\n```"))
+        sandbox.end()
+
+
+def test_when_a_block_takes_too_long_then_it_is_ended(tmp_path: Path) -> None:
+    with (
+        Sandbox(tmp_path, timeout_s=0.5) as sandbox,
+        pytest.raises(BlockFailed, match=r"longer than 0\.5 s"),
+    ):
+        sandbox.run(block_of("```sh\nsleep 60\n```"))

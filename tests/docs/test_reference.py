@@ -1,0 +1,83 @@
+"""The pages that are written from the code say what the code says."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from docs.tools.commands_page import commands_page
+from docs.tools.configuration_page import configuration_page
+from docs.tools.reference import PAGES
+from tenbaud.cli.app import app
+from tenbaud.config.load import load_config, preset_names
+from tenbaud.config.schema import FlightConfig
+from tests.rules.sources import TOP
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_when_the_code_changes_then_its_page_is_written_anew(name: str) -> None:
+    written = (TOP / name).read_text(encoding="utf-8")
+    assert written == PAGES[name](), f"{name} is not what the code says; run: make reference"
+
+
+def section_of(page: str, title: str) -> str:
+    return page.split(f"## {title}\n", 1)[1].split("\n## ", 1)[0]
+
+
+@pytest.mark.parametrize(
+    ("section", "row"),
+    [
+        ("`[timing]`", "| `tick_s` | s | `0.01` | number > 0, ≤ 1 | h: control tick |"),
+        ("`[link]`", "| `best_effort` |  | `false` | `true`, `false` |"),
+        ("`[transmitter.bridge.pitch]`", "| `counts_per_turn` | counts/turn | `4096` |"),
+        ('`[coder]` with `kind = "zoom"`', "| `window_signs` | signs | `2` | whole number ≥ 1, ≤ 16 |"),
+        ("`[transmitter]`", "| `soft_limit_rad` | rad | none | number > 0 or none |"),
+    ],
+)
+def test_when_a_field_is_looked_up_then_unit_default_range_and_meaning_are_there(
+    section: str, row: str
+) -> None:
+    assert row in section_of(configuration_page(), section)
+
+
+def leaves(values: dict[str, object], name: str = "") -> list[tuple[str, str]]:
+    """Return (section, field) of everything that a configuration holds."""
+    found = []
+    for field, value in values.items():
+        if isinstance(value, dict):
+            found += leaves(value, f"{name}.{field}" if name else field)
+        else:
+            found.append((name, field))
+    return found
+
+
+@pytest.mark.parametrize("preset", preset_names())
+def test_when_a_preset_is_loaded_then_every_field_of_it_is_on_the_page(preset: str) -> None:
+    page = configuration_page()
+    for section, field in leaves(load_config(preset).model_dump()):
+        if field == "kind" and section in ("model", "coder"):
+            continue
+        titles = [line for line in page.splitlines() if line.startswith(f"## `[{section}]`")]
+        texts = [section_of(page, title[3:]) for title in titles or ["## Top level"]]
+        assert any(f"| `{field}` |" in text for text in texts), (section, field)
+
+
+def test_when_the_page_is_read_then_every_table_is_whole() -> None:
+    for text in (configuration_page(), commands_page()):
+        for block in re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE):
+            columns = {len(re.findall(r"(?<!\\)\|", line)) for line in block.splitlines()}
+            assert len(columns) == 1, block
+    assert "annotation=" not in configuration_page()
+    assert FlightConfig.model_fields.keys() >= {"timing", "link"}
+
+
+def test_when_a_command_is_looked_up_then_it_and_its_options_are_there() -> None:
+    page = commands_page()
+    names = [info.name or info.callback.__name__ for info in app.registered_commands if info.callback]
+    for name in names:
+        assert f"## `tenbaud {name.replace('_', '-')}`" in page
+    demo = section_of(page, "`tenbaud demo`")
+    assert "| `--set` TEXT, repeatable |" in demo
+    assert "| `--clock` real\\|virtual | `virtual` |" in demo
+    assert "--run-folder" not in page, "hidden options stay hidden"

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from channel.recording import Field, RecordChannel
+from channel.codec import Codec
+from channel.recording import Field, RecordChannel, Recorder
+from channel.terms import Terms
+from transmitter.copies import Confirmed
 from transmitter.rigs.base import DeviceNote
 
 TICK_CHANNEL = RecordChannel(
@@ -60,3 +63,24 @@ SAMPLE_CHANNEL = RecordChannel(
         Field("lag_samples", "integer", "", "samples sent beyond it when its echo came", timing=True),
     ),
 )
+
+
+def write_sample(recorder: Recorder, terms: Terms, codec: Codec, done: Confirmed) -> None:
+    """Write down a confirmed sample, and what was estimated at each of its ticks."""
+    first_tick = done.sample * terms.ticks_per_sample
+    state = done.flown.state
+    row = (
+        done.sample,
+        done.word_sent,
+        done.word,
+        codec.coder.ranges(done.before.coder),
+        state.model,
+        state.coder,
+        f"{done.digest:016x}",
+        f"{done.peer_digest:016x}",
+        done.lag_samples,
+    )
+    recorder.write(SAMPLE_CHANNEL, done.sample * terms.sample_ns, row)
+    for offset, (coded, live) in enumerate(zip(done.flown.coded, done.live, strict=True)):
+        tick = first_tick + offset
+        recorder.write(ESTIMATE_CHANNEL, tick * terms.tick_ns, (tick, coded, live))

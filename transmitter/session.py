@@ -41,7 +41,7 @@ from channel.wire import WIRE_VERSION
 from channel.words import ERASED
 from transmitter.claims import Claims
 from transmitter.copies import Confirmed, Copies
-from transmitter.records import ESTIMATE_CHANNEL, SAMPLE_CHANNEL
+from transmitter.records import write_sample
 from transmitter.rejoin import Asking, start_of
 
 LAG_SAMPLES_MAX = HISTORY_SAMPLES
@@ -172,7 +172,7 @@ class TransmitterSession:
         taken = list(self.confirmed)
         self.confirmed.clear()
         for done in taken:
-            self._record(done)
+            write_sample(self._recorder, self.terms, self.codec, done)
         return taken
 
     # What arrives
@@ -379,23 +379,3 @@ class TransmitterSession:
             own.epoch, own.sample, own.transmitter_digest, own.receiver_digest, peer
         )
         self._recorder.write(LOCKSTEP_CHANNEL, own.sample * self.terms.sample_ns, row)
-
-    def _record(self, done: Confirmed) -> None:
-        terms = self.terms
-        first_tick = done.sample * terms.ticks_per_sample
-        state = done.flown.state
-        row = (
-            done.sample,
-            done.word_sent,
-            done.word,
-            self.codec.coder.ranges(done.before.coder),
-            state.model,
-            state.coder,
-            f"{done.digest:016x}",
-            f"{done.peer_digest:016x}",
-            done.lag_samples,
-        )
-        self._recorder.write(SAMPLE_CHANNEL, done.sample * terms.sample_ns, row)
-        for offset, (coded, live) in enumerate(zip(done.flown.coded, done.live, strict=True)):
-            tick = first_tick + offset
-            self._recorder.write(ESTIMATE_CHANNEL, tick * terms.tick_ns, (tick, coded, live))

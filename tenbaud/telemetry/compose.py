@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
 from typing import Any
 
 from channel.codec import Vector
@@ -83,19 +82,12 @@ class _Composer:
 
 
 class TransmitterComposer(_Composer):
-    """Composes the transmitter's messages. `gap` gives the gap to the limit where it is known."""
+    """Composes the transmitter's messages."""
 
-    def __init__(
-        self,
-        run: TransmitterRun,
-        tap: Tap,
-        live: LiveTransmitter,
-        gap: Callable[[], float | None] = lambda: None,
-    ) -> None:
+    def __init__(self, run: TransmitterRun, tap: Tap, live: LiveTransmitter) -> None:
         super().__init__(run.agreement, tap)
         self._run = run
         self._live = live
-        self._gap = gap
         self._range = 0.0
         self._angles: dict[int, tuple[float, float, float | None]] = {}
         self._estimates: dict[int, tuple[float, float | None, float]] = {}
@@ -108,7 +100,7 @@ class TransmitterComposer(_Composer):
         node, session = run.node, run.node.session
         rows = self.tap.take()
         points, samples = self._read(rows)
-        gap = self._gap()
+        gap = node.gauge.now if node.gauge is not None else None
         return {
             "role": "transmitter",
             **self._common(session, self._live.impairments, rows),
@@ -130,7 +122,7 @@ class TransmitterComposer(_Composer):
             "lateness": self._lateness(),
             "paused": self._live.paused,
             "pace": self._live.pace if self.agreement.clock == "virtual" else None,
-            **({} if gap is None else {"gap_to_floor": gap}),
+            "gap_to_floor": gap and gap.rms_over_floor,
         }
 
     def _read(self, rows: list[tuple[str, Row]]) -> tuple[list[Any], list[Any]]:

@@ -16,7 +16,13 @@ SENT_CHANNEL = RecordChannel(
         Field("slot", "integer", "", "slot of the symbol, counted from the first one of sample 0"),
         Field("symbol", "integer", "", "number of the symbol in the coder's alphabet"),
         Field("left_ns", "integer", "ns", "flight time at which it left; null: refused", timing=True),
-        Field("wire_bytes", "integer", "", "bytes of its frame, framing included"),
+        Field(
+            "wire_bytes",
+            "integer",
+            "",
+            "of its frame on this kind of line, framing included",
+            timing=True,
+        ),
     ),
 )
 

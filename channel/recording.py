@@ -23,7 +23,8 @@ class Field:
     unit: str = ""
     description: str = ""
     timing: bool = False
-    """True for wall-clock readings, which two runs of one flight need not share."""
+    """True for wall-clock readings and what depends on the kind of line: two runs of one flight need
+    not share them."""
 
 
 @dataclass(frozen=True, slots=True)

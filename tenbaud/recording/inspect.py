@@ -157,7 +157,9 @@ def _field_lines(channel: RecordChannel) -> list[str]:
 
 def _meaning(field: Field) -> str:
     unit = f"[{field.unit}]" if field.unit else ""
-    clock = "(wall clock)" if field.timing else ""
+    clock = ""
+    if field.timing:
+        clock = "(wall clock)" if field.unit in ("s", "ms", "ns") else "(may differ between runs)"
     return "  ".join(part for part in (unit, field.description, clock) if part)
 
 

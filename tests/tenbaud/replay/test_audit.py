@@ -76,6 +76,14 @@ def test_words_of_many_symbols_and_other_coders_pass(
     assert result.passed, result.leaks + result.gaps
 
 
+def test_a_serial_line_in_real_time_passes_too(tmp_path: Path) -> None:
+    flight = ("--link", "serial", "--clock", "real", "--duration", "3", "--out", "run")
+    assert run_command("demo", "--json", *flight, cwd=tmp_path).code == 0
+    result = audit(tmp_path / "run")
+    assert result.passed, result.leaks + result.gaps
+    assert result.counted.symbols_sent == result.counted.symbol_bytes == 30
+
+
 # What was doctored, and what the audit must say
 
 

@@ -72,6 +72,8 @@ class _Panel:
     def enable(self, enabled: bool) -> None:
         if enabled is not self._enabled:
             self._enabled = enabled
+            # The browser disables its own sliders with their group; NiceGUI's buttons are told.
+            self.box.props(remove="disabled") if enabled else self.box.props("disabled")
             for control in self.controls:
                 control.set_enabled(enabled)
 
@@ -89,15 +91,14 @@ class _Panel:
     def slider(
         self, name: str, least: int, most: int, step: int, unit: str, moved: Callable[[], None]
     ) -> _Slider:
-        slider = _Slider(name, (least, most, step), unit, moved)
-        self.controls.append(slider)
-        return slider
+        return _Slider(name, (least, most, step), unit, moved)
 
 
 class _Slider:
     """The browser's own slider, which every keyboard and screen reader knows how to use.
 
-    `moved` is called once when it is let go, or at each key, rather than for every step of a drag.
+    It is plain HTML whose value nobody but the visitor and `reset` changes: one that the server renders
+    again would jump back under a quick hand. `moved` is called when it is let go, or at each key.
     """
 
     def __init__(
@@ -105,39 +106,32 @@ class _Slider:
     ) -> None:
         self.value = 0.0
         self._moved = moved
-        self._form, self._unit = "+.0f" if spread[0] < 0 else ".0f", unit
-        with ui.element("label").classes("slider"):
-            ui.label(name).classes("slider-name")
-            self._shown = ui.label(self._text()).classes("slider-value")
-            least, most, step = spread
-            self._input = ui.element("input").props(
-                f'type=range min={least} max={most} step={step} value=0 aria-label="{name}"'
-            )
-        take_number = "(event) => emit(Number(event.target.value))"
-        self._input.on("input", lambda event: self._show(event.args), js_handler=take_number)
-        self._input.on("change", lambda event: self._take(event.args), js_handler=take_number)
+        self._unit = unit
+        least, most, step = spread
+        self._element = ui.html(
+            f'<span>{name}</span><output class="slider-value">0{unit}</output>'
+            f'<input type="range" min="{least}" max="{most}" step="{step}" value="0" '
+            f'aria-label="{name}">',
+            sanitize=False,
+            tag="label",
+        ).classes("slider")
+        show = "event.currentTarget.querySelector('output').textContent"
+        self._element.on("input", js_handler=f"(event) => {{ {show} = event.target.value + '{unit}' }}")
+        number = "(event) => emit(Number(event.target.value))"
+        self._element.on("change", lambda event: self._take(event.args), js_handler=number)
 
-    def set(self, value: float) -> None:
-        """Put the slider somewhere, without a command."""
-        self._show(value)
-        self._input.update()
-
-    def set_enabled(self, enabled: bool) -> None:
-        """Let it be moved, or not."""
-        self._input.props(remove="disabled") if enabled else self._input.props("disabled")
+    def reset(self) -> None:
+        """Put the slider to 0, without a command."""
+        self.value = 0.0
+        ui.run_javascript(
+            f"const slider = document.getElementById('c{self._element.id}');"
+            f"slider.querySelector('input').value = 0;"
+            f"slider.querySelector('output').textContent = '0{self._unit}';"
+        )
 
     def _take(self, value: float) -> None:
-        self._show(value)
-        self._moved()
-
-    def _show(self, value: float) -> None:
         self.value = value
-        # What the server believes the browser shows; no update is sent for it.
-        self._input.props["value"] = value
-        self._shown.set_text(self._text())
-
-    def _text(self) -> str:
-        return f"{self.value:{self._form}}{self._unit}"
+        self._moved()
 
 
 class _SetPoint(_Panel):
@@ -215,7 +209,7 @@ class _Line(_Panel):
 
     def _mend(self) -> None:
         for slider in (self.loss, self.flips, self.delay):
-            slider.set(0.0)
+            slider.reset()
         self._changed()
 
 

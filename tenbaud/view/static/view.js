@@ -52,7 +52,8 @@ function happened(event, old) {
   }
   if (role === "transmitter" && kind === "rejoin" && text.startsWith("session") && memory.brokenTime !== undefined) {
     const sample = text.match(/sample (\d+)/)?.[1];
-    mended = `${brokenText} (${memory.brokenTime.toFixed(1)} s); a common state was found, and they are equal again from sample ${sample}`;
+    const was = brokenText.match(/sample (\d+)/)?.[1];
+    mended = `broken after sample ${was}, at ${memory.brokenTime.toFixed(1)} s; equal again from sample ${sample}`;
   }
   // Left out: what the tape shows, what passes by itself, and what the other end has told already.
   if (kind === "erased" || kind === "late_symbol" || text === "guard holding") return;

@@ -1,16 +1,18 @@
 """What TLS, and a router, cost a round trip: `python -m benchmarks.secure_line`.
 
-Symbol frame out, command frame in, between two processes' worth of links in two threads of this one,
-over plain TCP, over TLS with client certificates and access rules, and over TLS through a router. The
-three take turns, so that a disturbed second disturbs all of them alike.
+Symbol frame out, command frame in, between two processes: over plain TCP, over TLS with client
+certificates and access rules, and over TLS through a router (in this process). The three take turns, so
+that a disturbed second disturbs all of them alike.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import signal
 import statistics
-import threading
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -51,8 +53,8 @@ def measure(turns: int) -> dict[str, float]:
         }
         times: dict[str, list[float]] = {name: [] for name in links}
         for _ in range(ROUNDS):
-            for name, (rig, desk) in links.items():
-                times[name] += _round_trips(rig, desk, turns // ROUNDS)
+            for name, rig in links.items():
+                times[name] += _round_trips(rig, turns // ROUNDS)
     medians = {name: statistics.median(taken) for name, taken in times.items()}
     figures = {f"{name}_round_trip_us": round(value, 1) for name, value in medians.items()}
     figures["tls_to_tcp"] = round(medians["tls"] / medians["tcp"], 3)
@@ -61,27 +63,37 @@ def measure(turns: int) -> dict[str, float]:
 
 
 @contextmanager
-def _pair(keys: Path | None, routed: bool = False) -> Iterator[tuple[ZenohLink, ZenohLink]]:
+def _pair(keys: Path | None, routed: bool = False) -> Iterator[ZenohLink]:
+    """Within the `with`, a link at whose other end a process answers."""
     endpoint = free_endpoint() if keys is None else with_protocol(free_endpoint(), "tls")
     with ExitStack() as stack:
         if routed and keys is not None:
             both = _security(keys, "hub", ("rig", "transmitter"), ("desk", "receiver"))
             stack.enter_context(ZenohRouter((endpoint,), security=both))
-        rig_peer, desk_peer = ("hub", "hub") if routed else ("desk", "rig")
-        here = (endpoint,)
-        desk_at, rig_at = ("router", "router") if routed else ("listen", "connect")
-        desk_keys = None if keys is None else _security(keys, "desk", (desk_peer, "transmitter"))
-        rig_keys = None if keys is None else _security(keys, "rig", (rig_peer, "receiver"))
-        desk = ZenohLink("receiver", SESSION, security=desk_keys, **{desk_at: here})
-        stack.enter_context(desk)
-        rig = ZenohLink("transmitter", SESSION, security=rig_keys, **{rig_at: here})
+        place, peer = ("router", "hub") if routed else ("listen", "rig")
+        command = [sys.executable, "-m", "benchmarks.secure_line", "--answer", place, endpoint]
+        answering = subprocess.Popen([*command, "" if keys is None else str(keys), peer])
+        stack.callback(answering.wait)
+        stack.callback(answering.terminate)
+        place, peer = ("router", "hub") if routed else ("connect", "desk")
+        security = None if keys is None else _security(keys, "rig", (peer, "receiver"))
+        rig = ZenohLink("transmitter", SESSION, security=security, **{place: (endpoint,)})
         stack.enter_context(rig)
         until = time.monotonic() + PATIENCE_S
-        while not (rig.peer_present() and desk.peer_present()):
+        while not rig.peer_present():
             if time.monotonic() > until:
-                raise RuntimeError("the two links did not meet")
+                raise RuntimeError("the two ends did not meet")
             time.sleep(0.01)
-        yield rig, desk
+        yield rig
+
+
+def _answer(place: str, endpoint: str, keys: str, peer: str) -> None:
+    security = _security(Path(keys), "desk", (peer, "transmitter")) if keys else None
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    with ZenohLink("receiver", SESSION, security=security, **{place: (endpoint,)}) as desk:
+        while True:
+            if desk.receive(PATIENCE_S) is not None:
+                desk.send(COMMAND)
 
 
 def _security(keys: Path, name: str, *peers: tuple[str, Part]) -> Security:
@@ -89,15 +101,7 @@ def _security(keys: Path, name: str, *peers: tuple[str, Part]) -> Security:
     return Security(read_node(keys / name).credentials, invited)
 
 
-def _round_trips(rig: ZenohLink, desk: ZenohLink, turns: int) -> list[float]:
-    def answer() -> None:
-        for _ in range(turns):
-            if desk.receive(PATIENCE_S) is None:
-                return
-            desk.send(COMMAND)
-
-    answering = threading.Thread(target=answer)
-    answering.start()
+def _round_trips(rig: ZenohLink, turns: int) -> list[float]:
     taken = []
     for _ in range(turns):
         started = time.perf_counter_ns()
@@ -105,7 +109,6 @@ def _round_trips(rig: ZenohLink, desk: ZenohLink, turns: int) -> list[float]:
         if rig.receive(PATIENCE_S) is None:
             raise RuntimeError("a round trip was lost")
         taken.append((time.perf_counter_ns() - started) / 1000.0)
-    answering.join()
     return taken
 
 
@@ -113,7 +116,12 @@ def main() -> None:
     """Measure and print one JSON object."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--turns", type=int, default=10_000)
-    print(json.dumps(measure(parser.parse_args().turns), indent=2))
+    parser.add_argument("--answer", nargs=4, help="used by this program itself")
+    arguments = parser.parse_args()
+    if arguments.answer is not None:
+        _answer(*arguments.answer)
+    else:
+        print(json.dumps(measure(arguments.turns), indent=2))
 
 
 if __name__ == "__main__":

@@ -89,7 +89,7 @@ def add_node(
             f"a {role} is connected to: say where with --host ADDRESS, repeatable; the other end "
             "checks that the certificate names the address it connects to"
         )
-    authority = _read_authority(keys)
+    authority = read_authority(keys)
     pem = _issue(authority, name, role, hosts, days)
     _make_private(keys / name)
     _write_node(keys / name, authority, pem)
@@ -99,7 +99,7 @@ def add_node(
 def renew_node(keys: Path, name: str, hosts: tuple[str, ...] = (), days: float = NODE_DAYS) -> NodeKeys:
     """Replace key and certificate of a node, with other addresses if any are given."""
     old = read_node(keys / name)
-    authority = _read_authority(keys)
+    authority = read_authority(keys)
     certified = old.certified
     pem = _issue(authority, name, certified.role, hosts or certified.hosts, days)
     _write_node(keys / name, authority, pem)
@@ -184,7 +184,8 @@ def _issue(authority: Pem, name: str, role: NodeRole, hosts: tuple[str, ...], da
         raise KeysError(f"no certificate for {name} at {', '.join(hosts)}: {error}") from error
 
 
-def _read_authority(keys: Path) -> Pem:
+def read_authority(keys: Path) -> Pem:
+    """Return the authority below a folder, to sign with; KeysError if there is none."""
     folder = keys / AUTHORITY
     try:
         return Pem((folder / "authority.pem").read_bytes(), (folder / "authority.key").read_bytes())

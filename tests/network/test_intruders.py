@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from tenbaud.keys.authority import NodeRole, issue, new_authority
-from tenbaud.keys.store import read_node
+from tenbaud.keys.store import read_authority, read_node
 from tests.network.flights import DESK_AT, RIG_AT, Flight, environment, make_keys, tls_links
 from tests.network.namespaces import Lab, Machine
 from tests.tenbaud.processes import REPOSITORY
@@ -43,11 +43,9 @@ def intrude(machine: Machine, *arguments: str, timeout_s: float = 60.0) -> dict[
 
 def odd_certificates(keys: Path, folder: Path) -> dict[str, tuple[str, str]]:
     """Make a certificate of another authority and an expired one of ours, both named rig."""
-    from tenbaud.keys.store import _read_authority
-
     made = {
         "foreign": issue(new_authority("another"), "rig", NodeRole.TRANSMITTER, ()),
-        "expired": issue(_read_authority(keys), "rig", NodeRole.TRANSMITTER, (), days=-1.0),
+        "expired": issue(read_authority(keys), "rig", NodeRole.TRANSMITTER, (), days=-1.0),
     }
     paths = {}
     for name, pem in made.items():

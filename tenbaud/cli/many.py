@@ -18,17 +18,19 @@ if TYPE_CHECKING:
     from tenbaud.flight.summary import Summary
 
 
+Sources = tuple[str | None, Path | None, Path | None, dict[str, Any]]
+"""preset, file, folder of files for single sessions, settings over all of them"""
+
+Wanted = tuple[str, str | None, int, int | None]
+"""pattern of session names, `--session` given besides, flights at a time and in all"""
+
+
 def serve(
-    sessions: str,
-    preset: str | None,
-    path: Path | None,
-    configs: Path | None,
-    changed: dict[str, Any],
+    wanted: Wanted,
+    sources: Sources,
     clock: str,
     addresses: tuple[tuple[str, ...], tuple[str, ...], bool],
     out: Path | None,
-    rigs_max: int,
-    flights: int | None,
     as_json: bool,
 ) -> None:
     """Serve until interrupted, or until so many flights have ended; see `docs/many-rigs.md`."""
@@ -42,7 +44,10 @@ def serve(
     from tenbaud.flight.stop import StopFlag
     from tenbaud.recording.folder import create_run_folder
 
-    agreement_of = agreements(preset, path, configs, changed, clock)
+    sessions, single, rigs_max, flights = wanted
+    if single is not None:
+        raise typer.BadParameter("give --session for one rig or --sessions for many, not both")
+    agreement_of = agreements(*sources, clock)
     common = agreement_of("")
     if common.config.link.kind != "zenoh":
         raise typer.BadParameter("--sessions needs Zenoh; a serial line has one rig at its other end")
@@ -50,12 +55,12 @@ def serve(
     listen, connect, insecure = addresses
     if not listen and not connect:
         listen = (DEFAULT_ENDPOINT,)
-    root = create_run_folder(None, "receiver-many", out)
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     with (
         StopFlag() as stop,
         ZenohHub(sessions, listen=listen, connect=connect, insecure=insecure) as hub,
     ):
+        root = create_run_folder(None, "receiver-many", out)
         lines: list[Callable[[str], None]] = [lambda text: typer.echo(text, err=True)]
         host = ManyHost(hub, agreement_of, root, rigs_max, lambda text: lines[-1](text))
         service = ManyService(hub, host)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tenbaud.cli import options
+from tenbaud.cli import many, options
 
 if TYPE_CHECKING:
     from channel.links.base import Role
@@ -138,24 +138,9 @@ def receive(
     )
     endpoints = (tuple(listen or ()), tuple(connect or ()), insecure)
     if sessions is not None:
-        from tenbaud.cli import many
-
-        if session is not None:
-            raise typer.BadParameter("give --session for one rig or --sessions for many, not both")
-        many.serve(
-            sessions,
-            preset,
-            config,
-            configs,
-            changed,
-            clock.value,
-            endpoints,
-            out,
-            rigs_max,
-            flights,
-            json,
-        )
-        return
+        sources = (preset, config, configs, changed)
+        wanted = (sessions, session, rigs_max, flights)
+        return many.serve(wanted, sources, clock.value, endpoints, out, json)
     _run("receiver", preset, config, changed, clock, endpoints, out, run_folder, json, status)
 
 

@@ -52,7 +52,6 @@ def serve(
     check_parts(common.config)
     where = endpoints_of("receiver", addresses, common.config, sessions=many.sessions)
     places = ", ".join(where.listen + where.connect + where.router)
-    root = create_run_folder(None, "receiver-many", node.out)
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     with (
         StopFlag() as stop,
@@ -69,6 +68,7 @@ def serve(
             should_stop=stop,
         ) as hub,
     ):
+        root = create_run_folder(None, "receiver-many", node.out)
         lines: list[Callable[[str], None]] = [lambda text: typer.echo(text, err=True)]
         host = ManyHost(hub, agreement_of, root, many.rigs_max, lambda text: lines[-1](text))
         service = ManyService(hub, host)

@@ -108,13 +108,17 @@ class ManyHost:
             case Hello():
                 self._opening.add(name)
                 self._worker.submit(self._begin, name, frame, data, number)
+                return []
             case Symbol():
                 answer = Unknown(frame.session, frame.epoch)
             case Bye() if frame.session == 0:
                 self._tell(f"{name}: as its transmitter sees it: {frame.reason}")
             case _:
                 self.counts["strays"] += 1
-        return [] if answer is None else [_closed(answer, number)]
+        if answer is None:
+            # A step of the virtual clock waits for its reply, even if nothing is to be said.
+            return [] if number is None else [encode_reply(Reply(number, None, ()))]
+        return [_closed(answer, number)]
 
     def ready(self) -> Iterable[tuple[str, Served]]:
         """Return the services that have become ready since the last call."""

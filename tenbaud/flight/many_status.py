@@ -6,6 +6,7 @@ everywhere.
 
 from __future__ import annotations
 
+import re
 import threading
 from typing import Self
 
@@ -70,10 +71,15 @@ class ManyStatus:
                 self._live.update(self.table(), refresh=True)
 
 
-def _calmness(served: Served) -> tuple[bool, int, str]:
+def _calmness(served: Served) -> tuple[bool, int, list[str]]:
     session = served.service.endpoint.session
     trouble = session.counts["desyncs"] + session.counts["rejoins"] + served.dropped
-    return session.phase is Phase.FLYING, -trouble, served.name
+    return session.phase is Phase.FLYING, -trouble, _natural(served.name)
+
+
+def _natural(name: str) -> list[str]:
+    """Return a key by which rig/10 comes after rig/9."""
+    return [part.zfill(12) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
 
 
 def _row(served: Served) -> tuple[str, ...]:

@@ -1,0 +1,202 @@
+"""One receiver for many rigs: each for itself, and none a trouble for the others."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from channel.errors import TenbaudError
+from channel.frames import Symbol, Unknown
+from channel.links.endpoints import free_endpoint
+from channel.virtual import Step, encode_step
+from channel.wire import decode, encode
+from receiver.many_service import BURST_MESSAGES
+from tenbaud.build import Agreement
+from tests.tenbaud.processes import finish, start
+from tests.tenbaud.room import PATIENCE_S, Rig, Room, agreement
+
+
+def test_when_two_rigs_fly_at_once_then_each_has_its_own_codec_and_folder(tmp_path: Path) -> None:
+    with Room(tmp_path) as room:
+        one, two = Rig(room, "rig/1").greet(), Rig(room, "rig/2").greet()
+        for _ in range(5):
+            one.fly(4)
+            two.fly(2)
+        one.bye()
+        two.bye()
+        room.until_ended(2)
+        assert room.service.served == ()
+        assert room.hub.joined == set()
+    assert room.summary("rig/1")["samples"] == 20
+    assert room.summary("rig/2")["samples"] == 10
+    for rig in (one, two):
+        assert rig.session.counts["desyncs"] == rig.session.counts["erasures"] == 0
+        summary = room.summary(rig.name)
+        assert summary["exit_code"] == 0
+        # A tick row for each of ten ticks, a sample row, and the begin and the end.
+        assert summary["recording_rows"] == 11 * summary["samples"] + 2
+        assert summary["recording_rows_lost"] == 0
+    names = sorted(path.name for path in (tmp_path / "rig-1").iterdir())
+    assert names == ["config.toml", "receiver.mcap", "summary.json"]
+    assert 'session = "rig/1"' in (tmp_path / "rig-1" / "config.toml").read_text()
+
+
+def test_when_a_rig_flies_again_then_it_is_a_new_flight_in_a_new_folder(tmp_path: Path) -> None:
+    with Room(tmp_path) as room:
+        for incarnation in (1, 2):
+            Rig(room, "rig/1", incarnation).greet().fly(3).bye()
+            room.until_ended(incarnation)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["rig-1", "rig-1-2"]
+    assert [one["samples"] for one in room.host.summaries] == [3, 3]
+
+
+def test_when_one_rig_floods_then_its_surplus_is_dropped_and_another_flies_on(tmp_path: Path) -> None:
+    surplus = 2000
+    with Room(tmp_path) as room:
+        good, bad = Rig(room, "rig/good").greet(), Rig(room, "rig/bad").greet()
+        good.fly(3)
+        for _ in range(surplus):
+            bad.put(b"garbage")
+        good.fly(10)
+        good.bye()
+        room.until_ended(1)
+    assert room.summary("rig/good")["messages_dropped"] == 0
+    assert good.session.counts["desyncs"] == good.session.counts["erasures"] == 0
+    spoilt = room.summary("rig/bad")
+    assert spoilt["messages_dropped"] + spoilt["malformed"] == surplus
+    assert spoilt["messages_dropped"] > surplus - 10 * BURST_MESSAGES
+
+
+def test_when_a_handshake_does_not_fit_then_it_is_refused_told_once_and_leaves_no_folder(
+    tmp_path: Path,
+) -> None:
+    with Room(tmp_path) as room:
+        good = Rig(room, "rig/good").greet().fly(2)
+        other = Rig(room, "rig/other", coder={"window_signs": 7}).greet()
+        other.put(encode(other.session.hello()))
+        other.hear()
+        good.fly(2)
+    assert "coder.window_signs" in (other.session.refusal or "")
+    assert len([text for text in room.told if "rig/other: refused" in text]) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["rig-good"]
+
+
+def test_when_one_rig_breaks_its_service_then_only_its_flight_ends(tmp_path: Path) -> None:
+    with Room(tmp_path) as room:
+        good, bad = Rig(room, "rig/good").greet(), Rig(room, "rig/bad").greet()
+        bad.fly(2)
+        bad.put(encode_step(Step(1, 0, b"on the other clock")))
+        bad.hear()
+        room.until_ended(1)
+        good.fly(5)
+    assert "the receiver failed" in bad.session.end_reason
+    assert room.summary("rig/bad")["exit_code"] == 3
+    assert room.summary("rig/good")["samples"] == 5
+
+
+def test_when_one_rig_loses_lockstep_then_it_rejoins_and_another_does_not_notice(
+    tmp_path: Path,
+) -> None:
+    spoilt = agreement(receiver={"sabotage": "sample=4,field=range"})
+    common = agreement()
+
+    def agreement_of(name: str) -> Agreement:
+        return spoilt if name == "rig/bad" else common
+
+    with Room(tmp_path, agreement_of) as room:
+        good, bad = Rig(room, "rig/good").greet(), Rig(room, "rig/bad").greet()
+        for _ in range(10):
+            good.fly(1)
+            bad.fly(1)
+    assert bad.session.counts["desyncs"] == bad.session.counts["rejoins"] == 1
+    assert room.summary("rig/bad")["rejoins"] == 1
+    assert good.session.counts["desyncs"] == room.summary("rig/good")["rejoins"] == 0
+
+
+def test_when_a_rig_dies_then_its_flight_is_closed_and_the_name_is_free_again(tmp_path: Path) -> None:
+    hasty = agreement(link={"peer_timeout_s": 0.3})
+    with Room(tmp_path, lambda name: hasty if name == "rig/dead" else agreement()) as room:
+        good = Rig(room, "rig/good").greet()
+        Rig(room, "rig/dead").greet().fly(2)
+        room.until_ended(1)
+        assert room.summary("rig/dead")["exit_code"] == 4
+        good.fly(2)
+        Rig(room, "rig/dead", 2).greet().fly(1)
+    assert good.session.counts["desyncs"] == 0
+
+
+def test_when_no_configuration_can_be_had_then_the_rig_is_told_why(tmp_path: Path) -> None:
+    common = agreement()
+
+    def agreement_of(name: str) -> Agreement:
+        if name == "rig/odd":
+            raise TenbaudError("rigs/odd.toml: no such thing")
+        return common
+
+    with Room(tmp_path, agreement_of) as room:
+        odd = Rig(room, "rig/odd").greet()
+        Rig(room, "rig/good").greet().fly(2)
+    assert "no such thing" in (odd.session.refusal or "")
+
+
+def test_when_there_are_too_many_rigs_then_the_next_is_refused_until_one_ends(tmp_path: Path) -> None:
+    with Room(tmp_path, rigs_max=1) as room:
+        first = Rig(room, "rig/1").greet()
+        assert "its limit" in (Rig(room, "rig/2").greet().session.refusal or "")
+        first.bye()
+        room.until_ended(1)
+        Rig(room, "rig/2", 2).greet().fly(1)
+
+
+def test_when_a_symbol_of_an_unknown_session_comes_then_its_rig_is_asked_to_greet(
+    tmp_path: Path,
+) -> None:
+    with Room(tmp_path) as room:
+        room.hub.up.put(("rig/lost", encode(Symbol(99, 3, 40, 1))))
+        answer = decode(room.hub.down["rig/lost"].get(True, PATIENCE_S))
+        room.hub.up.put(("rig/noise", b"?"))
+        Rig(room, "rig/1").greet()
+    assert answer == Unknown(99, 3)
+    assert room.host.counts["strays"] == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["rig-1"]
+
+
+@pytest.mark.parametrize("clock", ["virtual", "real"])
+def test_when_processes_meet_over_zenoh_then_each_flies_with_its_own_file(
+    tmp_path: Path, clock: str
+) -> None:
+    own = tmp_path / "rigs" / "rig" / "b.toml"
+    own.parent.mkdir(parents=True)
+    own.write_text("[coder]\nwindow_signs = 3\n")
+    endpoint = free_endpoint()
+    shared = ["--clock", clock, "--json"]
+    flight = ["transmit", "--connect", endpoint, "--duration", "3", *shared]
+    receiver = start(
+        *("receive", "--sessions", "rig/*", "--configs", "rigs", "--listen", endpoint),
+        *("--flights", "2", "--out", "many", *shared),
+        cwd=tmp_path,
+    )
+    strangers = [
+        start(*flight, "--session", "rig/c", "--set", "coder.window_signs=5", cwd=tmp_path),
+        start(*flight, "--session", "elsewhere", "--set", "link.peer_timeout_s=2.0", cwd=tmp_path),
+    ]
+    c, elsewhere = [finish(rig) for rig in strangers]
+    rigs = [
+        start(*flight, "--session", "rig/a", "--out", "a", cwd=tmp_path),
+        start(*flight, "--session", "rig/b", "--config", str(own), "--out", "b", cwd=tmp_path),
+    ]
+    a, b = [finish(rig) for rig in rigs]
+    ended = finish(receiver)
+    assert (a.code, b.code, c.code, elsewhere.code) == (0, 0, 3, 4), (a.err, b.err, c.err)
+    assert "coder.window_signs" in c.err
+    assert ended.code == 0, ended.err
+    flights = {flight["session"]: flight for flight in ended.summary["flights"]}
+    assert sorted(flights) == ["rig/a", "rig/b"]
+    for name, upper in (("rig/a", a.summary), ("rig/b", b.summary)):
+        assert upper["desyncs"] == 0
+        assert upper["digest_checks"] == flights[name]["samples"] == 30
+        assert flights[name]["config_digest"] == upper["config_digest"]
+    assert a.summary["config_digest"] != b.summary["config_digest"]
+    assert (tmp_path / "many" / "rig-b" / "receiver.mcap").stat().st_size > 0
+    assert ended.summary["refused"] == 1

@@ -72,7 +72,7 @@ class Block:
 
 def pages() -> list[str]:
     """Return every Markdown page that people read, from the top folder."""
-    found = list(sorted(TOP.glob("*.md")))
+    found = sorted(TOP.glob("*.md"))
     for folder in ("docs", "examples"):
         found += sorted((TOP / folder).rglob("*.md"))
     names = [path.relative_to(TOP).as_posix() for path in found]

@@ -41,7 +41,8 @@ INTRODUCTION = """# Configuration
 
 One TOML file holds everything about a flight; both ends read the same one. Give it with `--config`, set
 single fields with `--set SECTION.FIELD=VALUE`, or start from a preset (`tenbaud presets` lists them).
-Later wins: preset, then file, then command line. Every run writes the complete result to its `config.toml`.
+Later wins: preset, then file, then command line. Every run writes the complete result to its
+`config.toml`.
 
 The sections {shared} are *shared*: the two ends compare a digest of them in their handshake and do
 not fly when it differs. An unknown field or a value out of its range is refused, by name.

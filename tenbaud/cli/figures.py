@@ -47,22 +47,29 @@ def figures(
 
     [dim]tenbaud figures theory animation --docs docs[/dim]
     """
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    from tenbaud.figures.make import NUMBERS, make_figures
+    from tenbaud.figures.make import NUMBERS
     from tenbaud.recording.folder import create_run_folder
 
     drawings = [name for name in which or () if name in DRAWINGS]
     wanted = _wanted([name for name in which or ["all"] if name not in drawings], NUMBERS)
     found = _data(data)
-    folder = create_run_folder(None, "figures", out)
+    # The run's folder is for flights; the pages' drawings leave none, and need it only for want of docs.
+    folder = create_run_folder(None, "figures", out) if wanted or docs is None else docs
     pictures = (docs or folder) / "figures"
     pictures.mkdir(parents=True, exist_ok=True)
     if drawings:
         _draw_documentation(drawings, pictures)
-    if not wanted:
-        return
+    if wanted:
+        _draw_paper(wanted, folder, pictures, found)
+
+
+def _draw_paper(wanted: set[str], folder: Path, pictures: Path, data: Path | None) -> None:
+    """Draw figures of the paper and, with all of them, write the page beside their folder."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    from tenbaud.figures.make import NUMBERS, make_figures
+
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as bar:
@@ -71,17 +78,17 @@ def figures(
         def on_progress(done: float, total: float, what: str) -> None:
             bar.update(task, completed=done, total=total, description=what)
 
-        results = make_figures(wanted, folder, pictures, found, on_progress)
+        results = make_figures(wanted, folder, pictures, data, on_progress)
     typer.echo(f"{len(results.flown)} flights in {results.seconds:.0f} s; pictures in {pictures}")
     typer.echo(f"SVG and recordings in {folder}")
     if wanted != set(NUMBERS):
         return
     from tenbaud.figures.page import write_page
 
-    page = (docs or folder) / "REPRODUCTION.md"
+    page = pictures.parent / "REPRODUCTION.md"
     write_page(page, results)
     typer.echo(f"the table is in {page}")
-    if found is None:
+    if data is None:
         typer.echo(
             f"the recorded flights were left out: give their folder with --data or in {DATA_VARIABLE}",
             err=True,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tenbaud.cli import demo, doctor, figures, identify, nodes, rig, runs, sweep
+from tenbaud.cli import demo, doctor, figures, identify, nodes, rig, runs, sweep, tune
 from tenbaud.flight.outcome import ExitCode, outcome_of
 
 app = typer.Typer(
@@ -47,6 +47,7 @@ app.command()(nodes.receive)
 app.command()(identify.identify)
 app.command()(figures.figures)
 app.command()(sweep.sweep)
+app.command()(tune.tune)
 app.command()(runs.inspect)
 app.command()(runs.diff)
 app.command()(runs.presets)

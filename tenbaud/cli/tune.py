@@ -7,11 +7,14 @@ import math
 import re
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tenbaud.cli import options
+
+if TYPE_CHECKING:
+    from tenbaud.studies.tuning import Tuned
 
 
 class MethodOption(StrEnum):
@@ -85,6 +88,12 @@ def tune(
     if as_json:
         typer.echo(json.dumps({**tuned._asdict(), "preset_file": str(out)}, indent=2))
         return
+    _tell(tuned)
+    typer.echo(f"{out}: fly it with --config {out}")
+
+
+def _tell(tuned: Tuned) -> None:
+    """Print constants and errors."""
     for name, value in tuned.values.items():
         typer.echo(f"{name:36} {value:.6g}")
     for what, before, after in (
@@ -95,7 +104,6 @@ def tune(
         typer.echo(f"{what}: rms error {before_deg:.4g} -> {after_deg:.4g} degrees")
     if tuned.test_after > tuned.test_before:
         typer.echo("The fit does not hold on flights that it has not seen: it is over-fitted.")
-    typer.echo(f"{out}: fly it with --config {out}")
 
 
 def _parse_free(text: str) -> tuple[str, Any]:

@@ -19,7 +19,7 @@ def fly_plain(config: FlightConfig) -> FlightFigures:
     """Fly a configuration as `tenbaud demo --link memory` does, and return its figures."""
     try:
         agreement = agree(config, "virtual")
-    except TenbaudError as error:
+    except (TenbaudError, ValueError) as error:
         nothing = math.nan
         return FlightFigures(
             str(error), "plain", *(nothing,) * 6, erasures=0, commands_late=0, samples=0

@@ -20,6 +20,7 @@ from tenbaud.cli import (
     router,
     runs,
     sweep,
+    tune,
     view,
 )
 from tenbaud.flight.outcome import ExitCode, outcome_of
@@ -64,6 +65,7 @@ app.add_typer(keys.app, name="keys")
 app.command()(identify.identify)
 app.command()(figures.figures)
 app.command()(sweep.sweep)
+app.command()(tune.tune)
 app.command()(runs.inspect)
 app.command()(runs.diff)
 app.command()(replays.replay)

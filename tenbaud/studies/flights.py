@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from tenbaud.build import Agreement, read_flight_log
 from tenbaud.build_ends import build_controller, guard_settings, reference_of
 from tenbaud.build_rig import nominal_plant
 from tenbaud.config.load import ConfigError
-from tenbaud.config.schema import FlightConfig, ReferenceSection
+from tenbaud.config.schema import FlightConfig, FlightLogSection, ReferenceSection
 from tenbaud.studies.compiled import compiled, reader
 from tenbaud.studies.figures import FlightFigures, shared_parts
 from tenbaud.studies.flight_data import DONE, Errors, Given, Motion, Numbers, Work
@@ -68,7 +69,7 @@ class CompiledPoint:
         replay = config.transmitter.rig == "replay"
         ticks = self.agreement.flight_ticks
         if replay:
-            self._log = read_flight_log(config)
+            self._log = recorded_flight(config)
             ticks = min(ticks, len(self._log))
         self.numbers = _numbers(self.agreement, ticks, replay)
         controller = build_controller(config)
@@ -229,6 +230,19 @@ def _reference(section: str, tick_s: float, ticks: int) -> Any:
     reference = reference_of(ReferenceSection.model_validate_json(section), tick_s)
     values = np.array([reference.angle_rad(tick) for tick in range(ticks)])
     return values
+
+
+def recorded_flight(config: FlightConfig) -> FlightLog:
+    """Return the recorded flight of a configuration, read once as long as its file stays the same."""
+    path = Path(config.flight_log.file)
+    changed = path.stat().st_mtime_ns if path.exists() else 0
+    return _recorded_flight(config.flight_log.model_dump_json(), changed)
+
+
+@lru_cache(maxsize=4)
+def _recorded_flight(section: str, changed: int) -> FlightLog:
+    log = FlightLogSection.model_validate_json(section)
+    return read_flight_log(FlightConfig(flight_log=log))
 
 
 def _torque(config: FlightConfig, ticks: int) -> Any:

@@ -20,10 +20,10 @@ from channel.codec import add_correction, is_estimate
 from channel.limits import as_carried, limited
 from plant_sim.pitch import pitch_step
 from receiver.controllers.pid import motor_volts, pid_integral, pid_volts
-from tenbaud.studies.bare import bare
 from tenbaud.studies.flight_data import DONE, LEFT, Errors, Given, Motion, Numbers, Work
 from tenbaud.studies.parts import decode, encode, held_of, state_of, tick
 from tenbaud.studies.sensor_side import act, angle_at, count_at, guess, score
+from tenbaud.studies.uncounted import bare_given, bare_work
 
 
 def fly(
@@ -37,35 +37,8 @@ def fly(
     `constants` are those of (model, coder, plant, PID).
     """
     model_constants, coder_constants, plant_constants, pid_constants = constants
-    given = Given(
-        bare(given.start),
-        bare(given.alphabet),
-        bare(given.shifts),
-        bare(given.known),
-        bare(given.late),
-        bare(given.scored),
-        bare(given.reference),
-        bare(given.torque),
-        bare(given.counts),
-        bare(given.commands),
-        bare(given.applied),
-    )
-    work = Work(
-        bare(work.models),
-        bare(work.coders),
-        bare(work.sent),
-        bare(work.word),
-        bare(work.model),
-        bare(work.coder),
-        bare(work.spare),
-        bare(work.correction),
-        bare(work.nothing),
-        bare(work.coded),
-        bare(work.live),
-        bare(work.front),
-        bare(work.rear),
-        bare(work.applied),
-    )
+    given = bare_given(given)
+    work = bare_work(work)
     integral = 0.0
     plant = (given.start[0], given.start[1], 0.0, 0.0)
     motion = Motion(numbers.safe_front, numbers.safe_rear, 0, 0, 0, 0)

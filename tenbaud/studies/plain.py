@@ -17,7 +17,13 @@ from transmitter.scores import ErrorMeter
 
 def fly_plain(config: FlightConfig) -> FlightFigures:
     """Fly a configuration as `tenbaud demo --link memory` does, and return its figures."""
-    agreement = agree(config, "virtual")
+    try:
+        agreement = agree(config, "virtual")
+    except (TenbaudError, ValueError) as error:
+        nothing = math.nan
+        return FlightFigures(
+            str(error), "plain", *(nothing,) * 6, erasures=0, commands_late=0, samples=0
+        )
     run = transmit.prepare(agreement, None, DATAGRAM)
     endpoint = build_receiver(agreement, None, DATAGRAM)
     try:

@@ -103,7 +103,7 @@ def _on_cluster(tasks: list[ChunkTask], scheduler: str) -> Iterator[ChunkResult]
     require("distributed")
     distributed: Any = import_module("distributed")
     try:
-        client = distributed.Client(scheduler, timeout=10.0)
+        client = distributed.Client(scheduler, timeout=5.0)
     except (OSError, TimeoutError, ValueError) as error:
         raise StudyError(f"no Dask scheduler answers at {scheduler}: {error}") from error
     with client:

@@ -134,3 +134,9 @@ def test_impossible_disturbances_are_refused() -> None:
         WhiteTorque(1.0, STEP_S, seed=0).torque(-1)
     with pytest.raises(ValueError, match="torque_rad_s2 is inf"):
         StepTorque(0.0, math.inf, STEP_S)
+
+
+@pytest.mark.parametrize("steps", [0, 1, 4096, 9000])
+def test_when_torques_are_asked_for_at_once_then_they_are_those_of_each_step(steps: int) -> None:
+    one = parse_disturbance("step=-0.25@40,q=2e-3,step=0.5@10..12", 0.01, 7)
+    assert one.torques(steps).tolist() == [one.torque(step) for step in range(steps)]

@@ -8,7 +8,8 @@ allows named nodes (common names) what their part needs, on the keys of their ow
     part         may send                                  may be sent
     transmitter  up/*, its liveliness                      down/command, the receiver's liveliness
     receiver     down/command, its liveliness              up/*, the transmitter's liveliness
-    viewer       nothing                                   up/*, down/*, both livelinesses
+    viewer       nothing                                   up/*, down/*, telemetry/*, both livelinesses
+    operator     control                                   what a viewer is
 
 "Send" and "be sent" are seen from the invited node. A subscription is a message too and goes the other
 way; its key must be allowed exactly as it is declared, since a rule has to include the key of the
@@ -22,7 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-Part = Literal["transmitter", "receiver", "viewer"]
+Part = Literal["transmitter", "receiver", "viewer", "operator"]
 Rule = dict[str, object]
 
 KEY_ROOT = "tenbaud"
@@ -62,7 +63,13 @@ class Security:
 
 def security_settings(security: Security) -> dict[str, object]:
     """Return the Zenoh settings, by path, that admit the invited over TLS and nobody else."""
-    credentials = security.credentials
+    settings = tls_settings(security.credentials)
+    settings["access_control"] = access_rules(security.invited)
+    return settings
+
+
+def tls_settings(credentials: Credentials) -> dict[str, object]:
+    """Return the Zenoh settings, by path, that speak nothing but TLS and show this certificate."""
     certificate, key = str(credentials.certificate), str(credentials.private_key)
     tls: dict[str, object] = {
         "root_ca_certificate": str(credentials.authority),
@@ -75,9 +82,7 @@ def security_settings(security: Security) -> dict[str, object]:
         "close_link_on_expiration": True,
     }
     settings = {f"transport/link/tls/{name}": value for name, value in tls.items()}
-    settings["transport/link/protocols"] = ["tls"]
-    settings["access_control"] = access_rules(security.invited)
-    return settings
+    return settings | {"transport/link/protocols": ["tls"]}
 
 
 def access_rules(invited: Sequence[Invited]) -> dict[str, object]:
@@ -140,8 +145,10 @@ def _rules_of(invited: Invited, prefix: str) -> list[Rule]:
             may_be_sent("up/*")
             may_be_alive("receiver")
             may_see_alive("transmitter")
-        case "viewer":
-            may_be_sent("up/*", "down/*")
+        case "viewer" | "operator":
+            may_be_sent("up/*", "down/*", "telemetry/*")
             may_see_alive("transmitter")
             may_see_alive("receiver")
+            if invited.part == "operator":
+                may_send("control")
     return rules

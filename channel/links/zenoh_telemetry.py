@@ -11,13 +11,14 @@ publisher's thread waits a millisecond at most, and the loop never waits for tha
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 
 import zenoh
 
 from channel.errors import LinkError
 from channel.links.base import Role
+from channel.links.security import KEY_ROOT, Credentials, Security, tls_settings
+from channel.links.zenoh_config import open_session, zenoh_config, zenoh_settings
 
 OnMessage = Callable[[bytes], None]
 
@@ -25,22 +26,28 @@ OnMessage = Callable[[bytes], None]
 class TelemetryPort:
     """An end's side: listens on one endpoint, publishes, and hands commands over if it takes any.
 
-    `on_command` runs on a thread of Zenoh and may only put the bytes away. Raises LinkError when the
-    endpoint cannot be used.
+    `on_command` runs on a thread of Zenoh and may only put the bytes away. `security`: TLS, and only
+    the viewers and operators that it invites. Raises LinkError when the endpoint cannot be used.
     """
 
     def __init__(
-        self, role: Role, session_name: str, endpoint: str, on_command: OnMessage | None = None
+        self,
+        role: Role,
+        session_name: str,
+        endpoint: str,
+        on_command: OnMessage | None = None,
+        security: Security | None = None,
     ) -> None:
-        self._session = _open("peer", listen=(endpoint,))
+        settings = zenoh_settings("peer", (endpoint,), (), security=security)
+        self._session = open_session(zenoh_config(settings), f"{endpoint} for telemetry")
         self._publisher = self._session.declare_publisher(
-            f"tenbaud/{session_name}/telemetry/{role}",
+            f"{KEY_ROOT}/{session_name}/telemetry/{role}",
             congestion_control=zenoh.CongestionControl.DROP,
             priority=zenoh.Priority.BACKGROUND,
         )
         if on_command is not None:
             self._session.declare_subscriber(
-                f"tenbaud/{session_name}/control", _handler(on_command, 4096)
+                f"{KEY_ROOT}/{session_name}/control", _handler(on_command, 4096)
             )
 
     def publish(self, data: bytes) -> None:
@@ -58,15 +65,24 @@ class TelemetryPort:
 class TelemetryFeed:
     """A viewer's side: connected to one end. Raises LinkError when nobody listens there.
 
-    `on_message` runs on a thread of Zenoh and may only put the bytes away.
+    `on_message` runs on a thread of Zenoh and may only put the bytes away. `credentials`: over TLS.
     """
 
-    def __init__(self, endpoint: str, session_name: str, on_message: OnMessage) -> None:
+    def __init__(
+        self,
+        endpoint: str,
+        session_name: str,
+        on_message: OnMessage,
+        credentials: Credentials | None = None,
+    ) -> None:
         self.endpoint = endpoint
-        self._session = _open("client", connect=(endpoint,))
+        settings = zenoh_settings("client", (), (endpoint,)) | {"connect/timeout_ms": 1000}
+        if credentials is not None:
+            settings |= tls_settings(credentials)
+        self._session = open_session(zenoh_config(settings), f"{endpoint} for telemetry")
         self._name = session_name
         self._session.declare_subscriber(
-            f"tenbaud/{session_name}/telemetry/*", _handler(on_message, 1 << 20)
+            f"{KEY_ROOT}/{session_name}/telemetry/*", _handler(on_message, 1 << 20)
         )
 
     @property
@@ -76,7 +92,7 @@ class TelemetryFeed:
 
     def send(self, session_name: str, data: bytes) -> None:
         """Ask something of the flight of that name; nobody answers but the telemetry."""
-        self._session.put(f"tenbaud/{session_name}/control", data)
+        self._session.put(f"{KEY_ROOT}/{session_name}/control", data)
 
     def close(self) -> None:
         """Close the session."""
@@ -90,24 +106,3 @@ def _handler(take: OnMessage, bytes_max: int) -> zenoh.handlers.Callback[zenoh.S
             take(data)
 
     return zenoh.handlers.Callback(on_sample, indirect=False)
-
-
-def _open(mode: str, listen: tuple[str, ...] = (), connect: tuple[str, ...] = ()) -> zenoh.Session:
-    config = zenoh.Config()
-    settings: dict[str, object] = {
-        "mode": mode,
-        "listen/endpoints": list(listen),
-        "connect/endpoints": list(connect),
-        "connect/timeout_ms": 1000,
-        "scouting/delay": 0,
-        "scouting/multicast/enabled": False,
-        "scouting/gossip/enabled": False,
-        "transport/shared_memory/enabled": False,
-    }
-    for path, value in settings.items():
-        config.insert_json5(path, json.dumps(value))
-    try:
-        return zenoh.open(config)
-    except zenoh.ZError as error:
-        at = ", ".join(listen + connect)
-        raise LinkError(f"telemetry cannot use {at}: {error}") from error

@@ -117,7 +117,7 @@ def _run(
     agreement = replace(agree(config, node.clock.value), live=wish.control)
     endpoints = replace(endpoints_of(role, addresses, config, take_over), telemetry=wish)
     check_parts(config)
-    wish.check(role, endpoints.insecure)
+    wish.check(role, endpoints.insecure, endpoints.security is not None)
     whole = node.run_folder is None
     folder = RunFolder(node.run_folder or create_run_folder(None, f"{role}-{config.preset}", node.out))
     if whole:

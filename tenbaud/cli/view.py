@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -15,6 +16,9 @@ def view(
             "this user on this machine are found.",
             show_default=False,
         ),
+    ] = None,
+    keys: Annotated[
+        Path | None, typer.Option(help="This viewer's key folder (`tenbaud keys`), for tls endpoints.")
     ] = None,
     session: Annotated[str, typer.Option(help="Session name; any if not given.")] = "**",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Of the page; 0: any free one.")] = 8710,
@@ -36,6 +40,8 @@ def view(
     [dim]tenbaud demo --view[/dim]
 
     [dim]tenbaud view --connect tcp/127.0.0.1:7448 --connect tcp/127.0.0.1:7449[/dim]
+
+    [dim]tenbaud view --keys keys/desk --connect tls/10.0.0.2:7448[/dim]
     """
     if schema:
         import json
@@ -44,8 +50,17 @@ def view(
 
         typer.echo(json.dumps(schema_json(), indent=2))
         return
+    from channel.links.endpoints import check_endpoints
     from tenbaud.view.feed import Feed
     from tenbaud.view.server import Address, free_port, serve
 
     address = Address(host, port or free_port(host), insecure)
-    serve(Feed(tuple(connect or ()), session), address, open_browser=open_browser)
+    credentials = None
+    if keys is not None:
+        from tenbaud.keys.authority import NodeRole
+        from tenbaud.keys.store import usable
+
+        credentials = usable(keys, NodeRole.VIEWER).credentials
+    protected = tuple(one for one in connect or () if not one.startswith("unixsock"))
+    check_endpoints(protected, insecure=True, secured=credentials is not None)
+    serve(Feed(tuple(connect or ()), session, credentials), address, open_browser=open_browser)

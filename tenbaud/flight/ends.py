@@ -239,8 +239,15 @@ def _end(
 
 
 def _station(agreement: Agreement, role: Role, recorder: McapRecorder, endpoints: Endpoints) -> Station:
-    addresses = endpoints.listen + endpoints.connect
-    return open_station(agreement, role, recorder, endpoints.telemetry, addresses, endpoints.insecure)
+    return open_station(
+        agreement,
+        role,
+        recorder,
+        endpoints.telemetry,
+        endpoints.listen + endpoints.connect + endpoints.router,
+        endpoints.insecure,
+        endpoints.security,
+    )
 
 
 def _fly(

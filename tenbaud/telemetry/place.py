@@ -25,12 +25,16 @@ PATH_BYTES_MAX = 100
 
 
 def endpoint_for(
-    wish: str, role: Role, addresses: Sequence[str] = (), insecure: bool = False
+    wish: str,
+    role: Role,
+    addresses: Sequence[str] = (),
+    insecure: bool = False,
+    secured: bool = False,
 ) -> str | None:
     """Return where an end shall listen for viewers; None: nowhere.
 
     `wish` is "" (as usual: on, but off beside an insecure link that leaves this machine), "on", "off"
-    or a Zenoh endpoint. Raises LinkError.
+    or a Zenoh endpoint. `secured`: there is a certificate for it. Raises LinkError.
     """
     if wish == "off":
         return None
@@ -41,8 +45,9 @@ def endpoint_for(
         path = private_folder() / f"{role}-{os.getpid()}.sock"
         clear_stale()
         return f"{SOCKET}{path}"
-    if not is_loopback(wish):
-        check_endpoints((wish,), insecure)
+    protocol = wish.partition("/")[0]
+    if not is_loopback(wish) or protocol == "tls":
+        check_endpoints((wish,), insecure, secured)
     return wish
 
 

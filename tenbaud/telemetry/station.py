@@ -5,11 +5,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from channel.errors import LinkError
 from channel.links.base import Role
+from channel.links.security import Security
 from channel.recording import Recorder
 from receiver.endpoint import ReceiverEndpoint
 from receiver.steered import SteeredReference
@@ -34,10 +35,10 @@ class Wish:
     pace: float | None = None
     """virtual seconds per second at most"""
 
-    def check(self, role: Role, insecure: bool) -> None:
+    def check(self, role: Role, insecure: bool, secured: bool) -> None:
         """Raise LinkError for an endpoint that cannot be used, before anything starts."""
         if self.endpoint:
-            endpoint_for(self.endpoint, role, (), insecure)
+            endpoint_for(self.endpoint, role, (), insecure, secured)
 
 
 NO_WISH = Wish()
@@ -56,6 +57,7 @@ class Station:
     steering: SteeredReference | None
     pace: float | None
     tap: Tap | None
+    security: Security | None
     publisher: Publisher | None = field(default=None)
 
     def fly_transmitter(self, run: TransmitterRun, stop: Stop) -> LiveTransmitter:
@@ -102,7 +104,9 @@ class Station:
         from channel.links.zenoh_telemetry import TelemetryPort
 
         on_command = None if self.queue is None else self.queue.offer
-        return TelemetryPort(self.role, self.agreement.config.link.session, self.endpoint, on_command)
+        name = self.agreement.config.link.session
+        security = self.security if self.endpoint.startswith("tls/") else None
+        return TelemetryPort(self.role, name, self.endpoint, on_command, security)
 
 
 def open_station(
@@ -112,14 +116,16 @@ def open_station(
     wish: Wish,
     addresses: tuple[str, ...] = (),
     insecure: bool = False,
+    security: Security | None = None,
 ) -> Station:
     """Return the telemetry of one end; without an own wish, trouble with it only means none.
 
-    `addresses` and `insecure` are those of the flight's link. Raises LinkError for an endpoint that
+    `addresses`, `insecure` and `security` are those of the flight's link; the viewers invited there may
+    see the telemetry, and steer where the flight allows it. Raises LinkError for an endpoint that
     was asked for and cannot be used.
     """
     try:
-        endpoint = endpoint_for(wish.endpoint, role, addresses, insecure)
+        endpoint = endpoint_for(wish.endpoint, role, addresses, insecure, security is not None)
     except LinkError as error:
         if wish.endpoint:
             raise
@@ -136,4 +142,12 @@ def open_station(
         SteeredReference(build_reference(agreement.config)) if steerable else None,
         wish.pace if agreement.clock == "virtual" else None,
         tap,
+        None if security is None else _for_viewers(security, agreement.live),
     )
+
+
+def _for_viewers(security: Security, steerable: bool) -> Security:
+    viewers = [one for one in security.invited if one.part == "viewer"]
+    if steerable:
+        viewers = [replace(one, part="operator") for one in viewers]
+    return replace(security, invited=tuple(viewers))

@@ -10,6 +10,7 @@ from typing import Any, Self
 import orjson
 
 from channel.errors import LinkError
+from channel.links.security import Credentials
 from tenbaud.telemetry.place import found_endpoints
 
 LOOK_PERIOD_S = 0.5
@@ -20,10 +21,16 @@ class Feed:
     """Within a `with`, `take` returns what the ends have told since the last call.
 
     `endpoints` are where the ends listen; none: wherever a flight of this user is found. Ends may come
-    and go. `session_name` may be `**`, any.
+    and go. `session_name` may be `**`, any. `credentials`: over TLS.
     """
 
-    def __init__(self, endpoints: tuple[str, ...], session_name: str = "**") -> None:
+    def __init__(
+        self,
+        endpoints: tuple[str, ...],
+        session_name: str = "**",
+        credentials: Credentials | None = None,
+    ) -> None:
+        self._credentials = credentials
         self._endpoints = endpoints
         self._session_name = session_name
         self._messages: deque[bytes] = deque(maxlen=MESSAGES_MAX)
@@ -63,7 +70,9 @@ class Feed:
             self._open.pop(endpoint).close()
         for endpoint in self._wanted():
             if endpoint not in self._open and not self._ending.is_set():
-                opened = _try_open(endpoint, self._session_name, self._messages.append)
+                opened = _try_open(
+                    endpoint, self._session_name, self._messages.append, self._credentials
+                )
                 if opened is not None:
                     self._open[endpoint] = opened
 
@@ -76,10 +85,15 @@ class Feed:
             return ()
 
 
-def _try_open(endpoint: str, session_name: str, take: Callable[[bytes], None]) -> Any:
+def _try_open(
+    endpoint: str,
+    session_name: str,
+    take: Callable[[bytes], None],
+    credentials: Credentials | None,
+) -> Any:
     from channel.links.zenoh_telemetry import TelemetryFeed
 
     try:
-        return TelemetryFeed(endpoint, session_name, take)
+        return TelemetryFeed(endpoint, session_name, take, credentials)
     except LinkError:
         return None  # nobody there yet, or any more

@@ -41,7 +41,7 @@ def test_when_a_rate_of_the_table_is_flown_then_its_errors_come_out(rate: int) -
 
 
 def floor_of(phase: float) -> float:
-    """Return P11 at 1 bit/s, q = 1, when cos(phase) of the angle and sin(phase) of the rate are seen."""
+    """Return P11 at 1 bit/s, q = 1, when cos(phase) angle and sin(phase) rate are seen."""
     from scipy.linalg import solve_continuous_are
 
     plant, torque = np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([0.0, 1.0])

@@ -12,8 +12,9 @@ allows named nodes (common names) what their part needs, on the keys of their ow
     operator     control                                   what a viewer is
 
 "Send" and "be sent" are seen from the invited node. A subscription is a message too and goes the other
-way; its key must be allowed exactly as it is declared, since a rule has to include the key of the
-message, not merely meet it.
+way. A rule has to include its key whole, not merely meet it, and an end of many sessions subscribes to
+all of them at once; so an invited node may subscribe in any session, and what is let through to it, or
+from it, is what keeps it to its own.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ Part = Literal["transmitter", "receiver", "viewer", "operator"]
 Rule = dict[str, object]
 
 KEY_ROOT = "tenbaud"
+ANY = "**"
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,35 +106,37 @@ def access_rules(invited: Sequence[Invited]) -> dict[str, object]:
 
 
 def _rules_of(invited: Invited, prefix: str) -> list[Rule]:
-    root = f"{KEY_ROOT}/{invited.session}"
+    own = invited.session
     rules: list[Rule] = []
 
-    def allow(flow: str, messages: Sequence[str], *keys: str) -> None:
+    def allow(flow: str, messages: Sequence[str], session: str, *keys: str) -> None:
         rules.append(
             {
                 "id": f"{prefix} {len(rules)}",
                 "permission": "allow",
                 "flows": [flow],
                 "messages": list(messages),
-                "key_exprs": [f"{root}/{key}" for key in keys],
+                "key_exprs": [f"{KEY_ROOT}/{session}/{key}" for key in keys],
             }
         )
 
     def may_send(*keys: str) -> None:
-        allow("ingress", ["put"], *keys)
-        allow("egress", ["declare_subscriber"], *keys)
+        allow("ingress", ["put"], own, *keys)
+        allow("egress", ["declare_subscriber"], ANY, *keys)
 
     def may_be_sent(*keys: str) -> None:
-        allow("egress", ["put"], *keys)
-        allow("ingress", ["declare_subscriber"], *keys)
+        allow("egress", ["put"], own, *keys)
+        allow("ingress", ["declare_subscriber"], ANY, *keys)
 
     def may_be_alive(part: str) -> None:
-        allow("ingress", ["liveliness_token"], f"alive/{part}/*")
-        allow("egress", ["declare_liveliness_subscriber", "liveliness_query"], f"alive/{part}/*")
+        alive = f"alive/{part}/*"
+        allow("ingress", ["liveliness_token"], own, alive)
+        allow("egress", ["declare_liveliness_subscriber", "liveliness_query"], ANY, alive)
 
     def may_see_alive(part: str) -> None:
-        allow("egress", ["liveliness_token"], f"alive/{part}/*")
-        allow("ingress", ["declare_liveliness_subscriber", "liveliness_query"], f"alive/{part}/*")
+        alive = f"alive/{part}/*"
+        allow("egress", ["liveliness_token"], own, alive)
+        allow("ingress", ["declare_liveliness_subscriber", "liveliness_query"], ANY, alive)
 
     match invited.part:
         case "transmitter":

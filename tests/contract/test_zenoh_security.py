@@ -8,9 +8,10 @@ from dataclasses import replace
 import pytest
 
 from channel.errors import LinkError
-from channel.links.security import Security, access_rules
+from channel.links.security import Invited, Security, access_rules
 from channel.links.zenoh import ZenohLink
 from channel.links.zenoh_gate import reason_of
+from channel.links.zenoh_hub import ZenohHub
 from channel.links.zenoh_router import ZenohRouter
 from tests.contract.security import SESSION, credentials, free_tls_endpoint, security
 from tests.contract.test_links import PATIENCE_S, SILENCE_S, Pair, until
@@ -107,6 +108,42 @@ def test_when_a_viewer_is_invited_then_it_sees_and_cannot_send(pair: Pair, endpo
         page.send(b"symbol of a viewer", is_symbol=True)
         page.send(b"hello of a viewer")
         assert desk.receive(SILENCE_S) is None
+
+
+def test_when_many_rigs_are_served_then_each_is_confined_to_its_own_session(endpoint: str) -> None:
+    invited = tuple(
+        Invited(name, "transmitter", session)
+        for name, session in (("rig", "lab/1"), ("intern", "lab/2"))
+    )
+    with (
+        ZenohHub("lab/*", listen=(endpoint,), security=Security(credentials("desk"), invited)) as hub,
+        ZenohLink("transmitter", "lab/1", connect=(endpoint,), security=rig_of("rig", "lab/1")) as one,
+        ZenohLink(
+            "transmitter", "lab/2", connect=(endpoint,), security=rig_of("intern", "lab/2")
+        ) as two,
+        # The first rig's certificate, in the second one's session.
+        ZenohLink(
+            "transmitter", "lab/2", connect=(endpoint,), security=rig_of("rig", "lab/2")
+        ) as wrong,
+    ):
+        assert until(lambda: hub.present("lab/1") and hub.present("lab/2"))
+        hub.join("lab/1")
+        hub.join("lab/2")
+        assert until(lambda: one.peer_present() and two.peer_present())
+        one.send(b"symbol of one", is_symbol=True)
+        assert hub.receive(PATIENCE_S) == ("lab/1", b"symbol of one")
+        wrong.send(b"symbol of a thief", is_symbol=True)
+        assert hub.receive(SILENCE_S) is None
+        two.send(b"symbol of two", is_symbol=True)
+        assert hub.receive(PATIENCE_S) == ("lab/2", b"symbol of two")
+        hub.send("lab/2", b"command for two")
+        assert two.receive(PATIENCE_S) == b"command for two"
+        assert one.receive(SILENCE_S) is None
+        assert wrong.receive(SILENCE_S) is None
+
+
+def rig_of(name: str, session: str) -> Security:
+    return security(name, ("desk", "receiver"), session=session)
 
 
 def test_when_the_address_is_not_in_the_certificate_then_the_listener_is_not_believed(

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import os
+import queue
 import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
 from channel.errors import LinkError
+from channel.links.security import Invited, Part, Security
 from channel.links.zenoh_telemetry import TelemetryFeed, TelemetryPort
+from tests.contract.security import credentials, free_tls_endpoint
+from tests.contract.test_links import PATIENCE_S, SILENCE_S
 from tests.tenbaud.processes import REPOSITORY
 
 
@@ -57,6 +62,7 @@ def test_messages_reach_every_viewer_and_commands_come_back(tmp_path: Path) -> N
 
 STANDS_STILL = """
 import os, signal, sys
+from channel.links.security import Invited, Part, Security
 from channel.links.zenoh_telemetry import TelemetryFeed
 feed = TelemetryFeed(sys.argv[1], "lab", lambda data: None)
 print("ready", flush=True)
@@ -112,14 +118,36 @@ def test_when_an_end_allows_no_control_then_it_hears_no_command(tmp_path: Path) 
 
 
 def test_when_nobody_listens_then_the_viewer_is_told(tmp_path: Path) -> None:
-    with pytest.raises(LinkError, match="telemetry cannot use"):
+    with pytest.raises(LinkError, match=r"cannot use .* for telemetry"):
         TelemetryFeed(endpoint_in(tmp_path), "lab", lambda data: None)
 
 
 def test_when_the_place_is_taken_then_the_end_is_told(tmp_path: Path) -> None:
     port = TelemetryPort("transmitter", "lab", endpoint_in(tmp_path))
     try:
-        with pytest.raises(LinkError, match="telemetry cannot use"):
+        with pytest.raises(LinkError, match=r"cannot use .* for telemetry"):
             TelemetryPort("transmitter", "lab", endpoint_in(tmp_path))
     finally:
         port.close()
+
+
+@pytest.mark.parametrize("part", ["viewer", "operator"])
+def test_over_tls_only_the_invited_see_and_only_operators_steer(part: Part) -> None:
+    endpoint, commands = free_tls_endpoint(), queue.Queue[bytes]()
+    invited = Security(credentials("desk"), (Invited("page", part, "lab/one"),))
+    seen: dict[str, queue.Queue[bytes]] = {name: queue.Queue() for name in ("page", "intern")}
+    with ExitStack() as stack:
+        port = TelemetryPort("receiver", "lab/one", endpoint, commands.put, invited)
+        stack.callback(port.close)
+        feeds = {}
+        for name, messages in seen.items():
+            feeds[name] = TelemetryFeed(endpoint, "lab/one", messages.put, credentials(name))
+            stack.callback(feeds[name].close)
+        wait_until(lambda: port.publish(b"state") or not seen["page"].empty())
+        assert seen["intern"].empty()
+        feeds["intern"].send("lab/one", b"of a stranger")
+        feeds["page"].send("lab/one", b"of the page")
+        if part == "operator":
+            assert commands.get(timeout=PATIENCE_S) == b"of the page"
+        with pytest.raises(queue.Empty):
+            commands.get(timeout=SILENCE_S)

@@ -32,6 +32,8 @@ class StaticParameters:
 class StaticCoder:
     """`b` binary symbols per word, the most significant first. It has no state."""
 
+    uses_rates = False
+
     def __init__(self, parameters: StaticParameters) -> None:
         if axes_of(parameters.gains) != 1:
             raise ValueError("the static coder takes one measured axis, so one column of gains")

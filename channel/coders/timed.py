@@ -37,6 +37,8 @@ class TimedParameters:
 class TimedCoder:
     """A sign per axis, and ranges that shrink by the clock. Coder state: the ranges."""
 
+    uses_rates = False
+
     def __init__(self, parameters: TimedParameters) -> None:
         axes = axes_of(parameters.gains)
         if not 0.0 < parameters.decay <= 1.0:

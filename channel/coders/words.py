@@ -40,6 +40,7 @@ class WordsCoder:
     """
 
     impulse = True
+    uses_rates = False
 
     def __init__(self, parameters: WordsParameters) -> None:
         if not 1 <= parameters.bits <= 15:

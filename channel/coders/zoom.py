@@ -41,6 +41,8 @@ class ZoomCoder:
     Coder state: the ranges of all axes, then the last `window - 1` signs of each axis, newest first.
     """
 
+    uses_rates = False
+
     def __init__(self, parameters: ZoomParameters) -> None:
         axes = len(parameters.gains[0]) if parameters.gains else 0
         if axes < 1 or any(len(row) != axes for row in parameters.gains):

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tenbaud.cli import demo, doctor, figures, identify, nodes, rig, runs
+from tenbaud.cli import bench, demo, doctor, figures, identify, nodes, rig, runs
 from tenbaud.flight.outcome import ExitCode, outcome_of
 
 app = typer.Typer(
@@ -50,6 +50,7 @@ app.command()(runs.inspect)
 app.command()(runs.diff)
 app.command()(runs.presets)
 app.command()(doctor.doctor)
+app.add_typer(bench.bench, name="bench")
 app.command()(rig.rig)
 app.command()(rig.rig_check)
 

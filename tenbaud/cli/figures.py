@@ -48,7 +48,7 @@ def figures(
     from tenbaud.recording.folder import create_run_folder
 
     wanted = _wanted(which or ["all"], NUMBERS)
-    found = _data(data)
+    found = found_data(data)
     folder = create_run_folder(None, "figures", out)
     pictures = (docs or folder) / "figures"
     pictures.mkdir(parents=True, exist_ok=True)
@@ -84,7 +84,8 @@ def _wanted(names: list[str], known: tuple[str, ...]) -> set[str]:
     return set(known) if "all" in names else set(names)
 
 
-def _data(given: Path | None) -> Path | None:
+def found_data(given: Path | None) -> Path | None:
+    """Return the folder of the recorded flights, None without one; ConfigError if it lacks them."""
     from tenbaud.config.load import ConfigError
     from tenbaud.figures.real import UIUC_FILE
 

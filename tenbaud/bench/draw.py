@@ -22,7 +22,7 @@ CURVES = (
     (PAPER, "the paper's coder", LINE_C, "s"),
     ("tuned", "its coder, tuned", "#c9a400", "D"),
     ("combined", "sign of angle and rate", "#4c9f50", "^"),
-    (BEST, "history, range told", LINE_B, "o"),
+    (BEST, "history, steady range", LINE_B, "o"),
     ("history", "history, range finds itself", "#6a51a3", "v"),
 )
 
@@ -85,12 +85,12 @@ def draw_disturbances(path: Path, outcome: Outcome) -> None:
             linewidth=1.2,
             linestyle="--" if told else "-",
             capsize=2,
-            label=label + (" (told q)" if told else ""),
+            label=label + (" (told)" if told else ""),
         )
     panel.axhline(1.0, color=LINE_A, linewidth=1.5)
-    panel.set(xscale="log", yscale="log", ylim=(0.9, 60.0))
+    panel.set(xscale="log", yscale="log", ylim=(0.9, 400.0))
     panel.set_xticks(DENSITIES, [f"{density:g}" for density in DENSITIES])
-    panel.set_yticks([1, 1.5, 2, 3, 5, 10, 20, 50], ["1", "1.5", "2", "3", "5", "10", "20", "50"])
+    panel.set_yticks([1, 1.5, 2, 3, 5, 10, 30, 100], ["1", "1.5", "2", "3", "5", "10", "30", "100"])
     panel.set_yticks([], minor=True)
     panel.set_xticks([], minor=True)
     panel.set(xlabel="white torque q (rad²/s³)", ylabel="rms error over the floor, 10 bit/s")

@@ -150,7 +150,7 @@ ENTRANTS = (
     Entrant("sign of innovation, Kalman filter", "innovation", True, _aimed(*innovation_gains(), 0.0)),
     Entrant("sign of angle and rate combined", "combined", True, _aimed(AIMED_ANGLE, AIMED_SWING, AIM)),
     Entrant(
-        "history, range told",
+        "history, steady range",
         "history-told",
         True,
         _history(STEADY_ROWS, STEADY_WEIGHTS, STEADY_LOOKAHEAD, 1.0),

@@ -58,7 +58,7 @@ class Errors(NamedTuple):
 def configuration(case: Case) -> Agreement:
     """Return what both ends agree on for a case."""
     entrant = next(one for one in ENTRANTS if one.key == case.entrant)
-    tick_s = 0.01 if case.rate_bit_s <= 20.0 else 0.2 / case.rate_bit_s
+    tick_s = tick_of(case.rate_bit_s)
     told = case.density if entrant.told else None
     receiver: dict[str, Any] = {} if case.closed_loop else {"pid": IDLE}
     overrides = {
@@ -76,6 +76,11 @@ def configuration(case: Case) -> Agreement:
         "link": {"kind": "memory"},
     }
     return agree(load_config("paper-10baud", None, overrides), "virtual")
+
+
+def tick_of(rate_bit_s: float) -> float:
+    """Return the control tick, in s: the paper's, or five to a bit where that would be too few."""
+    return 0.01 if rate_bit_s <= 20.0 else 0.2 / rate_bit_s
 
 
 IDLE = {"proportional": 0.0, "integral": 0.0, "derivative": 0.0}

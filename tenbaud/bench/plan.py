@@ -34,7 +34,7 @@ class Scale:
     closed_seconds: float
 
 
-FULL = Scale(24, 110.0, 8, 125.0)
+FULL = Scale(16, 110.0, 6, 125.0)
 QUICK = Scale(4, 60.0, 2, 75.0)
 
 
@@ -154,4 +154,3 @@ def exponent(rates: list[float], mean_squares: list[list[float]]) -> Ratio:
     mean = sum(slopes) / len(slopes)
     variance = sum((one - mean) ** 2 for one in slopes) / max(1, len(slopes) - 1)
     return Ratio(mean, QUANTILE_95 * math.sqrt(variance / len(slopes)))
-

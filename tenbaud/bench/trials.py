@@ -48,9 +48,7 @@ def _four(threshold: float, outer: float) -> Quantise:
 
 TRIALS = (
     Trial("sign, one bit", 1.0, _sign, 1.4626, 1.3811, 1.4703),
-    Trial(
-        "two signs and a silence that is paid", math.log2(3.0), _three(1.340), 0.922, 1.032, 1.841
-    ),
+    Trial("two signs and a silence that is paid", math.log2(3.0), _three(1.340), 0.922, 1.032, 1.841),
     Trial("words of two bits", 2.0, _four(1.811, 3.378), 0.844, 0.375, 0.559),
 )
 

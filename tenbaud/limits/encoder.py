@@ -35,9 +35,9 @@ def floor_behind_encoder(
 
     The encoder's rounding is taken for white noise of `width^2 / 12` at every tick. Who forms the bits
     then knows the Kalman filter's estimate and no more; the error is the filter's own, plus the floor
-    of what the estimate does, which is the same plant driven by the innovations, `L r L'` (separation of
-    estimation and coding: Wolf and Ziv, IEEE Trans. Inf. Theory 16, 1970). Rounding is not white noise;
-    this is a yardstick, not a bound.
+    of what the estimate does, which is the same plant driven by the innovations, `L r L'` (separation
+    of estimation and coding: Wolf and Ziv, IEEE Trans. Inf. Theory 16, 1970). Rounding is not white
+    noise; this is a yardstick, not a bound.
     """
     if not tick_s > 0.0:
         raise ValueError(f"tick_s is {tick_s}; it must be above 0")

@@ -1,4 +1,4 @@
-"""`tenbaud bench coders` from nothing to page and pictures, at the smallest scale that has intervals."""
+"""`tenbaud bench coders` from nothing to page and pictures, at the smallest scale with intervals."""
 
 from __future__ import annotations
 

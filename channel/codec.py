@@ -71,6 +71,8 @@ class Coder(Protocol):
     alphabet: Alphabet
     impulse: bool
     """True: the correction is added to the state once. False: held over the sample, as in (22)."""
+    uses_rates: bool
+    """True: words are formed from all corrected states: angles, then rates; not from angles alone."""
 
     def initial(self) -> Vector:
         """Return the coder state that both ends start from."""
@@ -141,8 +143,15 @@ class Codec:
         return CodecState(0, self.model.initial(), self.coder.initial())
 
     def encode(self, state: CodecState, measurement: Vector) -> tuple[int, ...]:
-        """Return the word that a measurement at the sample's first tick asks for (20)."""
-        return self.coder.encode(state.coder, self.model.measured(state.model), measurement)
+        """Return the word that a measurement at the sample's first tick asks for (20).
+
+        For a coder that uses rates, the measurement holds one value per corrected state.
+        """
+        if self.coder.uses_rates:
+            predicted = state.model[: self.model.correction_size]
+        else:
+            predicted = self.model.measured(state.model)
+        return self.coder.encode(state.coder, predicted, measurement)
 
     def open(self, state: CodecState, word: Word) -> OpenSample:
         """Consume the word of `state.sample`."""

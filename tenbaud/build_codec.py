@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from channel.codec import Codec, Coder, Model
+from channel.coders.history import HistoryCoder, HistoryParameters
 from channel.coders.static import StaticCoder, StaticParameters
 from channel.coders.timed import TimedCoder, TimedParameters
 from channel.coders.words import WordsCoder, WordsParameters
@@ -20,6 +21,7 @@ from channel.words import ERASED
 from tenbaud.config.schema import (
     FixedCoderSection,
     FlightConfig,
+    HistoryCoderSection,
     HoldModelSection,
     PitchModelSection,
     PluginCoderSection,
@@ -110,6 +112,11 @@ def _gains(gains: tuple[float, float]) -> tuple[tuple[float, ...], ...]:
     return tuple((gain,) for gain in gains)
 
 
+def _common(section: Any) -> dict[str, Any]:
+    """Return what every coder of signs and gains takes."""
+    return {"gains": _gains(section.gains), "impulse": section.correction == "impulse"}
+
+
 def _zoom(section: ZoomCoderSection, config: FlightConfig) -> Coder:
     return ZoomCoder(
         ZoomParameters(
@@ -117,20 +124,7 @@ def _zoom(section: ZoomCoderSection, config: FlightConfig) -> Coder:
             minimum_range=section.minimum_range_rad,
             decay=section.decay,
             window=section.window_signs,
-            gains=_gains(section.gains),
-            impulse=section.correction == "impulse",
-        )
-    )
-
-
-def _fixed(section: FixedCoderSection, config: FlightConfig) -> Coder:
-    return TimedCoder(
-        TimedParameters(
-            initial_range=section.range_rad,
-            minimum_range=section.range_rad,
-            decay=1.0,
-            gains=_gains(section.gains),
-            impulse=section.correction == "impulse",
+            **_common(section),
         )
     )
 
@@ -141,21 +135,21 @@ def _timed(section: TimedCoderSection, config: FlightConfig) -> Coder:
             initial_range=section.initial_range_rad,
             minimum_range=section.minimum_range_rad,
             decay=section.decay,
-            gains=_gains(section.gains),
-            impulse=section.correction == "impulse",
+            **_common(section),
         )
+    )
+
+
+def _fixed(section: FixedCoderSection, config: FlightConfig) -> Coder:
+    """A timed coder whose range has nowhere to go."""
+    size = section.range_rad
+    return TimedCoder(
+        TimedParameters(initial_range=size, minimum_range=size, decay=1.0, **_common(section))
     )
 
 
 def _static(section: StaticCoderSection, config: FlightConfig) -> Coder:
-    return StaticCoder(
-        StaticParameters(
-            bits=section.bits,
-            range=section.range_rad,
-            gains=_gains(section.gains),
-            impulse=section.correction == "impulse",
-        )
-    )
+    return StaticCoder(StaticParameters(bits=section.bits, range=section.range_rad, **_common(section)))
 
 
 def _words(section: WordsCoderSection, config: FlightConfig) -> Coder:
@@ -169,6 +163,20 @@ def _words(section: WordsCoderSection, config: FlightConfig) -> Coder:
     )
 
 
+def _history(section: HistoryCoderSection, config: FlightConfig) -> Coder:
+    return HistoryCoder(
+        HistoryParameters(
+            rows=section.rows,
+            initial_range=section.initial_range_rad,
+            minimum_range=section.minimum_range_rad,
+            maximum_range=section.maximum_range_rad,
+            period_s=config.timing.symbol_period_s,
+            weights=section.weights,
+            lookahead=section.lookahead,
+        )
+    )
+
+
 MODELS: dict[str, Callable[[Any, FlightConfig], Model]] = {"pitch": _pitch, "hold": _hold}
 
 CODERS: dict[str, Callable[[Any, FlightConfig], Coder]] = {
@@ -177,4 +185,5 @@ CODERS: dict[str, Callable[[Any, FlightConfig], Coder]] = {
     "timed": _timed,
     "static": _static,
     "words": _words,
+    "history": _history,
 }

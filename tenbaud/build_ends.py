@@ -29,6 +29,7 @@ from transmitter.guard import Guard, GuardSettings
 from transmitter.node import TransmitterNode
 from transmitter.scores import Scores
 from transmitter.session import LAG_SAMPLES_MAX, TransmitterSession
+from transmitter.sight import Sight
 
 
 def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> TransmitterNode:
@@ -41,6 +42,7 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
         secrets.randbits(32),
         recorder,
         stop_on_desync=config.transmitter.on_desync == "stop",
+        sight=build_sight(agreement),
     )
     reference = build_reference(config)
     gauge = build_gauge(agreement)
@@ -57,6 +59,18 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
     return TransmitterNode(
         session, build_rig(config), build_guard(agreement), scores, recorder, rearm_ticks, gauge
     )
+
+
+def build_sight(agreement: Agreement) -> Sight | None:
+    """Return what gives a coder its rates, None for one that does without."""
+    codec = agreement.codec
+    if not codec.coder.uses_rates:
+        return None
+    tick_s = agreement.terms.tick_ns / 1e9
+    try:
+        return Sight(codec.model, tick_s, agreement.config.transmitter.sight_bandwidth_rad_s)
+    except ValueError as error:
+        raise ConfigError(f"coder.kind = {agreement.config.coder.kind!r}: {error}") from error
 
 
 def build_uplink(agreement: Agreement, wire: Wire, recorder: Recorder | None = None) -> Uplink:

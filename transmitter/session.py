@@ -43,6 +43,7 @@ from transmitter.claims import Claims
 from transmitter.copies import Confirmed, Copies
 from transmitter.records import write_sample
 from transmitter.rejoin import Asking, start_of
+from transmitter.sight import Sight
 
 LAG_SAMPLES_MAX = HISTORY_SAMPLES
 """Echoes may be this many samples behind before a rejoin is asked for."""
@@ -62,6 +63,7 @@ class TransmitterSession:
 
     `incarnation` is drawn by the caller (32 bits), so that the session itself stays deterministic.
     `stop_on_desync`: end the flight at the first digest that differs, instead of rejoining.
+    `sight`: gives a coder that uses rates its measurements; None: one with the usual bandwidth.
     """
 
     def __init__(
@@ -73,6 +75,7 @@ class TransmitterSession:
         recorder: Recorder | None = None,
         *,
         stop_on_desync: bool = False,
+        sight: Sight | None = None,
     ) -> None:
         self.codec = codec
         self.terms = terms
@@ -100,12 +103,17 @@ class TransmitterSession:
         self._asking = Asking(identity, incarnation, terms)
         self._claims = Claims(terms)
         self._stop_on_desync = stop_on_desync
+        self._sight = (
+            (sight or Sight(codec.model, terms.tick_ns / 1e9)) if codec.coder.uses_rates else None
+        )
         self._recorder = recorder or NullRecorder()
         self._due: deque[tuple[int, Vector]] = deque(
             enumerate([terms.initial_command] * terms.lead_ticks)
         )
         """commands of coming ticks"""
         self._tick = -1
+        self._command: Vector = terms.initial_command
+        """the last one given out"""
 
     # What happens at a tick
 
@@ -122,6 +130,8 @@ class TransmitterSession:
         not sent, and the next sample starts afresh.
         """
         self._tick = tick
+        if self._sight is not None:
+            measurement = self._sight.look(tick, measurement, self._command)
         if self.phase is Phase.REJOINING:
             return self._ask()
         if self.phase is not Phase.FLYING:
@@ -162,7 +172,10 @@ class TransmitterSession:
         """Return the command of this tick, None when it has not come; earlier ones are forgotten."""
         while self._due and self._due[0][0] < tick:
             self._due.popleft()
-        return self._due[0][1] if self._due and self._due[0][0] == tick else None
+        if not self._due or self._due[0][0] != tick:
+            return None
+        self._command = self._due[0][1]
+        return self._command
 
     def take_confirmed(self) -> list[Confirmed]:
         """Write the samples down that were confirmed since the last call, and return them.

@@ -39,6 +39,7 @@ class FunctionCoder:
     """the named tuple that the functions take first"""
     alphabet: Alphabet
     impulse: bool
+    uses_rates: bool = False
     correction_size: int
     """model states that a correction is for"""
 

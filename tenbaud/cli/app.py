@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from tenbaud.cli import (
+    bench,
     demo,
     doctor,
     figures,
@@ -74,6 +75,7 @@ app.command()(files.convert)
 app.command()(files.recover)
 app.command()(runs.presets)
 app.command()(doctor.doctor)
+app.add_typer(bench.bench, name="bench")
 app.command()(rig.rig)
 app.command()(rig.rig_check)
 

@@ -52,7 +52,7 @@ def figures(
 
     drawings = [name for name in which or () if name in DRAWINGS]
     wanted = _wanted([name for name in which or ["all"] if name not in drawings], NUMBERS)
-    found = _data(data)
+    found = found_data(data)
     # The run's folder is for flights; the pages' drawings leave none, and need it only without docs.
     folder = create_run_folder(None, "figures", out) if wanted or docs is None else docs
     pictures = (docs or folder) / "figures"
@@ -117,7 +117,8 @@ def _wanted(names: list[str], known: tuple[str, ...]) -> set[str]:
     return set(known) if "all" in names else set(names)
 
 
-def _data(given: Path | None) -> Path | None:
+def found_data(given: Path | None) -> Path | None:
+    """Return the folder of the recorded flights, None without one; ConfigError if it lacks them."""
     from tenbaud.config.load import ConfigError
     from tenbaud.figures.real import UIUC_FILE
 

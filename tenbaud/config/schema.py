@@ -147,6 +147,25 @@ class WordsCoderSection(Section):
     """tau of a low-pass behind the differentiator; 0: none"""
 
 
+class HistoryCoderSection(Section):
+    """One sign that looks ahead when it is formed and back when it is read; ranges in rad."""
+
+    kind: Literal["history"] = "history"
+    rows: Annotated[tuple[tuple[float, float, float], ...], Field(min_length=1, max_length=512)] = (
+        (1.0, 0.75, 1.0),
+    )
+    """(angle, rate, range) of each pattern of the last signs: corrections in units of the range, the
+    rate's per symbol period, and what the range is multiplied by. Bit j of a row's number says that the
+    sign j + 1 samples ago was the present one"""
+    initial_range_rad: Positive = 0.01
+    minimum_range_rad: Positive = 0.001
+    maximum_range_rad: Positive = 3.0
+    weights: tuple[float, float, float] = (0.7, 0.45, 0.75)
+    """of the error that is left after the look-ahead: angle, angle times swing, swing"""
+    lookahead: Annotated[int, Field(ge=0, le=6)] = 1
+    """samples that the transmitter looks ahead"""
+
+
 class PluginCoderSection(Section):
     """A coder from outside."""
 
@@ -178,6 +197,7 @@ CoderSection: TypeAlias = Annotated[
     | Annotated[TimedCoderSection, Tag("timed")]
     | Annotated[StaticCoderSection, Tag("static")]
     | Annotated[WordsCoderSection, Tag("words")]
+    | Annotated[HistoryCoderSection, Tag("history")]
     | Annotated[PluginCoderSection, Tag("plugin")],
     Discriminator(_kind_or("zoom")),
 ]
@@ -190,6 +210,7 @@ KINDS: dict[str, dict[str, type[Section]]] = {
         "timed": TimedCoderSection,
         "static": StaticCoderSection,
         "words": WordsCoderSection,
+        "history": HistoryCoderSection,
     },
 }
 """Sections that come in kinds; the first kind is what a section without `kind` is."""
@@ -237,6 +258,8 @@ class TransmitterSection(Section):
     rig: Literal["simulated", "replay", "serial", "quarc", "hil"] = "simulated"
     dry_run: bool = False
     """read the rig and never drive it"""
+    sight_bandwidth_rad_s: Annotated[float, Field(gt=0.0, le=10_000.0)] = 30.0
+    """how fast the observer of the rate follows the encoder, for coders that use rates"""
     encoder_counts_per_turn: Annotated[int, Field(ge=2, le=10_000_000)] = 4096
     encoder_sign: Literal[-1, 1] = 1
     encoder_zero_counts: int = 0

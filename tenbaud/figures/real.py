@@ -64,7 +64,8 @@ def identify_first_half(data: Path) -> FirstHalf:
     return FirstHalf(regression, fitted, model_section(physical, settings))
 
 
-def _replayed(file: Path, **sections: Any) -> Overrides:
+def replayed(file: Path, **sections: Any) -> Overrides:
+    """Return what makes a flight the replay of a recording."""
     return {
         **sections,
         "transmitter": {"rig": "replay", **sections.get("transmitter", {})},
@@ -80,13 +81,13 @@ def uiuc_jobs(data: Path, model: dict[str, Any]) -> list[Job]:
     for rate, period_s in RATES:
         timing = {"tick_s": TICK_S, "symbol_period_s": period_s}
         channel = {"rate_baud": 1.0 / period_s}
-        paper = _replayed(file, timing=timing, channel=channel, model=model, duration_s=2.0 * HALF_S)
+        paper = replayed(file, timing=timing, channel=channel, model=model, duration_s=2.0 * HALF_S)
         jobs += [
             Job(f"uiuc-paper-{rate}", "paper-10baud", paper, window_start_s=HALF_S),
             Job(
                 f"uiuc-tuned-{rate}",
                 f"uiuc-{rate}baud",
-                _replayed(file),
+                replayed(file),
                 processes=rate < 50,
                 window_start_s=HALF_S,
                 keep_series=rate == 10,
@@ -103,7 +104,7 @@ def uiuc_jobs(data: Path, model: dict[str, Any]) -> list[Job]:
 
 
 def _words(file: Path, period_s: float) -> Overrides:
-    return _replayed(
+    return replayed(
         file,
         timing={"tick_s": TICK_S, "symbol_period_s": period_s},
         channel={"rate_baud": WORD_BITS / period_s},
@@ -121,7 +122,7 @@ def ntnu_jobs(data: Path, folder: Path) -> list[Job]:
         log = folder / f"{Path(name).stem}-counts.csv"
         seconds = convert_ntnu(data / name, log)
         for preset in ("paper-10baud", "tuned-10baud", "tuned-20baud"):
-            overrides = _replayed(log.resolve(), duration_s=seconds)
+            overrides = replayed(log.resolve(), duration_s=seconds)
             jobs.append(Job(f"{Path(name).stem}-{preset}", preset, overrides, window_start_s=0.0))
     return jobs
 

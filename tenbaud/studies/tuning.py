@@ -51,6 +51,11 @@ CODER_RANGES = {
         "coder.gains.0": (0.2, 3.0, "log"),
         "coder.gains.1": (0.2, 3.0, "log"),
     },
+    "history": {
+        "coder.minimum_range_rad": (0.2, 5.0, "log"),
+        "coder.weights.0": (0.5, 2.0, "log"),
+        "coder.weights.2": (0.5, 2.0, "log"),
+    },
     "static": {"coder.gains.0": (0.1, 5.0, "log"), "coder.gains.1": (0.1, 5.0, "log")},
 }
 """Constants that are fitted unless others are named; log: the ends are multiples of what is set."""

@@ -17,6 +17,7 @@ from pathlib import Path
 
 from channel import numerics, wire
 from channel.codec import Codec
+from channel.coders.history import HistoryCoder, HistoryParameters
 from channel.coders.static import StaticCoder, StaticParameters
 from channel.coders.timed import TimedCoder, TimedParameters
 from channel.coders.words import WordsCoder, WordsParameters
@@ -106,6 +107,19 @@ GOLDEN_CODECS: dict[str, Codec] = {
         PitchModel(PitchParameters(), 0.01), StaticCoder(StaticParameters(bits=3)), 5
     ),
     "words of ten bits": Codec(HoldModel(0.01), WordsCoder(WordsParameters(rate_filter_s=0.03)), 1),
+    "history of three signs": Codec(
+        PitchModel(PitchParameters(), 0.01),
+        HistoryCoder(
+            HistoryParameters(
+                rows=((0.5, 0.3, 0.6), (0.7, 0.9, 1.1), (0.4, 1.1, 0.7), (1.2, 1.0, 1.5)),
+                initial_range=0.1,
+                minimum_range=0.02,
+                maximum_range=0.4,
+                period_s=0.1,
+            )
+        ),
+        10,
+    ),
 }
 
 

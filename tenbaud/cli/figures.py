@@ -53,7 +53,7 @@ def figures(
     drawings = [name for name in which or () if name in DRAWINGS]
     wanted = _wanted([name for name in which or ["all"] if name not in drawings], NUMBERS)
     found = _data(data)
-    # The run's folder is for flights; the pages' drawings leave none, and need it only for want of docs.
+    # A run's folder is for flights; the pages' drawings leave none.
     folder = create_run_folder(None, "figures", out) if wanted or docs is None else docs
     pictures = (docs or folder) / "figures"
     pictures.mkdir(parents=True, exist_ok=True)

@@ -53,7 +53,7 @@ def figures(
     drawings = [name for name in which or () if name in DRAWINGS]
     wanted = _wanted([name for name in which or ["all"] if name not in drawings], NUMBERS)
     found = found_data(data)
-    # The run's folder is for flights; the pages' drawings leave none, and need it only without docs.
+    # A run's folder is for flights; the pages' drawings leave none.
     folder = create_run_folder(None, "figures", out) if wanted or docs is None else docs
     pictures = (docs or folder) / "figures"
     pictures.mkdir(parents=True, exist_ok=True)
@@ -118,7 +118,7 @@ def _wanted(names: list[str], known: tuple[str, ...]) -> set[str]:
 
 
 def found_data(given: Path | None) -> Path | None:
-    """Return the folder of the recorded flights, None without one; ConfigError if it lacks them."""
+    """Return the folder of the recorded flights; ConfigError when it was named and holds none."""
     from tenbaud.config.load import ConfigError
     from tenbaud.figures.real import UIUC_FILE
 

@@ -30,9 +30,8 @@ def test_when_bits_flip_then_only_the_echo_keeps_the_copies_equal() -> None:
 
 @pytest.mark.parametrize("rate", [10, 50])
 def test_when_a_rate_of_the_table_is_flown_then_its_errors_come_out(rate: int) -> None:
-    row = re.search(
-        rf"^\| {rate} bit/s \| ([\d.]+) mrad \| ([\d.]+) mrad \| ([\d.]+) mrad \|", LIMITS, re.M
-    )
+    cells = r"([\d.]+) mrad \| " * 3
+    row = re.search(rf"^\| {rate} bit/s \| {cells}", LIMITS, re.MULTILINE)
     assert row is not None
     floor, paper, tuned = (float(cell) for cell in row.groups())
     assert 1e3 * math.sqrt(0.890 * theory.TORQUE_DENSITY / rate**3) == pytest.approx(floor, abs=0.006)
@@ -41,12 +40,12 @@ def test_when_a_rate_of_the_table_is_flown_then_its_errors_come_out(rate: int) -
 
 
 def floor_of(phase: float) -> float:
-    """Return P11 at 1 bit/s, q = 1, when cos(phase) angle and sin(phase) rate are seen."""
+    """Return P11 at 1 bit/s, q = 1, with cos(phase) of the angle and sin(phase) of the rate seen."""
     from scipy.linalg import solve_continuous_are
 
     plant, torque = np.array([[0.0, 1.0], [0.0, 0.0]]), np.diag([0.0, 1.0])
     low, high = 1e-2, 1e2
-    for _ in range(60):
+    for _ in range(32):
         scale = math.sqrt(low * high)
         seen = scale * np.array([[math.cos(phase), math.sin(phase)]])
         spread = solve_continuous_are(plant.T, seen.T, torque, np.eye(1))
@@ -56,7 +55,7 @@ def floor_of(phase: float) -> float:
 
 
 def test_when_the_floor_is_minimised_then_it_is_the_number_of_the_page() -> None:
-    phases = np.linspace(0.70, 0.83, 14)
+    phases = np.linspace(0.74, 0.79, 5)
     floors = [floor_of(float(phase)) for phase in phases]
     assert min(floors) == pytest.approx(theory.FLOOR_FACTOR, abs=1e-3)
     assert math.tan(phases[int(np.argmin(floors))]) == pytest.approx(0.96, abs=0.03)
@@ -87,10 +86,8 @@ def test_when_the_animation_is_told_then_a_codec_was_spoilt_and_the_line_was_cut
     assert good == ["a common state again: epoch 1", "a common state again: epoch 2"]
     picture = animation.frame_at(story, 16.0)
     assert picture.width > 600
-    reds = sum(
-        1 for red, green, blue in picture.get_flattened_data() if red > 180 > 90 > green + blue // 2
-    )
-    assert reds > 300, "the missing bits are drawn in red"
+    red, green, blue = np.moveaxis(np.asarray(picture).astype(int), 2, 0)
+    assert np.sum((red > 180) & (green < 60) & (blue < 60)) > 300, "the missing bits are drawn in red"
 
 
 @pytest.mark.soak

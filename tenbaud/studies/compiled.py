@@ -31,8 +31,8 @@ OPTIONS = {"fastmath": False, "error_model": "python", "nogil": True}
 BESIDE = ("plots.py", "run.py", "table.py", "tune.py", "tuning.py", "study.py", "settings.py")
 """Modules of the studies that no figure of a flight depends on."""
 
-LOOPS = "tenbaud.studies.lane_ticks"
-"""The module whose functions are loops over lanes, each compiled on its own; see `apart`."""
+LOOPS = ("tenbaud.studies.lane_ticks", "tenbaud.studies.lane_samples")
+"""Modules whose functions are loops over lanes, each compiled on its own; see `apart`."""
 
 Parts = tuple[tuple[str, Any], ...]
 """What stands for the placeholders of the flight: (name, compiled function)."""
@@ -68,7 +68,7 @@ def compiled(function: Callable[..., Any], parts: Parts = (), inline: bool = Fal
         package, _, rest = value.__module__.partition(".")
         if package in PACKAGES:
             ours = rest.startswith("studies")
-            inner = ours and value.__module__ != LOOPS
+            inner = ours and value.__module__ not in LOOPS
             names[name] = compiled(value, parts if ours else (), inner)
     scope = {**function.__globals__, **names}
     copy = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
@@ -76,7 +76,7 @@ def compiled(function: Callable[..., Any], parts: Parts = (), inline: bool = Fal
     # The cache knows a function by its name: with other parts it is another function.
     own = "_".join([function.__qualname__, *(part.__name__ for _, part in parts)])
     copy.__qualname__ = copy.__name__ = own
-    if function.__module__ == LOOPS:
+    if function.__module__ in LOOPS:
         return _jit(copy, pipeline_class=import_module("tenbaud.studies.apart").ApartCompiler)
     return _jit(copy, inline="always" if inline else "never", forceinline=True)
 

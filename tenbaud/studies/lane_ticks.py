@@ -96,3 +96,9 @@ def add_tracking(angle: Any, reference: float, squares: Any, largest: Any) -> No
         error = reference - angle[lane]
         squares[lane] += error * error
         largest[lane] = max(largest[lane], abs(angle[lane]))
+
+
+def keep(values: Any, row: Any) -> None:
+    """Keep one number of every lane."""
+    for lane in range(values.shape[0]):
+        row[lane] = values[lane]

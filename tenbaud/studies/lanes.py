@@ -1,22 +1,28 @@
 """Several flights of one configuration side by side, to be compiled.
 
 The same course as `kernel.fly`, on a line without faults, where nothing but the plant's torque differs
-from lane to lane. What happens once a sample is done lane by lane; what happens at every tick is done
-for all lanes at once (`lane_ticks`). A lane that leaves the ordinary course is flown on, to no purpose,
-and marked. Tests compare lanes with single flights, bit by bit.
+from lane to lane. What happens once a sample is done lane by lane (`lane_samples`); what happens at every
+tick is done for several lanes at once (`lane_ticks`). A lane that leaves the ordinary course is flown
+on, to no purpose, and marked. Tests compare lanes with single flights, bit by bit.
 """
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
-from channel.codec import add_correction, is_estimate
 from tenbaud.studies.flight_data import Given, Numbers
 from tenbaud.studies.lane_data import LaneWork, bare_lanes
-from tenbaud.studies.lane_ticks import add_error, add_tracking, decide, drive, observe, push, watch
-from tenbaud.studies.parts import decode, encode
-from tenbaud.studies.sensor_side import angle_at, count_at, is_stuck
+from tenbaud.studies.lane_samples import close, copy, send, take, watch_closely
+from tenbaud.studies.lane_ticks import (
+    add_error,
+    add_tracking,
+    decide,
+    drive,
+    keep,
+    observe,
+    push,
+    watch,
+)
 from tenbaud.studies.uncounted import bare_given
 
 
@@ -27,24 +33,27 @@ def fly_lanes(numbers: Numbers, constants: Any, given: Given, work: LaneWork) ->
     work = bare_lanes(work)
     age = 0
     for sample in range(given.scored.shape[0]):
-        first = sample * numbers.per_sample
         _guess(sample, numbers, model_constants, coder_constants, given, work)
-        _send(sample, numbers, coder_constants, work)
-        take(sample, work.coders[sample], work.coders[sample + 1], work.models[sample], numbers,
-             coder_constants, work)
+        words = work.sent[sample]
+        send(work.plant, work.coder, work.model, words, work.well, numbers, coder_constants)
+        take(
+            words,
+            work.coders[sample],
+            work.coders[sample + 1],
+            work.models[sample],
+            work.state,
+            work.held,
+            work.correction,
+            numbers,
+            coder_constants,
+        )
         _answer(sample, numbers, model_constants, pid_constants, given, work)
+        first = sample * numbers.per_sample
         for at in range(first, min(first + numbers.per_sample, numbers.ticks)):
-            longest = watch(work.plant[0], work.counts, work.still, at == 0, numbers)
-            if longest >= numbers.watch:
-                _watch_closely(at, numbers, model_constants, given, work)
-            if given.late[at]:
-                age += 1
-                if age > numbers.guard_timeout:
-                    return False
-                work.applied[at + 1] = work.applied[at]
-            else:
-                age = 0
-                drive(work.commanded[at + 1], work.applied[at], work.applied[at + 1], numbers)
+            age = age + 1 if given.late[at] else 0
+            if age > numbers.guard_timeout:
+                return False
+            _act(at, numbers, model_constants, given, work)
             if at >= numbers.window_start:
                 _score(at, sample, numbers, given, work)
             torque = work.torque[at if work.torque.shape[0] > 1 else 0]
@@ -63,50 +72,26 @@ def _guess(
     """Carry the confirmed copy of every lane to a sample's beginning; see `sensor_side.guess`."""
     known = given.known[sample * numbers.per_sample]
     commands = known * numbers.per_sample + numbers.lead
-    work.model[:] = work.models[known]
-    work.coder[:] = work.coders[known]
+    copy(work.models[known], work.model)
+    copy(work.coders[known], work.coder)
     for one in range(known, sample):
-        take(one, work.coder, work.spare, work.model, numbers, coder_constants, work)
-        work.coder[:] = work.spare
+        take(
+            work.sent[one],
+            work.coder,
+            work.spare,
+            work.model,
+            work.state,
+            work.held,
+            work.correction,
+            numbers,
+            coder_constants,
+        )
+        copy(work.spare, work.coder)
         first = one * numbers.per_sample
         for at in range(first, first + numbers.per_sample):
             last = min(at, commands - 1)
             observe(work.state, work.commanded[last + 1], work.held, model_constants)
-        _close(work.model, work)
-
-
-def _send(sample: int, numbers: Numbers, coder_constants: Any, work: LaneWork) -> None:
-    """Form the word of a sample for every lane."""
-    for lane in range(work.well.shape[0]):
-        if not math.isfinite(work.plant[0, lane]):
-            work.well[lane] = False
-            continue
-        angle = angle_at(count_at(work.plant[0, lane], numbers), numbers)
-        encode(
-            coder_constants, work.coder[lane], work.model[lane], (angle,), work.sent[sample, lane]
-        )
-
-
-def take(
-    sample: int,
-    coders: Any,
-    after: Any,
-    models: Any,
-    numbers: Numbers,
-    coder_constants: Any,
-    work: LaneWork,
-) -> None:
-    """Consume a sample's word for every lane: coder states `after`, and the model ready for its ticks."""
-    for lane in range(models.shape[0]):
-        word = work.sent[sample, lane]
-        decode(
-            coder_constants, coders[lane], models[lane], word, False, work.correction, after[lane]
-        )
-        work.state[:, lane] = models[lane]
-        if numbers.impulse:
-            add_correction(work.state[:, lane], work.correction)
-        else:
-            work.held[:, lane] = work.correction
+        close(work.state, work.integral, work.model, work.well)
 
 
 def _answer(
@@ -123,11 +108,11 @@ def _answer(
     state = work.state
     for at in range(first, after + numbers.lead):
         if at == after:
-            _close(work.models[sample + 1], work)
+            close(state, work.integral, work.models[sample + 1], work.well)
         if at < after:
-            work.coded[at] = state[0]
+            keep(state[0], work.coded[at])
         if at >= first + numbers.lead:
-            work.live[at] = state[0]
+            keep(state[0], work.live[at])
             decide(
                 given.reference[at],
                 state[0],
@@ -141,30 +126,29 @@ def _answer(
         held = work.held if at < after else work.nothing
         observe(state, work.commanded[at + 1], held, model_constants)
     if numbers.lead == 0:
-        _close(work.models[sample + 1], work)
+        close(state, work.integral, work.models[sample + 1], work.well)
 
 
-def _close(models: Any, work: LaneWork) -> None:
-    """Keep the state of every lane after a sample, and mark those that are no estimate."""
-    for lane in range(models.shape[0]):
-        models[lane] = work.state[:, lane]
-        if not (is_estimate(models[lane]) and math.isfinite(work.integral[lane])):
-            work.well[lane] = False
-
-
-def _watch_closely(
-    at: int, numbers: Numbers, model_constants: Any, given: Given, work: LaneWork
-) -> None:
-    """Mark the lanes whose encoder would be taken for stuck; see `sensor_side.act`."""
-    start = at - numbers.watch + 1
-    for lane in range(work.well.shape[0]):
-        still = work.still[lane]
-        if still == 0 or still % numbers.watch != 0:
-            continue
-        model = work.models[given.known[start], lane]
-        applied = work.applied[1:, :, lane]
-        if is_stuck(start, at, model, applied, model_constants, work.nothing[:, 0]):
-            work.well[lane] = False
+def _act(at: int, numbers: Numbers, model_constants: Any, given: Given, work: LaneWork) -> None:
+    """Read the encoder and put the tick's command on the motors; see `sensor_side.act`."""
+    longest = watch(work.plant[0], work.counts, work.still, at == 0, numbers)
+    if longest >= numbers.watch:
+        start = at - numbers.watch + 1
+        watch_closely(
+            start,
+            at,
+            work.still,
+            work.models[given.known[start]],
+            work.applied,
+            work.nothing,
+            work.well,
+            numbers,
+            model_constants,
+        )
+    if given.late[at]:
+        copy(work.applied[at], work.applied[at + 1])
+    else:
+        drive(work.commanded[at + 1], work.applied[at], work.applied[at + 1], numbers)
 
 
 def _score(at: int, sample: int, numbers: Numbers, given: Given, work: LaneWork) -> None:

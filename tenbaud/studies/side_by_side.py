@@ -12,11 +12,11 @@ from channel.codec import Codec
 from tenbaud.studies.compiled import compiled, lane_reader, lane_writer, reader
 from tenbaud.studies.figures import FlightFigures
 from tenbaud.studies.flight_data import Errors, Motion
-from tenbaud.studies.flights import CompiledPoint, flight_figures, torque_of
+from tenbaud.studies.flights import NOTHING, CompiledPoint, flight_figures, torque_of
 from tenbaud.studies.lane_data import LaneWork
 from tenbaud.studies.lane_sine import lane_sine
 from tenbaud.studies.lanes import fly_lanes
-from tenbaud.studies.schedule import Schedule
+from tenbaud.studies.schedule import Schedule, Uncommon
 
 LANES = 32
 """Flights side by side: four registers of eight numbers, so that one is worked on while others wait."""
@@ -25,31 +25,22 @@ FEWEST = 6
 """Fewer flights than this are faster one after the other."""
 
 
-def fly_side_by_side(
-    point: CompiledPoint, seeds: Sequence[int]
-) -> tuple[list[FlightFigures | None], LaneWork]:
-    """Fly up to `LANES` seeds; None for those that leave the ordinary course. For `can_share` points.
+MULTIPLE = 8
+"""Lanes of one register; a number of lanes that is no multiple would leave some to be flown alone."""
 
-    The work's lanes hold the states of each flight until the next call.
-    """
-    numbers, codec = point.numbers, point.agreement.codec
-    schedule = point.schedule(point.agreement)
-    work = _work(point, len(seeds))
-    for lane, seed in enumerate(seeds):
-        if work.torque.shape[0] > 1:
-            work.torque[:, lane] = torque_of(point.config, seed, numbers.ticks)
-    given = point.given(schedule, np.zeros(0))
-    try:
-        in_time = _compiled_lanes(codec)(numbers, point.constants, given, work)
-    except ValueError:
-        in_time = False
-    if not in_time:
-        return [None] * len(seeds), work
-    late = int(np.count_nonzero(schedule.late))
-    return [
-        _figures(point, work, schedule, late, lane) if work.well[lane] else None
-        for lane in range(len(seeds))
-    ], work
+
+def fly_seeds(point: CompiledPoint, seeds: Sequence[int]) -> list[FlightFigures | None]:
+    """Fly a point with these seeds; None for flights that only the nodes can fly."""
+    figures: list[FlightFigures | None] = []
+    while seeds and can_share(point) and len(seeds) >= FEWEST:
+        figures += fly_side_by_side(point, seeds[:LANES])[0]
+        seeds = seeds[LANES:]
+    for seed in seeds:
+        try:
+            figures.append(point.fly(seed)[0])
+        except Uncommon:
+            figures.append(None)
+    return figures
 
 
 def can_share(point: CompiledPoint) -> bool:
@@ -58,26 +49,57 @@ def can_share(point: CompiledPoint) -> bool:
     return not (numbers.replay or point.agreement.faults.any or numbers.soft_limit < math.inf)
 
 
-def _figures(
-    point: CompiledPoint, work: LaneWork, schedule: Schedule, late: int, lane: int
-) -> FlightFigures:
+def fly_side_by_side(
+    point: CompiledPoint, seeds: Sequence[int]
+) -> tuple[list[FlightFigures | None], LaneWork]:
+    """Fly up to `LANES` seeds of a point that `can_share`; None for those that leave the common course.
+
+    Also returned is what the lanes, in the order of the seeds, went through.
+    """
+    numbers, codec = point.numbers, point.agreement.codec
+    schedule = point.schedule(point.agreement)
+    work = _work(point, -(-len(seeds) // MULTIPLE) * MULTIPLE)
+    if work.torque.shape[0] > 1:
+        for lane, seed in enumerate(seeds):
+            work.torque[:, lane] = torque_of(point.config, seed, numbers.ticks)
+    given = point.given(schedule, NOTHING)
+    try:
+        in_time = _compiled_lanes(codec)(numbers, point.constants, given, work)
+    except ValueError:
+        in_time = False
+    if not in_time:
+        return [None] * len(seeds), work
+    figures = _figures(point, work, schedule)
+    return [figures[lane] if work.well[lane] else None for lane in range(len(seeds))], work
+
+
+def _figures(point: CompiledPoint, work: LaneWork, schedule: Schedule) -> list[FlightFigures]:
+    """Return the figures of every lane."""
     numbers = point.numbers
     at = np.arange(numbers.window_start, numbers.ticks)
     scored = schedule.scored[at // numbers.per_sample]
-    squares, largest = work.squares[:, lane].tolist(), work.largest[:, lane].tolist()
-    errors = Errors(
-        int(np.count_nonzero(scored)),
-        squares[0],
-        largest[0],
-        int(np.count_nonzero(scored & (at >= numbers.lead))),
-        squares[1],
-        largest[1],
-        len(at),
-        squares[2],
-        largest[2],
-    )
-    motion = Motion(0.0, 0.0, 0, 0, 0, late)
-    return flight_figures(errors, motion, schedule.erasures, len(schedule.scored))
+    coded, live = np.count_nonzero(scored), np.count_nonzero(scored & (at >= numbers.lead))
+    motion = Motion(0.0, 0.0, 0, 0, 0, int(np.count_nonzero(schedule.late)))
+    rows = zip(work.squares.T.tolist(), work.largest.T.tolist(), strict=True)
+    return [
+        flight_figures(
+            Errors(
+                int(coded),
+                squares[0],
+                largest[0],
+                int(live),
+                squares[1],
+                largest[1],
+                len(at),
+                squares[2],
+                largest[2],
+            ),
+            motion,
+            schedule.erasures,
+            len(schedule.scored),
+        )
+        for squares, largest in rows
+    ]
 
 
 def _compiled_lanes(codec: Codec) -> Any:

@@ -10,12 +10,16 @@ same function; `PitchPlant` wraps it for everyday use.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from plant_sim.disturbance import Disturbance
 
 PitchState = tuple[float, float, float, float]
 """Angle (rad), rate (rad/s), lagged front voltage (V), lagged rear voltage (V)."""
+
+Sine = Callable[[float], float]
+"""How a sine is taken; `math.sin` differs in its last bit between C libraries and processors."""
 
 PitchConstants = tuple[float, float, float, float, float, float, float, float]
 """What `pitch_constants` precomputes for `pitch_step`."""
@@ -89,7 +93,11 @@ def pitch_constants(parameters: PitchParameters, step_s: float) -> PitchConstant
 
 
 def pitch_step(
-    state: PitchState, volts: tuple[float, float], torque: float, constants: PitchConstants
+    state: PitchState,
+    volts: tuple[float, float],
+    torque: float,
+    constants: PitchConstants,
+    sine: Sine = math.sin,
 ) -> PitchState:
     """Advance (11), (12) by one step of held `volts` (front, rear) and held `torque` (rad/s^2).
 
@@ -111,13 +119,13 @@ def pitch_step(
     push_end = k_v * (mu_held + mu_excess * left_whole) + torque
 
     half = 0.5 * h
-    k1 = push_start - a_w * omega - a_th * math.sin(theta - theta_0)
+    k1 = push_start - a_w * omega - a_th * sine(theta - theta_0)
     w2 = omega + half * k1
-    k2 = push_middle - a_w * w2 - a_th * math.sin(theta + half * omega - theta_0)
+    k2 = push_middle - a_w * w2 - a_th * sine(theta + half * omega - theta_0)
     w3 = omega + half * k2
-    k3 = push_middle - a_w * w3 - a_th * math.sin(theta + half * w2 - theta_0)
+    k3 = push_middle - a_w * w3 - a_th * sine(theta + half * w2 - theta_0)
     w4 = omega + h * k3
-    k4 = push_end - a_w * w4 - a_th * math.sin(theta + h * w3 - theta_0)
+    k4 = push_end - a_w * w4 - a_th * sine(theta + h * w3 - theta_0)
     return (
         theta + h / 6.0 * (omega + 2.0 * (w2 + w3) + w4),
         omega + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4),
@@ -133,7 +141,7 @@ class PitchPlant:
     same `step_s`. Without one the torque is 0. The motors start at rest.
     """
 
-    __slots__ = ("_constants", "_disturbance", "_state", "_step_index")
+    __slots__ = ("_constants", "_disturbance", "_sine", "_state", "_step_index")
 
     def __init__(
         self,
@@ -142,6 +150,7 @@ class PitchPlant:
         disturbance: Disturbance | None = None,
         initial_angle_rad: float = 0.0,
         initial_rate: float = 0.0,
+        sine: Sine = math.sin,
     ) -> None:
         """Start at `initial_angle_rad` (rad) and `initial_rate` (rad/s), both finite."""
         for name, value in (
@@ -152,6 +161,7 @@ class PitchPlant:
                 raise ValueError(f"{name} is {value}; it must be finite")
         self._constants = pitch_constants(parameters, step_s)
         self._disturbance = disturbance
+        self._sine = sine
         self._state: PitchState = (float(initial_angle_rad), float(initial_rate), 0.0, 0.0)
         self._step_index = 0
 
@@ -187,5 +197,7 @@ class PitchPlant:
             raise ValueError(f"motor voltages are {volts}; they must be finite")
         disturbance = self._disturbance
         torque = 0.0 if disturbance is None else disturbance.torque(self._step_index)
-        self._state = pitch_step(self._state, (front, rear), torque, self._constants)
+        self._state = pitch_step(
+            self._state, (front, rear), torque, self._constants, self._sine
+        )
         self._step_index += 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from channel.numerics import sin
 from plant_sim.disturbance import parse_disturbance
 from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters, PitchPlant
@@ -84,6 +85,8 @@ def build_plant(config: FlightConfig, step_s: float) -> Plant:
         step_s,
         disturbance,
         initial_angle_rad=section.initial_angle_rad,
+        # Not the C library's: a simulated flight is then the same on every machine.
+        sine=sin,
     )
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from channel.codec import Codec
 from channel.coders.base import FunctionCoder
 from channel.flight_log import FlightLog
+from channel.numerics import sin
 from plant_sim.disturbance import parse_disturbance
 from plant_sim.pitch import pitch_constants
 from receiver.controllers.pid import Pid, PidConstants
@@ -26,7 +27,7 @@ from tenbaud.studies.compiled import compiled, reader
 from tenbaud.studies.figures import FlightFigures, shared_parts
 from tenbaud.studies.flight_data import DONE, Errors, Given, Motion, Numbers, Work
 from tenbaud.studies.kernel import fly
-from tenbaud.studies.schedule import Uncommon, schedule_of
+from tenbaud.studies.schedule import Schedule, Uncommon, schedule_of
 from transmitter.encoder_watch import WINDOW_S
 
 NOTHING = np.zeros(0)
@@ -116,21 +117,10 @@ class CompiledPoint:
             agreement = Agreement(
                 config, "virtual", agreement.codec, agreement.terms, agreement.identity
             )
-        if self._clean is None or agreement.faults.any:
-            self._clean = schedule_of(agreement, self._samples, self.numbers.ticks)
-        schedule = self._clean
+        schedule = self.schedule(agreement)
         work = self._work
-        given = Given(
-            np.array([self.config.transmitter.plant.initial_angle_rad, 0.0]),
-            np.array(agreement.codec.coder.alphabet.symbols, dtype=np.int64),
-            schedule.shifts,
-            schedule.known,
-            schedule.late,
-            schedule.scored,
-            self.reference,
-            _torque(agreement.config, self.numbers.ticks),
-            *_recorded(self._log, self._ahead),
-        )
+        torque = torque_of(agreement.config, agreement.config.seed, self.numbers.ticks)
+        given = self.given(schedule, torque)
         flight = _compiled_flight(agreement.codec)
         try:
             status, motion, errors = flight(self.numbers, self.constants, given, work)
@@ -138,8 +128,29 @@ class CompiledPoint:
             raise Uncommon(str(error)) from error
         if status != DONE:
             raise Uncommon("the flight left its ordinary course")
-        figures = _figures(errors, motion, schedule.erasures, self._samples)
+        figures = flight_figures(errors, motion, schedule.erasures, self._samples)
         return figures, Trace(work.models, work.coders, work.coded, work.live, work.front, work.rear)
+
+    def schedule(self, agreement: Agreement) -> Schedule:
+        """Return what the line does; on one without faults the same for all seeds."""
+        if self._clean is None or agreement.faults.any:
+            self._clean = schedule_of(agreement, self._samples, self.numbers.ticks)
+        clean: Schedule = self._clean
+        return clean
+
+    def given(self, schedule: Schedule, torque: Any) -> Given:
+        """Return what a flight reads."""
+        return Given(
+            np.array([self.config.transmitter.plant.initial_angle_rad, 0.0]),
+            np.array(self.agreement.codec.coder.alphabet.symbols, dtype=np.int64),
+            schedule.shifts,
+            schedule.known,
+            schedule.late,
+            schedule.scored,
+            self.reference,
+            torque,
+            *_recorded(self._log, self._ahead),
+        )
 
 
 def _compiled_flight(codec: Codec) -> Any:
@@ -151,6 +162,7 @@ def _compiled_flight(codec: Codec) -> Any:
         ("decode", compiled(decode)),
         ("state_of", reader(codec.model.state_size)),
         ("held_of", reader(codec.model.correction_size)),
+        ("sine", compiled(sin)),
     )
     return compiled(fly, parts)
 
@@ -247,12 +259,13 @@ def _recorded_flight(section: str, changed: int) -> FlightLog:
     return read_flight_log(FlightConfig(flight_log=log))
 
 
-def _torque(config: FlightConfig, ticks: int) -> Any:
+def torque_of(config: FlightConfig, seed: int, ticks: int) -> Any:
+    """Return the torque of every tick; empty without a disturbance."""
     text = config.transmitter.plant.disturbance
     if not text or config.transmitter.rig == "replay":
         return NOTHING
     try:
-        return parse_disturbance(text, config.timing.tick_s, config.seed).torques(ticks)
+        return parse_disturbance(text, config.timing.tick_s, seed).torques(ticks)
     except ValueError as error:
         raise ConfigError(f"transmitter.plant.disturbance: {error}") from error
 
@@ -267,7 +280,8 @@ def _recorded(log: FlightLog | None, ahead: int) -> tuple[Any, Any, Any]:
     return counts, commands, np.array(log.volts, dtype=float)
 
 
-def _figures(errors: Errors, motion: Motion, erasures: int, samples: int) -> FlightFigures:
+def flight_figures(errors: Errors, motion: Motion, erasures: int, samples: int) -> FlightFigures:
+    """Return what a study keeps of a compiled flight."""
     return FlightFigures(
         outcome="ok",
         engine="compiled",

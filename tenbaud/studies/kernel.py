@@ -21,7 +21,7 @@ from channel.limits import as_carried, limited
 from plant_sim.pitch import pitch_step
 from receiver.controllers.pid import motor_volts, pid_integral, pid_volts
 from tenbaud.studies.flight_data import DONE, LEFT, Errors, Given, Motion, Numbers, Work
-from tenbaud.studies.parts import decode, encode, held_of, state_of, tick
+from tenbaud.studies.parts import decode, encode, held_of, sine, state_of, tick
 from tenbaud.studies.sensor_side import act, angle_at, count_at, guess, score
 from tenbaud.studies.uncounted import bare_given, bare_work
 
@@ -93,7 +93,8 @@ def fly(
                 errors = score(at, sample, angle, errors, numbers, given, work)
             if not numbers.replay:
                 torque = given.torque[at] if given.torque.shape[0] > 0 else 0.0
-                plant = pitch_step(plant, (motion.front, motion.rear), torque, plant_constants)
+                volts = (motion.front, motion.rear)
+                plant = pitch_step(plant, volts, torque, plant_constants, sine)
     return DONE, motion, errors
 
 

@@ -76,8 +76,11 @@ def act(
     counts = given.counts[at] if numbers.replay else count_at(angle, numbers)
     still = motion.still + 1 if at > 0 and counts == motion.counts else 0
     window_over = still > 0 and still % numbers.watch == 0
-    if window_over and _stuck(at, numbers, model_constants, given, work):
-        return False, motion
+    if window_over:
+        start = at - numbers.watch + 1
+        model = work.models[given.known[start]]
+        if is_stuck(start, at, model, work.applied, model_constants, work.nothing):
+            return False, motion
     if numbers.soft_limit < math.inf and abs(angle_at(counts, numbers)) > numbers.soft_limit:
         return False, motion
     front, rear, age, late = motion.front, motion.rear, motion.age, motion.late
@@ -99,21 +102,18 @@ def act(
     return True, Motion(front, rear, counts, still, age, late)
 
 
-def _stuck(
-    at: int,
-    numbers: Numbers,
-    model_constants: Any,
-    given: Given,
-    work: Work,
+def is_stuck(
+    start: int, at: int, model: Any, applied: Any, model_constants: Any, nothing: Any
 ) -> bool:
-    """Return whether the encoder watch would take the encoder for stuck at the end of a window."""
-    start = at - numbers.watch + 1
-    held = held_of(work.nothing)
-    state = state_of(work.models[given.known[start]])
+    """Return whether the encoder watch would take the encoder for stuck at the end of a window.
+
+    `model` is the state confirmed at the window's first tick, `applied` the voltages of each tick.
+    """
+    held = held_of(nothing)
+    state = state_of(model)
     angle = state[0]
     for one in range(start, at + 1):
-        volts = (work.applied[one - 1, 0], work.applied[one - 1, 1])
-        state = tick(state, volts, held, model_constants)
+        state = tick(state, (applied[one - 1, 0], applied[one - 1, 1]), held, model_constants)
     return not -MOTION_RAD < state[0] - angle < MOTION_RAD
 
 

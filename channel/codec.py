@@ -135,6 +135,8 @@ class Codec:
         self.model = model
         self.coder = coder
         self.ticks_per_sample = ticks_per_sample
+        # A coder from outside that has never heard of rates does without.
+        self.uses_rates: bool = getattr(coder, "uses_rates", False)
         self.nothing_held: Vector = (0.0,) * model.correction_size
         self._layout = struct.Struct(f"<q{model.state_size + len(coder.initial())}d")
 
@@ -147,7 +149,7 @@ class Codec:
 
         For a coder that uses rates, the measurement holds one value per corrected state.
         """
-        if self.coder.uses_rates:
+        if self.uses_rates:
             predicted = state.model[: self.model.correction_size]
         else:
             predicted = self.model.measured(state.model)

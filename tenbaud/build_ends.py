@@ -64,7 +64,7 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
 def build_sight(agreement: Agreement) -> Sight | None:
     """Return what gives a coder its rates, None for one that does without."""
     codec = agreement.codec
-    if not codec.coder.uses_rates:
+    if not codec.uses_rates:
         return None
     tick_s = agreement.terms.tick_ns / 1e9
     try:

@@ -37,8 +37,15 @@ GAP_CHANNEL = RecordChannel(
     (
         Field("sample", "integer", "", "index of the sample"),
         Field("strength_rad2_per_s3", "number", "rad^2/s^3", "density q of the disturbing torque"),
-        Field("rms_over_floor", "number", "", "running rms of the live error over the least possible"),
-        Field("ideal_bits", "number", "bit", "that an ideal code would have needed for that error"),
+        # Which errors have come by then depends on when echoes came.
+        Field(
+            "rms_over_floor",
+            "number",
+            "",
+            "running rms of the live error over its floor",
+            timing=True,
+        ),
+        Field("ideal_bits", "number", "bit", "an ideal code's, for the same error", timing=True),
     ),
 )
 GAP_EVERY_S = 1.0

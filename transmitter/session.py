@@ -103,9 +103,7 @@ class TransmitterSession:
         self._asking = Asking(identity, incarnation, terms)
         self._claims = Claims(terms)
         self._stop_on_desync = stop_on_desync
-        self._sight = (
-            (sight or Sight(codec.model, terms.tick_ns / 1e9)) if codec.coder.uses_rates else None
-        )
+        self._sight = (sight or Sight(codec.model, terms.tick_ns / 1e9)) if codec.uses_rates else None
         self._recorder = recorder or NullRecorder()
         self._due: deque[tuple[int, Vector]] = deque(
             enumerate([terms.initial_command] * terms.lead_ticks)

@@ -179,7 +179,7 @@ def _require_ordinary(config: FlightConfig, codec: Codec) -> None:
     model, coder = codec.model, codec.coder
     if not (hasattr(model, "tick_function") and isinstance(coder, FunctionCoder)):
         raise Uncommon("a model or coder that is not written as functions")
-    if coder.uses_rates:
+    if codec.uses_rates:
         raise Uncommon("a coder that is shown rates, which the transmitter's observer finds")
 
 

@@ -34,8 +34,8 @@ def test_when_two_rigs_fly_at_once_then_each_has_its_own_codec_and_folder(tmp_pa
         assert rig.session.counts["desyncs"] == rig.session.counts["erasures"] == 0
         summary = room.summary(rig.name)
         assert summary["exit_code"] == 0
-        # A tick row for each of ten ticks, a sample row, and the begin and the end.
-        assert summary["recording_rows"] == 11 * summary["samples"] + 2
+        # A row for each of ten ticks, the symbol, the sample; the begin, the epoch, the end.
+        assert summary["recording_rows"] == 12 * summary["samples"] + 3
         assert summary["recording_rows_lost"] == 0
     names = sorted(path.name for path in (tmp_path / "rig-1").iterdir())
     assert names == ["config.toml", "receiver.mcap", "summary.json"]

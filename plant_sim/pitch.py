@@ -197,7 +197,5 @@ class PitchPlant:
             raise ValueError(f"motor voltages are {volts}; they must be finite")
         disturbance = self._disturbance
         torque = 0.0 if disturbance is None else disturbance.torque(self._step_index)
-        self._state = pitch_step(
-            self._state, (front, rear), torque, self._constants, self._sine
-        )
+        self._state = pitch_step(self._state, (front, rear), torque, self._constants, self._sine)
         self._step_index += 1

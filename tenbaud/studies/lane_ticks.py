@@ -14,8 +14,9 @@ from channel.limits import as_carried, limited
 from plant_sim.encoder import counts_of
 from plant_sim.pitch import pitch_step
 from receiver.controllers.pid import motor_volts, pid_integral, pid_volts
-from tenbaud.studies.parts import keep_state, lane_held, lane_state, sine, tick
 from tenbaud.studies.flight_data import Numbers
+from tenbaud.studies.parts import keep_state, lane_held, lane_state, sine, tick
+
 
 def observe(state: Any, volts: Any, held: Any, constants: Any) -> None:
     """Advance the model of every lane by one tick."""

@@ -102,9 +102,7 @@ def act(
     return True, Motion(front, rear, counts, still, age, late)
 
 
-def is_stuck(
-    start: int, at: int, model: Any, applied: Any, model_constants: Any, nothing: Any
-) -> bool:
+def is_stuck(start: int, at: int, model: Any, applied: Any, model_constants: Any, nothing: Any) -> bool:
     """Return whether the encoder watch would take the encoder for stuck at the end of a window.
 
     `model` is the state confirmed at the window's first tick, `applied` the voltages of each tick.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from tenbaud.config.schema import FlightConfig
 from tenbaud.studies.compiled import sources_digest
@@ -57,24 +57,19 @@ def fly_chunk(task: ChunkTask) -> ChunkResult:
 def _fly_point(config: FlightConfig, seeds: tuple[int, ...], engine: str) -> list[FlightFigures]:
     from tenbaud.studies.plain import fly_plain
 
-    point: Any = None
+    flown: list[FlightFigures | None] = [None] * len(seeds)
     if engine != "plain":
         from tenbaud.studies.flights import CompiledPoint
         from tenbaud.studies.schedule import Uncommon
+        from tenbaud.studies.side_by_side import fly_seeds
 
         try:
-            point = CompiledPoint(config)
+            flown = fly_seeds(CompiledPoint(config), seeds)
         except Uncommon as error:
             if engine == "compiled":
                 raise StudyError(f'engine = "compiled" cannot fly {error}; use auto') from error
-    figures = []
-    for seed in seeds:
-        flown = None
-        if point is not None:
-            try:
-                flown = point.fly(seed)[0]
-            except Uncommon:
-                # Some flights leave the common course: the nodes themselves fly them, slowly.
-                flown = None
-        figures.append(flown or fly_plain(config.model_copy(update={"seed": seed})))
-    return figures
+    # Some flights leave the common course: the nodes themselves fly them, slowly.
+    return [
+        figures or fly_plain(config.model_copy(update={"seed": seed}))
+        for figures, seed in zip(flown, seeds, strict=True)
+    ]

@@ -46,47 +46,18 @@ def fly(
     work.front[: numbers.lead] = numbers.initial_front
     work.rear[: numbers.lead] = numbers.initial_rear
     for sample in range(given.scored.shape[0]):
-        first = sample * numbers.per_sample
-        known = given.known[first]
-        work.model[:] = work.models[known]
-        work.coder[:] = work.coders[known]
-        good = True
-        if known < sample:
-            good = guess(
-                sample,
-                numbers,
-                model_constants,
-                coder_constants,
-                given,
-                work,
-            )
-        counts = given.counts[first] if numbers.replay else count_at(plant[0], numbers)
-        _send(sample, angle_at(counts, numbers), coder_constants, work)
+        well = _measure(sample, plant[0], numbers, model_constants, coder_constants, given, work)
         erased = _receive(sample, given, work)
         held = _open(sample, erased, numbers, coder_constants, work)
         answered, integral = _answer(
-            sample,
-            held,
-            integral,
-            numbers,
-            model_constants,
-            pid_constants,
-            given,
-            work,
+            sample, held, integral, numbers, model_constants, pid_constants, given, work
         )
-        if not (good and answered):
+        if not (well and answered):
             return LEFT, motion, errors
+        first = sample * numbers.per_sample
         for at in range(first, min(first + numbers.per_sample, numbers.ticks)):
-            good, motion = act(
-                at,
-                plant[0],
-                motion,
-                numbers,
-                model_constants,
-                given,
-                work,
-            )
-            if not good:
+            well, motion = act(at, plant[0], motion, numbers, model_constants, given, work)
+            if not well:
                 return LEFT, motion, errors
             if at >= numbers.window_start:
                 angle = angle_at(motion.counts, numbers) if numbers.replay else plant[0]
@@ -96,6 +67,28 @@ def fly(
                 volts = (motion.front, motion.rear)
                 plant = pitch_step(plant, volts, torque, plant_constants, sine)
     return DONE, motion, errors
+
+
+def _measure(
+    sample: int,
+    angle: float,
+    numbers: Numbers,
+    model_constants: Any,
+    coder_constants: Any,
+    given: Given,
+    work: Work,
+) -> bool:
+    """Measure at a sample's beginning and send its word; return whether the estimate is one."""
+    first = sample * numbers.per_sample
+    known = given.known[first]
+    work.model[:] = work.models[known]
+    work.coder[:] = work.coders[known]
+    well = True
+    if known < sample:
+        well = guess(sample, numbers, model_constants, coder_constants, given, work)
+    counts = given.counts[first] if numbers.replay else count_at(angle, numbers)
+    _send(sample, angle_at(counts, numbers), coder_constants, work)
+    return well
 
 
 def _send(sample: int, angle: float, coder_constants: Any, work: Work) -> None:

@@ -49,6 +49,11 @@ def can_share(point: CompiledPoint) -> bool:
     return not (numbers.replay or point.agreement.faults.any or numbers.soft_limit < math.inf)
 
 
+def machine_code(point: CompiledPoint) -> list[str]:
+    """Return what the flights were compiled to, for whoever wants to read it."""
+    return list(_compiled_lanes(point.agreement.codec).inspect_asm().values())
+
+
 def fly_side_by_side(
     point: CompiledPoint, seeds: Sequence[int]
 ) -> tuple[list[FlightFigures | None], LaneWork]:

@@ -20,10 +20,12 @@ from channel.errors import TenbaudError
 from plant_sim.encoder import angle_of
 from tenbaud.config.load import load_config
 from tenbaud.config.schema import FlightConfig
+from tenbaud.studies.figures import FlightFigures
 from tenbaud.studies.flights import CompiledPoint, recorded_flight
 from tenbaud.studies.plain import fly_plain
 from tenbaud.studies.schedule import Uncommon
 from tenbaud.studies.settings import StudyError, check_name, configured
+from tenbaud.studies.side_by_side import fly_seeds
 from tenbaud.studies.study import Range
 
 Method = Literal["differential-evolution", "nelder-mead"]
@@ -246,22 +248,18 @@ def _error(tuning: Tuning, values: dict[str, float], *, train: bool) -> float:
     seeds = tuning.split.train_seeds if train else tuning.split.test_seeds
     squares = 0.0
     try:
-        point: CompiledPoint | None = CompiledPoint(config)
+        flown = fly_seeds(CompiledPoint(config), seeds)
     except Uncommon:
-        point = None
-    for seed in seeds:
-        rms = _simulated_rms(config, point, seed)
+        flown = [None] * len(seeds)
+    for seed, figures in zip(seeds, flown, strict=True):
+        rms = _simulated_rms(config, figures, seed)
         squares += min(rms * rms, PENALTY_RAD * PENALTY_RAD) if math.isfinite(rms) else PENALTY_RAD**2
     return math.sqrt(squares / len(seeds))
 
 
-def _simulated_rms(config: FlightConfig, point: CompiledPoint | None, seed: int) -> float:
-    if point is not None:
-        try:
-            return point.fly(seed)[0].error_live_rms
-        except Uncommon:
-            pass
-    figures = fly_plain(config.model_copy(update={"seed": seed}))
+def _simulated_rms(config: FlightConfig, figures: FlightFigures | None, seed: int) -> float:
+    if figures is None:
+        figures = fly_plain(config.model_copy(update={"seed": seed}))
     return figures.error_live_rms if figures.outcome == "ok" else math.inf
 
 

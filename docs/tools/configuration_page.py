@@ -86,7 +86,8 @@ def _section(name: str, model: type[BaseModel], kind: str = "") -> Iterator[str]
         yield "No fields but `kind`.\n"
     for path, section in inner:
         known = [tag for tag, model_ in KINDS.get(path, {}).items() if model_ is section]
-        yield from _section(path, section, known[0] if known else "")
+        plain = path not in KINDS
+        yield from _section(path, section, "" if plain else known[0] if known else "module:Class")
 
 
 def _row(field: str, info: FieldInfo, meaning: str) -> str:
@@ -94,7 +95,7 @@ def _row(field: str, info: FieldInfo, meaning: str) -> str:
     cells = [
         f"`{field}`",
         unit,
-        _default(info.default),
+        _default(info.get_default(call_default_factory=True)),
         _allowed(info.annotation, info.metadata),
         meaning,
     ]
@@ -104,6 +105,8 @@ def _row(field: str, info: FieldInfo, meaning: str) -> str:
 def _default(value: object) -> str:
     if value is None:
         return "none"
+    if isinstance(value, dict):
+        return "`{}`" if not value else f"`{value}`"
     if isinstance(value, tuple):
         return "`[" + ", ".join(_plain(item) for item in value) + "]`"
     return f"`{_plain(value)}`"
@@ -127,6 +130,8 @@ def _allowed(annotation: Any, metadata: list[Any]) -> str:
         return ", ".join(f"`{_plain(value)}`" for value in get_args(annotation))
     if get_origin(annotation) is tuple:
         return _allowed_list(get_args(annotation))
+    if get_origin(annotation) is dict:
+        return "table"
     names = {
         float: "number",
         int: "whole number",

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from channel.frames import (
     Bye,
+    Claim,
     Commands,
     Desync,
     Echo,
@@ -126,6 +127,10 @@ FRAMES: dict[str, tuple[Frame, tuple[Field, ...]]] = {
     ),
     "bye": (Bye(SESSION, "over"), (Field("reason", "text", "for people"),)),
     "unknown": (Unknown(SESSION, EPOCH), ()),
+    "claim": (
+        Claim(SESSION, EPOCH, 0x5E6F7081),
+        (Field("by", "u32", "session of the receiver that takes over"),),
+    ),
 }
 
 
@@ -174,7 +179,7 @@ def _size(field: Field, message: bytes, offset: int) -> int:
 def _value(field: Field, part: bytes) -> str:
     if field.type in NUMBERS:
         number = struct.unpack(NUMBERS[field.type], part)[0]
-        large = field.name in ("session", "incarnation", "digest", "CRC") or field.name.endswith(
+        large = field.name in ("session", "incarnation", "digest", "CRC", "by") or field.name.endswith(
             "_digest"
         )
         return f"0x{number:0{2 * len(part)}X}" if large else str(number)

@@ -10,7 +10,8 @@ PAGE: Final = """\
 What R bit/s are worth at best, what the paper's coder makes of them, and what this project's does.
 This page and its pictures are written by
 
-```
+<!-- test: skip, minutes of flights and recorded data that are no part of the repository -->
+```sh
 tenbaud bench coders{flag} --docs docs --data ../shared/data
 ```
 

@@ -158,6 +158,17 @@ def _volts(axis: int) -> Maker:
     return make
 
 
+def _gap(source: Source) -> Series | None:
+    """Return the gap gauge, each value held until the next one."""
+    table = None if source.transmitter is None else source.transmitter.topics.get("gap")
+    if table is None or not len(table):
+        return None
+    samples = source.base.ticks // source.base.ticks_per_sample
+    last = np.searchsorted(table["sample"], samples, side="right") - 1
+    held: Series = np.where(last < 0, np.nan, table["rms_over_floor"][np.maximum(last, 0)])
+    return held
+
+
 def _erased(source: Source) -> Series | None:
     for end in (source.transmitter, source.receiver):
         table = None if end is None else end.topics.get("sample")
@@ -211,5 +222,6 @@ SIGNALS: tuple[tuple[str, str, str, Maker], ...] = (
         _ticks("transmitter", "tick", "late", None),
     ),
     ("lateness", "ms", "how late the tick began", _ticks("transmitter", "tick", "lateness_ms", None)),
+    ("gap_to_floor", "", "running rms of the live error over the least possible", _gap),
 )
 """Name, unit, meaning and where it comes from. The order is that of the converted files."""

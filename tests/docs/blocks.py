@@ -1,7 +1,7 @@
 """Finds the command blocks of the Markdown pages, and what is written above them for the tests.
 
 A block of commands is fenced as `sh` (every line is a command) or as `console` (lines after `$ ` are
-commands, the others what they say). A comment right above the fence may say how it is run:
+commands, the others what they say); one fenced as `python` is run by a fresh interpreter. A comment right above the fence may say how it is run:
 
     <!-- test: skip, needs a serial port -->      not here, for this reason
     <!-- test: soak, ten minutes of flights -->   with the long tests only
@@ -9,6 +9,9 @@ commands, the others what they say). A comment right above the fence may say how
     <!-- test: exit=5 -->                         is to end with this exit code
 
 Several may be given, between semicolons. `skip` and `soak` need a reason.
+
+A fence with a title, such as `sh title="desk"`, is typed in on the machine that the title names. Every
+block of such a page has one; `tests/network/test_pages.py` runs them, on machines made of namespaces.
 """
 
 from __future__ import annotations
@@ -19,9 +22,10 @@ from pathlib import Path
 
 from tests.rules.sources import TOP
 
-RUN_LANGUAGES = ("sh", "console")
+RUN_LANGUAGES = ("sh", "console", "python")
 NOTE = re.compile(r"^\s*<!--\s*test:\s*(.*?)\s*-->\s*$")
-FENCE = re.compile(r"^(?P<indent>\s*)```(?P<language>[\w-]*)\s*$")
+FENCE = re.compile(r'^(?P<indent>\s*)```(?P<language>[\w-]*)(?:\s+title="(?P<title>[^"]*)")?\s*$')
+ANY_FENCE = re.compile(r"^\s*(?:```|~~~)")
 COMMAND = re.compile(r"^\s*(?:\$ )?(?:tenbaud|make|python3? -m|pip|uvx?|pytest|sudo)(?:\s+[\w.'\"-]|$)")
 """What looks like a command, wherever it stands."""
 
@@ -45,6 +49,13 @@ class Block:
     """why it runs with the long tests only"""
     background: bool = False
     exit_code: int = 0
+    title: str = ""
+    """the machine that it is typed in on, and after a colon how; empty: this one"""
+
+    @property
+    def machine(self) -> str:
+        """Return the name of the machine in its title."""
+        return self.title.partition(":")[0]
 
     @property
     def name(self) -> str:
@@ -57,14 +68,14 @@ class Block:
     @property
     def script(self) -> str:
         """Return its commands."""
-        if self.language == "sh":
+        if self.language != "console":
             return self.text
         return "\n".join(line[2:] for line in self.text.splitlines() if line.startswith("$ "))
 
     @property
     def promised(self) -> list[str]:
         """Return the lines of output that it shows, without those that are left out by `...`."""
-        if self.language == "sh":
+        if self.language != "console":
             return []
         lines = [line for line in self.text.splitlines() if not line.startswith("$ ")]
         return [line for line in lines if line.strip() not in ("", "...")]
@@ -100,10 +111,13 @@ def parse(text: str, page: str) -> list[Block]:
             content = [
                 one[indent:] if one[:indent].isspace() else one for one in lines[index + 1 : end]
             ]
+            settings = _settings(note, page) | {"title": fence["title"] or ""}
             found.append(
-                Block(page, index + 2, fence["language"], "\n".join(content), **_settings(note, page))
+                Block(page, index + 2, fence["language"], "\n".join(content), **settings)  # type: ignore[arg-type]
             )
             note, index = "", end
+        elif ANY_FENCE.match(line):
+            raise NoteError(f"{page}:{index + 1}: a fence of a form that the tests do not read: {line}")
         elif line.strip():
             note = _unused(note, page, index)
         index += 1

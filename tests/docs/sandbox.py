@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import shutil
 import signal
 import subprocess
@@ -25,9 +26,13 @@ LEFT_OUT = (".git", ".venv", "runs", "site", "dist", "build", "*.egg-info", ".*_
 COMMANDS = {"tenbaud": "-m tenbaud", "python": "", "python3": "", "pytest": "-m pytest"}
 COMMANDS |= {name: f"-m {name}" for name in ("ruff", "mypy", "mkdocs")}
 LOOPBACK_PORT = re.compile(r"(?<=127\.0\.0\.1:)(\d+)\b|(?<=localhost:)(\d+)\b")
+VIEW_PORT = 8710
 BLOCK_TIMEOUT_S = 150.0
 STARTED_WITHIN_S = 20.0
 ENDED_WITHIN_S = 15.0
+SETTLED_WITHIN_S = 4.0
+LEFT_ALONE_S = 1.5
+"""How long a block in the background may take to end by itself before Ctrl-C is pressed."""
 
 
 class BlockFailed(AssertionError):
@@ -41,6 +46,7 @@ class Sandbox:
     folder: Path
     timeout_s: float = BLOCK_TIMEOUT_S
     ports: dict[str, str] = field(default_factory=dict)
+    _settled: bool = True
     _background: list[tuple[Block, subprocess.Popen[str], Path]] = field(default_factory=list)
 
     def __enter__(self) -> Sandbox:
@@ -48,6 +54,11 @@ class Sandbox:
         shutil.copytree(TOP, self.top, ignore=shutil.ignore_patterns(*LEFT_OUT), symlinks=True)
         (self.folder / "home").mkdir()
         self._exchange_default_port()
+        for name in ("demo", "view"):  # the live page's port: any free one
+            path = self.top / "tenbaud" / "cli" / f"{name}.py"
+            text = path.read_text()
+            assert f" = {VIEW_PORT}" in text
+            path.write_text(text.replace(f" = {VIEW_PORT}", " = 0"))
         programs = self.top / ".venv" / "bin"
         programs.mkdir(parents=True)
         for name, how in COMMANDS.items():
@@ -67,9 +78,12 @@ class Sandbox:
     def run(self, block: Block) -> str:
         """Type a block in; return what it says. BlockFailed if it is not what the page says."""
         script = LOOPBACK_PORT.sub(self._free_port, block.script)
+        if block.language == "python":
+            script = f"exec python -c {shlex.quote(script)}"
         if block.background:
             self._start(block, script)
             return ""
+        self._settled = False
         process = self._popen(script, subprocess.PIPE)
         try:
             said, _ = process.communicate(timeout=self.timeout_s)
@@ -83,7 +97,7 @@ class Sandbox:
     def end(self) -> None:
         """Wait for what runs in the background, then press Ctrl-C; BlockFailed if that went wrong."""
         for block, process, output in self._background:
-            interrupted = not _ends(process, 3.0)
+            interrupted = not _ends(process, LEFT_ALONE_S)
             if interrupted:
                 os.killpg(process.pid, signal.SIGINT)
             if not _ends(process, ENDED_WITHIN_S):
@@ -93,8 +107,11 @@ class Sandbox:
                 self._check(block, code, output.read_text())
 
     def _start(self, block: Block, script: str) -> None:
-        for _, earlier, _ in self._background:
-            _ends(earlier, 3.0)
+        if not self._settled:  # what the last command brought to its end may still hold a port
+            until = time.monotonic() + SETTLED_WITHIN_S
+            for _, earlier, _ in self._background:
+                _ends(earlier, max(0.0, until - time.monotonic()))
+            self._settled = True
         output = self.folder / f"background-{len(self._background)}.txt"
         with output.open("w") as stream:
             process = self._popen(script, stream)

@@ -16,13 +16,19 @@ from tests.docs.sandbox import BlockFailed, Sandbox
 
 ELSEWHERE = ("README.md",)
 """Walked by `test_newcomer.py`, which looks at what comes of it as well."""
+ON_MACHINES = ("docs/two-machines.md", "docs/router.md")
+"""Walked by `tests/network/test_pages.py`, each block on the machine that its title names."""
 RUN = {page: [block for block in blocks_of(page) if block.runs] for page in pages()}
 NORMAL = [
     page
     for page, blocks in RUN.items()
-    if page not in ELSEWHERE and any(not (one.skip or one.soak) for one in blocks)
+    if page not in (*ELSEWHERE, *ON_MACHINES) and any(not (one.skip or one.soak) for one in blocks)
 ]
-LONG = [page for page, blocks in RUN.items() if any(one.soak and not one.skip for one in blocks)]
+LONG = [
+    page
+    for page, blocks in RUN.items()
+    if page not in ON_MACHINES and any(one.soak and not one.skip for one in blocks)
+]
 NOT_RUN = [block for blocks in RUN.values() for block in blocks if block.skip]
 
 
@@ -68,6 +74,14 @@ def test_when_the_pages_are_collected_then_the_readme_and_the_docs_are_among_the
     assert sum(len(blocks) for blocks in RUN.values()) > 30
 
 
+def test_when_a_block_has_a_title_then_its_page_is_one_that_is_walked_on_machines() -> None:
+    titled = {page for page, blocks in RUN.items() if any(one.title for one in blocks)}
+    assert titled == set(ON_MACHINES)
+    for page in ON_MACHINES:
+        assert all(block.title for block in RUN[page]), f"{page}: a block that names no machine"
+        assert not any(block.soak for block in RUN[page]), f"{page}: nothing runs a block for soak there"
+
+
 def unknown_words(block: Block) -> list[str]:
     """Return the verbs and options of a block that `tenbaud` does not know."""
     page = commands_page()
@@ -101,6 +115,7 @@ def block_of(text: str) -> Block:
         ("<!-- test: skip, needs a rig -->\n```sh\ntrue\n```", {"skip": "needs a rig"}),
         ("<!-- test: soak, an hour -->\n\n```sh\ntrue\n```", {"soak": "an hour"}),
         ("<!-- test: background; exit=5 -->\n```sh\ntrue\n```", {"background": True, "exit_code": 5}),
+        ('<!-- test: background -->\n```sh title="a: b"\ntrue\n```', {"title": "a: b", "machine": "a"}),
     ],
 )
 def test_when_a_note_stands_above_a_block_then_it_is_understood(
@@ -117,6 +132,8 @@ def test_when_a_note_stands_above_a_block_then_it_is_understood(
         "<!-- test: sometimes -->\n```sh\ntrue\n```",
         "<!-- test: soak, long -->\n\nSome text.\n\n```sh\ntrue\n```",
         "```sh\ntrue\n",
+        "```sh hl_lines=1\ntrue\n```",
+        "~~~sh\ntrue\n~~~",
     ],
 )
 def test_when_a_note_or_a_fence_is_wrong_then_it_is_told(text: str) -> None:
@@ -126,7 +143,7 @@ def test_when_a_note_or_a_fence_is_wrong_then_it_is_told(text: str) -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["```\ntenbaud demo\n```", "Text:\n\n    tenbaud demo\n", "```text\nmake test\n```"],
+    ['```text title="desk"\ntenbaud demo\n```', "```\ntenbaud demo\n```", "Text:\n\n    tenbaud demo\n", "```text\nmake test\n```"],
 )
 def test_when_a_command_stands_where_nobody_runs_it_then_it_is_told(text: str) -> None:
     assert stray_commands(text, "a.md")
@@ -141,7 +158,9 @@ def test_when_a_command_that_is_not_run_has_an_unknown_word_then_it_is_told(scri
 def test_when_a_block_fails_or_says_something_else_then_the_page_fails(tmp_path: Path) -> None:
     with Sandbox(tmp_path) as sandbox:
         sandbox.run(block_of("```console\n$ echo one; echo two\n...\ntwo\n```"))
+        assert sandbox.run(block_of('```python\nprint("a", \'b\')\n```')) == "a b\n"
         for text in (
+            "```python\nraise SystemExit(1)\n```",
             "```sh\nfalse\ntrue\n```",
             "<!-- test: exit=3 -->\n```sh\ntrue\n```",
             "```console\n$ echo one\ntwo\n```",

@@ -1,9 +1,9 @@
 """Runs the command blocks of a page, in order, each on the machine that its title names.
 
-    ```sh title="desk"                            runs to its end, which must be a success
-    ```sh title="desk: in a terminal of its own"  stays running; looked at when the page is through
-    ```sh title="hub: ..., until Ctrl-C"          the same, and is interrupted then
-    ```sh title="desk: firewall" (or another word) left out; a test says which those are and why
+    ```sh title="desk"                             runs to its end, which must be a success
+    <!-- test: background -->                      stays running; looked at when the page is through
+    ```sh title="hub: ..., until Ctrl-C"           the same, and is interrupted then
+    <!-- test: skip, REASON -->                    left out
 
 A machine is a namespace with a home folder of its own. `scp` copies between homes, as it would between
 machines; `tenbaud` is this checkout's.
@@ -12,7 +12,6 @@ machines; `tenbaud` is this checkout's.
 from __future__ import annotations
 
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -21,15 +20,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tests.docs.blocks import Block, blocks_of
 from tests.network.flights import environment
 from tests.network.namespaces import Machine
-from tests.tenbaud.processes import REPOSITORY
 
-_BLOCK = re.compile(
-    r'^```sh title="(?P<machine>\w+)(?:: (?P<how>[^"]*))?"\n(?P<text>.*?)^```', re.M | re.S
-)
-_ANY_BLOCK = re.compile(r"^```\w", re.M)
-OWN_TERMINAL = "in a terminal of its own"
 UNTIL_INTERRUPT = "until Ctrl-C"
 
 _TENBAUD = '#!/bin/sh\nexec "{python}" -m tenbaud "$@"\n'
@@ -40,32 +34,15 @@ exec cp -pr "$2" "{homes}/${{3%%:*}}/${{3#*:}}"
 """
 
 
-@dataclass(frozen=True)
-class Block:
-    machine: str
-    how: str
-    text: str
-
-
 @dataclass
 class Ran:
     """What a page's blocks did."""
 
-    left_out: list[str] = field(default_factory=list)
-    """titles of blocks that were not run"""
     said: list[str] = field(default_factory=list)
     """by each block that was, in order"""
 
 
-def blocks_of(page: Path) -> list[Block]:
-    """Return the blocks of a page; none may lack a title."""
-    text = page.read_text(encoding="utf-8")
-    found = [Block(one["machine"], one["how"] or "", one["text"]) for one in _BLOCK.finditer(text)]
-    assert len(found) == len(_ANY_BLOCK.findall(text)), f"{page.name}: a block without a title"
-    return found
-
-
-def run_page(page: Path, machines: dict[str, Machine], folder: Path, patience_s: float = 60.0) -> Ran:
+def run_page(page: str, machines: dict[str, Machine], folder: Path, patience_s: float = 60.0) -> Ran:
     """Run a page's blocks; fails with what a block said that failed or did not end."""
     ran = Ran()
     homes = folder / "homes"
@@ -81,17 +58,15 @@ def run_page(page: Path, machines: dict[str, Machine], folder: Path, patience_s:
         (tools / name).chmod(0o755)
     with _terminals() as terminals:
         for block in blocks_of(page):
-            own_terminal = block.how.startswith(OWN_TERMINAL)
-            if block.machine not in machines or (block.how and not own_terminal):
-                ran.left_out.append(f"{block.machine}: {block.how}")
+            if block.skip or not block.runs:
                 continue
             process = _start(block, machines[block.machine], homes / block.machine, tools)
-            if own_terminal:
+            if block.background:
                 terminals.append((block, process))
             else:
                 ran.said.append(_finished(block, process, patience_s))
         for block, process in terminals:
-            if UNTIL_INTERRUPT in block.how:
+            if UNTIL_INTERRUPT in block.title:
                 os.killpg(process.pid, signal.SIGINT)
             ran.said.append(_finished(block, process, patience_s))
     return ran
@@ -113,7 +88,7 @@ def _start(block: Block, machine: Machine, home: Path, tools: Path) -> subproces
     surroundings = environment()
     surroundings |= {"HOME": str(home), "PATH": f"{tools}{os.pathsep}{surroundings['PATH']}"}
     return subprocess.Popen(
-        [*machine.prefix, "sh", "-e", "-c", block.text],
+        [*machine.prefix, "sh", "-e", "-c", block.script],
         cwd=home,
         env=surroundings,
         stdin=subprocess.DEVNULL,
@@ -130,12 +105,8 @@ def _finished(block: Block, process: subprocess.Popen[str], patience_s: float) -
     except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGKILL)
         said, _ = process.communicate()
-        raise AssertionError(f"{block} did not end; it said\n{said}") from None
+        raise AssertionError(f"{block.name} did not end; it said\n{said}") from None
     # Ctrl-C reaches the shell around the command too.
-    good = (0, -signal.SIGINT) if UNTIL_INTERRUPT in block.how else (0,)
-    assert process.returncode in good, f"{block} failed:\n{said}"
+    good = (0, -signal.SIGINT) if UNTIL_INTERRUPT in block.title else (0,)
+    assert process.returncode in good, f"{block.name} failed:\n{said}"
     return said
-
-
-def page(name: str) -> Path:
-    return REPOSITORY / "docs" / name

@@ -62,6 +62,7 @@ def test_the_cable_is_pulled_for_five_seconds_and_put_back(lab: Lab, tmp_path: P
     assert upper["desyncs"] == lower["desyncs"] == 0
 
 
+@pytest.mark.soak
 def test_both_machines_get_another_address(lab: Lab, tmp_path: Path) -> None:
     rig, desk = two_machines(lab)
     rig_plug, desk_plug = lab.cable(rig, RIG_AT, desk, DESK_AT)

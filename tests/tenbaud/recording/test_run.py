@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import itertools
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 
 from tenbaud import Run
 from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.signals import SIGNALS
 from tests.tenbaud.flown import SECONDS, flown
 from tests.tenbaud.processes import REPOSITORY
 
@@ -33,6 +35,22 @@ def test_every_signal_is_on_the_common_time_base_with_a_unit_and_a_meaning(lossy
     assert {"reference", "pitch", "estimate", "estimate_live", "range", "symbol", "erased"} <= set(
         lossy.names
     )
+
+
+def test_every_signal_is_in_the_table_of_the_documentation() -> None:
+    text = (REPOSITORY / "docs" / "recordings.md").read_text()
+    for name, _, _, _ in SIGNALS:
+        assert f"`{name}`" in text, name
+
+
+def test_the_gap_gauge_holds_its_last_value(lossy: Run) -> None:
+    rows = [row for row in lossy.table("transmitter", "gap").rows if row["rms_over_floor"] is not None]
+    assert len(rows) > 3
+    per_sample = lossy.base.ticks_per_sample
+    for before, after in itertools.pairwise(rows):
+        span = lossy.gap_to_floor[before["sample"] * per_sample : after["sample"] * per_sample]
+        assert (span == before["rms_over_floor"]).all()
+    assert np.isnan(lossy.gap_to_floor[0])
 
 
 def test_signals_are_what_the_rows_say(lossy: Run) -> None:

@@ -46,7 +46,6 @@ def make(folder: Path) -> list[Path]:
         light.wait_for_timeout(4000.0)
         light.get_by_role("button", name="Spoil the controller").click()
         state_is(light, "broken")
-        light.wait_for_timeout(400.0)
         take(light, "broken")
         light.get_by_role("button", name="Mend the wire").click()
         state_is(light, "lockstep")

@@ -10,6 +10,8 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 
+from scipy.stats import t as student
+
 from tenbaud.bench.entrants import ENTRANTS
 from tenbaud.bench.flight import FINE_COUNTS, RIG_COUNTS, Case, Errors, fly
 from tenbaud.bench.tracking import fly_tracking, tracking_cases
@@ -18,7 +20,6 @@ RATES = (5.0, 10.0, 20.0, 40.0)
 DENSITIES = (2e-4, 2e-3, 2e-2)
 NOMINAL = 2e-3
 WORKERS = 2
-QUANTILE_95 = 1.96
 
 OnProgress = Callable[[float, float], None]
 Cell = tuple[str, float, float, bool, int]
@@ -123,6 +124,11 @@ def _leave_interrupts_to_parent() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
+def quantile_95(count: int) -> float:
+    """Return how many standard errors a 95 % interval of so many values' mean reaches (Student)."""
+    return float(student.ppf(0.975, count - 1)) if count > 1 else math.inf
+
+
 def ratio(mean_squares: list[float], floor: float) -> Ratio:
     """Return the root mean square over the seeds, over the floor's root, with its 95 % interval.
 
@@ -134,7 +140,7 @@ def ratio(mean_squares: list[float], floor: float) -> Ratio:
     if not math.isfinite(mean):
         return Ratio(math.inf, math.inf)
     variance = sum((one - mean) ** 2 for one in mean_squares) / max(1, count - 1)
-    half = QUANTILE_95 * math.sqrt(variance / count)
+    half = quantile_95(count) * math.sqrt(variance / count)
     value = math.sqrt(mean / floor)
     return Ratio(value, 0.5 * value * half / mean)
 
@@ -153,4 +159,4 @@ def exponent(rates: list[float], mean_squares: list[list[float]]) -> Ratio:
         slopes.append(sum((x - middle) * y for x, y in zip(logs, heights, strict=True)) / spread)
     mean = sum(slopes) / len(slopes)
     variance = sum((one - mean) ** 2 for one in slopes) / max(1, len(slopes) - 1)
-    return Ratio(mean, QUANTILE_95 * math.sqrt(variance / len(slopes)))
+    return Ratio(mean, quantile_95(len(slopes)) * math.sqrt(variance / len(slopes)))

@@ -2,7 +2,7 @@
 
 import { colours, drawError, drawPitch, drawTape } from "/view/draw.js";
 
-const KEPT_S = 32, SAMPLES_KEPT = 160, EVENTS_SHOWN = 7, STALE_MS = 1500, BROKEN_SHOWN_MS = 1500, TEXT_MS = 200;
+const KEPT_S = 32, SAMPLES_KEPT = 160, EVENTS_SHOWN = 7, STALE_MS = 1500, BROKEN_SHOWN_MS = 2500, TEXT_MS = 200;
 const DEGREES = 180 / Math.PI;
 const SIGNS = { waiting: "M12 7v6M12 16.5v.5", silent: "M7 12h10", lockstep: "M7 12.5l3.5 3.5L17 8.5",
   broken: "M8 8l8 8M16 8l-8 8", rejoining: "M16.5 9a5.5 5.5 0 1 0 .8 5M17 5.5V9.4h-3.8" };

@@ -1,5 +1,7 @@
 """How fast a study flies: against python-control, against a plain C loop, and with two workers.
 
+Side by side against python-control, one at a time against the C loop, as it flies one at a time.
+
 All three fly the same flight: preset paper-10baud, 100 s, 10,000 ticks, one bit every 0.1 s. The errors
 of all three agree to the last bit. Times are of the processor, so that others on the machine count
 less; two workers are timed by the clock, which needs two idle cores.
@@ -21,11 +23,13 @@ import numpy as np
 
 from benchmarks.figures import Figure
 from channel.limits import from_millivolts, to_millivolts
+from channel.numerics import sin
 from plant_sim.encoder import angle_of, counts_of
-from plant_sim.pitch import pitch_step
+from plant_sim.pitch import Sine, pitch_step
 from receiver.controllers.pid import motor_volts, pid_integral, pid_volts
 from tenbaud.config.load import load_config
 from tenbaud.studies.flights import CompiledPoint
+from tenbaud.studies.side_by_side import LANES, fly_side_by_side
 
 ROUNDS = 7
 FLIGHTS = 40
@@ -38,15 +42,34 @@ def studies_figures() -> list[Figure]:
     figures, _ = point.fly(1)
     rms = figures.error_coded_rms
     compiled_s = _shortest(lambda: point.fly(1), FLIGHTS)
-    found = [Figure("study_flight_ms", compiled_s * 1e3, "ms", "10,000 ticks, one core")]
-    control_s, control_rms = _python_control(point)
+    shared_s = _side_by_side(point, rms)
+    noise = {"transmitter": {"plant": {"disturbance": "q=2e-3"}}}
+    noisy_s = _side_by_side(CompiledPoint(load_config("paper-10baud", None, noise)), None)
+    control_rms = _python_control(point, sin)[1]
     _agree("python-control", control_rms, rms)
-    found += [
+    control_s = min(_python_control(point, math.sin)[0] for _ in range(3))
+    found = [
+        Figure("study_flight_ms", shared_s * 1e3, "ms", f"10,000 ticks, {LANES} flights side by side"),
+        Figure("study_noisy_flight_ms", noisy_s * 1e3, "ms", "the same, with noise drawn for each"),
+        Figure("study_single_flight_ms", compiled_s * 1e3, "ms", "one flight at a time"),
         Figure("study_control_flight_ms", control_s * 1e3, "ms", "the same with python-control"),
-        Figure("study_over_control", control_s / compiled_s, "times", "at least 250; stretch 1000"),
+        Figure("study_over_control", control_s / shared_s, "times", "at least 250; stretch 1000"),
+        Figure("study_noisy_over_control", control_s / noisy_s, "times", "with noise"),
+        Figure("study_single_over_control", control_s / compiled_s, "times", "one at a time"),
     ]
     found += _c_loop(point, rms)
     return found + _workers()
+
+
+def _side_by_side(point: CompiledPoint, rms: float | None) -> float:
+    """Return seconds for each of many flights, all they need in Python included."""
+    seeds = range(1, LANES + 1)
+    for figures in fly_side_by_side(point, seeds)[0]:
+        if figures is None:
+            raise AssertionError("a flight left its ordinary course")
+        if rms is not None:
+            _agree("a flight among others", figures.error_coded_rms, rms)
+    return _shortest(lambda: fly_side_by_side(point, seeds), 2) / LANES
 
 
 def _shortest(fly: Callable[[], object], flights: int) -> float:
@@ -64,11 +87,12 @@ def _agree(who: str, theirs: float, ours: float) -> None:
         raise AssertionError(f"{who} found an error of {theirs!r} rad where the study found {ours!r}")
 
 
-def _python_control(point: CompiledPoint) -> tuple[float, float]:
+def _python_control(point: CompiledPoint, sine: Sine) -> tuple[float, float]:
     """Fly the closed loop with `control.input_output_response`; return seconds and rms error.
 
     One discrete-time system whose update is written with the nodes' own functions in plain Python,
-    which is kinder to it than numpy would be.
+    which is kinder to it than numpy would be. With `math.sin` for the plant it is faster, with that of
+    `channel.numerics` its bits are those of a study.
     """
     import control
 
@@ -90,7 +114,7 @@ def _python_control(point: CompiledPoint) -> tuple[float, float]:
         integral = pid_integral(pid_c, integral, error, volts)
         command = from_millivolts(to_millivolts(motor_volts(pid_c, volts)))
         state = codec.model.tick(state, command, (e1, e2))
-        body = pitch_step(body, command, 0.0, plant_c)
+        body = pitch_step(body, command, 0.0, plant_c, sine)
         return [*body, *state, m, last, e1, e2, integral, tick + 1.0]
 
     def output(t: float, x: Any, u: Any, params: object) -> list[float]:
@@ -100,16 +124,14 @@ def _python_control(point: CompiledPoint) -> tuple[float, float]:
     times = np.arange(numbers.ticks) * tick_s
     start = [0.0] * 8 + [*codec.initial().coder, 0.0, 0.0, 0.0, 0.0]
     reference = np.asarray(point.reference[: numbers.ticks])
-    seconds = []
-    for _ in range(3):
-        begun = time.process_time()
-        response = control.input_output_response(system, times, reference, start)
-        seconds.append(time.process_time() - begun)
+    begun = time.process_time()
+    response = control.input_output_response(system, times, reference, start)
+    seconds = time.process_time() - begun
     errors = (response.outputs[0] - response.outputs[1])[numbers.window_start :].tolist()
     squares = 0.0
     for error in errors:
         squares += error * error
-    return min(seconds), math.sqrt(squares / len(errors))
+    return seconds, math.sqrt(squares / len(errors))
 
 
 def _c_loop(point: CompiledPoint, rms: float) -> list[Figure]:

@@ -67,13 +67,13 @@ static void plant(double *s, double v_f, double v_r, double torque, const double
     double mu = v_f - v_r, excess = s[2] - s[3] - mu;
     double start = c[2] * (mu + excess) + torque, mid = c[2] * (mu + excess * c[6]) + torque;
     double end = c[2] * (mu + excess * c[7]) + torque, half = 0.5 * h;
-    double k1 = start - c[0] * omega - c[1] * sin(theta - c[3]);
+    double k1 = start - c[0] * omega - c[1] * own_sin(theta - c[3]);
     double w2 = omega + half * k1;
-    double k2 = mid - c[0] * w2 - c[1] * sin(theta + half * omega - c[3]);
+    double k2 = mid - c[0] * w2 - c[1] * own_sin(theta + half * omega - c[3]);
     double w3 = omega + half * k2;
-    double k3 = mid - c[0] * w3 - c[1] * sin(theta + half * w2 - c[3]);
+    double k3 = mid - c[0] * w3 - c[1] * own_sin(theta + half * w2 - c[3]);
     double w4 = omega + h * k3;
-    double k4 = end - c[0] * w4 - c[1] * sin(theta + h * w3 - c[3]);
+    double k4 = end - c[0] * w4 - c[1] * own_sin(theta + h * w3 - c[3]);
     s[0] = theta + h / 6.0 * (omega + 2.0 * (w2 + w3) + w4);
     s[1] = omega + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4);
     s[2] = v_f + (s[2] - v_f) * c[7];

@@ -1,9 +1,9 @@
 """Several flights of one configuration side by side, to be compiled.
 
 The same course as `kernel.fly`, on a line without faults, where only the torque on the plant differs
-from lane to lane. What happens once a sample is done lane by lane (`lane_samples`), what happens at every
-tick is done for several lanes at once (`lane_ticks`). A lane that leaves the ordinary course is flown
-on, to no purpose, and marked. Tests compare lanes with single flights, bit by bit.
+from lane to lane. What happens once a sample is done lane by lane (`lane_samples`), what happens at
+every tick for several lanes at once (`lane_ticks`). A lane that leaves the ordinary course is flown on,
+to no purpose, and marked. Tests compare lanes with single flights, bit by bit.
 """
 
 from __future__ import annotations

@@ -27,9 +27,7 @@ SLOW_ECHO = {
 
 @pytest.mark.parametrize("changes", [CLEAN, NOISE, REAL_WIRE, SLOW_ECHO], ids=str)
 @pytest.mark.parametrize("preset", PRESETS)
-def test_when_flights_share_a_processor_then_no_bit_differs(
-    preset: str, changes: dict[str, Any]
-) -> None:
+def test_when_flights_share_registers_then_no_bit_differs(preset: str, changes: dict[str, Any]) -> None:
     point = CompiledPoint(config_of(preset, changes))
     seeds = range(5, 14)
     figures, work = fly_side_by_side(point, seeds)
@@ -45,7 +43,7 @@ def test_when_flights_share_a_processor_then_no_bit_differs(
 
 
 @pytest.mark.parametrize("preset", ["paper-10baud", "usual-1000baud"])
-def test_when_flights_share_a_processor_then_each_is_an_ordinary_flight(preset: str) -> None:
+def test_when_flights_share_registers_then_each_is_an_ordinary_flight(preset: str) -> None:
     config = config_of(preset, NOISE)
     flown = fly_seeds(CompiledPoint(config), range(1, 8))
     assert len({figures.error_coded_rms for figures in flown if figures}) == 7
@@ -55,7 +53,7 @@ def test_when_flights_share_a_processor_then_each_is_an_ordinary_flight(preset: 
         assert repr(figures._replace(engine="")) == repr(plain._replace(engine=""))
 
 
-def test_when_a_flight_leaves_its_course_then_the_others_do_not(
+def test_when_a_lane_leaves_its_course_then_no_other_does(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     point = CompiledPoint(config_of("paper-10baud", NOISE))
@@ -73,11 +71,10 @@ def test_when_a_flight_leaves_its_course_then_the_others_do_not(
     ]
 
 
-def test_when_an_encoder_is_stuck_then_no_lane_has_figures() -> None:
-    # The motors have a tenth of their strength: the encoder stands still where the model moves.
-    changes = {"transmitter": {"plant": {"mismatch": (0.0, 0.0, -0.9999)}}, "duration_s": 20.0}
-    config = load_config("paper-10baud", None, {**changes, "seed": 1})
-    point = CompiledPoint(config)
+def test_when_an_encoder_stands_still_then_no_lane_has_figures() -> None:
+    # A quarter of a turn is one count: the model moves while the encoder does not.
+    changes = {"transmitter": {"encoder_counts_per_turn": 4}, "duration_s": 20.0}
+    point = CompiledPoint(load_config("paper-10baud", None, changes))
     assert fly_seeds(point, (1,)) == [None]
     assert fly_side_by_side(point, range(8))[0] == [None] * 8
 

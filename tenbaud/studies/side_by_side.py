@@ -21,7 +21,7 @@ from tenbaud.studies.schedule import Schedule, Uncommon
 LANES = 32
 """Flights side by side: four registers of eight numbers, so that one is worked on while others wait."""
 
-FEWEST = 6
+FEWEST = 4
 """Fewer flights than this are faster one after the other."""
 
 

@@ -152,7 +152,10 @@ class PitchPlant:
         initial_rate: float = 0.0,
         sine: Sine = math.sin,
     ) -> None:
-        """Start at `initial_angle_rad` (rad) and `initial_rate` (rad/s), both finite."""
+        """Start at `initial_angle_rad` (rad) and `initial_rate` (rad/s), both finite.
+
+        `sine` is `math.sin` or one whose bits do not depend on the machine.
+        """
         for name, value in (
             ("initial_angle_rad", initial_angle_rad),
             ("initial_rate", initial_rate),

@@ -79,7 +79,9 @@ def test_when_a_block_has_a_title_then_its_page_is_one_that_is_walked_on_machine
     assert titled == set(ON_MACHINES)
     for page in ON_MACHINES:
         assert all(block.title for block in RUN[page]), f"{page}: a block that names no machine"
-        assert not any(block.soak for block in RUN[page]), f"{page}: nothing runs a block for soak there"
+        assert not any(block.soak for block in RUN[page]), (
+            f"{page}: nothing runs a block for soak there"
+        )
 
 
 def unknown_words(block: Block) -> list[str]:
@@ -143,7 +145,12 @@ def test_when_a_note_or_a_fence_is_wrong_then_it_is_told(text: str) -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ['```text title="desk"\ntenbaud demo\n```', "```\ntenbaud demo\n```", "Text:\n\n    tenbaud demo\n", "```text\nmake test\n```"],
+    [
+        '```text title="desk"\ntenbaud demo\n```',
+        "```\ntenbaud demo\n```",
+        "Text:\n\n    tenbaud demo\n",
+        "```text\nmake test\n```",
+    ],
 )
 def test_when_a_command_stands_where_nobody_runs_it_then_it_is_told(text: str) -> None:
     assert stray_commands(text, "a.md")
@@ -158,7 +165,7 @@ def test_when_a_command_that_is_not_run_has_an_unknown_word_then_it_is_told(scri
 def test_when_a_block_fails_or_says_something_else_then_the_page_fails(tmp_path: Path) -> None:
     with Sandbox(tmp_path) as sandbox:
         sandbox.run(block_of("```console\n$ echo one; echo two\n...\ntwo\n```"))
-        assert sandbox.run(block_of('```python\nprint("a", \'b\')\n```')) == "a b\n"
+        assert sandbox.run(block_of("```python\nprint(\"a\", 'b')\n```")) == "a b\n"
         for text in (
             "```python\nraise SystemExit(1)\n```",
             "```sh\nfalse\ntrue\n```",

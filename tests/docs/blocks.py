@@ -1,8 +1,8 @@
 """Finds the command blocks of the Markdown pages, and what is written above them for the tests.
 
 A block of commands is fenced as `sh` (every line is a command) or as `console` (lines after `$ ` are
-commands, the others what they say); one fenced as `python` is run by a fresh interpreter. A comment right
-above the fence may say how it is run:
+commands, the others what they say); one fenced as `python` is run by a fresh interpreter. A comment
+right above the fence may say how it is run:
 
     <!-- test: skip, needs a serial port -->      not here, for this reason
     <!-- test: soak, ten minutes of flights -->   with the long tests only

@@ -21,8 +21,14 @@ help: ## list the targets
 demo: $(STAMP) ## fly: both processes on this machine, the plant simulated
 	$(BIN)/tenbaud demo
 
-test: $(STAMP) ## run the tests, serially: some start real processes and need the cores
-	$(BIN)/python -m pytest
+# Flights in real time need the cores to themselves; everything else shares them, two by two.
+REAL_TIME := tests/network $(addprefix tests/tenbaud/,flight telemetry view test_demo.py test_fire.py \
+	test_emulated_flights.py test_many_rigs.py test_processes.py test_restarts.py \
+	test_serial_flight.py test_serial_line.py)
+
+test: $(STAMP) ## run the tests: most on two cores at once, then the flights in real time
+	$(BIN)/python -m pytest -n 2 --dist loadgroup $(addprefix --ignore=,$(REAL_TIME)) tests
+	$(BIN)/python -m pytest $(REAL_TIME)
 
 check: $(STAMP) ## lint, format, types, and the project's own rules
 	$(BIN)/ruff check .

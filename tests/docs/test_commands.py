@@ -14,6 +14,9 @@ from docs.tools.commands_page import commands_page
 from tests.docs.blocks import COMMAND, Block, NoteError, blocks_of, needed, pages, parse, stray_commands
 from tests.docs.sandbox import BlockFailed, Sandbox
 
+# The pages' commands meet at the default port, so one worker runs them all.
+pytestmark = pytest.mark.xdist_group("default port")
+
 ELSEWHERE = ("README.md",)
 """Walked by `test_newcomer.py`, which looks at what comes of it as well."""
 ON_MACHINES = ("docs/two-machines.md", "docs/router.md")

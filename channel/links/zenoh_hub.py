@@ -26,6 +26,11 @@ CHANNEL_MESSAGES_MAX = 1024
 _PATTERN = re.compile(r"(?:[A-Za-z0-9_.-]+|\*\*?)(?:/(?:[A-Za-z0-9_.-]+|\*\*?))*")
 
 
+def is_session_pattern(pattern: str) -> bool:
+    """Return whether this is a session's name, or one with `*` and `**` for parts of it."""
+    return bool(_PATTERN.fullmatch(pattern))
+
+
 class ZenohHub:
     """The receiving end of every session whose name matches `pattern`, such as `rig/*`.
 
@@ -48,7 +53,7 @@ class ZenohHub:
         connections_max: int = SESSIONS_MAX,
         should_stop: Callable[[], bool] = lambda: False,
     ) -> None:
-        if not _PATTERN.fullmatch(pattern):
+        if not is_session_pattern(pattern):
             raise LinkError(
                 f"sessions {pattern!r}: write names as in rig/7, with * for any one part, as in rig/*"
             )

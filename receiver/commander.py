@@ -41,7 +41,7 @@ class _Flown(NamedTuple):
 class Commander:
     """Flies samples; see the module's text.
 
-    `counts` gets `bad_commands`, and `tell` is told of the first one.
+    `counts` gets `bad_commands` and `bad_references`, and `tell` is told of the first of each.
     """
 
     def __init__(
@@ -107,11 +107,11 @@ class Commander:
 
     def write_down(self) -> None:
         """Record what was flown since the last call. It can wait until the commands have left."""
-        for before, word, flown, digest, now_ns in self._unwritten:
+        unwritten, self._unwritten = self._unwritten, []
+        for before, word, flown, digest, now_ns in unwritten:
             ranges = self.codec.coder.ranges(before.coder)
             write_sample(self._recorder, self.terms, word, ranges, flown.state, digest, now_ns)
-            write_commands(self._recorder, self.terms, before.sample, flown, self._controller)
-        self._unwritten.clear()
+            write_commands(self._recorder, self.terms, before.sample, flown, self._reference_rad)
 
     def _decide(self, tick: int, state: Vector) -> Vector:
         """Ask the controller, limit what it wants, and return it as the wire will carry it."""
@@ -119,6 +119,16 @@ class Commander:
         limited = self.terms.limits.apply(volts, self.hold)
         self.hold = from_millivolts(to_millivolts(limited))
         return self.hold
+
+    def _reference_rad(self, tick: int) -> float | None:
+        try:
+            return self._controller.reference_rad(tick)
+        except Exception as error:  # the user's code too, and only a column of the recording
+            self._counts["bad_references"] += 1
+            if self._counts["bad_references"] == 1:
+                problem = f"{type(error).__name__}: {error}"
+                self._tell(EventKind.CONTROLLER, f"the reference of tick {tick} failed: {problem}")
+            return None
 
     def _ask(self, tick: int, state: Vector) -> Vector:
         """Return what the controller wants; its last command where it fails or wants nonsense."""

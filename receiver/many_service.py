@@ -122,6 +122,13 @@ class ManyService:
 
     def run(self, should_stop: Callable[[], bool]) -> None:
         """Serve until asked to stop; flights that are still going on are then ended."""
+        try:
+            self._serve(should_stop)
+        finally:
+            for served in self.served:
+                self._close(served, None)
+
+    def _serve(self, should_stop: Callable[[], bool]) -> None:
         now_ns = time.monotonic_ns()
         probe_ns = now_ns + PROBE_NS
         poll_ns = now_ns + POLL_NS
@@ -138,11 +145,9 @@ class ManyService:
                 poll_ns = now_ns + POLL_NS
                 for served in self.served:
                     self._guarded(served, self._check, now_ns)
-            for served in self._touched.values():
-                served.service.endpoint.session.rest()
-            self._touched.clear()
-        for served in self.served:
-            self._close(served, None)
+            touched, self._touched = self._touched, {}
+            for served in touched.values():
+                self._guarded(served, _rest)
 
     def _take_in(self, due_ns: int) -> None:
         """Take messages until none is left or a batch is full; wait for the first one."""
@@ -203,3 +208,7 @@ class ManyService:
         if self._served.pop(served.name, None) is not None:
             self._touched.pop(served.name, None)
             self._host.ended(served, error)
+
+
+def _rest(served: Served) -> None:
+    served.service.endpoint.session.rest()

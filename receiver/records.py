@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from channel.audit_trail import ARRIVED_CHANNEL, EPOCH_CHANNEL, epoch_row
 from channel.codec import CodecState, Vector
 from channel.frames import Desync, Symbol
@@ -10,7 +12,9 @@ from channel.lockstep import LOCKSTEP_CHANNEL, History
 from channel.recording import Field, RecordChannel, Recorder
 from channel.terms import Terms
 from channel.words import Word
-from receiver.controllers.base import Controller
+
+ReferenceOf = Callable[[int], float | None]
+"""Tick -> what the controller steers to, rad."""
 
 TICK_CHANNEL = RecordChannel(
     "tick",
@@ -52,12 +56,12 @@ def write_sample(
 
 
 def write_commands(
-    recorder: Recorder, terms: Terms, sample: int, flown: FlownSample, controller: Controller
+    recorder: Recorder, terms: Terms, sample: int, flown: FlownSample, reference_rad: ReferenceOf
 ) -> None:
-    """Write down the commands that were decided with one sample."""
+    """Write down the commands that were decided with one sample, and what they steered to."""
     tick = sample * terms.ticks_per_sample + terms.lead_ticks
     for believed, command in zip(flown.live, flown.commands, strict=True):
-        row = (tick, controller.reference_rad(tick), believed, command)
+        row = (tick, reference_rad(tick), believed, command)
         recorder.write(TICK_CHANNEL, tick * terms.tick_ns, row)
         tick += 1
 

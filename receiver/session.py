@@ -85,7 +85,7 @@ class ReceiverSession:
         self.meter = BaudMeter()
         self.counts: Counter[str] = Counter()
         """erasures, symbols_late, symbols_misplaced, stale_frames, refused_hellos, bad_commands,
-        desyncs, rejoins"""
+        bad_references, desyncs, rejoins"""
         self.end_reason = ""
         self.refusal: str | None = None
         self.desync: Desync | None = None

@@ -190,7 +190,8 @@ class GapGauge:
         return (sample, None, None, None) if gap is None else (sample, *astuple(gap))
 
     def _gap(self, strength: float | None, mean_square: float | None) -> Gap | None:
-        if strength is None or not mean_square:
+        # A strength of 0: an encoder without steps, on a plant that nothing has pushed at all.
+        if not strength or not mean_square:
             return None
         per_density = mean_square / strength
         flown_s = self._errors.count * self._tick_s

@@ -13,7 +13,6 @@ Keys, `NAME` being the session's name:
 
 from __future__ import annotations
 
-import re
 import secrets
 from collections.abc import Callable
 
@@ -24,9 +23,7 @@ from channel.links.base import LinkBase, Role
 from channel.links.security import KEY_ROOT, Security
 from channel.links.zenoh_gate import Gate
 from channel.links.zenoh_inbox import ChannelInbox
-from channel.links.zenoh_node import open_node
-
-_NAME = re.compile(r"[A-Za-z0-9_.-]+(/[A-Za-z0-9_.-]+)*")
+from channel.links.zenoh_node import is_session_name, open_node
 
 
 class ZenohLink(LinkBase):
@@ -57,9 +54,10 @@ class ZenohLink(LinkBase):
         should_stop: Callable[[], bool] = lambda: False,
     ) -> None:
         super().__init__()
-        if not _NAME.fullmatch(session_name):
+        if not is_session_name(session_name):
             raise LinkError(
-                f"session name {session_name!r}: letters, digits, '_', '-', '.', and '/' between parts"
+                f"session name {session_name!r}: letters, digits, '_', '-', '.', and '/' between "
+                "parts, none of which is '.' or '..'"
             )
         self._inbox: ChannelInbox | None = None
         self._gate: Gate | None = None

@@ -14,6 +14,7 @@ import sys
 import threading
 from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Self, TextIO
 
 import zenoh
@@ -109,13 +110,19 @@ class HandshakeLog:
 
     def _read(self) -> None:
         for line in self._lines:
-            found = _REFUSAL.search(_COLOURS.sub("", line.rstrip()))
-            if found is None:
-                sys.stderr.write(line)
-                continue
-            reason = reason_of(found["text"])
-            self.refused[reason] += 1
-            self._on_refused(reason, self.refused[reason])
+            # A pipe that nobody reads fills up, and then holds up Zenoh and with it the flight: a
+            # terminal that has gone is no reason to stop.
+            with suppress(OSError):
+                self._take(line)
+
+    def _take(self, line: str) -> None:
+        found = _REFUSAL.search(_COLOURS.sub("", line.rstrip()))
+        if found is None:
+            sys.stderr.write(line)
+            return
+        reason = reason_of(found["text"])
+        self.refused[reason] += 1
+        self._on_refused(reason, self.refused[reason])
 
 
 def _tell(reason: str, count: int) -> None:

@@ -19,11 +19,16 @@ from channel.links.security import KEY_ROOT, Security
 from channel.links.zenoh_config import SESSIONS_MAX
 from channel.links.zenoh_gate import Gate
 from channel.links.zenoh_inbox import ChannelInbox
-from channel.links.zenoh_node import open_node
+from channel.links.zenoh_node import is_session_name, open_node
 
 CHANNEL_MESSAGES_MAX = 1024
 
 _PATTERN = re.compile(r"(?:[A-Za-z0-9_.-]+|\*\*?)(?:/(?:[A-Za-z0-9_.-]+|\*\*?))*")
+
+
+def is_session_pattern(pattern: str) -> bool:
+    """Return whether this is a session's name, or one with `*` and `**` for parts of it."""
+    return bool(_PATTERN.fullmatch(pattern))
 
 
 class ZenohHub:
@@ -48,7 +53,7 @@ class ZenohHub:
         connections_max: int = SESSIONS_MAX,
         should_stop: Callable[[], bool] = lambda: False,
     ) -> None:
-        if not _PATTERN.fullmatch(pattern):
+        if not is_session_pattern(pattern):
             raise LinkError(
                 f"sessions {pattern!r}: write names as in rig/7, with * for any one part, as in rig/*"
             )
@@ -83,14 +88,22 @@ class ZenohHub:
             raise
 
     def receive(self, timeout_s: float) -> tuple[str, bytes] | None:
-        """Return (session name, message), or None after `timeout_s` seconds (0: only what is there)."""
+        """Return (session name, message), or None after `timeout_s` seconds (0: only what is there).
+
+        None too, at once, for a message under a name that no session can have: it is counted.
+        """
         sample = self._inbox.sample(timeout_s) if self._inbox is not None else None
         if sample is None:
+            return None
+        name = _name_in(str(sample.key_expr), "/up/")
+        # The key is the sender's choice, and a name leads to a configuration and a folder.
+        if not is_session_name(name):
+            self.counts.dropped["no session's name"] += 1
             return None
         data = sample.payload.to_bytes()
         self.counts.messages_in += 1
         self.counts.bytes_in += len(data)
-        return _name_in(str(sample.key_expr), "/up/"), data
+        return name, data
 
     def wake(self) -> None:
         """End the wait of the thread that receives; for other threads."""

@@ -66,8 +66,9 @@ class ChannelInbox:
 
     def close(self) -> None:
         """Stop taking messages. A channel left full would hang the closing session."""
-        self._waker.close()
+        # First, for a full channel also holds up the thread that wakes, which is then waited for.
         self._subscriber.undeclare()
+        self._waker.close()
 
     def _is_wake(self, sample: zenoh.Sample) -> bool:
         # Only our own wake-ups are empty: no frame and no envelope is.

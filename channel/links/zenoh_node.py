@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import zenoh
@@ -10,6 +11,13 @@ from channel.errors import LinkError
 from channel.links.endpoints import check_endpoints
 from channel.links.security import Security
 from channel.links.zenoh_config import SESSIONS_MAX, open_session, zenoh_config, zenoh_settings
+
+_NAME = re.compile(r"[A-Za-z0-9_.-]+(/[A-Za-z0-9_.-]+)*")
+
+
+def is_session_name(name: str) -> bool:
+    """Return whether a session may have this name; names become keys, file names and printed text."""
+    return bool(_NAME.fullmatch(name)) and not {".", ".."} & set(name.split("/"))
 
 
 def open_node(

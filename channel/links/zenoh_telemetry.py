@@ -11,7 +11,8 @@ publisher's thread waits a millisecond at most, and the loop never waits for tha
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import zenoh
 
@@ -40,15 +41,16 @@ class TelemetryPort:
     ) -> None:
         settings = zenoh_settings("peer", (endpoint,), (), security=security)
         self._session = open_session(zenoh_config(settings), f"{endpoint} for telemetry")
-        self._publisher = self._session.declare_publisher(
-            f"{KEY_ROOT}/{session_name}/telemetry/{role}",
-            congestion_control=zenoh.CongestionControl.DROP,
-            priority=zenoh.Priority.BACKGROUND,
-        )
-        if on_command is not None:
-            self._session.declare_subscriber(
-                f"{KEY_ROOT}/{session_name}/control", _handler(on_command, 4096)
+        with _closed_on_error(self._session, session_name):
+            self._publisher = self._session.declare_publisher(
+                f"{KEY_ROOT}/{session_name}/telemetry/{role}",
+                congestion_control=zenoh.CongestionControl.DROP,
+                priority=zenoh.Priority.BACKGROUND,
             )
+            if on_command is not None:
+                self._session.declare_subscriber(
+                    f"{KEY_ROOT}/{session_name}/control", _handler(on_command, 4096)
+                )
 
     def publish(self, data: bytes) -> None:
         """Send one message to whoever listens. Raises LinkError."""
@@ -80,10 +82,10 @@ class TelemetryFeed:
         if credentials is not None:
             settings |= tls_settings(credentials)
         self._session = open_session(zenoh_config(settings), f"{endpoint} for telemetry")
-        self._name = session_name
-        self._session.declare_subscriber(
-            f"{KEY_ROOT}/{session_name}/telemetry/*", _handler(on_message, 1 << 20)
-        )
+        with _closed_on_error(self._session, session_name):
+            self._session.declare_subscriber(
+                f"{KEY_ROOT}/{session_name}/telemetry/*", _handler(on_message, 1 << 20)
+            )
 
     @property
     def is_connected(self) -> bool:
@@ -97,6 +99,16 @@ class TelemetryFeed:
     def close(self) -> None:
         """Close the session."""
         self._session.close()
+
+
+@contextmanager
+def _closed_on_error(session: zenoh.Session, session_name: str) -> Iterator[None]:
+    """Within a `with`, what Zenoh refuses closes the session and becomes a LinkError."""
+    try:
+        yield
+    except zenoh.ZError as error:
+        session.close()
+        raise LinkError(f"no telemetry under the session name {session_name!r}: {error}") from error
 
 
 def _handler(take: OnMessage, bytes_max: int) -> zenoh.handlers.Callback[zenoh.Sample]:

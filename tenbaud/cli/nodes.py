@@ -81,6 +81,8 @@ def receive(
     """
     changed = node.changes(rig=rig, sabotaged_end="receiver")
     if sessions is None:
+        if configs is not None or flights is not None:
+            raise typer.BadParameter("--configs and --flights go with --sessions, the names to serve")
         _run("receiver", node, addresses, changed, take_over=take_over)
         return
     from tenbaud.cli import many
@@ -89,6 +91,11 @@ def receive(
         raise typer.BadParameter("give --session for one rig or --sessions for many, not both")
     if take_over:
         raise typer.BadParameter("--take-over is for one rig's flight; give its --session")
+    if node.allow_control or node.telemetry not in ("", "off"):
+        raise typer.BadParameter(
+            "--telemetry and --allow-control are for one rig's flight; among many --sessions the "
+            "transmitters have telemetry of their own"
+        )
     many.serve(many.Many(sessions, configs, rigs_max, flights), node, addresses, changed)
 
 

@@ -51,9 +51,14 @@ def view(
         typer.echo(json.dumps(schema_json(), indent=2))
         return
     from channel.links.endpoints import check_endpoints
+    from channel.links.zenoh_hub import is_session_pattern
     from tenbaud.view.feed import Feed
     from tenbaud.view.server import Address, free_port, serve
 
+    if not is_session_pattern(session):
+        raise typer.BadParameter(
+            f"--session {session!r}: a session's name as in rig/7, with * for any one part"
+        )
     address = Address(host, port or free_port(host), insecure)
     credentials = None
     if keys is not None:

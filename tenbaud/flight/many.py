@@ -129,14 +129,10 @@ class ManyHost:
 
     def ended(self, served: Served, error: Exception | None) -> None:
         """End a flight: tell its transmitter now, and have its files finished."""
-        session = served.service.endpoint.session
-        if not isinstance(served.service, VirtualService):
-            reason = STOPPED if error is None else "the receiver failed"
-            if isinstance(error, LinkLost):
-                reason = "no word from the transmitter"
-            for message in served.service.endpoint.bye(reason):
-                self._hub.send(served.name, message)
-        session.rest()
+        try:
+            self._say_goodbye(served, error)
+        except Exception as problem:  # what has ended it may stand in the way of a farewell too
+            error = error or problem
         self.counts["messages_dropped"] += served.dropped
         flight = self._open[served.name]
         flight.recorder.finish_soon()
@@ -144,9 +140,22 @@ class ManyHost:
         self._opening.add(served.name)
         self._worker.submit(self._finish, flight, served, error)
 
+    def _say_goodbye(self, served: Served, error: Exception | None) -> None:
+        if not isinstance(served.service, VirtualService):
+            reason = STOPPED if error is None else "the receiver failed"
+            if isinstance(error, LinkLost):
+                reason = "no word from the transmitter"
+            for message in served.service.endpoint.bye(reason):
+                self._hub.send(served.name, message)
+        served.service.endpoint.session.rest()
+
     def close(self) -> None:
-        """Wait until all files are finished."""
+        """Wait until all files are finished; for after the loop."""
         self._worker.shutdown()
+        # Opened when the loop had ended already: nobody flew it, but its file is there.
+        for name, served in self.ready():
+            served.service.endpoint.bye(STOPPED)
+            self._finish(self._open[name], served, None)
         self._writer.close()
 
     # In the worker's thread
@@ -182,9 +191,13 @@ class ManyHost:
         link = agreement.config.link.model_copy(update={"session": name})
         folder.config.write_text(dump_config(agreement.config.model_copy(update={"link": link})))
         recorder = open_recorder(agreement, "receiver", folder.receiver, self._writer)
-        endpoint = build_receiver(agreement, recorder, DATAGRAM)
+        try:
+            endpoint = build_receiver(agreement, recorder, DATAGRAM)
+            self._hub.join(name)
+        except BaseException:
+            recorder.finish_soon()
+            raise
         timeout_s = link.peer_timeout_s
-        self._hub.join(name)
         self._open[name] = Flight(name, agreement, folder, recorder)
         self.counts["flights"] += 1
         self._tell(f"{name}: a flight begins, recording into {folder.path}")
@@ -213,11 +226,13 @@ class ManyHost:
                 "recording_rows_lost": flight.recorder.rows_dropped,
                 "recording_error": flight.recorder.error,
             }
-            write_summary(flight.folder, flight.summary)
             self.summaries.append(flight.summary)
+            write_summary(flight.folder, flight.summary)
             self._tell(
                 f"{flight.name}: ended after {flight.summary['samples']} samples: {outcome.text}"
             )
+        except OSError as problem:
+            self._tell(f"{flight.name}: {flight.folder.path}/summary.json was not written: {problem}")
         finally:
             self._open.pop(flight.name, None)
             self._hub.leave(flight.name)

@@ -119,11 +119,7 @@ def read_node(folder: Path) -> NodeKeys:
             f"{folder} is no node's key folder ({error.strerror}: {error.filename}); make one with "
             "`tenbaud keys add NAME` and copy it whole"
         ) from error
-    if mode & _OTHERS:
-        raise KeysError(
-            f"{folder / 'node.key'} can be read by others (mode {stat.S_IMODE(mode):04o}); take that "
-            f"away: chmod 600 {folder / 'node.key'}"
-        )
+    _check_private(folder / "node.key", mode)
     try:
         certified = read_certificate(certificate)
         signed = is_signed_by(certificate, authority)
@@ -188,12 +184,23 @@ def read_authority(keys: Path) -> Pem:
     """Return the authority below a folder, to sign with; KeysError if there is none."""
     folder = keys / AUTHORITY
     try:
-        return Pem((folder / "authority.pem").read_bytes(), (folder / "authority.key").read_bytes())
+        pem = Pem((folder / "authority.pem").read_bytes(), (folder / "authority.key").read_bytes())
+        mode = (folder / "authority.key").stat().st_mode
     except OSError as error:
         raise KeysError(
             f"there is no authority in {folder} ({error.strerror}); `tenbaud keys init` makes one, and "
             "--folder names another place"
         ) from error
+    _check_private(folder / "authority.key", mode)
+    return pem
+
+
+def _check_private(key: Path, mode: int) -> None:
+    if mode & _OTHERS:
+        raise KeysError(
+            f"{key} can be read by others (mode {stat.S_IMODE(mode):04o}); take that away: "
+            f"chmod 600 {key}"
+        )
 
 
 def _write_node(folder: Path, authority: Pem, pem: Pem) -> None:

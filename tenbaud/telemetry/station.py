@@ -58,6 +58,8 @@ class Station:
     pace: float | None
     tap: Tap | None
     security: Security | None
+    wished: bool = False
+    """whether this telemetry was asked for, so that a flight without it is refused"""
     publisher: Publisher | None = field(default=None)
 
     def fly_transmitter(self, run: TransmitterRun, stop: Stop) -> LiveTransmitter:
@@ -106,7 +108,13 @@ class Station:
         on_command = None if self.queue is None else self.queue.offer
         name = self.agreement.config.link.session
         security = self.security if self.endpoint.startswith("tls/") else None
-        return TelemetryPort(self.role, name, self.endpoint, on_command, security)
+        try:
+            return TelemetryPort(self.role, name, self.endpoint, on_command, security)
+        except LinkError as error:
+            if self.wished:
+                raise
+            sys.stderr.write(f"tenbaud: no telemetry: {error}\n")
+            return None
 
 
 def open_station(
@@ -143,6 +151,7 @@ def open_station(
         wish.pace if agreement.clock == "virtual" else None,
         tap,
         None if security is None else _for_viewers(security, agreement.live),
+        bool(wish.endpoint),
     )
 
 

@@ -85,6 +85,8 @@ class Board:
         if message["version"] != SCHEMA_VERSION:
             raise ValueError("another version of the telemetry")
         role, flight = message["role"], message["flight"]
+        if role not in ("transmitter", "receiver"):
+            raise ValueError("no end of a flight")
         if flight != self.flight and not self._turns_to(flight, now_s):
             return
         self.heard_s[role] = now_s

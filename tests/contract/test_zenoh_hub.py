@@ -57,3 +57,20 @@ def test_when_another_thread_rings_then_the_wait_ends() -> None:
         # Without the ring this would outlast the test's own limit of time.
         assert hub.receive(10_000.0) is None
         assert hub.receive(0.0) is None
+
+
+@pytest.mark.parametrize("name", ["rig/..", "../rig", "rig/a b", "rig/a\nb", "rig/\x1b[2J"])
+def test_when_a_key_names_no_session_then_its_message_is_dropped_and_counted(name: str) -> None:
+    endpoint = free_endpoint()
+    with (
+        ZenohHub("**", listen=(endpoint,)) as hub,
+        ZenohLink("transmitter", "rig/1", connect=(endpoint,)) as one,
+    ):
+        assert until(lambda: hub.present("rig/1"))
+        one._session.put(f"tenbaud/{name}/up/control", b"let me in")
+        one.send(b"a")
+        heard = [hub.receive(PATIENCE_S), hub.receive(PATIENCE_S)]
+        assert [item for item in heard if item is not None] == [("rig/1", b"a")]
+        assert hub.counts.dropped == {"no session's name": 1}
+    with pytest.raises(LinkError, match="session name"):
+        ZenohLink("transmitter", name, connect=(endpoint,))

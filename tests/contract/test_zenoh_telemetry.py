@@ -151,3 +151,14 @@ def test_over_tls_only_the_invited_see_and_only_operators_steer(part: Part) -> N
             assert commands.get(timeout=PATIENCE_S) == b"of the page"
         with pytest.raises(queue.Empty):
             commands.get(timeout=SILENCE_S)
+
+
+def test_when_a_name_is_no_key_then_it_is_said_and_the_endpoint_is_free_again(tmp_path: Path) -> None:
+    with pytest.raises(LinkError, match="a//b"):
+        TelemetryPort("receiver", "a//b", endpoint_in(tmp_path))
+    port = TelemetryPort("receiver", "lab", endpoint_in(tmp_path))
+    try:
+        with pytest.raises(LinkError, match="a//b"):
+            TelemetryFeed(endpoint_in(tmp_path), "a//b", [].append)
+    finally:
+        port.close()

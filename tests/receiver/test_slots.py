@@ -212,6 +212,20 @@ def test_when_the_controller_gives_no_number_then_the_last_command_is_held(bad: 
     assert session.counts["bad_commands"] == 10
 
 
+def test_when_the_controller_has_no_reference_then_the_flight_goes_on_and_says_so_once() -> None:
+    session = flying()
+
+    def fail(tick: int) -> float:
+        raise LookupError("the table ends")
+
+    session._commander._controller.reference_rad = fail  # type: ignore[method-assign]
+    for slot in range(2):
+        session.on_frame(symbol(slot), 0)
+        session.rest()
+    assert session.counts["bad_references"] == 20
+    assert kinds(session).count(EventKind.CONTROLLER) == 1
+
+
 def test_when_commands_are_limited_and_rounded_then_the_codec_uses_what_the_wire_carries() -> None:
     session = flying(7.0, -0.12345, limits=CommandLimits(5.0, 0.3))
     (answer,) = session.on_frame(symbol(0), 0)

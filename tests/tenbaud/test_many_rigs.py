@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -13,6 +14,9 @@ from channel.virtual import Step, encode_step
 from channel.wire import decode, encode
 from receiver.many_service import BURST_MESSAGES
 from tenbaud.build import Agreement
+from tenbaud.flight import many
+from tenbaud.flight.ends import open_recorder
+from tenbaud.recording.writer import McapRecorder
 from tests.tenbaud.processes import finish, start
 from tests.tenbaud.room import PATIENCE_S, Rig, Room, agreement
 
@@ -160,6 +164,52 @@ def test_when_a_symbol_of_an_unknown_session_comes_then_its_rig_is_asked_to_gree
     assert answer == Unknown(99, 3)
     assert room.host.counts["strays"] == 1
     assert [path.name for path in tmp_path.iterdir()] == ["rig-1"]
+
+
+def test_when_a_rig_asks_as_the_receiver_stops_then_its_recording_is_finished(tmp_path: Path) -> None:
+    room = Room(tmp_path)
+    late = Rig(room, "rig/late")
+    assert room.host.knock("rig/late", encode(late.session.hello())) == []
+    room.host.close()
+    assert room.summary("rig/late")["samples"] == 0
+    assert room.summary("rig/late")["recording_error"] is None
+    assert room.hub.joined == set()
+
+
+def test_when_a_flight_cannot_be_built_then_its_file_is_finished_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened = []
+
+    def open_and_note(*arguments: Any) -> McapRecorder:
+        opened.append(open_recorder(*arguments))
+        return opened[-1]
+
+    def fail(*_: Any) -> None:
+        raise TenbaudError("no controller of this name")
+
+    monkeypatch.setattr(many, "open_recorder", open_and_note)
+    monkeypatch.setattr(many, "build_receiver", fail)
+    with Room(tmp_path) as room:
+        odd = Rig(room, "rig/odd").greet()
+        assert "no controller" in (odd.session.refusal or "")
+        (recorder,) = opened
+        assert recorder._finished.wait(PATIENCE_S)
+
+
+def test_when_recording_one_rig_fails_then_only_its_flight_ends(tmp_path: Path) -> None:
+    with Room(tmp_path) as room:
+        good, bad = Rig(room, "rig/good").greet(), Rig(room, "rig/bad").greet()
+        (served,) = [one for one in room.service.served if one.name == "rig/bad"]
+
+        def fail() -> None:
+            raise RuntimeError("a coder of the user's")
+
+        served.service.endpoint.session._commander.write_down = fail  # type: ignore[method-assign]
+        bad.put(encode(bad.session.on_measurement(0, (0.0,))[0]))
+        good.fly(5)
+        assert [one.name for one in room.service.served] == ["rig/good"]
+    assert room.summary("rig/good")["samples"] == 5
 
 
 @pytest.mark.parametrize("clock", ["virtual", "real"])

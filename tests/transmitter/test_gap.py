@@ -13,7 +13,7 @@ from tenbaud.config.load import load_config
 from tenbaud.flight import transmit
 from tenbaud.flight.summary import transmitter_part
 from tests.channel.parts import ListRecorder
-from transmitter.gap import GAP_CHANNEL, MEMORY_S, Running
+from transmitter.gap import GAP_CHANNEL, MEMORY_S, GapGauge, Limit, Running, StrengthMeter
 
 
 def fly(preset: str, seconds: float = 60.0, **changed: Any) -> tuple[dict[str, Any], ListRecorder]:
@@ -75,6 +75,17 @@ def test_when_the_model_predicts_nothing_then_there_is_no_gauge() -> None:
     summary, recorder = fly("usual-1000baud", seconds=1.5)
     assert summary["rms_over_floor"] is None
     assert not recorder.column(GAP_CHANNEL.topic, "sample")
+
+
+def test_when_nothing_has_pushed_at_all_then_there_is_no_gauge() -> None:
+    limit = Limit(1.0, lambda per_density: per_density)
+    codec = agree(load_config("tuned-10baud", None, {}), "virtual").codec
+    still = StrengthMeter(codec, 0.01, angle_step_rad=0.0)
+    still.squares.add(0.0)
+    assert still.value == 0.0
+    gauge = GapGauge(limit, still, codec.ticks_per_sample, 0.01)
+    gauge.on_error(0.1)
+    assert gauge.now is None
 
 
 def test_a_running_mean_forgets_and_the_whole_does_not() -> None:

@@ -117,6 +117,13 @@ def test_when_others_may_read_the_private_key_then_it_is_refused(keys: Path) -> 
         read_node(keys / "rig")
 
 
+def test_when_others_may_read_the_authority_s_key_then_it_signs_nothing(keys: Path) -> None:
+    (keys / "authority" / "authority.key").chmod(0o644)
+    with pytest.raises(KeysError, match=r"chmod 600 .*authority\.key"):
+        add_node(keys, "rig", NodeRole.TRANSMITTER, ())
+    assert not (keys / "rig").exists()
+
+
 def test_when_the_authority_beside_it_is_another_then_it_is_refused(keys: Path) -> None:
     add_node(keys, "rig", NodeRole.TRANSMITTER, ())
     other = new_authority("other").certificate

@@ -89,6 +89,7 @@ def test_without_news_there_is_none() -> None:
 def test_what_is_no_telemetry_is_counted_and_left() -> None:
     board = Board()
     junk = [b"", b"[]", b"{}", b"\xff", transmitter(version=2), b'{"version":1,"role":"pilot"}']
+    junk += [transmitter(role="pilot"), transmitter(role=5)]
     assert not board.take(junk, 0.0)
     assert board.foreign == len(junk)
     assert not board.heads

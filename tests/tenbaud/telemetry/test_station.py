@@ -1,0 +1,44 @@
+"""Telemetry that cannot be had: missed by itself, refused where it was asked for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from channel.errors import LinkError
+from channel.links.zenoh_telemetry import TelemetryPort
+from tenbaud.telemetry.place import endpoint_for
+from tenbaud.telemetry.station import Station, Wish, open_station
+from tests.channel.parts import ListRecorder
+from tests.tenbaud.room import agreement
+
+
+class Silent:
+    skipped = 0
+
+    def compose(self) -> dict[str, Any]:
+        return {}
+
+
+def station(wish: Wish) -> Station:
+    return open_station(agreement(), "receiver", ListRecorder(), wish)  # type: ignore[arg-type]
+
+
+def test_when_the_usual_place_is_taken_then_the_flight_goes_on_without(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    usual = endpoint_for("", "receiver")
+    assert usual is not None
+    taken = TelemetryPort("receiver", "another", usual)
+    try:
+        unasked = station(Wish())
+        with unasked.publishing(lambda _: Silent()):
+            assert unasked.summary() == {"telemetry": "off"}
+        assert "no telemetry" in capsys.readouterr().err
+        with pytest.raises(LinkError), station(Wish("on")).publishing(lambda _: Silent()):
+            pass
+    finally:
+        taken.close()

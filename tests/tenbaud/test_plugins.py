@@ -101,10 +101,12 @@ def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with a module in it, as the working folder."""
     (tmp_path / "outside.py").write_text(OUTSIDE)
     (tmp_path / "needy.py").write_text("import a_library_that_nobody_has\n")
+    (tmp_path / "pack").mkdir()
+    (tmp_path / "pack" / "needy.py").write_text("import pack.forgotten\n")
     (tmp_path / "broken.py").write_text("def f(:\n")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [entry for entry in sys.path if entry])
-    for name in ("outside", "needy", "broken"):
+    for name in ("outside", "needy", "broken", "pack", "pack.needy"):
         monkeypatch.delitem(sys.modules, name, raising=False)
     return tmp_path
 
@@ -141,6 +143,8 @@ def test_options_reach_the_class_and_count_in_the_handshake(outside: Path) -> No
     ("name", "value", "words"),
     [
         ("receiver.controller", "nowhere:Law", "there is no module nowhere"),
+        ("receiver.controller", "nowhere.inner:Law", "there is no module nowhere.inner"),
+        ("receiver.controller", "pack.needy:Law", "needs pack.forgotten"),
         ("receiver.controller", "outside:Lav", r"no class 'Lav'; did you mean Law\?"),
         ("receiver.controller", "outside:NUMBER", "no class 'NUMBER'"),
         ("receiver.controller", "outside:Deaf", "its command must take 2 .*; it has no reference_rad"),

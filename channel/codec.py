@@ -150,11 +150,13 @@ class Codec:
 
         For a coder that uses rates, the measurement holds one value per corrected state.
         """
+        return self.coder.encode(state.coder, self.predicted(state), measurement)
+
+    def predicted(self, state: CodecState) -> Vector:
+        """Return what a measurement is compared with: angles, or all corrected states."""
         if self.uses_rates:
-            predicted = state.model[: self.model.correction_size]
-        else:
-            predicted = self.model.measured(state.model)
-        return self.coder.encode(state.coder, predicted, measurement)
+            return state.model[: self.model.correction_size]
+        return self.model.measured(state.model)
 
     def open(self, state: CodecState, word: Word) -> OpenSample:
         """Consume the word of `state.sample`."""

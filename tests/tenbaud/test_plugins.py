@@ -11,7 +11,7 @@ from tenbaud import Run
 from tenbaud.build import agree
 from tenbaud.build_ends import build_controller, check_parts
 from tenbaud.config.load import ConfigError, load_config
-from tenbaud.flying import nested
+from tenbaud.flying import fly, nested
 from tenbaud.replay.audit import audit
 from tests.tenbaud.processes import run as run_command
 
@@ -73,6 +73,13 @@ class Deaf:
         pass
     def command(self, tick):
         return (0.0, 0.0)
+
+class Ahead(Steps):
+    """A coder that asks where the angle will be, for which it needs the rate."""
+    uses_rates = True
+    def encode(self, coder, predicted, measurement):
+        ahead = measurement[0] - predicted[0] + 0.1 * (measurement[1] - predicted[1])
+        return (1 if ahead >= 0.0 else -1,)
 
 class Growing(Steps):
     def decode(self, coder, state, word):
@@ -137,6 +144,13 @@ def test_options_reach_the_class_and_count_in_the_handshake(outside: Path) -> No
     assert one.identity.config_digest != other.identity.config_digest
     controller = build_controller(one.config)
     assert controller.command(0, (controller.reference_rad(0), 0.0)) == (0.05, -0.05)  # type: ignore[arg-type]
+
+
+def test_a_coder_that_uses_rates_is_given_them(outside: Path) -> None:
+    settings = {"coder.kind": "outside:Ahead", "duration_s": 10.0}
+    run = fly("tuned-10baud", settings=settings, out=outside / "run")
+    assert run.summary["coder_bits_up"] == 100
+    assert audit(outside / "run").passed
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,9 @@ Three rules keep it so:
   integers, and the `sin`, `cos`, `exp` of `channel.numerics`. The C library's functions differ
   between two processors in the last bit, and on a marginal plant one bit is enough in the end:
   nothing on the link pulls the copies together again. A test walks the syntax tree of this file.
-* **Decisions from symbols.** Every branch of the coder follows from symbols, which are integers,
-  never from comparing two floats that each end made for itself.
+* **Decisions from symbols.** What a word means follows from symbols, which are integers, and from no
+  comparison of two floats that each end made for itself; limits that a range is held within are the
+  exception, and the same on either side of the edge.
 
 One sample `k`, its ticks `kN ... (k+1)N - 1`:
 
@@ -149,11 +150,13 @@ class Codec:
 
         For a coder that uses rates, the measurement holds one value per corrected state.
         """
+        return self.coder.encode(state.coder, self.predicted(state), measurement)
+
+    def predicted(self, state: CodecState) -> Vector:
+        """Return what a measurement is compared with: angles, or all corrected states."""
         if self.uses_rates:
-            predicted = state.model[: self.model.correction_size]
-        else:
-            predicted = self.model.measured(state.model)
-        return self.coder.encode(state.coder, predicted, measurement)
+            return state.model[: self.model.correction_size]
+        return self.model.measured(state.model)
 
     def open(self, state: CodecState, word: Word) -> OpenSample:
         """Consume the word of `state.sample`."""

@@ -79,7 +79,7 @@ def _try_out(codec: Codec, config: FlightConfig) -> None:
                 "motor voltages"
             )
         state = codec.initial()
-        word = codec.encode(state, codec.model.measured(state.model))
+        word = codec.encode(state, codec.predicted(state))
         codec.coder.alphabet.word_number(word)
         for consumed in (word, ERASED):
             before = len(state.model), len(state.coder)

@@ -81,7 +81,7 @@ def load_class(field: str, name: str) -> Any:
     try:
         module = import_module(module_name)
     except ModuleNotFoundError as error:
-        if error.name is not None and module_name.split(".")[0] != error.name.split(".")[0]:
+        if error.name is not None and not f"{module_name}.".startswith(f"{error.name}."):
             raise PluginError(
                 f"{field} = {name!r}: the module {module_name} needs {error.name}, which is not "
                 "installed."

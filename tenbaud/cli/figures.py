@@ -43,7 +43,7 @@ def figures(
 
     [dim]tenbaud figures 7[/dim]
 
-    [dim]tenbaud figures all --docs docs --data ../shared/data[/dim]
+    [dim]tenbaud figures all --docs docs --data FOLDER[/dim]
 
     [dim]tenbaud figures theory animation --docs docs[/dim]
     """

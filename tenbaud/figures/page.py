@@ -25,7 +25,7 @@ results beside ours. This page and its pictures are written by
 
 <!-- test: skip, minutes of flights and recorded data that are no part of the repository -->
 ```sh
-tenbaud figures all --docs docs --data ../shared/data
+tenbaud figures all --docs docs --data FOLDER
 ```
 
 and no number in its tables is typed in by hand. One figure alone: `tenbaud figures 7`. The flights of

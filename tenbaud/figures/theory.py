@@ -20,13 +20,12 @@ from tenbaud.figures.copies import CopiesApart, fly_copies
 from tenbaud.figures.curves import read_curves
 from tenbaud.figures.flights import Curves
 from tenbaud.figures.style import FAINT, LINE_A, LINE_B, LINE_C, legend_above, new_figure, save
+from tenbaud.limits.closed import DOUBLE_INTEGRATOR
 from tenbaud.recording.figure import Series
 
 TORQUE_DENSITY = 2e-3
 """q of the white torque in rad^2/s^3, where a figure has one."""
 TORQUE = f"q={TORQUE_DENSITY:g}"
-FLOOR_FACTOR = 0.890
-"""Mean square error of the double integrator at R bit/s: no code has less than 0.890 q/R^3."""
 
 RATES_BAUD = (4, 5, 10, 20, 25, 50)
 LEADS_TICKS = (0, 3, 5, 10, 20, 30, 50, 70, 100)
@@ -153,7 +152,7 @@ def draw_limits(path: Path) -> None:
     scaled = [errors_of(*scaled_at(rate)).coded_rad for rate in RATES_BAUD]
     figure, (panel,) = new_figure(1, height=3.6)
     rates = np.geomspace(RATES_BAUD[0], RATES_BAUD[-1], 50)
-    floor = np.sqrt(FLOOR_FACTOR * TORQUE_DENSITY / rates**3)
+    floor = np.sqrt(DOUBLE_INTEGRATOR * TORQUE_DENSITY / rates**3)
     panel.fill_between(rates, 1e3 * floor, 1e-2, color=FAINT, alpha=0.25, linewidth=0)
     panel.loglog(
         rates, 1e3 * floor, color=FAINT, label=r"double integrator, any code: $\sqrt{0.890\,q/R^3}$"

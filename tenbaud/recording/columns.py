@@ -16,6 +16,8 @@ from channel.recording import Field
 from tenbaud.recording.run import Run
 from tenbaud.recording.table import Table
 
+TABLES = ("flight", "samples", "events")
+
 
 @dataclass(frozen=True, slots=True)
 class Column:
@@ -78,9 +80,6 @@ def event_columns(run: Run) -> list[Column]:
 
 def all_columns(run: Run) -> dict[str, list[Column]]:
     """Return the three tables by name; one without rows is left out."""
-    tables = {
-        "flight": flight_columns(run),
-        "samples": sample_columns(run),
-        "events": event_columns(run),
-    }
+    makers = (flight_columns, sample_columns, event_columns)
+    tables = {name: make(run) for name, make in zip(TABLES, makers, strict=True)}
     return {name: columns for name, columns in tables.items() if columns and len(columns[0].values)}

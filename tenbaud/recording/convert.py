@@ -11,7 +11,7 @@ import numpy as np
 import orjson
 
 from channel.recording import Field, RecordChannel
-from tenbaud.recording.columns import Column, all_columns, flight_columns
+from tenbaud.recording.columns import TABLES, Column, all_columns, flight_columns
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.layouts import flight_layouts
 from tenbaud.recording.run import Run
@@ -34,6 +34,8 @@ def convert(run: Run, form: str, output: Path | None = None, overwrite: bool = F
             f"{target} exists already and is not overwritten. Add --force, or choose another place "
             "with --out."
         )
+    if target.exists():
+        _check_replaceable(run, form, target)
     # Whoever is interrupted leaves no half of a file behind under the name of a whole one.
     unfinished = target.with_name(f".{target.name}.unfinished")
     _remove(unfinished)
@@ -52,6 +54,27 @@ def convert(run: Run, form: str, output: Path | None = None, overwrite: bool = F
     if form == "mcap":
         written += flight_layouts(run, target)
     return written
+
+
+def _check_replaceable(run: Run, form: str, target: Path) -> None:
+    """Raise RecordingError where replacing `target` would take more than an earlier conversion."""
+    is_folder = form in ("csv", "parquet")
+    folder = run.folder
+    own = (run.path, folder.config, folder.summary, folder.figure, folder.transmitter, folder.receiver)
+    if target.is_dir() != is_folder:
+        there, wanted = ("file", "folder") if is_folder else ("folder", "file")
+        why = f"it is a {there}, and {form} is a {wanted}"
+    elif target.resolve() in [one.resolve() for one in own]:
+        why = "it is a part of the run itself"
+    elif is_folder and (others := {one.name for one in target.iterdir()} - _names_written(form)):
+        why = f"it holds {min(others)}, which no conversion wrote"
+    else:
+        return
+    raise RecordingError(f"{target} is not replaced: {why}. Choose another place with --out.")
+
+
+def _names_written(form: str) -> set[str]:
+    return {f"{table}.{form}" for table in TABLES}
 
 
 def _remove(path: Path) -> None:

@@ -59,17 +59,17 @@ def _recover_file(path: Path, output: Path | None) -> Recovered:
     target = output or path
     unfinished = target.with_name(f".{target.name}.unfinished")
     kept = None if output is not None else path.with_name(f"{path.stem}.cut{path.suffix}")
-    for taken in (output, kept):
-        if taken is not None and taken.exists():
-            raise RecordingError(
-                f"{taken} exists already and is not overwritten. Move it away, or choose another "
-                "place with --out."
-            )
     stream = MessageStream(path)
     try:
         rows, last_ns = _copy(stream, unfinished)
         if stream.complete:
             return Recovered(path, None, rows, last_ns)
+        for taken in (output, kept):
+            if taken is not None and taken.exists():
+                raise RecordingError(
+                    f"{taken} exists already and is not overwritten. Move it away, or choose another "
+                    "place with --out."
+                )
         if kept is not None:
             path.rename(kept)
         unfinished.replace(target)

@@ -86,7 +86,7 @@ def _check_whole(record: FlightRecord, result: Audit) -> None:
 
 
 def _check_counts(record: FlightRecord, result: Audit) -> None:
-    """The summary must not claim less than the recording shows."""
+    """The summary must claim the coder bits that the recording shows."""
     counted = result.counted
     summary = record.summaries.get("transmitter", {})
     whole = record.transmitter is not None and bool(record.transmitter.end)

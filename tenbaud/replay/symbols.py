@@ -101,10 +101,10 @@ def unpack(path: Path) -> Unpacked:
         clock: Literal["real", "virtual"] = "real" if head["clock"] == "real" else "virtual"
         agreement = agree(config, clock)
         epochs = _epochs(head["epochs"], data[head_at + length :], agreement.codec)
-    except (OSError, ValueError, KeyError, struct.error, zlib.error) as error:
+        steps = tuple((int(tick), float(angle)) for tick, angle in head["set_points"])
+        return Unpacked(agreement, epochs, steps, str(head["last_digest"]))
+    except (OSError, ValueError, KeyError, TypeError, struct.error, zlib.error) as error:
         raise RecordingError(f"{path} is no symbols file of a flight: {error}.") from error
-    steps = tuple((int(tick), float(angle)) for tick, angle in head["set_points"])
-    return Unpacked(agreement, epochs, steps, head["last_digest"])
 
 
 def _epochs(described: list[list[Any]], data: bytes, codec: Codec) -> list[Epoch]:

@@ -70,7 +70,7 @@ def _counts(result: Audit) -> list[str]:
         lines.append(f"symbol bytes up     {counted.symbol_bytes}")
     for name, field in (("wire bytes up", "wire_bytes_up"), ("wire bytes down", "wire_bytes_down")):
         value = _said(result, field)
-        lines.append(f"{name:19} {'not in a summary' if value is None else value}")
+        lines.append(f"{name:19} {'not in a summary' if value is None else f'{value}, by the summary'}")
     if counted.baud is not None:
         lines.append(f"baud                {counted.baud:.3f} measured, {terms.rate_baud:g} paid for")
     if counted.symbols_taken is not None:

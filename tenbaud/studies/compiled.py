@@ -28,7 +28,10 @@ PACKAGES = ("channel", "plant_sim", "receiver", "transmitter", "tenbaud")
 OPTIONS = {"fastmath": False, "error_model": "python", "nogil": True}
 """How everything is compiled: divisions by zero are errors and nothing is reordered, as in Python."""
 
-BESIDE = ("plots.py", "run.py", "table.py", "tune.py", "tuning.py", "study.py", "settings.py")
+SOURCES = (*PACKAGES[:-1], "tenbaud.config", "tenbaud.flight", "tenbaud.studies")
+"""Packages that the figures of a flight depend on; beside them, what builds its parts."""
+
+BESIDE = ("plots.py", "run.py", "table.py", "tuning.py", "study.py", "settings.py")
 """Modules of the studies that no figure of a flight depends on."""
 
 LOOPS = ("tenbaud.studies.lane_ticks", "tenbaud.studies.lane_samples")
@@ -144,13 +147,20 @@ def _jit(function: Callable[..., Any], **more: Any) -> Any:
 def sources_digest() -> str:
     """Return what stands for all sources that the figures of a flight depend on."""
     digest = blake2b(digest_size=12)
-    for package in (*PACKAGES[:-1], "tenbaud.studies"):
+    for path in figure_sources():
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def figure_sources() -> list[Path]:
+    """Return the files that the figures of a flight depend on, always in the same order."""
+    found = sorted(Path(__file__).parents[1].glob("build*.py"))
+    for package in SOURCES:
         spec = find_spec(package)
         for place in (spec and spec.submodule_search_locations) or ():
-            for path in sorted(Path(place).rglob("*.py")):
-                if path.name not in BESIDE:
-                    digest.update(path.read_bytes())
-    return digest.hexdigest()
+            beside = BESIDE if package == "tenbaud.studies" else ()
+            found += [path for path in sorted(Path(place).rglob("*.py")) if path.name not in beside]
+    return found
 
 
 @cache

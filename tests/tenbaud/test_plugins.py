@@ -11,7 +11,7 @@ from tenbaud import Run
 from tenbaud.build import agree
 from tenbaud.build_ends import build_controller, check_parts
 from tenbaud.config.load import ConfigError, load_config
-from tenbaud.flying import nested
+from tenbaud.flying import fly, nested
 from tenbaud.replay.audit import audit
 from tests.tenbaud.processes import run as run_command
 
@@ -74,6 +74,13 @@ class Deaf:
     def command(self, tick):
         return (0.0, 0.0)
 
+class Ahead(Steps):
+    """A coder that asks where the angle will be, for which it needs the rate."""
+    uses_rates = True
+    def encode(self, coder, predicted, measurement):
+        ahead = measurement[0] - predicted[0] + 0.1 * (measurement[1] - predicted[1])
+        return (1 if ahead >= 0.0 else -1,)
+
 class Growing(Steps):
     def decode(self, coder, state, word):
         return (0.0, 0.0), (*coder, 1.0)
@@ -101,10 +108,12 @@ def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with a module in it, as the working folder."""
     (tmp_path / "outside.py").write_text(OUTSIDE)
     (tmp_path / "needy.py").write_text("import a_library_that_nobody_has\n")
+    (tmp_path / "pack").mkdir()
+    (tmp_path / "pack" / "needy.py").write_text("import pack.forgotten\n")
     (tmp_path / "broken.py").write_text("def f(:\n")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [entry for entry in sys.path if entry])
-    for name in ("outside", "needy", "broken"):
+    for name in ("outside", "needy", "broken", "pack", "pack.needy"):
         monkeypatch.delitem(sys.modules, name, raising=False)
     return tmp_path
 
@@ -137,10 +146,19 @@ def test_options_reach_the_class_and_count_in_the_handshake(outside: Path) -> No
     assert controller.command(0, (controller.reference_rad(0), 0.0)) == (0.05, -0.05)  # type: ignore[arg-type]
 
 
+def test_a_coder_that_uses_rates_is_given_them(outside: Path) -> None:
+    settings = {"coder.kind": "outside:Ahead", "duration_s": 10.0}
+    run = fly("tuned-10baud", settings=settings, out=outside / "run")
+    assert run.summary["coder_bits_up"] == 100
+    assert audit(outside / "run").passed
+
+
 @pytest.mark.parametrize(
     ("name", "value", "words"),
     [
         ("receiver.controller", "nowhere:Law", "there is no module nowhere"),
+        ("receiver.controller", "nowhere.inner:Law", "there is no module nowhere.inner"),
+        ("receiver.controller", "pack.needy:Law", "needs pack.forgotten"),
         ("receiver.controller", "outside:Lav", r"no class 'Lav'; did you mean Law\?"),
         ("receiver.controller", "outside:NUMBER", "no class 'NUMBER'"),
         ("receiver.controller", "outside:Deaf", "its command must take 2 .*; it has no reference_rad"),

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from tenbaud.cli.app import app
 from tenbaud.figures import animation, theory
 from tenbaud.figures.copies import fly_copies
+from tenbaud.limits.closed import DOUBLE_INTEGRATOR
 from tests.rules.sources import TOP
 
 LIMITS = (TOP / "docs/theory/limits.md").read_text(encoding="utf-8")
@@ -57,7 +58,7 @@ def floor_of(phase: float) -> float:
 def test_when_the_floor_is_minimised_then_it_is_the_number_of_the_page() -> None:
     phases = np.linspace(0.74, 0.79, 5)
     floors = [floor_of(float(phase)) for phase in phases]
-    assert min(floors) == pytest.approx(theory.FLOOR_FACTOR, abs=1e-3)
+    assert min(floors) == pytest.approx(DOUBLE_INTEGRATOR, abs=1e-3)
     assert math.tan(phases[int(np.argmin(floors))]) == pytest.approx(0.96, abs=0.03)
     assert floor_of(1e-6) == pytest.approx(1.0 / (2.0 * math.log(2.0) ** 3), rel=1e-3)
 

@@ -149,3 +149,24 @@ def test_the_command_writes_into_the_folder_of_the_run_and_explains_itself(
     assert "--force" in again.err
     assert run_command("convert", "run", "--to", "csv", "--force", cwd=tmp_path).code == 0
     assert run_command("convert", "none", "--to", "csv", cwd=tmp_path).code == 2
+
+
+def test_force_replaces_an_earlier_conversion_and_nothing_else(lossy: Run, tmp_path: Path) -> None:
+    copy = Run(shutil.copytree(lossy.path, tmp_path / "run"))
+    convert(copy, "csv")
+    assert convert(copy, "csv", overwrite=True)
+    before = {path: path.read_bytes() for path in copy.path.rglob("*") if path.is_file()}
+    notes = tmp_path / "notes"
+    notes.mkdir()
+    (notes / "diary.txt").write_text("months of work")
+    for form, target, why in (
+        ("mat", notes, "it is a folder, and mat is a file"),
+        ("csv", notes, "diary.txt"),
+        ("csv", copy.path, "part of the run"),
+        ("mcap", copy.folder.transmitter, "part of the run"),
+        ("csv", copy.folder.config, "it is a file, and csv is a folder"),
+    ):
+        with pytest.raises(RecordingError, match=why):
+            convert(copy, form, target, overwrite=True)
+    assert (notes / "diary.txt").read_text() == "months of work"
+    assert {path: path.read_bytes() for path in copy.path.rglob("*") if path.is_file()} == before

@@ -65,6 +65,10 @@ def test_a_whole_file_is_left_alone_and_nothing_is_overwritten(flight: Run, tmp_
         recover(copy)
     (elsewhere,) = recover(copy, tmp_path / "mended.mcap")
     assert whole_rows(tmp_path / "mended.mcap") == elsewhere.rows
+    (tmp_path / "receiver.cut.mcap").unlink()
+    assert recover(copy)[0].kept == tmp_path / "receiver.cut.mcap"
+    (again,) = recover(copy)
+    assert again.kept is None
     with pytest.raises(RecordingError, match="Give one recording"):
         recover(flight.path, tmp_path / "both.mcap")
 

@@ -237,7 +237,12 @@ def test_the_command_says_what_it_counted_and_exits_with_the_verdict(
 ) -> None:
     done = run_command("audit", str(clean.path), cwd=tmp_path)
     assert done.code == 0, done.out
-    for words in ("coder bits up       120", "wire bytes up", "10.000 measured, 10 paid for", "passed"):
+    for words in (
+        "coder bits up       120",
+        "by the summary",
+        "10.000 measured, 10 paid for",
+        "passed",
+    ):
         assert words in done.out
     bad = doctored(
         clean.path,

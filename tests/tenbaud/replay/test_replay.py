@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import json
+import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -101,6 +104,13 @@ def test_a_spoilt_symbols_file_is_refused_or_found_out(tmp_path: Path) -> None:
     for broken in (b"", data[:40], data[:-1], data + b"\0", b"x" + data):
         file.write_bytes(broken)
         with pytest.raises(RecordingError, match="is no symbols file"):
+            unpack(file)
+    for lacking in ("last_digest", "set_points", "epochs"):
+        head = json.loads(zlib.decompress(replayed.packed.head))
+        del head[lacking]
+        packed = replace(replayed.packed, head=zlib.compress(json.dumps(head).encode()))
+        file.write_bytes(packed.data)
+        with pytest.raises(RecordingError, match=f"is no symbols file .*{lacking}"):
             unpack(file)
     file.write_bytes(data[:-1] + bytes([data[-1] ^ 1]))
     done = run_command("replay", "bad.symbols", cwd=tmp_path)

@@ -6,8 +6,8 @@ alone would let every node of the authority in. So each end also denies everythi
 allows named nodes (common names) what their part needs, on the keys of their own session:
 
     part         may send                                  may be sent
-    transmitter  up/*, its liveliness                      down/command, the receiver's liveliness
-    receiver     down/command, its liveliness              up/*, the transmitter's liveliness
+    transmitter  up/*, its liveliness                      down/*, the receiver's liveliness
+    receiver     down/*, its liveliness                    up/*, the transmitter's liveliness
     viewer       nothing                                   up/*, down/*, telemetry/*, both livelinesses
     operator     control                                   what a viewer is
 

@@ -81,6 +81,8 @@ class ManyHost:
         self._opening: set[str] = set()
         self._open: dict[str, Flight] = {}
         self._refused: deque[tuple[str, int]] = deque(maxlen=TOLD_MAX)
+        self._unexplained: set[str] = set()
+        """names refused whose transmitters have not said yet how they see it"""
         self.summaries: list[Summary] = []
         """of the flights that have ended"""
         self.counts: Counter[str] = Counter()
@@ -111,7 +113,9 @@ class ManyHost:
                 return []
             case Symbol():
                 answer = Unknown(frame.session, frame.epoch)
-            case Bye() if frame.session == 0:
+            case Bye() if frame.session == 0 and name in self._unexplained:
+                # Once per refusal: a line on a terminal takes the loop's time.
+                self._unexplained.discard(name)
                 self._tell(f"{name}: as its transmitter sees it: {frame.reason}")
             case _:
                 self.counts["strays"] += 1
@@ -182,6 +186,8 @@ class ManyHost:
     def _refusal(self, name: str, hello: Hello, problem: str, config: str) -> Refuse:
         if (name, hello.incarnation) not in self._refused:
             self._refused.append((name, hello.incarnation))
+            if len(self._unexplained) < TOLD_MAX:
+                self._unexplained.add(name)
             self.counts["refused"] += 1
             self._tell(f"{name}: refused: {problem}")
         return Refuse(hello.incarnation, problem, config)
@@ -226,7 +232,6 @@ class ManyHost:
                 "recording_rows_lost": flight.recorder.rows_dropped,
                 "recording_error": flight.recorder.error,
             }
-            self.summaries.append(flight.summary)
             write_summary(flight.folder, flight.summary)
             self._tell(
                 f"{flight.name}: ended after {flight.summary['samples']} samples: {outcome.text}"
@@ -237,6 +242,9 @@ class ManyHost:
             self._open.pop(flight.name, None)
             self._hub.leave(flight.name)
             self._opening.discard(flight.name)
+            # Last: who sees the flight ended may count on its place being free.
+            if flight.summary:
+                self.summaries.append(flight.summary)
 
 
 def _outcome(end_reason: str, served: Served, error: Exception | None) -> Outcome:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from channel.errors import TenbaudError
-from channel.frames import Symbol, Unknown
+from channel.frames import Bye, Symbol, Unknown
 from channel.links.endpoints import free_endpoint
 from channel.virtual import Step, encode_step
 from channel.wire import decode, encode
@@ -80,7 +80,11 @@ def test_when_a_handshake_does_not_fit_then_it_is_refused_told_once_and_leaves_n
         other = Rig(room, "rig/other", coder={"window_signs": 7}).greet()
         other.put(encode(other.session.hello()))
         other.hear()
+        for _ in range(5):
+            other.put(encode(Bye(0, "as I see it")))
         good.fly(2)
+    # The first is what it said of itself when it was refused.
+    assert len([text for text in room.told if "as its transmitter sees it" in text]) == 1
     assert "coder.window_signs" in (other.session.refusal or "")
     assert len([text for text in room.told if "rig/other: refused" in text]) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["rig-good"]

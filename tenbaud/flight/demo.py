@@ -87,6 +87,9 @@ def _fly_processes(
             for end in ends:
                 end.end()
     if not transmitter.summary:
+        if stop():
+            # Ctrl-C came before the flight had begun, and there is nothing to sum up.
+            raise KeyboardInterrupt
         raise LinkLost("the transmitter ended without a summary:\n  " + transmitter.last_words())
     summary = joined(transmitter.summary, receiver.summary)
     code = ExitCode(transmitter.process.returncode or receiver.process.returncode)

@@ -6,27 +6,24 @@ import time
 from collections.abc import Callable
 
 from channel.clocks import SkewedClock
-from channel.errors import ConfigMismatch, LinkLost
+from channel.errors import ConfigMismatch
 from channel.line import Line
 from channel.links.base import Link
 from channel.outbox import Outbox
 from channel.virtual import is_envelope
 from receiver.endpoint import ReceiverEndpoint
+from receiver.service import POLL_S, Service
 from receiver.session import Phase
 
-POLL_S = 0.2
-"""How often a quiet service looks whether it should stop."""
 
-REFUSAL_LINGER_S = 1.0
-"""How long a refused transmitter has to say in which fields it differs."""
-
-
-class RealService:
+class RealService(Service):
     """Serves one flight, without a link: messages and times in, messages out.
 
     `line` is the downlink, whose flight time begins with the first message sent; `clock` what this
     end takes for the time. All times are of the monotonic clock.
     """
+
+    missed = "nothing came"
 
     def __init__(
         self,
@@ -35,14 +32,12 @@ class RealService:
         line: Line | None = None,
         clock: SkewedClock | None = None,
     ) -> None:
-        self.endpoint = endpoint
-        self._peer_timeout_s = peer_timeout_s
+        super().__init__(endpoint, peer_timeout_s)
         self._line = line or Line()
         self._at_once = self._line.at_once
         self._clock = clock
         self._outbox = Outbox()
         self._line_start_ns: int | None = None
-        self._heard_ns = time.monotonic_ns()
 
     def next_due_ns(self, now_ns: int) -> int | None:
         """Return when there is something to do without a message; None: nothing is planned."""
@@ -71,21 +66,6 @@ class RealService:
             messages += self.endpoint.on_bytes(data, shown_ns)
         messages += self.endpoint.on_time(shown_ns)
         return self._on_line(messages, now_ns)
-
-    def over(self, now_ns: int) -> bool:
-        """Return whether the flight is over; LinkLost when nothing came for too long."""
-        session = self.endpoint.session
-        quiet_s = (now_ns - self._heard_ns) / 1e9
-        if session.phase is Phase.ENDED:
-            return True
-        if session.refusal is not None and quiet_s > REFUSAL_LINGER_S:
-            return True
-        if quiet_s > self._peer_timeout_s:
-            raise LinkLost(
-                f"nothing came from a transmitter for {self._peer_timeout_s:g} s; is it running, with "
-                "the same session name and the other end of this endpoint?"
-            )
-        return False
 
     def _on_line(self, messages: list[bytes], now_ns: int) -> list[bytes]:
         """Put messages on the line; return those that it has delivered by now."""

@@ -5,23 +5,23 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from channel.errors import ConfigMismatch, FrameError, LinkLost
+from channel.errors import ConfigMismatch, FrameError
 from channel.links.base import Link
 from channel.virtual import decode_step, encode_reply, is_envelope
 from receiver.endpoint import ReceiverEndpoint
-from receiver.real_service import POLL_S, REFUSAL_LINGER_S
+from receiver.service import POLL_S, Service
 from receiver.session import Phase
 
 
-class VirtualService:
+class VirtualService(Service):
     """Serves one flight, without a link: steps in, replies out. Times are of the monotonic clock."""
 
+    missed = "no message"
+
     def __init__(self, endpoint: ReceiverEndpoint, peer_timeout_s: float) -> None:
-        self.endpoint = endpoint
-        self._peer_timeout_s = peer_timeout_s
+        super().__init__(endpoint, peer_timeout_s)
         self._last_number = -1
         self._last_reply = b""
-        self._heard_ns = time.monotonic_ns()
 
     def next_due_ns(self, now_ns: int) -> int | None:
         """Return None: the transmitter's process keeps the time."""
@@ -50,21 +50,6 @@ class VirtualService:
             self._last_number = step.number
             self._last_reply = encode_reply(reply._replace(number=step.number))
         return [self._last_reply]
-
-    def over(self, now_ns: int) -> bool:
-        """Return whether the flight is over; LinkLost when no step came for too long."""
-        session = self.endpoint.session
-        quiet_s = (now_ns - self._heard_ns) / 1e9
-        if session.phase is Phase.ENDED:
-            return True
-        if session.refusal is not None and quiet_s > REFUSAL_LINGER_S:
-            return True
-        if quiet_s > self._peer_timeout_s:
-            raise LinkLost(
-                f"no message from a transmitter for {self._peer_timeout_s:g} s; is it running, with "
-                "the same session name and the other end of this endpoint?"
-            )
-        return False
 
 
 def serve_virtual(

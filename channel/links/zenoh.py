@@ -14,16 +14,16 @@ Keys, `NAME` being the session's name:
 from __future__ import annotations
 
 import secrets
-from collections.abc import Callable
+from typing import Unpack
 
 import zenoh
 
 from channel.errors import LinkError
 from channel.links.base import LinkBase, Role
-from channel.links.security import KEY_ROOT, Security
+from channel.links.security import KEY_ROOT
 from channel.links.zenoh_gate import Gate
 from channel.links.zenoh_inbox import ChannelInbox
-from channel.links.zenoh_node import is_session_name, open_node
+from channel.links.zenoh_node import NodeOptions, is_session_name, open_node
 
 
 class ZenohLink(LinkBase):
@@ -43,15 +43,8 @@ class ZenohLink(LinkBase):
         role: Role,
         session_name: str,
         *,
-        listen: tuple[str, ...] = (),
-        connect: tuple[str, ...] = (),
-        router: tuple[str, ...] = (),
-        scouting: bool = False,
-        insecure: bool = False,
-        security: Security | None = None,
         best_effort: bool = False,
-        patience_s: float = 10.0,
-        should_stop: Callable[[], bool] = lambda: False,
+        **node: Unpack[NodeOptions],
     ) -> None:
         super().__init__()
         if not is_session_name(session_name):
@@ -63,18 +56,9 @@ class ZenohLink(LinkBase):
         self._gate: Gate | None = None
         self._peers: set[str] = set()
         self._closed = False
-        self._session = open_node(
-            listen,
-            connect,
-            router,
-            scouting=scouting,
-            insecure=insecure,
-            security=security,
-            patience_s=patience_s,
-            should_stop=should_stop,
-        )
+        self._session = open_node(**node)
         try:
-            self._gate = Gate(self._session, security, self.counts.refused)
+            self._gate = Gate(self._session, node.get("security"), self.counts.refused)
             self._declare(role, f"{KEY_ROOT}/{session_name}", best_effort)
         except BaseException:
             self.close()

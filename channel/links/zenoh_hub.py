@@ -9,17 +9,16 @@ from __future__ import annotations
 
 import re
 import secrets
-from collections.abc import Callable
+from typing import Unpack
 
 import zenoh
 
 from channel.errors import LinkError
 from channel.links.base import LinkCounts
-from channel.links.security import KEY_ROOT, Security
-from channel.links.zenoh_config import SESSIONS_MAX
+from channel.links.security import KEY_ROOT
 from channel.links.zenoh_gate import Gate
 from channel.links.zenoh_inbox import ChannelInbox
-from channel.links.zenoh_node import is_session_name, open_node
+from channel.links.zenoh_node import NodeOptions, is_session_name, open_node
 
 CHANNEL_MESSAGES_MAX = 1024
 
@@ -43,15 +42,7 @@ class ZenohHub:
     def __init__(
         self,
         pattern: str,
-        *,
-        listen: tuple[str, ...] = (),
-        connect: tuple[str, ...] = (),
-        router: tuple[str, ...] = (),
-        scouting: bool = False,
-        insecure: bool = False,
-        security: Security | None = None,
-        connections_max: int = SESSIONS_MAX,
-        should_stop: Callable[[], bool] = lambda: False,
+        **node: Unpack[NodeOptions],
     ) -> None:
         if not is_session_pattern(pattern):
             raise LinkError(
@@ -63,18 +54,9 @@ class ZenohHub:
         self._inbox: ChannelInbox | None = None
         self._closed = False
         self._gate: Gate | None = None
-        self._session = open_node(
-            listen,
-            connect,
-            router,
-            scouting=scouting,
-            insecure=insecure,
-            security=security,
-            connections_max=connections_max,
-            should_stop=should_stop,
-        )
+        self._session = open_node(**node)
         try:
-            self._gate = Gate(self._session, security, self.counts.refused)
+            self._gate = Gate(self._session, node.get("security"), self.counts.refused)
             self._inbox = ChannelInbox(
                 self._session, f"{KEY_ROOT}/{pattern}/up/*", CHANNEL_MESSAGES_MAX
             )

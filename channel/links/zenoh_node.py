@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from typing import TypedDict
 
 import zenoh
 
@@ -20,11 +21,30 @@ def is_session_name(name: str) -> bool:
     return bool(_NAME.fullmatch(name)) and not {".", ".."} & set(name.split("/"))
 
 
+class NodePlace(TypedDict, total=False):
+    """Where a node is and whom it lets in: `open_node`, for those that hand it on."""
+
+    listen: tuple[str, ...]
+    connect: tuple[str, ...]
+    router: tuple[str, ...]
+    scouting: bool
+    insecure: bool
+    security: Security | None
+
+
+class NodeOptions(NodePlace, total=False):
+    """All that `open_node` takes."""
+
+    patience_s: float
+    should_stop: Callable[[], bool]
+    connections_max: int
+
+
 def open_node(
+    *,
     listen: tuple[str, ...] = (),
     connect: tuple[str, ...] = (),
     router: tuple[str, ...] = (),
-    *,
     scouting: bool = False,
     insecure: bool = False,
     security: Security | None = None,

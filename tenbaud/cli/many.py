@@ -58,12 +58,7 @@ def serve(
         knocks(where) as refused,
         ZenohHub(
             many.sessions,
-            listen=where.listen,
-            connect=where.connect,
-            router=where.router,
-            scouting=where.scouting,
-            insecure=where.insecure,
-            security=where.security,
+            **where.node(),
             connections_max=max(SESSIONS_MAX, 2 * many.rigs_max),
             should_stop=stop,
         ) as hub,

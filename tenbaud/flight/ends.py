@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from channel.links.base import Link, Role
 from channel.links.security import Security
@@ -28,6 +29,9 @@ from tenbaud.recording.writer import McapRecorder
 from tenbaud.telemetry.compose import ReceiverComposer, TransmitterComposer
 from tenbaud.telemetry.live import LiveTransmitter
 from tenbaud.telemetry.station import NO_WISH, Station, Wish, open_station
+
+if TYPE_CHECKING:
+    from channel.links.zenoh_node import NodePlace
 
 Stop = Callable[[], bool]
 SWITCH_INTERVAL_S = 0.0002
@@ -52,6 +56,17 @@ class Endpoints:
     """receiver: take a flight over from the receiver that has it"""
     telemetry: Wish = NO_WISH
 
+    def node(self) -> NodePlace:
+        """Return what opens this end's Zenoh session."""
+        return {
+            "listen": self.listen,
+            "connect": self.connect,
+            "router": self.router,
+            "scouting": self.scouting,
+            "insecure": self.insecure,
+            "security": self.security,
+        }
+
 
 def open_link(
     agreement: Agreement, role: Role, endpoints: Endpoints, stop: Stop = lambda: False
@@ -72,12 +87,7 @@ def _zenoh(agreement: Agreement, role: Role, endpoints: Endpoints, stop: Stop) -
     return ZenohLink(
         role,
         agreement.config.link.session,
-        listen=endpoints.listen,
-        connect=endpoints.connect,
-        router=endpoints.router,
-        scouting=endpoints.scouting,
-        insecure=endpoints.insecure,
-        security=endpoints.security,
+        **endpoints.node(),
         best_effort=agreement.config.link.best_effort,
         patience_s=agreement.config.link.peer_timeout_s,
         should_stop=stop,

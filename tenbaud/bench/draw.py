@@ -10,8 +10,9 @@ import numpy as np
 
 from tenbaud.bench.entrants import BEST, ENTRANTS, PAPER
 from tenbaud.bench.flight import FINE_COUNTS, RIG_COUNTS
-from tenbaud.bench.page import estimation, floor_of
-from tenbaud.bench.plan import DENSITIES, NOMINAL, RATES, Outcome, ratio
+from tenbaud.bench.intervals import ratio
+from tenbaud.bench.plan import DENSITIES, NOMINAL, RATES, Outcome
+from tenbaud.bench.tables import estimation, floor_of
 from tenbaud.figures.style import FAINT, LINE_A, LINE_B, LINE_C, save
 from tenbaud.limits.encoder import encoder_floor
 

@@ -163,4 +163,8 @@ ENTRANTS = (
     ),
 )
 PAPER = "paper"
+TUNED = "tuned"
 BEST = "history-told"
+
+PRESETS = {"tuned-10baud": 10.0, "history-10baud": 10.0, "tuned-20baud": 20.0, "history-20baud": 20.0}
+"""bit/s of the presets that are flown as they are, beside the entrants"""

@@ -1,4 +1,4 @@
-"""One flight for the table: the nodes' own parts, joined without the protocol around them.
+"""One flight for the page: the nodes' own parts, joined without the protocol around them.
 
 Codec, rate observer, encoder, plant and controller are those that a flight in memory has at command
 lead 0, in the same order; a test holds that the errors are the same to the last bit. Without frames,
@@ -15,7 +15,7 @@ from channel.codec import Vector
 from channel.errors import CodecDiverged
 from channel.limits import from_millivolts, to_millivolts
 from plant_sim.encoder import Encoder
-from tenbaud.bench.entrants import ENTRANTS
+from tenbaud.bench.entrants import ENTRANTS, PRESETS
 from tenbaud.build import Agreement, agree
 from tenbaud.build_ends import build_controller, build_sight
 from tenbaud.build_rig import build_plant
@@ -30,9 +30,10 @@ PERIOD_S = 25.0
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A flight of the table."""
+    """A flight of the page."""
 
     entrant: str
+    """an entrant's key, or a preset's name"""
     rate_bit_s: float
     density: float
     seed: int
@@ -57,24 +58,28 @@ class Errors(NamedTuple):
 
 def configuration(case: Case) -> Agreement:
     """Return what both ends agree on for a case."""
-    entrant = next(one for one in ENTRANTS if one.key == case.entrant)
-    tick_s = tick_of(case.rate_bit_s)
-    told = case.density if entrant.told else None
     receiver: dict[str, Any] = {} if case.closed_loop else {"pid": IDLE}
-    overrides = {
+    overrides: dict[str, Any] = {
         "seed": case.seed,
         "duration_s": case.seconds,
-        "timing": {"tick_s": tick_s, "symbol_period_s": 1.0 / case.rate_bit_s, "lead_ticks": 0},
-        "channel": {"rate_baud": case.rate_bit_s},
-        "coder": entrant.section(case.rate_bit_s, case.density),
+        "timing": {"lead_ticks": 0},
+        "channel": {"delivery": "start"},
         "transmitter": {
             "encoder_counts_per_turn": case.counts,
-            "sight_bandwidth_rad_s": sight_bandwidth(told, case.counts, tick_s),
             "plant": {"disturbance": f"q={case.density!r}"},
         },
         "receiver": receiver,
         "link": {"kind": "memory"},
     }
+    if case.entrant in PRESETS:
+        return agree(load_config(case.entrant, None, overrides), "virtual")
+    entrant = next(one for one in ENTRANTS if one.key == case.entrant)
+    tick_s = tick_of(case.rate_bit_s)
+    told = case.density if entrant.told else None
+    overrides["timing"] |= {"tick_s": tick_s, "symbol_period_s": 1.0 / case.rate_bit_s}
+    overrides["channel"]["rate_baud"] = case.rate_bit_s
+    overrides["coder"] = entrant.section(case.rate_bit_s, case.density)
+    overrides["transmitter"]["sight_bandwidth_rad_s"] = sight_bandwidth(told, case.counts, tick_s)
     return agree(load_config("paper-10baud", None, overrides), "virtual")
 
 

@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
-from tenbaud.bench.entrants import ENTRANTS, Entrant
-from tenbaud.bench.flight import FINE_COUNTS, RIG_COUNTS, tick_of
-from tenbaud.bench.plan import DENSITIES, NOMINAL, RATES, Outcome, exponent, ratio
+from tenbaud.bench import tables
+from tenbaud.bench.entrants import AIM
+from tenbaud.bench.flight import FINE_COUNTS, PERIOD_S, RIG_COUNTS, SETTLE_S, tick_of
+from tenbaud.bench.intervals import exponent, ratio
+from tenbaud.bench.plan import DENSITIES, NOMINAL, RATES, Outcome
 from tenbaud.bench.prose import NOT_RECORDED, PAGE, RECORDED, SUMMARY
 from tenbaud.bench.recorded import Row
-from tenbaud.bench.tracking import DISTURBANCES, PRESETS, USUAL
-from tenbaud.bench.trials import TRIALS, fly_trial
 from tenbaud.limits.closed import DOUBLE_INTEGRATOR, WIENER
 from tenbaud.limits.encoder import (
     double_integrator_rate_at_encoder_floor,
     encoder_floor,
     floor_behind_encoder,
 )
-from tenbaud.limits.floor import floor, word_floor
-from tenbaud.limits.linear import integrators, linear_model, pitch, rate_needed
+from tenbaud.limits.linear import linear_model, rate_needed
 
 PICTURE = "figures/limits.png"
 DISTURBANCE_PICTURE = "figures/limits-disturbance.png"
@@ -37,7 +36,7 @@ def write_page(path: Path, outcome: Outcome, recorded: Sequence[Row], quick: boo
         wiener=WIENER,
         double=DOUBLE_INTEGRATOR,
         nominal=NOMINAL,
-        floors=_floors(),
+        floors=tables.floors_table(),
         counts=RIG_COUNTS,
         rounding=math.degrees(encoder_floor(RIG_COUNTS)),
         at_encoder=", ".join(
@@ -45,13 +44,19 @@ def write_page(path: Path, outcome: Outcome, recorded: Sequence[Row], quick: boo
             for q in DENSITIES
         ),
         pendulum=rate_needed(pendulum.dynamics),
-        floor_exponent=exponent(list(RATES), [[floor_of(rate, NOMINAL)] for rate in RATES]).value,
-        estimation="\n\n".join(_estimation(outcome, density) for density in DENSITIES),
-        encoder=_encoder(outcome),
-        closed="\n\n".join(_closed(outcome, density) for density in DENSITIES),
-        tracking=_tracking(outcome),
-        recorded=_recorded(recorded),
-        tried=_tried(),
+        floor_exponent=exponent(RATES, [[tables.floor_of(rate, NOMINAL)] for rate in RATES]).value,
+        estimation="\n\n".join(tables.estimation_table(outcome, density) for density in DENSITIES),
+        encoder=tables.encoder_table(outcome),
+        closed="\n\n".join(tables.closed_table(outcome, density) for density in DENSITIES),
+        tracking=tables.tracking_table(outcome),
+        recorded=RECORDED.format(table=tables.recorded_table(recorded)) if recorded else NOT_RECORDED,
+        pairs=tables.pairs_table(outcome),
+        presets=tables.presets_table(outcome),
+        aim=AIM,
+        behind_20=_over_floor_behind(20.0),
+        settle=SETTLE_S,
+        period=PERIOD_S,
+        tried=tables.tried_table(),
         seeds=outcome.scale.seeds,
         seconds=outcome.scale.seconds,
         closed_seeds=outcome.scale.closed_seeds,
@@ -60,28 +65,11 @@ def write_page(path: Path, outcome: Outcome, recorded: Sequence[Row], quick: boo
     path.write_text(text, encoding="utf-8")
 
 
-def estimation(outcome: Outcome, entrant: str, rate: float, density: float, counts: int) -> list[float]:
-    """Return the mean squares of one cell, estimation only."""
-    return [one.estimation for one in outcome.flights[(entrant, rate, density, False, counts)]]
-
-
-def floor_of(rate: float, density: float) -> float:
-    """Return the floor that the table divides by: that of the pitch at rest."""
-    return floor(pitch(density), rate)
-
-
-def _table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
-    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)])
-
-
-RATE_HEADER = ("coder", *(f"{rate:g} bit/s" for rate in RATES))
-
-
 def _summary(outcome: Outcome) -> str:
     found = {
         f"{key}{suffix}": ratio(
-            estimation(outcome, entrant, rate, NOMINAL, FINE_COUNTS), floor_of(rate, NOMINAL)
+            tables.estimation(outcome, entrant, rate, NOMINAL, FINE_COUNTS),
+            tables.floor_of(rate, NOMINAL),
         ).value
         for key, entrant in (
             ("paper", "paper"),
@@ -94,108 +82,7 @@ def _summary(outcome: Outcome) -> str:
     return SUMMARY.format(**found)
 
 
-def _floors() -> str:
-    double, body = integrators(2, NOMINAL), pitch(NOMINAL)
-    rows = [
-        (
-            f"{rate:g}",
-            _degrees(floor(double, rate)),
-            _degrees(floor(body, rate)),
-            _degrees(word_floor(body, 1.0, 1.0 / rate)),
-            _degrees(floor(body, rate, erased=0.3)),
-            _degrees(floor_behind_encoder(NOMINAL, rate, RIG_COUNTS, tick_of(rate))),
-        )
-        for rate in RATES
-    ]
-    return _table(
-        (
-            "bit/s",
-            "double integrator",
-            "pitch (2)",
-            "pitch, one bit at a time",
-            "pitch, 30 % of the bits lost",
-            f"double integrator, {RIG_COUNTS} counts",
-        ),
-        rows,
-    )
-
-
-def _estimation(outcome: Outcome, density: float) -> str:
-    rows = []
-    for entrant in ENTRANTS:
-        squares = [estimation(outcome, entrant.key, rate, density, FINE_COUNTS) for rate in RATES]
-        cells = [
-            str(ratio(one, floor_of(rate, density))) for one, rate in zip(squares, RATES, strict=True)
-        ]
-        finite = all(math.isfinite(value) for one in squares for value in one)
-        rows.append((_name(entrant), *cells, str(exponent(list(RATES), squares)) if finite else "-"))
-    table = _table((*RATE_HEADER, "exponent"), rows)
-    return f"q = {density:g} rad^2/s^3:\n\n{table}"
-
-
-def _name(entrant: Entrant) -> str:
-    return entrant.name + (", told" if entrant.told else "")
-
-
-def _encoder(outcome: Outcome) -> str:
-    rows = []
-    for entrant in ENTRANTS:
-        cells = []
-        for rate in RATES:
-            squares = estimation(outcome, entrant.key, rate, NOMINAL, RIG_COUNTS)
-            behind = floor_behind_encoder(NOMINAL, rate, RIG_COUNTS, tick_of(rate))
-            plain = ratio(squares, floor_of(rate, NOMINAL))
-            cells.append(f"{plain} / {ratio(squares, behind).value:.2f}")
-        rows.append((_name(entrant), *cells))
-    return _table(RATE_HEADER, rows)
-
-
-def _closed(outcome: Outcome, density: float) -> str:
-    rows = []
-    for entrant in ENTRANTS:
-        cells = []
-        for rate in RATES:
-            flown = outcome.flights[(entrant.key, rate, density, True, FINE_COUNTS)]
-            cells.append(str(ratio([one.estimation for one in flown], floor_of(rate, density))))
-        rows.append((_name(entrant), *cells))
-    return f"q = {density:g} rad^2/s^3:\n\n{_table(RATE_HEADER, rows)}"
-
-
-def _tracking(outcome: Outcome) -> str:
-    rows = []
-    for loop in PRESETS:
-        cells = []
-        for disturbance in DISTURBANCES:
-            squares = outcome.tracking[f"{loop}|{disturbance}"]
-            usual = outcome.tracking[f"{USUAL}|{disturbance}"]
-            rms = math.sqrt(sum(squares) / len(squares))
-            share = rms / math.sqrt(sum(usual) / len(usual))
-            cells.append(f"{rms:.4f} rad, x {share:.4f}")
-        rows.append((loop, *cells))
-    return _table(("loop", "no torque", "white torque, q = 2e-3"), rows)
-
-
-def _recorded(recorded: Sequence[Row]) -> str:
-    if not recorded:
-        return NOT_RECORDED
-    rows = [
-        (
-            row.recording,
-            row.rate,
-            f"{100.0 * row.paper_type.rms:.2f} % / {100.0 * row.paper_type.largest:.1f} %",
-            f"{100.0 * row.history.rms:.2f} % / {100.0 * row.history.largest:.1f} %",
-            f"{100.0 * abs(row.gain):.0f} % {'less' if row.gain > 0.0 else 'more'}",
-        )
-        for row in recorded
-    ]
-    header = ("recording", "rate", "paper's coder, tuned", "history coder", "rms error")
-    return RECORDED.format(table=_table(header, rows))
-
-
-def _tried() -> str:
-    rows = [(one.name, f"{one.bits:.3f}", f"{fly_trial(one):.2f}") for one in TRIALS]
-    return _table(("word", "bits paid", "rms over the floor"), rows)
-
-
-def _degrees(mean_square: float) -> str:
-    return f"{math.degrees(math.sqrt(mean_square)):.3g} deg"
+def _over_floor_behind(rate_bit_s: float) -> float:
+    """Return the yardstick behind the encoder over the floor, as rms."""
+    behind = floor_behind_encoder(NOMINAL, rate_bit_s, RIG_COUNTS, tick_of(rate_bit_s))
+    return math.sqrt(behind / tables.floor_of(rate_bit_s, NOMINAL))

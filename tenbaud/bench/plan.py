@@ -1,8 +1,7 @@
-"""Which flights the table needs, flown on two cores, and what comes of them."""
+"""Which flights the page needs, flown on two cores."""
 
 from __future__ import annotations
 
-import math
 import multiprocessing
 import signal
 from collections import defaultdict
@@ -10,9 +9,7 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 
-from scipy.stats import t as student
-
-from tenbaud.bench.entrants import ENTRANTS
+from tenbaud.bench.entrants import ENTRANTS, PRESETS
 from tenbaud.bench.flight import FINE_COUNTS, RIG_COUNTS, Case, Errors, fly
 from tenbaud.bench.tracking import fly_tracking, tracking_cases
 
@@ -36,7 +33,7 @@ class Scale:
 
 
 FULL = Scale(16, 110.0, 6, 125.0)
-QUICK = Scale(4, 60.0, 2, 75.0)
+QUICK = Scale(4, 60.0, 4, 75.0)
 
 
 @dataclass(slots=True)
@@ -46,21 +43,6 @@ class Outcome:
     flights: dict[Cell, list[Errors]] = field(default_factory=lambda: defaultdict(list))
     tracking: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
     scale: Scale = FULL
-
-
-@dataclass(frozen=True, slots=True)
-class Ratio:
-    """A root mean square over the floor, with half the width of its 95 % interval."""
-
-    value: float
-    half: float
-
-    def __str__(self) -> str:
-        if not math.isfinite(self.value):
-            return "lost"
-        if self.value >= 10.0:
-            return f"{self.value:.1f} +- {self.half:.1f}"
-        return f"{self.value:.2f} +- {self.half:.2f}"
 
 
 def cases(scale: Scale) -> list[Case]:
@@ -80,7 +62,13 @@ def cases(scale: Scale) -> list[Case]:
                     Case(entrant.key, rate, density, seed, scale.closed_seconds, True, FINE_COUNTS)
                     for seed in range(1, scale.closed_seeds + 1)
                 ]
-    return found
+    return found + [
+        Case(preset, rate, density, seed, scale.seconds, counts=counts)
+        for preset, rate in PRESETS.items()
+        for density in DENSITIES
+        for counts in (FINE_COUNTS, RIG_COUNTS)
+        for seed in range(1, scale.seeds + 1)
+    ]
 
 
 def fly_all(scale: Scale, on_progress: OnProgress) -> Outcome:
@@ -122,41 +110,3 @@ def _fly_batch(batch: list[Case]) -> list[Errors]:
 
 def _leave_interrupts_to_parent() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def quantile_95(count: int) -> float:
-    """Return how many standard errors a 95 % interval of so many values' mean reaches (Student)."""
-    return float(student.ppf(0.975, count - 1)) if count > 1 else math.inf
-
-
-def ratio(mean_squares: list[float], floor: float) -> Ratio:
-    """Return the root mean square over the seeds, over the floor's root, with its 95 % interval.
-
-    The seeds' mean squares are independent; the interval is that of their mean, carried through the
-    square root.
-    """
-    count = len(mean_squares)
-    mean = sum(mean_squares) / count
-    if not math.isfinite(mean):
-        return Ratio(math.inf, math.inf)
-    variance = sum((one - mean) ** 2 for one in mean_squares) / max(1, count - 1)
-    half = quantile_95(count) * math.sqrt(variance / count)
-    value = math.sqrt(mean / floor)
-    return Ratio(value, 0.5 * value * half / mean)
-
-
-def exponent(rates: list[float], mean_squares: list[list[float]]) -> Ratio:
-    """Return the slope of log rms against log rate with its 95 % interval.
-
-    One slope per seed, each over all rates; the interval is that of their mean.
-    """
-    logs = [math.log(rate) for rate in rates]
-    middle = sum(logs) / len(logs)
-    spread = sum((one - middle) ** 2 for one in logs)
-    slopes = []
-    for squares in zip(*mean_squares, strict=True):
-        heights = [0.5 * math.log(one) for one in squares]
-        slopes.append(sum((x - middle) * y for x, y in zip(logs, heights, strict=True)) / spread)
-    mean = sum(slopes) / len(slopes)
-    variance = sum((one - mean) ** 2 for one in slopes) / max(1, len(slopes) - 1)
-    return Ratio(mean, quantile_95(len(slopes)) * math.sqrt(variance / len(slopes)))

@@ -9,12 +9,13 @@ from pathlib import Path
 import pytest
 
 from channel.wire import DATAGRAM
-from tenbaud.bench.entrants import ENTRANTS, innovation_gains, unit_rad
+from tenbaud.bench.entrants import ENTRANTS, PRESETS, innovation_gains, unit_rad
 from tenbaud.bench.flight import Case, configuration, fly, fly_agreement
-from tenbaud.bench.plan import exponent, ratio
+from tenbaud.bench.intervals import exponent, paired, ratio
 from tenbaud.bench.tracking import HISTORY_10, USUAL, TrackingCase, fly_tracking
 from tenbaud.bench.trials import TRIALS, fly_trial
 from tenbaud.build_ends import build_receiver
+from tenbaud.config.load import load_config
 from tenbaud.figures.flights import Job
 from tenbaud.figures.flights import fly as fly_job
 from tenbaud.figures.real import HALF_S, UIUC_FILE, replayed
@@ -24,7 +25,7 @@ from tenbaud.limits.linear import pitch
 from tests.tenbaud.figures.recorded_data import FOLDER, needs_data
 
 
-@pytest.mark.parametrize("entrant", [one.key for one in ENTRANTS])
+@pytest.mark.parametrize("entrant", [*(one.key for one in ENTRANTS), "history-10baud"])
 def test_when_both_sessions_fly_it_in_memory_then_the_errors_are_the_same_to_the_last_bit(
     entrant: str,
 ) -> None:
@@ -94,4 +95,24 @@ def test_when_errors_fall_with_a_power_then_the_exponent_is_found_with_its_inter
     assert found.value == pytest.approx(-1.5)
     assert found.half == pytest.approx(0.0, abs=1e-12)
     assert str(ratio([4.0, 4.0], 1.0)) == "2.00 +- 0.00"
+
+
+def test_when_two_coders_share_their_seeds_then_what_the_seeds_do_to_both_drops_out() -> None:
+    others = [1.0, 9.0, 2.0, 30.0]
+    found = paired([0.64 * one for one in others], others)
+    assert found.value == pytest.approx(0.8)
+    assert found.half == pytest.approx(0.0, abs=1e-12)
+    assert not math.isfinite(paired([1.0, math.inf], [1.0, 1.0]).value)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_when_a_preset_is_flown_then_nothing_of_its_coder_is_changed(preset: str) -> None:
+    case = Case(preset, PRESETS[preset], 2e-3, 1, 30.0)
+    flown, as_it_is = configuration(case).config, load_config(preset, None, {})
+    assert flown.coder == as_it_is.coder
+    assert flown.timing.symbol_period_s == pytest.approx(1.0 / PRESETS[preset])
+    assert flown.transmitter.sight_bandwidth_rad_s == as_it_is.transmitter.sight_bandwidth_rad_s
+
+
+def test_when_one_estimate_is_lost_then_the_mean_says_so() -> None:
     assert str(ratio([4.0, math.inf], 1.0)) == "lost"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from rich.console import Console
@@ -12,14 +12,20 @@ from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from benchmarks.codec import codec_figures
 from benchmarks.fastest import fastest_figures
 from benchmarks.figures import Figure, show, write
-from benchmarks.flights import cold_start_figures, memory_figures, real_figures, virtual_figures
+from benchmarks.flights import (
+    FlightFailed,
+    cold_start_figures,
+    memory_figures,
+    real_figures,
+    virtual_figures,
+)
 from benchmarks.latency import latency_figures
 from benchmarks.load import load_figures
 from benchmarks.page import page_figures
 from benchmarks.recordings import recording_figures
 from benchmarks.studies import studies_figures
 
-BENCHMARKS: dict[str, Callable[[], list[Figure]]] = {
+BENCHMARKS: dict[str, Callable[[], Iterable[Figure]]] = {
     "codec": codec_figures,
     "start": cold_start_figures,
     "virtual": virtual_figures,
@@ -41,15 +47,22 @@ def main(names: list[str]) -> int:
         print(f"no benchmark {', '.join(unknown)}; there are {', '.join(BENCHMARKS)}", file=sys.stderr)
         return 2
     figures: list[Figure] = []
+    failures: list[str] = []
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         for name in names or BENCHMARKS:
             task = progress.add_task(name)
-            figures += BENCHMARKS[name]()
+            try:
+                # One by one: what was measured before a flight failed is kept.
+                figures.extend(BENCHMARKS[name]())
+            except FlightFailed as failure:
+                failures.append(f"{name}: {failure}")
             progress.remove_task(task)
     show(figures)
     write(figures, Path("bench.json"))
-    return 0
+    for text in failures:
+        print(text, file=sys.stderr)
+    return 1 if failures else 0
 
 
 if __name__ == "__main__":

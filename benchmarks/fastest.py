@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from benchmarks.figures import Figure
 from benchmarks.flights import demo_summary
 
@@ -10,14 +12,13 @@ RATES = (1000, 2000)
 SECONDS = 15.0
 
 
-def fastest_figures(rates: tuple[int, ...] = RATES, seconds: float = SECONDS) -> list[Figure]:
-    """Return late commands, missed ticks and erasures at each rate, both ends recording."""
-    figures = []
+def fastest_figures(rates: tuple[int, ...] = RATES, seconds: float = SECONDS) -> Iterator[Figure]:
+    """Yield late commands, missed ticks and erasures at each rate, both ends recording."""
     for rate in rates:
         summary = fly_at(rate, seconds)
         ticks = summary["samples"]
         asked = "below 0.1" if rate == RATES[0] else ""
-        figures += [
+        yield from (
             Figure(
                 f"fastest_{rate}_late_commands_percent",
                 100.0 * summary["commands_late"] / ticks,
@@ -29,8 +30,7 @@ def fastest_figures(rates: tuple[int, ...] = RATES, seconds: float = SECONDS) ->
             Figure(f"fastest_{rate}_erasures", summary["erasures"], f"of {ticks}"),
             Figure(f"fastest_{rate}_desyncs", summary["desyncs"], "", "0"),
             Figure(f"fastest_{rate}_loop_late_ms_p99", summary["loop_late_ms_p99"], "ms"),
-        ]
-    return figures
+        )
 
 
 def fly_at(rate: int, seconds: float) -> dict[str, float]:

@@ -17,6 +17,10 @@ from channel.links.endpoints import free_endpoint
 WARM_UP_FRACTION = 0.15
 
 
+class FlightFailed(RuntimeError):
+    """A flight that was to be measured did not end as it should."""
+
+
 def virtual_figures(rounds: int = 5) -> list[Figure]:
     """Return how many times faster than real time a recorded 100 s flight at 10 baud goes."""
     factors = sorted(demo_summary("--mismatch", "0.1")["realtime_factor"] for _ in range(rounds))
@@ -91,7 +95,7 @@ def demo_summary(*arguments: str) -> dict[str, Any]:
         ended = _start(folder, "demo", "--out", "run", *arguments, clock=None)
         out, err = ended.communicate()
         if ended.returncode:
-            raise RuntimeError(f"the demo failed: {err}")
+            raise FlightFailed(f"tenbaud demo {' '.join(arguments)} failed:\n{err}")
         summary: dict[str, Any] = json.loads(out)
         return summary
 

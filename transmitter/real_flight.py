@@ -132,12 +132,16 @@ class RealFlight:
         # What the last echo was answered with: the report of a difference.
         self._send_due()
         self._node.rest()
-        # The farewell is spared the line's delay: this process is about to end.
-        for frame in self._node.session.bye(reason()):
-            self._link.send(self._wire.encode(frame))
+        self.leave(reason())
         while not landing.over:
             landing.step(self._now_ns())
             self._wait_until(min(landing.next_ns, self._now_ns() + terms.tick_ns))
+
+    def leave(self, reason: str) -> None:
+        """End the session on both sides at once; before the first tick nothing else is to be done."""
+        # The farewell is spared the line's delay: this process is about to end.
+        for frame in self._node.session.bye(reason):
+            self._link.send(self._wire.encode(frame))
 
     def _now_ns(self) -> int:
         return time.monotonic_ns() - self._start_ns

@@ -88,6 +88,8 @@ def fly_real(run: TransmitterRun, link: Link, should_stop: Stop) -> Outcome:
     with run.node.rig:
         flight.greet(run.agreement.config.link.peer_timeout_s)
         if should_stop():
+            # A session may have begun meanwhile, whose receiver would wait for the flight.
+            flight.leave(STOPPED)
             return Outcome(ExitCode.INTERRUPTED, STOPPED)
         _check_welcome(run)
         greeting_bytes = _control_bytes(run, flight)

@@ -16,15 +16,18 @@ from tenbaud.build_ends import build_receiver
 from tenbaud.config.load import load_config
 from tenbaud.flight import receive, transmit
 from tenbaud.flight.outcome import ExitCode, Outcome
+from transmitter.node import STOPPED
+from transmitter.session import Phase
 
 SECONDS = 2.0
+PATIENCE_S = 20.0
 LAST_SAMPLE = 19
 DELAY = "up:delay=150ms"
 """The symbol of the last sample leaves 100 ms before the last tick and arrives after it."""
 
 
 def agreement_on(clock: Any, **ends: Any) -> Agreement:
-    link = {"peer_timeout_s": 60.0, "impairments": DELAY}
+    link = {"peer_timeout_s": 3 * PATIENCE_S, "impairments": DELAY}
     changed = {"duration_s": SECONDS, "link": link, **ends}
     return agree(load_config("paper-10baud", None, changed), clock)
 
@@ -43,7 +46,9 @@ def fly_virtual(**transmitter: Any) -> tuple[Outcome, ReceiverEndpoint]:
     return outcome, endpoint
 
 
-def fly_real(endpoint: ReceiverEndpoint, should_stop: Callable[[], bool]) -> Outcome:
+def fly_real(
+    endpoint: ReceiverEndpoint, should_stop: Callable[[transmit.TransmitterRun], bool]
+) -> Outcome:
     """Fly over a memory link in real time, the receiver in a thread of its own."""
     agreement = agreement_on("real")
     near, far = memory_pair()
@@ -51,13 +56,13 @@ def fly_real(endpoint: ReceiverEndpoint, should_stop: Callable[[], bool]) -> Out
     def serve() -> None:
         receive.serve(agreement, endpoint, far, lambda: False)
 
-    service = threading.Thread(target=serve)
+    service = threading.Thread(target=serve, daemon=True)
     service.start()
     try:
         run = transmit.prepare(agreement, None, DATAGRAM)
-        return transmit.fly_real(run, near, should_stop)
+        return transmit.fly_real(run, near, lambda: should_stop(run))
     finally:
-        service.join(20.0)
+        service.join(PATIENCE_S)
         assert not service.is_alive(), "the receiver was not told that the flight is over"
 
 
@@ -71,6 +76,13 @@ def test_when_the_last_echo_differs_then_the_flight_is_a_desync(on_desync: str) 
 
 def test_when_the_last_echo_differs_on_the_real_clock_then_the_flight_is_a_desync() -> None:
     endpoint = spoilt_receiver("real")
-    outcome = fly_real(endpoint, lambda: False)
+    outcome = fly_real(endpoint, lambda _: False)
     assert outcome.code is ExitCode.DESYNC
     assert f"differ after sample {LAST_SAMPLE}" in endpoint.session.end_reason
+
+
+def test_when_it_is_stopped_as_the_welcome_arrives_then_the_receiver_is_told() -> None:
+    endpoint = build_receiver(agreement_on("real"), None, DATAGRAM)
+    outcome = fly_real(endpoint, lambda run: run.node.session.phase is Phase.FLYING)
+    assert outcome.code is ExitCode.INTERRUPTED
+    assert endpoint.session.end_reason.endswith(STOPPED)

@@ -45,13 +45,17 @@ class SabotagedCodec(Codec):
 
     def arm(self, sabotage: Sabotage) -> None:
         """Make this mistake from now on, and no other; ValueError for a field that does not exist."""
+        self.check(sabotage)
+        self._sabotage = sabotage
+
+    def check(self, sabotage: Sabotage) -> None:
+        """Raise ValueError for a field that does not exist in this codec's state."""
         size = len(getattr(self.initial(), sabotage.part))
         if sabotage.index >= size:
             raise ValueError(
                 f"sabotage: {sabotage.part}.{sabotage.index} does not exist; the codec's "
                 f"{sabotage.part} state has {size} value(s)"
             )
-        self._sabotage = sabotage
 
     def close(self, state: CodecState, opened: OpenSample, model: Vector) -> CodecState:
         """Return the state after the sample, wrong in one bit after the one named."""

@@ -105,10 +105,11 @@ class RealFlight:
             tick += 1
         return tick
 
-    def finish(self, reason: str, tick: int = 0) -> None:
+    def finish(self, reason: Callable[[], str], tick: int = 0) -> None:
         """Let the last echoes come in, end the session on both sides, take a real rig's motors down.
 
-        `tick` is the first one that was not flown.
+        `reason` is asked for what the receiver is told once they are in. `tick` is the first one that
+        was not flown.
         """
         terms = self._node.session.terms
         linger_ns = (
@@ -128,13 +129,19 @@ class RealFlight:
                 break
             landing.step(self._now_ns())
             self._take_in((min(until_ns, landing.next_ns) - self._now_ns()) / 1e9)
+        # What the last echo was answered with: the report of a difference.
+        self._send_due()
         self._node.rest()
-        # The farewell is spared the line's delay: this process is about to end.
-        for frame in self._node.session.bye(reason):
-            self._link.send(self._wire.encode(frame))
+        self.leave(reason())
         while not landing.over:
             landing.step(self._now_ns())
             self._wait_until(min(landing.next_ns, self._now_ns() + terms.tick_ns))
+
+    def leave(self, reason: str) -> None:
+        """End the session on both sides at once; before the first tick nothing else is to be done."""
+        # The farewell is spared the line's delay: this process is about to end.
+        for frame in self._node.session.bye(reason):
+            self._link.send(self._wire.encode(frame))
 
     def _now_ns(self) -> int:
         return time.monotonic_ns() - self._start_ns

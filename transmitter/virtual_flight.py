@@ -84,8 +84,11 @@ class VirtualFlight:
             node.actuate(tick)
         return first + ticks
 
-    def finish(self, tick: int, reason: str) -> None:
-        """Let the last echoes come in, then end the session on both sides."""
+    def finish(self, tick: int, reason: Callable[[], str]) -> None:
+        """Let the last echoes come in, then end the session on both sides.
+
+        `reason` is asked for what the receiver is told once they are in.
+        """
         terms = self._node.session.terms
         now_ns = tick * terms.tick_ns
         # What is still on the line arrives within one delivery and one deadline either way.
@@ -94,7 +97,7 @@ class VirtualFlight:
         self._pass_to(now_ns + linger_ns, deadlines=False)
         self._node.rest()
         # The farewell is spared what goes wrong on the line: the receiver's process must hear it.
-        for frame in self._node.session.bye(reason):
+        for frame in self._node.session.bye(reason()):
             data = self._wire.encode(frame)
             self._uplink.meter.count(frame, self._wire.size(data))
             self._step(now_ns + linger_ns, data)

@@ -6,15 +6,15 @@ alone would let every node of the authority in. So each end also denies everythi
 allows named nodes (common names) what their part needs, on the keys of their own session:
 
     part         may send                                  may be sent
-    transmitter  up/*, its liveliness                      down/*, the receiver's liveliness
-    receiver     down/*, its liveliness                    up/*, the transmitter's liveliness
-    viewer       nothing                                   up/*, down/*, telemetry/*, both livelinesses
+    transmitter  up/symbol, up/control, its liveliness     down/command, the receiver's liveliness
+    receiver     down/command, its liveliness              what the transmitter may send
+    viewer       nothing                                   what both may send, telemetry/ROLE of both
     operator     control                                   what a viewer is
 
 "Send" and "be sent" are seen from the invited node. A subscription is a message too and goes the other
-way. A rule has to include its key whole, not merely meet it, and an end of many sessions subscribes to
-all of them at once; so an invited node may subscribe in any session, and what is let through to it, or
-from it, is what keeps it to its own.
+way. A rule has to include its key whole, not merely meet it, and an end subscribes to `up/*` at once,
+an end of many sessions to all of them; so an invited node may subscribe to every key beside its own, in
+any session, and what is let through to it, or from it, is what keeps it to its own.
 """
 
 from __future__ import annotations
@@ -29,6 +29,10 @@ Rule = dict[str, object]
 
 KEY_ROOT = "tenbaud"
 ANY = "**"
+UP = ("up/symbol", "up/control")
+DOWN = ("down/command",)
+TELEMETRY = ("telemetry/transmitter", "telemetry/receiver")
+CONTROL = ("control",)
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,11 +126,11 @@ def _rules_of(invited: Invited, prefix: str) -> list[Rule]:
 
     def may_send(*keys: str) -> None:
         allow("ingress", ["put"], own, *keys)
-        allow("egress", ["declare_subscriber"], ANY, *keys)
+        allow("egress", ["declare_subscriber"], ANY, *_subscribed(keys))
 
     def may_be_sent(*keys: str) -> None:
         allow("egress", ["put"], own, *keys)
-        allow("ingress", ["declare_subscriber"], ANY, *keys)
+        allow("ingress", ["declare_subscriber"], ANY, *_subscribed(keys))
 
     def may_be_alive(part: str) -> None:
         alive = f"alive/{part}/*"
@@ -140,19 +144,25 @@ def _rules_of(invited: Invited, prefix: str) -> list[Rule]:
 
     match invited.part:
         case "transmitter":
-            may_send("up/*")
-            may_be_sent("down/*")
+            may_send(*UP)
+            may_be_sent(*DOWN)
             may_be_alive("transmitter")
             may_see_alive("receiver")
         case "receiver":
-            may_send("down/*")
-            may_be_sent("up/*")
+            may_send(*DOWN)
+            may_be_sent(*UP)
             may_be_alive("receiver")
             may_see_alive("transmitter")
         case "viewer" | "operator":
-            may_be_sent("up/*", "down/*", "telemetry/*")
+            may_be_sent(*UP, *DOWN, *TELEMETRY)
             may_see_alive("transmitter")
             may_see_alive("receiver")
             if invited.part == "operator":
-                may_send("control")
+                may_send(*CONTROL)
     return rules
+
+
+def _subscribed(keys: Sequence[str]) -> list[str]:
+    """Return what is subscribed to by whoever takes these keys: `up/*` for `up/symbol`."""
+    folders = (key.rpartition("/") for key in keys)
+    return list(dict.fromkeys(f"{folder}{slash}*" if slash else key for folder, slash, key in folders))

@@ -6,12 +6,14 @@ deadline, so a second thread sleeps until the deadline and then puts a message o
 channel. It is left alone for as long as messages come in time: a deadline that moves on is noticed
 when the old one is reached, and only one that moves forward wakes the thread up.
 
-A full channel holds up the thread of Zenoh that fills it, and with it whoever sends.
+That message is told by a secret, so that nobody outside can send one: a flood of them would be passed
+over without end. A full channel holds up the thread of Zenoh that fills it, and with it whoever sends.
 """
 
 from __future__ import annotations
 
 import math
+import secrets
 import threading
 import time
 from collections.abc import Callable
@@ -29,6 +31,7 @@ class ChannelInbox:
     ) -> None:
         self._session = session
         self._wake_key = key.replace("*", "wake")
+        self._wake_payload = secrets.token_bytes(16)
         self._subscriber = session.declare_subscriber(key, zenoh.handlers.FifoChannel(messages_max))
         self._interrupted = False
         self._waker = _Waker(self.wake)
@@ -62,7 +65,9 @@ class ChannelInbox:
 
     def wake(self) -> None:
         """Let the loop that waits look at its deadline; it goes on waiting if that is not reached."""
-        self._session.put(self._wake_key, b"", allowed_destination=zenoh.Locality.SESSION_LOCAL)
+        self._session.put(
+            self._wake_key, self._wake_payload, allowed_destination=zenoh.Locality.SESSION_LOCAL
+        )
 
     def close(self) -> None:
         """Stop taking messages. A channel left full would hang the closing session."""
@@ -71,8 +76,8 @@ class ChannelInbox:
         self._waker.close()
 
     def _is_wake(self, sample: zenoh.Sample) -> bool:
-        # Only our own wake-ups are empty: no frame and no envelope is.
-        return len(sample.payload) == 0 and str(sample.key_expr) == self._wake_key
+        payload = sample.payload
+        return len(payload) == len(self._wake_payload) and payload.to_bytes() == self._wake_payload
 
 
 class _Waker:

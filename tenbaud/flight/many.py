@@ -30,6 +30,7 @@ from tenbaud.flight.ends import open_recorder
 from tenbaud.flight.outcome import ExitCode, Outcome, outcome_of
 from tenbaud.flight.receive import ended_outcome
 from tenbaud.flight.report import write_summary
+from tenbaud.flight.sparing import SparingTeller
 from tenbaud.flight.summary import Summary, receiver_part
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RunFolder
@@ -75,6 +76,7 @@ class ManyHost:
         self._root = root
         self._rigs_max = rigs_max
         self._tell = tell
+        self._tell_stranger = SparingTeller(tell)
         self._writer = SharedWriter()
         self._worker = ThreadPoolExecutor(1, "files")
         self._ready: deque[tuple[str, Served]] = deque()
@@ -116,7 +118,7 @@ class ManyHost:
             case Bye() if frame.session == 0 and name in self._unexplained:
                 # Once per refusal: a line on a terminal takes the loop's time.
                 self._unexplained.discard(name)
-                self._tell(f"{name}: as its transmitter sees it: {frame.reason}")
+                self._tell_stranger(f"{name}: as its transmitter sees it: {frame.reason}")
             case _:
                 self.counts["strays"] += 1
         if answer is None:
@@ -161,6 +163,7 @@ class ManyHost:
             served.service.endpoint.bye(STOPPED)
             self._finish(self._open[name], served, None)
         self._writer.close()
+        self._tell_stranger.finish()
 
     # In the worker's thread
 
@@ -189,7 +192,7 @@ class ManyHost:
             if len(self._unexplained) < TOLD_MAX:
                 self._unexplained.add(name)
             self.counts["refused"] += 1
-            self._tell(f"{name}: refused: {problem}")
+            self._tell_stranger(f"{name}: refused: {problem}")
         return Refuse(hello.incarnation, problem, config)
 
     def _serve(self, name: str, agreement: Agreement, data: bytes) -> Served:

@@ -73,13 +73,13 @@ def fly_virtual(run: TransmitterRun, peer: Peer, should_stop: Stop) -> Outcome:
             end = flight.run(run.agreement.flight_ticks, should_stop)
             run.ticks = end - first
             run.rejoin_bytes = _control_bytes(run, flight) - greeting_bytes
-            outcome = _outcome(run, True)
-            flight.finish(end, _farewell(outcome))
+            ending = _Ending(run, _outcome(run, True))
+            flight.finish(end, ending.farewell)
         finally:
             run.flight_s = time.perf_counter() - started
             run.wire_bytes_down = flight.inlet.wire_bytes
             run.extra["malformed"] = flight.inlet.malformed
-    return outcome
+    return ending.outcome
 
 
 def fly_real(run: TransmitterRun, link: Link, should_stop: Stop) -> Outcome:
@@ -88,6 +88,8 @@ def fly_real(run: TransmitterRun, link: Link, should_stop: Stop) -> Outcome:
     with run.node.rig:
         flight.greet(run.agreement.config.link.peer_timeout_s)
         if should_stop():
+            # A session may have begun meanwhile, whose receiver would wait for the flight.
+            flight.leave(STOPPED)
             return Outcome(ExitCode.INTERRUPTED, STOPPED)
         _check_welcome(run)
         greeting_bytes = _control_bytes(run, flight)
@@ -96,8 +98,8 @@ def fly_real(run: TransmitterRun, link: Link, should_stop: Stop) -> Outcome:
         try:
             run.ticks = flight.run(run.agreement.flight_ticks) - first
             run.rejoin_bytes = _control_bytes(run, flight) - greeting_bytes
-            outcome = _outcome(run, link.peer_present())
-            flight.finish(_farewell(outcome), run.ticks)
+            ending = _Ending(run, _outcome(run, link.peer_present()))
+            flight.finish(ending.farewell, run.ticks)
         finally:
             run.flight_s = time.perf_counter() - started
             run.wire_bytes_down = flight.inlet.wire_bytes
@@ -111,7 +113,7 @@ def fly_real(run: TransmitterRun, link: Link, should_stop: Stop) -> Outcome:
                 "loop_late_ms_p99": lateness.percentile_ms(99.0),
                 "loop_late_ms_max": lateness.largest_ns / 1e6,
             }
-    return outcome
+    return ending.outcome
 
 
 def link_peer(
@@ -136,8 +138,21 @@ def _control_bytes(run: TransmitterRun, flight: VirtualFlight | RealFlight) -> i
     return run.uplink.meter.control_bytes + flight.inlet.control_bytes
 
 
-def _farewell(outcome: Outcome) -> str:
-    return FLIGHT_OVER if outcome.code is ExitCode.OK else outcome.text
+class _Ending:
+    """The outcome of a flight: as it was after the last tick, then with what the last echoes tell.
+
+    Of these, only that the copies differ counts: a flight that was flown to its end is over.
+    """
+
+    def __init__(self, run: TransmitterRun, outcome: Outcome) -> None:
+        self.outcome = outcome
+        self._run = run
+
+    def farewell(self) -> str:
+        """Settle the outcome, now that the last echoes are in; return what the receiver is told."""
+        if self.outcome.code is ExitCode.OK:
+            self.outcome = _desync_outcome(self._run) or self.outcome
+        return FLIGHT_OVER if self.outcome.code is ExitCode.OK else self.outcome.text
 
 
 def _outcome(run: TransmitterRun, peer_present: bool) -> Outcome:
@@ -162,16 +177,25 @@ def _outcome(run: TransmitterRun, peer_present: bool) -> Outcome:
         return Outcome(
             ExitCode.LINK_LOST, "the flight ended while the transmitter was asking for a common state"
         )
+    return _desync_outcome(run) or Outcome(ExitCode.OK, FLIGHT_OVER)
+
+
+def _desync_outcome(run: TransmitterRun) -> Outcome | None:
+    """Return the outcome of a flight that was flown to its end though the copies differed, if so."""
+    session = run.node.session
+    if session.desync is None:
+        return None
+    if run.agreement.config.transmitter.on_desync == "stop":
+        return Outcome(ExitCode.DESYNC, desync_text(session.desync))
     desyncs = session.counts["desyncs"]
-    expected = run.agreement.desyncs_expected + run.desyncs_asked
-    if session.desync is not None and desyncs > expected:
-        return Outcome(
-            ExitCode.DESYNC,
-            f"the copies of the codec differed {desyncs} time(s) and nobody asked for it; the flight "
-            f"went on, but this should never happen: {desync_text(session.desync)}. Both states are "
-            "in the recordings (`tenbaud diff RUN`); please report it",
-        )
-    return Outcome(ExitCode.OK, FLIGHT_OVER)
+    if desyncs <= run.agreement.desyncs_expected + run.desyncs_asked:
+        return None
+    return Outcome(
+        ExitCode.DESYNC,
+        f"the copies of the codec differed {desyncs} time(s) and nobody asked for it; the flight "
+        f"went on, but this should never happen: {desync_text(session.desync)}. Both states are "
+        "in the recordings (`tenbaud diff RUN`); please report it",
+    )
 
 
 def desync_text(desync: Desync) -> str:

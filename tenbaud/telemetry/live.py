@@ -18,6 +18,7 @@ from collections.abc import Callable
 
 from channel.events import EVENT_CHANNEL, Event, EventKind, event_row
 from channel.impairments import ImpairedLine, parse_impairments
+from channel.links.base import Role
 from channel.recording import Recorder
 from channel.sabotage import SabotagedCodec, parse_sabotage
 from receiver.endpoint import ReceiverEndpoint
@@ -95,9 +96,7 @@ class LiveTransmitter:
             case Impair(text=text):
                 return self._impair(text)
             case Spoil(end=end, field=field):
-                self._run.desyncs_asked += 1
-                if end == "transmitter":
-                    return spoil(self._run.node.session, field, self._confirmed_sample())
+                return self._spoil(end, field)
             case SetPoint():
                 self._run.node.scores.forget_reference()
         return None
@@ -112,8 +111,12 @@ class LiveTransmitter:
             self._run.desyncs_asked = math.inf
         return line_text(text)
 
-    def _confirmed_sample(self) -> int:
-        return self._run.node.session.copies.confirmed.sample
+    def _spoil(self, end: Role, field: str) -> str | None:
+        session = self._run.node.session
+        # Both codecs are the same kind: what this one cannot do, the receiver's refuses too.
+        told, spoils = spoil(session, field, session.copies.confirmed.sample, end == "transmitter")
+        self._run.desyncs_asked += spoils
+        return told if end == "transmitter" else None
 
     def _next_sample_tick(self, tick: int) -> int:
         per_sample = self._run.agreement.terms.ticks_per_sample
@@ -185,7 +188,7 @@ class LiveReceiver:
                     _set_faults(self._endpoint.downlink, parse_impairments(text).down)
                     return line_text(text)
             case Spoil(end="receiver", field=field):
-                return spoil(session, field, session.state.sample)
+                return spoil(session, field, session.state.sample)[0]
         return None
 
     def _tell(self, text: str) -> None:
@@ -197,13 +200,23 @@ class LiveReceiver:
         self._recorder.write(EVENT_CHANNEL, time_ns, event_row(event))
 
 
-def spoil(session: object, field: str, sample: int) -> str:
-    """Spoil one field of a session's codec in one bit after a sample; return the words for it."""
+def spoil(session: object, field: str, sample: int, arm: bool = True) -> tuple[str, bool]:
+    """Spoil one field of a session's codec in one bit after a sample; `arm` False: only look.
+
+    Return the words for it, and whether the codec has such a field at all: a person's command must
+    not end the flight.
+    """
     codec = getattr(session, "codec", None)
     if not isinstance(codec, SabotagedCodec):
-        return "this codec cannot be spoilt: ignored"
-    codec.arm(parse_sabotage(f"sample={sample},field={field}"))
-    return f"one bit of this codec's {field} spoilt after sample {sample}"
+        return "this codec cannot be spoilt: ignored", False
+    sabotage = parse_sabotage(f"sample={sample},field={field}")
+    try:
+        codec.check(sabotage)
+    except ValueError as error:
+        return f"{error}: ignored", False
+    if arm:
+        codec.arm(sabotage)
+    return f"one bit of this codec's {field} spoilt after sample {sample}", True
 
 
 def line_text(text: str) -> str:

@@ -84,19 +84,26 @@ def found_endpoints() -> list[str]:
 
 
 def clear_stale() -> None:
-    """Remove the socket files of processes that are gone."""
+    """Remove the socket files that nobody listens at any more."""
     for path in private_folder().glob("*.sock"):
-        number = path.stem.rpartition("-")[2]
-        if number.isdigit() and not _runs(int(number)):
-            for file in (path, path.with_name(f"{path.name}.lock")):
+        lock = path.with_name(f"{path.name}.lock")
+        if not _is_held(lock):
+            for file in (path, lock):
                 file.unlink(missing_ok=True)
 
 
-def _runs(pid: int) -> bool:
+def _is_held(lock: Path) -> bool:
+    """Return whether somebody holds the lock that Zenoh keeps for as long as it listens.
+
+    It is seen in every container that has the folder, where a process number would be another's.
+    """
+    import fcntl
+
     try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
+        with lock.open() as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except FileNotFoundError:
         return False
-    except PermissionError:
+    except OSError:
         return True
-    return True
+    return False

@@ -10,7 +10,7 @@ import zenoh
 from channel.links.endpoints import free_endpoint
 from channel.links.zenoh_config import zenoh_config, zenoh_settings
 from channel.links.zenoh_inbox import ChannelInbox
-from tests.contract.test_links import PATIENCE_S
+from tests.contract.test_links import PATIENCE_S, SILENCE_S
 
 KEY = "tenbaud/full/up/symbol"
 
@@ -38,3 +38,17 @@ def test_when_the_channel_is_full_and_the_waker_waits_in_it_then_it_closes_all_t
             while inbox._subscriber.try_recv() is not None:
                 pass  # lets the session close, so that the test ends
         assert not closing.is_alive()
+
+
+def test_when_others_put_under_the_waking_key_then_none_is_passed_over() -> None:
+    with zenoh.open(zenoh_config(zenoh_settings("peer", (free_endpoint(),), ()))) as session:
+        inbox = ChannelInbox(session, "tenbaud/full/up/*")
+        try:
+            for _ in range(3):
+                session.put("tenbaud/full/up/wake", b"")
+            session.put(KEY, b"one")
+            assert [inbox.get(PATIENCE_S) for _ in range(4)] == [b"", b"", b"", b"one"]
+            inbox.wake()
+            assert inbox.get(SILENCE_S) is None
+        finally:
+            inbox.close()

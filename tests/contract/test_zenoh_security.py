@@ -82,6 +82,18 @@ def test_when_the_invited_rig_plays_the_receiver_then_its_commands_go_nowhere(en
         assert not desk.peer_present()
 
 
+def test_when_an_invited_node_puts_under_another_key_then_it_is_not_heard(pair: Pair) -> None:
+    rig, desk = pair
+    for sender, taker, key in (
+        (rig, desk, "up/wake"),
+        (rig, desk, "up/more"),
+        (desk, rig, "down/wake"),
+    ):
+        sender._session.put(f"tenbaud/{SESSION}/{key}", b"anything")  # type: ignore[attr-defined]
+        assert taker.receive(SILENCE_S) is None
+    check_both_ways(*pair)  # type: ignore[arg-type]
+
+
 def test_when_an_invited_node_flies_in_another_session_then_it_stays_out(endpoint: str) -> None:
     with (
         ZenohLink("receiver", SESSION, listen=(endpoint,), security=DESK) as desk,

@@ -52,7 +52,7 @@ class Flight:
         """Greet, fly and finish; return the flight itself."""
         self.virtual.greet()
         self.ticks = self.virtual.run(round(seconds * 1e9 / self.transmitter.terms.tick_ns))
-        self.virtual.finish(self.ticks, "done")
+        self.virtual.finish(self.ticks, lambda: "done")
         return self
 
     @property

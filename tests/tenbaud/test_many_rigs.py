@@ -16,6 +16,7 @@ from receiver.many_service import BURST_MESSAGES
 from tenbaud.build import Agreement
 from tenbaud.flight import many
 from tenbaud.flight.ends import open_recorder
+from tenbaud.flight.sparing import LINES_AT_ONCE, PERIOD_S
 from tenbaud.recording.writer import McapRecorder
 from tests.tenbaud.processes import finish, start
 from tests.tenbaud.room import PATIENCE_S, Rig, Room, agreement
@@ -88,6 +89,22 @@ def test_when_a_handshake_does_not_fit_then_it_is_refused_told_once_and_leaves_n
     assert "coder.window_signs" in (other.session.refusal or "")
     assert len([text for text in room.told if "rig/other: refused" in text]) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["rig-good"]
+
+
+def test_when_an_intruder_asks_under_ever_new_names_then_few_refusals_are_told_and_all_counted(
+    tmp_path: Path,
+) -> None:
+    asked = 10 * LINES_AT_ONCE
+    with Room(tmp_path, rigs_max=1) as room:
+        good = Rig(room, "rig/good").greet()
+        stranger = Rig(room, "rig/stranger")
+        for number in range(asked):
+            room.hub.up.put((f"rig/{number}", encode(stranger.session.hello())))
+        good.fly(2)
+    assert room.host.counts["refused"] == asked
+    told = [text for text in room.told if "refused" in text]
+    assert len(told) <= LINES_AT_ONCE + PATIENCE_S / PERIOD_S
+    assert "left out" in room.told[-1]
 
 
 def test_when_one_rig_breaks_its_service_then_only_its_flight_ends(tmp_path: Path) -> None:

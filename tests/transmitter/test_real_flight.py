@@ -99,7 +99,7 @@ def test_when_a_flight_is_flown_in_real_time_then_every_sample_is_checked() -> N
         flight.greet(peer_timeout_s=10.0)
         assert session.phase is Phase.FLYING
         ticks = flight.run(TICKS)
-        flight.finish("landed")
+        flight.finish(lambda: "landed")
     assert service.error is None
     assert ticks == TICKS
     assert end.session.phase is ReceiverPhase.ENDED
@@ -171,6 +171,6 @@ def test_when_garbage_comes_in_greeting_then_it_is_counted_and_the_greeting_goes
     far.send(b"garbage")
     with Service(end, far):
         flight.greet(peer_timeout_s=10.0)
-        flight.finish("enough")
+        flight.finish(lambda: "enough")
     assert flight.inlet.malformed == 1
     assert end.session.phase is ReceiverPhase.ENDED

@@ -11,7 +11,17 @@ from pathlib import Path
 import pytest
 
 from channel.errors import LinkError
+from channel.links.zenoh_telemetry import TelemetryPort
 from tenbaud.telemetry import place
+from tests.tenbaud.processes import REPOSITORY
+
+LISTENS = """
+import sys, time
+from channel.links.zenoh_telemetry import TelemetryPort
+port = TelemetryPort("transmitter", "lab", sys.argv[1])
+print("ready", flush=True)
+time.sleep(60)
+"""
 
 
 @pytest.fixture(autouse=True)
@@ -59,15 +69,41 @@ def test_a_folder_open_to_others_is_refused(own_folder: Path) -> None:
         place.private_folder()
 
 
-def test_a_flight_of_this_process_is_found_and_one_of_a_dead_process_is_cleared() -> None:
+def test_when_a_flight_listens_then_it_is_found_whatever_its_number() -> None:
     dead = subprocess.Popen([sys.executable, "-c", ""])
     dead.wait()
     folder = place.private_folder()
-    stale = folder / f"transmitter-{dead.pid}.sock"
-    live = folder / f"transmitter-{os.getpid()}.sock"
-    for path in (stale, live):
-        with socket.socket(socket.AF_UNIX) as listener:
-            listener.bind(str(path))
-    (folder / f"{stale.name}.lock").touch()
-    assert place.found_endpoints() == [f"{place.SOCKET}{live}"]
-    assert sorted(path.name for path in folder.iterdir()) == [live.name]
+    # Of another container's process, so to speak: here nobody has this number.
+    live = folder / f"transmitter-{dead.pid}.sock"
+    # The number has been given to somebody else meanwhile.
+    stale = folder / f"receiver-{os.getpid()}.sock"
+    with socket.socket(socket.AF_UNIX) as listener:
+        listener.bind(str(stale))
+    stale.with_name(f"{stale.name}.lock").touch()
+    port = TelemetryPort("transmitter", "lab", f"{place.SOCKET}{live}")
+    try:
+        assert place.found_endpoints() == [f"{place.SOCKET}{live}"]
+        assert sorted(path.name for path in folder.iterdir()) == [live.name, f"{live.name}.lock"]
+    finally:
+        port.close()
+    assert place.found_endpoints() == []
+
+
+def test_when_a_flight_was_killed_then_its_files_are_cleared() -> None:
+    folder = place.private_folder()
+    endpoint = f"{place.SOCKET}{folder / 'transmitter-1.sock'}"
+    killed = subprocess.Popen(
+        [sys.executable, "-c", LISTENS, endpoint],
+        env={**os.environ, "PYTHONPATH": str(REPOSITORY)},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert killed.stdout is not None
+        assert killed.stdout.readline() == "ready\n"
+        assert place.found_endpoints() == [endpoint]
+    finally:
+        killed.kill()
+        killed.communicate()
+    assert place.found_endpoints() == []
+    assert list(folder.iterdir()) == []

@@ -1,0 +1,43 @@
+"""Commands to a running flight that it cannot obey: told, and nothing else."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from channel.events import EventKind
+from channel.wire import DATAGRAM
+from tenbaud.build import agree
+from tenbaud.build_ends import build_receiver
+from tenbaud.config.load import load_config
+from tenbaud.flight import transmit
+from tenbaud.flight.outcome import ExitCode
+from tenbaud.telemetry.commands import CommandQueue
+from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
+from tests.channel.parts import ListRecorder
+
+
+@pytest.mark.parametrize("end", ["transmitter", "receiver"])
+def test_when_a_field_is_to_be_spoilt_that_the_codec_lacks_then_it_is_told_and_the_flight_goes_on(
+    end: str,
+) -> None:
+    config = load_config("static-10baud", None, {"duration_s": 2.0})
+    agreement = replace(agree(config, "virtual"), live=True)
+    run = transmit.prepare(agreement, None, DATAGRAM)
+    endpoint = build_receiver(agreement, None, DATAGRAM)
+    queues = (CommandQueue(), CommandQueue())
+    for queue in queues:
+        # The static coder has no state, hence no range.
+        queue.offer(json.dumps({"kind": "spoil", "end": end, "field": "range"}).encode())
+    run.node.at_tick = LiveTransmitter(run, queues[0], lambda: False).at_tick
+    live = LiveReceiver(endpoint, queues[1], lambda: False, ListRecorder(), None, "")
+    assert not live()
+    outcome = transmit.fly_virtual(run, endpoint, lambda: False)
+    assert outcome.code is ExitCode.OK, outcome.text
+    assert run.desyncs_asked == 0
+    session = run.node.session if end == "transmitter" else endpoint.session
+    told = [event.text for event in session.events if event.kind is EventKind.CONTROL]
+    assert len(told) == 1
+    assert told[0].endswith("coder state has 0 value(s): ignored")

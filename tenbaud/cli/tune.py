@@ -160,7 +160,7 @@ def _named(texts: list[str]) -> dict[str, Any]:
 def _parse_free(text: str) -> tuple[str, Any]:
     from pydantic import ValidationError
 
-    from tenbaud.studies.study import Range
+    from tenbaud.studies.study_file import Range
 
     match = re.fullmatch(r"([\w.]+)=([^.:]*(?:\.\d[^.:]*)?)\.\.([^:]+)(?::(log|linear))?", text.strip())
     if match is None:

@@ -33,7 +33,7 @@ SOURCES = (*PACKAGES[:-1], "tenbaud.config", "tenbaud.flight", "tenbaud.studies"
 
 BESIDE = (
     *("constants.py", "judging.py", "tuning.py"),
-    *("plots.py", "run.py", "table.py", "study.py", "settings.py"),
+    *("plots.py", "run.py", "table.py", "study.py", "study_file.py", "points.py", "settings.py"),
 )
 """Modules of the studies that no figure of a flight depends on."""
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from tenbaud.config.schema import FlightConfig
 from tenbaud.studies.settings import StudyError, check_name
-from tenbaud.studies.study import Range
+from tenbaud.studies.study_file import Range
 
 CODER_RANGES = {
     "zoom": {

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from tenbaud.build import ticks_of
-from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
 from tenbaud.studies.figures import FlightFigures
 from tenbaud.studies.flights import CompiledPoint, recorded_flight
@@ -22,7 +21,7 @@ from tenbaud.studies.plain import fly_plain
 from tenbaud.studies.schedule import Uncommon
 from tenbaud.studies.settings import StudyError, configured
 from tenbaud.studies.side_by_side import fly_seeds
-from tenbaud.studies.study import Range
+from tenbaud.studies.study_file import Range
 
 Method = Literal["differential-evolution", "nelder-mead"]
 
@@ -54,8 +53,23 @@ class Tuning:
     seed: int = 1
 
     def config(self, values: dict[str, float]) -> FlightConfig:
-        """Return the configuration with these constants; ConfigError where there is none."""
-        return configured(self.preset, self.file, self.overrides, dict(values))
+        """Return the configuration with these constants; ConfigError where there is none.
+
+        A simulated plant stays what it is when the model is moved.
+        """
+        fitted = any(name.startswith("model.") for name in values)
+        plant = self._plant() if fitted else {}
+        return configured(self.preset, self.file, self.overrides, {**plant, **values})
+
+    def _plant(self) -> dict[str, Any]:
+        config = self.config({})
+        if config.model.kind != "pitch" or config.transmitter.plant.relative_to == "pitch":
+            return {}
+        where = "transmitter.plant"
+        return {
+            f"{where}.relative_to": "pitch",
+            **{f"{where}.pitch.{name}": value for name, value in config.model.model_dump().items()},
+        }
 
 
 class Judged(NamedTuple):
@@ -92,16 +106,6 @@ def judge(tuning: Tuning, values: dict[str, float], *, train: bool) -> Judged:
             reason = reason or why
             lost += 1
     return Judged(math.sqrt(squares / len(figures)), lost, len(figures), reason)
-
-
-def check_rig(config: FlightConfig) -> None:
-    """Raise ConfigError unless the rig is one that a fit can fly some hundred times."""
-    rig = config.transmitter.rig
-    if rig not in ("simulated", "replay"):
-        raise ConfigError(
-            f"the {rig} rig moves in real time and cannot be flown some hundred times: record a flight "
-            "of it and give that as --rig replay:FILE"
-        )
 
 
 def _fly_all(config: FlightConfig, seeds: Sequence[int]) -> list[FlightFigures]:

@@ -11,7 +11,7 @@ import numpy as np
 from tenbaud.studies.settings import StudyError
 
 LABELS = {
-    "rate": "R in bit/s",
+    "rate": "R in symbols per second (baud)",
     "loss": "share of messages lost",
     "flip": "share of symbols flipped",
     "delay": "delay each way in s",

@@ -14,16 +14,16 @@ import numpy as np
 from channel.errors import TenbaudError
 from tenbaud.config.schema import FlightConfig
 from tenbaud.studies.constants import present
+from tenbaud.studies.figures import shared_parts
 from tenbaud.studies.judging import (
     PENALTY_RAD,
     Judged,
     Tuning,
-    check_rig,
     judge,
     split_ticks,
 )
 from tenbaud.studies.settings import StudyError
-from tenbaud.studies.study import Range
+from tenbaud.studies.study_file import Range
 
 POPULATION = 8
 """Candidates per constant in differential evolution."""
@@ -57,7 +57,7 @@ def tune(tuning: Tuning, on_evaluation: OnEvaluation) -> Tuned:
     from; only what the search tries later is penalised instead.
     """
     config = tuning.config({})
-    check_rig(config)
+    shared_parts(config)
     start = {name: present(config, name) for name in tuning.free}
     before = judge(tuning, start, train=True)
     if before.lost == before.flights:

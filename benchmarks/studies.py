@@ -192,7 +192,8 @@ def _workers() -> list[Figure]:
     """Return how much faster two processes fly a study than one."""
     from tenbaud.studies.chunk import task_of
     from tenbaud.studies.run import flying_in_pool
-    from tenbaud.studies.study import Study, StudyFile
+    from tenbaud.studies.study import Study
+    from tenbaud.studies.study_file import StudyFile
 
     file = StudyFile.model_validate(
         {

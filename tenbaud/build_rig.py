@@ -91,9 +91,11 @@ def build_plant(config: FlightConfig, step_s: float) -> Plant:
 
 
 def nominal_plant(config: FlightConfig) -> PitchParameters:
-    """Return the plant that the codec's model describes, or that stands in where it has none."""
+    """Return the plant that the codec's model describes, or the one that is given beside it."""
     model = config.model
-    section = model if isinstance(model, PitchModelSection) else config.transmitter.plant.pitch
+    plant = config.transmitter.plant
+    follows = isinstance(model, PitchModelSection) and plant.relative_to == "model"
+    section = model if follows else plant.pitch
     return PitchParameters(**section.model_dump(exclude={"kind"}), volts_max=config.limits.volts_max)
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -28,7 +30,10 @@ def tune(
     out: Annotated[Path, typer.Option(help="File for the preset that was found; must not exist yet.")],
     preset: options.Preset = None,
     config: options.ConfigFile = None,
-    rig: options.Rig = None,
+    rig: Annotated[
+        str | None,
+        typer.Option(help="simulated, or replay:FILE to fit on a recorded flight.", show_default=False),
+    ] = None,
     duration: options.Duration = None,
     mismatch: Annotated[float | None, typer.Option(help="Plant off the model, 0.1 for 10 %.")] = None,
     disturbance: options.Disturbance = None,
@@ -37,31 +42,58 @@ def tune(
     free: Annotated[
         list[str] | None,
         typer.Option(
-            help="Constant to fit and its range, such as coder.decay=0.7..0.99 or "
-            "coder.minimum_range_rad=0.003..0.1:log; repeatable. Not given: the usual ones."
+            help="Constant of coder or model to fit and its range, such as coder.decay=0.7..0.99 or "
+            "coder.minimum_range_rad=0.003..0.1:log; repeatable. Not given: the usual ones of the "
+            "coder, its gains and its range."
         ),
     ] = None,
-    model: Annotated[bool, typer.Option("--model", help="Fit the model's constants as well.")] = False,
+    model: Annotated[
+        bool,
+        typer.Option(
+            "--model",
+            help="Fit the pitch model's damping, stiffness, gain, lag and equilibrium as well.",
+        ),
+    ] = False,
     seeds: Annotated[int, typer.Option(min=1, help="Simulated flights for the fit.")] = 6,
-    test_seeds: Annotated[int, typer.Option(min=1, help="Other flights for the judgement.")] = 12,
+    test_seeds: Annotated[
+        int, typer.Option(min=1, help="Simulated flights for the judgement, of the seeds after those.")
+    ] = 12,
     train_share: Annotated[
-        float, typer.Option(min=0.05, max=0.95, help="Share of a recorded flight for the fit.")
+        float,
+        typer.Option(
+            min=0.05, max=0.95, help="Share of a recorded flight for the fit; the rest is to judge."
+        ),
     ] = 0.5,
     method: Annotated[MethodOption, typer.Option(help="How to search.")] = MethodOption.EVOLUTION,
-    evaluations: Annotated[int, typer.Option(min=1, help="How often to fly at most.")] = 600,
+    evaluations: Annotated[
+        int,
+        typer.Option(
+            min=1,
+            help="Sets of constants to fly at most, those configured included; each is flown on all "
+            "flights for the fit.",
+        ),
+    ] = 600,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the search.")] = 1,
     as_json: options.AsJson = False,
 ) -> None:
-    """Fit a coder's constants, and with --model the model's, on flights; judge them on others."""
+    """Fit a coder's constants, and with --model the model's, on flights; judge them on others.
+
+    What is made small is the rms error of what the receiver believed. Simulated flights of --seeds
+    seeds are for the fit, and --test-seeds others for the judgement; of a recorded flight the first
+    --train-share, and the rest. Both errors are reported, before and after.
+
+    The preset written to --out has the sections timing, channel, model and coder over the preset that
+    the fit started from. Plant, disturbance, line and recording are not in it.
+    """
     from tenbaud.studies.compiled import require
-    from tenbaud.studies.settings import StudyError
 
     require("numba")
-    from tenbaud.studies.tuning import Split, Tuning, free_ranges, preset_text
+    from tenbaud.studies.constants import free_ranges
+    from tenbaud.studies.judging import Split, Tuning
+    from tenbaud.studies.tuning import preset_text
     from tenbaud.studies.tuning import tune as fit
 
-    if out.exists():
-        raise StudyError(f"{out} exists already; name another file")
+    _make_room(out)
     overrides = options.overrides(
         duration=duration,
         rig=rig,
@@ -72,18 +104,15 @@ def tune(
     )
     first = seeds + 1
     split = Split(tuple(range(1, first)), tuple(range(first, first + test_seeds)), train_share)
-    named = dict(_parse_free(text) for text in free or ())
     tuning = Tuning(preset, config, overrides, {}, split, method.value, evaluations, seed)
-    ranges = free_ranges(tuning.config({}), named, model=model)
-    tuning = Tuning(preset, config, overrides, ranges, split, method.value, evaluations, seed)
+    ranges = free_ranges(tuning.config({}), _named(free or []), model=model)
+    tuning = replace(tuning, free=ranges)
     with _bar(evaluations) as (progress, task):
 
         def told(count: int, error: float) -> None:
-            text = f"best {math.degrees(error):.4g}°"
-            progress.update(task, completed=min(count, evaluations), description=text)
+            progress.update(task, completed=count, description=f"best {math.degrees(error):.4g}°")
 
         tuned = fit(tuning, told)
-    out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(preset_text(tuning, tuned), encoding="utf-8")
     if as_json:
         typer.echo(json.dumps({**tuned._asdict(), "preset_file": str(out)}, indent=2))
@@ -92,24 +121,46 @@ def tune(
     typer.echo(f"{out}: fly it with --config {out}")
 
 
+def _make_room(out: Path) -> None:
+    """Make the folder of the preset; StudyError where none can be written, before anything is flown."""
+    from tenbaud.studies.settings import StudyError
+
+    if out.exists():
+        raise StudyError(f"{out} exists already; name another file")
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StudyError(f"cannot write {out}: {error.strerror}") from error
+    if not os.access(out.parent, os.W_OK):
+        raise StudyError(f"cannot write {out}: its folder may not be written to")
+
+
 def _tell(tuned: Tuned) -> None:
     """Print constants and errors."""
+    from tenbaud.studies.tuning import report
+
     for name, value in tuned.values.items():
         typer.echo(f"{name:36} {value:.6g}")
-    for what, before, after in (
-        (f"fit on {tuned.train_what}", tuned.train_before, tuned.train_after),
-        (f"judged on {tuned.test_what}", tuned.test_before, tuned.test_after),
-    ):
-        before_deg, after_deg = math.degrees(before), math.degrees(after)
-        typer.echo(f"{what}: rms error {before_deg:.4g} -> {after_deg:.4g} degrees")
+    for line in report(tuned):
+        typer.echo(line)
     if tuned.test_after > tuned.test_before:
         typer.echo("The fit does not hold on flights that it has not seen: it is over-fitted.")
+
+
+def _named(texts: list[str]) -> dict[str, Any]:
+    named: dict[str, Any] = {}
+    for text in texts:
+        name, ends = _parse_free(text)
+        if name in named:
+            raise typer.BadParameter(f"--free {text}: {name} is named twice")
+        named[name] = ends
+    return named
 
 
 def _parse_free(text: str) -> tuple[str, Any]:
     from pydantic import ValidationError
 
-    from tenbaud.studies.study import Range
+    from tenbaud.studies.study_file import Range
 
     match = re.fullmatch(r"([\w.]+)=([^.:]*(?:\.\d[^.:]*)?)\.\.([^:]+)(?::(log|linear))?", text.strip())
     if match is None:
@@ -118,8 +169,11 @@ def _parse_free(text: str) -> tuple[str, Any]:
     try:
         values = {"from": float(first), "to": float(last), "scale": scale or "linear"}
         return name, Range.model_validate(values)
-    except (ValueError, ValidationError) as error:
-        raise typer.BadParameter(f"--free {text}: {error}") from error
+    except ValidationError as error:
+        why = error.errors()[0]["msg"].removeprefix("Value error, ")
+        raise typer.BadParameter(f"--free {text}: {why}") from error
+    except ValueError as error:
+        raise typer.BadParameter(f"--free {text}: both ends are numbers") from error
 
 
 def _bar(total: int) -> Any:

@@ -179,7 +179,9 @@ def _kind_or(default: str) -> Callable[[Any], str]:
     """Return the discriminator of a section whose `kind` may be left out."""
 
     def kind(value: Any) -> str:
-        named = value.get("kind", default) if isinstance(value, dict) else value.kind
+        named = (
+            value.get("kind", default) if isinstance(value, dict) else getattr(value, "kind", default)
+        )
         return "plugin" if ":" in str(named) else str(named)
 
     return kind
@@ -235,8 +237,10 @@ class PlantSection(Section):
     """the pitch axis, or module:Class"""
     options: Options = Field(default_factory=dict)
     """what a class from outside is built with"""
+    relative_to: Literal["model", "pitch"] = "model"
+    """the codec's model, so that the plant moves with it; or the constants in `pitch`"""
     pitch: PitchModelSection = PitchModelSection()
-    """what the plant is relative to when the codec's model is no pitch model"""
+    """what the plant is relative to where the codec's model is none, or `relative_to` says so"""
     mismatch: float | tuple[float, float, float] = 0.0
     """fraction by which damping, stiffness and gain are off the model: 0.1 is 10 % more of each"""
     disturbance: str = ""

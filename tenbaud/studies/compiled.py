@@ -31,7 +31,10 @@ OPTIONS = {"fastmath": False, "error_model": "python", "nogil": True}
 SOURCES = (*PACKAGES[:-1], "tenbaud.config", "tenbaud.flight", "tenbaud.studies")
 """Packages that the figures of a flight depend on; beside them, what builds its parts."""
 
-BESIDE = ("plots.py", "run.py", "table.py", "tuning.py", "study.py", "settings.py")
+BESIDE = (
+    *("constants.py", "judging.py", "tuning.py"),
+    *("plots.py", "run.py", "table.py", "study.py", "study_file.py", "points.py", "settings.py"),
+)
 """Modules of the studies that no figure of a flight depends on."""
 
 LOOPS = ("tenbaud.studies.lane_ticks", "tenbaud.studies.lane_samples")

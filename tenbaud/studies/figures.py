@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from channel.identity import Identity
-from tenbaud.build import Agreement, build_terms
+from tenbaud.build import REAL_RIGS, Agreement, build_terms
 from tenbaud.build_codec import build_codec
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
@@ -31,6 +31,11 @@ class FlightFigures(NamedTuple):
 
 def shared_parts(config: FlightConfig) -> Agreement:
     """Return what both ends would agree on, without the handshake's identity; ConfigError."""
+    if config.transmitter.rig in REAL_RIGS:
+        raise ConfigError(
+            f"the {config.transmitter.rig} rig moves in real time and cannot be flown some hundred "
+            "times: record a flight of it and replay that"
+        )
     try:
         codec = build_codec(config)
         terms = build_terms(config, codec, "virtual")

@@ -172,6 +172,8 @@ def _require_ordinary(config: FlightConfig, codec: Codec) -> None:
     rig, controller = config.transmitter.rig, config.receiver.controller
     if (rig, controller) not in (("simulated", "pid"), ("replay", "recorded")):
         raise Uncommon(f"the rig {rig} with the controller {controller}")
+    if rig == "simulated" and config.transmitter.plant.kind != "pitch":
+        raise Uncommon("a plant from outside")
     if config.transmitter.sabotage or config.receiver.sabotage or config.transmitter.dry_run:
         raise Uncommon("sabotage and dry runs")
     if config.link.kind == "serial":

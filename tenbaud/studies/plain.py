@@ -15,8 +15,11 @@ from tenbaud.studies.figures import FlightFigures
 from transmitter.scores import ErrorMeter
 
 
-def fly_plain(config: FlightConfig) -> FlightFigures:
-    """Fly a configuration as `tenbaud demo --link memory` does, and return its figures."""
+def fly_plain(config: FlightConfig, window_start: int | None = None) -> FlightFigures:
+    """Fly a configuration as `tenbaud demo --link memory` does, and return its figures.
+
+    Errors count from tick `window_start` on; where a flight's usually do, if not given.
+    """
     try:
         agreement = agree(config, "virtual")
     except (TenbaudError, ValueError) as error:
@@ -26,6 +29,9 @@ def fly_plain(config: FlightConfig) -> FlightFigures:
         )
     run = transmit.prepare(agreement, None, DATAGRAM)
     endpoint = build_receiver(agreement, None, DATAGRAM)
+    scores = run.node.scores
+    if window_start is not None:
+        scores.window_start_tick = window_start
     try:
         outcome = transmit.fly_virtual(run, endpoint, lambda: False)
     except (TenbaudError, ValueError) as error:
@@ -34,7 +40,6 @@ def fly_plain(config: FlightConfig) -> FlightFigures:
     # While the line rests at the end, the receiver may erase samples that were never flown.
     heard = node.session.copies.next_sample
     flown = min(heard, -(-run.ticks // agreement.terms.ticks_per_sample))
-    scores = node.scores
     return FlightFigures(
         outcome="ok" if outcome.code is ExitCode.OK else outcome.text,
         engine="plain",

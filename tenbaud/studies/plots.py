@@ -11,7 +11,7 @@ import numpy as np
 from tenbaud.studies.settings import StudyError
 
 LABELS = {
-    "rate": "R in bit/s",
+    "rate": "R in symbols per second (baud)",
     "loss": "share of messages lost",
     "flip": "share of symbols flipped",
     "delay": "delay each way in s",
@@ -26,16 +26,27 @@ QUANTITIES = {
 COLOURS = {"error_coded_rms": "C0", "error_live_rms": "C1", "tracking_rms": "C2"}
 LEVELS_MAX = 40
 """A setting with more values than these was sampled, and is drawn as dots."""
+CHARACTERS_MAX = 60
+"""So many characters of labels have room side by side."""
+LABELLED_MAX = 12
+"""So many levels of a setting have room for a label each."""
 MAPS_MAX = 12
 """Pairs beyond these are left out: nobody reads fifty maps."""
 
 
 def draw_study(table: Any, names: list[str], title: str, folder: Path) -> list[Path]:
-    """Draw all plots of a table into a folder; return the files."""
+    """Draw all plots of a table into a folder; return the files.
+
+    A setting with one value has none, unless all have one. The title says how many flights have no
+    figures, and so are in none of the medians.
+    """
     good = np.array(table["outcome"].to_pylist()) == "ok"
     if not good.any():
         raise StudyError("no flight of this study has figures, so there is nothing to draw")
     columns = {name: np.array(table[name].to_pylist())[good] for name in (*names, *QUANTITIES)}
+    if missing := int(np.count_nonzero(~good)):
+        title = f"{title}\n{missing} of {len(good)} flights have no figures and are left out"
+    names = [name for name in names if len(np.unique(columns[name])) > 1] or names
     numeric = [name for name in names if columns[name].dtype.kind in "fiub"]
     paths = [_curves(columns, name, title, folder) for name in names]
     for first, second in itertools.islice(itertools.combinations(numeric, 2), MAPS_MAX):
@@ -64,14 +75,18 @@ def _curves(columns: dict[str, Any], name: str, title: str, folder: Path) -> Pat
         if axes.lines:
             axes.legend(loc="best", fontsize=9)
     upper.set_yscale("log")
-    upper.yaxis.set_major_formatter("{x:g}")
-    upper.yaxis.set_minor_formatter("{x:g}")
+    _label_decades(upper.yaxis, *upper.get_ylim())
     if values.dtype.kind not in "fiu":
-        lower.set_xticks(np.arange(len(levels)), [str(one) for one in levels])
+        texts = [str(one) for one in levels]
+        lower.set_xticks(np.arange(len(levels)), texts)
+        if sum(len(text) for text in texts) > CHARACTERS_MAX:
+            lower.tick_params(axis="x", labelrotation=20)
+    elif values.dtype.kind in "iu" and len(levels) <= LABELLED_MAX and not _spans(levels):
+        lower.set_xticks(levels)
     elif _spans(levels):
         lower.set_xscale("log")
         if not sampled and len(levels) <= 10:
-            lower.set_xticks(levels, [f"{one:.3g}" for one in levels])
+            lower.set_xticks(levels, [f"{one:.4g}" for one in levels])
             lower.minorticks_off()
     lower.set_xlabel(LABELS.get(name, name))
     what = "each dot a flight" if sampled else "medians, and the middle half of all flights"
@@ -110,8 +125,12 @@ def _map(columns: dict[str, Any], first: str, second: str, title: str, folder: P
     errors = np.degrees(columns[quantity])
     figure, axes = plt.subplots(figsize=(6.4, 4.8), layout="constrained")
     xs, ys = np.unique(x), np.unique(y)
-    if len(xs) * len(ys) > len(errors):
-        drawn: Any = axes.scatter(x, y, c=errors, cmap="viridis", s=18, norm=LogNorm())
+    places = np.unique(np.column_stack((x, y)), axis=0)
+    if len(places) < len(xs) * len(ys) or max(len(xs), len(ys)) > LEVELS_MAX:
+        medians = [_median(errors[(x == one) & (y == other)]) for one, other in places]
+        drawn: Any = axes.scatter(
+            places[:, 0], places[:, 1], c=medians, cmap="viridis", s=18, norm=LogNorm()
+        )
         for levels, scale in ((xs, axes.set_xscale), (ys, axes.set_yscale)):
             if _spans(levels):
                 scale("log")
@@ -120,26 +139,37 @@ def _map(columns: dict[str, Any], first: str, second: str, title: str, folder: P
         drawn = axes.pcolormesh(
             np.arange(len(xs) + 1), np.arange(len(ys) + 1), grid, cmap="viridis", norm=LogNorm()
         )
-        axes.set_xticks(np.arange(len(xs)) + 0.5, [f"{one:.3g}" for one in xs])
-        axes.set_yticks(np.arange(len(ys)) + 0.5, [f"{one:.3g}" for one in ys])
-        for (row, column), value in np.ndenumerate(grid):
-            dark = value * value < np.nanmin(grid) * np.nanmax(grid)
-            axes.text(
-                column + 0.5,
-                row + 0.5,
-                f"{value:.3g}",
-                ha="center",
-                va="center",
-                color="white" if dark else "black",
-                fontsize=8,
-            )
+        for levels, set_ticks in ((xs, axes.set_xticks), (ys, axes.set_yticks)):
+            shown = np.arange(0, len(levels), -(-len(levels) // LABELLED_MAX))
+            set_ticks(shown + 0.5, [f"{levels[index]:.4g}" for index in shown])
+        if max(grid.shape) <= LABELLED_MAX:
+            _write_medians(axes, grid)
     bar = figure.colorbar(drawn, ax=axes, label=f"{QUANTITIES[quantity]}, degrees")
-    for axis in (bar.ax.yaxis.set_major_formatter, bar.ax.yaxis.set_minor_formatter):
-        axis("{x:g}")
+    _label_decades(bar.ax.yaxis, drawn.norm.vmin, drawn.norm.vmax)
     axes.set_xlabel(LABELS.get(first, first))
     axes.set_ylabel(LABELS.get(second, second))
     axes.set_title(title)
     return _save(figure, folder / f"map_{_file(first)}_{_file(second)}.png")
+
+
+def _write_medians(axes: Any, grid: Any) -> None:
+    """Write each number into its cell, so that it can be read on the cell's colour."""
+    middle = np.nanmin(grid) * np.nanmax(grid)
+    for (row, column), value in np.ndenumerate(grid):
+        text = f"{value:.0f}" if value >= 1000.0 else f"{value:.3g}"
+        colour = "white" if value * value < middle else "black"
+        axes.text(column + 0.5, row + 0.5, text, ha="center", va="center", color=colour, fontsize=8)
+
+
+def _label_decades(axis: Any, low: float, high: float) -> None:
+    """Label a log axis with as many numbers as there is room for."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    span = high / low
+    subs = (1.0,) if span > 1000.0 else (1.0, 2.0, 5.0) if span > 5.0 else tuple(range(1, 10))
+    axis.set_major_locator(LogLocator(subs=subs, numticks=20))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _median(errors: Any) -> float:

@@ -6,13 +6,15 @@ after a kill, or when workers vanish for good, the same command goes on with wha
 
 from __future__ import annotations
 
+import os
 import queue
+import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from importlib import import_module
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from typing import Any
 
 from tenbaud.studies.chunk import ChunkResult, ChunkTask, fly_chunk, task_of
@@ -79,7 +81,7 @@ def flying_in_pool(tasks: list[ChunkTask], workers: int) -> Iterator[ChunkResult
 
 def _in_one_pool(left: dict[int, ChunkTask], workers: int) -> Iterator[ChunkResult]:
     """Fly what is left, in the order of completion; BrokenProcessPool when a process vanished."""
-    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_end_with_parent)
     try:
         waiting = iter(list(left.values()))
         flying: set[Future[ChunkResult]] = set()
@@ -96,6 +98,18 @@ def _in_one_pool(left: dict[int, ChunkTask], workers: int) -> Iterator[ChunkResu
                 yield result
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _end_with_parent() -> None:
+    """Let this process end when the one that started it does, however that ends."""
+    parent = parent_process()
+
+    def await_it() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    threading.Thread(target=await_it, daemon=True).start()
 
 
 def _on_cluster(tasks: list[ChunkTask], scheduler: str) -> Iterator[ChunkResult]:

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import copy
 import difflib
+import math
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic import BaseModel
 
@@ -25,14 +26,47 @@ class StudyError(TenbaudError):
     """A study that cannot be run; the text names what is wrong and where."""
 
 
+class Short(NamedTuple):
+    """A short name: what it stands for, its unit, and what it may be."""
+
+    what: str
+    unit: str
+    low: float
+    high: float = math.inf
+
+
 SHORT_NAMES = {
-    "rate": "R in bit/s: channel.rate_baud, and timing.symbol_period_s for one word in that time",
-    "loss": "probability that a message is lost, either way",
-    "flip": "probability that a symbol arrives as another one",
-    "delay": "delay of every message in s, either way",
-    "mismatch": "transmitter.plant.mismatch",
-    "density": "q of the white torque on the plant, rad^2/s^3",
+    # Beside a rate timing.symbol_period_s becomes that of one word.
+    "rate": Short("number of symbols per second (channel.rate_baud)", " baud", 1e-6),
+    "loss": Short("share of messages lost either way", "", 0.0, 1.0),
+    "flip": Short("share of symbols that arrive as another one", "", 0.0, 1.0),
+    "delay": Short("delay of every message either way in seconds", " s", 0.0),
+    "mismatch": Short("fraction by which the plant is off the model", "", -1.0, 10.0),
+    "density": Short("q of the white torque on the plant in rad^2/s^3", " rad^2/s^3", 0.0),
 }
+
+
+FIELDS = {"rate": "channel.rate_baud", "mismatch": "transmitter.plant.mismatch"}
+"""Short names of a field."""
+
+
+def check_value(name: str, value: object) -> None:
+    """Raise StudyError unless a value is one that a short name can have."""
+    short = SHORT_NAMES.get(name)
+    if short is None:
+        return
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not number or not short.low <= value <= short.high:  # type: ignore[operator]
+        most = "" if short.high == math.inf else f" and at most {short.high:g}"
+        raise StudyError(
+            f"{name} = {value!r}: give the {short.what}: a number, at least {short.low:g}{most}"
+        )
+
+
+def in_words(point: dict[str, Any]) -> str:
+    """Return the settings of a point with their units."""
+    units = {name: short.unit for name, short in SHORT_NAMES.items()}
+    return ", ".join(f"{name} = {value!r}{units.get(name, '')}" for name, value in point.items())
 
 
 def put(values: dict[str, Any], name: str, value: object) -> None:
@@ -46,34 +80,8 @@ def put(values: dict[str, Any], name: str, value: object) -> None:
     here[last] = value
 
 
-def overrides_of(fixed: dict[str, Any], swept: dict[str, Any]) -> dict[str, Any]:
-    """Return configuration overrides from fixed sections and swept settings."""
-    values = copy.deepcopy(fixed)
-    texts: list[str] = []
-    for name, value in swept.items():
-        match name:
-            case "rate":
-                put(values, "channel.rate_baud", value)
-            case "loss" | "flip":
-                texts += [f"{'up:' if name == 'flip' else ''}{name}={value!r}"] if value else []
-            case "delay":
-                texts += [f"delay={float(value) * 1000.0:.6f}ms"] if value else []
-            case "mismatch":
-                put(values, "transmitter.plant.mismatch", value)
-            case "density":
-                _add_text(values, "transmitter", "plant", "disturbance", f"q={value!r}")
-            case _:
-                put(values, name, value)
-    if texts:
-        _add_text(values, "link", "impairments", ",".join(texts))
-    return values
-
-
-def _add_text(values: dict[str, Any], *place: str) -> None:
-    *sections, last, text = place
-    for section in sections:
-        values = values.setdefault(section, {})
-    values[last] = ",".join(filter(None, (values.get(last, ""), text)))
+TEXTS = ("loss", "flip", "delay", "density")
+"""Short names that are added to a text which may say something else already."""
 
 
 def configured(
@@ -81,11 +89,15 @@ def configured(
 ) -> FlightConfig:
     """Return the configuration of one point; ConfigError or StudyError where there is none."""
     entries = {name: value for name, value in swept.items() if name.rpartition(".")[2].isdigit()}
-    whole = {name: value for name, value in swept.items() if name not in entries}
-    values = overrides_of(fixed, whole)
+    texts = {name: value for name, value in swept.items() if name in TEXTS}
+    values = copy.deepcopy(fixed)
+    for name, value in swept.items():
+        if name not in entries and name not in texts:
+            put(values, FIELDS.get(name, name), value)
     config = load_config(preset, file, values)
-    if not entries and "rate" not in swept:
+    if not (entries or texts or "rate" in swept):
         return config
+    _put_texts(config, values, texts)
     if "rate" in swept:
         words = build_codec(config).coder.alphabet.symbols_per_word
         put(values, "timing.symbol_period_s", words / float(swept["rate"]))
@@ -95,17 +107,40 @@ def configured(
     return load_config(preset, file, values)
 
 
+def _put_texts(config: FlightConfig, values: dict[str, Any], texts: dict[str, Any]) -> None:
+    """Add what is swept to the texts of a configuration; StudyError where they say it already."""
+    plant, link = config.transmitter.plant.disturbance, config.link.impairments
+    for name, value in texts.items():
+        text = plant if name == "density" else link
+        item = "q" if name == "density" else name
+        for said in text.split(","):
+            if said.partition("=")[0].rpartition(":")[2].strip() == item:
+                raise StudyError(f"{name} is swept, and the configuration has {said.strip()} already")
+        match name:
+            case "density":
+                more = f"q={value!r}"
+            case "delay":
+                more = f"delay={float(value) * 1000.0:.6f}ms" if value else ""
+            case _:
+                more = f"{'up:' if name == 'flip' else ''}{name}={value!r}" if value else ""
+        place = "transmitter.plant.disturbance" if name == "density" else "link.impairments"
+        put(values, place, ",".join(filter(None, (_at(values, place) or text, more))))
+
+
+def _at(values: Any, name: str) -> Any:
+    """Return the field of a dotted name in nested sections, None where there is none."""
+    for part in name.split("."):
+        values = values.get(part) if isinstance(values, dict) else None
+    return values
+
+
 def _with_entry(
     config: FlightConfig, values: dict[str, Any], field: str, index: int, value: object
 ) -> list[Any]:
     """Return a list of the configuration with one entry changed."""
-    here: Any = values
-    for part in field.split("."):
-        here = here.get(part) if isinstance(here, dict) else None
+    here = _at(values, field)
     if not isinstance(here, list):
-        here = config.model_dump(mode="json")
-        for part in field.split("."):
-            here = here.get(part) if isinstance(here, dict) else None
+        here = _at(config.model_dump(mode="json"), field)
     if not isinstance(here, list) or index >= len(here):
         size = f"has {len(here)} entries" if isinstance(here, list) else "is no list"
         raise StudyError(f"{field}.{index} cannot be swept: {field} {size}")
@@ -129,6 +164,7 @@ def field_names() -> tuple[str, ...]:
     """Return the dotted names of all fields of a configuration, those of every kind included."""
     names = list(_fields_of(FlightConfig, ""))
     for section, kinds in KINDS.items():
+        names.remove(section)
         for kind in kinds.values():
             names += _fields_of(kind, f"{section}.")
     return tuple(dict.fromkeys(names))

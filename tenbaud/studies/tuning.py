@@ -1,82 +1,35 @@
-"""Fitting constants of a coder, and if asked of the model, on flights; judged on flights it never saw.
-
-On simulated flights, one set of seeds is for the fit and another for the judgement. On a recorded
-flight, the first part is for the fit and the rest for the judgement; there the codec flies through the
-whole recording and only the rest counts. The measure is the rms error of what the receiver believed.
-"""
+"""Fitting constants of a coder, and if asked of the model, on flights; judged on others."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
 from importlib import import_module
-from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from channel.errors import TenbaudError
-from plant_sim.encoder import angle_of
-from tenbaud.config.load import load_config
 from tenbaud.config.schema import FlightConfig
-from tenbaud.studies.figures import FlightFigures
-from tenbaud.studies.flights import CompiledPoint, recorded_flight
-from tenbaud.studies.plain import fly_plain
-from tenbaud.studies.schedule import Uncommon
-from tenbaud.studies.settings import StudyError, check_name, configured
-from tenbaud.studies.side_by_side import fly_seeds
-from tenbaud.studies.study import Range
-
-Method = Literal["differential-evolution", "nelder-mead"]
-
-PENALTY_RAD = 100.0
-"""What a flight without figures counts as: worse than any error that an angle can have."""
+from tenbaud.studies.constants import present
+from tenbaud.studies.figures import shared_parts
+from tenbaud.studies.judging import (
+    PENALTY_RAD,
+    Judged,
+    Tuning,
+    judge,
+    split_ticks,
+)
+from tenbaud.studies.settings import StudyError
+from tenbaud.studies.study_file import Range
 
 POPULATION = 8
 """Candidates per constant in differential evolution."""
 
-CODER_RANGES = {
-    "zoom": {
-        "coder.minimum_range_rad": (0.1, 10.0, "log"),
-        "coder.decay": (0.6, 0.99, "linear"),
-        "coder.gains.0": (0.2, 3.0, "log"),
-        "coder.gains.1": (0.2, 3.0, "log"),
-    },
-    "fixed": {
-        "coder.range_rad": (0.1, 10.0, "log"),
-        "coder.gains.0": (0.2, 3.0, "log"),
-        "coder.gains.1": (0.2, 3.0, "log"),
-    },
-    "timed": {
-        "coder.minimum_range_rad": (0.1, 10.0, "log"),
-        "coder.gains.0": (0.2, 3.0, "log"),
-        "coder.gains.1": (0.2, 3.0, "log"),
-    },
-    "history": {
-        "coder.minimum_range_rad": (0.2, 5.0, "log"),
-        "coder.weights.0": (0.5, 2.0, "log"),
-        "coder.weights.2": (0.5, 2.0, "log"),
-    },
-    "static": {"coder.gains.0": (0.1, 5.0, "log"), "coder.gains.1": (0.1, 5.0, "log")},
-}
-"""Constants that are fitted unless others are named; log: the ends are multiples of what is set."""
-
-MODEL_FACTORS = (
-    "model.rate_damping_per_s",
-    "model.stiffness_per_s2",
-    "model.torque_gain_rad_per_v_s2",
-    "model.motor_lag_s",
-)
-
-
-class Split(NamedTuple):
-    """Which flights are for the fit, and which for the judgement."""
-
-    train_seeds: tuple[int, ...]
-    test_seeds: tuple[int, ...]
-    train_share: float
-    """of a recorded flight"""
+OnEvaluation = Callable[[int, float], None]
+"""(sets of constants flown, smallest error so far in rad)"""
 
 
 class Tuned(NamedTuple):
@@ -88,111 +41,102 @@ class Tuned(NamedTuple):
     train_after: float
     test_after: float
     evaluations: int
+    """sets of constants flown on the flights for the fit, those before included"""
+    penalised: int
+    """of these, how many made no flight or left some of the flights without figures"""
+    without_figures: dict[str, int]
+    """flights that count as `PENALTY_RAD` in one of the four errors, by its name"""
     train_what: str
     test_what: str
 
 
-@dataclass(frozen=True, slots=True)
-class Tuning:
-    """A fit: of which constants, on which flights, how."""
+def tune(tuning: Tuning, on_evaluation: OnEvaluation) -> Tuned:
+    """Fit constants. The same tuning gives the same constants: all chance comes from its seed.
 
-    preset: str | None
-    file: Path | None
-    overrides: dict[str, Any]
-    free: dict[str, Range]
-    split: Split
-    method: Method = "differential-evolution"
-    evaluations: int = 600
-    seed: int = 1
-
-    def config(self, values: dict[str, float], **changes: Any) -> FlightConfig:
-        """Return the configuration with these constants; ConfigError where there is none."""
-        fixed = {**self.overrides, **changes}
-        return configured(self.preset, self.file, fixed, dict(values))
-
-
-def free_ranges(config: FlightConfig, names: dict[str, Range], *, model: bool) -> dict[str, Range]:
-    """Return the constants to fit: those named, or the usual ones of the coder, and of the model.
-
-    StudyError for names that do not exist and for a coder without usual ones.
+    Raises what is wrong with the configuration, the recording or the constants that the fit starts
+    from; only what the search tries later is penalised instead.
     """
-    for name in names:
-        check_name(name)
-    free = dict(names)
-    if not free:
-        usual = CODER_RANGES.get(config.coder.kind)
-        if usual is None:
-            raise StudyError(
-                f"the coder {config.coder.kind!r} has no usual constants: name some with --free"
-            )
-        free = {name: _usual(config, name, *spread) for name, spread in usual.items()}
-    if model:
-        if config.model.kind != "pitch":
-            raise StudyError(f"the model {config.model.kind!r} has no constants to fit")
-        free |= {name: _usual(config, name, 0.5, 2.0, "log") for name in MODEL_FACTORS}
-        free["model.equilibrium_rad"] = Range.model_validate({"from": -0.4, "to": 0.4})
-    return free
-
-
-def _usual(config: FlightConfig, name: str, low: float, high: float, scale: str) -> Range:
-    factor = abs(present(config, name)) if scale == "log" else 1.0
-    return Range.model_validate({"from": low * factor, "to": high * factor, "scale": scale})
-
-
-def present(config: FlightConfig, name: str) -> float:
-    """Return what a constant is now."""
-    here: Any = config
-    for part in name.split("."):
-        here = here[int(part)] if part.isdigit() else getattr(here, part, None)
-        if here is None:
-            raise StudyError(f"{name} is not a constant of the coder and model that are configured")
-    if isinstance(here, bool) or not isinstance(here, int | float):
-        raise StudyError(f"{name} is no number, so it cannot be fitted")
-    return float(here)
-
-
-def tune(tuning: Tuning, on_evaluation: Callable[[int, float], None]) -> Tuned:
-    """Fit; `on_evaluation` is told the number of evaluations and the smallest error so far, in rad.
-
-    The same tuning gives the same constants: all chance comes from its seed.
-    """
-    names = list(tuning.free)
     config = tuning.config({})
-    start = {name: present(config, name) for name in names}
-    best: dict[str, Any] = {"error": math.inf, "values": start, "count": 0}
-
-    def error_at(shares: Iterable[float]) -> float:
-        values = {
-            name: tuning.free[name].at(min(max(float(share), 0.0), 1.0))
-            for name, share in zip(names, shares, strict=True)
-        }
-        error = train_error(tuning, values)
-        best["count"] += 1
-        if error < best["error"]:
-            best["error"], best["values"] = error, values
-        on_evaluation(best["count"], best["error"])
-        return error
-
-    before = train_error(tuning, start)
-    _search(error_at, [_share(tuning.free[name], start[name]) for name in names], tuning)
-    if before <= best["error"]:
-        best["values"] = start
-    values = best["values"]
-    recorded = config.transmitter.rig == "replay"
-    train_what, test_what = _described(tuning.split, recorded)
+    shared_parts(config)
+    start = {name: present(config, name) for name in tuning.free}
+    before = judge(tuning, start, train=True)
+    if before.lost == before.flights:
+        raise StudyError(
+            f"no flight with the constants as configured has figures, so there is nothing to start "
+            f"from: {before.reason}"
+        )
+    before_test = judge(tuning, start, train=False)
+    trials = _Trials(tuning, on_evaluation, start, before)
+    trials.note(start, before)
+    with suppress(_Spent):
+        _search(trials.error_at, [_share(tuning.free[name], start[name]) for name in start], tuning)
+    after_test = judge(tuning, trials.values, train=False)
+    judged = {
+        "train_before": before,
+        "test_before": before_test,
+        "train_after": trials.best,
+        "test_after": after_test,
+    }
+    train_what, test_what = _described(config, tuning)
     return Tuned(
-        values,
-        before,
-        test_error(tuning, start),
-        train_error(tuning, values),
-        test_error(tuning, values),
-        best["count"],
-        train_what,
-        test_what,
+        values=trials.values,
+        **{name: one.rms_rad for name, one in judged.items()},
+        evaluations=trials.count,
+        penalised=trials.penalised,
+        without_figures={name: one.lost for name, one in judged.items() if one.lost},
+        train_what=train_what,
+        test_what=test_what,
     )
 
 
+class _Spent(Exception):
+    """As many sets of constants were flown as were asked for."""
+
+
+@dataclass(slots=True)
+class _Trials:
+    """What the search has tried, and the best of it."""
+
+    tuning: Tuning
+    on_evaluation: OnEvaluation
+    values: dict[str, float]
+    best: Judged
+    count: int = 0
+    penalised: int = 0
+    names: list[str] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Keep the constants in one order."""
+        self.names = list(self.tuning.free)
+
+    def error_at(self, shares: Iterable[float]) -> float:
+        """Return the error of constants, each given as a share of its range; _Spent at the bound."""
+        if self.count >= self.tuning.evaluations:
+            raise _Spent
+        free = self.tuning.free
+        values = {
+            name: free[name].at(min(max(float(share), 0.0), 1.0))
+            for name, share in zip(self.names, shares, strict=True)
+        }
+        try:
+            judged = judge(self.tuning, values, train=True)
+        except TenbaudError as error:
+            # Some corners of the ranges are no coder at all; how many, the report says.
+            judged = Judged(PENALTY_RAD, 1, 1, str(error))
+        self.note(values, judged)
+        return judged.rms_rad
+
+    def note(self, values: dict[str, float], judged: Judged) -> None:
+        """Count one set of constants, and keep it if it is the best."""
+        self.count += 1
+        self.penalised += judged.lost > 0
+        if judged.rms_rad < self.best.rms_rad:
+            self.best, self.values = judged, values
+        self.on_evaluation(self.count, self.best.rms_rad)
+
+
 def _search(error_at: Callable[[Any], float], start: list[float], tuning: Tuning) -> None:
+    """Search until nothing gets better; `error_at` ends it where enough has been flown."""
     optimize: Any = import_module("scipy.optimize")
     size = len(start)
     if tuning.method == "nelder-mead":
@@ -201,14 +145,13 @@ def _search(error_at: Callable[[Any], float], start: list[float], tuning: Tuning
             error_at, start, method="Nelder-Mead", bounds=[(0.0, 1.0)] * size, options=options
         )
         return
-    rounds = max(1, tuning.evaluations // (POPULATION * size) - 1)
     optimize.differential_evolution(
         error_at,
         [(0.0, 1.0)] * size,
         x0=start,
         rng=np.random.default_rng(tuning.seed),
         popsize=POPULATION,
-        maxiter=rounds,
+        maxiter=tuning.evaluations,
         polish=False,
         tol=0.0,
     )
@@ -225,91 +168,64 @@ def _share(one: Range, value: float) -> float:
     return min(max(share, 0.0), 1.0)
 
 
-def train_error(tuning: Tuning, values: dict[str, float]) -> float:
-    """Return the error on the flights for the fit."""
-    return _error(tuning, values, train=True)
-
-
-def test_error(tuning: Tuning, values: dict[str, float]) -> float:
-    """Return the error on the flights for the judgement."""
-    return _error(tuning, values, train=False)
-
-
-test_error.__test__ = False  # type: ignore[attr-defined]
-
-
-def _error(tuning: Tuning, values: dict[str, float], *, train: bool) -> float:
-    try:
-        config = tuning.config(values)
-        if config.transmitter.rig == "replay":
-            return _recorded_error(config, tuning.split.train_share, train=train)
-    except (Uncommon, TenbaudError):
-        return PENALTY_RAD
-    seeds = tuning.split.train_seeds if train else tuning.split.test_seeds
-    squares = 0.0
-    try:
-        flown = fly_seeds(CompiledPoint(config), seeds)
-    except Uncommon:
-        flown = [None] * len(seeds)
-    for seed, figures in zip(seeds, flown, strict=True):
-        rms = _simulated_rms(config, figures, seed)
-        squares += min(rms * rms, PENALTY_RAD * PENALTY_RAD) if math.isfinite(rms) else PENALTY_RAD**2
-    return math.sqrt(squares / len(seeds))
-
-
-def _simulated_rms(config: FlightConfig, figures: FlightFigures | None, seed: int) -> float:
-    if figures is None:
-        figures = fly_plain(config.model_copy(update={"seed": seed}))
-    return figures.error_live_rms if figures.outcome == "ok" else math.inf
-
-
-def _recorded_error(config: FlightConfig, share: float, *, train: bool) -> float:
-    """Return the rms error over the first part of a recording, or over the rest."""
-    log = recorded_flight(config)
-    border = math.floor(share * len(log))
-    if train:
-        config = config.model_copy(update={"duration_s": border * config.timing.tick_s})
-    point = CompiledPoint(config)
-    _, trace = point.fly(config.seed)
-    numbers = point.numbers
-    first, last = (0, min(border, numbers.ticks)) if train else (border, numbers.ticks)
-    first = max(first, numbers.lead)
-    if last <= first:
-        raise StudyError("the recording is too short for such a split")
-    place = (numbers.counts_per_turn, numbers.sign, numbers.zero_counts)
-    angles = np.array([angle_of(row[0], *place) for row in log.counts[first:last]])
-    return float(np.sqrt(np.mean((angles - trace.live[first:last]) ** 2)))
-
-
-def _described(split: Split, recorded: bool) -> tuple[str, str]:
-    if recorded:
-        percent = 100.0 * split.train_share
-        return f"first {percent:g} % of the recording", f"last {100.0 - percent:g} % of it"
-    return f"seeds {_listed(split.train_seeds)}", f"seeds {_listed(split.test_seeds)}"
+def _described(config: FlightConfig, tuning: Tuning) -> tuple[str, str]:
+    split = tuning.split
+    if config.transmitter.rig != "replay":
+        return f"seeds {_listed(split.train_seeds)}", f"seeds {_listed(split.test_seeds)}"
+    border, last = (tick * config.timing.tick_s for tick in split_ticks(config, split.train_share))
+    return f"0 ... {border:g} s of the recording", f"{border:g} ... {last:g} s of it"
 
 
 def _listed(seeds: tuple[int, ...]) -> str:
     return f"{seeds[0]} ... {seeds[-1]}" if len(seeds) > 1 else str(seeds[0])
 
 
+def report(tuned: Tuned) -> Iterator[str]:
+    """Yield lines with the errors of both parts, and what they leave out."""
+    for what, part in (
+        (f"fit on {tuned.train_what}", "train"),
+        (f"judged on {tuned.test_what}", "test"),
+    ):
+        before, after = (math.degrees(getattr(tuned, f"{part}_{when}")) for when in ("before", "after"))
+        yield f"{what}: rms error {before:.4g} -> {after:.4g} degrees"
+    for name, lost in tuned.without_figures.items():
+        part, when = name.split("_")
+        flights = "flights for the fit" if part == "train" else "flights for the judgement"
+        yield (f"{lost} of the {flights} had no figures {when} and count as {PENALTY_RAD:g} rad each")
+    if tuned.penalised:
+        yield (
+            f"{tuned.penalised} of the {tuned.evaluations} sets of constants tried made no flight, or "
+            f"left some without figures, and were counted with {PENALTY_RAD:g} rad for each"
+        )
+
+
 def preset_text(tuning: Tuning, tuned: Tuned) -> str:
-    """Return a configuration file with the constants found, and how they were found."""
+    """Return a configuration file with the constants found, and how they were found.
+
+    It has what decides how a coder does, and leaves out what it was flown on.
+    """
     import tomli_w
 
     config = tuning.config(tuned.values)
-    base = load_config(tuning.preset, tuning.file, tuning.overrides)
-    after, before = config.model_dump(mode="json"), base.model_dump(mode="json")
+    after = config.model_dump(mode="json", exclude_none=True)
     sections = {name: after[name] for name in ("timing", "channel", "model", "coder")}
-    degrees = [
-        math.degrees(value)
-        for value in (tuned.train_before, tuned.train_after, tuned.test_before, tuned.test_after)
-    ]
+    file = [] if tuning.file is None else [f"--config {tuning.file}"]
+    flown_with = [*file, *_settings(tuning.overrides)]
     lines = [
         f"# Fitted by tenbaud tune: {tuning.method}, {tuned.evaluations} evaluations, "
         f"seed {tuning.seed}.",
-        f"# Fit on {tuned.train_what}: rms error {degrees[0]:.4g} -> {degrees[1]:.4g} degrees.",
-        f"# Judged on {tuned.test_what}: {degrees[2]:.4g} -> {degrees[3]:.4g} degrees.",
+        *(f"# {line}." for line in report(tuned)),
         "# Fitted: " + ", ".join(tuned.values) + ".",
+        f"# Flown with: {', '.join(flown_with) or 'nothing changed'}.",
     ]
-    head = {"preset": config.preset, "description": f"{before['description']}; fitted"}
+    head = {"preset": config.preset, "description": f"{config.description}; fitted".lstrip("; ")}
     return "\n".join(lines) + "\n" + tomli_w.dumps(head | sections)
+
+
+def _settings(values: dict[str, Any], prefix: str = "") -> Iterator[str]:
+    """Yield settings with their dotted names."""
+    for name, value in values.items():
+        if isinstance(value, dict):
+            yield from _settings(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}={value!r}"

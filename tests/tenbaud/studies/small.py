@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from tenbaud.studies.study import Study, StudyFile
+from tenbaud.studies.study import Study
+from tenbaud.studies.study_file import StudyFile
 
 SMALL: dict[str, Any] = {
     "name": "small",

@@ -127,6 +127,7 @@ def test_when_a_recorded_flight_is_compiled_then_no_figure_differs(tmp_path: Pat
         {"link": {"impairments": "raw=0.01"}},
         {"transmitter": {"sabotage": "sample=9,field=range"}},
         {"coder": {"kind": "history"}},
+        {"transmitter": {"plant": {"kind": "outside:Cart"}}},
     ],
     ids=str,
 )

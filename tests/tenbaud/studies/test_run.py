@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from tenbaud.studies.table import Results, read_results
 from tests.rules.sources import TOP
 from tests.tenbaud.studies.small import SMALL, study_of
 
+psutil: Any = import_module("psutil")
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(TOP), "OMP_NUM_THREADS": "1"}
 
 
@@ -138,6 +140,23 @@ def test_when_the_command_is_killed_then_the_same_command_goes_on(
     subprocess.run(command, env=ENVIRONMENT, check=True, capture_output=True, timeout=60)
     assert all(one.stat().st_mtime_ns == written for one, written in kept.items())
     assert read_results(out / "results.parquet").equals(expected)
+
+
+def test_when_the_command_is_killed_then_its_processes_do_not_outlive_it(tmp_path: Path) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(tomli_w.dumps(SMALL | {"seeds": 2000}))
+    command = [sys.executable, "-m", "tenbaud", "sweep", str(path), "--out", str(tmp_path / "out")]
+    first = subprocess.Popen([*command, "--workers", "2"], env=ENVIRONMENT, stderr=subprocess.DEVNULL)
+    try:
+        _until(lambda: len(list((tmp_path / "out" / "chunks").glob("*.parquet"))) >= 2)
+        workers = [
+            one for one in psutil.Process(first.pid).children() if "spawn_main" in str(one.cmdline())
+        ]
+    finally:
+        first.kill()
+        first.wait()
+    assert len(workers) == 2
+    _until(lambda: not any(worker.is_running() for worker in workers), 10.0)
 
 
 def test_when_no_scheduler_answers_then_the_error_says_where(tmp_path: Path) -> None:

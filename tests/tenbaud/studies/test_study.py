@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,8 @@ import pytest
 import tomli_w
 
 from tenbaud.studies.settings import StudyError
-from tenbaud.studies.study import read_study
+from tenbaud.studies.study import Study, read_study
+from tenbaud.studies.study_file import StudyFile
 from tests.rules.sources import TOP
 from tests.tenbaud.studies.small import SMALL, study_of
 
@@ -35,6 +37,27 @@ def test_when_short_names_are_swept_then_the_texts_are_put_together() -> None:
     (config,) = study.configs
     assert config.link.impairments == "loss=0.1,up:flip=0.02,delay=50.000000ms"
     assert config.transmitter.plant.disturbance == "q=0.001"
+
+
+def test_when_words_have_many_symbols_then_the_rate_is_that_of_the_symbols() -> None:
+    changes = {"coder": {"kind": "words", "bits": 4}}
+    study = study_of(set=changes, grid={"rate": [10, 100]}, preset="usual-1000baud")
+    settings = [(one.channel.rate_baud, one.timing.symbol_period_s) for one in study.configs]
+    assert settings == [(10.0, 0.4), (100.0, 0.04)]
+
+
+def test_when_the_configuration_has_texts_then_what_is_swept_is_added(tmp_path: Path) -> None:
+    (tmp_path / "flight.toml").write_text(
+        '[link]\nimpairments = "delay=30ms"\n[transmitter.plant]\ndisturbance = "step=0.5@1"\n'
+    )
+    values = SMALL | {"preset": None, "config": "flight.toml", "set": {}}
+    values["grid"] = {"loss": [0.0, 0.1], "density": [1e-3]}
+    study = Study(StudyFile.model_validate(values), tmp_path)
+    assert [config.link.impairments for config in study.configs] == [
+        "delay=30ms",
+        "delay=30ms,loss=0.1",
+    ]
+    assert {config.transmitter.plant.disturbance for config in study.configs} == {"step=0.5@1,q=0.001"}
 
 
 def test_when_one_entry_of_a_list_is_swept_then_the_others_stay() -> None:
@@ -90,6 +113,35 @@ def test_when_an_example_is_read_then_it_is_a_study(name: str) -> None:
         ({"preset": "tunned-10baud"}, "tuned-10baud"),
         ({"flights": 3}, "unknown; a study has"),
         ({"sample": {"points": 4, "settings": {}}}, "sample.settings is empty"),
+        (
+            {"sample": {"points": 4, "settings": {"coder.decay": {"from": 0, "to": 1, "steps": 3}}}},
+            "steps are of a grid",
+        ),
+        ({"set": {"seed": 4}}, "use seeds"),
+        ({"set": {"transmitter": {"plant": {"mismatch": 0.1}}}}, "leave one of them out"),
+        ({"set": {"channel": {"rate_baud": 10.0}}}, "leave one of them out"),
+        ({"grid": {"duration_s": [1.0]}}, "leave one of them out"),
+        ({"grid": {"density": [1e-3]}}, "has q=2e-3 already"),
+        ({"grid": {"loss": [0.1]}, "set": {"link": {"impairments": "up:loss=0.2"}}}, "up:loss=0.2"),
+        ({"grid": {"rate": [-5]}}, "rate = -5: give the number of symbols per second"),
+        ({"grid": {"rate": [True]}}, "rate = True: give the number of symbols per second"),
+        ({"grid": {"rate": [7]}}, "rate = 7 baud is no flight"),
+        ({"grid": {"delay": [-0.1]}}, "delay = -0.1: give the delay of every message .* in seconds"),
+        ({"grid": {"delay": ["x"]}}, "in seconds"),
+        ({"grid": {"loss": [1.5]}}, "at least 0 and at most 1"),
+        ({"grid": {"loss": [math.nan]}}, "grid.loss: a list of finite numbers"),
+        ({"grid": {"loss": 0.1}}, "grid.loss: a list of finite numbers"),
+        ({"grid": {"loss": {"from": 0.1}}}, "grid.loss.to: Field required"),
+        ({"grid": {"coder": ["zoom"]}}, "no setting 'coder'"),
+        (
+            {"grid": {"transmitter.plant.disturbance": ["q=-1"]}, "set": {}},
+            "disturbance = 'q=-1' is no",
+        ),
+        ({"grid": {"transmitter.rig": ["hil"]}}, "moves in real time"),
+        ({"grid": {"transmitter.rig": ["replay"]}}, "names no recording"),
+        ({"grid": {"receiver.reference.kind": ["csv"]}}, "names no file"),
+        ({"grid": {"receiver.controller": ["nowhere:Law"]}}, "no module nowhere"),
+        ({"grid": {"duration_s": [1e7]}, "set": {}}, "ticks"),
         (
             {"sample": {"points": 4, "settings": {"mismatch": {"from": 0.0, "to": 0.2}}}},
             "on the grid and sampled",

@@ -12,12 +12,22 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
+from channel.errors import TenbaudError
+from tenbaud.build_rig import nominal_plant
 from tenbaud.cli.app import app
 from tenbaud.config.load import load_config
+from tenbaud.studies.constants import free_ranges
+from tenbaud.studies.flights import CompiledPoint
+from tenbaud.studies.judging import PENALTY_RAD, Split, Tuning, judge, split_ticks
+from tenbaud.studies.plain import fly_plain
 from tenbaud.studies.settings import StudyError
-from tenbaud.studies.study import Range
-from tenbaud.studies.tuning import Split, Tuning, free_ranges, test_error, train_error, tune
+from tenbaud.studies.study_file import Range
+from tenbaud.studies.tuning import preset_text, tune
 
+REPLAY: dict[str, Any] = {
+    "transmitter": {"rig": "replay"},
+    "receiver": {"controller": "recorded"},
+}
 SPLIT = Split((1, 2), (3, 4, 5), 0.5)
 OVERRIDES = {"duration_s": 20.0, "transmitter": {"plant": {"mismatch": 0.1, "disturbance": "q=2e-3"}}}
 
@@ -45,10 +55,12 @@ def test_when_constants_are_fitted_then_both_errors_are_those_of_the_flights(met
     counts: list[int] = []
     tuned = tune(tuning, lambda count, error: counts.append(count))
     assert tuned.train_after < 0.8 * tuned.train_before
-    assert tuned.train_after == train_error(tuning, tuned.values)
-    assert tuned.test_after == test_error(tuning, tuned.values)
+    assert tuned.train_after == judge(tuning, tuned.values, train=True).rms_rad
+    assert tuned.test_after == judge(tuning, tuned.values, train=False).rms_rad
     assert tuned.test_after != tuned.train_after
-    assert counts == list(range(1, tuned.evaluations + 1))
+    assert counts == list(range(1, 61))
+    assert tuned.evaluations == 60
+    assert tuned.without_figures == {}
     assert tuned == tune(tuning, lambda count, error: None)
 
 
@@ -74,7 +86,87 @@ def test_when_a_constant_does_not_exist_then_the_nearest_is_named() -> None:
         free_ranges(load_config("usual-1000baud"), {}, model=False)
 
 
-def test_when_a_recording_is_split_then_fit_and_judgement_see_different_halves(tmp_path: Path) -> None:
+@pytest.mark.parametrize("method", ["differential-evolution", "nelder-mead"])
+@pytest.mark.parametrize("evaluations", [1, 2, 7, 33, 40])
+def test_when_evaluations_are_bounded_then_no_more_are_flown(method: Any, evaluations: int) -> None:
+    counts: list[int] = []
+    tuning = usual(method=method, evaluations=evaluations, split=Split((1,), (2,), 0.5))
+    tuned = tune(tuning, lambda count, error: counts.append(count))
+    assert tuned.evaluations == len(counts) == evaluations
+
+
+@pytest.mark.parametrize(
+    ("preset", "overrides", "text"),
+    [
+        ("no-such-preset", {}, "there is no preset"),
+        ("paper-10baud", {"transmitter": {"plant": {"disturbance": "q=-1"}}}, "disturbance"),
+        ("paper-10baud", {"channel": {"rate_baud": 3.0}}, "symbol_period_s"),
+        ("paper-10baud", {"transmitter": {"rig": "quarc"}}, "real time"),
+        ("paper-10baud", {"coder": {"gains": [4000.0, 9e7]}}, "nothing to start from: "),
+        ("uiuc-10baud", REPLAY | {"flight_log": {"file": "missing.csv"}}, "missing.csv"),
+        ("uiuc-history-10baud", REPLAY | {"flight_log": {"file": "missing.csv"}}, "missing.csv"),
+    ],
+    ids=str,
+)
+def test_when_the_start_cannot_be_flown_then_the_error_says_why(
+    preset: str, overrides: dict[str, Any], text: str
+) -> None:
+    free = {"coder.minimum_range_rad": Range.model_validate({"from": 0.01, "to": 0.1})}
+    told: list[int] = []
+    with pytest.raises(TenbaudError, match=text):
+        tune(
+            tuning_of(free, preset=preset, overrides=overrides),
+            lambda count, error: told.append(count),
+        )
+    assert not told
+
+
+def test_when_part_of_a_range_is_no_coder_then_it_is_penalised_and_counted() -> None:
+    free = {"coder.decay": Range.model_validate({"from": 0.5, "to": 1.5})}
+    tuned = tune(tuning_of(free, evaluations=20), lambda count, error: None)
+    assert 3 < tuned.penalised < 17
+    assert tuned.values["coder.decay"] <= 1.0
+    assert tuned.train_after < 0.1 < PENALTY_RAD
+    assert f"{tuned.penalised} of the 20 sets of constants" in preset_text(tuning_of(free), tuned)
+
+
+def test_when_the_model_is_fitted_then_the_simulated_plant_stays() -> None:
+    tuning = usual()
+    before = tuning.config({})
+    after = tuning.config({"model.stiffness_per_s2": 0.9, "model.motor_lag_s": 0.2})
+    assert after.model.model_dump()["stiffness_per_s2"] == 0.9
+    assert nominal_plant(after) == nominal_plant(before)
+    assert CompiledPoint(after).constants[2] == CompiledPoint(before).constants[2]
+    assert CompiledPoint(after).constants[0] != CompiledPoint(before).constants[0]
+    plain = fly_plain(after.model_copy(update={"seed": 1}))
+    assert plain._replace(engine="") == CompiledPoint(after).fly(1)[0]._replace(engine="")
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("transmitter.plant.mismatch", "no constant of coder or model"),
+        ("rate", "no constant of coder or model"),
+        ("coder.window_signs", "whole number"),
+        ("coder.correction", "no number"),
+        ("coder.gains.2", "not a constant"),
+        ("coder.weights.0", "not a constant"),
+    ],
+)
+def test_when_something_else_is_to_be_fitted_then_it_is_refused(name: str, text: str) -> None:
+    one = Range.model_validate({"from": 0.1, "to": 1.0})
+    with pytest.raises(StudyError, match=text):
+        free_ranges(load_config("paper-10baud"), {name: one}, model=False)
+
+
+def test_when_a_usual_constant_is_zero_then_it_stays_zero() -> None:
+    config = load_config("paper-10baud", None, {"model": {"motor_lag_s": 0.0}})
+    assert "model.motor_lag_s" not in free_ranges(config, {}, model=True)
+
+
+@pytest.fixture(name="log")
+def log_of(tmp_path: Path) -> Path:
+    """A recording of 20 s whose second half moves ten times as far as its first."""
     log = tmp_path / "flight.csv"
     chance = random.Random(5)
     with log.open("w", newline="") as file:
@@ -83,6 +175,73 @@ def test_when_a_recording_is_split_then_fit_and_judgement_see_different_halves(t
         for step in range(1000):
             wild = 500.0 if step >= 500 else 50.0
             writer.writerow((step, round(wild * math.sin(0.02 * step) + chance.gauss(0, 2)), 0.0, 0.0))
+    return log
+
+
+def replayed(log: Path, **changes: Any) -> dict[str, Any]:
+    return REPLAY | {"flight_log": {"file": str(log)}} | changes
+
+
+@pytest.mark.parametrize("train", [True, False])
+@pytest.mark.parametrize("duration_s", [8.0, 120.0])
+def test_when_a_recording_is_judged_then_it_is_as_the_nodes_fly_it(
+    log: Path, train: bool, duration_s: float
+) -> None:
+    tuning = tuning_of({}, preset="uiuc-10baud", overrides=replayed(log, duration_s=duration_s))
+    config = tuning.config({})
+    border, ticks = split_ticks(config, 0.5)
+    assert (border, ticks) == ((200, 400) if duration_s == 8.0 else (500, 1000))
+    until = border if train else ticks
+    plain = fly_plain(config.model_copy(update={"duration_s": until * 0.02}), 0 if train else border)
+    assert judge(tuning, {}, train=train).rms_rad == plain.error_live_rms
+
+
+def test_when_only_the_nodes_can_fly_a_coder_then_a_recording_is_judged_too(log: Path) -> None:
+    tuning = tuning_of({}, preset="uiuc-history-10baud", overrides=replayed(log, duration_s=6.0))
+    first, second = judge(tuning, {}, train=True), judge(tuning, {}, train=False)
+    assert 0.0 < first.rms_rad < 0.2
+    assert first.lost == second.lost == 0
+    assert first.rms_rad != second.rms_rad
+
+
+def test_when_a_recording_is_too_short_to_split_then_it_is_refused(log: Path) -> None:
+    tuning = tuning_of({}, preset="uiuc-10baud", overrides=replayed(log, duration_s=0.02))
+    with pytest.raises(StudyError, match="too few to be split"):
+        judge(tuning, {}, train=True)
+
+
+def test_when_the_preset_cannot_be_written_then_nothing_is_flown(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    result = CliRunner().invoke(app, ["tune", "--out", str(tmp_path / "file" / "found.toml")])
+    assert result.exit_code != 0
+    assert "cannot write" in str(result.exception)
+
+
+@pytest.mark.parametrize(
+    ("free", "text"),
+    [
+        (["coder.decay"], "write NAME=FROM..TO"),
+        (["coder.decay=nan..1"], "finite"),
+        (["coder.decay=a..1"], "both ends are numbers"),
+        (["coder.decay=0..1:log"], "above 0"),
+        (["coder.decay=0.1..0.5", "coder.decay=0.1..0.9"], "named twice"),
+    ],
+    ids=str,
+)
+def test_when_a_range_is_written_wrongly_then_it_says_how(
+    tmp_path: Path, free: list[str], text: str
+) -> None:
+    command = ["tune", "--out", str(tmp_path / "found.toml")]
+    for one in free:
+        command += ["--free", one]
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 2
+    assert text in " ".join(result.output.replace("│", " ").split())
+
+
+def test_when_a_recording_is_split_then_fit_and_judgement_see_different_halves(
+    tmp_path: Path, log: Path
+) -> None:
     found = tmp_path / "found.toml"
     command = [
         "tune",
@@ -98,14 +257,15 @@ def test_when_a_recording_is_split_then_fit_and_judgement_see_different_halves(t
     result = CliRunner().invoke(app, command)
     assert result.exit_code == 0, result.output
     summary = json.loads(result.stdout)
-    assert summary["train_what"] == "first 50 % of the recording"
+    assert summary["train_what"] == "0 ... 10 s of the recording"
     assert summary["train_after"] <= summary["train_before"]
     assert summary["test_after"] > 2.0 * summary["train_after"], (
         "the second half moves ten times as far"
     )
     config = load_config(None, found)
     assert config.coder.model_dump()["gains"][1] == pytest.approx(summary["values"]["coder.gains.1"])
-    assert "Judged on last 50 % of it" in found.read_text()
+    assert "judged on 10 ... 20 s of it" in found.read_text()
+    assert f"flight_log.file='{log}'" in found.read_text()
     again = CliRunner().invoke(app, command)
     assert again.exit_code != 0
     assert "exists already" in str(again.exception)

@@ -1,0 +1,106 @@
+"""Which constants of a coder and a model are fitted, and between which ends."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tenbaud.config.schema import FlightConfig
+from tenbaud.studies.settings import StudyError, check_name
+from tenbaud.studies.study_file import Range
+
+CODER_RANGES = {
+    "zoom": {
+        "coder.minimum_range_rad": (0.1, 10.0, "log"),
+        "coder.decay": (0.6, 0.99, "linear"),
+        "coder.gains.0": (0.2, 3.0, "log"),
+        "coder.gains.1": (0.2, 3.0, "log"),
+    },
+    "fixed": {
+        "coder.range_rad": (0.1, 10.0, "log"),
+        "coder.gains.0": (0.2, 3.0, "log"),
+        "coder.gains.1": (0.2, 3.0, "log"),
+    },
+    "timed": {
+        "coder.minimum_range_rad": (0.1, 10.0, "log"),
+        "coder.gains.0": (0.2, 3.0, "log"),
+        "coder.gains.1": (0.2, 3.0, "log"),
+    },
+    "history": {
+        "coder.minimum_range_rad": (0.2, 5.0, "log"),
+        "coder.weights.0": (0.5, 2.0, "log"),
+        "coder.weights.2": (0.5, 2.0, "log"),
+    },
+    "static": {"coder.gains.0": (0.1, 5.0, "log"), "coder.gains.1": (0.1, 5.0, "log")},
+}
+"""Constants that are fitted unless others are named; log: the ends are multiples of what is set."""
+
+MODEL_FACTORS = (
+    "model.rate_damping_per_s",
+    "model.stiffness_per_s2",
+    "model.torque_gain_rad_per_v_s2",
+    "model.motor_lag_s",
+)
+
+EQUILIBRIUM_RAD = Range.model_validate({"from": -0.4, "to": 0.4})
+
+
+def free_ranges(config: FlightConfig, names: dict[str, Range], *, model: bool) -> dict[str, Range]:
+    """Return the constants to fit: those named, or the usual ones of the coder; and of the model.
+
+    A usual constant that is not above 0 stays as it is: the ends are multiples of it. StudyError for
+    names that are no constants of coder or model, and for a coder or model without usual ones.
+    """
+    for name in names:
+        _check_constant(config, name)
+    free = dict(names)
+    if not free:
+        usual = CODER_RANGES.get(config.coder.kind)
+        if usual is None:
+            raise StudyError(
+                f"the coder {config.coder.kind!r} has no usual constants: name some with --free"
+            )
+        free = _usual(config, usual)
+    if model:
+        if config.model.kind != "pitch":
+            raise StudyError(f"the model {config.model.kind!r} has no constants to fit")
+        factors = dict.fromkeys(MODEL_FACTORS, (0.5, 2.0, "log"))
+        free = _usual(config, factors) | {"model.equilibrium_rad": EQUILIBRIUM_RAD} | free
+    if not free:
+        raise StudyError("no usual constant is above 0 here: name some with --free")
+    return free
+
+
+def _usual(config: FlightConfig, spreads: dict[str, tuple[float, float, str]]) -> dict[str, Range]:
+    ranges = {}
+    for name, (low, high, scale) in spreads.items():
+        factor = present(config, name) if scale == "log" else 1.0
+        if factor > 0.0:
+            ends = {"from": low * factor, "to": high * factor, "scale": scale}
+            ranges[name] = Range.model_validate(ends)
+    return ranges
+
+
+def _check_constant(config: FlightConfig, name: str) -> None:
+    check_name(name)
+    if name.partition(".")[0] not in ("coder", "model"):
+        raise StudyError(
+            f"{name} is no constant of coder or model, so it is not fitted; set it, or sweep it"
+        )
+    present(config, name)
+
+
+def present(config: FlightConfig, name: str) -> float:
+    """Return what a constant is now; StudyError where there is none that can be fitted."""
+    here: Any = config
+    for part in name.split("."):
+        try:
+            here = here[int(part)] if part.isdigit() else getattr(here, part, None)
+        except (IndexError, TypeError):
+            here = None
+        if here is None:
+            raise StudyError(f"{name} is not a constant of the coder and model that are configured")
+    if isinstance(here, bool) or not isinstance(here, int | float):
+        raise StudyError(f"{name} is no number, so it cannot be fitted")
+    if isinstance(here, int):
+        raise StudyError(f"{name} is a whole number, which a fit cannot move; sweep it")
+    return here

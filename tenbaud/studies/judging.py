@@ -1,0 +1,149 @@
+"""Flights on which constants are fitted, and others on which they are judged.
+
+On simulated flights, one set of seeds is for the fit and another for the judgement. On a recorded
+flight, the first part is for the fit and the rest for the judgement; there the codec flies through the
+whole recording and only the rest counts. The measure is the rms error of what the receiver believed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+from tenbaud.build import ticks_of
+from tenbaud.config.schema import FlightConfig
+from tenbaud.studies.figures import FlightFigures
+from tenbaud.studies.flights import CompiledPoint, recorded_flight
+from tenbaud.studies.plain import fly_plain
+from tenbaud.studies.schedule import Uncommon
+from tenbaud.studies.settings import StudyError, configured
+from tenbaud.studies.side_by_side import fly_seeds
+from tenbaud.studies.study_file import Range
+
+Method = Literal["differential-evolution", "nelder-mead"]
+
+PENALTY_RAD = 100.0
+"""What a flight without figures counts as: worse than any error that an angle can have."""
+
+
+class Split(NamedTuple):
+    """Which flights are for the fit, and which for the judgement."""
+
+    train_seeds: tuple[int, ...]
+    test_seeds: tuple[int, ...]
+    train_share: float
+    """of a recorded flight"""
+
+
+@dataclass(frozen=True, slots=True)
+class Tuning:
+    """A fit: of which constants, on which flights, how."""
+
+    preset: str | None
+    file: Path | None
+    overrides: dict[str, Any]
+    free: dict[str, Range]
+    split: Split
+    method: Method = "differential-evolution"
+    evaluations: int = 600
+    """sets of constants to fly at most, those that are configured included"""
+    seed: int = 1
+
+    def config(self, values: dict[str, float]) -> FlightConfig:
+        """Return the configuration with these constants; ConfigError where there is none.
+
+        A simulated plant stays what it is when the model is moved.
+        """
+        fitted = any(name.startswith("model.") for name in values)
+        plant = self._plant() if fitted else {}
+        return configured(self.preset, self.file, self.overrides, {**plant, **values})
+
+    def _plant(self) -> dict[str, Any]:
+        config = self.config({})
+        if config.model.kind != "pitch" or config.transmitter.plant.relative_to == "pitch":
+            return {}
+        where = "transmitter.plant"
+        return {
+            f"{where}.relative_to": "pitch",
+            **{f"{where}.pitch.{name}": value for name, value in config.model.model_dump().items()},
+        }
+
+
+class Judged(NamedTuple):
+    """What came of the flights of one part of a split."""
+
+    rms_rad: float
+    """over all of them; one without figures counts as `PENALTY_RAD`"""
+    lost: int
+    """flights without figures"""
+    flights: int
+    reason: str
+    """why the first of those has none"""
+
+
+def judge(tuning: Tuning, values: dict[str, float], *, train: bool) -> Judged:
+    """Fly constants on the flights for the fit, or on those for the judgement.
+
+    ConfigError, StudyError and the like where these constants make no flight at all.
+    """
+    config = tuning.config(values)
+    if config.transmitter.rig == "replay":
+        figures = [_fly_part(config, tuning.split.train_share, train=train)]
+    else:
+        seeds = tuning.split.train_seeds if train else tuning.split.test_seeds
+        figures = _fly_all(config, seeds)
+    squares, lost, reason = 0.0, 0, ""
+    for one in figures:
+        rms = one.error_live_rms
+        if one.outcome == "ok" and math.isfinite(rms):
+            squares += min(rms, PENALTY_RAD) ** 2
+        else:
+            squares += PENALTY_RAD**2
+            why = "nothing of it was scored" if one.outcome == "ok" else one.outcome
+            reason = reason or why
+            lost += 1
+    return Judged(math.sqrt(squares / len(figures)), lost, len(figures), reason)
+
+
+def _fly_all(config: FlightConfig, seeds: Sequence[int]) -> list[FlightFigures]:
+    try:
+        flown = fly_seeds(CompiledPoint(config), seeds)
+    except Uncommon:
+        flown = [None] * len(seeds)
+    return [
+        figures or fly_plain(config.model_copy(update={"seed": seed}))
+        for seed, figures in zip(seeds, flown, strict=True)
+    ]
+
+
+def _fly_part(config: FlightConfig, share: float, *, train: bool) -> FlightFigures:
+    """Fly a recording's first part; or fly through all of it and score the rest."""
+    border, ticks = split_ticks(config, share)
+    until = border if train else ticks
+    config = config.model_copy(update={"duration_s": until * config.timing.tick_s})
+    start = 0 if train else border
+    try:
+        point = CompiledPoint(config)
+        point.numbers = point.numbers._replace(window_start=start)
+        return point.fly(config.seed)[0]
+    except Uncommon:
+        return fly_plain(config, start)
+
+
+def split_ticks(config: FlightConfig, share: float) -> tuple[int, int]:
+    """Return (ticks for the fit, ticks in all) of a recorded flight, as far as it is to be flown.
+
+    StudyError when a part of it has nothing to score.
+    """
+    ticks = min(len(recorded_flight(config)), ticks_of(config.duration_s, config))
+    border = math.floor(share * ticks)
+    lead = config.timing.lead_ticks
+    if min(border, ticks - border) <= (0 if lead == "auto" else lead):
+        raise StudyError(
+            f"{ticks} ticks of the recording are too few to be split at {100.0 * share:g} %: fly more "
+            "of it (duration_s), or change --train-share"
+        )
+    return border, ticks

@@ -22,7 +22,7 @@ def transmit(
     addresses: options.Addresses,
     duration: options.Duration = None,
     seed: options.Seed = None,
-    rig: Annotated[str | None, typer.Option(help=options.RIG_HELP)] = None,
+    rig: options.Rig = None,
     dry_run: options.DryRun = False,
     mismatch: Annotated[
         float | None, typer.Option(help="Simulated plant off the codec's model, 0.1 for 10 %.")

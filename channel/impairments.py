@@ -17,6 +17,7 @@ Items are separated by commas. `up:` or `down:` before an item keeps it to one d
 
 from __future__ import annotations
 
+import math
 import random
 import re
 from collections import Counter
@@ -34,7 +35,7 @@ FOR_EVER_NS = 2**62
 REORDER_NS = 150_000_000
 
 _UNITS_NS = {"s": 1e9, "ms": 1e6, "us": 1e3}
-_TIME = re.compile(r"(-?\d+(?:\.\d*)?)(us|ms|s)")
+_TIME = re.compile(r"(\d+(?:\.\d*)?)(us|ms|s)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,11 +105,13 @@ def _with_item(faults: LineFaults, item: str) -> LineFaults:
     if not equals:
         raise ValueError("write NAME=VALUE")
     if name == "skew":
-        number = value.removesuffix("ppm")
-        return replace(faults, skew_ppm=float(number))
+        skew_ppm = _number(value.removesuffix("ppm"))
+        if skew_ppm <= -1e6:
+            raise ValueError("such a clock would stand still or run backwards")
+        return replace(faults, skew_ppm=skew_ppm)
     if name == "step":
         jump, _, start = value.partition("@")
-        step = (_time_ns(start), _time_ns(jump))
+        step = (_time_ns(start), _time_ns(jump.removeprefix("-")) * (-1 if jump[:1] == "-" else 1))
         return replace(faults, clock_steps=tuple(sorted((*faults.clock_steps, step))))
     changed = faults
     if prefix != "down" or not colon:
@@ -159,16 +162,26 @@ def _with_value(one: Impairments, name: str, value: str) -> Impairments:
 
 def _probability(text: str) -> float:
     percent = text.endswith("%")
-    value = float(text.removesuffix("%")) / (100.0 if percent else 1.0)
+    value = _number(text.removesuffix("%")) / (100.0 if percent else 1.0)
     if not 0.0 <= value <= 1.0:
         raise ValueError(f"{text} is not between 0 and 1")
+    return value
+
+
+def _number(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ValueError(f"{text!r} is no number")
     return value
 
 
 def _time_ns(text: str) -> int:
     match = _TIME.fullmatch(text)
     if match is None:
-        raise ValueError(f"{text!r} is no time; write 30ms, 1.5s or 200us")
+        raise ValueError(f"{text!r} is no time from 0 on; write 30ms, 1.5s or 200us")
     return round(float(match[1]) * _UNITS_NS[match[2]])
 
 

@@ -36,7 +36,7 @@ def fly(
     """
     from tenbaud.build import agree
     from tenbaud.build_ends import check_parts
-    from tenbaud.config.load import load_config
+    from tenbaud.config.load import load_config, nested
     from tenbaud.flight.demo import fly_demo
     from tenbaud.recording.folder import RunFolder, create_run_folder
     from tenbaud.recording.run import Run
@@ -51,15 +51,3 @@ def fly(
         said = "\n  ".join([str(result.summary["outcome"]), *result.messages])
         raise FlightFailed(f"{said}\n  the recordings are in {folder.path}")
     return Run(folder.path)
-
-
-def nested(settings: dict[str, Any]) -> dict[str, Any]:
-    """Return settings by full name as the sections that a configuration has."""
-    sections: dict[str, Any] = {}
-    for name, value in settings.items():
-        *path, field = name.split(".")
-        place = sections
-        for part in path:
-            place = place.setdefault(part, {})
-        place[field] = value
-    return sections

@@ -86,13 +86,18 @@ def demo(
         for off in flights
     ]
     agreements = _agree_all(preset, config, changes, clock)
-    wish = _view_wish(agreements, view_port, pace, open_browser) if view else None
-    raise typer.Exit(_fly_all(agreements, out, json, wish))
+    if open_browser and not view:
+        raise typer.BadParameter("--open opens the live page; it goes with --view")
+    wish = _view_wish(agreements, view_port, open_browser) if view else None
+    in_memory = agreements[0].config.link.kind == "memory"
+    if pace is not None and (clock is not options.ClockOption.VIRTUAL or in_memory):
+        raise typer.BadParameter("--pace slows the virtual clock of two processes down, and no other")
+    if wish is not None and clock is options.ClockOption.VIRTUAL:
+        pace = pace or 1.0
+    raise typer.Exit(_fly_all(agreements, out, json, wish, pace))
 
 
-def _view_wish(
-    agreements: list[Agreement], port: int, pace: float | None, open_browser: bool
-) -> ViewWish:
+def _view_wish(agreements: list[Agreement], port: int, open_browser: bool) -> ViewWish:
     """Return how the flight is to be looked at, checked before anything starts."""
     from tenbaud.flight.viewing import ViewWish
     from tenbaud.view.server import Address, free_port, require_nicegui
@@ -102,8 +107,7 @@ def _view_wish(
     require_nicegui()
     address = Address(port=port or free_port("127.0.0.1"))
     address.check()
-    virtual = agreements[0].clock == "virtual"
-    return ViewWish(address.port, (pace or 1.0) if virtual else None, open_browser)
+    return ViewWish(address.port, open_browser)
 
 
 def _agree_all(
@@ -124,7 +128,11 @@ def _agree_all(
 
 
 def _fly_all(
-    agreements: list[Agreement], out: options.Out, as_json: bool, wish: ViewWish | None
+    agreements: list[Agreement],
+    out: options.Out,
+    as_json: bool,
+    wish: ViewWish | None,
+    pace: float | None,
 ) -> int:
     from tenbaud.flight.ends import write_json
     from tenbaud.flight.report import show_summaries
@@ -137,7 +145,7 @@ def _fly_all(
         if out is not None and index:
             explicit = out.with_name(f"{out.name}-{index + 1}")
         folder = RunFolder(create_run_folder(None, agreement.config.preset, explicit))
-        result = _fly_shown(agreement, folder, wish)
+        result = _fly_shown(agreement, folder, wish, pace)
         results.append(result)
         folders.append(folder)
         if as_json:
@@ -151,10 +159,12 @@ def _fly_all(
     return int(results[-1].code)
 
 
-def _fly_shown(agreement: Agreement, folder: RunFolder, wish: ViewWish | None) -> DemoResult:
+def _fly_shown(
+    agreement: Agreement, folder: RunFolder, wish: ViewWish | None, pace: float | None
+) -> DemoResult:
     """Fly once, and show how it goes."""
     from tenbaud.flight.demo import fly_demo
     from tenbaud.flight.status import StatusDisplay
 
     with StatusDisplay() as display:
-        return fly_demo(agreement, folder, display.show, view=wish)
+        return fly_demo(agreement, folder, display.show, view=wish, pace=pace)

@@ -22,7 +22,7 @@ def transmit(
     addresses: options.Addresses,
     duration: options.Duration = None,
     seed: options.Seed = None,
-    rig: Annotated[str | None, typer.Option(help=options.RIG_HELP)] = None,
+    rig: options.Rig = None,
     dry_run: options.DryRun = False,
     mismatch: Annotated[
         float | None, typer.Option(help="Simulated plant off the codec's model, 0.1 for 10 %.")
@@ -50,6 +50,8 @@ def transmit(
         disturbance=disturbance,
         on_desync=on_desync,
     )
+    if pace is not None and node.clock is not options.ClockOption.VIRTUAL:
+        raise typer.BadParameter("--pace slows the virtual clock down; the real one cannot be paced")
     _run("transmitter", node, addresses, changed, pace=pace)
 
 
@@ -120,6 +122,7 @@ def _run(
     from tenbaud.telemetry.station import Wish
 
     config = load_config(node.preset, node.config, changed)
+    _check_link(config, addresses.insecure)
     wish = Wish(node.telemetry, node.allow_control, pace)
     agreement = replace(agree(config, node.clock.value), live=wish.control)
     endpoints = replace(endpoints_of(role, addresses, config, take_over), telemetry=wish)
@@ -144,6 +147,18 @@ def _run(
     if outcome.code is not ExitCode.OK:
         typer.echo(f"tenbaud {role}: {outcome.text}", err=True)
         raise typer.Exit(int(outcome.code))
+
+
+def _check_link(config: FlightConfig, insecure: bool) -> None:
+    """Refuse, before there is a run folder, a link that one end by itself cannot open."""
+    if config.link.kind == "memory":
+        raise typer.BadParameter(
+            "link.kind = memory joins two ends in one process: `tenbaud demo --link memory`"
+        )
+    if config.link.kind == "serial":
+        from channel.links.serial_port import check_port
+
+        check_port(config.link.port, insecure)
 
 
 def _write_up(role: Role, config: FlightConfig, folder: RunFolder, summary: dict[str, Any]) -> None:

@@ -107,18 +107,14 @@ Downlink = Annotated[
         show_default=False,
     ),
 ]
-RIG_HELP = (
-    "simulated, replay:FILE for a recorded flight, or a real rig: cobs:PORT, ascii:PORT, qsb:PORT, "
-    "quarc:HOST:PORT, quarc-server:PORT, hil[:CARD]."
-)
-Rig = Annotated[str | None, typer.Option(help=RIG_HELP)]
+Rig = Annotated[str | None, typer.Option(help=rigs.FORMS)]
 Disturbance = Annotated[
     str | None, typer.Option(help='Torque on the plant, such as "q=2e-3,step=0.5@30".')
 ]
 Impair = Annotated[
     str | None,
     typer.Option(
-        help='What goes wrong on the line, such as "loss=0.2,up:flip=0.01,delay=30ms±10ms". On a real '
+        help='What goes wrong on the line, such as "up:loss=0.3,delay=30ms". On a real '
         "clock each end spoils what it sends: give both the same text.",
         show_default=False,
     ),
@@ -292,47 +288,29 @@ def overrides(
     settings: list[str] | None = None,
 ) -> dict[str, Any]:
     """Return the configuration that these options set, as nested sections."""
-    values: dict[str, Any] = {}
-    for name, value in (
-        ("duration_s", duration),
-        ("seed", seed),
-        ("timing.lead_ticks", lead),
-        ("channel.delivery", delivery),
-        ("link.session", session),
-        ("link.kind", link),
-        ("link.port", port),
-        ("link.line_rate_baud", line_rate),
-        ("link.downlink", downlink),
-        ("transmitter.plant.mismatch", mismatch),
-        ("transmitter.plant.disturbance", disturbance),
-        ("link.impairments", impair),
-        ("transmitter.on_desync", on_desync),
-        (f"{sabotaged_end}.sabotage", sabotage),
-    ):
-        if value is not None:
-            _put(values, name, value)
+    from tenbaud.config.load import nested
+
+    named = {
+        "duration_s": duration,
+        "seed": seed,
+        "timing.lead_ticks": lead,
+        "channel.delivery": delivery,
+        "link.session": session,
+        "link.kind": link,
+        "link.port": port,
+        "link.line_rate_baud": line_rate,
+        "link.downlink": downlink,
+        "transmitter.plant.mismatch": mismatch,
+        "transmitter.plant.disturbance": disturbance,
+        "link.impairments": impair,
+        "transmitter.on_desync": on_desync,
+        f"{sabotaged_end}.sabotage": sabotage,
+        "transmitter.dry_run": dry_run or None,
+    }
+    values: dict[str, Any] = {name: value for name, value in named.items() if value is not None}
     if rig is not None:
-        _put_rig(values, rig)
-    if dry_run:
-        _put(values, "transmitter.dry_run", True)
-    for setting in settings or []:
-        name, value = _parse_setting(setting)
-        _put(values, name, value)
-    return values
-
-
-def _put_rig(values: dict[str, Any], rig: str) -> None:
-    kind, colon, file = rig.partition(":")
-    if kind in rigs.KINDS:
-        for name, value in rigs.settings_of(kind, file).items():
-            _put(values, name, value)
-        return
-    _put(values, "transmitter.rig", kind)
-    if kind == "replay":
-        if not colon or not file:
-            raise typer.BadParameter("write --rig replay:FILE, with the recorded flight's file")
-        _put(values, "receiver.controller", "recorded")
-        _put(values, "flight_log.file", str(Path(file).resolve()))
+        values |= rigs.settings_of(rig)
+    return nested(values | dict(_parse_setting(setting) for setting in settings or []))
 
 
 def _parse_setting(setting: str) -> tuple[str, Any]:
@@ -345,10 +323,3 @@ def _parse_setting(setting: str) -> tuple[str, Any]:
         return name.strip(), tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         return name.strip(), text
-
-
-def _put(values: dict[str, Any], name: str, value: object) -> None:
-    *sections, field = name.split(".")
-    for section in sections:
-        values = values.setdefault(section, {})
-    values[field] = value

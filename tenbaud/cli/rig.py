@@ -126,7 +126,7 @@ def _hint(form: str, address: str) -> str:
 
 
 def rig_check(
-    rig: Annotated[str, typer.Option(help=options.RIG_HELP)] = "",
+    rig: options.Rig = None,
     preset: options.Preset = None,
     config: options.ConfigFile = None,
     seconds: Annotated[float, typer.Option(help="How long to look.")] = 10.0,
@@ -142,7 +142,7 @@ def rig_check(
     from tenbaud.config.load import load_config
     from tenbaud.rigcheck import check_rig, show_check
 
-    changed = options.overrides(rig=rig or None, settings=settings)
+    changed = options.overrides(rig=rig, settings=settings)
     result = check_rig(load_config(preset, config, changed), seconds, live=not json)
     if json:
         sys.stdout.write(json_module.dumps(result.as_dict(), indent=2) + "\n")

@@ -1,14 +1,15 @@
-"""How `--rig` names a real rig."""
+"""How `--rig` names a rig."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import typer
 
-KINDS = ("cobs", "ascii", "qsb", "quarc", "quarc-server", "hil")
 
-
-def settings_of(kind: str, where: str) -> dict[str, object]:
-    """Return the fields that `--rig KIND:WHERE` sets."""
+def settings_of(rig: str) -> dict[str, object]:
+    """Return the fields that `--rig KIND` or `--rig KIND:WHERE` sets."""
+    kind, _, where = rig.partition(":")
     match kind:
         case "hil":
             settings: dict[str, object] = {"transmitter.rig": "hil"}
@@ -24,7 +25,7 @@ def settings_of(kind: str, where: str) -> dict[str, object]:
                 "transmitter.quarc.host": host or "127.0.0.1",
                 "transmitter.quarc.port": int(port),
             }
-        case _:
+        case "cobs" | "ascii" | "qsb":
             if not where:
                 raise typer.BadParameter(f"write --rig {kind}:PORT, such as {kind}:/dev/ttyACM0")
             return {
@@ -32,3 +33,22 @@ def settings_of(kind: str, where: str) -> dict[str, object]:
                 "transmitter.serial.format": kind,
                 "transmitter.serial.port": where,
             }
+        case "replay":
+            if not where:
+                raise typer.BadParameter("write --rig replay:FILE, with the recorded flight's file")
+            return {
+                "transmitter.rig": "replay",
+                "receiver.controller": "recorded",
+                "flight_log.file": str(Path(where).resolve()),
+            }
+        case "simulated" | "serial":
+            # A serial rig may have its port from the configuration's own file.
+            return {"transmitter.rig": kind}
+        case _:
+            raise typer.BadParameter(f"--rig {rig}: no such rig; there are {FORMS}")
+
+
+FORMS = (
+    "simulated, replay:FILE for a recorded flight, or a real rig: cobs:PORT, ascii:PORT, qsb:PORT, "
+    "quarc:HOST:PORT, quarc-server:PORT, hil[:CARD]."
+)

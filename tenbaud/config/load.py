@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import tomllib
+from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -50,6 +51,29 @@ def load_config(
     except ValidationError as error:
         source = str(path) if path is not None else f"preset {base}"
         raise ConfigError(_describe_all(source, error)) from error
+
+
+def nested(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings by their full names, `coder.decay`, as the sections of a configuration.
+
+    Raises ConfigError for a section that is set as a whole and in parts.
+    """
+    sections: dict[str, Any] = {}
+    for name, value in settings.items():
+        *path, field = name.split(".")
+        place = sections
+        for depth, part in enumerate(path, 1):
+            place = place.setdefault(part, {})
+            if not isinstance(place, dict):
+                raise _set_twice(".".join(path[:depth]))
+        if field in place:
+            raise _set_twice(name)
+        place[field] = value
+    return sections
+
+
+def _set_twice(section: str) -> ConfigError:
+    return ConfigError(f"{section} is set as a whole, and fields within it too; set one or the other")
 
 
 def dump_config(config: FlightConfig) -> str:

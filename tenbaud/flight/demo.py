@@ -53,10 +53,12 @@ def fly_demo(
     *,
     draw: bool = True,
     view: ViewWish | None = None,
+    pace: float | None = None,
 ) -> DemoResult:
     """Fly once into an existing, empty run folder; write summary and, if wished, figure there.
 
-    `view`: serve the live page beside the flight, which may then be steered from it.
+    `view`: serve the live page beside the flight, which may then be steered from it. `pace`: on the
+    virtual clock, at most so many times real time; not for the link "memory".
     """
     folder.config.write_text(dump_config(agreement.config))
     if agreement.config.link.kind == "memory":
@@ -65,6 +67,8 @@ def fly_demo(
         result = DemoResult(joined(upper, lower), outcome.code, messages)
     else:
         with page_beside(view) as viewing:
+            if pace is not None:
+                viewing.transmitter += ["--pace", str(pace)]
             result = _fly_processes(agreement, folder, on_status, viewing)
     write_summary(folder, result.summary)
     problem = draw_run(folder, figure_title(agreement.config, result.summary)) if draw else None

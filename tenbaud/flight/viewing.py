@@ -27,7 +27,6 @@ class ViewWish:
     """How a demonstration is to be looked at."""
 
     port: int
-    pace: float | None
     open_browser: bool = False
 
 
@@ -47,11 +46,10 @@ def page_beside(wish: ViewWish | None) -> Iterator[Viewing]:
         return
     with TemporaryDirectory(prefix="tenbaud-view-") as folder:
         places = [f"{SOCKET}{Path(folder) / name}.sock" for name in ("transmitter", "receiver")]
-        pace = [] if wish.pace is None else ["--pace", str(wish.pace)]
         process = _start(places, wish)
         try:
             yield Viewing(
-                ["--telemetry", places[0], "--allow-control", *pace],
+                ["--telemetry", places[0], "--allow-control"],
                 ["--telemetry", places[1], "--allow-control"],
             )
             time.sleep(LAST_WORD_S)

@@ -50,6 +50,10 @@ def test_when_an_item_has_a_direction_then_the_other_is_spared() -> None:
     assert not parse_impairments("").any
 
 
+def test_when_a_clock_jumps_back_then_its_step_is_negative() -> None:
+    assert parse_impairments("step=-50ms@10s").clock_steps == ((10 * SECOND, -50 * MS),)
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -61,6 +65,14 @@ def test_when_an_item_has_a_direction_then_the_other_is_spared() -> None:
         ("delay=5ms±6ms", "larger than the delay"),
         ("cut=10s", "START+LENGTH"),
         ("burst=0.1/0", "left some time"),
+        ("loss=often", "'often' is no number"),
+        ("loss=nan", "no number"),
+        ("skew=nan", "no number"),
+        ("skew=-1000000ppm", "stand still"),
+        ("delay=-5ms", "no time from 0 on"),
+        ("reorder=0.1/-5ms", "no time from 0 on"),
+        ("cut=10s+-2s", "no time from 0 on"),
+        ("step=5ms@-1s", "no time from 0 on"),
     ],
 )
 def test_when_an_item_makes_no_sense_then_it_is_named(text: str, words: str) -> None:

@@ -3,6 +3,7 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+import typer
 
 from tenbaud.build import agree
 from tenbaud.build_rig import build_axes, build_rig, quarc_commands, quarc_fields
@@ -101,3 +102,9 @@ def test_every_rig_setting_survives_the_config_file(tmp_path: Any) -> None:
 
 def test_a_rig_does_not_change_what_both_ends_agree_on() -> None:
     assert agree(configured("cobs:X"), "real").identity == agree(load_config(), "real").identity
+
+
+@pytest.mark.parametrize("rig", ["cobra:/dev/ttyACM0", "quarc:10.0.0.5", "cobs", "replay"])
+def test_when_a_rig_is_named_that_there_is_not_then_the_forms_are_shown(rig: str) -> None:
+    with pytest.raises(typer.BadParameter, match=r"cobs:PORT|quarc:HOST:PORT|replay:FILE"):
+        options.overrides(rig=rig)

@@ -10,8 +10,8 @@ import pytest
 from tenbaud import Run
 from tenbaud.build import agree
 from tenbaud.build_ends import build_controller, check_parts
-from tenbaud.config.load import ConfigError, load_config
-from tenbaud.flying import fly, nested
+from tenbaud.config.load import ConfigError, load_config, nested
+from tenbaud.flying import fly
 from tenbaud.replay.audit import audit
 from tests.tenbaud.processes import run as run_command
 

@@ -6,7 +6,7 @@ import json
 import os
 from collections import Counter
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -78,14 +78,19 @@ def sweep(
     if as_json:
         typer.echo(json.dumps(summary, indent=2))
         return
+    _tell(summary, why)
+
+
+def _tell(summary: dict[str, Any], why: Counter[str]) -> None:
+    """Print the summary; `why` flights have no figures, and how often."""
     typer.echo(
         f"{summary['flights']} flights ({summary['points']} points, {summary['seeds']} seeds each), "
-        f"{summary['flights_compiled']} of them compiled: {results.table_path}"
+        f"{summary['flights_compiled']} of them compiled: {summary['results']}"
     )
     if why:
         most, count = why.most_common(1)[0]
         typer.echo(f"{why.total()} have no figures (column outcome). {count} of them: {most}")
-    for path in drawn:
+    for path in summary["plots"]:
         typer.echo(f"  {path}")
 
 

@@ -1,4 +1,4 @@
-"""Plots of studies: labels that can be read, no number hidden behind another, nothing left out unsaid."""
+"""Plots of studies: labels that can be read, no number hidden, nothing left out unsaid."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def kept_figures(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, Any]]:
 
 
 def table_of(settings: dict[str, list[Any]], errors: list[float], outcomes: list[str]) -> Any:
-    figures = {name: errors for name in ("error_live_rms", "error_coded_rms", "tracking_rms")}
+    figures = dict.fromkeys(("error_live_rms", "error_coded_rms", "tracking_rms"), errors)
     return pa.table({**settings, **figures, "outcome": outcomes})
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+from collections import Counter
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -36,7 +37,12 @@ def sweep(
         bool, typer.Option("--json", help="Summary on standard output as JSON, nothing else there.")
     ] = False,
 ) -> None:
-    """Fly a study: settings swept on a grid or sampled, many seeds, results as Parquet and plots."""
+    """Fly a study: settings swept on a grid or sampled, many seeds, results as Parquet and plots.
+
+    The same command goes on with what is missing after a stop or a kill. Four or more seeds of a point
+    are flown side by side; flights of different points are not, so many seeds of few points are flown
+    sooner than few seeds of many.
+    """
     from tenbaud.studies.run import run_study
     from tenbaud.studies.settings import StudyError
     from tenbaud.studies.study import read_study
@@ -47,20 +53,24 @@ def sweep(
     what = read_study(study, seeds)
     folder = out or Path("studies") / what.file.name
     results = Results(what, folder)
-    with _Bar(what.file.name) as bar:
-        table = run_study(what, results, bar.update, workers or os.cpu_count() or 1, scheduler)
+    try:
+        with _Bar(what.file.name) as bar:
+            table = run_study(what, results, bar.update, workers or os.cpu_count() or 1, scheduler)
+    except KeyboardInterrupt:
+        typer.echo(f"stopped; what was flown is kept in {folder}. The same command goes on", err=True)
+        raise
     drawn = []
     if plots:
         from tenbaud.studies.plots import draw_study
 
         drawn = draw_study(table, what.names, what.file.description or what.file.name, folder)
-    outcomes = table["outcome"].to_pylist()
+    why = Counter(one for one in table["outcome"].to_pylist() if one != "ok")
     summary = {
         "study": what.file.name,
         "points": len(what.points),
         "seeds": len(what.seeds),
         "flights": what.flights,
-        "flights_without_figures": sum(outcome != "ok" for outcome in outcomes),
+        "flights_without_figures": why.total(),
         "flights_compiled": sum(one == "compiled" for one in table["engine"].to_pylist()),
         "results": str(results.table_path),
         "plots": [str(path) for path in drawn],
@@ -68,13 +78,19 @@ def sweep(
     if as_json:
         typer.echo(json.dumps(summary, indent=2))
         return
+    _tell(summary, why)
+
+
+def _tell(summary: dict[str, Any], why: Counter[str]) -> None:
+    """Print the summary; `why` flights have no figures, and how often."""
     typer.echo(
         f"{summary['flights']} flights ({summary['points']} points, {summary['seeds']} seeds each), "
-        f"{summary['flights_compiled']} of them compiled: {results.table_path}"
+        f"{summary['flights_compiled']} of them compiled: {summary['results']}"
     )
-    if summary["flights_without_figures"]:
-        typer.echo(f"{summary['flights_without_figures']} have no figures; see the column outcome")
-    for path in drawn:
+    if why:
+        most, count = why.most_common(1)[0]
+        typer.echo(f"{why.total()} have no figures (column outcome). {count} of them: {most}")
+    for path in summary["plots"]:
         typer.echo(f"  {path}")
 
 

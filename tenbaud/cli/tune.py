@@ -26,54 +26,66 @@ class MethodOption(StrEnum):
     SIMPLEX = "nelder-mead"
 
 
+Out = Annotated[Path, typer.Option(help="File for the preset that was found; must not exist yet.")]
+Rig = Annotated[
+    str | None,
+    typer.Option(help="simulated, or replay:FILE to fit on a recorded flight.", show_default=False),
+]
+Mismatch = Annotated[float | None, typer.Option(help="Plant off the model, 0.1 for 10 %.")]
+Free = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Constant of coder or model to fit and its range, such as coder.decay=0.7..0.99 or "
+        "coder.minimum_range_rad=0.003..0.1:log; repeatable. Not given: the usual ones of the coder, "
+        "its gains and its range."
+    ),
+]
+Model = Annotated[
+    bool,
+    typer.Option(
+        "--model", help="Fit the pitch model's damping, stiffness, gain, lag and equilibrium as well."
+    ),
+]
+Seeds = Annotated[int, typer.Option(min=1, help="Simulated flights for the fit.")]
+TestSeeds = Annotated[
+    int, typer.Option(min=1, help="Simulated flights for the judgement, of the seeds after those.")
+]
+TrainShare = Annotated[
+    float,
+    typer.Option(
+        min=0.05, max=0.95, help="Share of a recorded flight for the fit; the rest is to judge."
+    ),
+]
+Method = Annotated[MethodOption, typer.Option(help="How to search.")]
+Evaluations = Annotated[
+    int,
+    typer.Option(
+        min=1,
+        help="Sets of constants to fly at most, those configured included; each is flown on all "
+        "flights for the fit.",
+    ),
+]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of the search.")]
+
+
 def tune(
-    out: Annotated[Path, typer.Option(help="File for the preset that was found; must not exist yet.")],
+    out: Out,
     preset: options.Preset = None,
     config: options.ConfigFile = None,
-    rig: Annotated[
-        str | None,
-        typer.Option(help="simulated, or replay:FILE to fit on a recorded flight.", show_default=False),
-    ] = None,
+    rig: Rig = None,
     duration: options.Duration = None,
-    mismatch: Annotated[float | None, typer.Option(help="Plant off the model, 0.1 for 10 %.")] = None,
+    mismatch: Mismatch = None,
     disturbance: options.Disturbance = None,
     impair: options.Impair = None,
     settings: options.Settings = None,
-    free: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Constant of coder or model to fit and its range, such as coder.decay=0.7..0.99 or "
-            "coder.minimum_range_rad=0.003..0.1:log; repeatable. Not given: the usual ones of the "
-            "coder, its gains and its range."
-        ),
-    ] = None,
-    model: Annotated[
-        bool,
-        typer.Option(
-            "--model",
-            help="Fit the pitch model's damping, stiffness, gain, lag and equilibrium as well.",
-        ),
-    ] = False,
-    seeds: Annotated[int, typer.Option(min=1, help="Simulated flights for the fit.")] = 6,
-    test_seeds: Annotated[
-        int, typer.Option(min=1, help="Simulated flights for the judgement, of the seeds after those.")
-    ] = 12,
-    train_share: Annotated[
-        float,
-        typer.Option(
-            min=0.05, max=0.95, help="Share of a recorded flight for the fit; the rest is to judge."
-        ),
-    ] = 0.5,
-    method: Annotated[MethodOption, typer.Option(help="How to search.")] = MethodOption.EVOLUTION,
-    evaluations: Annotated[
-        int,
-        typer.Option(
-            min=1,
-            help="Sets of constants to fly at most, those configured included; each is flown on all "
-            "flights for the fit.",
-        ),
-    ] = 600,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the search.")] = 1,
+    free: Free = None,
+    model: Model = False,
+    seeds: Seeds = 6,
+    test_seeds: TestSeeds = 12,
+    train_share: TrainShare = 0.5,
+    method: Method = MethodOption.EVOLUTION,
+    evaluations: Evaluations = 600,
+    seed: Seed = 1,
     as_json: options.AsJson = False,
 ) -> None:
     """Fit a coder's constants, and with --model the model's, on flights; judge them on others.

@@ -110,6 +110,7 @@ class Tables:
             raise RecordingError(
                 f"The recording {self.path} has no topic {name!r}. "
                 f"It has: {', '.join(self.topics) or 'none at all'}."
+                + ("" if self.complete else " It was cut or damaged before one.")
             )
         return self.topics[name]
 

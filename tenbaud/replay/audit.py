@@ -69,6 +69,12 @@ def audit(path: Path, other: Path | None = None) -> Audit:
 
 
 def _check_whole(record: FlightRecord, result: Audit) -> None:
+    if record.transmitter is None:
+        result.notes.append("only the receiver's recording is here: when each symbol left is not shown")
+    if record.receiver is None:
+        result.notes.append(
+            "only the transmitter's recording is here: what arrived, and when, is not shown"
+        )
     for end, tables in record.ends():
         dropped = int(tables.end.get("rows_dropped", "0"))
         if dropped:

@@ -47,7 +47,7 @@ EQUILIBRIUM_RAD = Range.model_validate({"from": -0.4, "to": 0.4})
 def free_ranges(config: FlightConfig, names: dict[str, Range], *, model: bool) -> dict[str, Range]:
     """Return the constants to fit: those named, or the usual ones of the coder; and of the model.
 
-    A usual constant that is not above 0 stays as it is: the ends are multiples of it. StudyError for
+    A usual constant that is 0 stays 0: the ends are multiples of what it is. StudyError for
     names that are no constants of coder or model, and for a coder or model without usual ones.
     """
     for name in names:
@@ -66,7 +66,7 @@ def free_ranges(config: FlightConfig, names: dict[str, Range], *, model: bool) -
         factors = dict.fromkeys(MODEL_FACTORS, (0.5, 2.0, "log"))
         free = _usual(config, factors) | {"model.equilibrium_rad": EQUILIBRIUM_RAD} | free
     if not free:
-        raise StudyError("no usual constant is above 0 here: name some with --free")
+        raise StudyError("every usual constant is 0 here: name some with --free")
     return free
 
 
@@ -74,9 +74,10 @@ def _usual(config: FlightConfig, spreads: dict[str, tuple[float, float, str]]) -
     ranges = {}
     for name, (low, high, scale) in spreads.items():
         factor = present(config, name) if scale == "log" else 1.0
-        if factor > 0.0:
-            ends = {"from": low * factor, "to": high * factor, "scale": scale}
-            ranges[name] = Range.model_validate(ends)
+        # A sign stays what it is; below 0 there is no log scale.
+        if factor != 0.0:
+            ends = {"from": low * factor, "to": high * factor}
+            ranges[name] = Range.model_validate(ends | {"scale": scale if factor > 0.0 else "linear"})
     return ranges
 
 

@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from tenbaud.studies.settings import StudyError
-
 LABELS = {
     "rate": "R in symbols per second (baud)",
     "loss": "share of messages lost",
@@ -35,14 +33,14 @@ MAPS_MAX = 12
 
 
 def draw_study(table: Any, names: list[str], title: str, folder: Path) -> list[Path]:
-    """Draw all plots of a table into a folder; return the files.
+    """Draw all plots of a table into a folder; return the files, none where no flight has figures.
 
     A setting with one value has none, unless all have one. The title says how many flights have no
     figures, and so are in none of the medians.
     """
     good = np.array(table["outcome"].to_pylist()) == "ok"
     if not good.any():
-        raise StudyError("no flight of this study has figures, so there is nothing to draw")
+        return []
     columns = {name: np.array(table[name].to_pylist())[good] for name in (*names, *QUANTITIES)}
     if missing := int(np.count_nonzero(~good)):
         title = f"{title}\n{missing} of {len(good)} flights have no figures and are left out"

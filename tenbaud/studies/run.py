@@ -6,6 +6,7 @@ after a kill, or when workers vanish for good, the same command goes on with wha
 
 from __future__ import annotations
 
+import logging
 import os
 import queue
 import threading
@@ -120,6 +121,9 @@ def _on_cluster(tasks: list[ChunkTask], scheduler: str) -> Iterator[ChunkResult]
         client = distributed.Client(scheduler, timeout=5.0)
     except (OSError, TimeoutError, ValueError) as error:
         raise StudyError(f"no Dask scheduler answers at {scheduler}: {error}") from error
+    # What it says of workers and connections that come and go is said below, in one line.
+    for part in ("client", "utils"):
+        logging.getLogger(f"distributed.{part}").setLevel(logging.CRITICAL)
     with client:
         finished: queue.SimpleQueue[Any] = queue.SimpleQueue()
         futures = client.map(fly_chunk, tasks, pure=False, retries=2)

@@ -22,6 +22,9 @@ from tenbaud.studies.schedule import Schedule, Uncommon
 LANES = 32
 """Flights side by side: four registers of eight numbers, so that one is worked on while others wait."""
 
+LANE_TICKS_MAX = 2_000_000
+"""Ticks of all lanes together: their arrays then take a hundred megabytes, and no processor's cache."""
+
 FEWEST = 4
 """Fewer flights than this are faster one after the other."""
 
@@ -33,9 +36,10 @@ MULTIPLE = 8
 def fly_seeds(point: CompiledPoint, seeds: Sequence[int]) -> list[FlightFigures | None]:
     """Fly a point with these seeds; None for flights that only the nodes can fly."""
     figures: list[FlightFigures | None] = []
-    while seeds and can_share(point) and len(seeds) >= FEWEST:
-        figures += fly_side_by_side(point, seeds[:LANES])[0]
-        seeds = seeds[LANES:]
+    lanes = min(LANES, LANE_TICKS_MAX // point.numbers.ticks // MULTIPLE * MULTIPLE)
+    while lanes and can_share(point) and len(seeds) >= FEWEST:
+        figures += fly_side_by_side(point, seeds[:lanes])[0]
+        seeds = seeds[lanes:]
     for seed in seeds:
         try:
             figures.append(point.fly(seed)[0])

@@ -210,10 +210,23 @@ def test_each_machine_may_have_kept_its_own_end(clean: Run, tmp_path: Path) -> N
         for file in (f"{name}.mcap", "config.toml", "summary.json"):
             shutil.copy(clean.path / file, tmp_path / name / file)
     assert audit(tmp_path / "transmitter", tmp_path / "receiver").passed
-    assert audit(tmp_path / "transmitter").passed
-    assert audit(tmp_path / "receiver").passed
+    for name in ("transmitter", "receiver"):
+        alone = audit(tmp_path / name)
+        assert alone.passed
+        assert any(f"only the {name}'s recording is here" in note for note in alone.notes)
+    assert not audit(tmp_path / "transmitter", tmp_path / "receiver").notes
     with pytest.raises(RecordingError, match="both hold"):
         audit(clean.path, tmp_path / "receiver")
+
+
+def test_a_damaged_recording_is_named_as_such(clean: Run, tmp_path: Path) -> None:
+    shutil.copytree(clean.path, tmp_path / "run")
+    path = tmp_path / "run" / "receiver.mcap"
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(RecordingError, match=r"receiver\.mcap .* cut or damaged"):
+        audit(tmp_path / "run")
 
 
 def test_another_configuration_than_the_one_flown_is_refused(clean: Run, tmp_path: Path) -> None:

@@ -87,6 +87,23 @@ def test_when_seeds_are_many_then_they_come_back_in_order() -> None:
     ]
 
 
+def test_when_flights_are_long_then_fewer_share_registers(monkeypatch: pytest.MonkeyPatch) -> None:
+    point = CompiledPoint(config_of("paper-10baud", NOISE))
+    together: list[int] = []
+
+    def counted(point: CompiledPoint, seeds: Any) -> Any:
+        together.append(len(seeds))
+        return fly_side_by_side(point, seeds)
+
+    monkeypatch.setattr(side_by_side, "fly_side_by_side", counted)
+    expected = fly_seeds(point, range(20))
+    for ticks_max, sizes in ((point.numbers.ticks * 9, [8, 8, 4]), (point.numbers.ticks * 7, [])):
+        together.clear()
+        monkeypatch.setattr(side_by_side, "LANE_TICKS_MAX", ticks_max)
+        assert fly_seeds(point, range(20)) == expected
+        assert together == sizes
+
+
 def test_when_the_line_has_faults_then_flights_are_flown_one_by_one() -> None:
     point = CompiledPoint(config_of("paper-10baud", BAD_LINE))
     assert not can_share(point)

@@ -164,6 +164,12 @@ def test_when_a_usual_constant_is_zero_then_it_stays_zero() -> None:
     assert "model.motor_lag_s" not in free_ranges(config, {}, model=True)
 
 
+def test_when_a_usual_constant_is_negative_then_its_sign_stays() -> None:
+    config = load_config("paper-10baud", None, {"model": {"torque_gain_rad_per_v_s2": -0.4}})
+    one = free_ranges(config, {}, model=True)["model.torque_gain_rad_per_v_s2"]
+    assert (one.first, one.last, one.scale) == (-0.2, -0.8, "linear")
+
+
 @pytest.fixture(name="log")
 def log_of(tmp_path: Path) -> Path:
     """A recording of 20 s whose second half moves ten times as far as its first."""

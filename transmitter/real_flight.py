@@ -105,10 +105,10 @@ class RealFlight:
             tick += 1
         return tick
 
-    def finish(self, reason: str, tick: int = 0) -> None:
+    def finish(self, tick: int, reason: str) -> None:
         """Let the last echoes come in, end the session on both sides, take a real rig's motors down.
 
-        `tick` is the first one that was not flown.
+        `tick` is the first one that was not flown, as `run` returns it.
         """
         terms = self._node.session.terms
         linger_ns = (
@@ -131,7 +131,9 @@ class RealFlight:
         self._node.rest()
         # The farewell is spared the line's delay: this process is about to end.
         for frame in self._node.session.bye(reason):
-            self._link.send(self._wire.encode(frame))
+            data = self._wire.encode(frame)
+            self._uplink.meter.count(frame, self._wire.size(data))
+            self._link.send(data)
         while not landing.over:
             landing.step(self._now_ns())
             self._wait_until(min(landing.next_ns, self._now_ns() + terms.tick_ns))

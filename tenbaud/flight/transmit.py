@@ -94,10 +94,11 @@ def fly_real(run: TransmitterRun, link: Link, should_stop: Stop) -> Outcome:
         started = time.perf_counter()
         first = run.node.session.epoch_tick
         try:
-            run.ticks = flight.run(run.agreement.flight_ticks) - first
+            end = flight.run(run.agreement.flight_ticks)
+            run.ticks = end - first
             run.rejoin_bytes = _control_bytes(run, flight) - greeting_bytes
             outcome = _outcome(run, link.peer_present())
-            flight.finish(_farewell(outcome), run.ticks)
+            flight.finish(end, _farewell(outcome))
         finally:
             run.flight_s = time.perf_counter() - started
             run.wire_bytes_down = flight.inlet.wire_bytes

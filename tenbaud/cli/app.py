@@ -83,11 +83,10 @@ app.command()(rig.rig_check)
 def main() -> None:
     """Run the command line; errors become one message and an exit code."""
     from channel.errors import TenbaudError
-    from tenbaud.recording.errors import RecordingError
 
     try:
         app()
-    except (TenbaudError, RecordingError, ValueError) as error:
+    except (TenbaudError, ValueError) as error:
         typer.echo(f"tenbaud: {error}", err=True)
         code = outcome_of(error).code
         sys.exit(ExitCode.USAGE if code is ExitCode.FAILED else code)

@@ -60,7 +60,7 @@ def prepare(agreement: Agreement, recorder: Recorder | None, wire: Wire) -> Tran
 def fly_virtual(run: TransmitterRun, peer: Peer, should_stop: Stop) -> Outcome:
     """Fly on the virtual clock against a peer in this process or another."""
     faults = run.agreement.faults
-    if faults.skew_ppm or faults.clock_steps:
+    if faults.bad_clock:
         peer = SkewedPeer(peer, SkewedClock(faults))
     flight = VirtualFlight(run.node, run.uplink, run.downlink, peer)
     with run.node.rig:

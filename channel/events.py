@@ -18,14 +18,12 @@ class EventKind(StrEnum):
     REJOIN = "rejoin"
     ERASED = "erased"
     LATE_SYMBOL = "late_symbol"
-    LATE_COMMAND = "late_command"
     STALE = "stale"
     MALFORMED = "malformed"
     GUARD = "guard"
     SENSOR = "sensor"
     CONTROLLER = "controller"
     PEER = "peer"
-    RECORDING = "recording"
     CONTROL = "control"
 
 

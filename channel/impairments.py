@@ -81,6 +81,11 @@ class LineFaults:
         return self != LineFaults()
 
     @property
+    def bad_clock(self) -> bool:
+        """Return whether the receiver's clock shows another time than the transmitter's."""
+        return bool(self.skew_ppm or self.clock_steps)
+
+    @property
     def longest_delay_ns(self) -> int:
         """Return the longest usual delay of a symbol up and its command down, together."""
         return sum(one.delay_ns + one.jitter_ns for one in (self.up, self.down))

@@ -39,9 +39,9 @@ def fly_sample(
 
     `known` holds the `D` commands of ticks `kN ... kN + D - 1`, decided with earlier words.
     """
-    samples = codec.ticks_per_sample
+    count = codec.ticks_per_sample
     lead = len(known)
-    first_tick = state.sample * samples
+    first_tick = state.sample * count
     tick = codec.model.tick
     opened = codec.open(state, word)
     model, held = opened.model, opened.held
@@ -49,11 +49,11 @@ def fly_sample(
     live: list[Vector] = []
     commands: list[Vector] = []
     closed: CodecState | None = None
-    for index in range(samples + lead):
-        if index == samples:
+    for index in range(count + lead):
+        if index == count:
             closed = codec.close(state, opened, model)
             held = codec.nothing_held
-        if index < samples:
+        if index < count:
             coded.append(model)
         if index < lead:
             command = known[index]

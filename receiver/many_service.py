@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from channel.lateness import LatenessMeter
-from receiver.endpoint import ReceiverEndpoint
+from receiver.service import Service
 
 POLL_NS = 200_000_000
 """How often every service is asked whether its flight is over."""
@@ -32,21 +32,6 @@ BATCH_MESSAGES_MAX = 64
 BURST_MESSAGES = 50
 SURPLUS = 4.0
 """A session may send this many times its symbol rate, and so many messages at once, for control."""
-
-
-class Service(Protocol):
-    """One flight: messages and times in, messages out."""
-
-    endpoint: ReceiverEndpoint
-
-    def next_due_ns(self, now_ns: int) -> int | None:
-        """Return when there is something to do without a message."""
-
-    def take(self, data: bytes | None, now_ns: int) -> list[bytes]:
-        """Take a message, or none, and let time pass; return what is to be sent."""
-
-    def over(self, now_ns: int) -> bool:
-        """Return whether the flight is over; LinkLost when nothing came for too long."""
 
 
 class Hub(Protocol):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from abc import ABC, abstractmethod
 
 from channel.errors import LinkLost
 from receiver.endpoint import ReceiverEndpoint
@@ -15,8 +16,11 @@ REFUSAL_LINGER_S = 1.0
 """How long a refused transmitter has to say in which fields it differs."""
 
 
-class Service:
-    """Serves one flight, without a link. All times are of the monotonic clock."""
+class Service(ABC):
+    """Serves one flight, without a link: messages and times in, messages out.
+
+    All times are of the monotonic clock.
+    """
 
     missed: str
     """what did not come when a transmitter is silent, for the error's text"""
@@ -25,6 +29,14 @@ class Service:
         self.endpoint = endpoint
         self._peer_timeout_s = peer_timeout_s
         self._heard_ns = time.monotonic_ns()
+
+    @abstractmethod
+    def next_due_ns(self, now_ns: int) -> int | None:
+        """Return when there is something to do without a message; None: nothing is planned."""
+
+    @abstractmethod
+    def take(self, data: bytes | None, now_ns: int) -> list[bytes]:
+        """Take a message, or none, and let time pass to `now_ns`; return what is to be sent now."""
 
     def over(self, now_ns: int) -> bool:
         """Return whether the flight is over; LinkLost when nothing came for too long."""

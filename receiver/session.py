@@ -84,8 +84,8 @@ class ReceiverSession:
         self.epoch = 0
         self.meter = BaudMeter()
         self.counts: Counter[str] = Counter()
-        """erasures, symbols_late, symbols_misplaced, stale_frames, refused_hellos, bad_commands,
-        bad_references, desyncs, rejoins"""
+        """erasures, symbols_late, symbols_misplaced, stale_frames, malformed, refused_hellos,
+        bad_commands, bad_references, desyncs, rejoins"""
         self.end_reason = ""
         self.refusal: str | None = None
         self.desync: Desync | None = None

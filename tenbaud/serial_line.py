@@ -18,9 +18,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, Self
 
+from channel.serial_budget import LINE_BITS_PER_BYTE
+
 Way = Literal["up", "down"]
 
-LINE_BITS_PER_BYTE = 10
 QUEUE_BYTES_MAX = 4096
 """What waits in a direction; more is left in the sender's own buffer, as with a real port."""
 STEP_S = 0.0005

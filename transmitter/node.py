@@ -101,10 +101,10 @@ class TransmitterNode:
         """Score and record what was confirmed: work for when the next symbol is on its way."""
         if not self.session.confirmed:
             return
-        first = self.session.terms.ticks_per_sample
+        per_sample = self.session.terms.ticks_per_sample
         for done in self.session.take_confirmed():
             pairs = zip(done.flown.coded, done.live, strict=True)
-            for tick, (coded, live) in enumerate(pairs, done.sample * first):
+            for tick, (coded, live) in enumerate(pairs, done.sample * per_sample):
                 self.scores.on_estimate(tick, coded, live)
             if self.gauge is not None:
                 self._gauge(self.gauge, done)

@@ -105,11 +105,11 @@ class RealFlight:
             tick += 1
         return tick
 
-    def finish(self, reason: Callable[[], str], tick: int = 0) -> None:
+    def finish(self, tick: int, reason: Callable[[], str]) -> None:
         """Let the last echoes come in, end the session on both sides, take a real rig's motors down.
 
-        `reason` is asked for what the receiver is told once they are in. `tick` is the first one that
-        was not flown.
+        `tick` is the first one that was not flown, as `run` returns it; `reason` is asked for what the
+        receiver is told once the echoes are in.
         """
         terms = self._node.session.terms
         linger_ns = (
@@ -141,7 +141,9 @@ class RealFlight:
         """End the session on both sides at once; before the first tick nothing else is to be done."""
         # The farewell is spared the line's delay: this process is about to end.
         for frame in self._node.session.bye(reason):
-            self._link.send(self._wire.encode(frame))
+            data = self._wire.encode(frame)
+            self._uplink.meter.count(frame, self._wire.size(data))
+            self._link.send(data)
 
     def _now_ns(self) -> int:
         return time.monotonic_ns() - self._start_ns

@@ -355,8 +355,7 @@ class TransmitterSession:
         )
         self._record_failure(self.desync, None)
         if self._stop_on_desync:
-            ended = [self.desync, *self.bye("the two copies of the codec disagree")]
-            return ended
+            return [self.desync, *self.bye("the two copies of the codec disagree")]
         return self.rejoin(Why.DESYNC, "the two copies of the codec disagree")
 
     # Reports

@@ -35,6 +35,11 @@ def excite(
     """
     rest = round(rest_s / step_s)
     total = round(duration_s / step_s)
+    if total <= rest:
+        raise IdentificationError(
+            f"an experiment of {duration_s:g} s is over before the rig is excited: it rests for "
+            f"{rest_s:g} s first; make it longer (--duration), best by a minute"
+        )
     rows = np.empty((total, 3))
     for tick in range(total):
         mu = signal.volts(tick - rest) if tick >= rest else 0.0

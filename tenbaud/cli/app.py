@@ -57,37 +57,28 @@ def _root(
     """Take the options that come before the command."""
 
 
-app.command()(demo.demo)
-app.command()(nodes.transmit)
-app.command()(nodes.receive)
-app.command()(view.view)
-app.command()(router.router)
-app.add_typer(keys.app, name="keys")
-app.command()(identify.identify)
-app.command()(figures.figures)
-app.command()(sweep.sweep)
-app.command()(tune.tune)
-app.command()(runs.inspect)
-app.command()(runs.diff)
-app.command()(replays.replay)
-app.command()(replays.audit)
-app.command()(files.convert)
-app.command()(files.recover)
-app.command()(runs.presets)
-app.command()(doctor.doctor)
-app.add_typer(bench.bench, name="bench")
-app.command()(rig.rig)
-app.command()(rig.rig_check)
+for panel, commands in (
+    ("Fly", (demo.demo, nodes.transmit, nodes.receive, view.view, runs.presets)),
+    (
+        "What was flown",
+        (runs.inspect, runs.diff, replays.replay, replays.audit, files.convert, files.recover),
+    ),
+    ("Rigs and machines", (doctor.doctor, rig.rig, rig.rig_check, router.router)),
+    ("Models, coders, studies", (identify.identify, figures.figures, sweep.sweep, tune.tune)),
+):
+    for command in commands:
+        app.command(rich_help_panel=panel)(command)
+app.add_typer(keys.app, name="keys", rich_help_panel="Rigs and machines")
+app.add_typer(bench.bench, name="bench", rich_help_panel="Models, coders, studies")
 
 
 def main() -> None:
     """Run the command line; errors become one message and an exit code."""
     from channel.errors import TenbaudError
-    from tenbaud.recording.errors import RecordingError
 
     try:
         app()
-    except (TenbaudError, RecordingError, ValueError) as error:
+    except (TenbaudError, ValueError) as error:
         typer.echo(f"tenbaud: {error}", err=True)
         code = outcome_of(error).code
         sys.exit(ExitCode.USAGE if code is ExitCode.FAILED else code)

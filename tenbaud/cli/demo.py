@@ -86,19 +86,27 @@ def demo(
         for off in flights
     ]
     agreements = _agree_all(preset, config, changes, clock)
-    if open_browser and not view:
-        raise typer.BadParameter("--open opens the live page; it goes with --view")
-    wish = _view_wish(agreements, view_port, open_browser) if view else None
-    in_memory = agreements[0].config.link.kind == "memory"
-    if pace is not None and (clock is not options.ClockOption.VIRTUAL or in_memory):
-        raise typer.BadParameter("--pace slows the virtual clock of two processes down, and no other")
-    if wish is not None and clock is options.ClockOption.VIRTUAL:
-        pace = pace or 1.0
+    pace = _checked_pace(agreements[0], pace, view)
+    wish = _view_wish(agreements, view, view_port, open_browser)
     raise typer.Exit(_fly_all(agreements, out, json, wish, pace))
 
 
-def _view_wish(agreements: list[Agreement], port: int, open_browser: bool) -> ViewWish:
-    """Return how the flight is to be looked at, checked before anything starts."""
+def _checked_pace(agreement: Agreement, pace: float | None, view: bool) -> float | None:
+    """Return how many times real time to fly at most; a flight that is looked at keeps to 1."""
+    virtual = agreement.clock == "virtual" and agreement.config.link.kind != "memory"
+    if pace is not None and not virtual:
+        raise typer.BadParameter("--pace slows the virtual clock of two processes down, and no other")
+    return pace or (1.0 if view and virtual else None)
+
+
+def _view_wish(
+    agreements: list[Agreement], view: bool, port: int, open_browser: bool
+) -> ViewWish | None:
+    """Return how the flight is to be looked at, if it is, checked before anything starts."""
+    if not view:
+        if open_browser:
+            raise typer.BadParameter("--open opens the live page; it goes with --view")
+        return None
     from tenbaud.flight.viewing import ViewWish
     from tenbaud.view.server import Address, free_port, require_nicegui
 

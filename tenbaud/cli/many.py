@@ -6,7 +6,7 @@ import gc
 import json
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ import typer
 from tenbaud.cli import options
 
 if TYPE_CHECKING:
+    from channel.terms import Clock
     from tenbaud.build import Agreement
     from tenbaud.flight.many import ManyHost
     from tenbaud.flight.summary import Summary
@@ -93,7 +94,7 @@ def serve(
 
 
 def agreements(
-    preset: str | None, path: Path | None, configs: Path | None, changed: dict[str, Any], clock: str
+    preset: str | None, path: Path | None, configs: Path | None, changed: dict[str, Any], clock: Clock
 ) -> Callable[[str], Agreement]:
     """Return what gives the agreement for a session name; "" for that without a file of its own.
 
@@ -114,8 +115,8 @@ def agreements(
             config = load_config(preset if own is None else None, own or path, changed)
             if own is not None:
                 check_parts(config)
-            known[own] = (changed_s, agree(config, clock))  # type: ignore[arg-type]
-        return replace(known[own][1])
+            known[own] = (changed_s, agree(config, clock))
+        return known[own][1]
 
     return agreement_of
 

@@ -53,5 +53,7 @@ def presets() -> None:
     """List the presets that come with tenbaud."""
     from tenbaud.config.load import load_config, preset_names
 
-    for name in preset_names():
-        typer.echo(f"{name:16} {load_config(name).description}")
+    names = preset_names()
+    width = max(map(len, names))
+    for name in names:
+        typer.echo(f"{name:{width}}  {load_config(name).description}")

@@ -70,7 +70,6 @@ class Flown:
     largest_rad: float
     rms_rad: float
     """of the codec's error"""
-    live_largest_rad: float
     pitch_rad: float
     """largest pitch in the window"""
     reference_rad: float
@@ -168,13 +167,11 @@ def _fly_processes(job: Job, agreement: Any, folder: Path) -> Flown:
     curves = read_curves(run.transmitter, run.receiver)
     used = (curves.times_s >= start_s - 1e-9) & ~np.isnan(curves.coded_rad)
     error = (curves.pitch_rad - curves.coded_rad)[used]
-    live = (curves.pitch_rad - curves.live_rad)[used]
     return Flown(
         job.name,
         result.summary,
         float(np.abs(error).max()),
         float(np.sqrt(np.mean(error**2))),
-        float(np.nanmax(np.abs(live))),
         float(np.abs(curves.pitch_rad[curves.times_s >= start_s - 1e-9]).max()),
         float(result.summary["reference_amplitude_rad"] or 0.0),
         curves if job.keep_series else None,
@@ -200,7 +197,6 @@ def _fly_in_memory(job: Job, agreement: Any) -> Flown:
         transmitter_part(run, outcome),
         scores.coded.largest,
         scores.coded.rms or 0.0,
-        scores.live.largest,
         scores.angle_max_rad,
         scores.reference_max_rad,
     )

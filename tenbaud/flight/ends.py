@@ -23,6 +23,7 @@ from tenbaud.flight.outcome import Outcome, outcome_of
 from tenbaud.flight.status import Status, StatusMode, StatusReporter
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, gap_part, link_part, receiver_part, transmitter_part
+from tenbaud.flight.transmit import Stop
 from tenbaud.recording.folder import RunFolder
 from tenbaud.recording.shared import SharedWriter
 from tenbaud.recording.writer import McapRecorder
@@ -33,7 +34,6 @@ from tenbaud.telemetry.station import NO_WISH, Station, Wish, open_station
 if TYPE_CHECKING:
     from channel.links.zenoh_node import NodePlace
 
-Stop = Callable[[], bool]
 SWITCH_INTERVAL_S = 0.0002
 """A busy recorder thread may keep the loop waiting this long; Python's default is 5 ms."""
 

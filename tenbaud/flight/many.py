@@ -214,9 +214,7 @@ class ManyHost:
             return Served(name, VirtualService(endpoint, timeout_s), None, data)
         endpoint.downlink = build_line(agreement, "down", DATAGRAM)
         faults = agreement.faults
-        clock = None
-        if faults.skew_ppm or faults.clock_steps:
-            clock = SkewedClock(faults, time.monotonic_ns())
+        clock = SkewedClock(faults, time.monotonic_ns()) if faults.bad_clock else None
         service = RealService(endpoint, timeout_s, endpoint.downlink, clock)
         symbols_per_s = 1e9 * agreement.terms.symbols_per_word / agreement.terms.sample_ns
         return Served(name, service, SURPLUS * symbols_per_s, data)

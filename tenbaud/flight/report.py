@@ -109,7 +109,8 @@ def _value(summary: Summary, name: str) -> Any:
         case "wire_bytes":
             return f"{get('wire_bytes_up')} / {get('wire_bytes_down')}"
         case "lost":
-            return f"{get('erasures')} / {get('symbols_late', '-')}"
+            late = get("symbols_late")
+            return f"{get('erasures')} / {'-' if late is None else late}"
         case "rejoins":
             return f"{get('rejoins')}, {get('rejoin_bytes')} control bytes" if get("rejoins") else None
         case "impairments":

@@ -9,13 +9,12 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from typing import Any
 
 from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-Status = dict[str, Any]
+from tenbaud.flight.status import Status
 
 GAUGE_DEGREES = 180
 GAUGE_CELLS = 41

@@ -113,17 +113,12 @@ def link_part(link: Link, refused: Counter[str] | None = None) -> Summary:
 def joined(transmitter: Summary, receiver: Summary) -> Summary:
     """Return one summary: the transmitter's figures, and those that only the receiver has."""
     own = ("baud_measured", "symbols_late", "symbols_misplaced", "stale_frames", "bad_commands")
-    dropped = {**transmitter.get("link_dropped", {})}
-    for kind, count in receiver.get("link_dropped", {}).items():
-        dropped[kind] = dropped.get(kind, 0) + count
-    both = {
-        "link_dropped": dropped,
-        "reconnects": transmitter.get("reconnects", 0) + receiver.get("reconnects", 0),
-        "connections_refused": {
-            **transmitter.get("connections_refused", {}),
-            **receiver.get("connections_refused", {}),
-        },
+    both: Summary = {
+        name: dict(Counter(transmitter.get(name, {})) + Counter(receiver.get(name, {})))
+        for name in ("link_dropped", "connections_refused")
     }
+    for name in ("reconnects", "malformed"):
+        both[name] = transmitter.get(name, 0) + receiver.get(name, 0)
     if receiver.get("impaired_down"):
         both["impaired_down"] = receiver["impaired_down"]
     return {**transmitter, **both, **{name: receiver.get(name) for name in own}}

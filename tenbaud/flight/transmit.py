@@ -60,7 +60,7 @@ def prepare(agreement: Agreement, recorder: Recorder | None, wire: Wire) -> Tran
 def fly_virtual(run: TransmitterRun, peer: Peer, should_stop: Stop) -> Outcome:
     """Fly on the virtual clock against a peer in this process or another."""
     faults = run.agreement.faults
-    if faults.skew_ppm or faults.clock_steps:
+    if faults.bad_clock:
         peer = SkewedPeer(peer, SkewedClock(faults))
     flight = VirtualFlight(run.node, run.uplink, run.downlink, peer)
     with run.node.rig:
@@ -96,10 +96,11 @@ def fly_real(run: TransmitterRun, link: Link, should_stop: Stop) -> Outcome:
         started = time.perf_counter()
         first = run.node.session.epoch_tick
         try:
-            run.ticks = flight.run(run.agreement.flight_ticks) - first
+            end = flight.run(run.agreement.flight_ticks)
+            run.ticks = end - first
             run.rejoin_bytes = _control_bytes(run, flight) - greeting_bytes
             ending = _Ending(run, _outcome(run, link.peer_present()))
-            flight.finish(ending.farewell, run.ticks)
+            flight.finish(end, ending.farewell)
         finally:
             run.flight_s = time.perf_counter() - started
             run.wire_bytes_down = flight.inlet.wire_bytes

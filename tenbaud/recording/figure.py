@@ -65,6 +65,11 @@ class _Flight:
     cuts_s: list[tuple[float, float]] = field(default_factory=list)
     """times in which nothing was to pass, on purpose"""
 
+    @property
+    def live_is_coded(self) -> bool:
+        """Whether both estimates are one, as without a command lead: one curve hides the other."""
+        return np.array_equal(self.live.values, self.coded.values, equal_nan=True)
+
 
 def draw_flight(transmitter: Path, receiver: Path | None, output: Path, title: str) -> None:
     """Draw the first measured axis of a flight into the PNG file `output`.
@@ -177,8 +182,11 @@ def _draw_pitch(panel: Axes, flight: _Flight) -> None:
     _plot(panel, flight.reference, "reference", color=REFERENCE_COLOUR, linewidth=1.1, linestyle="-.")
     # Good estimates lie on the pitch: only thin lines over a thick one can all be seen.
     _plot(panel, flight.pitch, r"pitch $\theta$", color=PITCH_COLOUR, linewidth=2.2)
-    _plot(panel, flight.live, "live estimate", color=LIVE_COLOUR, linewidth=0.8)
-    _plot(panel, flight.coded, "coded estimate", color=CODED_COLOUR, linewidth=0.8)
+    if flight.live_is_coded:
+        _plot(panel, flight.coded, "estimate", color=CODED_COLOUR, linewidth=0.8)
+    else:
+        _plot(panel, flight.live, "live estimate", color=LIVE_COLOUR, linewidth=0.8)
+        _plot(panel, flight.coded, "coded estimate", color=CODED_COLOUR, linewidth=0.8)
     for index, (start_s, end_s) in enumerate(flight.cuts_s):
         label = "line cut" if index == 0 else ""
         panel.axvspan(start_s, end_s, color=ERASURE_COLOUR, alpha=0.12, linewidth=0, label=label)
@@ -201,8 +209,13 @@ def _draw_pitch(panel: Axes, flight: _Flight) -> None:
 
 
 def _draw_errors(panel: Axes, flight: _Flight) -> None:
-    _plot(panel, flight.error_live, "error of the live estimate", color=LIVE_COLOUR, linewidth=0.9)
-    _plot(panel, flight.error_coded, "error of the coded estimate", color=CODED_COLOUR, linewidth=0.9)
+    if flight.live_is_coded:
+        _plot(panel, flight.error_coded, "error of the estimate", color=CODED_COLOUR, linewidth=0.9)
+    else:
+        _plot(panel, flight.error_live, "error of the live estimate", color=LIVE_COLOUR, linewidth=0.9)
+        _plot(
+            panel, flight.error_coded, "error of the coded estimate", color=CODED_COLOUR, linewidth=0.9
+        )
     panel.axhline(0.0, color="#999999", linewidth=0.6)
     panel.set_ylabel("error, rad")
     _legend_above(panel)

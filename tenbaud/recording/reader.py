@@ -95,14 +95,6 @@ class MessageStream:
             ) from error
 
 
-def read_messages(path: Path) -> MessageStream:
-    """Stream all messages of a recording as (topic, flight time in ns, row).
-
-    Raises RecordingError if there is no such file, or if it is empty or no MCAP file.
-    """
-    return MessageStream(path)
-
-
 @dataclass(slots=True)
 class TopicSummary:
     """What one topic of a recording holds."""

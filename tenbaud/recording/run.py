@@ -123,10 +123,7 @@ class Run:
 
     def table(self, end: str, topic: str) -> Table:
         """Return the rows of one topic as they were recorded, `run.table("transmitter", "sample")`."""
-        tables = self._end(end)
-        if tables is None:
-            raise RecordingError(f"{self.path} holds no recording of the {end}.")
-        return tables.topic(topic)
+        return self.tables(end).topic(topic)
 
     def topics(self, end: str) -> list[str]:
         """Return the topics that an end recorded."""

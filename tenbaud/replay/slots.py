@@ -115,7 +115,7 @@ def _check_taken(taken: list[Row], record: FlightRecord) -> list[str]:
     terms = agreement.terms
     leaks = [*_doubled(taken, "taken by the receiver"), *_foreign(taken, agreement)]
     faults = agreement.faults
-    if agreement.clock == "virtual" and not (faults.skew_ppm or faults.clock_steps):
+    if agreement.clock == "virtual" and not faults.bad_clock:
         # There the receiver's clock is the flight's.
         early = [
             row

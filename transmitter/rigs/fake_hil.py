@@ -125,11 +125,6 @@ class FakeHIL:
         self._fed = time.monotonic()
         return not self.expired
 
-    def watchdog_is_expired(self) -> bool:
-        """Return whether it has."""
-        self._look()
-        return self.expired
-
     def watchdog_clear(self) -> None:
         """Allow access again."""
         self.expired, self._watchdog_s = False, None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from binascii import crc_hqx
 
-CRC_START = 0xFFFF
+from channel.wire import CRC_START
 
 
 def crc16(data: bytes) -> int:

@@ -250,7 +250,10 @@ class SerialBridge(DeviceRig):
 
 
 def _cannot_open(url: str, error: Exception) -> str:
-    text = f"{url} cannot be opened: {error}"
+    # pyserial puts the port's name and the system's error in twice; the error beneath has it once.
+    beneath = error.__context__
+    plain = beneath.strerror if isinstance(beneath, OSError) and beneath.strerror else str(error)
+    text = f"{url} cannot be opened: {plain}"
     number = getattr(error, "errno", None)
     if number == 13 or "Permission" in str(error):
         return f"{text}; on Linux your user must be in the group that owns it (often dialout)"

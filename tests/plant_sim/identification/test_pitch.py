@@ -188,5 +188,11 @@ def test_when_a_sequence_is_pseudo_random_then_it_repeats_only_after_its_length(
 
 def test_when_the_rig_ends_early_then_the_experiment_says_at_which_tick() -> None:
     signal = parse_excitation("square:1,0,1", STEP_S)
-    with pytest.raises(IdentificationError, match="tick 7 of 300"):
-        excite(lambda tick, *_: None if tick == 7 else 0.0, signal, STEP_S, 3.0)
+    with pytest.raises(IdentificationError, match="tick 7 of 600"):
+        excite(lambda tick, *_: None if tick == 7 else 0.0, signal, STEP_S, 6.0)
+
+
+def test_when_an_experiment_is_no_longer_than_its_rest_then_it_is_refused() -> None:
+    signal = parse_excitation("square:0.2,0,2.5", STEP_S)
+    with pytest.raises(IdentificationError, match="rests for 5 s first"):
+        excite(lambda *_: 0.0, signal, STEP_S, 5.0)

@@ -88,7 +88,7 @@ def test_when_the_rate_is_estimated_then_ten_bits_do_better_than_a_thousand(tmp_
         folder.path.mkdir()
         run_in_memory(agree(config, "virtual"), folder, "none")
         curves = read_curves(folder.transmitter, folder.receiver)
-        one = Flown(job.name, {}, 0.0, 0.0, 0.0, 1.0, 1.0, curves)
+        one = Flown(job.name, {}, 0.0, 0.0, 1.0, 1.0, curves)
         errors[job.name] = draw.rate_error(one)
     assert errors["rate-observer"] < 0.75 * errors["rate-usual"]  # measured: 0.50
     assert errors["rate-observer-tuned"] < 0.4 * errors["rate-usual"]  # measured: 0.24

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tenbaud import fly as fly_once
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.figure import decimate, draw_flight, interrupt_gaps
 from tenbaud.recording.folder import RunFolder
@@ -56,3 +57,17 @@ def test_thinned_curve_keeps_its_peaks_its_order_and_its_gaps() -> None:
     assert np.isnan(thin_values[gap]).all()
     short = (times[:10], values[:10])
     assert decimate(*short, 4000) == short
+
+
+@pytest.mark.parametrize(
+    ("lead_ticks", "curves"), [(0, ["estimate"]), (3, ["live estimate", "coded estimate"])]
+)
+def test_when_both_estimates_are_one_then_the_legend_names_no_curve_that_is_hidden(
+    tmp_path: Path, lead_ticks: int, curves: list[str]
+) -> None:
+    settings = {"duration_s": 3.0, "timing.lead_ticks": lead_ticks}
+    figure = fly_once(settings=settings, out=tmp_path / "run").plot()
+    legends = [panel.get_legend() for panel in figure.axes[:2]]
+    labels = [[text.get_text() for text in legend.get_texts()] for legend in legends]
+    assert labels[0][2:] == curves
+    assert labels[1] == [f"error of the {curve}" for curve in curves]

@@ -8,7 +8,7 @@ from mcap.writer import CompressionType, Writer
 
 from tenbaud.recording.encoding import channel_schema, row_encoder
 from tenbaud.recording.errors import RecordingError
-from tenbaud.recording.reader import Recording, read_messages
+from tenbaud.recording.reader import MessageStream, Recording
 from tests.tenbaud.recording.rows import TICK, Rows, tick_row
 
 ROWS_PER_CHUNK = 50
@@ -43,7 +43,7 @@ def test_cut_file_is_read_up_to_the_cut_wherever_it_falls(chunked: tuple[Path, l
     cuts |= set(range(9, ends[0], 97))
     for cut in sorted(cuts):
         path.write_bytes(whole[:cut])
-        stream = read_messages(path)
+        stream = MessageStream(path)
         ticks = [row["tick"] for _, _, row in stream]
         # The index behind a chunk may be cut without harm to the chunk.
         certain = ROWS_PER_CHUNK * sum(end <= cut for end in ends)
@@ -57,7 +57,7 @@ def test_blocks_that_were_never_filled_count_as_a_cut(chunked: tuple[Path, list[
     whole = path.read_bytes()
     half_empty = whole[: ends[1] + 300] + bytes(len(whole) - ends[1] - 300)
     path.write_bytes(half_empty)
-    stream = read_messages(path)
+    stream = MessageStream(path)
     assert len(list(stream)) == 2 * ROWS_PER_CHUNK
     assert not stream.complete
 
@@ -67,13 +67,13 @@ def test_damaged_chunk_is_not_believed(chunked: tuple[Path, list[int]]) -> None:
     damaged = bytearray(path.read_bytes())
     damaged[ends[1] + 200] ^= 1
     path.write_bytes(damaged)
-    stream = read_messages(path)
+    stream = MessageStream(path)
     assert len(list(stream)) == 2 * ROWS_PER_CHUNK
     assert not stream.complete
 
 
 def test_complete_file_says_so_only_after_its_end(chunked: tuple[Path, list[int]]) -> None:
-    stream = read_messages(chunked[0])
+    stream = MessageStream(chunked[0])
     assert not stream.complete
     assert len(list(stream)) == ROWS_PER_CHUNK * CHUNKS
     assert stream.complete
@@ -104,7 +104,7 @@ def test_wrong_files_are_named_with_what_to_do(tmp_path: Path) -> None:
         (text, "is not a recording"),
     ):
         with pytest.raises(RecordingError, match=words) as caught:
-            read_messages(path)
+            MessageStream(path)
         assert str(path) in str(caught.value)
 
 
@@ -117,7 +117,7 @@ def test_file_of_another_program_is_refused(tmp_path: Path) -> None:
         writer.add_message(channel, 0, b"\x00", 0)
         writer.finish()
     with pytest.raises(RecordingError, match=r"not written by tenbaud.*'/imu'"):
-        list(read_messages(path))
+        list(MessageStream(path))
 
 
 def test_file_cut_right_after_its_head_has_no_rows(

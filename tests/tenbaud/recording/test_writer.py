@@ -14,7 +14,7 @@ from mcap.writer import Writer
 
 from channel.recording import Field, RecordChannel
 from tenbaud.recording.errors import RecordingError
-from tenbaud.recording.reader import Recording, read_messages
+from tenbaud.recording.reader import MessageStream, Recording
 from tenbaud.recording.writer import McapRecorder
 from tests.tenbaud.recording.rows import SAMPLE, TICK, sample_row, tick_row
 
@@ -125,7 +125,7 @@ def test_rows_after_close_are_counted_and_close_may_be_repeated(tmp_path: Path) 
     recorder.close()
     assert (recorder.rows_written, recorder.rows_dropped) == (1, 1)
     assert recorder.path.stat().st_size == size_bytes
-    assert read_messages(recorder.path).path == recorder.path
+    assert MessageStream(recorder.path).path == recorder.path
 
 
 def test_row_that_cannot_be_encoded_is_lost_alone(tmp_path: Path) -> None:
@@ -175,7 +175,7 @@ def test_disk_that_fills_up_leaves_what_was_written(
     assert (recorder.rows_written, recorder.rows_dropped) == (600, 1400)
     assert recorder.error is not None
     assert "The flight goes on" in recorder.error
-    stream = read_messages(path)
+    stream = MessageStream(path)
     assert [row["tick"] for _, _, row in stream] == list(range(600))
     assert not stream.complete
 
@@ -188,7 +188,7 @@ def test_killed_process_loses_at_most_the_last_second(tmp_path: Path) -> None:
         assert process.stdout is not None
         marked = int(process.stdout.readline())
         process.send_signal(getattr(signal, "SIGKILL", signal.SIGTERM))
-    stream = read_messages(path)
+    stream = MessageStream(path)
     ticks = [row["tick"] for _, _, row in stream]
     assert not stream.complete
     assert ticks == list(range(len(ticks)))

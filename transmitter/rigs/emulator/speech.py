@@ -138,7 +138,7 @@ class QsbSpeech:
         self.counts: Counter[str] = Counter()
         self.streams = False
         self._stamped = False
-        self._cutter_rest = b""
+        self._rest = b""
 
     def encode(self, sample: RawSample) -> bytes:
         """Return the counter as the adapter streams it."""
@@ -149,7 +149,7 @@ class QsbSpeech:
 
     def feed(self, data: bytes) -> tuple[list[DeviceCommand], int]:
         """Take register writes; `S0E` starts the stream, `R0E` stops it and asks once."""
-        *lines, self._cutter_rest = (self._cutter_rest + data).split(b"\n")
+        *lines, self._rest = (self._rest + data).split(b"\n")
         asked = 0
         for line in filter(None, (line.strip().upper() for line in lines)):
             if line == b"S0E":

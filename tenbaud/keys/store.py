@@ -17,6 +17,7 @@ import stat
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from shlex import quote
 
 from channel.errors import TenbaudError
 from channel.links.security import Credentials
@@ -199,7 +200,7 @@ def _check_private(key: Path, mode: int) -> None:
     if mode & _OTHERS:
         raise KeysError(
             f"{key} can be read by others (mode {stat.S_IMODE(mode):04o}); take that away: "
-            f"chmod 600 {key}"
+            f"chmod 600 {quote(str(key))}"
         )
 
 

@@ -26,6 +26,7 @@ from tenbaud.keys.authority import (
     Certified,
     NodeRole,
     Pem,
+    end_of,
     is_signed_by,
     issue,
     new_authority,
@@ -182,7 +183,7 @@ def _issue(authority: Pem, name: str, role: NodeRole, hosts: tuple[str, ...], da
 
 
 def read_authority(keys: Path) -> Pem:
-    """Return the authority below a folder, to sign with; KeysError if there is none."""
+    """Return the authority below a folder, to sign with; KeysError if there is none or it expired."""
     folder = keys / AUTHORITY
     try:
         pem = Pem((folder / "authority.pem").read_bytes(), (folder / "authority.key").read_bytes())
@@ -193,6 +194,15 @@ def read_authority(keys: Path) -> Pem:
             "--folder names another place"
         ) from error
     _check_private(folder / "authority.key", mode)
+    try:
+        end = end_of(pem.certificate)
+    except ValueError as error:
+        raise KeysError(f"{folder / 'authority.pem'} cannot be used: {error}") from error
+    if end <= datetime.now(UTC):
+        raise KeysError(
+            f"the authority in {folder} expired on {end:%Y-%m-%d}, and nothing that it signs is valid "
+            "any more; make another with `tenbaud keys init --folder ELSEWHERE`, and every node anew"
+        )
     return pem
 
 

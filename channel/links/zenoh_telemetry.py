@@ -93,8 +93,14 @@ class TelemetryFeed:
         return bool(self._session.info.peers_zid() or self._session.info.routers_zid())
 
     def send(self, session_name: str, data: bytes) -> None:
-        """Ask something of the flight of that name; nobody answers but the telemetry."""
-        self._session.put(f"{KEY_ROOT}/{session_name}/control", data)
+        """Ask something of the flight of that name; nobody answers but the telemetry.
+
+        May be called while another thread closes: LinkError once it has.
+        """
+        try:
+            self._session.put(f"{KEY_ROOT}/{session_name}/control", data)
+        except zenoh.ZError as error:
+            raise LinkError(f"the command could not be sent: {error}") from error
 
     def close(self) -> None:
         """Close the session."""

@@ -59,6 +59,8 @@ def view(
         raise typer.BadParameter(
             f"--session {session!r}: a session's name as in rig/7, with * for any one part"
         )
+    # As in a URL, or bare.
+    host = host.removeprefix("[").removesuffix("]")
     address = Address(host, port or free_port(host), insecure)
     credentials = None
     if keys is not None:

@@ -122,6 +122,13 @@ def read_certificate(pem: bytes) -> Certified:
     )
 
 
+def end_of(certificate_pem: bytes) -> datetime:
+    """Return when any certificate expires, an authority's too; ValueError for what is none."""
+    from cryptography import x509
+
+    return x509.load_pem_x509_certificate(certificate_pem).not_valid_after_utc
+
+
 def is_signed_by(certificate_pem: bytes, authority_pem: bytes) -> bool:
     """Return whether a certificate comes from this authority."""
     from cryptography import x509

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from shlex import quote
 
-from tenbaud.keys.authority import NodeRole
+from tenbaud.keys.authority import Certified, NodeRole
 from tenbaud.keys.store import NodeKeys
 
 PORT = 7447
@@ -25,27 +26,30 @@ def next_steps(nodes: Sequence[NodeKeys]) -> str:
     if receiver is None:
         return "Next: tenbaud keys add desk --role receiver --host ADDRESS   (where the rig reaches it)"
     rig, desk = transmitter.certified, receiver.certified
-    at = endpoint_of(desk.hosts[0]) if desk.hosts else f"tls/ADDRESS:{PORT}"
+    at = _place(desk)
+    at_rig, at_desk = (quote(str(node.folder)) for node in (transmitter, receiver))
     lines = [
         f"Copy {transmitter.folder} to the rig's machine and {receiver.folder} to the other, over ssh;",
         "they hold private keys. Then:",
-        f"  on {desk.name}:  tenbaud receive --keys {receiver.folder} --peer {rig.name} --listen {at}",
-        f"  on {rig.name}:  tenbaud transmit --keys {transmitter.folder} --peer {desk.name} "
-        f"--connect {at}",
+        f"  on {desk.name}:  tenbaud receive --keys {at_desk} --peer {rig.name} --listen {at}",
+        f"  on {rig.name}:  tenbaud transmit --keys {at_rig} --peer {desk.name} --connect {at}",
     ]
     if router is not None:
         hub = router.certified
-        at = endpoint_of(hub.hosts[0]) if hub.hosts else f"tls/ADDRESS:{PORT}"
+        at = _place(hub)
         lines += [
             f"Or, where the two cannot reach each other, through {hub.name}:",
-            f"  on {hub.name}:  tenbaud router --keys {router.folder} --listen {at} "
+            f"  on {hub.name}:  tenbaud router --keys {quote(str(router.folder))} --listen {at} "
             f"--flight helicopter={rig.name},{desk.name}",
-            f"  on {desk.name}:  tenbaud receive --keys {receiver.folder} --peer {hub.name} "
-            f"--router {at}",
-            f"  on {rig.name}:  tenbaud transmit --keys {transmitter.folder} --peer {hub.name} "
-            f"--router {at}",
+            f"  on {desk.name}:  tenbaud receive --keys {at_desk} --peer {hub.name} --router {at}",
+            f"  on {rig.name}:  tenbaud transmit --keys {at_rig} --peer {hub.name} --router {at}",
         ]
     return "\n".join(lines)
+
+
+def _place(node: Certified) -> str:
+    # Brackets around an address of IPv6 mean something to a shell.
+    return quote(endpoint_of(node.hosts[0])) if node.hosts else f"tls/ADDRESS:{PORT}"
 
 
 def _first(nodes: Sequence[NodeKeys], role: NodeRole) -> NodeKeys | None:

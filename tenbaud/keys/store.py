@@ -17,6 +17,7 @@ import stat
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from shlex import quote
 
 from channel.errors import TenbaudError
 from channel.links.security import Credentials
@@ -25,6 +26,7 @@ from tenbaud.keys.authority import (
     Certified,
     NodeRole,
     Pem,
+    end_of,
     is_signed_by,
     issue,
     new_authority,
@@ -181,7 +183,7 @@ def _issue(authority: Pem, name: str, role: NodeRole, hosts: tuple[str, ...], da
 
 
 def read_authority(keys: Path) -> Pem:
-    """Return the authority below a folder, to sign with; KeysError if there is none."""
+    """Return the authority below a folder, to sign with; KeysError if there is none or it expired."""
     folder = keys / AUTHORITY
     try:
         pem = Pem((folder / "authority.pem").read_bytes(), (folder / "authority.key").read_bytes())
@@ -192,6 +194,15 @@ def read_authority(keys: Path) -> Pem:
             "--folder names another place"
         ) from error
     _check_private(folder / "authority.key", mode)
+    try:
+        end = end_of(pem.certificate)
+    except ValueError as error:
+        raise KeysError(f"{folder / 'authority.pem'} cannot be used: {error}") from error
+    if end <= datetime.now(UTC):
+        raise KeysError(
+            f"the authority in {folder} expired on {end:%Y-%m-%d}, and nothing that it signs is valid "
+            "any more; make another with `tenbaud keys init --folder ELSEWHERE`, and every node anew"
+        )
     return pem
 
 
@@ -199,7 +210,7 @@ def _check_private(key: Path, mode: int) -> None:
     if mode & _OTHERS:
         raise KeysError(
             f"{key} can be read by others (mode {stat.S_IMODE(mode):04o}); take that away: "
-            f"chmod 600 {key}"
+            f"chmod 600 {quote(str(key))}"
         )
 
 

@@ -13,7 +13,7 @@ import orjson
 from channel.recording import Field, RecordChannel
 from tenbaud.recording.columns import TABLES, Column, all_columns, flight_columns
 from tenbaud.recording.errors import RecordingError
-from tenbaud.recording.layouts import flight_layouts
+from tenbaud.recording.layouts import flight_layouts, layout_paths
 from tenbaud.recording.run import Run
 
 
@@ -21,17 +21,19 @@ def convert(run: Run, form: str, output: Path | None = None, overwrite: bool = F
     """Write a run in another form; return the files that were written.
 
     Without `output` it goes into the folder of the run: `csv/` and `parquet/` have a file per table,
-    the other forms are one file, `flight.mat`, `flight.json` or `flight.mcap`. What exists already is
-    replaced only with `overwrite`. Raises RecordingError for an unknown form, a run that cannot be
-    read and a place that cannot be written.
+    the other forms are one file, `flight.mat`, `flight.json` or `flight.mcap`, which has layouts for
+    its viewers beside it. What exists already is replaced only with `overwrite`. Raises
+    RecordingError for an unknown form, a run that cannot be read and a place that cannot be written.
     """
     if form not in FORMS:
         raise RecordingError(f"A run cannot become {form!r}. Known: {', '.join(FORMS)}.")
     default, write = FORMS[form]
     target = output or run.folder.path / default
-    if target.exists() and not overwrite:
+    layouts = layout_paths(target) if form == "mcap" else []
+    there = [path for path in (target, *layouts) if path.exists()]
+    if there and not overwrite:
         raise RecordingError(
-            f"{target} exists already and is not overwritten. Add --force, or choose another place "
+            f"{there[0]} exists already and is not overwritten. Add --force, or choose another place "
             "with --out."
         )
     if target.exists():
@@ -44,16 +46,15 @@ def convert(run: Run, form: str, output: Path | None = None, overwrite: bool = F
         write(run, unfinished)
         _remove(target)
         unfinished.replace(target)
+        if layouts:
+            flight_layouts(run, target)
     except OSError as error:
         raise RecordingError(
             f"{target} cannot be written: {error.strerror or error}. Choose another place with --out."
         ) from error
     finally:
         _remove(unfinished)
-    written = sorted(target.iterdir()) if target.is_dir() else [target]
-    if form == "mcap":
-        written += flight_layouts(run, target)
-    return written
+    return sorted(target.iterdir()) if target.is_dir() else [target, *layouts]
 
 
 def _check_replaceable(run: Run, form: str, target: Path) -> None:

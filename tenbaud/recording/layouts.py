@@ -105,12 +105,17 @@ def flight_plots(run: Run) -> tuple[Plot, ...]:
     return tuple(plots)
 
 
+def layout_paths(recording: Path) -> list[Path]:
+    """Return where the layouts of a converted file go: Foxglove's, then PlotJuggler's."""
+    suffixes = (FOXGLOVE_SUFFIX, PLOTJUGGLER_SUFFIX)
+    return [recording.with_name(recording.stem + suffix) for suffix in suffixes]
+
+
 def flight_layouts(run: Run, recording: Path) -> list[Path]:
     """Write both layouts beside a converted file; return their paths."""
     plots = flight_plots(run)
-    foxglove = recording.with_name(recording.stem + FOXGLOVE_SUFFIX)
+    foxglove, juggler = layout_paths(recording)
     foxglove.write_text(foxglove_layout(plots))
-    juggler = recording.with_name(recording.stem + PLOTJUGGLER_SUFFIX)
     juggler.write_text(plotjuggler_layout(plots, recording.name))
     return [foxglove, juggler]
 

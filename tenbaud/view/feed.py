@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, Self
 
 import orjson
@@ -53,7 +54,9 @@ class Feed:
     def send(self, session_name: str, command: dict[str, object]) -> None:
         """Ask something of a flight, at both its ends; each obeys what concerns it."""
         for feed in tuple(self._open.values()):
-            feed.send(session_name, orjson.dumps(command))
+            # The thread beside may have closed it a moment ago: the end is gone, and obeys nothing.
+            with suppress(LinkError):
+                feed.send(session_name, orjson.dumps(command))
 
     def _run(self) -> None:
         try:

@@ -24,6 +24,8 @@ from tenbaud.view.feed import Feed
 STREAM_PERIOD_S = 0.05
 IDLE_PERIOD_S = 0.5
 FIRST_LOOKS = 100
+EVERYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}
+"""Hosts that stand for every address of this machine, and by which one it finds itself there."""
 STATIC = Path(__file__).parent / "static"
 
 
@@ -47,7 +49,13 @@ class Address:
     @property
     def url(self) -> str:
         """Return what to type into a browser on this machine."""
-        return f"http://{self.host if self.is_local else '127.0.0.1'}:{self.port}"
+        return f"http://{self.name}:{self.port}"
+
+    @property
+    def name(self) -> str:
+        """Return this machine's name for itself in a URL: one of IPv6 stands in brackets."""
+        host = EVERYWHERE.get(self.host, self.host)
+        return f"[{host}]" if ":" in host else host
 
     def check(self) -> None:
         """Refuse an address that is taken, or that others can reach unless told to allow it."""
@@ -58,12 +66,12 @@ class Address:
                 "trust with that, add --insecure"
             )
         try:
-            with socket.socket() as probe:
+            with _socket_for(self.host) as probe:
                 probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
                 probe.bind((self.host, self.port))
         except OSError as error:
             raise PageUnavailable(
-                f"the page cannot be served at {self.host}:{self.port}: {error.strerror}; give another "
+                f"the page cannot be served at {self.name}:{self.port}: {error.strerror}; give another "
                 "--port (--view-port of `tenbaud demo`), or 0 for any free one"
             ) from error
 
@@ -89,7 +97,7 @@ def serve(feed: Feed, address: Address, *, open_browser: bool = False) -> None:
 
     board = Board()
     if address.is_local:
-        names = ["127.0.0.1", "localhost", address.host]
+        names = ["127.0.0.1", "localhost", address.name]
         app.add_middleware(TrustedHostMiddleware, allowed_hosts=names)
     app.add_static_files("/view", STATIC, max_cache_age=0)
     _add_stream(app, feed, board)
@@ -166,8 +174,13 @@ def _same_origin(origin: str | None, host: str | None) -> bool:
     return origin is None or urlsplit(origin).netloc == host
 
 
+def _socket_for(host: str) -> socket.socket:
+    """Return a socket that takes this host's kind of address."""
+    return socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
+
+
 def free_port(host: str) -> int:
     """Return a port that was free at this address a moment ago."""
-    with socket.socket() as probe:
+    with _socket_for(host) as probe:
         probe.bind((host, 0))
         return int(probe.getsockname()[1])

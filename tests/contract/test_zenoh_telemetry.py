@@ -6,6 +6,7 @@ import os
 import queue
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -114,6 +115,26 @@ def test_when_an_end_allows_no_control_then_it_hears_no_command(tmp_path: Path) 
         viewer.send("lab", b"up")
     finally:
         viewer.close()
+        port.close()
+
+
+def test_when_a_viewer_is_closed_while_it_sends_then_sending_is_a_link_error(tmp_path: Path) -> None:
+    port = TelemetryPort("transmitter", "lab", endpoint_in(tmp_path))
+    viewer = TelemetryFeed(endpoint_in(tmp_path), "lab", lambda data: None)
+    closing = threading.Thread(target=viewer.close)
+    until_s = time.monotonic() + PATIENCE_S
+
+    def send_on() -> None:
+        while time.monotonic() < until_s:
+            viewer.send("lab", b"up")
+
+    try:
+        viewer.send("lab", b"up")
+        closing.start()
+        with pytest.raises(LinkError, match="could not be sent"):
+            send_on()
+    finally:
+        closing.join()
         port.close()
 
 

@@ -104,6 +104,26 @@ def test_when_a_certificate_ends_soon_then_it_is_said_and_when_it_has_then_it_is
         usable(keys / "late", NodeRole.TRANSMITTER)
 
 
+def test_when_the_authority_has_expired_then_it_signs_nothing_and_says_so(keys: Path) -> None:
+    add_node(keys, "rig", NodeRole.TRANSMITTER, ())
+    before = (keys / "rig" / "node.pem").read_bytes()
+    expired = new_authority("tenbaud authority", days=-1.0)
+    (keys / "authority" / "authority.pem").write_bytes(expired.certificate)
+    (keys / "authority" / "authority.key").write_bytes(expired.private_key)
+    with pytest.raises(KeysError, match=r"authority in .* expired on .* keys init"):
+        renew_node(keys, "rig")
+    with pytest.raises(KeysError, match=r"authority in .* expired on .* keys init"):
+        add_node(keys, "new", NodeRole.TRANSMITTER, ())
+    assert (keys / "rig" / "node.pem").read_bytes() == before
+    assert not (keys / "new").exists()
+
+
+def test_when_the_authority_s_certificate_is_none_then_its_file_is_named(keys: Path) -> None:
+    (keys / "authority" / "authority.pem").write_bytes(b"not a certificate")
+    with pytest.raises(KeysError, match=r"authority\.pem cannot be used"):
+        add_node(keys, "rig", NodeRole.TRANSMITTER, ())
+
+
 def test_when_a_certificate_is_for_another_role_then_it_is_refused(keys: Path) -> None:
     add_node(keys, "rig", NodeRole.TRANSMITTER, ())
     with pytest.raises(KeysError, match="certificate of a transmitter, and this is a receiver"):

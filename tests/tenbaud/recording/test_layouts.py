@@ -15,7 +15,13 @@ import pytest
 
 from tenbaud import Run
 from tenbaud.recording.convert import convert
-from tenbaud.recording.layouts import RECORDING_PLOTS, foxglove_layout, plotjuggler_layout
+from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.layouts import (
+    RECORDING_PLOTS,
+    foxglove_layout,
+    layout_paths,
+    plotjuggler_layout,
+)
 from tenbaud.recording.reader import Recording
 from tests.tenbaud.flown import flown
 from tests.tenbaud.processes import REPOSITORY
@@ -96,6 +102,28 @@ def test_every_name_in_the_layouts_of_a_converted_run_is_in_it(run: Run, tmp_pat
             match = pattern.fullmatch(text)
             assert match is not None, text
             assert_is_recorded(recording, *match.groups())
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_when_a_layout_exists_then_nothing_is_written_without_being_told_to(
+    run: Run, tmp_path: Path, which: int
+) -> None:
+    target = tmp_path / "flight.mcap"
+    own = layout_paths(target)[which]
+    own.write_text("my own plots")
+    with pytest.raises(RecordingError, match=rf"{own.name} exists already.*--force"):
+        convert(run, "mcap", target)
+    assert [path.name for path in tmp_path.iterdir()] == [own.name]
+    assert own.read_text() == "my own plots"
+    assert own in convert(run, "mcap", target, overwrite=True)
+    assert "flight" in own.read_text()
+
+
+def test_when_a_layout_cannot_be_written_then_it_is_said(run: Run, tmp_path: Path) -> None:
+    target = tmp_path / "flight.mcap"
+    layout_paths(target)[0].mkdir()
+    with pytest.raises(RecordingError, match="cannot be written"):
+        convert(run, "mcap", target, overwrite=True)
 
 
 def test_the_committed_layouts_are_those_that_the_code_makes() -> None:

@@ -6,11 +6,26 @@ import socket
 import subprocess
 import sys
 from pathlib import Path
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
 
 import pytest
 
+from benchmarks.browser import served
 from tenbaud.view.server import Address, PageUnavailable, _same_origin, free_port
 from tests.tenbaud.processes import run
+
+
+def _has_ipv6() -> bool:
+    try:
+        with socket.socket(socket.AF_INET6) as probe:
+            probe.bind(("::1", 0))
+    except OSError:
+        return False
+    return True
+
+
+NEEDS_IPV6 = pytest.mark.skipif(not _has_ipv6(), reason="this machine has no IPv6 loopback")
 
 WITHOUT_NICEGUI = """
 import sys
@@ -35,6 +50,47 @@ def test_a_port_that_is_taken_is_named() -> None:
         with pytest.raises(PageUnavailable, match=f"{port}.*another --port"):
             Address(port=port).check()
     Address(port=free_port("127.0.0.1")).check()
+
+
+@pytest.mark.parametrize(
+    ("host", "url"),
+    [
+        ("127.0.0.1", "http://127.0.0.1:8710"),
+        ("localhost", "http://localhost:8710"),
+        ("::1", "http://[::1]:8710"),
+        ("0.0.0.0", "http://127.0.0.1:8710"),
+        ("::", "http://[::1]:8710"),
+        ("192.0.2.1", "http://192.0.2.1:8710"),
+    ],
+)
+def test_the_url_leads_to_where_the_page_is_served(host: str, url: str) -> None:
+    assert Address(host, 8710).url == url
+
+
+@NEEDS_IPV6
+@pytest.mark.parametrize("host", ["::1", "[::1]"])
+def test_when_the_host_is_an_ipv6_address_then_the_page_is_served_there(
+    host: str, tmp_path: Path
+) -> None:
+    pytest.importorskip("nicegui")
+    with served(tmp_path, "view", "--host", host, "--port", "0") as page:
+        assert page.url.startswith("http://[::1]:")
+        with urlopen(page.url, timeout=10.0) as answer:
+            assert answer.status == 200
+            assert "tenbaud" in answer.read().decode()
+        foreign = Request(page.url, headers={"Host": "example.org"})
+        with pytest.raises(HTTPError, match="400"):
+            urlopen(foreign, timeout=10.0)
+
+
+@NEEDS_IPV6
+def test_when_a_port_at_an_ipv6_address_is_taken_then_it_is_named() -> None:
+    with socket.socket(socket.AF_INET6) as other:
+        other.bind(("::1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        with pytest.raises(PageUnavailable, match=rf"\[::1\]:{port}.*another --port"):
+            Address("::1", port).check()
 
 
 @pytest.mark.parametrize(

@@ -95,8 +95,11 @@ def tune(
     --train-share, and the rest. Both errors are reported, before and after.
 
     The preset written to --out has the sections timing, channel, model and coder over the preset that
-    the fit started from. Plant, disturbance, line and recording are not in it.
+    the fit started from. Plant, disturbance, line and recording are not in it. Ctrl-C ends the search
+    and keeps the best that it has found; a second one ends at once.
     """
+    from tenbaud.flight.outcome import ExitCode
+    from tenbaud.flight.stop import StopFlag
     from tenbaud.studies.compiled import require
 
     require("numba")
@@ -119,18 +122,21 @@ def tune(
     tuning = Tuning(preset, config, overrides, {}, split, method.value, evaluations, seed)
     ranges = free_ranges(tuning.config({}), _named(free or []), model=model)
     tuning = replace(tuning, free=ranges)
-    with _bar(evaluations) as (progress, task):
+    with StopFlag() as stop, _bar(evaluations) as (progress, task):
 
         def told(count: int, error: float) -> None:
             progress.update(task, completed=count, description=f"best {math.degrees(error):.4g}°")
 
-        tuned = fit(tuning, told)
+        tuned = fit(tuning, told, stop)
     out.write_text(preset_text(tuning, tuned), encoding="utf-8")
     if as_json:
         typer.echo(json.dumps({**tuned._asdict(), "preset_file": str(out)}, indent=2))
-        return
-    _tell(tuned)
-    typer.echo(f"{out}: fly it with --config {out}")
+    else:
+        _tell(tuned)
+        typer.echo(f"{out}: fly it with --config {out}")
+    if stop.raised:
+        typer.echo(f"stopped after {tuned.evaluations} of {evaluations} evaluations", err=True)
+        raise typer.Exit(ExitCode.INTERRUPTED)
 
 
 def _make_room(out: Path) -> None:

@@ -50,8 +50,12 @@ class Tuned(NamedTuple):
     test_what: str
 
 
-def tune(tuning: Tuning, on_evaluation: OnEvaluation) -> Tuned:
+def tune(
+    tuning: Tuning, on_evaluation: OnEvaluation, should_stop: Callable[[], bool] = lambda: False
+) -> Tuned:
     """Fit constants. The same tuning gives the same constants: all chance comes from its seed.
+
+    The search ends early when `should_stop` says so; what it has found by then is judged and returned.
 
     Raises what is wrong with the configuration, the recording or the constants that the fit starts
     from; only what the search tries later is penalised instead.
@@ -66,7 +70,7 @@ def tune(tuning: Tuning, on_evaluation: OnEvaluation) -> Tuned:
             f"from: {before.reason}"
         )
     before_test = judge(tuning, start, train=False)
-    trials = _Trials(tuning, on_evaluation, start, before)
+    trials = _Trials(tuning, on_evaluation, should_stop, start, before)
     trials.note(start, before)
     with suppress(_Spent):
         _search(trials.error_at, [_share(tuning.free[name], start[name]) for name in start], tuning)
@@ -90,7 +94,7 @@ def tune(tuning: Tuning, on_evaluation: OnEvaluation) -> Tuned:
 
 
 class _Spent(Exception):
-    """As many sets of constants were flown as were asked for."""
+    """As many sets of constants were flown as were asked for, or the search was told to stop."""
 
 
 @dataclass(slots=True)
@@ -99,6 +103,7 @@ class _Trials:
 
     tuning: Tuning
     on_evaluation: OnEvaluation
+    should_stop: Callable[[], bool]
     values: dict[str, float]
     best: Judged
     count: int = 0
@@ -110,8 +115,8 @@ class _Trials:
         self.names = list(self.tuning.free)
 
     def error_at(self, shares: Iterable[float]) -> float:
-        """Return the error of constants, each given as a share of its range; _Spent at the bound."""
-        if self.count >= self.tuning.evaluations:
+        """Return the error of constants, each a share of its range; _Spent when it is enough."""
+        if self.count >= self.tuning.evaluations or self.should_stop():
             raise _Spent
         free = self.tuning.free
         values = {

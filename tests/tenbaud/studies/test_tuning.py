@@ -6,6 +6,7 @@ import csv
 import json
 import math
 import random
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +17,11 @@ from channel.errors import TenbaudError
 from tenbaud.build_rig import nominal_plant
 from tenbaud.cli.app import app
 from tenbaud.config.load import load_config
+from tenbaud.flight.outcome import ExitCode
+from tenbaud.studies import tuning as tuning_module
 from tenbaud.studies.constants import free_ranges
 from tenbaud.studies.flights import CompiledPoint
-from tenbaud.studies.judging import PENALTY_RAD, Split, Tuning, judge, split_ticks
+from tenbaud.studies.judging import PENALTY_RAD, Judged, Split, Tuning, judge, split_ticks
 from tenbaud.studies.plain import fly_plain
 from tenbaud.studies.settings import StudyError
 from tenbaud.studies.study_file import Range
@@ -47,6 +50,36 @@ def tuning_of(free: dict[str, Range], **changes: Any) -> Tuning:
 
 def usual(**changes: Any) -> Tuning:
     return tuning_of(free_ranges(load_config("paper-10baud"), {}, model=False), **changes)
+
+
+def test_when_the_search_is_stopped_then_what_it_has_found_is_kept() -> None:
+    seen: list[float] = []
+    tuning = usual(evaluations=1000)
+    tuned = tune(tuning, lambda count, error: seen.append(error), lambda: len(seen) >= 20)
+    assert tuned.evaluations == len(seen) == 20
+    assert tuned.train_after == seen[-1] < tuned.train_before
+    assert tuned.test_after == judge(tuning, tuned.values, train=False).rms_rad
+
+
+def test_when_ctrl_c_ends_the_command_then_the_preset_is_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(tuning: Tuning, values: dict[str, float], *, train: bool) -> Judged:
+        flown.append(1)
+        if len(flown) == 20:
+            signal.raise_signal(signal.SIGINT)
+        return judge(tuning, values, train=train)
+
+    flown: list[int] = []
+    monkeypatch.setattr(tuning_module, "judge", interrupted)
+    out = tmp_path / "found.toml"
+    fit = [*("tune", "--out", str(out), "--duration", "20", "--mismatch", "0.1"), "--seeds", "2"]
+    done = CliRunner().invoke(app, fit)
+    assert done.exit_code == ExitCode.INTERRUPTED, done.output
+    # Twenty flights: those before the fit on both parts, and nineteen sets of constants.
+    assert "stopped after 19 of 600 evaluations" in done.output
+    assert f"{out}: fly it with --config" in done.output
+    assert load_config(None, out).coder.kind == "zoom"
 
 
 @pytest.mark.parametrize("method", ["differential-evolution", "nelder-mead"])

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import io
+import sys
+import threading
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -69,6 +72,38 @@ def test_when_a_valid_node_is_not_invited_then_it_neither_hears_nor_is_heard(
         assert rig.receive(SILENCE_S) is None
     assert desk.counts.refused == {"uninvited certificate intern": 2}
     check_both_ways(rig, desk)  # type: ignore[arg-type]
+
+
+class StuckTerminal(io.StringIO):
+    """Takes nothing until it is released, as a terminal that was stopped with Ctrl-S."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.released = threading.Event()
+        self.threads: set[str] = set()
+
+    def write(self, text: str) -> int:
+        self.threads.add(threading.current_thread().name)
+        self.released.wait(PATIENCE_S)
+        return super().write(text)
+
+
+def test_when_the_terminal_takes_nothing_then_no_thread_of_zenoh_waits_for_it(
+    pair: Pair, endpoint: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, desk = pair
+    terminal = StuckTerminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    stranger = security("intern", ("desk", "receiver"))
+    try:
+        with ZenohLink("transmitter", SESSION, connect=(endpoint,), security=stranger):
+            assert until(lambda: desk.counts.refused["uninvited certificate intern"] == 1)
+            assert until(lambda: bool(terminal.threads))
+        check_both_ways(*pair)  # type: ignore[arg-type]
+        assert terminal.threads == {"zenoh gate"}
+    finally:
+        terminal.released.set()
+    assert until(lambda: "uninvited certificate intern (1 so far)" in terminal.getvalue())
 
 
 def test_when_the_invited_rig_plays_the_receiver_then_its_commands_go_nowhere(endpoint: str) -> None:

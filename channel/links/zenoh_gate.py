@@ -15,6 +15,7 @@ import threading
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
+from queue import SimpleQueue
 from typing import Self, TextIO
 
 import zenoh
@@ -34,6 +35,8 @@ REASONS = (
 )
 OTHER_REASON = "failed handshake"
 UNINVITED = "uninvited certificate"
+LAST_WORD_S = 1.0
+"""How long a session that closes waits for a terminal."""
 
 
 def reason_of(text: str) -> str:
@@ -45,7 +48,10 @@ def reason_of(text: str) -> str:
 
 
 class Gate:
-    """Counts the links of nodes that were not invited, for as long as the session is open."""
+    """Counts the links of nodes that were not invited, for as long as the session is open.
+
+    They are told on a thread of its own: one of Zenoh's carries symbols, and a terminal may block.
+    """
 
     def __init__(
         self, session: zenoh.Session, security: Security | None, refused: Counter[str]
@@ -53,22 +59,35 @@ class Gate:
         self._invited = {one.name for one in security.invited} if security is not None else set()
         self._refused = refused
         self._listener = None
+        self._untold: SimpleQueue[tuple[str, int] | None] = SimpleQueue()
+        self._thread = threading.Thread(target=self._tell_on, name="zenoh gate", daemon=True)
         if security is not None:
             # Runs on a thread of Zenoh and calls nothing of Zenoh.
             handler = zenoh.handlers.Callback(self._on_link, indirect=False)
             self._listener = session.info.declare_link_events_listener(handler, history=True)
+            self._thread.start()
 
     def close(self) -> None:
         """Stop listening; to be called before the session is closed."""
         if self._listener is not None:
             self._listener.undeclare()
             self._listener = None
+            self._untold.put(None)
+            self._thread.join(LAST_WORD_S)
 
     def _on_link(self, event: zenoh.LinkEvent) -> None:
         name = event.link.auth_identifier
         if event.kind == zenoh.SampleKind.PUT and name not in self._invited:
-            self._refused[f"{UNINVITED} {name}"] += 1
-            _tell(f"{UNINVITED} {name}", self._refused[f"{UNINVITED} {name}"])
+            reason = f"{UNINVITED} {name}"
+            self._refused[reason] += 1
+            if _is_told(self._refused[reason]):
+                self._untold.put((reason, self._refused[reason]))
+
+    def _tell_on(self) -> None:
+        while (item := self._untold.get()) is not None:
+            # A terminal that has gone is no reason to stop.
+            with suppress(OSError):
+                _tell(*item)
 
 
 class HandshakeLog:
@@ -104,7 +123,7 @@ class HandshakeLog:
         # The pipe's last writer goes, and the thread comes to its end.
         os.dup2(self._saved, 1)
         os.close(self._saved)
-        self._thread.join(1.0)
+        self._thread.join(LAST_WORD_S)
         self._lines.close()
         self._own_stdout.close()
 
@@ -125,7 +144,11 @@ class HandshakeLog:
         self._on_refused(reason, self.refused[reason])
 
 
+def _is_told(count: int) -> bool:
+    """Return whether it is the first time, or the count has another digit."""
+    return str(count).rstrip("0") == "1"
+
+
 def _tell(reason: str, count: int) -> None:
-    """Say it the first time, and whenever the count has another digit."""
-    if count == 10 ** (len(str(count)) - 1):
+    if _is_told(count):
         sys.stderr.write(f"tenbaud: turned a connection away: {reason} ({count} so far)\n")

@@ -49,7 +49,6 @@ class ZenohHub:
                 f"sessions {pattern!r}: write names as in rig/7, with * for any one part, as in rig/*"
             )
         self.counts = LinkCounts()
-        self._present: set[str] = set()
         self._joined: dict[str, tuple[zenoh.Publisher, zenoh.LivelinessToken]] = {}
         self._inbox: ChannelInbox | None = None
         self._closed = False
@@ -59,11 +58,6 @@ class ZenohHub:
             self._gate = Gate(self._session, node.get("security"), self.counts.refused)
             self._inbox = ChannelInbox(
                 self._session, f"{KEY_ROOT}/{pattern}/up/*", CHANNEL_MESSAGES_MAX
-            )
-            self._watch = self._session.liveliness().declare_subscriber(
-                f"{KEY_ROOT}/{pattern}/alive/transmitter/*",
-                zenoh.handlers.Callback(self._on_alive, indirect=False),
-                history=True,
             )
         except BaseException:
             self.close()
@@ -77,7 +71,7 @@ class ZenohHub:
         sample = self._inbox.sample(timeout_s) if self._inbox is not None else None
         if sample is None:
             return None
-        name = _name_in(str(sample.key_expr), "/up/")
+        name = str(sample.key_expr).removeprefix(f"{KEY_ROOT}/").rpartition("/up/")[0]
         # The key is the sender's choice, and a name leads to a configuration and a folder.
         if not is_session_name(name):
             self.counts.dropped["no session's name"] += 1
@@ -134,10 +128,6 @@ class ZenohHub:
         self.counts.messages_out += 1
         self.counts.bytes_out += len(data)
 
-    def present(self, name: str) -> bool:
-        """Return whether a transmitter of this session is known to be there now."""
-        return any(_name_in(key, "/alive/") == name for key in tuple(self._present))
-
     def close(self) -> None:
         """Close the Zenoh session; what was sent before is still delivered."""
         if not self._closed:
@@ -154,18 +144,6 @@ class ZenohHub:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _on_alive(self, sample: zenoh.Sample) -> None:
-        # On a thread of Zenoh; calls nothing of Zenoh.
-        key = str(sample.key_expr)
-        if sample.kind == zenoh.SampleKind.PUT:
-            self._present.add(key)
-        else:
-            self._present.discard(key)
-
 
 def _command_key(name: str) -> str:
     return f"{KEY_ROOT}/{name}/down/command"
-
-
-def _name_in(key: str, mark: str) -> str:
-    return key.removeprefix(f"{KEY_ROOT}/").rpartition(mark)[0]

@@ -15,27 +15,13 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from channel import numerics, wire
+from channel import frames, numerics, wire
 from channel.codec import Codec
 from channel.coders.history import HistoryCoder, HistoryParameters
 from channel.coders.static import StaticCoder, StaticParameters
 from channel.coders.timed import TimedCoder, TimedParameters
 from channel.coders.words import WordsCoder, WordsParameters
 from channel.coders.zoom import ZoomCoder, ZoomParameters
-from channel.frames import (
-    Bye,
-    Claim,
-    Commands,
-    Desync,
-    Echo,
-    Frame,
-    Hello,
-    Refuse,
-    Symbol,
-    Unknown,
-    Welcome,
-    Why,
-)
 from channel.limits import from_millivolts
 from channel.models.hold import HoldModel
 from channel.models.pitch import PitchModel, PitchParameters
@@ -64,35 +50,35 @@ def numerics_vectors() -> dict[str, list[list[str]]]:
     }
 
 
-def example_frames() -> list[Frame]:
+def example_frames() -> list[frames.Frame]:
     """Return one frame of every kind and variant; the golden bytes are theirs, in this order."""
     digest = 0x0123456789ABCDEF
-    echo = Echo(6, 1, digest, (1500, -1500, 0, 32767, -32768, 1))
+    echo = frames.Echo(6, 1, digest, (1500, -1500, 0, 32767, -32768, 1))
     return [
-        Hello(0xDEADBEEF, "0.1.0", bytes(range(16)), bytes(range(100, 108))),
-        Hello(0, "", bytes(16), bytes(8)),
-        Hello(9, "1", bytes(16), bytes(8), 3, 0x01020304, 5, 77, Why.GAP),
-        Welcome(0x01020304, 5, 6, 0xDEADBEEF),
-        Welcome(0x01020304, 5, 6, 0xDEADBEEF, 3, (1500, -1500), bytes(range(40))),
-        Refuse(0xDEADBEEF, "versions differ: 1 and \u00b5", '{"rate_baud": 10.0}'),
-        Symbol(0x01020304, 5, 0x0A0B0C0D, 1),
-        Symbol(0xFFFFFFFF, 0xFFFF, 0xFFFFFFFF, 0xFF),
-        Commands(0x01020304, 5, (echo,)),
-        Commands(0x01020304, 5, (echo, Echo(7, 0xFFFF, 2**64 - 1, (0, 1, 2, 3, 4, 5)))),
-        Commands(0x01020304, 0, (Echo(0, 0, 0, ()),)),
-        Desync(0x01020304, 5, 300, digest, digest + 1, bytes(range(32))),
-        Desync(0x01020304, 5, 0, 0, 1, b""),
-        Bye(0x01020304, "done"),
-        Bye(0, ""),
-        Unknown(0x01020304, 5),
-        Claim(0x01020304, 5, 0x0A0B0C0D),
+        frames.Hello(0xDEADBEEF, "0.1.0", bytes(range(16)), bytes(range(100, 108))),
+        frames.Hello(0, "", bytes(16), bytes(8)),
+        frames.Hello(9, "1", bytes(16), bytes(8), 3, 0x01020304, 5, 77, frames.Why.GAP),
+        frames.Welcome(0x01020304, 5, 6, 0xDEADBEEF),
+        frames.Welcome(0x01020304, 5, 6, 0xDEADBEEF, 3, (1500, -1500), bytes(range(40))),
+        frames.Refuse(0xDEADBEEF, "versions differ: 1 and \u00b5", '{"rate_baud": 10.0}'),
+        frames.Symbol(0x01020304, 5, 0x0A0B0C0D, 1),
+        frames.Symbol(0xFFFFFFFF, 0xFFFF, 0xFFFFFFFF, 0xFF),
+        frames.Commands(0x01020304, 5, (echo,)),
+        frames.Commands(0x01020304, 5, (echo, frames.Echo(7, 0xFFFF, 2**64 - 1, (0, 1, 2, 3, 4, 5)))),
+        frames.Commands(0x01020304, 0, (frames.Echo(0, 0, 0, ()),)),
+        frames.Desync(0x01020304, 5, 300, digest, digest + 1, bytes(range(32))),
+        frames.Desync(0x01020304, 5, 0, 0, 1, b""),
+        frames.Bye(0x01020304, "done"),
+        frames.Bye(0, ""),
+        frames.Unknown(0x01020304, 5),
+        frames.Claim(0x01020304, 5, 0x0A0B0C0D),
     ]
 
 
 def frame_vectors() -> dict[str, list[list[str]]]:
     """Return [kind, bytes in hex] of `example_frames`."""
-    frames = example_frames()
-    return {"frames": [[type(frame).__name__, wire.encode(frame).hex()] for frame in frames]}
+    examples = example_frames()
+    return {"frames": [[type(frame).__name__, wire.encode(frame).hex()] for frame in examples]}
 
 
 GOLDEN_CODECS: dict[str, Codec] = {

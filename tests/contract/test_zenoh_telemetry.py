@@ -108,14 +108,19 @@ def test_when_nobody_watches_then_publishing_costs_nothing_and_raises_nothing(tm
         port.close()
 
 
-def test_when_an_end_allows_no_control_then_it_hears_no_command(tmp_path: Path) -> None:
+def test_when_an_end_allows_no_control_then_a_command_is_lost_and_telemetry_goes_on(
+    tmp_path: Path,
+) -> None:
+    seen: list[bytes] = []
     port = TelemetryPort("transmitter", "lab", endpoint_in(tmp_path))
-    viewer = TelemetryFeed(endpoint_in(tmp_path), "lab", lambda data: None)
+    viewer = TelemetryFeed(endpoint_in(tmp_path), "lab", seen.append)
     try:
         viewer.send("lab", b"up")
+        wait_until(lambda: port.publish(b"still here") or b"still here" in seen)
     finally:
         viewer.close()
         port.close()
+    assert set(seen) == {b"still here"}
 
 
 def test_when_a_viewer_is_closed_while_it_sends_then_sending_is_a_link_error(tmp_path: Path) -> None:

@@ -120,8 +120,8 @@ def test_the_keys_commands_lead_from_one_to_the_next(tenbaud: Callable[..., Said
     assert "tenbaud keys add desk --role receiver --host" in added
     add_desk = ("keys", "add", "desk", "--role", "receiver", "--host", "fd00::2", "--days", "9")
     both = tenbaud(*add_desk).text
-    assert "tenbaud receive --keys keys/desk --peer rig --listen tls/[fd00::2]:7447" in both
-    assert "tenbaud transmit --keys keys/rig --peer desk --connect tls/[fd00::2]:7447" in both
+    assert "tenbaud receive --keys keys/desk --peer rig --listen 'tls/[fd00::2]:7447'" in both
+    assert "tenbaud transmit --keys keys/rig --peer desk --connect 'tls/[fd00::2]:7447'" in both
     shown = tenbaud("keys", "show").text
     assert "desk, receiver" in shown
     assert "expires in 9 days" in shown

@@ -39,9 +39,14 @@ class Uplink:
                 self._recorder.write(SENT_CHANNEL, now_ns, (frame.slot, frame.number, None, 0))
         if leaves_ns is None:
             return []
-        data = self.wire.encode(frame)
-        size = self.wire.size(data)
-        self.meter.count(frame, size)
+        data, size = self.counted(frame)
         if isinstance(frame, Symbol):
             self._recorder.write(SENT_CHANNEL, leaves_ns, (frame.slot, frame.number, leaves_ns, size))
         return self.line.carry(data, isinstance(frame, Symbol), leaves_ns)
+
+    def counted(self, frame: Frame) -> tuple[bytes, int]:
+        """Count a frame that bypasses the line; return its bytes and its size on the wire."""
+        data = self.wire.encode(frame)
+        size = self.wire.size(data)
+        self.meter.count(frame, size)
+        return data, size

@@ -41,7 +41,6 @@ class RealFlight:
     ) -> None:
         self._node = node
         self._uplink = uplink
-        self._wire = uplink.wire
         self._link = link
         self._should_stop = should_stop
         self._outbox = Outbox()
@@ -141,9 +140,7 @@ class RealFlight:
         """End the session on both sides at once; before the first tick nothing else is to be done."""
         # The farewell is spared the line's delay: this process is about to end.
         for frame in self._node.session.bye(reason):
-            data = self._wire.encode(frame)
-            self._uplink.meter.count(frame, self._wire.size(data))
-            self._link.send(data)
+            self._link.send(self._uplink.counted(frame)[0])
 
     def _now_ns(self) -> int:
         return time.monotonic_ns() - self._start_ns

@@ -38,7 +38,6 @@ class VirtualFlight:
     def __init__(self, node: TransmitterNode, uplink: Uplink, downlink: Line, peer: Peer) -> None:
         self._node = node
         self._uplink = uplink
-        self._wire = uplink.wire
         self._downlink = downlink
         self._peer = peer
         self._arrivals: list[_Arrival] = []
@@ -98,9 +97,7 @@ class VirtualFlight:
         self._node.rest()
         # The farewell is spared what goes wrong on the line: the receiver's process must hear it.
         for frame in self._node.session.bye(reason()):
-            data = self._wire.encode(frame)
-            self._uplink.meter.count(frame, self._wire.size(data))
-            self._step(now_ns + linger_ns, data)
+            self._step(now_ns + linger_ns, self._uplink.counted(frame)[0])
 
     def _offer(self, frames: Sequence[Frame], now_ns: int) -> None:
         for frame in frames:

@@ -87,7 +87,7 @@ class Gate:
         while (item := self._untold.get()) is not None:
             # A terminal that has gone is no reason to stop.
             with suppress(OSError):
-                _tell(*item)
+                _say(*item)
 
 
 class HandshakeLog:
@@ -151,4 +151,8 @@ def _is_told(count: int) -> bool:
 
 def _tell(reason: str, count: int) -> None:
     if _is_told(count):
-        sys.stderr.write(f"tenbaud: turned a connection away: {reason} ({count} so far)\n")
+        _say(reason, count)
+
+
+def _say(reason: str, count: int) -> None:
+    sys.stderr.write(f"tenbaud: turned a connection away: {reason} ({count} so far)\n")

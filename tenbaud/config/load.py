@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -70,6 +70,15 @@ def nested(settings: Mapping[str, Any]) -> dict[str, Any]:
             raise _set_twice(name)
         place[field] = value
     return sections
+
+
+def flattened(sections: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the full name and the value of each setting in nested sections, as `nested` takes them."""
+    for name, value in sections.items():
+        if isinstance(value, dict):
+            yield from flattened(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value
 
 
 def _set_twice(section: str) -> ConfigError:

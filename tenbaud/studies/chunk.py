@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from tenbaud.config.schema import FlightConfig
@@ -50,11 +51,12 @@ def fly_chunk(task: ChunkTask) -> ChunkResult:
         )
     figures: list[FlightFigures] = []
     for text, seeds in task.points:
-        figures += _fly_point(FlightConfig.model_validate_json(text), seeds, task.engine)
+        figures += fly_point(FlightConfig.model_validate_json(text), seeds, task.engine)
     return ChunkResult(task.chunk, figures)
 
 
-def _fly_point(config: FlightConfig, seeds: tuple[int, ...], engine: str) -> list[FlightFigures]:
+def fly_point(config: FlightConfig, seeds: Sequence[int], engine: str) -> list[FlightFigures]:
+    """Fly a configuration with these seeds; StudyError where `engine` is one that cannot."""
     from tenbaud.studies.plain import fly_plain
 
     flown: list[FlightFigures | None] = [None] * len(seeds)

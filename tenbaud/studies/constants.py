@@ -8,22 +8,21 @@ from tenbaud.config.schema import FlightConfig
 from tenbaud.studies.settings import StudyError, check_name
 from tenbaud.studies.study_file import Range
 
+GAINS = {"coder.gains.0": (0.2, 3.0, "log"), "coder.gains.1": (0.2, 3.0, "log")}
+
 CODER_RANGES = {
     "zoom": {
         "coder.minimum_range_rad": (0.1, 10.0, "log"),
         "coder.decay": (0.6, 0.99, "linear"),
-        "coder.gains.0": (0.2, 3.0, "log"),
-        "coder.gains.1": (0.2, 3.0, "log"),
+        **GAINS,
     },
     "fixed": {
         "coder.range_rad": (0.1, 10.0, "log"),
-        "coder.gains.0": (0.2, 3.0, "log"),
-        "coder.gains.1": (0.2, 3.0, "log"),
+        **GAINS,
     },
     "timed": {
         "coder.minimum_range_rad": (0.1, 10.0, "log"),
-        "coder.gains.0": (0.2, 3.0, "log"),
-        "coder.gains.1": (0.2, 3.0, "log"),
+        **GAINS,
     },
     "history": {
         "coder.minimum_range_rad": (0.2, 5.0, "log"),

@@ -8,19 +8,18 @@ whole recording and only the rest counts. The measure is the rms error of what t
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from tenbaud.build import ticks_of
 from tenbaud.config.schema import FlightConfig
+from tenbaud.studies.chunk import fly_point
 from tenbaud.studies.figures import FlightFigures
 from tenbaud.studies.flights import CompiledPoint, recorded_flight
 from tenbaud.studies.plain import fly_plain
 from tenbaud.studies.schedule import Uncommon
 from tenbaud.studies.settings import StudyError, configured
-from tenbaud.studies.side_by_side import fly_seeds
 from tenbaud.studies.study_file import Range
 
 Method = Literal["differential-evolution", "nelder-mead"]
@@ -94,7 +93,7 @@ def judge(tuning: Tuning, values: dict[str, float], *, train: bool) -> Judged:
         figures = [_fly_part(config, tuning.split.train_share, train=train)]
     else:
         seeds = tuning.split.train_seeds if train else tuning.split.test_seeds
-        figures = _fly_all(config, seeds)
+        figures = fly_point(config, seeds, "auto")
     squares, lost, reason = 0.0, 0, ""
     for one in figures:
         rms = one.error_live_rms
@@ -106,17 +105,6 @@ def judge(tuning: Tuning, values: dict[str, float], *, train: bool) -> Judged:
             reason = reason or why
             lost += 1
     return Judged(math.sqrt(squares / len(figures)), lost, len(figures), reason)
-
-
-def _fly_all(config: FlightConfig, seeds: Sequence[int]) -> list[FlightFigures]:
-    try:
-        flown = fly_seeds(CompiledPoint(config), seeds)
-    except Uncommon:
-        flown = [None] * len(seeds)
-    return [
-        figures or fly_plain(config.model_copy(update={"seed": seed}))
-        for seed, figures in zip(seeds, flown, strict=True)
-    ]
 
 
 def _fly_part(config: FlightConfig, share: float, *, train: bool) -> FlightFigures:

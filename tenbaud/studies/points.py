@@ -4,26 +4,15 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
-from typing import Any
 
-from tenbaud.studies.settings import StudyError, check_name, check_value
+from tenbaud.config.load import flattened
+from tenbaud.studies.settings import FIELDS, TEXTS, StudyError, check_name, check_value
 from tenbaud.studies.study_file import Range, SampleSection, StudyFile, Value
 
 FLIGHTS_MAX = 10_000_000
 
-SAME = (
-    ("rate", "timing.symbol_period_s"),
-    ("rate", "channel.rate_baud"),
-    ("mismatch", "transmitter.plant.mismatch"),
-)
+SAME = (("rate", "timing.symbol_period_s"), *FIELDS.items())
 """Short names and what they replace."""
-
-ADDED = (
-    ("density", "transmitter.plant.disturbance"),
-    *((name, "link.impairments") for name in ("loss", "flip", "delay")),
-)
-"""Short names and the texts that they are added to."""
 
 
 def names_of(file: StudyFile) -> list[str]:
@@ -40,10 +29,10 @@ def names_of(file: StudyFile) -> list[str]:
     twice = {name for name in names if names.count(name) > 1}
     if twice:
         raise StudyError(f"{', '.join(sorted(twice))}: on the grid and sampled at once")
-    for one, other in (*SAME, *ADDED):
+    for one, other in (*SAME, *TEXTS.items()):
         if one in names and other in names:
             raise StudyError(f"{one} and {other} set the same thing: sweep one of them")
-    _check_fixed(names, set(_named(file.set)))
+    _check_fixed(names, {name for name, _ in flattened(file.set)})
     return names
 
 
@@ -53,15 +42,6 @@ def _check_fixed(names: list[str], fixed: set[str]) -> None:
     for one, other in (*((name, name) for name in names), *SAME):
         if one in names and other in fixed:
             raise StudyError(f"{one} is swept, and set.{other} says what it is: leave one of them out")
-
-
-def _named(values: dict[str, Any], prefix: str = "") -> Iterator[str]:
-    """Yield the dotted names of all fields in nested sections."""
-    for name, value in values.items():
-        if isinstance(value, dict):
-            yield from _named(value, f"{prefix}{name}.")
-        else:
-            yield f"{prefix}{name}"
 
 
 def points_of(file: StudyFile) -> list[dict[str, Value]]:

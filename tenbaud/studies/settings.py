@@ -11,6 +11,7 @@ import difflib
 import math
 from collections.abc import Iterator
 from functools import cache
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -49,6 +50,12 @@ SHORT_NAMES = {
 FIELDS = {"rate": "channel.rate_baud", "mismatch": "transmitter.plant.mismatch"}
 """Short names of a field."""
 
+TEXTS = {
+    "density": "transmitter.plant.disturbance",
+    **dict.fromkeys(("loss", "flip", "delay"), "link.impairments"),
+}
+"""Short names of what is added to a text, which may say something else already."""
+
 
 def check_value(name: str, value: object) -> None:
     """Raise StudyError unless a value is one that a short name can have."""
@@ -80,10 +87,6 @@ def put(values: dict[str, Any], name: str, value: object) -> None:
     here[last] = value
 
 
-TEXTS = ("loss", "flip", "delay", "density")
-"""Short names that are added to a text which may say something else already."""
-
-
 def configured(
     preset: str | None, file: Path | None, fixed: dict[str, Any], swept: dict[str, Any]
 ) -> FlightConfig:
@@ -109,9 +112,8 @@ def configured(
 
 def _put_texts(config: FlightConfig, values: dict[str, Any], texts: dict[str, Any]) -> None:
     """Add what is swept to the texts of a configuration; StudyError where they say it already."""
-    plant, link = config.transmitter.plant.disturbance, config.link.impairments
     for name, value in texts.items():
-        text = plant if name == "density" else link
+        text = attrgetter(TEXTS[name])(config)
         item = "q" if name == "density" else name
         for said in text.split(","):
             if said.partition("=")[0].rpartition(":")[2].strip() == item:
@@ -123,7 +125,7 @@ def _put_texts(config: FlightConfig, values: dict[str, Any], texts: dict[str, An
                 more = f"delay={float(value) * 1000.0:.6f}ms" if value else ""
             case _:
                 more = f"{'up:' if name == 'flip' else ''}{name}={value!r}" if value else ""
-        place = "transmitter.plant.disturbance" if name == "density" else "link.impairments"
+        place = TEXTS[name]
         put(values, place, ",".join(filter(None, (_at(values, place) or text, more))))
 
 

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from channel.errors import TenbaudError
+from tenbaud.config.load import flattened
 from tenbaud.config.schema import FlightConfig
 from tenbaud.studies.constants import present
 from tenbaud.studies.figures import shared_parts
@@ -215,7 +216,7 @@ def preset_text(tuning: Tuning, tuned: Tuned) -> str:
     after = config.model_dump(mode="json", exclude_none=True)
     sections = {name: after[name] for name in ("timing", "channel", "model", "coder")}
     file = [] if tuning.file is None else [f"--config {tuning.file}"]
-    flown_with = [*file, *_settings(tuning.overrides)]
+    flown_with = [*file, *(f"{name}={value!r}" for name, value in flattened(tuning.overrides))]
     lines = [
         f"# Fitted by tenbaud tune: {tuning.method}, {tuned.evaluations} evaluations, "
         f"seed {tuning.seed}.",
@@ -225,12 +226,3 @@ def preset_text(tuning: Tuning, tuned: Tuned) -> str:
     ]
     head = {"preset": config.preset, "description": f"{config.description}; fitted".lstrip("; ")}
     return "\n".join(lines) + "\n" + tomli_w.dumps(head | sections)
-
-
-def _settings(values: dict[str, Any], prefix: str = "") -> Iterator[str]:
-    """Yield settings with their dotted names."""
-    for name, value in values.items():
-        if isinstance(value, dict):
-            yield from _settings(value, f"{prefix}{name}.")
-        else:
-            yield f"{prefix}{name}={value!r}"

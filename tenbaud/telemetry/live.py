@@ -211,11 +211,10 @@ def spoil(session: object, field: str, sample: int, arm: bool = True) -> tuple[s
         return "this codec cannot be spoilt: ignored", False
     sabotage = parse_sabotage(f"sample={sample},field={field}")
     try:
-        codec.check(sabotage)
+        # Arming checks too.
+        (codec.arm if arm else codec.check)(sabotage)
     except ValueError as error:
         return f"{error}: ignored", False
-    if arm:
-        codec.arm(sabotage)
     return f"one bit of this codec's {field} spoilt after sample {sample}", True
 
 

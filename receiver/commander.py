@@ -12,6 +12,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from channel.codec import Codec, CodecState, Vector
+from channel.errors import CodecDiverged
 from channel.events import EventKind
 from channel.frames import Echo
 from channel.lead import FlownSample, fly_sample
@@ -28,6 +29,14 @@ Tell = Callable[[EventKind, str], None]
 
 UNWRITTEN_MAX = 32
 """Samples that may be flown before they are recorded even if nobody finds the time."""
+
+
+class Standing(NamedTuple):
+    """Where a flight stands: all that the next epoch follows from."""
+
+    state: CodecState
+    hold: Vector
+    commands: tuple[Vector, ...]
 
 
 class _Flown(NamedTuple):
@@ -68,6 +77,17 @@ class Commander:
         self._echoes: deque[Echo] = deque(maxlen=terms.repeats + 1)
         self._unwritten: list[_Flown] = []
 
+    @property
+    def standing(self) -> Standing:
+        """Return where the flight stands, to be gone back to."""
+        return Standing(self.state, self.hold, tuple(self._commands))
+
+    def go_back(self, standing: Standing) -> None:
+        """Stand where the flight stood before."""
+        self.state, self.hold, commands = standing
+        self._commands = deque(commands)
+        self._echoes.clear()
+
     def restart(self, sample: int) -> None:
         """Begin afresh at a sample, from the codec's initial state and command."""
         self.state = self.codec.initial()._replace(sample=sample)
@@ -90,7 +110,10 @@ class Commander:
     def fly(self, word: Word, epoch: int, now_ns: int) -> tuple[Echo, ...]:
         """Consume the word of the next sample; return its echo after those that it repeats."""
         before = self.state
-        flown = fly_sample(self.codec, before, word, tuple(self._commands), self._decide)
+        try:
+            flown = fly_sample(self.codec, before, word, tuple(self._commands), self._decide)
+        except (ArithmeticError, ValueError) as error:
+            raise CodecDiverged(f"the estimate diverged in sample {before.sample}: {error}") from error
         self._commands.extend(flown.commands)
         for _ in range(len(self._commands) - self.terms.lead_ticks):
             self._commands.popleft()

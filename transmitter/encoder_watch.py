@@ -29,10 +29,11 @@ class EncoderWatch:
         self._state: Vector = ()
         self._left = 0
 
-    def check(self, counts: tuple[int, ...], applied: Vector, estimate: Vector) -> str | None:
+    def check(self, counts: tuple[int, ...], applied: Vector, estimate: Vector | None) -> str | None:
         """Take one tick; return what is wrong, or None.
 
-        `applied` are the voltages of the tick, `estimate` the model state to start a window from.
+        `applied` are the voltages of the tick, `estimate` the model state to start a window from;
+        None: there is none that could be relied on.
         """
         before, self._counts = self._counts, counts
         if len(before) != len(counts):
@@ -47,9 +48,15 @@ class EncoderWatch:
             self._left = 0
             return None
         if self._left == 0:
+            if estimate is None:
+                return None
             self._start = self._state = estimate
             self._left = self._window_ticks
-        self._state = self._model.tick(self._state, applied, self._nothing_held)
+        try:
+            self._state = self._model.tick(self._state, applied, self._nothing_held)
+        except (ArithmeticError, ValueError):  # beyond what the model can say: so it says nothing
+            self._left = 0
+            return None
         self._left -= 1
         return self._judge(counts) if self._left == 0 else None
 

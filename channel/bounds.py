@@ -123,7 +123,8 @@ class Bounds:
 
     def _are_allowed(self, millivolts: Sequence[int]) -> bool:
         # min and max: this runs for every command frame, and they are the fastest there is.
-        return -self._millivolts_max <= min(millivolts) and max(millivolts) <= self._millivolts_max
+        largest = self._millivolts_max
+        return not millivolts or (-largest <= min(millivolts) and max(millivolts) <= largest)
 
     def _of_state(self, welcome: Welcome) -> str | None:
         if not welcome.state:

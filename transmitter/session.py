@@ -321,12 +321,15 @@ class TransmitterSession:
         except CANNOT_FLY as error:
             return self._on_diverged(error)
         self.confirmed.append(done)
-        first_tick = echo.sample * self.terms.ticks_per_sample + self.terms.lead_ticks
-        self._due.extend(enumerate(commands, first_tick))
         self.history.add(self.epoch, word, done.flown.state)
         self.counts["digest_checks"] += 1
         self.counts["erasures"] += word is ERASED
-        return [] if done.digest == echo.digest else self._on_desync(done)
+        if done.digest != echo.digest:
+            return self._on_desync(done)
+        # Only now: whoever does not hold the same state moves no motor.
+        first_tick = echo.sample * self.terms.ticks_per_sample + self.terms.lead_ticks
+        self._due.extend(enumerate(commands, first_tick))
+        return []
 
     def _on_desync(self, done: Confirmed) -> list[Frame]:
         self.counts["desyncs"] += 1

@@ -16,6 +16,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
+
+from tenbaud.view.server import LOOK_ONLY, SERVING
 
 CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or "/usr/bin/chromium"
 ARGUMENTS = (
@@ -61,6 +64,9 @@ class Served:
 
     process: subprocess.Popen[str]
     url: str = ""
+    """with the secret that steers"""
+    look_url: str = ""
+    """with the secret of who may only look"""
     said: list[str] = field(default_factory=list)
     _up: threading.Event = field(default_factory=threading.Event)
 
@@ -69,9 +75,17 @@ class Served:
         assert self.process.stderr is not None
         for line in self.process.stderr:
             self.said.append(line.rstrip())
-            if line.startswith("tenbaud view: "):
+            if line.startswith(SERVING):
                 self.url = line.split()[-1]
+            if line.startswith(LOOK_ONLY):
+                self.look_url = line.split()[-1]
+            if self.url and (self.look_url or "--view-only" in self.process.args):
                 self._up.set()
+
+    @property
+    def port(self) -> int:
+        """Where the page is served."""
+        return int(urlsplit(self.url).port or 0)
 
     def wait_until_up(self) -> None:
         """Return when the page is served; RuntimeError with what was said if that never happens."""

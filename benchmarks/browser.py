@@ -46,12 +46,13 @@ def why_no_browser() -> str | None:
 
 
 @contextmanager
-def browser() -> Iterator[Any]:
-    """Within the `with`, a headless Chromium."""
+def browser(*arguments: str) -> Iterator[Any]:
+    """Within the `with`, a headless Chromium; `arguments` go to it beside the usual ones."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        words = [*ARGUMENTS, *arguments]
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=words)
         try:
             yield chromium
         finally:
@@ -67,6 +68,7 @@ class Served:
     """with the secret that steers"""
     look_url: str = ""
     """with the secret of who may only look"""
+    folder: Path = Path()
     said: list[str] = field(default_factory=list)
     _up: threading.Event = field(default_factory=threading.Event)
 
@@ -108,7 +110,9 @@ class Served:
 
 
 @contextmanager
-def served(folder: Path, *arguments: str) -> Iterator[Served]:
+def served(
+    folder: Path, *arguments: str, environment: dict[str, str] | None = None
+) -> Iterator[Served]:
     """Within the `with`, `tenbaud` with these arguments serves a page; they name a port of 0."""
     top = Path(__file__).parents[1]
     path = os.pathsep.join([str(top), os.environ.get("PYTHONPATH", "")])
@@ -117,13 +121,13 @@ def served(folder: Path, *arguments: str) -> Iterator[Served]:
     process = subprocess.Popen(
         [sys.executable, "-m", "tenbaud", *arguments],
         cwd=folder,
-        env={**own, "PYTHONPATH": path},
+        env={**own, "PYTHONPATH": path, **(environment or {})},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     )
-    one = Served(process)
+    one = Served(process, folder=folder)
     threading.Thread(target=one.read, daemon=True).start()
     try:
         one.wait_until_up()

@@ -18,6 +18,7 @@ from channel.terms import Clock, Terms
 from tenbaud.build_codec import build_codec
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
+from tenbaud.liveness import RoundTrip, check_liveness, round_trip
 from tenbaud.serial_terms import on_serial_line
 
 REAL_RIGS = ("serial", "quarc", "hil")
@@ -41,6 +42,7 @@ class Agreement:
     codec: Codec
     terms: Terms
     identity: Identity
+    trip: RoundTrip
     live: bool = False
     """whether line, codec and set-point may be changed in flight, by hand"""
 
@@ -93,11 +95,19 @@ def agree(config: FlightConfig, clock: Clock) -> Agreement:
         codec = build_codec(config)
         terms = build_terms(config, codec, clock)
         terms.check(clock)
+        trip = round_trip(terms, parse_impairments(config.link.impairments), clock)
+        check_liveness(watchdog_wanted_s(config), terms, trip)
     except ValueError as error:
         raise ConfigError(str(error)) from error
     shared = config.shared_json(terms.lead_ticks)
     identity = Identity(software_version(), shared, numerics_probe(codec))
-    return Agreement(config, clock, codec, terms, identity)
+    return Agreement(config, clock, codec, terms, identity, trip)
+
+
+def watchdog_wanted_s(config: FlightConfig) -> float | None:
+    """Return the watchdog's time-out as configured, None where it is "auto"."""
+    wanted = config.transmitter.watchdog_s
+    return None if wanted == "auto" else wanted
 
 
 def build_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:

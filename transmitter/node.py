@@ -128,7 +128,7 @@ class TransmitterNode:
         owed = session.phase is Phase.FLYING and tick >= session.epoch_tick
         late = command is None and owed and not self.guard.stopped
         self.commands_late += late
-        volts = self.guard.apply(tick, command)
+        volts = self.guard.apply(tick, command, session.owing.is_owed(tick))
         self.rig.write(tick, volts)
         self._applied = volts if reading.applied_volts is None else reading.applied_volts
         time_ns = tick * self.session.terms.tick_ns

@@ -41,6 +41,8 @@ from channel.wire import WIRE_VERSION
 from channel.words import ERASED
 from transmitter.claims import Claims
 from transmitter.copies import Confirmed, Copies
+from transmitter.echo_order import EchoOrder
+from transmitter.owing import Owing
 from transmitter.records import write_sample
 from transmitter.rejoin import Asking, start_of
 from transmitter.sight import Sight
@@ -64,6 +66,7 @@ class TransmitterSession:
     `incarnation` is drawn by the caller (32 bits), so that the session itself stays deterministic.
     `stop_on_desync`: end the flight at the first digest that differs, instead of rejoining.
     `sight`: gives a coder that uses rates its measurements; None: one with the usual bandwidth.
+    `overtaking_samples`: by how many samples command frames may arrive out of order on this line.
     """
 
     def __init__(
@@ -76,6 +79,7 @@ class TransmitterSession:
         *,
         stop_on_desync: bool = False,
         sight: Sight | None = None,
+        overtaking_samples: int = 0,
     ) -> None:
         self.codec = codec
         self.terms = terms
@@ -96,6 +100,7 @@ class TransmitterSession:
         """when the receiver last told something new in the present epoch"""
         self.epoch_tick = 0
         """first tick of the present epoch"""
+        self.owing = Owing(terms)
         self.confirmed: deque[Confirmed] = deque(maxlen=2 * LAG_SAMPLES_MAX)
         """samples confirmed and not yet written down (`take_confirmed`)"""
         self.events: deque[Event] = deque(maxlen=1000)
@@ -103,6 +108,7 @@ class TransmitterSession:
         self._asking = Asking(identity, incarnation, terms)
         self._claims = Claims(terms)
         self._stop_on_desync = stop_on_desync
+        self._echoes = EchoOrder(terms.repeats + overtaking_samples)
         self._sight = (sight or Sight(codec.model, terms.tick_ns / 1e9)) if codec.uses_rates else None
         self._recorder = recorder or NullRecorder()
         self._due: deque[tuple[int, Vector]] = deque(
@@ -261,8 +267,10 @@ class TransmitterSession:
         self.epoch = welcome.epoch
         self.heard_tick = self._tick
         self.copies.restart(state, hold)
+        self._echoes.clear()
         self.epoch_tick = state.sample * self.terms.ticks_per_sample
-        self._due = deque(enumerate([hold] * self.terms.lead_ticks, self.epoch_tick))
+        held = self.owing.begin(self.epoch_tick, self._tick, self._asking.why)
+        self._due = deque(enumerate([hold] * held, self.epoch_tick))
         self.phase = Phase.FLYING
         begins_ns = state.sample * self.terms.sample_ns
         self._recorder.write(EPOCH_CHANNEL, begins_ns, epoch_row(self.epoch, state, hold))
@@ -295,16 +303,14 @@ class TransmitterSession:
             return []
         self.heard_tick = self._tick
         self._claims.on_command()
-        for echo in frame.echoes:
-            expected = self.copies.confirmed.sample
-            if echo.sample < expected:
-                continue
-            if echo.sample > expected:
-                return self.rejoin(
-                    Why.GAP,
-                    f"the echo of sample {expected} never came (got {echo.sample}), more than "
-                    f"{self.terms.repeats} command frames in a row were lost",
-                )
+        expected = self.copies.confirmed.sample
+        if not self._echoes.add(frame.echoes, expected):
+            return self.rejoin(
+                Why.GAP,
+                f"the echo of sample {expected} never came (got {frame.echoes[0].sample}), more than "
+                f"{self.terms.repeats} command frames in a row were lost",
+            )
+        while (echo := self._echoes.take(self.copies.confirmed.sample)) is not None:
             problem = self._confirm(echo)
             if problem:
                 return problem
@@ -331,6 +337,7 @@ class TransmitterSession:
         ]
         done = self.copies.confirm(word, commands, echo.digest)
         self.confirmed.append(done)
+        self.owing.on_confirmed()
         self._due.extend(enumerate(commands, echo.sample * per_sample + self.terms.lead_ticks))
         self.history.add(self.epoch, word, done.flown.state)
         self.counts["digest_checks"] += 1

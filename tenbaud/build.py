@@ -42,7 +42,6 @@ class Agreement:
     codec: Codec
     terms: Terms
     identity: Identity
-    trip: RoundTrip
     live: bool = False
     """whether line, codec and set-point may be changed in flight, by hand"""
 
@@ -56,6 +55,11 @@ class Agreement:
     def faults(self) -> LineFaults:
         """Return what goes wrong on the line, on purpose."""
         return parse_impairments(self.config.link.impairments)
+
+    @property
+    def trip(self) -> RoundTrip:
+        """Return how long commands take, as far as the configuration knows."""
+        return round_trip(self.terms, self.faults, self.clock)
 
     @property
     def desyncs_expected(self) -> float:
@@ -93,21 +97,27 @@ def agree(config: FlightConfig, clock: Clock) -> Agreement:
         )
     try:
         codec = build_codec(config)
-        terms = build_terms(config, codec, clock)
-        terms.check(clock)
-        trip = round_trip(terms, parse_impairments(config.link.impairments), clock)
-        check_liveness(watchdog_wanted_s(config), terms, trip)
+        terms = checked_terms(config, codec, clock)
     except ValueError as error:
         raise ConfigError(str(error)) from error
     shared = config.shared_json(terms.lead_ticks)
     identity = Identity(software_version(), shared, numerics_probe(codec))
-    return Agreement(config, clock, codec, terms, identity, trip)
+    return Agreement(config, clock, codec, terms, identity)
 
 
 def watchdog_wanted_s(config: FlightConfig) -> float | None:
     """Return the watchdog's time-out as configured, None where it is "auto"."""
     wanted = config.transmitter.watchdog_s
     return None if wanted == "auto" else wanted
+
+
+def checked_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:
+    """Return the terms of a flight; ValueError, with the arithmetic, where they cannot be flown."""
+    terms = build_terms(config, codec, clock)
+    terms.check(clock)
+    trip = round_trip(terms, parse_impairments(config.link.impairments), clock)
+    check_liveness(watchdog_wanted_s(config), terms, trip)
+    return terms
 
 
 def build_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:

@@ -51,6 +51,10 @@ class TransmitterNode:
         self.scores = scores
         self.gauge = gauge
         self.commands_late = 0
+        self.ticks_commanded = 0
+        """whose own command passed the guard"""
+        self.ticks_down = 0
+        """with the guard at the safe voltage, or on its way there"""
         self.sensor_fault: str | None = None
         self.tick = 0
         self.rearmed = 0
@@ -129,6 +133,8 @@ class TransmitterNode:
         late = command is None and owed and not self.guard.stopped
         self.commands_late += late
         volts = self.guard.apply(tick, command, session.owing.is_owed(tick))
+        self.ticks_down += self.guard.stopped
+        self.ticks_commanded += command is not None and not self.guard.stopped
         self.rig.write(tick, volts)
         self._applied = volts if reading.applied_volts is None else reading.applied_volts
         time_ns = tick * self.session.terms.tick_ns

@@ -92,6 +92,7 @@ class TransmitterSession:
         self.counts: Counter[str] = Counter()
         """digest_checks, desyncs, rejoins, stale_frames, words_missed, erasures, claims_refused,
         take_overs"""
+        self.rejoins_asked: Counter[Why] = Counter()
         self.end_reason = ""
         self.refusal: str | None = None
         self.desync: Desync | None = None
@@ -158,6 +159,7 @@ class TransmitterSession:
         if self.phase is not Phase.FLYING:
             return []
         self.phase = Phase.REJOINING
+        self.rejoins_asked[why] += 1
         self._asking.begin(why, self._tick)
         self._tell(EventKind.REJOIN, f"{text}: asking for a new epoch after {self.epoch}")
         return self._ask()

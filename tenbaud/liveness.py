@@ -67,8 +67,8 @@ def check_liveness(wanted_s: float | None, terms: Terms, trip: RoundTrip) -> Non
         raise ValueError(
             f"the round trip takes up to {trip.longest_ticks * tick_ms:g} ms, which is "
             f"{trip_samples:.1f} samples; both ends remember {HISTORY_SAMPLES}, so every echo would come "
-            f"too late: shorten the delay, or set timing.symbol_period_s to at least "
-            f"{trip.longest_ticks * tick_ms / 1e3 / HISTORY_SAMPLES:.3g}"
+            f"too late: shorten it to {HISTORY_SAMPLES * terms.sample_ns / 1e6:g} ms, or lengthen "
+            "timing.symbol_period_s"
         )
     last_ticks = terms.lead_ticks + terms.ticks_per_sample - 1
     if trip.shortest_ticks > last_ticks:

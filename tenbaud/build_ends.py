@@ -24,7 +24,7 @@ from tenbaud.build_gauge import build_gauge
 from tenbaud.build_rig import build_rig
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig, ReferenceSection
-from tenbaud.liveness import overtaking_samples, watchdog_ticks
+from tenbaud.liveness import overtaking_ticks, watchdog_ticks
 from tenbaud.plugins import CONTROLLER, build_plugin, is_plugin
 from transmitter.guard import Guard, GuardSettings
 from transmitter.node import TransmitterNode
@@ -44,7 +44,7 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
         recorder,
         stop_on_desync=config.transmitter.on_desync == "stop",
         sight=build_sight(agreement),
-        overtaking_samples=overtaking_samples(terms, agreement.faults),
+        overtaking_ticks=overtaking_ticks(terms, agreement.faults),
     )
     reference = build_reference(config)
     gauge = build_gauge(agreement)

@@ -1,7 +1,7 @@
-"""Whether a flight can come back from every lost lockstep, from its lead, its delays and its watchdog.
+"""Whether a flight comes back from every lost lockstep: its lead, delays and watchdog together.
 
-`agree` checks this for every configuration, so that what cannot fly is refused, with numbers, instead of
-asking for a new epoch for ever. `docs/RELIABILITY.md` has the reasoning.
+`agree` checks this for every configuration, so that what cannot fly is refused, with numbers, instead
+of asking for a new epoch for ever. `docs/RELIABILITY.md` has the reasoning.
 """
 
 from __future__ import annotations
@@ -24,29 +24,25 @@ for a new epoch and its answer, one of which may be lost."""
 class RoundTrip:
     """From the first tick of a sample to the arrival of its commands, in ticks."""
 
-    shortest_ticks: int
-    """nothing erased, and the line as fast as it can be"""
+    in_time_ticks: int
+    """nothing erased, and the line as slow as it can be"""
     longest_ticks: int
-    """the symbol is given up at its deadline, and the line is as slow as it can be"""
+    """the same, and the symbol is given up at its deadline"""
 
 
 def round_trip(terms: Terms, faults: LineFaults, clock: Clock) -> RoundTrip:
     """Return the round trip that terms and line allow."""
-    lines = (faults.up, faults.down)
-    fixed_ns = terms.uplink_delivery_ns + terms.uplink_line_ns + terms.downlink_line_ns
-    shortest_ns = fixed_ns + sum(one.delay_ns - one.jitter_ns for one in lines)
+    delay_ns = faults.longest_delay_ns
+    line_ns = terms.uplink_delivery_ns + terms.uplink_line_ns + terms.downlink_line_ns
     ideal = clock == "virtual" and terms.lead_ticks == 0 and terms.uplink_delivery_ns == 0
     needed_ticks = 0 if ideal else terms.lead_needed_ticks
-    return RoundTrip(
-        _ticks(shortest_ns, terms), needed_ticks + _ticks(faults.longest_delay_ns, terms)
-    )
+    return RoundTrip(_ticks(line_ns + delay_ns, terms), needed_ticks + _ticks(delay_ns, terms))
 
 
-def overtaking_samples(terms: Terms, faults: LineFaults) -> int:
-    """Return by how many samples command frames may overtake each other on this line."""
+def overtaking_ticks(terms: Terms, faults: LineFaults) -> int:
+    """Return how long after a command frame one may come that was sent before it."""
     down = faults.down
-    spread_ns = 2 * down.jitter_ns + (down.reorder_ns if down.reorder else 0)
-    return min(HISTORY_SAMPLES, -(-spread_ns // terms.sample_ns))
+    return _ticks(2 * down.jitter_ns + (down.reorder_ns if down.reorder else 0), terms)
 
 
 def watchdog_ticks(wanted_s: float | None, terms: Terms, trip: RoundTrip) -> int:
@@ -66,24 +62,24 @@ def check_liveness(wanted_s: float | None, terms: Terms, trip: RoundTrip) -> Non
     if trip_samples > HISTORY_SAMPLES:
         raise ValueError(
             f"the round trip takes up to {trip.longest_ticks * tick_ms:g} ms, which is "
-            f"{trip_samples:.1f} samples; both ends remember {HISTORY_SAMPLES}, so every echo would come "
-            f"too late: shorten it to {HISTORY_SAMPLES * terms.sample_ns / 1e6:g} ms, or lengthen "
+            f"{trip_samples:.1f} samples; both ends remember {HISTORY_SAMPLES}, so every echo would "
+            f"come too late: shorten it to {HISTORY_SAMPLES * terms.sample_ns / 1e6:g} ms, or lengthen "
             "timing.symbol_period_s"
         )
     last_ticks = terms.lead_ticks + terms.ticks_per_sample - 1
-    if trip.shortest_ticks > last_ticks:
+    if trip.in_time_ticks > last_ticks:
         raise ValueError(
-            f"lead_ticks = {terms.lead_ticks} is too short for this line: a command comes at the "
-            f"earliest {trip.shortest_ticks} ticks ({trip.shortest_ticks * tick_ms:g} ms) after the "
-            f"sample it rests on, and the last one that it decides is due after {last_ticks}, so none "
-            f'would ever be in time; set lead_ticks to at least {trip.longest_ticks}, or to "auto"'
+            f"lead_ticks = {terms.lead_ticks} is too short for this line: commands come up to "
+            f"{trip.in_time_ticks} ticks ({trip.in_time_ticks * tick_ms:g} ms) after the sample they "
+            f"rest on, and the last of them is due after {last_ticks}, so the motors would go without; "
+            f'set lead_ticks to at least {trip.longest_ticks}, or to "auto"'
         )
     least_ticks = max(0, trip.longest_ticks - terms.lead_ticks) + 1
     if wanted_s is None or watchdog_ticks(wanted_s, terms, trip) >= least_ticks:
         return
     raise ValueError(
-        f"transmitter.watchdog_s = {wanted_s:g} is too short: with lead_ticks = {terms.lead_ticks} and a "
-        f"round trip of up to {trip.longest_ticks} ticks of {tick_ms:g} ms, commands may be "
+        f"transmitter.watchdog_s = {wanted_s:g} is too short: with lead_ticks = {terms.lead_ticks} and "
+        f"a round trip of up to {trip.longest_ticks} ticks of {tick_ms:g} ms, commands may be "
         f"{least_ticks - 1} ticks late on a line that loses nothing, and the watchdog would trip in "
         f"every epoch; set it to at least {least_ticks * terms.tick_ns / 1e9:g}, set lead_ticks to at "
         f'least {trip.longest_ticks}, or leave it at "auto" '

@@ -10,31 +10,40 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from channel.frames import Echo
+from channel.lockstep import HISTORY_SAMPLES
 
 
 class EchoOrder:
-    """Holds what came early.
+    """Holds what came early; times are ticks.
 
-    `reach_samples`: how far ahead of the expected sample an echo may be while the expected one can
-    still come: as many samples as each frame repeats, and as many as frames may overtake each other by.
+    `overtaking_ticks`: how long after a frame one may come that was sent before it.
     """
 
-    def __init__(self, reach_samples: int) -> None:
-        self._reach_samples = reach_samples
+    def __init__(self, overtaking_ticks: int) -> None:
+        self._overtaking_ticks = overtaking_ticks
         self._early: dict[int, Echo] = {}
+        self._missing: int | None = None
+        """sample whose echo a later frame has shown to be lost or overtaken"""
+        self._until_tick = 0
+        """when it can no longer come"""
 
-    def add(self, echoes: Sequence[Echo], expected: int) -> bool:
-        """Take the echoes of a frame; return whether that of the expected sample may still come."""
+    def add(self, echoes: Sequence[Echo], expected: int, tick: int) -> None:
+        """Take the echoes of a frame; `expected` is the sample whose echo is next."""
         for echo in echoes:
-            if echo.sample >= expected:
+            if expected <= echo.sample <= expected + HISTORY_SAMPLES:
                 self._early[echo.sample] = echo
-        ahead = echoes[-1].sample - expected
-        return expected in self._early or ahead <= self._reach_samples
+        if echoes[0].sample > expected and self._missing != expected:
+            self._missing, self._until_tick = expected, tick + self._overtaking_ticks
 
     def take(self, expected: int) -> Echo | None:
         """Return the echo of this sample, which is then held no longer."""
         return self._early.pop(expected, None)
 
+    def is_lost(self, expected: int, tick: int) -> bool:
+        """Return whether the echo of this sample can no longer come."""
+        return self._missing == expected and tick >= self._until_tick
+
     def clear(self) -> None:
         """Forget everything: a new epoch begins."""
         self._early.clear()
+        self._missing = None

@@ -66,7 +66,7 @@ class TransmitterSession:
     `incarnation` is drawn by the caller (32 bits), so that the session itself stays deterministic.
     `stop_on_desync`: end the flight at the first digest that differs, instead of rejoining.
     `sight`: gives a coder that uses rates its measurements; None: one with the usual bandwidth.
-    `overtaking_samples`: by how many samples command frames may arrive out of order on this line.
+    `overtaking_ticks`: how long after a command frame one may come that was sent before it.
     """
 
     def __init__(
@@ -79,7 +79,7 @@ class TransmitterSession:
         *,
         stop_on_desync: bool = False,
         sight: Sight | None = None,
-        overtaking_samples: int = 0,
+        overtaking_ticks: int = 0,
     ) -> None:
         self.codec = codec
         self.terms = terms
@@ -109,7 +109,7 @@ class TransmitterSession:
         self._asking = Asking(identity, incarnation, terms)
         self._claims = Claims(terms)
         self._stop_on_desync = stop_on_desync
-        self._echoes = EchoOrder(terms.repeats + overtaking_samples)
+        self._echoes = EchoOrder(overtaking_ticks)
         self._sight = (sight or Sight(codec.model, terms.tick_ns / 1e9)) if codec.uses_rates else None
         self._recorder = recorder or NullRecorder()
         self._due: deque[tuple[int, Vector]] = deque(
@@ -144,6 +144,8 @@ class TransmitterSession:
         sample, offset = divmod(tick, self.terms.ticks_per_sample)
         if sample - self.copies.confirmed.sample > LAG_SAMPLES_MAX:
             return self.rejoin(Why.LAG, f"no echo for {LAG_SAMPLES_MAX} samples")
+        if problem := self._check_gap():
+            return problem
         while self.copies.next_sample < sample:
             self.counts["words_missed"] += 1
             self.copies.sent(ERASED)
@@ -305,18 +307,16 @@ class TransmitterSession:
             return []
         self.heard_tick = self._tick
         self._claims.on_command()
-        expected = self.copies.confirmed.sample
-        if not self._echoes.add(frame.echoes, expected):
-            return self.rejoin(
-                Why.GAP,
-                f"the echo of sample {expected} never came (got {frame.echoes[0].sample}), more than "
-                f"{self.terms.repeats} command frames in a row were lost",
-            )
+        self._echoes.add(frame.echoes, self.copies.confirmed.sample, self._tick)
         while (echo := self._echoes.take(self.copies.confirmed.sample)) is not None:
-            problem = self._confirm(echo)
-            if problem:
+            if problem := self._confirm(echo):
                 return problem
-        return []
+        return self._check_gap()
+
+    def _check_gap(self) -> list[Frame]:
+        if not self._echoes.is_lost(self.copies.confirmed.sample, self._tick):
+            return []
+        return self.rejoin(Why.GAP, "more command frames in a row were lost than each repeats samples")
 
     def _confirm(self, echo: Echo) -> list[Frame]:
         """Advance the confirmed copy by one echo; return the report of a desync, if it is one."""

@@ -107,7 +107,9 @@ def verdict_text(
     numbers.append(f"{counts.erased} of these erased")
     if counts.ticks:
         numbers.append(f"guard down for {counts.ticks_down / counts.ticks:.0%} of the flight")
-        numbers.append(f"a command in time for {counts.ticks_commanded / counts.ticks:.0%} of the ticks")
+        numbers.append(
+            f"a command in time for {counts.ticks_commanded / counts.ticks:.0%} of the ticks"
+        )
     reasons = ", ".join(f"{why} {number}" for why, number in asked.items())
     numbers.append(f"{counts.rejoins} rejoins" + (f" (asked for: {reasons})" if reasons else ""))
     lines = [f"the flight did not fly ({', '.join(faults)}): " + ", ".join(numbers)]
@@ -121,7 +123,7 @@ def _on_words(one: Settings) -> str:
         return (
             f"symbols spread by {one.uplink_spread_s:g} s on this line, and one that is more than "
             f"channel.deadline_allowance_s = {one.deadline_allowance_s:g} late is erased: set it to at "
-            f"least {one.uplink_spread_s:g} at both ends, and leave timing.lead_ticks at \"auto\""
+            f'least {one.uplink_spread_s:g} at both ends, and leave timing.lead_ticks at "auto"'
         )
     return (
         "nearly all symbols are lost, or later than channel.deadline_allowance_s = "
@@ -131,10 +133,10 @@ def _on_words(one: Settings) -> str:
 
 def _on_commands(one: Settings) -> str:
     return (
-        f"the command lead is {one.lead_s:g} s, the watchdog {one.watchdog_s:g} s, and the configuration "
-        f"knows of a round trip of {one.round_trip_s:g} s; if the line takes longer, raise "
-        "timing.lead_ticks (--lead) at both ends to what it takes, and leave transmitter.watchdog_s at "
-        '"auto"'
+        f"the command lead is {one.lead_s:g} s, the watchdog {one.watchdog_s:g} s, and the "
+        f"configuration knows of a round trip of {one.round_trip_s:g} s; if the line takes longer, "
+        "raise timing.lead_ticks (--lead) at both ends to what it takes, and leave "
+        'transmitter.watchdog_s at "auto"'
     )
 
 

@@ -13,7 +13,7 @@ from channel.coders.zoom import ZoomParameters
 from channel.impairments import Impairments, LineFaults
 from channel.sabotage import Sabotage
 from channel.terms import Terms
-from tenbaud.liveness import check_liveness, overtaking_samples, round_trip, watchdog_ticks
+from tenbaud.liveness import check_liveness, overtaking_ticks, round_trip, watchdog_ticks
 from tests.channel.parts import IMPULSE, PAPER, THREE_SIGNS, TICK_NS, TICK_S, terms
 
 FAULTY_S = 20.0
@@ -45,9 +45,9 @@ class Plan:
     watchdog_ticks: int = 50
 
     @property
-    def overtaking_samples(self) -> int:
-        """By how many samples command frames overtake each other, as a configuration would know it."""
-        return overtaking_samples(self.terms, LineFaults(self.up, self.down))
+    def overtaking_ticks(self) -> int:
+        """How long command frames overtake each other, as a configuration would know it."""
+        return overtaking_ticks(self.terms, LineFaults(self.up, self.down))
 
     @property
     def is_slow(self) -> bool:
@@ -77,7 +77,7 @@ def with_liveness(plan: Plan, chance: random.Random) -> Plan:
     faults = LineFaults(plan.up, plan.down)
     needed = plan.terms.lead_needed_ticks + -(-faults.longest_delay_ns // TICK_NS)
     trip = round_trip(replace(plan.terms, lead_ticks=needed), faults, "real")
-    shortest = max(plan.terms.lead_needed_ticks, trip.shortest_ticks - plan.terms.ticks_per_sample + 1)
+    shortest = max(plan.terms.lead_needed_ticks, trip.in_time_ticks - plan.terms.ticks_per_sample + 1)
     lead = chance.choice(
         (needed, needed, chance.randint(min(shortest, needed), needed), needed + chance.randint(1, 200))
     )
@@ -91,9 +91,7 @@ def with_liveness(plan: Plan, chance: random.Random) -> Plan:
 
 
 def _stretched(one: Impairments, factor: float) -> Impairments:
-    return replace(
-        one, delay_ns=round(one.delay_ns * factor), jitter_ns=round(one.jitter_ns * factor)
-    )
+    return replace(one, delay_ns=round(one.delay_ns * factor), jitter_ns=round(one.jitter_ns * factor))
 
 
 def _draw_faults(seed: int) -> Plan:

@@ -127,7 +127,7 @@ class World:
             self.identity,
             self._started,
             recorder,
-            overtaking_samples=self.plan.overtaking_samples,
+            overtaking_ticks=self.plan.overtaking_ticks,
         )
         guard = Guard(self.terms.limits, GuardSettings(self.plan.watchdog_ticks, 50, (0.0, 0.0)))
         scores = Scores(self.codec.model, 0, 2000, REFERENCE.angle_rad)

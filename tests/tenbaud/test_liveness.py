@@ -152,7 +152,9 @@ def test_when_any_configuration_is_accepted_then_lockstep_comes_back() -> None:
 
 def test_when_the_watchdog_is_automatic_then_it_knows_lead_and_round_trip() -> None:
     def ticks(**changes: Any) -> int:
-        return guard_settings(agree(load_config("paper-10baud", None, changes), "virtual")).timeout_ticks
+        return guard_settings(
+            agree(load_config("paper-10baud", None, changes), "virtual")
+        ).timeout_ticks
 
     assert ticks() == 50
     assert ticks(**lead(60)) == 60 + 20
@@ -173,12 +175,12 @@ def test_when_a_watchdog_is_shorter_than_commands_are_late_then_it_is_refused_wi
     assert str(caught.value) == (
         "transmitter.watchdog_s = 0.1 is too short: with lead_ticks = 3 and a round trip of up to 13 "
         "ticks of 10 ms, commands may be 10 ticks late on a line that loses nothing, and the watchdog "
-        "would trip in every epoch; set it to at least 0.11, set lead_ticks to at least 13, or leave it "
-        'at "auto" (0.5)'
+        "would trip in every epoch; set it to at least 0.11, set lead_ticks to at least 13, or leave "
+        'it at "auto" (0.5)'
     )
 
 
-def test_when_no_command_could_be_in_time_then_the_lead_is_refused_with_numbers() -> None:
+def test_when_commands_could_come_too_late_for_good_then_the_lead_is_refused() -> None:
     with pytest.raises(ConfigError, match=r"after 18, .* lead_ticks to at least 23, or to .auto"):
         fly(**lead(9), **line("delay=100ms"))
     assert fly(**lead(11), **line("delay=100ms")).outcome.code is ExitCode.OK

@@ -314,9 +314,9 @@ class TransmitterSession:
         return self._check_gap()
 
     def _check_gap(self) -> list[Frame]:
-        if not self._echoes.is_lost(self.copies.confirmed.sample, self._tick):
+        if not self._echoes.is_lost(expected := self.copies.confirmed.sample, self._tick):
             return []
-        return self.rejoin(Why.GAP, "more command frames in a row were lost than each repeats samples")
+        return self.rejoin(Why.GAP, f"the echo of sample {expected} never came, nor a repetition of it")
 
     def _confirm(self, echo: Echo) -> list[Frame]:
         """Advance the confirmed copy by one echo; return the report of a desync, if it is one."""

@@ -56,7 +56,7 @@ class Commander:
         self.codec = codec
         self.terms = terms
         self.state = codec.initial()
-        self.history = History(codec)
+        self.history = History(codec, 2 * terms.history_samples)
         self.hold = terms.initial_command
         """last command decided"""
         self._controller = controller
@@ -79,7 +79,15 @@ class Commander:
         `silent_samples` had no symbol before.
         """
         known = tuple(self._commands)
-        self.state = carried_to(self.codec, self.state, sample, known, self.hold, silent_samples)
+        self.state = carried_to(
+            self.codec,
+            self.state,
+            sample,
+            known,
+            self.hold,
+            silent_samples,
+            self.terms.history_samples,
+        )
         self._hold(self.hold)
 
     def _hold(self, command: Vector) -> None:

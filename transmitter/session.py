@@ -34,7 +34,7 @@ from channel.frames import (
 )
 from channel.identity import Identity, differing_fields
 from channel.limits import from_millivolts
-from channel.lockstep import HISTORY_SAMPLES, LOCKSTEP_CHANNEL, History
+from channel.lockstep import LOCKSTEP_CHANNEL, History
 from channel.recording import NullRecorder, Recorder
 from channel.terms import Terms
 from channel.wire import WIRE_VERSION
@@ -44,9 +44,6 @@ from transmitter.copies import Confirmed, Copies
 from transmitter.records import write_sample
 from transmitter.rejoin import Asking, start_of
 from transmitter.sight import Sight
-
-LAG_SAMPLES_MAX = HISTORY_SAMPLES
-"""Echoes may be this many samples behind before a rejoin is asked for."""
 
 
 class Phase(Enum):
@@ -96,13 +93,15 @@ class TransmitterSession:
         """when the receiver last told something new in the present epoch"""
         self.epoch_tick = 0
         """first tick of the present epoch"""
-        self.confirmed: deque[Confirmed] = deque(maxlen=2 * LAG_SAMPLES_MAX)
+        self.confirmed: deque[Confirmed] = deque(maxlen=2 * terms.history_samples)
         """samples confirmed and not yet written down (`take_confirmed`)"""
         self.events: deque[Event] = deque(maxlen=1000)
-        self.history = History(codec)
+        self.history = History(codec, 2 * terms.history_samples)
         self._asking = Asking(identity, incarnation, terms)
         self._claims = Claims(terms)
         self._stop_on_desync = stop_on_desync
+        self._lag_samples_max = terms.history_samples
+        """Echoes may be this many samples behind before a rejoin is asked for."""
         self._sight = (sight or Sight(codec.model, terms.tick_ns / 1e9)) if codec.uses_rates else None
         self._recorder = recorder or NullRecorder()
         self._due: deque[tuple[int, Vector]] = deque(
@@ -135,8 +134,8 @@ class TransmitterSession:
         if self.phase is not Phase.FLYING:
             return []
         sample, offset = divmod(tick, self.terms.ticks_per_sample)
-        if sample - self.copies.confirmed.sample > LAG_SAMPLES_MAX:
-            return self.rejoin(Why.LAG, f"no echo for {LAG_SAMPLES_MAX} samples")
+        if sample - self.copies.confirmed.sample > self._lag_samples_max:
+            return self.rejoin(Why.LAG, f"no echo for {self._lag_samples_max} samples")
         while self.copies.next_sample < sample:
             self.counts["words_missed"] += 1
             self.copies.sent(ERASED)

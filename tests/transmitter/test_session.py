@@ -191,9 +191,7 @@ def test_when_the_first_tick_of_a_word_was_missed_then_none_of_its_symbols_leave
     assert session.counts["words_missed"] == 1
 
 
-def test_when_samples_are_short_then_echoes_may_lag_by_a_time_and_requests_are_spaced() -> (
-    None
-):
+def test_when_samples_are_short_then_echoes_may_lag_by_a_time_and_requests_are_spaced() -> None:
     session = flying(lead_ticks=13, tick_ns=50_000, rate_baud=2000.0)
     sent = [symbol for tick in range(5000) for symbol in session.on_measurement(tick, (1.0,))]
     assert len(sent) == 500

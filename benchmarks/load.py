@@ -1,7 +1,7 @@
 """How many 10-baud rigs a receiver process serves in real time, and what each of them costs.
 
 The receivers are `tenbaud receive --sessions`, recording every flight; the rigs are `light_rigs`, on
-the same cores, and what they take of these is shown beside. CPU is in percent of one core, while all fly.
+the same cores, and what they take of these is shown beside. CPU is in percent of one core.
 Then the same with two receivers behind a router, the rigs spread over them by the names of their
 sessions, for what a fleet costs (docs/fleet.md).
 """

@@ -35,7 +35,8 @@ CHUNK_BYTES = 1 << 20
 # some six times a tick. In real time a batch is therefore shorter than a fast flight's tick, and the
 # pause after it lets the loop run.
 BATCH_ROWS = 200
-REAL_TIME_BATCH_ROWS = 10
+REAL_TIME_BATCH_ROWS = 20
+SHARED_BATCH_ROWS = 50
 BATCH_PAUSE_S = 0.0005
 FULL_PAUSE_S = 0.002
 CLOSE_TIMEOUT_S = 10.0
@@ -67,7 +68,8 @@ class McapRecorder:
         self._queue: deque[tuple[RecordChannel, int, Sequence[object]]] = deque()
         self._queue_limit = queue_limit
         self._wait_when_full = wait_when_full
-        self._batch_rows = BATCH_ROWS if wait_when_full else REAL_TIME_BATCH_ROWS
+        in_real_time = REAL_TIME_BATCH_ROWS if shared is None else SHARED_BATCH_ROWS
+        self._batch_rows = BATCH_ROWS if wait_when_full else in_real_time
         self._dropped_at_queue = 0
         self._dropped_in_thread = 0
         self._rows_written = 0

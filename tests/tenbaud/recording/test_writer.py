@@ -23,7 +23,7 @@ KILLED_PROGRAM = """
 import sys, time
 from pathlib import Path
 from channel.recording import Field, RecordChannel
-from tenbaud.recording.writer import REAL_TIME_BATCH_ROWS, McapRecorder
+from tenbaud.recording.writer import McapRecorder
 
 channel = RecordChannel("tick", (Field("tick", "integer"),))
 recorder = McapRecorder(Path(sys.argv[1]), {})

@@ -106,7 +106,7 @@ class ZenohHub:
             f"{KEY_ROOT}/{name}/alive/receiver/{secrets.token_hex(4)}"
         )
         self._joined[name] = (publisher, token)
-        self._names |= {key: name for key in _inbound_keys(name)}
+        self._names |= dict.fromkeys(_inbound_keys(name), name)
 
     def leave(self, name: str) -> None:
         """Take back what `join` did."""

@@ -31,6 +31,7 @@ SECONDS = 10.0
 SETTLE_S = 2.0
 TIMEOUT_S = 90.0
 LATE_MS = 5.0
+SYMBOLS_PER_S = 10
 LINEAR_RIGS = 100
 """Up to here a receiver keeps up, and the cost of one rig follows from the slope."""
 
@@ -103,6 +104,8 @@ def measure(rigs: int, seconds: float, shards: int = 0) -> dict[str, float]:
                 *("tenbaud", "receive", "--sessions", pattern, "--preset", "tuned-10baud"),
                 *("--router" if shards else "--listen", endpoint),
                 *("--rigs-max", str(rigs), "--out", f"many-{index}", "--json"),
+                # The first rig has its session long before the last, and waits for it without a word.
+                *("--set", f"link.peer_timeout_s={TIMEOUT_S}"),
             )
             for index, pattern in enumerate(
                 [session_pattern(shard) for shard in range(shards)] or [f"{NAME}/*"]
@@ -122,6 +125,11 @@ def measure(rigs: int, seconds: float, shards: int = 0) -> dict[str, float]:
         summaries = [_ended(receiver) for receiver in receivers]
     flights = [flight for summary in summaries for flight in summary["flights"]]
     lost = sum(flight["recording_rows_lost"] for flight in flights)
+    flown = round(seconds * SYMBOLS_PER_S) * rigs
+    if seen["samples"] != flown:
+        raise RuntimeError(
+            f"the rigs flew {seen['samples']} of {flown} samples: some lost their sessions"
+        )
     if len(flights) != rigs or lost:
         raise RuntimeError(f"{len(flights)} of {rigs} flights, {lost} rows lost")
     return {

@@ -31,9 +31,12 @@ POLL_PERIOD_S = 0.1
 # Together with one poll period and the time of a batch this stays below the promised second.
 FLUSH_PERIOD_S = 0.8
 CHUNK_BYTES = 1 << 20
-# A batch holds the interpreter for some 2 ms. The pause after it lets a waiting 100 Hz loop run at
-# once instead of after the interpreter's own 5 ms switch interval.
+# While a batch is written, a loop waits for the interpreter each time that it sends, receives or wakes,
+# some six times a tick. In real time a batch is therefore shorter than a fast flight's tick, and the
+# pause after it lets the loop run.
 BATCH_ROWS = 200
+REAL_TIME_BATCH_ROWS = 20
+SHARED_BATCH_ROWS = 50
 BATCH_PAUSE_S = 0.0005
 FULL_PAUSE_S = 0.002
 CLOSE_TIMEOUT_S = 10.0
@@ -65,6 +68,8 @@ class McapRecorder:
         self._queue: deque[tuple[RecordChannel, int, Sequence[object]]] = deque()
         self._queue_limit = queue_limit
         self._wait_when_full = wait_when_full
+        in_real_time = REAL_TIME_BATCH_ROWS if shared is None else SHARED_BATCH_ROWS
+        self._batch_rows = BATCH_ROWS if wait_when_full else in_real_time
         self._dropped_at_queue = 0
         self._dropped_in_thread = 0
         self._rows_written = 0
@@ -195,13 +200,13 @@ class McapRecorder:
             waiting = len(self._queue)
             if not waiting:
                 return
-            # With the queue half full losing rows is the worse evil, so no more pauses.
-            if waiting < self._queue_limit // 2:
+            # With the queue half full losing rows is the worse evil, and at the end nobody is held up.
+            if waiting < self._queue_limit // 2 and not self._closing.is_set():
                 time.sleep(BATCH_PAUSE_S)
 
     def _write_batch(self) -> None:
         queue = self._queue
-        for _ in range(min(BATCH_ROWS, len(queue))):
+        for _ in range(min(self._batch_rows, len(queue))):
             channel, time_ns, row = queue.popleft()
             if self._failed:
                 self._dropped_in_thread += 1

@@ -17,7 +17,6 @@ import numpy as np
 from channel.errors import FrameError
 from channel.frames import Frame, Symbol
 from channel.line import Delivery
-from channel.lockstep import HISTORY_SAMPLES
 from tenbaud.build import Agreement
 from tenbaud.build_ends import build_line
 from transmitter.virtual_flight import GREETINGS_MAX
@@ -71,7 +70,7 @@ def _arrays(
     at = np.arange(ticks, dtype=np.int64)
     known = np.searchsorted(echo_ns, at * tick_ns, side="right").astype(np.int64)
     known[::per_sample] = known_first
-    if np.any(np.arange(len(echo_ns)) - known_first > HISTORY_SAMPLES):
+    if np.any(np.arange(len(echo_ns)) - known_first > terms.history_samples):
         raise Uncommon("echoes lag by more than the ends allow")
     scored = echo_ns <= ticks * tick_ns + _linger_ns(agreement)
     erased = (shifts.reshape(-1, terms.symbols_per_word) < 0).any(axis=1)
@@ -218,13 +217,13 @@ class _LineFlight:
         while self._deadline_ns() <= now_ns:
             self._silent += 1
             self._settle(-1, now_ns)
-            if self._silent >= HISTORY_SAMPLES * self._terms.symbols_per_word:
+            if self._silent >= self._terms.history_samples * self._terms.symbols_per_word:
                 raise Uncommon("the line is silent for longer than the receiver waits")
 
     def _on_symbol(self, arrival: _Arrival) -> None:
         if arrival.slot < self._slot:
             return
-        if arrival.slot - self._slot > HISTORY_SAMPLES * self._terms.symbols_per_word:
+        if arrival.slot - self._slot > self._terms.history_samples * self._terms.symbols_per_word:
             raise Uncommon("a gap that is longer than the receiver bridges")
         self._silent = 0
         while self._slot < arrival.slot:

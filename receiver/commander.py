@@ -15,7 +15,7 @@ from channel.codec import Codec, CodecState, Vector
 from channel.events import EventKind
 from channel.frames import Echo
 from channel.lead import FlownSample, fly_sample
-from channel.limits import are_plausible, from_millivolts, to_millivolts
+from channel.limits import are_plausible, as_carried_all, to_millivolts
 from channel.lockstep import History
 from channel.recording import Recorder
 from channel.terms import Terms
@@ -97,9 +97,9 @@ class Commander:
         self.state = flown.state
         self.history.add(epoch, word, self.state)
         digest = self.codec.digest(self.state)
-        millivolts = [mv for command in flown.commands for mv in to_millivolts(command)]
+        millivolts = to_millivolts([volts for command in flown.commands for volts in command])
         number = self.codec.coder.alphabet.word_number(word)
-        self._echoes.append(Echo(before.sample, number, digest, tuple(millivolts)))
+        self._echoes.append(Echo(before.sample, number, digest, millivolts))
         self._unwritten.append(_Flown(before, word, flown, digest, now_ns))
         if len(self._unwritten) >= UNWRITTEN_MAX:
             self.write_down()
@@ -117,7 +117,7 @@ class Commander:
         """Ask the controller, limit what it wants, and return it as the wire will carry it."""
         volts = self._ask(tick, state)
         limited = self.terms.limits.apply(volts, self.hold)
-        self.hold = from_millivolts(to_millivolts(limited))
+        self.hold = as_carried_all(limited)
         return self.hold
 
     def _reference_rad(self, tick: int) -> float | None:

@@ -42,7 +42,7 @@ EXPONENT_MAX = 700.0
 
 _EIGHTH_TURN = 0.7853981633974483  # pi/4
 _ONE_QUARTER_MAX = 2.35
-"""From an eighth of a turn to this, a little below three eighths, the nearest quarter turn is the first."""
+"""Below this, and above an eighth of a turn, one quarter turn is nearest (3 pi/4 is 2.356)."""
 _QUARTER_TURNS_PER_RAD = 0.6366197723675814  # 2/pi
 # pi/2 = HIGH + MIDDLE + LOW + 5e-40. HIGH and MIDDLE have 37 significant bits, so that their
 # product with a count below 2**16 is exact (53 bits).

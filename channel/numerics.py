@@ -104,7 +104,7 @@ def sin(x: float) -> float:
         value = 1.0 - (0.5 * z - (z * z * series - r * tail))
         return value if x > 0.0 else -value
     if not (-ANGLE_RAD_MAX <= x <= ANGLE_RAD_MAX):  # written so that a NaN is refused too
-        raise ValueError(f"sin takes angles from -100000 to 100000 rad, got {x}")
+        raise ValueError("sin takes angles from -100000 to 100000 rad")
     quarters, remainder, tail = _reduce_angle(x)
     quadrant = quarters & 3
     if quadrant == 0:
@@ -121,7 +121,7 @@ def cos(x: float) -> float:
     if -_EIGHTH_TURN <= x <= _EIGHTH_TURN:
         return _cos_reduced(x, 0.0)
     if not (-ANGLE_RAD_MAX <= x <= ANGLE_RAD_MAX):
-        raise ValueError(f"cos takes angles from -100000 to 100000 rad, got {x}")
+        raise ValueError("cos takes angles from -100000 to 100000 rad")
     quarters, remainder, tail = _reduce_angle(x)
     quadrant = quarters & 3
     if quadrant == 0:
@@ -136,7 +136,7 @@ def cos(x: float) -> float:
 def exp(x: float) -> float:
     """Return e to the power ``x``; ``|x| <= EXPONENT_MAX``, otherwise ``ValueError``."""
     if not (-EXPONENT_MAX <= x <= EXPONENT_MAX):
-        raise ValueError(f"exp takes exponents from -700 to 700, got {x}")
+        raise ValueError("exp takes exponents from -700 to 700")
     octaves = math.floor(x * _OCTAVES_PER_UNIT + 0.5)
     high = x - octaves * _LN2_HIGH  # exact
     low = octaves * _LN2_LOW

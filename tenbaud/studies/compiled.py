@@ -25,7 +25,7 @@ from channel.errors import TenbaudError
 
 PACKAGES = ("channel", "plant_sim", "receiver", "transmitter", "tenbaud")
 
-OPTIONS = {"fastmath": False, "error_model": "python", "nogil": True}
+OPTIONS = {"fastmath": False, "error_model": "python", "nogil": True, "_nrt": False}
 """How everything is compiled: divisions by zero are errors and nothing is reordered, as in Python."""
 
 SOURCES = (*PACKAGES[:-1], "tenbaud.config", "tenbaud.flight", "tenbaud.studies")

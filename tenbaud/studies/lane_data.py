@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from tenbaud.studies.bare import bare
-
 
 class LaneWork(NamedTuple):
     """Arrays of flights side by side.
@@ -50,31 +48,3 @@ class LaneWork(NamedTuple):
     squares: Any
     largest: Any
     """of the errors coded and live, and of tracking and the angle: kind, lane"""
-
-
-def bare_lanes(work: LaneWork) -> LaneWork:
-    """Return the same arrays, uncounted; see `bare`."""
-    return LaneWork(
-        bare(work.torque),
-        bare(work.models),
-        bare(work.coders),
-        bare(work.sent),
-        bare(work.model),
-        bare(work.coder),
-        bare(work.spare),
-        bare(work.correction),
-        bare(work.state),
-        bare(work.held),
-        bare(work.nothing),
-        bare(work.plant),
-        bare(work.integral),
-        bare(work.counts),
-        bare(work.still),
-        bare(work.well),
-        bare(work.commanded),
-        bare(work.applied),
-        bare(work.coded),
-        bare(work.live),
-        bare(work.squares),
-        bare(work.largest),
-    )

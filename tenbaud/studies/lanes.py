@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 from tenbaud.studies.flight_data import Given, Numbers
-from tenbaud.studies.lane_data import LaneWork, bare_lanes
+from tenbaud.studies.lane_data import LaneWork
 from tenbaud.studies.lane_samples import close, copy, send, take, watch_closely
 from tenbaud.studies.lane_ticks import (
     add_error,
@@ -23,14 +23,11 @@ from tenbaud.studies.lane_ticks import (
     push,
     watch,
 )
-from tenbaud.studies.uncounted import bare_given
 
 
 def fly_lanes(numbers: Numbers, constants: Any, given: Given, work: LaneWork) -> bool:
     """Fly; return whether the commands came in time. Everything else is in `work`."""
     model_constants, coder_constants, plant_constants, pid_constants = constants
-    given = bare_given(given)
-    work = bare_lanes(work)
     age = 0
     for sample in range(given.scored.shape[0]):
         _guess(sample, numbers, model_constants, coder_constants, given, work)

@@ -69,7 +69,7 @@ class Terms:
 
     def slot_ns(self, slot: int) -> int:
         """Return the flight time at which a slot begins."""
-        return slot * self.sample_ns // self.symbols_per_word
+        return slot * self.tick_ns * self.ticks_per_sample // self.symbols_per_word
 
     @property
     def lead_needed_ticks(self) -> int:

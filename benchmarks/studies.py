@@ -53,7 +53,7 @@ def studies_figures() -> list[Figure]:
             "study_over_control",
             control_s / compiled_s,
             "times",
-            "1000 asked; docs/studies.md says why not",
+            "1000; see docs/studies.md",
         ),
         Figure("study_noisy_over_control", control_s / noisy_s, "times", "with noise"),
     ]

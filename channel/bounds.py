@@ -6,8 +6,8 @@ that they would act on, and count what is dropped under `COUNTER`. The limits:
 
 * **counters**: samples and slots leave half of their range on the wire for the flight that follows, and
   flight times fit 63 bits of nanoseconds;
-* **reach**: a sample is at most `REACH_SAMPLES` ahead of what this end's own clock says (for symbols,
-  which come on a schedule, `receiver.schedule` is much stricter);
+* **reach**: a sample is at most twice the history (`Terms.history_samples`) ahead of what this end's
+  own clock says; `receiver.schedule` is stricter with symbols and requests;
 * **states**: of this codec and finite, the model within `STATE_MAX`, the coder as its kind says;
 * **commands**: as many as a sample has, each within the voltage limit, as the receiver's limiter leaves
   them;
@@ -17,21 +17,20 @@ that they would act on, and count what is dropped under `COUNTER`. The limits:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
 
 from channel.codec import Codec, CodecState, is_coder_state, is_estimate
+from channel.events import EventKind
 from channel.frames import Bye, Commands, Desync, Echo, Frame, Hello, Refuse, Symbol, Welcome
 from channel.limits import to_millivolts
-from channel.lockstep import HISTORY_SAMPLES
 from channel.terms import Terms
 from channel.words import WIRE_ERASED
 
+Tell = Callable[[EventKind, str], None]
+
 COUNTER = "out_of_bounds"
 """Name under which sessions count, and summaries show, the frames dropped for what they hold."""
-
-REACH_SAMPLES = 2 * HISTORY_SAMPLES
-"""The two ends' counts of samples may differ by the history, by which either runs on when it hears
-nothing, and by the round trip, which the history covers as well."""
 
 COUNTER_MAX = 2**31
 """Half of what 32 bits count."""
@@ -42,12 +41,20 @@ TEXT_CHARACTERS_MAX = 2000
 
 
 class Bounds:
-    """The bounds of one flight. Each method returns what is wrong with a frame; None: nothing."""
+    """The bounds of one flight. The methods `of_...` return what is wrong with a frame; None: nothing.
 
-    def __init__(self, codec: Codec, terms: Terms) -> None:
+    What is dropped is counted in `counts` and told by `tell`.
+    """
+
+    def __init__(self, codec: Codec, terms: Terms, counts: Counter[str], tell: Tell) -> None:
+        self._counts = counts
+        self._tell = tell
         self._codec = codec
         self._terms = terms
         self._echoes_max = terms.repeats + 1
+        # The two counts of samples may differ by the history, by which either end runs on when it hears
+        # nothing, and by the round trip, which the history covers as well.
+        self._reach = 2 * terms.history_samples
         self._inputs = codec.model.input_size
         self._millivolts = terms.ticks_per_sample * self._inputs
         limit = terms.limits.volts_max
@@ -55,6 +62,14 @@ class Bounds:
         self._millivolts_max = to_millivolts((largest,))[0]
         self._state_bytes = len(codec.pack(codec.initial()))
         self.sample_max = min(COUNTER_MAX // terms.symbols_per_word, TIME_NS_MAX // terms.sample_ns)
+
+    def drops(self, problem: str | None) -> bool:
+        """Count and tell a frame that is dropped for what it holds; return whether it is."""
+        if problem is None:
+            return False
+        self._counts[COUNTER] += 1
+        self._tell(EventKind.STALE, f"dropped a frame that is out of bounds: {problem}")
+        return True
 
     def of_symbol(self, symbol: Symbol) -> str | None:
         """Check a symbol of the present epoch, but for its time."""
@@ -66,9 +81,9 @@ class Bounds:
         """Check a request for a session, but for its time."""
         return self._of_sample(hello.sample)
 
-    def of_report(self, report: Desync, epoch: int, sample: int, kept: int) -> str | None:
-        """Check the report of a difference; this end is at `sample` and knows the last `kept` ones."""
-        if report.epoch > epoch or not sample - kept <= report.sample < sample:
+    def of_report(self, report: Desync, epoch: int, sample: int) -> str | None:
+        """Check the report of a difference at an end that consumes `sample` next."""
+        if report.epoch > epoch or not sample - self._reach <= report.sample < sample:
             return f"a difference after sample {report.sample} of epoch {report.epoch}"
         if report.state and len(report.state) != self._state_bytes:
             return f"a state of {len(report.state)} bytes"
@@ -78,7 +93,7 @@ class Bounds:
         """Check a command frame; the clock stands in `sample`, and `next_sample` is sent next."""
         if len(commands.echoes) > self._echoes_max:
             return f"{len(commands.echoes)} echoes, where at most {self._echoes_max} are agreed"
-        if commands.echoes[-1].sample > sample + REACH_SAMPLES:
+        if commands.echoes[-1].sample > sample + self._reach:
             return f"an echo of sample {commands.echoes[-1].sample} during sample {sample}"
         for echo in commands.echoes:
             problem = self._of_echo(echo)
@@ -99,7 +114,7 @@ class Bounds:
             return f"a command to hold for {len(hold)} motors, not {self._inputs}"
         if hold and not self._are_allowed(hold):
             return f"a command of {hold} mV to hold, beyond +-{self._millivolts_max}"
-        if sample is not None and welcome.first_sample > sample + REACH_SAMPLES + self._lead_samples:
+        if sample is not None and welcome.first_sample > sample + self._reach + self._lead_samples:
             return f"a start at sample {welcome.first_sample} during sample {sample}"
         return self._of_sample(welcome.first_sample) or self._of_state(welcome)
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections import Counter, deque
 from enum import Enum
 
-from channel.bounds import COUNTER, Bounds, within_text_bounds
+from channel.bounds import Bounds, within_text_bounds
 from channel.codec import Codec, CodecState
 from channel.events import EVENT_CHANNEL, Event, EventKind, event_row
 from channel.frames import (
@@ -32,7 +32,7 @@ from channel.frames import (
 )
 from channel.identity import Identity
 from channel.limits import to_millivolts
-from channel.lockstep import HISTORY_SAMPLES, STATES_KEPT, History, difference_text
+from channel.lockstep import History, difference_text
 from channel.recording import NullRecorder, Recorder
 from channel.shaper import BaudMeter
 from channel.terms import Terms
@@ -45,9 +45,6 @@ from receiver.rejoin import Greeter, Verdict, desync_answer, difference, first_s
 from receiver.schedule import Proven, Schedule, Timing
 from receiver.short_slots import SlotFinder
 from receiver.stranger import Stranger
-
-GAP_SAMPLES_MAX = HISTORY_SAMPLES
-"""A symbol this far ahead is no gap any more; after as many erasures in a row none are counted on."""
 
 EPOCH_MAX = 0xFFFF
 
@@ -86,13 +83,14 @@ class ReceiverSession:
         self.epoch = 0
         self.meter = BaudMeter()
         self.counts: Counter[str] = Counter()
-        """erasures, symbols_late, symbols_misplaced, stale_frames, malformed, refused_hellos,
-        bad_commands, bad_references, desyncs, rejoins, out_of_bounds"""
+        """samples (flown), samples_skipped (between epochs), erasures, symbols_late, symbols_misplaced,
+        stale_frames, malformed, refused_hellos, bad_commands, bad_references, desyncs, rejoins,
+        out_of_bounds"""
         self.end_reason = ""
         self.refusal: str | None = None
         self.desync: Desync | None = None
         self.events: deque[Event] = deque(maxlen=1000)
-        self._greeter = Greeter()
+        self._greeter = Greeter(terms)
         self._stranger = Stranger(session_number, take_over)
         self._recorder = recorder or NullRecorder()
         self._commander = Commander(codec, terms, controller, self._recorder, self.counts, self._tell)
@@ -102,9 +100,11 @@ class ReceiverSession:
         """whether a symbol of this epoch has been received"""
         self._silent_slots = 0
         self._slots = SlotFinder(terms)
-        self._bounds = Bounds(codec, terms)
+        self._bounds = Bounds(codec, terms, self.counts, self._tell)
         self._schedule = Schedule(terms)
         self._proven = Proven(self._commander.standing, self._schedule, 0, None)
+        self._gap_samples_max = terms.history_samples
+        """A symbol this far ahead is no gap any more; after as many erasures in a row none are due."""
 
     @property
     def state(self) -> CodecState:
@@ -156,9 +156,10 @@ class ReceiverSession:
         while deadline is not None and deadline <= now_ns:
             self._silent_slots += 1
             frames += self._settle(None, now_ns)
-            if self._silent_slots >= GAP_SAMPLES_MAX * self.terms.symbols_per_word:
+            if self._silent_slots >= self._gap_samples_max * self.terms.symbols_per_word:
                 self._schedule.anchor(None)
-                self._tell(EventKind.PEER, f"no symbol for {GAP_SAMPLES_MAX} samples: waiting for one")
+                text = f"no symbol for {self._gap_samples_max} samples: waiting for one"
+                self._tell(EventKind.PEER, text)
             deadline = self.next_deadline()
         return frames
 
@@ -182,7 +183,7 @@ class ReceiverSession:
     def _on_hello(self, hello: Hello, now_ns: int) -> list[Frame]:
         if self.phase is Phase.ENDED:
             return [Refuse(hello.incarnation, f"this receiver has ended: {self.end_reason}", "")]
-        if self._is_out_of_bounds(self._bounds.of_hello(hello)):
+        if self._bounds.drops(self._bounds.of_hello(hello)):
             return []
         schedule = self._schedule if self._advanced else self._proven.schedule
         in_reach = schedule.reaches(hello.sample, now_ns)
@@ -197,7 +198,7 @@ class ReceiverSession:
             case Verdict.BUSY:
                 return [Refuse(hello.incarnation, "this receiver is flying with another", "")]
             case Verdict.IGNORE if not in_reach:
-                self._is_out_of_bounds(f"a request for sample {hello.sample}, ahead of the clock")
+                self._bounds.drops(f"a request for sample {hello.sample}, ahead of the clock")
             case Verdict.REFUSE:
                 problem = difference(hello, self.identity) or ""
                 self._refuse(problem)
@@ -225,6 +226,7 @@ class ReceiverSession:
         else:
             self.epoch += 1
             self.counts["rejoins"] += 1
+            self.counts["samples_skipped"] += max(0, first - self.state.sample)
             if hello.incarnation == (last.incarnation if proven is None else proven):
                 self._commander.carry_on(first, self._proven.silent_slots // count)
                 state = self.codec.pack(self.state)
@@ -267,20 +269,20 @@ class ReceiverSession:
         if not self._is_current(symbol.session) or symbol.epoch != self.epoch:
             self.counts["stale_frames"] += 1
             return self._on_foreign_symbol(symbol)
-        if self._is_out_of_bounds(self._bounds.of_symbol(symbol)):
+        if self._bounds.drops(self._bounds.of_symbol(symbol)):
             return []
         if symbol.slot < self._slot:
             return self._on_late_symbol(symbol, now_ns)
         timing = self._schedule.timing(symbol.slot, now_ns)
         if timing is Timing.EARLY:
-            self._is_out_of_bounds(f"slot {symbol.slot} is not due yet")
+            self._bounds.drops(f"slot {symbol.slot} is not due yet")
             return []
         return self._take_symbol(symbol, now_ns, anew=timing is Timing.NEW)
 
     def _take_symbol(self, symbol: Symbol, now_ns: int, *, anew: bool) -> list[Frame]:
         """Consume a symbol of a slot that is due. `anew`: it replaces the schedule."""
         ahead = symbol.slot - self._slot
-        if ahead > GAP_SAMPLES_MAX * self.terms.symbols_per_word:
+        if ahead > self._gap_samples_max * self.terms.symbols_per_word:
             self.counts["stale_frames"] += 1
             self._tell(EventKind.STALE, f"slot {symbol.slot} is {ahead} ahead: dropped")
             return [Unknown(symbol.session, symbol.epoch)]
@@ -301,7 +303,7 @@ class ReceiverSession:
         self.counts["symbols_late"] += 1
         write_symbol(self._recorder, self.terms, symbol, now_ns, taken=False)
         self._tell(EventKind.LATE_SYMBOL, f"slot {symbol.slot} was settled already: dropped")
-        within = self._slot - symbol.slot <= GAP_SAMPLES_MAX * self.terms.symbols_per_word
+        within = self._slot - symbol.slot <= self._gap_samples_max * self.terms.symbols_per_word
         if within and self._schedule.is_replaced_by(symbol.slot, now_ns):
             self._schedule.take(symbol.slot, now_ns, anew=True)
         return []
@@ -354,6 +356,7 @@ class ReceiverSession:
         whole = len(symbols) == len(self._word)
         self._word = []
         word = tuple(symbols) if whole else ERASED
+        self.counts["samples"] += 1
         echoes = self._commander.fly(word, self.epoch, now_ns)
         return [Commands(self.session_number, self.epoch, echoes)]
 
@@ -361,8 +364,7 @@ class ReceiverSession:
 
     def _on_desync(self, theirs: Desync) -> list[Frame]:
         """Write a failure down and answer with this end's state; the request that follows rejoins."""
-        sample = self.state.sample
-        if self._is_out_of_bounds(self._bounds.of_report(theirs, self.epoch, sample, STATES_KEPT)):
+        if self._bounds.drops(self._bounds.of_report(theirs, self.epoch, self.state.sample)):
             return []
         answer = desync_answer(theirs, self.history, self.codec)
         last = self.desync
@@ -372,14 +374,6 @@ class ReceiverSession:
             self._tell(EventKind.DESYNC, difference_text(theirs), theirs.sample)
             write_failure(self._recorder, self.terms, self.history, theirs)
         return [answer]
-
-    def _is_out_of_bounds(self, problem: str | None) -> bool:
-        """Count and tell a frame that is dropped for what it holds; return whether it is."""
-        if problem is None:
-            return False
-        self.counts[COUNTER] += 1
-        self._tell(EventKind.STALE, f"dropped a frame that is out of bounds: {problem}")
-        return True
 
     def _is_current(self, session: int) -> bool:
         return self.phase is Phase.FLYING and session == self.session_number

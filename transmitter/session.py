@@ -16,7 +16,7 @@ from dataclasses import replace
 from enum import Enum
 
 from channel.audit_trail import EPOCH_CHANNEL, epoch_row
-from channel.bounds import COUNTER, Bounds, shown, within_text_bounds
+from channel.bounds import Bounds, shown, within_text_bounds
 from channel.codec import Codec, Vector
 from channel.events import EVENT_CHANNEL, Event, EventKind, event_row
 from channel.frames import (
@@ -35,19 +35,18 @@ from channel.frames import (
     Why,
 )
 from channel.identity import Identity, differing_fields
-from channel.lockstep import HISTORY_SAMPLES, History, difference_text
+from channel.lockstep import History, difference_text
 from channel.recording import NullRecorder, Recorder
 from channel.terms import Terms
 from channel.wire import foreign_version_text
 from channel.words import ERASED
 from transmitter.claims import Claims
 from transmitter.copies import CANNOT_FLY, Confirmed, Copies
+from transmitter.echo_order import EchoOrder
+from transmitter.owing import Owing
 from transmitter.records import write_failure, write_sample
 from transmitter.rejoin import Asking, commands_of, start_of
 from transmitter.sight import Sight
-
-LAG_SAMPLES_MAX = HISTORY_SAMPLES
-"""Echoes may be this many samples behind before a rejoin is asked for."""
 
 
 class Phase(Enum):
@@ -65,6 +64,7 @@ class TransmitterSession:
     `incarnation` is drawn by the caller (32 bits), so that the session itself stays deterministic.
     `stop_on_desync`: end the flight at the first digest that differs, instead of rejoining.
     `sight`: gives a coder that uses rates its measurements; None: one with the usual bandwidth.
+    `overtaking_ticks`: how long after a command frame one may come that was sent before it.
     """
 
     def __init__(
@@ -77,6 +77,7 @@ class TransmitterSession:
         *,
         stop_on_desync: bool = False,
         sight: Sight | None = None,
+        overtaking_ticks: int = 0,
     ) -> None:
         self.codec = codec
         self.terms = terms
@@ -89,6 +90,7 @@ class TransmitterSession:
         self.counts: Counter[str] = Counter()
         """digest_checks, desyncs, rejoins, stale_frames, words_missed, erasures, claims_refused,
         take_overs, out_of_bounds, diverged"""
+        self.rejoins_asked: Counter[Why] = Counter()
         self.end_reason = ""
         self.refusal: str | None = None
         self.desync: Desync | None = None
@@ -98,14 +100,18 @@ class TransmitterSession:
         """when the receiver last told something new in the present epoch"""
         self.epoch_tick = 0
         """first tick of the present epoch"""
-        self.confirmed: deque[Confirmed] = deque(maxlen=2 * LAG_SAMPLES_MAX)
+        self.owing = Owing(terms)
+        self.confirmed: deque[Confirmed] = deque(maxlen=2 * terms.history_samples)
         """samples confirmed and not yet written down (`take_confirmed`)"""
         self.events: deque[Event] = deque(maxlen=1000)
-        self.history = History(codec)
+        self.history = History(codec, 2 * terms.history_samples)
         self._asking = Asking(identity, incarnation, terms)
         self._claims = Claims(terms)
-        self._bounds = Bounds(codec, terms)
+        self._bounds = Bounds(codec, terms, self.counts, self._tell)
         self._stop_on_desync = stop_on_desync
+        self._echoes = EchoOrder(overtaking_ticks, terms.history_samples)
+        self._lag_samples_max = terms.history_samples
+        """Echoes may be this many samples behind before a rejoin is asked for."""
         self._sight = (sight or Sight(codec.model, terms.tick_ns / 1e9)) if codec.uses_rates else None
         self._recorder = recorder or NullRecorder()
         self._due: deque[tuple[int, Vector]] = deque(
@@ -138,8 +144,10 @@ class TransmitterSession:
         if self.phase is not Phase.FLYING:
             return []
         sample, offset = divmod(tick, self.terms.ticks_per_sample)
-        if sample - self.copies.confirmed.sample > LAG_SAMPLES_MAX:
-            return self.rejoin(Why.LAG, f"no echo for {LAG_SAMPLES_MAX} samples")
+        if sample - self.copies.confirmed.sample > self._lag_samples_max:
+            return self.rejoin(Why.LAG, f"no echo for {self._lag_samples_max} samples")
+        if frames := self._check_gap():
+            return frames
         while self.copies.next_sample < sample:
             self.counts["words_missed"] += 1
             self.copies.sent(ERASED)
@@ -160,6 +168,7 @@ class TransmitterSession:
         if self.phase is not Phase.FLYING:
             return []
         self.phase = Phase.REJOINING
+        self.rejoins_asked[why] += 1
         self._asking.begin(why, self._tick)
         self._tell(EventKind.REJOIN, f"{text}: asking for a new epoch after {self.epoch}")
         return self._ask()
@@ -249,7 +258,7 @@ class TransmitterSession:
             self.counts["stale_frames"] += 1
             return []
         again = self.phase is not Phase.GREETING
-        if self._is_out_of_bounds(self._bounds.of_welcome(welcome, self._sample if again else None)):
+        if self._bounds.drops(self._bounds.of_welcome(welcome, self._sample if again else None)):
             return []
         state, hold = start_of(welcome, self.codec, self.terms)
         farewell: list[Frame] = []
@@ -261,8 +270,10 @@ class TransmitterSession:
         self.epoch = welcome.epoch
         self.heard_tick = self._tick
         self.copies.restart(state, hold)
+        self._echoes.clear()
         self.epoch_tick = state.sample * self.terms.ticks_per_sample
-        self._due = deque(enumerate([hold] * self.terms.lead_ticks, self.epoch_tick))
+        held = self.owing.begin(self.epoch_tick, self._tick, self._asking.why)
+        self._due = deque(enumerate([hold] * held, self.epoch_tick))
         self.phase = Phase.FLYING
         begins_ns = state.sample * self.terms.sample_ns
         self._recorder.write(EPOCH_CHANNEL, begins_ns, epoch_row(self.epoch, state, hold))
@@ -294,23 +305,20 @@ class TransmitterSession:
             self.counts["stale_frames"] += 1
             return []
         problem = self._bounds.of_commands(frame, self._sample, self.copies.next_sample)
-        if self._is_out_of_bounds(problem):
+        if self._bounds.drops(problem):
             return []
         self.heard_tick = self._tick
         self._claims.on_command()
-        for echo in frame.echoes:
-            expected = self.copies.confirmed.sample
-            if echo.sample < expected:
-                continue
-            if echo.sample > expected:
-                return self.rejoin(
-                    Why.GAP,
-                    f"the echo of sample {expected} never came (got {echo.sample}), more than "
-                    f"{self.terms.repeats} command frames in a row were lost",
-                )
+        self._echoes.add(frame.echoes, self.copies.confirmed.sample, self._tick, self._sample)
+        while (echo := self._echoes.take(self.copies.confirmed.sample)) is not None:
             if frames := self._confirm(echo):
                 return frames
-        return []
+        return self._check_gap()
+
+    def _check_gap(self) -> list[Frame]:
+        if not self._echoes.is_lost(expected := self.copies.confirmed.sample, self._tick):
+            return []
+        return self.rejoin(Why.GAP, f"the echo of sample {expected} never came, nor a repetition of it")
 
     def _confirm(self, echo: Echo) -> list[Frame]:
         """Advance the confirmed copy by one echo; return the report of a desync, if it is one."""
@@ -327,6 +335,7 @@ class TransmitterSession:
         if done.digest != echo.digest:
             return self._on_desync(done)
         # Only now: whoever does not hold the same state moves no motor.
+        self.owing.on_confirmed()
         first_tick = echo.sample * self.terms.ticks_per_sample + self.terms.lead_ticks
         self._due.extend(enumerate(commands, first_tick))
         return []
@@ -355,14 +364,6 @@ class TransmitterSession:
     def _sample(self) -> int:
         """Return the sample that this end's clock stands in."""
         return max(0, self._tick) // self.terms.ticks_per_sample
-
-    def _is_out_of_bounds(self, problem: str | None) -> bool:
-        """Count and tell a frame that is dropped for what it holds; return whether it is."""
-        if problem is None:
-            return False
-        self.counts[COUNTER] += 1
-        self._tell(EventKind.STALE, f"dropped a frame that is out of bounds: {problem}")
-        return True
 
     def _is_answer(self, frame: Desync) -> bool:
         """Return whether this is the first answer to our last report: the same, with another state."""

@@ -17,8 +17,8 @@ from channel.frames import (
     Welcome,
 )
 from channel.limits import CommandLimits, from_millivolts
+from channel.lockstep import HISTORY_SAMPLES
 from channel.words import WIRE_ERASED
-from receiver.session import GAP_SAMPLES_MAX
 from tests.receiver.sessions import (
     CODEC,
     MS,
@@ -111,11 +111,11 @@ def test_when_a_symbol_is_not_of_the_alphabet_then_it_is_dropped_and_counted() -
 
 def test_when_a_slot_is_far_ahead_then_it_is_dropped_and_not_a_gap() -> None:
     session = flying()
-    at_ns = (GAP_SAMPLES_MAX + 1) * 100 * MS
-    assert session.on_frame(symbol(GAP_SAMPLES_MAX + 1), at_ns) == [Unknown(SESSION, 0)]
+    at_ns = (HISTORY_SAMPLES + 1) * 100 * MS
+    assert session.on_frame(symbol(HISTORY_SAMPLES + 1), at_ns) == [Unknown(SESSION, 0)]
     assert session.counts["stale_frames"] == 1
     assert kinds(session)[-1] is EventKind.STALE
-    assert len(session.on_frame(symbol(GAP_SAMPLES_MAX), at_ns)) == GAP_SAMPLES_MAX + 1
+    assert len(session.on_frame(symbol(HISTORY_SAMPLES), at_ns)) == HISTORY_SAMPLES + 1
 
 
 @pytest.mark.parametrize(

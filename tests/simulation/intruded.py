@@ -1,8 +1,8 @@
 """The world with company: an intruder on the line, and second receivers of the same flight.
 
 Every receiver hears all that goes up, and the transmitter all that comes down, as on one Zenoh key. A
-receiver that has ended (a second one is refused) is a process that has gone; the flight's own is started
-again after a second, by whoever looks after it.
+receiver that has ended (a second one is refused) is a process that has gone; the flight's own is
+started again after a second, by whoever looks after it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Somebody on the line: hears both directions, plays recordings back, and forges frames with a good check.
+"""Somebody on the line: hears both ways, plays recordings back, forges frames with a good check.
 
 A forged frame is made from what was heard: session, epoch, incarnation, request and sample as they are,
 nearly as they are, extreme or random. What is left out is what the protocol allows to whoever knows the

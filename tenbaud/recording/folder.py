@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from dataclasses import dataclass
 from datetime import datetime
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.lock import hold
 
 DEFAULT_ROOT = Path("runs")
 CONFIG_NAME = "config.toml"
@@ -118,16 +120,22 @@ def find_recordings(path: Path) -> list[Path]:
 
 
 def open_new_recording(path: Path) -> BinaryIO:
-    """Open a file for writing; RecordingError if it holds data or cannot be made."""
+    """Open a file for writing, and hold its lock; RecordingError if it holds data or cannot be made.
+
+    A link is not followed: what it leads to is nobody's recording.
+    """
+    flags = os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC | getattr(os, "O_NOFOLLOW", 0)
     try:
-        if path.exists() and path.stat().st_size > 0:
-            raise RecordingError(
-                f"The recording {path} exists already and is not overwritten. "
-                "Choose another folder or move the file away."
-            )
-        return path.open("wb")
+        stream = open(os.open(path, flags, 0o666), "wb")
     except OSError as error:
         raise RecordingError(
             f"The recording {path} cannot be created: {error.strerror or error}. "
             "Check that its folder exists and may be written to."
         ) from error
+    if not hold(stream.fileno()) or os.fstat(stream.fileno()).st_size > 0:
+        stream.close()
+        raise RecordingError(
+            f"The recording {path} exists already and is not overwritten. "
+            "Choose another folder or move the file away."
+        )
+    return stream

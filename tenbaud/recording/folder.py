@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
+import stat
 from dataclasses import dataclass
 from datetime import datetime
 from itertools import count
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
+
+import orjson
 
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.lock import hold
@@ -19,6 +23,8 @@ TRANSMITTER_NAME = "transmitter.mcap"
 RECEIVER_NAME = "receiver.mcap"
 SUMMARY_NAME = "summary.json"
 FIGURE_NAME = "flight.png"
+SMALL_BYTES_MAX = 4 << 20
+"""Of a configuration or a summary that is read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +123,30 @@ def find_recordings(path: Path) -> list[Path]:
             "Give the folder of one run, not the folder that holds the runs."
         )
     return found
+
+
+def read_small(path: Path) -> str:
+    """Return the text of a small file of a run folder.
+
+    Raises OSError for what is missing, no plain file or too large, ValueError for what is no text.
+    """
+    handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
+    with open(handle, "rb") as stream:
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
+            raise OSError(errno.EINVAL, "it is no plain file", str(path))
+        data = stream.read(SMALL_BYTES_MAX + 1)
+    if len(data) > SMALL_BYTES_MAX:
+        raise OSError(errno.EFBIG, f"it has more than {SMALL_BYTES_MAX} bytes", str(path))
+    return data.decode()
+
+
+def read_summary(path: Path) -> dict[str, Any]:
+    """Return the figures in a `summary.json`; empty where there is none that can be read."""
+    try:
+        summary = orjson.loads(read_small(path))
+    except (OSError, ValueError):
+        return {}
+    return summary if isinstance(summary, dict) else {}
 
 
 def open_new_recording(path: Path) -> BinaryIO:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from channel.recording import Field, RecordChannel
-from tenbaud.recording.folder import RunFolder, find_recordings
+from tenbaud.recording.folder import RunFolder, find_recordings, read_summary
 from tenbaud.recording.reader import Recording, Row, TopicSummary
 from tenbaud.recording.writer import END_METADATA
 
@@ -57,17 +57,19 @@ def describe_json(path: Path) -> list[dict[str, Any]]:
 
 def _headline(path: Path) -> str:
     """Return what `summary.json` says in one line; empty without it."""
-    try:
-        summary = json.loads(RunFolder(path).summary.read_text())
-    except (OSError, ValueError):
+    summary = read_summary(RunFolder(path).summary)
+    if not summary:
         return ""
-    parts = [
-        f"{summary.get('preset')}: {summary.get('outcome')}",
-        f"{summary['duration_s']:g} s" if "duration_s" in summary else "",
-        f"{summary['coder_bits_up']:g} bits up" if "coder_bits_up" in summary else "",
-        f"{summary['erasures']} erasures" if summary.get("erasures") else "",
-        f"{summary['desyncs']} desyncs" if summary.get("desyncs") else "",
-    ]
+    parts = [f"{summary.get('preset')}: {summary.get('outcome')}"]
+    for name, form in (
+        ("duration_s", "{:g} s"),
+        ("coder_bits_up", "{:g} bits up"),
+        ("erasures", "{:g} erasures"),
+        ("desyncs", "{:g} desyncs"),
+    ):
+        value = summary.get(name)
+        if isinstance(value, int | float) and (value or name not in ("erasures", "desyncs")):
+            parts.append(form.format(value))
     return ", ".join(part for part in parts if part)
 
 

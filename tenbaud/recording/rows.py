@@ -39,8 +39,7 @@ KNOWN = (
 NEVER_NULL = {
     ("epoch", "epoch"),
     *(("epoch", name) for name in ("state", "coder", "hold_volts")),
-    *(("sample", name) for name in ("range", "state", "coder", "digest")),
-    *(("estimate", name) for name in ("coded_state", "live_state")),
+    *(("sample", name) for name in ("state", "coder", "digest")),
     *(("tick", name) for name in ("live_state", "command_volts", "applied_volts")),
     *(("symbol", name) for name in ("symbol", "arrived_ns", "taken", "wire_bytes")),
 }

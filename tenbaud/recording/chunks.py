@@ -86,13 +86,14 @@ class Damage:
 
 
 def blocks_of_file(stream: BinaryIO, size: int) -> Iterator[Block | Damage]:
-    """Yield the blocks of a file of `size` bytes, in order; after damage from the next whole chunk on."""
+    """Yield the blocks of a file of `size` bytes; after damage from the next whole chunk on."""
     from tenbaud.recording.resync import Resync
 
     resync = Resync(stream, size)
     at = len(MCAP0_MAGIC)
-    certain, kinds = at, _SKIPPED
-    """up to here every length was confirmed by a checksum or by a second length"""
+    # Up to here every length was confirmed by a checksum or by a second length.
+    certain = at
+    kinds: tuple[Opcode, ...] = _SKIPPED
     while at < size:
         try:
             head = read_head(stream, at, size)
@@ -135,6 +136,18 @@ def summary_of_file(stream: BinaryIO, size: int) -> Iterator[Described | Metadat
                 yield MetadataIndex.read(_Exact(stream.read(length)))
     except BROKEN:
         return
+
+
+def metadata_at(stream: BinaryIO, at: int, size: int) -> Metadata | None:
+    """Return the metadata record at `at`; None if there is none."""
+    try:
+        head = read_head(stream, at, size)
+        if head is None or head[0] != Opcode.METADATA or head[1] > RECORD_BYTES_MAX:
+            return None
+        record: Metadata = Metadata.read(_Exact(stream.read(head[1])))
+        return record
+    except (*BROKEN, OverflowError):
+        return None
 
 
 def read_head(stream: BinaryIO, at: int, size: int) -> tuple[int, int] | None:
@@ -265,7 +278,8 @@ def _decompressed(compression: str, packed: memoryview, size: int) -> bytes:
             return zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
         case "lz4":
             try:
-                return lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size)
+                unpacked: bytes = lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size)
+                return unpacked
             except RuntimeError as error:
                 raise Torn(f"a chunk cannot be unpacked ({error})") from error
         case _:

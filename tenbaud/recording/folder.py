@@ -156,7 +156,7 @@ def open_new_recording(path: Path) -> BinaryIO:
     """
     flags = os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC | getattr(os, "O_NOFOLLOW", 0)
     try:
-        stream = open(os.open(path, flags, 0o666), "wb")
+        stream = os.fdopen(os.open(path, flags, 0o666), "wb")
     except OSError as error:
         raise RecordingError(
             f"The recording {path} cannot be created: {error.strerror or error}. "

@@ -51,7 +51,10 @@ class HoleFinder:
             first = {message[0]: message for message in reversed(messages)}
             self._open.behind = first | self._open.behind
             self._open.blocks += 1
-            if self._open.blocks >= BLOCKS_BEHIND or self._open.before.keys() <= self._open.behind.keys():
+            if (
+                self._open.blocks >= BLOCKS_BEHIND
+                or self._open.before.keys() <= self._open.behind.keys()
+            ):
                 self._open = None
         self._last.update({message[0]: message for message in messages})
 
@@ -66,9 +69,7 @@ class HoleFinder:
         return [_hole(gap, topics, channels) for gap in self._gaps if gap.behind or ended]
 
 
-def _hole(
-    gap: _Gap, topics: Mapping[int, str | None], channels: Mapping[str, RecordChannel]
-) -> Hole:
+def _hole(gap: _Gap, topics: Mapping[int, str | None], channels: Mapping[str, RecordChannel]) -> Hole:
     missing: Missing = {}
     keys: dict[str, str] = {}
     for channel_id, message in gap.behind.items():

@@ -58,13 +58,13 @@ def packed_holes(holes: list[Hole]) -> dict[str, str]:
 
 
 def unpacked_holes(metadata: dict[str, str]) -> list[Hole]:
-    """Return the holes that a recovered file tells of; one that cannot be read is one without detail."""
+    """Return the holes that a recovered file tells of; of one that cannot be read only that it is."""
     holes = []
     for text in list(metadata.values())[:HOLES_MAX]:
         try:
             holes.append(_unpacked(orjson.loads(text)))
         except (ValueError, KeyError, TypeError, AttributeError):
-            holes.append(Hole(0.0, None, "the recovered file tells of a hole, in words that are damaged"))
+            holes.append(Hole(0.0, None, "what the recovered file says of this hole is damaged"))
     return holes
 
 

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from channel.recording import Field, RecordChannel
+from tenbaud.recording.encoding import END_METADATA
 from tenbaud.recording.folder import RunFolder, find_recordings, read_summary
-from tenbaud.recording.reader import Recording, Row, TopicSummary
-from tenbaud.recording.writer import END_METADATA
+from tenbaud.recording.reader import Recording, TopicSummary
+from tenbaud.recording.rows import Row
 
 EVENT_TOPIC = "event"
 EVENTS_SHOWN = 20

@@ -6,7 +6,6 @@ counts as in use; a recorder writes at least once a second while its flight goes
 
 from __future__ import annotations
 
-import os
 import time
 from pathlib import Path
 

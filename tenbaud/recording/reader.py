@@ -9,23 +9,29 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import BinaryIO
 
-from mcap.records import Channel, Footer, Metadata, Schema
+from mcap.records import Channel, Footer, Metadata, MetadataIndex, Schema
 from mcap.writer import MCAP0_MAGIC
 
 from channel.recording import RecordChannel
-from tenbaud.recording.chunks import Damage, Described, RawMessage, blocks_of_file, summary_of_file
-from tenbaud.recording.encoding import channel_from_schema
+from tenbaud.recording.chunks import (
+    Damage,
+    Described,
+    RawMessage,
+    blocks_of_file,
+    metadata_at,
+    summary_of_file,
+)
+from tenbaud.recording.encoding import END_METADATA, RUN_METADATA, channel_from_schema
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.gaps import HoleFinder
 from tenbaud.recording.holes import HOLES_METADATA, Hole, unpacked_holes
 from tenbaud.recording.rows import Row, RowDecoder, channel_of_names, check_channel
-from tenbaud.recording.writer import END_METADATA, RUN_METADATA
 
 METADATA_RECORDS_MAX = 100
 
@@ -241,7 +247,8 @@ class Recording:
         self, topic: str, names: Sequence[str] | None = None
     ) -> Iterator[tuple[list[int], list[Row]]]:
         """Stream times and rows of one topic many at a time; only fields in `names` are checked."""
-        for block in rows_in_blocks(self.path, {topic: names}, self._size):
+        stream = MessageStream(self.path, topic, self._size)
+        for block in rows_in_blocks(stream, {topic: names}):
             yield block[topic]
 
     @property
@@ -267,23 +274,36 @@ class Recording:
 
 
 def rows_in_blocks(
-    path: Path, wanted: dict[str, Sequence[str] | None], size: int | None = None
+    stream: MessageStream, wanted: Mapping[str, Sequence[str] | None]
 ) -> Iterator[dict[str, tuple[list[int], list[Row]]]]:
     """Yield block by block the times and rows of some topics, in one pass over the file.
 
     `wanted` gives for each topic the fields that will be used, which alone are checked; None: all.
     """
-    stream = MessageStream(path, size=size)
     decoders: dict[str, RowDecoder] = {}
     for block in stream.texts():
         found = {}
         for topic, (times, texts) in block.items():
             if topic in wanted:
                 if topic not in decoders:
-                    decoders[topic] = RowDecoder(str(path), stream.channels[topic], wanted[topic])
+                    channel = stream.channels[topic]
+                    decoders[topic] = RowDecoder(str(stream.path), channel, wanted[topic])
                 found[topic] = (times, decoders[topic].decode(texts))
         if found:
             yield found
+
+
+def stored_metadata(path: Path, names: Sequence[str]) -> dict[str, dict[str, str]]:
+    """Return metadata of a finished recording by way of its index, without reading its rows."""
+    found: dict[str, dict[str, str]] = {}
+    with open_recording(path) as stream:
+        size = os.fstat(stream.fileno()).st_size
+        for index in list(summary_of_file(stream, size)):
+            if isinstance(index, MetadataIndex) and index.name in names:
+                record = metadata_at(stream, index.offset, size)
+                if record is not None and record.name == index.name:
+                    found[record.name] = dict(record.metadata)
+    return found
 
 
 def open_recording(path: Path) -> BinaryIO:

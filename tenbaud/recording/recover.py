@@ -16,13 +16,13 @@ from typing import BinaryIO
 
 from mcap.writer import CompressionType, Writer
 
-from tenbaud.recording.encoding import channel_schema
+from tenbaud.recording.encoding import END_METADATA, RUN_METADATA, channel_schema
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import find_recordings
 from tenbaud.recording.holes import HOLES_METADATA, Hole, packed_holes
 from tenbaud.recording.lock import in_use
 from tenbaud.recording.reader import MessageStream, open_recording
-from tenbaud.recording.writer import CHUNK_BYTES, END_METADATA, PROFILE, RUN_METADATA
+from tenbaud.recording.writer import CHUNK_BYTES, PROFILE
 
 RECOVERED_NOTE = "recovered"
 RECOVERED_TEXT = "from a recording that was cut or damaged; what is missing is lost"
@@ -143,7 +143,8 @@ def _keep(path: Path, kept: Path) -> None:
 
 def _exists(path: Path) -> RecordingError:
     return RecordingError(
-        f"{path} exists already and is not overwritten. Move it away, or choose another place with --out."
+        f"{path} exists already and is not overwritten. Move it away, or choose another place with "
+        "--out."
     )
 
 

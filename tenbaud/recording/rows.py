@@ -54,7 +54,10 @@ _TYPES: dict[str, frozenset[type]] = {
     "numbers": frozenset({list}),
     "integers": frozenset({list}),
 }
-_ITEM_TYPES = {"numbers": frozenset({float, int, _NONE}), "integers": frozenset({int})}
+_ITEM_TYPES: dict[str, frozenset[type]] = {
+    "numbers": frozenset({float, int, _NONE}),
+    "integers": frozenset({int}),
+}
 _WORDS = {
     "number": "a number",
     "integer": "a whole number",
@@ -154,7 +157,8 @@ class RowDecoder:
             bad = max(range(len(values)), key=lambda index: abs(values[index]))
             raise self._error(bad, f"has {values[bad]} for {name!r}, which no flight reaches")
         if one.type in _ITEM_TYPES:
-            self._check_items(one, values, _ITEM_TYPES[one.type] - ({_NONE} if never_null else set()))
+            allowed = _ITEM_TYPES[one.type]
+            self._check_items(one, values, allowed - {_NONE} if never_null else allowed)
 
     def _is_key(self, one: Field) -> bool:
         return one.name in KEYS and one is self._channel.fields[0]

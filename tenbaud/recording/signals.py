@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tenbaud.recording.table import Series, Table, Tables
 
@@ -62,7 +62,7 @@ class TimeBase:
         return chosen
 
 
-def _scattered(keys: np.ndarray[Any, np.dtype[np.int64]], values: Series, first: int, count: int) -> Series:
+def _scattered(keys: NDArray[np.int64], values: Series, first: int, count: int) -> Series:
     placed = np.full(count, np.nan)
     at = keys - first
     inside = (at >= 0) & (at < count)
@@ -172,7 +172,8 @@ def _erased(source: Source) -> Series | None:
         table = None if end is None else end.topics.get("sample")
         if table is not None:
             words = table["word"] if "word" in table.names else np.zeros((len(table), 0))
-            return source.base.hold(table, np.isnan(words).all(axis=1).astype(np.float64))
+            known = np.count_nonzero(~np.isnan(words), axis=1)
+            return source.base.hold(table, np.where(known == 0, 1.0, 0.0))
     return None
 
 

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from channel.recording import Field, RecordChannel
+from channel.recording import Field
+from tenbaud.recording.encoding import END_METADATA
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.holes import Hole
 from tenbaud.recording.reader import Recording
 from tenbaud.recording.rows import KEYS, Row
-from tenbaud.recording.writer import END_METADATA
 
 Series = NDArray[np.float64]
 
@@ -148,9 +148,8 @@ class Table:
             at += len(part)
         return whole
 
-
     def _check_cells(self, one: Field, width: int, rows: int, items: int) -> None:
-        """In a recording all lists of a field have one length; a single long one asks for much memory."""
+        """All lists of a recorded field have one length; single long ones would ask for much memory."""
         if width > 16 and width * rows > 4 * items + (1 << 20):
             raise RecordingError(
                 f"{self._recording.path}: the lists in the field {one.name!r} of the topic "

@@ -76,7 +76,8 @@ def _transmitter_rows(ticks: range) -> list[bytes]:
             _message(
                 1,
                 tick,
-                f'{{"tick":{tick},"time_s":{tick * TICK_S},"measured_rad":[{pitch}],"true_rad":[{pitch}],'
+                f'{{"tick":{tick},"time_s":{tick * TICK_S},"measured_rad":[{pitch}],'
+                f'"true_rad":[{pitch}],'
                 '"commanded_volts":[0.5,-0.5],"applied_volts":[0.5,-0.5],"late":false,'
                 '"lateness_ms":0.1,"guard":"running"}',
             )
@@ -89,7 +90,8 @@ def _transmitter_rows(ticks: range) -> list[bytes]:
                 _message(
                     3,
                     tick,
-                    f'{{"sample":{tick // PER_SAMPLE},"word_sent":[{word}],"word":[{word}],"range":[0.1],'
+                    f'{{"sample":{tick // PER_SAMPLE},"word_sent":[{word}],"word":[{word}],'
+                    '"range":[0.1],'
                     f'"state":[{coded},0.1],"coder":[0.1,1.0],"digest":"{tick:016x}",'
                     f'"peer_digest":"{tick:016x}","lag_samples":1}}',
                 )

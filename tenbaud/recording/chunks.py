@@ -25,7 +25,7 @@ from mcap.records import Channel, Footer, Message, Metadata, MetadataIndex, Sche
 from mcap.writer import MCAP0_MAGIC
 
 CHUNK_BYTES_MAX = 16 << 20
-"""Of a chunk's content. A recorder closes its chunks at 1 MiB, other tools at 4 MiB."""
+"""Of a chunk's content. A recorder closes its chunks at 256 KiB, other tools at 4 MiB."""
 RECORD_BYTES_MAX = 32 << 20
 """Of a record that is read at all."""
 EXPANSION_MAX = 256

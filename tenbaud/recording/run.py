@@ -168,6 +168,11 @@ class Run:
         """False if a recording was cut; what it held up to the cut is here."""
         return all(self.tables(end).complete for end in self.ends)
 
+    @property
+    def notes(self) -> list[str]:
+        """What to know before believing the recordings: another version, a cut, holes."""
+        return [note for end in self.ends for note in self.tables(end).notes]
+
     @cached_property
     def summary(self) -> dict[str, Any]:
         """The figures in `summary.json`; empty without it."""

@@ -17,6 +17,7 @@ from channel.recording import Field
 from tenbaud.recording.encoding import END_METADATA
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.holes import Hole
+from tenbaud.recording.notes import recording_notes
 from tenbaud.recording.reader import Recording
 from tenbaud.recording.rows import KEYS, Row
 
@@ -169,6 +170,13 @@ class Tables:
     """what the recorder said when it finished: rows written and dropped; empty if the file was cut"""
     topics: dict[str, Table]
     holes: list[Hole] = field(default_factory=list)
+    strays: int = 0
+    """rows that nothing in the file describes, and that are left out"""
+
+    @property
+    def notes(self) -> list[str]:
+        """What a person should know before believing what is computed from this recording."""
+        return recording_notes(self.path, self.metadata, self.complete, self.holes, self.strays)
 
     def topic(self, name: str) -> Table:
         """Return a topic; RecordingError if there is none."""
@@ -194,6 +202,7 @@ def read_tables(path: Path) -> Tables:
         recording.metadata_record(END_METADATA),
         {topic: Table(recording, topic) for topic in recording.topics},
         recording.holes,
+        recording.strays,
     )
 
 

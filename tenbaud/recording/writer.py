@@ -36,7 +36,8 @@ PROFILE = "tenbaud"
 POLL_PERIOD_S = 0.1
 # Together with one poll period and the time of a batch this stays below the promised second.
 FLUSH_PERIOD_S = 0.8
-CHUNK_BYTES = 1 << 20
+# A damaged byte costs a chunk: here some ten seconds of a flight at 100 Hz.
+CHUNK_BYTES = 1 << 18
 # A batch holds the interpreter for some 2 ms. The pause after it lets a waiting 100 Hz loop run at
 # once instead of after the interpreter's own 5 ms switch interval.
 BATCH_ROWS = 200

@@ -1,8 +1,8 @@
 """Run folders that are nearly ones, or not at all, for everything that reads recordings.
 
-Recordings are changed byte by byte, and row by row with checksums that are right, so that what is inside
-is read too; so are configurations and summaries. Only the project's own errors may come out, in bounded
-time and memory. `python -m tests.tenbaud.recording.fuzz RUN INPUTS SEED` prints what came of it.
+Recordings are changed byte by byte, and row by row with checksums that are right, so that what is
+inside is read too; so are configurations and summaries. Only the project's own errors may come out, in
+bounded time and memory. `python -m tests.tenbaud.recording.fuzz RUN INPUTS SEED` prints what came.
 """
 
 from __future__ import annotations

@@ -103,7 +103,7 @@ def recording_figures() -> list[Figure]:
 
 
 def long_flight_end(folder: Path, ticks: int = LONG_TICKS) -> list[Figure]:
-    """Record a long flight without flying it; return what its end takes: summary aside, files and figure.
+    """Record a long flight without flying it; return what its end takes: both files and the figure.
 
     The memory is what the process has at its end over what it had after the first hundredth.
     """

@@ -199,11 +199,22 @@ def read_tables(path: Path) -> Tables:
         path,
         recording.complete,
         recording.metadata,
-        recording.metadata_record(END_METADATA),
+        _checked_end(path, recording.metadata_record(END_METADATA)),
         {topic: Table(recording, topic) for topic in recording.topics},
         recording.holes,
         recording.strays,
     )
+
+
+def _checked_end(path: Path, end: dict[str, str]) -> dict[str, str]:
+    for name in ("rows_written", "rows_dropped", "rows_recovered"):
+        count = end.get(name, "0")
+        if not (count.isascii() and count.isdigit() and len(count) < 19):
+            raise RecordingError(
+                f"{path}: its end says {count!r:.40} for {name}, which is no count. "
+                "tenbaud writes no such end: the file was changed, or another program wrote it."
+            )
+    return end
 
 
 @contextmanager

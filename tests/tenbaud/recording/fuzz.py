@@ -231,6 +231,8 @@ SLOW: tuple[Callable[[Path], object], ...] = (
     _recover,
 )
 
+SLOW_EVERY = 12
+
 
 def fuzz(run: Path, inputs: int, seed: int) -> dict[str, Any]:
     """Feed so many run folders to the readers; return counts, the slowest one, memory and faults."""
@@ -253,8 +255,8 @@ def fuzz(run: Path, inputs: int, seed: int) -> dict[str, Any]:
             for path, data in files.items():
                 (folder / path).write_bytes(data)
             readers = [chance.choice(QUICK)] if changed in original.recordings else []
-            if number % 8 == 0 or not readers:
-                readers.append(SLOW[number // 8 % len(SLOW)])
+            if number % SLOW_EVERY == 0 or not readers:
+                readers.append(SLOW[number // SLOW_EVERY % len(SLOW)])
             for reader in readers:
                 started_s = time.perf_counter()
                 try:

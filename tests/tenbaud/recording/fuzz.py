@@ -15,6 +15,7 @@ import sys
 import tempfile
 import time
 import traceback
+import zlib
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -31,7 +32,8 @@ from tenbaud.recording.reader import MessageStream
 from tenbaud.recording.recover import recover
 from tenbaud.replay.audit import audit
 from tenbaud.replay.record import load_record
-from tenbaud.replay.replay import replay
+from tenbaud.replay.replay import replay, replay_symbols
+from tenbaud.replay.symbols import MAGIC, unpack
 from tests.tenbaud.recording.craft import Message, chunk, mcap_file, messages_of
 
 NAMES = ("transmitter.mcap", "receiver.mcap", "config.toml", "summary.json")
@@ -232,15 +234,48 @@ SLOW: tuple[Callable[[Path], object], ...] = (
 )
 
 SLOW_EVERY = 12
+SYMBOLS_EVERY = 6
+
+
+def mutated_symbols(chance: random.Random, data: bytes) -> bytes:
+    """Return a symbols file changed in its bytes, or in what its packed head says."""
+    if chance.random() < 0.3:
+        return mutated_bytes(chance, data)
+    at = len(MAGIC) + 4
+    length = int.from_bytes(data[at - 4 : at], "little")
+    head = json.loads(zlib.decompress(data[at : at + length]))
+    where = chance.choice((head, head["epochs"], chance.choice(head["epochs"]), head["config"]))
+    places = list(where) if isinstance(where, dict) else range(len(where))
+    where[chance.choice(places)] = chance.choice(VALUES)
+    packed = zlib.compress(json.dumps(head).encode())
+    return MAGIC + len(packed).to_bytes(4, "little") + packed + data[at + length :]
+
+
+def _symbols(path: Path) -> None:
+    replay_symbols(unpack(path))
 
 
 def fuzz(run: Path, inputs: int, seed: int) -> dict[str, Any]:
     """Feed so many run folders to the readers; return counts, the slowest one, memory and faults."""
     chance = random.Random(seed)
     original = Original(run)
+    whole_flight = replay(load_record(run)).packed.data
     outcomes: Counter[str] = Counter()
-    slowest_s = 0.0
+    times_s: list[float] = []
     faults: list[str] = []
+    before = 0
+
+    def told(number: int, changed: str, reader: Callable[[Path], object], path: Path) -> None:
+        started_s = time.perf_counter()
+        try:
+            reader(path)
+            outcomes["accepted"] += 1
+        except TenbaudError:
+            outcomes["refused"] += 1
+        except Exception:
+            faults.append(f"input {number} of seed {seed}, {changed}: {traceback.format_exc(-4)}")
+        times_s.append(time.perf_counter() - started_s)
+
     with tempfile.TemporaryDirectory(prefix="tenbaud-fuzz-") as name:
         folder = Path(name) / "run"
         for number in range(inputs):
@@ -258,21 +293,21 @@ def fuzz(run: Path, inputs: int, seed: int) -> dict[str, Any]:
             if number % SLOW_EVERY == 0 or not readers:
                 readers.append(SLOW[number // SLOW_EVERY % len(SLOW)])
             for reader in readers:
-                started_s = time.perf_counter()
-                try:
-                    reader(folder)
-                    outcomes["accepted"] += 1
-                except TenbaudError:
-                    outcomes["refused"] += 1
-                except Exception:
-                    faults.append(
-                        f"input {number} of seed {seed}, {changed}: {traceback.format_exc(-4)}"
-                    )
-                slowest_s = max(slowest_s, time.perf_counter() - started_s)
+                told(number, changed, reader, folder)
+            if number % SYMBOLS_EVERY == 0:
+                symbols = folder / "flight.symbols"
+                symbols.write_bytes(mutated_symbols(chance, whole_flight))
+                told(number, "flight.symbols", _symbols, symbols)
             if number == inputs // 10:
                 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
-    return {"inputs": inputs, **outcomes, "slowest_s": slowest_s, "grown_kib": grown, "faults": faults}
+    return {
+        "inputs": inputs,
+        **outcomes,
+        "slowest_s": max(times_s),
+        "grown_kib": grown,
+        "faults": faults,
+    }
 
 
 if __name__ == "__main__":

@@ -233,8 +233,8 @@ SLOW: tuple[Callable[[Path], object], ...] = (
     _recover,
 )
 
-SLOW_EVERY = 12
-SYMBOLS_EVERY = 6
+SLOW_EVERY = 24
+SYMBOLS_EVERY = 12
 
 
 def mutated_symbols(chance: random.Random, data: bytes) -> bytes:

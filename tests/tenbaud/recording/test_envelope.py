@@ -55,8 +55,9 @@ def test_a_curve_in_pieces_has_the_extremes_of_the_whole_one(seed: int) -> None:
     # Against the definition: lowest and highest of every stretch of the final width.
     width = 2.0 ** np.ceil(np.log2((times[-1] - times[0]) / (POINTS // 2)))
     for stretch in range(int(times[-1] / width) + 1):
-        inside = (times >= stretch * width) & (times < (stretch + 1) * width)
-        drawn = (kept_times >= stretch * width) & (kept_times < (stretch + 1) * width)
+        span = [stretch * width, (stretch + 1) * width]
+        inside = slice(*np.searchsorted(times, span))
+        drawn = slice(*np.searchsorted(kept_times, span))
         assert np.nanmin(kept[drawn]) == np.nanmin(values[inside])
         assert np.nanmax(kept[drawn]) == np.nanmax(values[inside])
         assert np.isnan(kept[drawn]).any() == np.isnan(values[inside]).any()

@@ -57,6 +57,18 @@ class IntrudedWorld(World):
         alphabet = self.codec.coder.alphabet
         self._second_down = ImpairedLine(plan.down, alphabet, f"{plan.seed} second down")
 
+    @property
+    def recovery_ns_max(self) -> int:
+        """Return the bound of a flight that was alone, and what a forged answer costs beside it.
+
+        The transmitter has taken an epoch for begun in which nobody flies. It learns of that when its
+        watchdog has had enough, which counts from when the first command of that epoch was owed; then
+        it asks as ever.
+        """
+        wasted_ticks = 2 * self.terms.lead_ticks + self.plan.watchdog_ticks
+        wasted_ns = wasted_ticks * self.terms.tick_ns + self.plan.round_trip_ns
+        return super().recovery_ns_max + wasted_ns
+
     def fly(self) -> IntrudedWorld:
         """Fly as ever, in company until the faults stop."""
         chance = self.intruder.chance

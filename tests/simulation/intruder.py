@@ -53,6 +53,8 @@ class Intruder:
         self._identity = identity
         self._heard: deque[bytes] = deque(maxlen=HEARD_MAX)
         self._session = 1
+        self._sessions = {0, 1}
+        """all that were heard of"""
         self._epoch = 0
         self._incarnation = 1
         self._request = 0
@@ -77,6 +79,8 @@ class Intruder:
             frame = wire.decode(data)
         except FrameError:
             return
+        if isinstance(frame, Welcome | Symbol):
+            self._sessions.add(frame.session)
         match frame:
             case Hello():
                 self._incarnation, self._request = frame.incarnation, frame.request
@@ -98,7 +102,7 @@ class Intruder:
         """Return a message with a good check; None for one that may end a flight, or fits no frame."""
         kind = self.chance.choice(list(self._makers))
         frame = self._makers[kind]()
-        if isinstance(frame, Bye) and frame.session in (0, self._session):
+        if isinstance(frame, Bye) and frame.session in self._sessions:
             return None
         if isinstance(frame, Refuse) and frame.incarnation == self._incarnation:
             return None

@@ -290,6 +290,8 @@ class TransmitterSession:
             self._claims.settle()
             self._tell(EventKind.REFUSED, f"the receiver that takes over refused: {refuse.reason}")
             return []
+        if self.phase is Phase.REJOINING and not self._asking.is_refused():
+            return []
         lines = [refuse.reason]
         if refuse.config and refuse.config != self.identity.config:
             lines += differing_fields(self.identity.config, refuse.config)

@@ -10,7 +10,9 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass
 
+from channel.bounds import COUNTER
 from channel.impairments import ImpairedLine
+from channel.sabotage import Sabotage, SabotagedCodec
 from receiver.endpoint import ReceiverEndpoint
 from receiver.session import Phase
 from tests.simulation.faults import FAULTY_S, Plan
@@ -81,6 +83,13 @@ class IntrudedWorld(World):
         self.faults.update(self.intruder.counts)
         return self
 
+    @property
+    def out_of_bounds(self) -> int:
+        """Return how many frames both ends have dropped for what they hold."""
+        node, endpoint = self.node, self.endpoint
+        counts = [end.session.counts for end in (node, endpoint) if end is not None]
+        return sum(count[COUNTER] for count in counts)
+
     def _inject(self) -> None:
         chance, intruder = self.intruder.chance, self.intruder
         replay = chance.random() < self.intrusion.replayed_share
@@ -117,6 +126,11 @@ class IntrudedWorld(World):
     def _calm(self) -> None:
         super()._calm()
         self._stop_second()
+        for end in (self.node, self.endpoint):
+            codec = None if end is None else end.session.codec
+            if isinstance(codec, SabotagedCodec):
+                # Company puts samples off; what was to go wrong by now does so no more.
+                codec.arm(Sabotage(-1, "model", 0))
         if self.endpoint is None:
             self.start_receiver()
 

@@ -59,6 +59,8 @@ class Intruder:
         self._incarnation = 1
         self._request = 0
         self._sample = 0
+        self._echoed = 0
+        """sample whose echo comes next"""
         self._state = codec.initial()
         self._makers: dict[str, Callable[[], Frame]] = {
             "hello": self._hello,
@@ -86,9 +88,11 @@ class Intruder:
                 self._incarnation, self._request = frame.incarnation, frame.request
             case Welcome():
                 self._session, self._epoch = frame.session, frame.epoch
-                self._sample = frame.first_sample
+                self._sample = self._echoed = frame.first_sample
                 if frame.state:
                     self._state = self._codec.unpack(frame.state)
+            case Commands():
+                self._echoed = frame.echoes[-1].sample + 1
             case Symbol():
                 self._session, self._epoch = frame.session, frame.epoch
                 self._sample = frame.slot // self._terms.symbols_per_word
@@ -209,7 +213,7 @@ class Intruder:
     def _commands(self) -> Commands:
         count = self._count(self.chance.randrange(1, self._terms.repeats + 2)) or 1
         volts = self._count(self._terms.ticks_per_sample * self._codec.model.input_size)
-        last = max(count - 1, self._number(self._sample, U32))
+        last = max(count - 1, self._number(self.chance.choice((self._sample, self._echoed)), U32))
         echoes = tuple(
             Echo(
                 last + 1 - count + index,

@@ -39,7 +39,7 @@ U16, U32, U64 = 0xFFFF, 0xFFFF_FFFF, 0xFFFF_FFFF_FFFF_FFFF
 STEPS = (0, 0, 0, 1, 1, 2, 3, 5, 8, 20, 63, 64, 65, 127, 128, 129, 200, 1000)
 FLOATS = (0.0, -0.0, 1.0, -1.0, 0.5, 3.0, 1e3, STATE_MAX * 0.999, -STATE_MAX, 1e36, -1e300, 5e-324)
 NOT_NUMBERS = (float("nan"), float("inf"), float("-inf"))
-TEXTS = ("", "done", "x" * 3000, "\x1b]0;title\x07", "\u2028\u202e", "{" * 500, "[" * 4000)
+TEXTS = ("", "done", "x" * 2500, "\x1b]0;title\x07", "\u2028\u202e", "{" * 500, "[" * 4000)
 
 
 class Intruder:
@@ -190,6 +190,8 @@ class Intruder:
 
     def _welcome(self) -> Welcome:
         session, epoch = self._flight()
+        # One that is believed makes a session of this number.
+        self._sessions.add(session)
         sample = self._number(self._sample, U32)
         inputs = self._codec.model.input_size
         return Welcome(

@@ -12,7 +12,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 import typer
 from typer.models import ArgumentInfo, OptionInfo
 
-from tenbaud.cli.app import app
+from tenbaud.cli.commands import app
 from tenbaud.flight.outcome import ExitCode
 
 INTRODUCTION = """# Commands

@@ -43,8 +43,10 @@ def serve(
     from tenbaud.flight.ends import SWITCH_INTERVAL_S, knocks
     from tenbaud.flight.many import ManyHost
     from tenbaud.flight.many_status import ManyStatus
+    from tenbaud.flight.outcome import ExitCode
     from tenbaud.flight.stop import StopFlag
     from tenbaud.recording.folder import create_run_folder
+    from tenbaud.whole import write_whole
 
     agreement_of = agreements(node.preset, node.config, many.configs, changed, node.clock.value)
     common = agreement_of("")
@@ -86,11 +88,14 @@ def serve(
             host.close()
     summary = _summary(host, service.lateness.percentile_ms, many.sessions)
     summary["turned_away"] = dict(refused + hub.counts.refused)
-    (root / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    write_whole(root / "summary.json", json.dumps(summary, indent=2) + "\n")
     if node.json:
         sys.stdout.write(json.dumps(summary, indent=2) + "\n")
     else:
         _show(host.summaries, root)
+    if host.counts["not_written"]:
+        typer.echo(f"tenbaud: {host.counts['not_written']} files below {root} are not whole", err=True)
+        raise typer.Exit(int(ExitCode.NOT_WRITTEN))
 
 
 def agreements(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
@@ -107,6 +108,7 @@ def tune(
     from tenbaud.studies.judging import Split, Tuning
     from tenbaud.studies.tuning import preset_text
     from tenbaud.studies.tuning import tune as fit
+    from tenbaud.whole import write_whole
 
     _make_room(out)
     overrides = options.overrides(
@@ -128,7 +130,7 @@ def tune(
             progress.update(task, completed=count, description=f"best {math.degrees(error):.4g}°")
 
         tuned = fit(tuning, told, stop)
-    out.write_text(preset_text(tuning, tuned), encoding="utf-8")
+    write_whole(out, preset_text(tuning, tuned))
     if as_json:
         typer.echo(json.dumps({**tuned._asdict(), "preset_file": str(out)}, indent=2))
     else:
@@ -140,17 +142,15 @@ def tune(
 
 
 def _make_room(out: Path) -> None:
-    """Make the folder of the preset; StudyError where none can be written, before anything is flown."""
+    """Make the folder of the preset; an error where none can be written, before anything is flown."""
     from tenbaud.studies.settings import StudyError
+    from tenbaud.whole import make_folder, write_error
 
     if out.exists():
         raise StudyError(f"{out} exists already; name another file")
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StudyError(f"cannot write {out}: {error.strerror}") from error
+    make_folder(out.parent)
     if not os.access(out.parent, os.W_OK):
-        raise StudyError(f"cannot write {out}: its folder may not be written to")
+        raise write_error(out, PermissionError(errno.EACCES, os.strerror(errno.EACCES)))
 
 
 def _tell(tuned: Tuned) -> None:

@@ -19,7 +19,7 @@ from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build import Agreement
 from tenbaud.build_ends import build_receiver
 from tenbaud.flight import receive, transmit
-from tenbaud.flight.outcome import Outcome, outcome_of
+from tenbaud.flight.outcome import SAFE, Outcome, first_cause, outcome_of
 from tenbaud.flight.status import Status, StatusMode, StatusReporter
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, gap_part, link_part, receiver_part, transmitter_part
@@ -108,6 +108,7 @@ def run_transmitter(
                 StatusReporter(lambda: transmitter_status(run), status),
             ):
                 outcome = _guarded(lambda: _fly(run, link, stop, recorder, live))
+                outcome = first_cause(outcome, link.trouble(), SAFE)
             run.node.rest()
         summary = transmitter_part(run, outcome) | link_part(link, refused) | station.summary()
         return outcome, _with_recording(summary, recorder)
@@ -131,6 +132,7 @@ def run_receiver(
                 outcome = _guarded(
                     lambda: receive.serve(agreement, endpoint, link, live, recorder.help_out)
                 )
+                outcome = first_cause(outcome, link.trouble())
             endpoint.session.rest()
         summary = receiver_part(agreement, endpoint, outcome) | link_part(link, refused)
         summary |= station.summary()

@@ -9,20 +9,19 @@ from typing import Self
 SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 
 
-class StopFlag:
-    """Within a `with`, signals raise this flag instead of ending the process."""
+class _Handlers:
+    """Within a `with`, `_on_signal` gets the signals that end a process.
+
+    A SIGHUP that is ignored stays so: the command was started with nohup.
+    """
 
     def __init__(self) -> None:
-        self.raised = False
         self._before: dict[int, object] = {}
-
-    def __call__(self) -> bool:
-        """Return whether the flight was asked to stop."""
-        return self.raised
 
     def __enter__(self) -> Self:
         for number in SIGNALS:
-            self._before[number] = signal.signal(number, self._on_signal)
+            if number == SIGNALS[0] or signal.getsignal(number) is not signal.SIG_IGN:
+                self._before[number] = signal.signal(number, self._on_signal)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -30,6 +29,33 @@ class StopFlag:
             signal.signal(number, handler)  # type: ignore[arg-type]
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        raise NotImplementedError
+
+
+class StopFlag(_Handlers):
+    """Within a `with`, signals raise this flag instead of ending the process."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.raised = False
+
+    def __call__(self) -> bool:
+        """Return whether the flight was asked to stop."""
+        return self.raised
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
         if self.raised:
             raise KeyboardInterrupt
         self.raised = True
+
+
+class Interruptions(_Handlers):
+    """Within a `with`, signals raise KeyboardInterrupt: what is open is closed on the way out."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.received: signal.Signals | None = None
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        self.received = signal.Signals(number)
+        raise KeyboardInterrupt

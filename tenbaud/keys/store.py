@@ -11,9 +11,9 @@ Private keys have mode 0600 and their folders 0700; a key that others may read i
 
 from __future__ import annotations
 
-import os
 import re
 import stat
+from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -32,6 +32,7 @@ from tenbaud.keys.authority import (
     new_authority,
     read_certificate,
 )
+from tenbaud.whole import whole_file, whole_path, write_error, write_whole
 
 AUTHORITY = "authority"
 AUTHORITY_NAME = "tenbaud authority"
@@ -72,9 +73,10 @@ def create_authority(keys: Path) -> Path:
         )
     pem = new_authority(AUTHORITY_NAME)
     _make_private(keys)
-    _make_private(folder)
-    _write(folder / "authority.key", pem.private_key, 0o600)
-    _write(folder / "authority.pem", pem.certificate, 0o644)
+    with whole_path(folder) as part:
+        _make_private(part)
+        write_whole(part / "authority.key", pem.private_key, 0o600)
+        write_whole(part / "authority.pem", pem.certificate, 0o644)
     return folder
 
 
@@ -93,8 +95,9 @@ def add_node(
         )
     authority = read_authority(keys)
     pem = _issue(authority, name, role, hosts, days)
-    _make_private(keys / name)
-    _write_node(keys / name, authority, pem)
+    with whole_path(keys / name) as part:
+        _make_private(part)
+        _write_node(part, authority, pem)
     return read_node(keys / name)
 
 
@@ -215,20 +218,20 @@ def _check_private(key: Path, mode: int) -> None:
 
 
 def _write_node(folder: Path, authority: Pem, pem: Pem) -> None:
-    _write(folder / "node.key", pem.private_key, 0o600)
-    _write(folder / "node.pem", pem.certificate, 0o644)
-    _write(folder / "authority.pem", authority.certificate, 0o644)
+    """Write the three files of a node: all of them new, or all as they were."""
+    with ExitStack() as written:
+        for name, data, mode in (
+            ("authority.pem", authority.certificate, 0o644),
+            ("node.pem", pem.certificate, 0o644),
+            ("node.key", pem.private_key, 0o600),
+        ):
+            stream = written.enter_context(whole_file(folder / name, mode))
+            stream.write(data)
+            stream.flush()
 
 
 def _make_private(folder: Path) -> None:
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-
-
-def _write(path: Path, data: bytes, mode: int) -> None:
-    """Write a whole file at once; at no moment can it be read by more than its mode says."""
-    fresh = path.with_name(path.name + ".new")
-    fresh.unlink(missing_ok=True)
-    number = os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
-    with os.fdopen(number, "wb") as stream:
-        stream.write(data)
-    os.replace(fresh, path)
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError as error:
+        raise write_error(folder, error) from error

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from tenbaud.recording.columns import TABLES, Column, all_columns, flight_column
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.layouts import flight_layouts, layout_paths
 from tenbaud.recording.run import Run
+from tenbaud.whole import make_folder, whole_path
 
 
 def convert(run: Run, form: str, output: Path | None = None, overwrite: bool = False) -> list[Path]:
@@ -38,22 +38,11 @@ def convert(run: Run, form: str, output: Path | None = None, overwrite: bool = F
         )
     if target.exists():
         _check_replaceable(run, form, target)
-    # Whoever is interrupted leaves no half of a file behind under the name of a whole one.
-    unfinished = target.with_name(f".{target.name}.unfinished")
-    _remove(unfinished)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        write(run, unfinished)
-        _remove(target)
-        unfinished.replace(target)
-        if layouts:
-            flight_layouts(run, target)
-    except OSError as error:
-        raise RecordingError(
-            f"{target} cannot be written: {error.strerror or error}. Choose another place with --out."
-        ) from error
-    finally:
-        _remove(unfinished)
+    make_folder(target.parent)
+    with whole_path(target) as part:
+        write(run, part)
+    if layouts:
+        flight_layouts(run, target)
     return sorted(target.iterdir()) if target.is_dir() else [target, *layouts]
 
 
@@ -76,13 +65,6 @@ def _check_replaceable(run: Run, form: str, target: Path) -> None:
 
 def _names_written(form: str) -> set[str]:
     return {f"{table}.{form}" for table in TABLES}
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path)
-    else:
-        path.unlink(missing_ok=True)
 
 
 def _write_csv(run: Run, folder: Path) -> None:
@@ -159,7 +141,8 @@ def _write_parquet(run: Run, folder: Path) -> None:
             fields.append(pyarrow.field(column.name, array.type, metadata=about))
         schema = pyarrow.schema(fields, metadata=run.metadata)
         table = pyarrow.Table.from_arrays(arrays, schema=schema)
-        parquet.write_table(table, folder / f"{name}.parquet", compression="zstd")
+        with (folder / f"{name}.parquet").open("wb") as stream:
+            parquet.write_table(table, stream, compression="zstd")
 
 
 def _write_json(run: Run, path: Path) -> None:
@@ -209,6 +192,8 @@ def _write_mcap(run: Run, path: Path) -> None:
     with McapRecorder(path, run.metadata, wait_when_full=True) as recorder:
         for row in rows:
             recorder.write(channel, round(row[0] * tick_ns), row)
+    if isinstance(recorder.cause, OSError):
+        raise recorder.cause
     if recorder.error is not None:
         raise RecordingError(recorder.error)
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from channel.impairments import parse_impairments
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.reader import Recording
+from tenbaud.whole import whole_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -78,7 +79,9 @@ def draw_flight(transmitter: Path, receiver: Path | None, output: Path, title: s
     from it. The receiver's recording adds the reference. Raises RecordingError if the
     transmitter's recording holds no flight.
     """
-    draw_run(transmitter, receiver, title).savefig(output, dpi=150, format="png")
+    figure = draw_run(transmitter, receiver, title)
+    with whole_file(output) as stream:
+        figure.savefig(stream, dpi=150, format="png")
 
 
 def draw_run(transmitter: Path | None, receiver: Path | None, title: str) -> Figure:

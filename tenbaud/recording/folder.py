@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from tenbaud.recording.errors import RecordingError
+from tenbaud.whole import write_error
 
 DEFAULT_ROOT = Path("runs")
 CONFIG_NAME = "config.toml"
@@ -62,7 +63,7 @@ def create_run_folder(
 
     Without `explicit` it is `<root>/<local time>_<name>`, with -2, -3 ... appended if taken; root
     is `runs` if not given. An explicit folder must not exist yet. `now` is the clock, for tests.
-    Raises RecordingError if the folder exists or cannot be made.
+    Raises RecordingError if the folder exists, WriteError if it cannot be made.
     """
     if explicit is not None:
         if not _make(explicit):
@@ -89,10 +90,7 @@ def _make(folder: Path) -> bool:
     except OSError as error:
         if isinstance(error, FileExistsError) and folder.parent.is_dir():
             return False
-        raise RecordingError(
-            f"The run folder {folder} cannot be made: {error.strerror or error}. "
-            "Check that its parent is a folder that may be written to, or choose another place."
-        ) from error
+        raise write_error(folder, error) from error
     return True
 
 
@@ -118,7 +116,7 @@ def find_recordings(path: Path) -> list[Path]:
 
 
 def open_new_recording(path: Path) -> BinaryIO:
-    """Open a file for writing; RecordingError if it holds data or cannot be made."""
+    """Open a file for writing; RecordingError if it holds data, WriteError if it cannot be made."""
     try:
         if path.exists() and path.stat().st_size > 0:
             raise RecordingError(
@@ -127,7 +125,4 @@ def open_new_recording(path: Path) -> BinaryIO:
             )
         return path.open("wb")
     except OSError as error:
-        raise RecordingError(
-            f"The recording {path} cannot be created: {error.strerror or error}. "
-            "Check that its folder exists and may be written to."
-        ) from error
+        raise write_error(path, error) from error

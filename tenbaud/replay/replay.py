@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +15,7 @@ from tenbaud.replay.control import controller_of, steps_by_hand
 from tenbaud.replay.record import Epoch, FlightRecord, by_key, epochs_of
 from tenbaud.replay.refly import Delay, Reflown, refly
 from tenbaud.replay.symbols import Packed, Unpacked, pack
+from tenbaud.whole import write_error, write_whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +153,7 @@ def _compare_commands(tables: Tables, flown: Sequence[Reflown]) -> list[str]:
 
 
 def save_symbols(replayed: Replayed, path: Path) -> None:
-    """Write the packed flight; the file must not exist yet."""
-    with path.open("xb") as stream:
-        stream.write(replayed.packed.data)
+    """Write the packed flight; WriteError where that is not possible, or the file exists already."""
+    if path.exists():
+        raise write_error(path, FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST)))
+    write_whole(path, replayed.packed.data)

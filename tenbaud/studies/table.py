@@ -1,12 +1,11 @@
 """Results as Parquet: a file per chunk while a study runs, one table when it is done.
 
-A file is written under another name and renamed when it is whole, so one that a killed process left
-half written is never taken for a result.
+A file stands under its name when it is whole, so one that a killed process left half written is never
+taken for a result.
 """
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from tenbaud.studies.compiled import require, sources_digest
 from tenbaud.studies.figures import FlightFigures
 from tenbaud.studies.settings import StudyError
 from tenbaud.studies.study import Study
+from tenbaud.whole import make_folder, whole_file
 
 STUDY_KEY, SOURCES_KEY = b"tenbaud.study", b"tenbaud.sources"
 
@@ -35,11 +35,8 @@ class Results:
 
         StudyError when the folder holds the results of another study or of other sources.
         """
-        try:
-            self._chunks.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise StudyError(f"cannot write into {self.folder}: {error.strerror}") from error
-        for left in self._chunks.glob("*.part"):
+        make_folder(self._chunks)
+        for left in self._chunks.glob(".*.part"):
             left.unlink(missing_ok=True)
         done = set()
         for index in range(self.study.chunks):
@@ -79,11 +76,8 @@ class Results:
     def _store(self, table: Any, path: Path) -> None:
         import pyarrow.parquet as pq
 
-        part = path.with_suffix(".part")
-        pq.write_table(table.replace_schema_metadata(self._metadata), part)
-        with part.open("rb") as file:
-            os.fsync(file.fileno())
-        part.replace(path)
+        with whole_file(path) as stream:
+            pq.write_table(table.replace_schema_metadata(self._metadata), stream)
 
     def _path(self, index: int) -> Path:
         return self._chunks / f"{index:06d}.parquet"

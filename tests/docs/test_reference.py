@@ -9,7 +9,7 @@ import pytest
 from docs.tools.commands_page import commands_page
 from docs.tools.configuration_page import configuration_page
 from docs.tools.reference import PAGES
-from tenbaud.cli.app import app
+from tenbaud.cli.commands import app
 from tenbaud.config.load import load_config, preset_names
 from tenbaud.config.schema import FlightConfig
 from tests.rules.sources import TOP

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 from channel.errors import TenbaudError
 from tenbaud.build_rig import nominal_plant
-from tenbaud.cli.app import app
+from tenbaud.cli.commands import app
 from tenbaud.config.load import load_config
 from tenbaud.flight.outcome import ExitCode
 from tenbaud.studies import tuning as tuning_module

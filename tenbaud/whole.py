@@ -50,7 +50,7 @@ def whole_path(path: Path) -> Iterator[Path]:
     An existing file, link or folder of that name is replaced; a link is never followed. Raises
     WriteError for every OSError within the `with`.
     """
-    part = path.with_name(f".{path.name[:NAME_CHARACTERS]}.{secrets.token_hex(4)}.part")
+    part = _beside(path)
     try:
         yield part
         _flush(part)
@@ -100,6 +100,16 @@ def write_whole(path: Path, content: bytes | str, mode: int | None = None) -> No
         stream.write(data)
 
 
+def check_room(path: Path) -> None:
+    """Raise WriteError where no file can be made beside `path`, for before a long computation."""
+    part = _beside(path)
+    try:
+        part.touch()
+        remove(part)
+    except OSError as error:
+        raise write_error(path, error) from error
+
+
 def make_folder(path: Path) -> Path:
     """Make a folder and those above it, if they are not there; return it. Raises WriteError."""
     try:
@@ -117,6 +127,10 @@ def remove(path: Path) -> None:
         shutil.rmtree(path)
     else:
         path.unlink(missing_ok=True)
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name(f".{path.name[:NAME_CHARACTERS]}.{secrets.token_hex(4)}.part")
 
 
 def _is_device(path: Path) -> bool:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import errno
 import json
 import math
-import os
 import re
 from dataclasses import replace
 from enum import StrEnum
@@ -130,11 +128,13 @@ def tune(
             progress.update(task, completed=count, description=f"best {math.degrees(error):.4g}°")
 
         tuned = fit(tuning, told, stop)
+    if not as_json:
+        _tell(tuned)
+    # After the figures, which a full disk must not take along.
     write_whole(out, preset_text(tuning, tuned))
     if as_json:
         typer.echo(json.dumps({**tuned._asdict(), "preset_file": str(out)}, indent=2))
     else:
-        _tell(tuned)
         typer.echo(f"{out}: fly it with --config {out}")
     if stop.raised:
         typer.echo(f"stopped after {tuned.evaluations} of {evaluations} evaluations", err=True)
@@ -144,13 +144,12 @@ def tune(
 def _make_room(out: Path) -> None:
     """Make the folder of the preset; an error where none can be written, before anything is flown."""
     from tenbaud.studies.settings import StudyError
-    from tenbaud.whole import make_folder, write_error
+    from tenbaud.whole import check_room, make_folder
 
     if out.exists():
         raise StudyError(f"{out} exists already; name another file")
     make_folder(out.parent)
-    if not os.access(out.parent, os.W_OK):
-        raise write_error(out, PermissionError(errno.EACCES, os.strerror(errno.EACCES)))
+    check_room(out)
 
 
 def _tell(tuned: Tuned) -> None:

@@ -103,7 +103,7 @@ def _result(agreement: Agreement, transmitter: _Child, receiver: _Child) -> Demo
     ends.sort(key=lambda end: end.process.returncode >= 0)
     outcomes = [outcome for end in ends if (outcome := end.outcome()).code is not ExitCode.OK]
     config = agreement.config
-    known = {"preset": config.preset, "link": config.link.kind, "clock": agreement.clock}
+    known: Summary = {"preset": config.preset, "link": config.link.kind, "clock": agreement.clock}
     summary = known | joined(transmitter.summary, receiver.summary)
     if not outcomes:
         return DemoResult(summary, ExitCode.OK, [])

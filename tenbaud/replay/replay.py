@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import errno
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +13,7 @@ from tenbaud.replay.control import controller_of, steps_by_hand
 from tenbaud.replay.record import Epoch, FlightRecord, by_key, epochs_of
 from tenbaud.replay.refly import Delay, Reflown, refly
 from tenbaud.replay.symbols import Packed, Unpacked, pack
-from tenbaud.whole import write_error, write_whole
+from tenbaud.whole import write_whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +151,9 @@ def _compare_commands(tables: Tables, flown: Sequence[Reflown]) -> list[str]:
 
 
 def save_symbols(replayed: Replayed, path: Path) -> None:
-    """Write the packed flight; WriteError where that is not possible, or the file exists already."""
+    """Write the packed flight. Raises WriteError, and RecordingError where the file exists already."""
     if path.exists():
-        raise write_error(path, FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST)))
+        raise RecordingError(
+            f"{path} exists already and is not overwritten. Name another file with --save."
+        )
     write_whole(path, replayed.packed.data)

@@ -253,7 +253,7 @@ def test_when_the_preset_cannot_be_written_then_nothing_is_flown(tmp_path: Path)
     (tmp_path / "file").write_text("")
     result = CliRunner().invoke(app, ["tune", "--out", str(tmp_path / "file" / "found.toml")])
     assert result.exit_code != 0
-    assert "cannot write" in str(result.exception)
+    assert "cannot be written: Not a directory" in str(result.exception)
 
 
 @pytest.mark.parametrize(

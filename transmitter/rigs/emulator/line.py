@@ -56,9 +56,14 @@ class PtyLine:
         if self._link is None:
             self.address = path
             return
-        if self._link.is_symlink():
-            self._link.unlink()
-        self._link.symlink_to(path)
+        try:
+            if self._link.is_symlink():
+                self._link.unlink()
+            self._link.symlink_to(path)
+        except OSError as error:
+            self.unplug()
+            # Of the two names it would give the wrong one.
+            raise OSError(error.errno, error.strerror, str(self._link)) from error
 
     def unplug(self) -> None:
         """Let it vanish."""
@@ -67,7 +72,8 @@ class PtyLine:
                 os.close(handle)
         self._master = self._slave = -1
         if self._link is not None and self._link.is_symlink():
-            self._link.unlink()
+            with contextlib.suppress(OSError):
+                self._link.unlink()
 
     def wait(self, timeout_s: float) -> None:
         """Wait for bytes."""

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from receiver.controllers.base import Controller
+from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.table import Tables
 from tenbaud.replay.control import controller_of, steps_by_hand
 from tenbaud.replay.record import Epoch, FlightRecord, by_key, epochs_of

@@ -66,9 +66,8 @@ class Results:
     def join(self) -> Any:
         """Write all chunks as one table; return it."""
         import pyarrow as pa
-        import pyarrow.parquet as pq
 
-        parts = [pq.read_table(self._path(index)) for index in range(self.study.chunks)]
+        parts = [_table(self._path(index)) for index in range(self.study.chunks)]
         table = pa.concat_tables(parts)
         self._store(table, self.table_path)
         return table
@@ -88,9 +87,10 @@ class Results:
         import pyarrow.parquet as pq
 
         try:
-            file = pq.read_metadata(path)
-            metadata = file.metadata or {}
-            pq.read_table(path)
+            with path.open("rb") as stream:
+                file = pq.read_metadata(stream)
+                metadata = file.metadata or {}
+                pq.read_table(stream)
         except (pa.ArrowException, OSError):
             path.unlink(missing_ok=True)
             return False
@@ -117,13 +117,20 @@ def _column(name: str, values: list[Any], study: Study) -> Any:
     return pa.array(values)
 
 
+def _table(path: Path) -> Any:
+    import pyarrow.parquet as pq
+
+    # Opened by Python, which takes names that are no text.
+    with path.open("rb") as stream:
+        return pq.read_table(stream)
+
+
 def read_results(path: Path) -> Any:
     """Return the table of a finished study; StudyError where it cannot be read."""
     require("pyarrow")
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     try:
-        return pq.read_table(path)
+        return _table(path)
     except (pa.ArrowException, OSError) as error:
         raise StudyError(f"cannot read the results {path}: {error}") from error

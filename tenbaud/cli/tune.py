@@ -45,9 +45,12 @@ Model = Annotated[
         "--model", help="Fit the pitch model's damping, stiffness, gain, lag and equilibrium as well."
     ),
 ]
-Seeds = Annotated[int, typer.Option(min=1, help="Simulated flights for the fit.")]
+Seeds = Annotated[int, typer.Option(min=1, max=100_000, help="Simulated flights for the fit.")]
 TestSeeds = Annotated[
-    int, typer.Option(min=1, help="Simulated flights for the judgement, of the seeds after those.")
+    int,
+    typer.Option(
+        min=1, max=100_000, help="Simulated flights for the judgement, of the seeds after those."
+    ),
 ]
 TrainShare = Annotated[
     float,
@@ -60,11 +63,12 @@ Evaluations = Annotated[
     int,
     typer.Option(
         min=1,
+        max=10_000_000,
         help="Sets of constants to fly at most, those configured included; each is flown on all "
         "flights for the fit.",
     ),
 ]
-Seed = Annotated[int, typer.Option(min=0, help="Seed of the search.")]
+Seed = Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Seed of the search.")]
 
 
 def tune(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -110,8 +111,15 @@ def _write_mat(run: Run, path: Path) -> None:
     for name in ("samples", "events"):
         if name in tables:
             contents[name] = {column.name: _matlab_cells(column) for column in tables[name]}
-    contents["run"] = {**run.metadata, "path": str(run.path), "tick_s": run.base.tick_s}
-    savemat(str(path), contents, appendmat=False, do_compression=True, oned_as="column")
+    contents["run"] = {**run.metadata, "path": _shown(run.path), "tick_s": run.base.tick_s}
+    with path.open("wb") as stream:
+        # The library's own signature leaves out that it takes streams too.
+        savemat(stream, contents, do_compression=True, oned_as="column")  # type: ignore[arg-type]
+
+
+def _shown(path: Path) -> str:
+    """Return a path as text, also where its bytes are none."""
+    return os.fsencode(path).decode("utf-8", "backslashreplace")
 
 
 def _matlab_cells(column: Column) -> Any:
@@ -149,7 +157,7 @@ def _write_json(run: Run, path: Path) -> None:
     """The signals by name with unit, description and values; null where there is no value."""
     tables = all_columns(run)
     document = {
-        "run": {**run.metadata, "path": str(run.path), "tick_s": run.base.tick_s},
+        "run": {**run.metadata, "path": _shown(run.path), "tick_s": run.base.tick_s},
         "time_s": run.time_s,
         "signals": {
             signal.name: {

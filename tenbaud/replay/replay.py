@@ -14,7 +14,7 @@ from tenbaud.replay.control import controller_of, steps_by_hand
 from tenbaud.replay.record import Epoch, FlightRecord, by_key, epochs_of
 from tenbaud.replay.refly import Delay, Reflown, refly
 from tenbaud.replay.symbols import Packed, Unpacked, pack
-from tenbaud.whole import write_whole
+from tenbaud.whole import make_folder, write_whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,4 +157,5 @@ def save_symbols(replayed: Replayed, path: Path) -> None:
         raise RecordingError(
             f"{path} exists already and is not overwritten. Name another file with --save."
         )
+    make_folder(path.parent)
     write_whole(path, replayed.packed.data)

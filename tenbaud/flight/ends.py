@@ -24,6 +24,7 @@ from tenbaud.flight.status import Status, StatusMode, StatusReporter
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, gap_part, link_part, receiver_part, transmitter_part
 from tenbaud.flight.transmit import Stop
+from tenbaud.flight.trouble import Trouble
 from tenbaud.recording.folder import RunFolder
 from tenbaud.recording.shared import SharedWriter
 from tenbaud.recording.writer import McapRecorder
@@ -101,6 +102,7 @@ def run_transmitter(
     with _end(agreement, "transmitter", folder) as (recorder, stop):
         station = _station(agreement, "transmitter", recorder, endpoints)
         with knocks(endpoints) as refused, open_link(agreement, "transmitter", endpoints, stop) as link:
+            trouble = Trouble(link, endpoints.security, refused)
             run = transmit.prepare(agreement, station.recorder, link.wire)
             live = station.fly_transmitter(run, stop)
             with (
@@ -108,7 +110,7 @@ def run_transmitter(
                 StatusReporter(lambda: transmitter_status(run), status),
             ):
                 outcome = _guarded(lambda: _fly(run, link, stop, recorder, live))
-                outcome = first_cause(outcome, link.trouble(), SAFE)
+                outcome = first_cause(outcome, trouble.text(), SAFE)
             run.node.rest()
         summary = transmitter_part(run, outcome) | link_part(link, refused) | station.summary()
         return outcome, _with_recording(summary, recorder)
@@ -121,6 +123,7 @@ def run_receiver(
     with _end(agreement, "receiver", folder) as (recorder, stop):
         station = _station(agreement, "receiver", recorder, endpoints)
         with knocks(endpoints) as refused, open_link(agreement, "receiver", endpoints, stop) as link:
+            trouble = Trouble(link, endpoints.security, refused)
             endpoint = build_receiver(
                 agreement, station.recorder, link.wire, endpoints.take_over, station.steering
             )
@@ -132,7 +135,7 @@ def run_receiver(
                 outcome = _guarded(
                     lambda: receive.serve(agreement, endpoint, link, live, recorder.help_out)
                 )
-                outcome = first_cause(outcome, link.trouble())
+                outcome = first_cause(outcome, trouble.text())
             endpoint.session.rest()
         summary = receiver_part(agreement, endpoint, outcome) | link_part(link, refused)
         summary |= station.summary()

@@ -27,6 +27,7 @@ from tenbaud.keys.authority import (
     NodeRole,
     Pem,
     end_of,
+    is_key_of,
     is_signed_by,
     issue,
     new_authority,
@@ -117,8 +118,8 @@ def read_node(folder: Path) -> NodeKeys:
         certificate = (folder / "node.pem").read_bytes()
         authority = (folder / "authority.pem").read_bytes()
         mode = (folder / "node.key").stat().st_mode
-        with (folder / "node.key").open("rb"):
-            pass
+        key = (folder / "node.key").read_bytes()
+        _check_unchanged(folder)
     except OSError as error:
         raise KeysError(
             f"{folder} is no node's key folder ({error.strerror}: {error.filename}); make one with "
@@ -128,12 +129,18 @@ def read_node(folder: Path) -> NodeKeys:
     try:
         certified = read_certificate(certificate)
         signed = is_signed_by(certificate, authority)
-    except ValueError as error:
+        belongs = is_key_of(key, certificate)
+    except (TypeError, ValueError) as error:
         raise KeysError(f"{folder / 'node.pem'} cannot be used: {error}") from error
     if not signed:
         raise KeysError(
             f"{folder / 'node.pem'} was not signed by the authority beside it; copy the folder of one "
             "authority whole"
+        )
+    if not belongs:
+        raise KeysError(
+            f"{folder / 'node.key'} is not the key of node.pem beside it; where the authority is: "
+            f"`tenbaud keys renew {certified.name}`, then copy the folder again"
         )
     return NodeKeys(folder, certified)
 
@@ -221,6 +228,18 @@ def _check_private(key: Path, mode: int) -> None:
             f"{key} can be read by others (mode {stat.S_IMODE(mode):04o}); take that away: "
             f"chmod 600 {quote(str(key))}"
         )
+
+
+def _check_unchanged(folder: Path) -> None:
+    """Refuse a folder in which somebody else can put another authority."""
+    for path in (folder, folder / "authority.pem", folder / "node.pem"):
+        mode = path.stat().st_mode
+        sticky = path == folder and mode & stat.S_ISVTX  # there everybody keeps their own files
+        if mode & (stat.S_IWGRP | stat.S_IWOTH) and not sticky:
+            raise KeysError(
+                f"{path} can be changed by others (mode {stat.S_IMODE(mode):04o}), who could choose "
+                f"whom to trust; take that away: chmod go-w {quote(str(path))}"
+            )
 
 
 def _write_node(folder: Path, authority: Pem, pem: Pem) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -106,14 +106,22 @@ ENDS_OF_THEIR_OWN = {"rig-check": 2}
 
 
 @contextmanager
-def small_disk(folder: Path, *, room: bool) -> Iterator[Path]:
-    """Mount a small file system, full or with room; skips where that is not permitted."""
+def small_disk(folder: Path, *, room_bytes: int) -> Iterator[Path]:
+    """Mount a small file system; skips where that is not permitted."""
     folder.mkdir()
-    options = "size=64k" if room else "size=16k"
-    with _mounted(folder, options):
-        if not room:
-            (folder / "filled").write_bytes(bytes(16 * 1024))
+    with _mounted(folder, f"size={room_bytes or 16_384},nr_inodes=1k"):
+        if not room_bytes:
+            fill(folder)
         yield folder
+
+
+def fill(disk: Path) -> Path:
+    """Take all the room that is left on a disk; return the file that holds it."""
+    filling = disk / "filled"
+    with suppress(OSError), filling.open("wb", buffering=0) as file:
+        while True:
+            file.write(bytes(4096))
+    return filling
 
 
 @contextmanager

@@ -71,7 +71,7 @@ def test_every_command_is_walked_through() -> None:
 def test_on_a_full_disk_it_is_said_and_no_half_file_is_left(
     form: Arguments, inputs: Inputs, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with small_disk(tmp_path / "disk", room=False) as disk:
+    with small_disk(tmp_path / "disk", room_bytes=0) as disk:
         code = run(form(inputs, str(disk / "out")))
         said = capsys.readouterr().err
         assert code == ExitCode.NOT_WRITTEN, said
@@ -95,7 +95,7 @@ def test_on_a_read_only_disk_it_is_said(
 def test_a_disk_that_fills_in_flight_ends_the_recording_and_not_the_flight(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with small_disk(tmp_path / "disk", room=True) as disk:
+    with small_disk(tmp_path / "disk", room_bytes=65_536) as disk:
         flight = ["demo", "--link", "memory", "--mismatch", "0", "--duration", "60"]
         code = run([*flight, "--out", str(disk / "out")])
         shown, said = capsys.readouterr()

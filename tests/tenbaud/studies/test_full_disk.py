@@ -1,8 +1,7 @@
-"""Studies on disks that fill up: said in words, what was flown is kept, and the same command goes on."""
+"""Studies on disks that fill up: said in words, and the same command goes on with what is missing."""
 
 from __future__ import annotations
 
-import errno
 import os
 from pathlib import Path
 
@@ -12,7 +11,7 @@ from channel.links.endpoints import free_endpoint
 from tenbaud.studies.run import run_study
 from tenbaud.studies.table import Results
 from tenbaud.whole import WriteError
-from tests.tenbaud.endings.commands import left_below, small_disk
+from tests.tenbaud.endings.commands import fill, left_below, small_disk
 from tests.tenbaud.studies.small import study_of
 from tests.tenbaud.studies.test_run import cluster, flown, ignore
 
@@ -23,25 +22,18 @@ def test_when_the_disk_fills_up_then_it_is_said_and_the_same_command_goes_on(
 ) -> None:
     study = study_of()
     expected = flown(study, tmp_path / "expected")
-    with small_disk(tmp_path / "disk", room=True) as disk:
-        filling = disk / "filled"
+    with small_disk(tmp_path / "disk", room_bytes=262_144) as disk:
 
-        def fill(done: int, total: int) -> None:
-            if done and not filling.exists():
-                with filling.open("wb") as file:
-                    try:
-                        while True:
-                            file.write(bytes(4096))
-                            file.flush()
-                    except OSError as error:
-                        assert error.errno == errno.ENOSPC
+        def fill_up(done: int, total: int) -> None:
+            if done:
+                fill(disk)
 
         with pytest.raises(WriteError, match=os.strerror(errno.ENOSPC)):
-            run_study(study, Results(study, disk / "out"), fill, workers)
+            run_study(study, Results(study, disk / "out"), fill_up, workers)
         kept = left_below(disk)
         assert kept
         assert {path.suffix for path in kept} == {".parquet"}
-        filling.write_bytes(b"")
+        (disk / "filled").unlink()
         assert run_study(study, Results(study, disk / "out"), ignore, workers).equals(expected)
 
 
@@ -49,13 +41,6 @@ def test_workers_of_a_cluster_need_no_disk(tmp_path: Path) -> None:
     study = study_of()
     expected = flown(study, tmp_path / "expected")
     address = free_endpoint().replace("tcp/", "tcp://")
-    with small_disk(tmp_path / "disk", room=True) as disk, cluster(address, disk):
-        for path in (disk / "filled", disk / "more"):
-            with path.open("wb") as file:
-                try:
-                    while True:
-                        file.write(bytes(4096))
-                        file.flush()
-                except OSError as error:
-                    assert error.errno == errno.ENOSPC
+    with small_disk(tmp_path / "disk", room_bytes=262_144) as disk, cluster(address, disk):
+        fill(disk)
         assert flown(study, tmp_path / "out", scheduler=address).equals(expected)

@@ -215,6 +215,7 @@ def transmitter_status(run: transmit.TransmitterRun) -> Status:
         "rejoins": node.session.counts["rejoins"],
         "words": node.session.history.last_words(WORDS_SHOWN),
         "guard": node.guard.state.value,
+        "kept_symbols_per_s": run.rate and run.rate.kept_symbols_per_s,
         **gap_part(node.gauge.now if node.gauge is not None else None),
     }
 

@@ -1,7 +1,7 @@
 """Writes a flight into an MCAP file from a thread of its own.
 
 The flight only appends to a queue. The thread takes the rows out ten times a second, encodes them
-and hands them to the `mcap` package in chunks; what a killed process loses is the chunk that was
+and writes them in chunks; what a killed process loses is the chunk that was
 still open, at most one second. Trouble with the disk ends the recording, never the flight.
 """
 
@@ -15,9 +15,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from mcap.writer import CompressionType, Writer
-
 from channel.recording import RecordChannel
+from tenbaud.recording.chunk_writer import ChunkWriter
 from tenbaud.recording.encoding import (
     END_METADATA,
     OVERVIEW_METADATA,
@@ -38,9 +37,12 @@ POLL_PERIOD_S = 0.1
 FLUSH_PERIOD_S = 0.8
 # A damaged byte costs a chunk: here some ten seconds of a flight at 100 Hz.
 CHUNK_BYTES = 1 << 18
-# A batch holds the interpreter for some 2 ms. The pause after it lets a waiting 100 Hz loop run at
-# once instead of after the interpreter's own 5 ms switch interval.
+# While a batch is written, a loop waits for the interpreter each time that it sends, receives or wakes,
+# some six times a tick. In real time a batch is therefore shorter than a fast flight's tick, and the
+# pause after it lets the loop run.
 BATCH_ROWS = 200
+REAL_TIME_BATCH_ROWS = 20
+SHARED_BATCH_ROWS = 50
 BATCH_PAUSE_S = 0.0005
 FULL_PAUSE_S = 0.002
 CLOSE_TIMEOUT_S = 10.0
@@ -74,6 +76,8 @@ class McapRecorder:
         self._queue: deque[tuple[RecordChannel, int, Sequence[object]]] = deque()
         self._queue_limit = queue_limit
         self._wait_when_full = wait_when_full
+        in_real_time = REAL_TIME_BATCH_ROWS if shared is None else SHARED_BATCH_ROWS
+        self._batch_rows = BATCH_ROWS if wait_when_full else in_real_time
         self._dropped_at_queue = 0
         self._dropped_in_thread = 0
         self._rows_written = 0
@@ -84,10 +88,7 @@ class McapRecorder:
         self._failed = False
         self._writers: dict[int, _ChannelWriter] = {}
         self._stream = open_new_recording(path)
-        # Compressed, a row of twelve fields takes a third of the bytes for about 1 us more. The
-        # message indexes stay, though they cost about as much time: viewers that find chunk
-        # indexes in a file look a topic's rows up in the message indexes.
-        self._writer = Writer(self._stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+        self._writer = ChunkWriter(self._stream, CHUNK_BYTES)
         self._flushed_s = time.monotonic()
         self._closing = threading.Event()
         self._writing = threading.Lock()
@@ -205,13 +206,13 @@ class McapRecorder:
             waiting = len(self._queue)
             if not waiting:
                 return
-            # With the queue half full losing rows is the worse evil, so no more pauses.
-            if waiting < self._queue_limit // 2:
+            # With the queue half full losing rows is the worse evil, and at the end nobody is held up.
+            if waiting < self._queue_limit // 2 and not self._closing.is_set():
                 time.sleep(BATCH_PAUSE_S)
 
     def _write_batch(self) -> None:
         queue = self._queue
-        for _ in range(min(BATCH_ROWS, len(queue))):
+        for _ in range(min(self._batch_rows, len(queue))):
             channel, time_ns, row = queue.popleft()
             if self._failed:
                 self._dropped_in_thread += 1
@@ -226,8 +227,8 @@ class McapRecorder:
                 continue
             self._rows_unflushed += 1
             # MCAP times are unsigned; what happens before tick 0 is filed at zero.
-            log_time_ns = max(0, time_ns)
-            self._writer.add_message(entry.channel_id, log_time_ns, data, log_time_ns)
+            log_time_ns = time_ns if time_ns > 0 else 0
+            self._writer.add_message(entry.channel_id, log_time_ns, data)
             if entry.gather is not None:
                 entry.gather(channel.topic, log_time_ns, row)
 

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from mcap.writer import CompressionType, Writer
-
+from tenbaud.recording.chunk_writer import ChunkWriter
 from tenbaud.recording.encoding import END_METADATA, RUN_METADATA, channel_schema
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import find_recordings
@@ -152,7 +151,7 @@ def _copy(stream: MessageStream, output: BinaryIO) -> tuple[int, int]:
     """Write every message of a stream into a finished file; return their number and last time."""
     rows, last_ns = 0, 0
     channels: dict[str, int] = {}
-    writer = Writer(output, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+    writer = ChunkWriter(output, CHUNK_BYTES)
     writer.start(profile=PROFILE, library="tenbaud")
     headed = False
     for topic, time_ns, data in stream.undecoded():
@@ -163,11 +162,12 @@ def _copy(stream: MessageStream, output: BinaryIO) -> tuple[int, int]:
             channel = stream.channels[topic]
             schema = writer.register_schema(topic, "jsonschema", channel_schema(channel))
             channels[topic] = writer.register_channel(topic, "json", schema)
-        writer.add_message(channels[topic], time_ns, data, time_ns)
+        writer.add_message(channels[topic], time_ns, data)
         rows += 1
         last_ns = max(last_ns, time_ns)
     if not headed:
         writer.add_metadata(RUN_METADATA, stream.metadata.get(RUN_METADATA, {}))
+    writer.flush()
     if stream.holes:
         writer.add_metadata(HOLES_METADATA, packed_holes(stream.holes))
     end = stream.metadata.get(END_METADATA, {"rows_written": str(rows)})

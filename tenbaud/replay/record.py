@@ -110,6 +110,12 @@ def epochs_of(tables: Tables, agreement: Agreement) -> list[Epoch]:
     codec, terms = agreement.codec, agreement.terms
     samples = tables.topic("sample").rows
     epochs = [_epoch(row) for row in tables.topics["epoch"].rows] if "epoch" in tables.topics else []
+    before = bool(epochs and samples) and samples[0]["sample"] < epochs[0].start.sample
+    if tables.holes and (not epochs or before):
+        raise RecordingError(
+            f"{tables.path} lacks the state that its first epoch starts from: it is in a hole, "
+            "so nothing can be computed from its symbols."
+        )
     if not epochs:
         # From before epochs were recorded: one of them, from the common initial state.
         first = samples[0]["sample"] if samples else 0

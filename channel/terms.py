@@ -70,7 +70,7 @@ class Terms:
 
     def slot_ns(self, slot: int) -> int:
         """Return the flight time at which a slot begins."""
-        return slot * self.sample_ns // self.symbols_per_word
+        return slot * self.tick_ns * self.ticks_per_sample // self.symbols_per_word
 
     def samples_in(self, time_ns: int, at_least: int) -> int:
         """Return a time as a number of samples, rounded up, and no fewer than `at_least`."""

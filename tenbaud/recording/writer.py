@@ -1,7 +1,7 @@
 """Writes a flight into an MCAP file from a thread of its own.
 
 The flight only appends to a queue. The thread takes the rows out ten times a second, encodes them
-and hands them to the `mcap` package in chunks; what a killed process loses is the chunk that was
+and writes them in chunks; what a killed process loses is the chunk that was
 still open, at most one second. Trouble with the disk ends the recording, never the flight.
 """
 
@@ -15,9 +15,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from mcap.writer import CompressionType, Writer
-
 from channel.recording import RecordChannel
+from tenbaud.recording.chunk_writer import ChunkWriter
 from tenbaud.recording.encoding import channel_schema, row_encoder
 from tenbaud.recording.folder import open_new_recording
 from tenbaud.recording.shared import SharedWriter
@@ -79,10 +78,7 @@ class McapRecorder:
         self._failed = False
         self._writers: dict[int, _ChannelWriter] = {}
         self._stream = open_new_recording(path)
-        # Compressed, a row of twelve fields takes a third of the bytes for about 1 us more. The
-        # message indexes stay, though they cost about as much time: viewers that find chunk
-        # indexes in a file look a topic's rows up in the message indexes.
-        self._writer = Writer(self._stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+        self._writer = ChunkWriter(self._stream, CHUNK_BYTES)
         self._flushed_s = time.monotonic()
         self._closing = threading.Event()
         self._writing = threading.Lock()
@@ -221,8 +217,7 @@ class McapRecorder:
                 continue
             self._rows_unflushed += 1
             # MCAP times are unsigned; what happens before tick 0 is filed at zero.
-            log_time_ns = max(0, time_ns)
-            self._writer.add_message(entry.channel_id, log_time_ns, data, log_time_ns)
+            self._writer.add_message(entry.channel_id, time_ns if time_ns > 0 else 0, data)
 
     def _register(self, channel: RecordChannel) -> _ChannelWriter:
         schema_id = self._writer.register_schema(channel.topic, "jsonschema", channel_schema(channel))

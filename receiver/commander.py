@@ -15,7 +15,7 @@ from channel.codec import Codec, CodecState, Vector
 from channel.events import EventKind
 from channel.frames import Echo
 from channel.lead import FlownSample, fly_sample
-from channel.limits import are_plausible, as_carried_all, to_millivolts
+from channel.limits import are_plausible, from_millivolts, to_millivolts
 from channel.lockstep import History
 from channel.recording import Recorder
 from channel.terms import Terms

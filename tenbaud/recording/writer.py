@@ -13,23 +13,30 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from channel.recording import RecordChannel
 from tenbaud.recording.chunk_writer import ChunkWriter
-from tenbaud.recording.encoding import channel_schema, row_encoder
+from tenbaud.recording.encoding import (
+    END_METADATA,
+    OVERVIEW_METADATA,
+    RUN_METADATA,
+    channel_schema,
+    row_encoder,
+)
 from tenbaud.recording.folder import open_new_recording
 from tenbaud.recording.shared import SharedWriter
 
+if TYPE_CHECKING:
+    from tenbaud.recording.gather import OverviewRecorder
+
 PROFILE = "tenbaud"
-RUN_METADATA = "run"
-END_METADATA = "recorder"
-"""Written by `close` only: how many rows were written and dropped, and why."""
 
 POLL_PERIOD_S = 0.1
 # Together with one poll period and the time of a batch this stays below the promised second.
 FLUSH_PERIOD_S = 0.8
-CHUNK_BYTES = 1 << 20
+# A damaged byte costs a chunk: here some ten seconds of a flight at 100 Hz.
+CHUNK_BYTES = 1 << 18
 # While a batch is written, a loop waits for the interpreter each time that it sends, receives or wakes,
 # some six times a tick. In real time a batch is therefore shorter than a fast flight's tick, and the
 # pause after it lets the loop run.
@@ -56,12 +63,14 @@ class McapRecorder:
         queue_limit: int = 65536,
         wait_when_full: bool = False,
         shared: SharedWriter | None = None,
+        overview: OverviewRecorder | None = None,
     ) -> None:
         """Create the file; raises RecordingError if that is impossible or it holds data.
 
         `wait_when_full` is for flights in virtual time only, which a wait does not disturb and
         which can outrun the disk: `write` then waits for room instead of dropping the row.
-        `shared` is a thread that writes for many recorders, in place of one of its own.
+        `shared` is a thread that writes for many recorders, in place of one of its own. `overview`
+        gathers what the figure of a long flight shows, and is stored at the end of the file.
         """
         self.path = path
         self._queue: deque[tuple[RecordChannel, int, Sequence[object]]] = deque()
@@ -74,6 +83,7 @@ class McapRecorder:
         self._rows_written = 0
         self._rows_unflushed = 0
         self._metadata = metadata
+        self._overview = overview
         self._error: str | None = None
         self._failed = False
         self._writers: dict[int, _ChannelWriter] = {}
@@ -217,12 +227,17 @@ class McapRecorder:
                 continue
             self._rows_unflushed += 1
             # MCAP times are unsigned; what happens before tick 0 is filed at zero.
-            self._writer.add_message(entry.channel_id, time_ns if time_ns > 0 else 0, data)
+            log_time_ns = time_ns if time_ns > 0 else 0
+            self._writer.add_message(entry.channel_id, log_time_ns, data)
+            if entry.gather is not None:
+                entry.gather(channel.topic, log_time_ns, row)
 
     def _register(self, channel: RecordChannel) -> _ChannelWriter:
         schema_id = self._writer.register_schema(channel.topic, "jsonschema", channel_schema(channel))
         channel_id = self._writer.register_channel(channel.topic, "json", schema_id)
         entry = _ChannelWriter(channel, channel_id)
+        if self._overview is not None and self._overview.wants(channel):
+            entry.gather = self._overview.add
         self._writers[id(channel)] = entry
         return entry
 
@@ -245,6 +260,9 @@ class McapRecorder:
         counts = {"rows_written": str(self._rows_written), "rows_dropped": str(self.rows_dropped)}
         if self._error is not None:
             counts["error"] = self._error
+        overview = self._overview.metadata() if self._overview is not None else None
+        if overview is not None:
+            self._writer.add_metadata(OVERVIEW_METADATA, overview)
         self._writer.add_metadata(END_METADATA, counts)
         self._writer.finish()
 
@@ -276,6 +294,7 @@ class _ChannelWriter:
         self.channel = channel
         self.channel_id = channel_id
         self.encode = row_encoder(channel)
+        self.gather: Callable[[str, int, Sequence[object]], None] | None = None
 
 
 def _bad_row_text(path: Path, channel: RecordChannel, row: Sequence[object], error: Exception) -> str:

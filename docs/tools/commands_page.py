@@ -40,7 +40,9 @@ EXIT_MEANINGS = {
     ExitCode.LINK_LOST: "the other end is not there, or was lost",
     ExitCode.DESYNC: "the codecs differed and nobody had spoilt them on purpose; or `--on-desync stop`",
     ExitCode.SAFETY_STOP: "the rig or the guard beside the motors ended the flight",
-    ExitCode.INTERRUPTED: "Ctrl-C",
+    ExitCode.NOT_FLOWN: "the flight went to its end and [did not fly](../RELIABILITY.md#did-it-fly)",
+    ExitCode.NOT_WRITTEN: "a file, the recording or standard output could not be written",
+    ExitCode.INTERRUPTED: "Ctrl-C, or another signal that asks to end",
 }
 
 

@@ -16,8 +16,10 @@ def main() -> None:
     # Until the imports below are done, some tenths of a second, Ctrl-C ends this process as any other.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     from tenbaud.cli.streams import leave, lost_output, prepare_streams
+    from tenbaud.flight.lifeline import follow_parent
 
     prepare_streams()
+    follow_parent()
     code = run(sys.argv[1:])
     error = lost_output()
     if error is not None:

@@ -31,6 +31,19 @@ class UnitOption(StrEnum):
     DEG = "deg"
 
 
+Start = Annotated[
+    float, typer.Option("--from", help="Use the record from here on, s.", min=0.0, max=1e7)
+]
+End = Annotated[
+    float | None, typer.Option("--to", help="Use the record up to here, s.", min=0.0, max=1e7)
+]
+Bandwidth = Annotated[
+    float, typer.Option(help="Pass band w_f of the filters, rad/s.", min=0.001, max=1000.0)
+]
+Damping = Annotated[float, typer.Option(help="Damping rho of the filters.", min=0.01, max=100.0)]
+Forgetting = Annotated[float, typer.Option(help="alpha of (10), 1/s.", min=0.0, max=100.0)]
+
+
 def identify(
     source: Annotated[
         Path | None,
@@ -59,22 +72,14 @@ def identify(
     unit: Annotated[
         UnitOption, typer.Option(help="Unit of the log's angle column.")
     ] = UnitOption.COUNTS,
-    start: Annotated[
-        float, typer.Option("--from", help="Use the record from here on, s.", min=0.0, max=1e7)
-    ] = 0.0,
-    end: Annotated[
-        float | None, typer.Option("--to", help="Use the record up to here, s.", min=0.0, max=1e7)
-    ] = None,
+    start: Start = 0.0,
+    end: End = None,
     equilibrium: Annotated[
         str, typer.Option(help="theta_0: auto, quiet (a stretch at rest), estimate, or rad.")
     ] = "auto",
-    bandwidth: Annotated[
-        float, typer.Option(help="Pass band w_f of the filters, rad/s.", min=0.001, max=1000.0)
-    ] = 1.0,
-    damping: Annotated[
-        float, typer.Option(help="Damping rho of the filters.", min=0.01, max=100.0)
-    ] = 0.7,
-    forgetting: Annotated[float, typer.Option(help="alpha of (10), 1/s.", min=0.0, max=100.0)] = 0.01,
+    bandwidth: Bandwidth = 1.0,
+    damping: Damping = 0.7,
+    forgetting: Forgetting = 0.01,
     settings: options.Settings = None,
     out: options.Out = None,
     json: options.AsJson = False,

@@ -110,7 +110,6 @@ def tune(
     from tenbaud.studies.judging import Split, Tuning
     from tenbaud.studies.tuning import preset_text
     from tenbaud.studies.tuning import tune as fit
-    from tenbaud.whole import write_whole
 
     _make_room(out)
     overrides = options.overrides(
@@ -132,14 +131,7 @@ def tune(
             progress.update(task, completed=count, description=f"best {math.degrees(error):.4g}°")
 
         tuned = fit(tuning, told, stop)
-    if not as_json:
-        _tell(tuned)
-    # After the figures, which a full disk must not take along.
-    write_whole(out, preset_text(tuning, tuned))
-    if as_json:
-        typer.echo(json.dumps({**tuned._asdict(), "preset_file": str(out)}, indent=2))
-    else:
-        typer.echo(f"{out}: fly it with --config {out}")
+    _leave(tuned, preset_text(tuning, tuned), out, as_json)
     if stop.raised:
         typer.echo(f"stopped after {tuned.evaluations} of {evaluations} evaluations", err=True)
         raise typer.Exit(ExitCode.INTERRUPTED)
@@ -154,6 +146,20 @@ def _make_room(out: Path) -> None:
         raise StudyError(f"{out} exists already; name another file")
     make_folder(out.parent)
     check_room(out)
+
+
+def _leave(tuned: Tuned, preset: str, out: Path, as_json: bool) -> None:
+    """Print what was found, and write it."""
+    from tenbaud.whole import write_whole
+
+    if not as_json:
+        _tell(tuned)
+    # After the figures, which a full disk must not take along.
+    write_whole(out, preset)
+    if as_json:
+        typer.echo(json.dumps({**tuned._asdict(), "preset_file": str(out)}, indent=2))
+    else:
+        typer.echo(f"{out}: fly it with --config {out}")
 
 
 def _tell(tuned: Tuned) -> None:

@@ -20,6 +20,7 @@ from tenbaud.config.section import (
     Counts,
     Factor,
     Gain,
+    Mismatch,
     NotNegative,
     Options,
     PluginName,
@@ -241,10 +242,6 @@ class Limits(Section):
     """command of the ticks before the first one decided"""
 
 
-Mismatch = Annotated[float, Field(ge=-0.999, le=10.0)]
-"""A fraction: -1 would leave nothing of the constant."""
-
-
 class PlantSection(Section):
     """The simulated plant, relative to the codec's model."""
 
@@ -276,7 +273,8 @@ class TransmitterSection(Section):
     encoder_zero_counts: Counts = 0
     plant: PlantSection = PlantSection()
     watchdog_s: Positive | Literal["auto"] = "auto"
-    """age of the last command after which the voltage is taken down; "auto": max(5 T_s, 0.1 s)"""
+    """age of the last command after which the voltage is taken down; "auto": the largest of 5 T_s,
+    0.1 s, command lead + 2 T_s and round trip + 2 T_s"""
     ramp_s: Positive = 1.0
     """time from the held voltage to the safe one"""
     safe_volts: tuple[Volts, Volts] = (0.0, 0.0)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from channel.errors import ConfigMismatch, DesyncError, LinkLost, SafetyStop, TenbaudError
+from tenbaud.flight.verdict import NotFlown
 from tenbaud.whole import WriteError
 
 
@@ -20,6 +21,7 @@ class ExitCode(IntEnum):
     LINK_LOST = 4
     DESYNC = 5
     SAFETY_STOP = 6
+    NOT_FLOWN = 7
     NOT_WRITTEN = 8
     INTERRUPTED = 130
 
@@ -30,6 +32,8 @@ class Outcome:
 
     code: ExitCode
     text: str
+    not_flown: tuple[NotFlown, ...] = ()
+    """in what the flight fell short, for NOT_FLOWN"""
 
 
 FLIGHT_OVER = "the flight is over"

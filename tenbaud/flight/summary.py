@@ -42,7 +42,10 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         "stale_commands": session.counts["stale_frames"],
         "claims_refused": session.counts["claims_refused"],
         "take_overs": session.counts["take_overs"],
+        "rejoins_asked": {why.name.lower(): n for why, n in session.rejoins_asked.items()},
         "guard_rearmed": node.rearmed,
+        "ticks_guard_down": node.ticks_down,
+        "ticks_commanded": node.ticks_commanded,
         "impairments": config.link.impairments,
         "impaired_up": impaired(run.uplink.line),
         "impaired_down": impaired(run.downlink),
@@ -56,12 +59,28 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         "commands_late": node.commands_late,
         "symbols_refused": run.uplink.shaper.refused,
         "words_missed": session.counts["words_missed"],
+        **_rate(run),
         "sensor_fault": node.sensor_fault,
         "loop_late_ms_p50": None,
         "loop_late_ms_p99": None,
         "loop_late_ms_max": None,
         "realtime_factor": flown_s / run.flight_s if run.flight_s else None,
         **run.extra,
+    }
+
+
+def _rate(run: TransmitterRun) -> Summary:
+    """Return the symbol rate asked for, the one kept, and the share that is missing."""
+    terms, counts = run.agreement.terms, run.node.session.counts
+    asked = 1e9 * terms.symbols_per_word / terms.sample_ns
+    if not run.ticks:
+        return {"symbols_per_s_asked": asked, "symbols_per_s_kept": None, "symbols_missing_share": None}
+    samples = run.ticks / terms.ticks_per_sample
+    share = min(1.0, (counts["digest_checks"] - counts["erasures"]) / samples)
+    return {
+        "symbols_per_s_asked": asked,
+        "symbols_per_s_kept": share * asked,
+        "symbols_missing_share": 1.0 - share,
     }
 
 
@@ -141,6 +160,7 @@ def _common(agreement: Agreement, outcome: Outcome) -> Summary:
         "preset": config.preset,
         "outcome": outcome.text,
         "exit_code": int(outcome.code),
+        "not_flown": [fault.value for fault in outcome.not_flown],
         "link": config.link.kind,
         "clock": agreement.clock,
         "lead_ticks": agreement.terms.lead_ticks,

@@ -34,6 +34,7 @@ means nothing. For every other ``x``, ``sin(-x) == -sin(x)`` and ``cos(-x) == co
 from __future__ import annotations
 
 import math
+from typing import NoReturn
 
 ANGLE_RAD_MAX = 100000.0
 """Largest angle accepted: it keeps the count of quarter turns below 2**16."""
@@ -104,7 +105,7 @@ def sin(x: float) -> float:
         value = 1.0 - (0.5 * z - (z * z * series - r * tail))
         return value if x > 0.0 else -value
     if not (-ANGLE_RAD_MAX <= x <= ANGLE_RAD_MAX):  # written so that a NaN is refused too
-        raise ValueError("sin takes angles from -100000 to 100000 rad")
+        refuse("sin takes angles from -100000 to 100000 rad", x)
     quarters, remainder, tail = _reduce_angle(x)
     quadrant = quarters & 3
     if quadrant == 0:
@@ -121,7 +122,7 @@ def cos(x: float) -> float:
     if -_EIGHTH_TURN <= x <= _EIGHTH_TURN:
         return _cos_reduced(x, 0.0)
     if not (-ANGLE_RAD_MAX <= x <= ANGLE_RAD_MAX):
-        raise ValueError("cos takes angles from -100000 to 100000 rad")
+        refuse("cos takes angles from -100000 to 100000 rad", x)
     quarters, remainder, tail = _reduce_angle(x)
     quadrant = quarters & 3
     if quadrant == 0:
@@ -136,7 +137,7 @@ def cos(x: float) -> float:
 def exp(x: float) -> float:
     """Return e to the power ``x``; ``|x| <= EXPONENT_MAX``, otherwise ``ValueError``."""
     if not (-EXPONENT_MAX <= x <= EXPONENT_MAX):
-        raise ValueError("exp takes exponents from -700 to 700")
+        refuse("exp takes exponents from -700 to 700", x)
     octaves = math.floor(x * _OCTAVES_PER_UNIT + 0.5)
     high = x - octaves * _LN2_HIGH  # exact
     low = octaves * _LN2_LOW
@@ -145,6 +146,11 @@ def exp(x: float) -> float:
     polynomial = _E5 + r * (_E6 + r * (_E7 + r * (_E8 + r * _E9)))
     polynomial = _E0 + r * (_E1 + r * (_E2 + r * (_E3 + r * (_E4 + r * polynomial))))
     return (1.0 + (r + (tail + r * r * polynomial))) * _power_of_two(octaves)
+
+
+def refuse(what: str, x: float) -> NoReturn:
+    """Raise ValueError for a number out of range; in compiled studies its text lacks the number."""
+    raise ValueError(f"{what}, got {x}")
 
 
 def _reduce_angle(x: float) -> tuple[int, float, float]:

@@ -158,5 +158,5 @@ def test_when_the_machine_code_is_read_then_nothing_is_fused() -> None:
 
 def test_when_an_angle_is_beyond_all_sense_then_the_compiled_sine_refuses_it_too() -> None:
     assert compiled(sin)(1.25).hex() == sin(1.25).hex()
-    with pytest.raises(ValueError, match="sin takes angles"):
+    with pytest.raises(ValueError, match="out of range"):
         compiled(sin)(2e5)

@@ -15,7 +15,8 @@ from typing import Literal
 from channel.recording import RecordChannel
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RECEIVER_NAME, TRANSMITTER_NAME, RunFolder
-from tenbaud.recording.reader import Recording, Row
+from tenbaud.recording.reader import Recording
+from tenbaud.recording.rows import Row
 
 IGNORED_TOPIC = "event"
 LOCKSTEP_TOPIC = "sample"

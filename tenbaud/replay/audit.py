@@ -19,6 +19,7 @@ from channel.errors import TenbaudError
 from receiver.controllers.base import Controller
 from receiver.rejoin import carried_to
 from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.notes import hole_notes, version_notes
 from tenbaud.recording.recover import RECOVERED_NOTE
 from tenbaud.replay.control import controller_of, recorded_commands, steps_by_hand
 from tenbaud.replay.record import Epoch, FlightRecord, epochs_of, load_record
@@ -76,9 +77,11 @@ def _check_whole(record: FlightRecord, result: Audit) -> None:
             "only the transmitter's recording is here: what arrived, and when, is not shown"
         )
     for end, tables in record.ends():
+        result.notes += version_notes(tables.path, tables.metadata)
         dropped = int(tables.end.get("rows_dropped", "0"))
         if dropped:
             result.gaps.append(f"the {end}'s recorder dropped {dropped} rows")
+        result.gaps += hole_notes(tables.path, tables.holes)
         if not tables.end:
             result.notes.append(f"the {end}'s recording was cut: audited up to the cut")
         if RECOVERED_NOTE in tables.end:

@@ -13,6 +13,9 @@ from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.run import Run
 from tenbaud.recording.table import Table, Tables
 
+NUMBER_MAX = 1e9
+"""Of a state or a command, in rad, rad/s or V."""
+
 
 @dataclass(slots=True)
 class Epoch:
@@ -111,6 +114,8 @@ def epochs_of(tables: Tables, agreement: Agreement) -> list[Epoch]:
         # From before epochs were recorded: one of them, from the common initial state.
         first = samples[0]["sample"] if samples else 0
         epochs = [Epoch(0, codec.initial()._replace(sample=first), terms.initial_command)]
+    for epoch in epochs:
+        check_epoch(epoch, agreement, str(tables.path))
     index = 0
     for row in samples:
         sample = row["sample"]
@@ -123,8 +128,35 @@ def epochs_of(tables: Tables, agreement: Agreement) -> list[Epoch]:
                 f"{tables.path} lacks sample {expected}: the next one recorded is {sample}. "
                 "Rows were lost, so what follows cannot be computed from the symbols."
             )
-        epoch.words.append(None if row["word"] is None else tuple(row["word"]))
+        word = None if row["word"] is None else tuple(row["word"])
+        if word is not None and not _is_word(word, agreement):
+            raise RecordingError(
+                f"{tables.path}: sample {sample} consumed {list(word)!r:.60}, which is no word of the "
+                "flight's coder. The file was changed, or its configuration is another one."
+            )
+        epoch.words.append(word)
     return epochs
+
+
+def check_epoch(epoch: Epoch, agreement: Agreement, where: str) -> None:
+    """Raise RecordingError where an epoch starts from no state and command of this flight's codec."""
+    initial = agreement.codec.initial()
+    for name, values, like in (
+        ("state", epoch.start.model, initial.model),
+        ("coder state", epoch.start.coder, initial.coder),
+        ("held command", epoch.hold, agreement.terms.initial_command),
+    ):
+        if len(values) != len(like) or not all(abs(one) <= NUMBER_MAX for one in values):
+            raise RecordingError(
+                f"{where}: epoch {epoch.number} starts with the {name} {list(values)!r:.60}, and the "
+                f"flight's has {len(like)} numbers up to {NUMBER_MAX:g}. The file was changed, or its "
+                "configuration is another one."
+            )
+
+
+def _is_word(word: tuple[int, ...], agreement: Agreement) -> bool:
+    alphabet = agreement.codec.coder.alphabet
+    return len(word) == alphabet.symbols_per_word and all(one in alphabet.symbols for one in word)
 
 
 def _epoch(row: dict[str, Any]) -> Epoch:

@@ -109,7 +109,8 @@ def _result(agreement: Agreement, transmitter: _Child, receiver: _Child) -> Demo
         return DemoResult(summary, ExitCode.OK, [])
     code = first_code(*(end.outcome().code for end in ends if end.process.returncode > 0))
     code = first_code(code, outcomes[0].code)
-    if not summary.get("exit_code") or outcomes[0].text != summary.get("outcome"):
+    was_killed = ends[0].process.returncode < 0
+    if was_killed or not summary.get("exit_code"):
         summary["outcome"], summary["exit_code"] = outcomes[0].text, int(code)
     return DemoResult(summary, code, [outcome.text for outcome in reversed(outcomes)])
 

@@ -27,6 +27,7 @@ ROWS: tuple[tuple[str, str, str], ...] = (
     ("bytes on the serial line up / down", "line_bytes", "{}"),
     ("dropped by the link", "link_dropped", "{}"),
     ("reconnects", "reconnects", "{}"),
+    ("frames dropped, out of bounds", "out_of_bounds", "{}"),
     ("digest checks", "digest_checks", "{}"),
     ("desyncs", "desyncs", "{}"),
     ("rejoins, and what they cost", "rejoins", "{}"),
@@ -145,8 +146,8 @@ def _value(summary: Summary, name: str) -> Any:
             return f"{up} / {down}" if up else None
         case "link_dropped":
             return ", ".join(f"{kind} {n}" for kind, n in (get("link_dropped") or {}).items()) or None
-        case "reconnects":
-            return get("reconnects") or None
+        case "reconnects" | "out_of_bounds":
+            return get(name) or None
         case "error_coded" | "error_live":
             largest, rms = get(f"{name}_max_fraction"), get(f"{name}_rms_fraction")
             if largest is None or rms is None:

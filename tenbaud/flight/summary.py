@@ -133,14 +133,20 @@ def link_part(link: Link, refused: Counter[str] | None = None) -> Summary:
 
 
 def joined(transmitter: Summary, receiver: Summary) -> Summary:
-    """Return one summary: the transmitter's figures, and those that only the receiver has."""
+    """Return one summary: the transmitter's figures, and those that only the receiver has.
+
+    Of an end that was killed there is none; without the transmitter's the receiver's figures stand.
+    """
+    if not transmitter:
+        return dict(receiver)
     own = ("baud_measured", "symbols_late", "symbols_misplaced", "stale_frames", "bad_commands")
     both: Summary = {
         name: dict(Counter(transmitter.get(name, {})) + Counter(receiver.get(name, {})))
         for name in ("link_dropped", "connections_refused")
     }
-    for name in ("reconnects", "malformed", COUNTER):
+    for name in ("reconnects", "malformed", "recording_rows_lost", COUNTER):
         both[name] = transmitter.get(name, 0) + receiver.get(name, 0)
+    both["recording_error"] = transmitter.get("recording_error") or receiver.get("recording_error")
     if receiver.get("impaired_down"):
         both["impaired_down"] = receiver["impaired_down"]
     return {**transmitter, **both, **{name: receiver.get(name) for name in own}}

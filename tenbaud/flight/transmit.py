@@ -18,7 +18,7 @@ from channel.virtual import Peer
 from channel.wire import Wire
 from tenbaud.build import Agreement
 from tenbaud.build_ends import build_line, build_transmitter, build_uplink
-from tenbaud.flight.outcome import FLIGHT_OVER, ExitCode, Outcome
+from tenbaud.flight.outcome import FLIGHT_OVER, SAFE, ExitCode, Outcome
 from tenbaud.flight.verdict import FlightCounts, faults_of, settings_of, verdict_text
 from transmitter.node import STOPPED, TransmitterNode
 from transmitter.rate_watch import RateWatch
@@ -184,7 +184,7 @@ def _outcome(run: TransmitterRun, peer_present: bool) -> Outcome:
     if session.phase is Phase.ENDED or (node.guard.stopped and not peer_present):
         return Outcome(
             ExitCode.LINK_LOST,
-            f"{session.end_reason or 'the receiver is gone'}; the motors are at their safe voltage",
+            f"{session.end_reason or 'the receiver is gone'}; {SAFE}",
         )
     if node.guard.stopped:
         return Outcome(

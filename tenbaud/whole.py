@@ -29,6 +29,7 @@ _ADVICE = {
     errno.EPERM: "Choose a place that this user may write to",
     errno.ENOTDIR: "A file stands where a folder should be: choose another place",
     errno.ENAMETOOLONG: "Choose a shorter name",
+    errno.ELOOP: "It is a symbolic link, and links are not followed: remove it or choose another place",
 }
 
 

@@ -16,6 +16,7 @@ from tenbaud.recording.inspect import describe_text
 from tenbaud.recording.reader import MessageStream
 from tenbaud.recording.recover import recover
 from tenbaud.recording.writer import McapRecorder
+from tenbaud.whole import WriteError
 from tests.tenbaud.ends import End, wait_for
 from tests.tenbaud.flown import flown
 from tests.tenbaud.processes import run as run_command
@@ -186,7 +187,7 @@ def test_no_link_is_followed(flight: Run, tmp_path: Path) -> None:
     path.symlink_to(precious)
     with pytest.raises(RecordingError, match="link"):
         recover(path)
-    with pytest.raises(RecordingError):
+    with pytest.raises(WriteError, match="links are not followed"):
         McapRecorder(path, {})
     path.unlink()
     path.write_bytes(before)

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from receiver.controllers.base import Controller
+from tenbaud.files.whole import make_folder, write_whole
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.table import Tables
 from tenbaud.replay.control import controller_of, steps_by_hand
 from tenbaud.replay.record import Epoch, FlightRecord, by_key, epochs_of
 from tenbaud.replay.refly import Delay, Reflown, refly
 from tenbaud.replay.symbols import Packed, Unpacked, pack
-from tenbaud.whole import make_folder, write_whole
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ import random
 from collections import Counter
 from dataclasses import replace
 
-from channel.impairments import Impairments, LineFaults
+from channel.line.impairments import Impairments, LineFaults
 from tests.simulation.faults import FAULTY_S, Plan, draw
 from tests.simulation.intruded import IntrudedWorld, Intrusion
 from tests.simulation.watch import LivenessViolation

@@ -10,11 +10,11 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass
 
-from channel.bounds import COUNTER
-from channel.impairments import ImpairedLine
-from channel.sabotage import Sabotage, SabotagedCodec
+from channel.line.impairments import ImpairedLine
+from channel.protocol.bounds import COUNTER
+from channel.protocol.sabotage import Sabotage, SabotagedCodec
 from receiver.endpoint import ReceiverEndpoint
-from receiver.session import Phase
+from receiver.session.session import Phase
 from tests.simulation.faults import FAULTY_S, Plan
 from tests.simulation.intruder import Intruder
 from tests.simulation.world import World

@@ -6,7 +6,7 @@ from collections import Counter
 
 import pytest
 
-from channel.bounds import Bounds
+from channel.protocol.bounds import Bounds
 from tests.simulation.forgeries import fly_among_forgeries, forgeries
 
 MESSAGES = 10_000

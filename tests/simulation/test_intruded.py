@@ -6,15 +6,15 @@ from dataclasses import replace
 
 import pytest
 
-from channel.events import EventKind
-from channel.frames import Symbol
-from channel.impairments import Impairments
-from channel.wire import encode
+from channel.line.impairments import Impairments
+from channel.protocol.events import EventKind
+from channel.protocol.frames import Symbol
+from channel.protocol.wire import encode
 from tests.simulation.forgeries import quiet_plan
 from tests.simulation.intruded import IntrudedWorld, Intrusion, draw_intrusion
 from tests.simulation.soak import fly_intruded_seed
 from tests.simulation.watch import LivenessViolation, SafetyViolation
-from transmitter.session import TransmitterSession
+from transmitter.session.session import TransmitterSession
 
 SEEDS = 16
 SECOND = 1_000_000_000

@@ -108,7 +108,8 @@ class Greeter:
         same = before is not None and replace(before, sample=hello.sample) == hello
         if not same or before is None:
             self._persisted = 0
-        elif hello.sample <= before.sample:
+        elif hello.sample and hello.sample <= before.sample:
+            # A copy. One that has not flown yet asks for sample 0 every time.
             self._doubted = before
             return False
         self._persisted += 1

@@ -3,7 +3,7 @@
 Every message type is made with a good check and with fields as they are, nearly as they are, extreme
 or random (`tests.simulation.intruder`), and given to both ends between the honest traffic, from one
 message a second to a flood. When it ends, lockstep must be back within the bound of `IntrudedWorld` and
-stay: no rejoin follows, and no digest differs.
+stay: `Watch.check_recovery` lets no rejoin follow.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from dataclasses import replace
 from channel.line.impairments import Impairments, LineFaults
 from tests.simulation.faults import FAULTY_S, Plan, draw
 from tests.simulation.intruded import IntrudedWorld, Intrusion
-from tests.simulation.watch import LivenessViolation
 
 RATES_HZ = (1.0, 10.0, 100.0, 400.0)
 FLOOD_HZ = 2000.0
@@ -48,8 +47,6 @@ def fly_among_forgeries(seed: int, rate_hz: float, counts: Counter[str]) -> None
     """Fly once, on a line that does nothing wrong but delay, and add up what was forged."""
     world = IntrudedWorld(quiet_plan(seed), Intrusion(rate_hz, replayed_share=0.0))
     world.fly()
-    if world.watch.rejoins != world.rejoins_when_recovered:
-        raise LivenessViolation("the ends rejoined again after they were locked")
     counts.update(world.intruder.counts)
     counts["out of bounds"] += world.out_of_bounds
     counts["rejoins"] += world.watch.rejoins

@@ -7,6 +7,7 @@ started again after a second, by whoever looks after it.
 
 from __future__ import annotations
 
+import math
 import random
 from dataclasses import dataclass
 
@@ -54,7 +55,6 @@ class IntrudedWorld(World):
         self.intruder = Intruder(
             random.Random(f"{plan.seed} intruder"), self.codec, self.terms, self.identity
         )
-        self.rejoins_when_recovered = 0
         self._second: ReceiverEndpoint | None = None
         alphabet = self.codec.coder.alphabet
         self._second_down = ImpairedLine(plan.down, alphabet, f"{plan.seed} second down")
@@ -70,6 +70,15 @@ class IntrudedWorld(World):
         wasted_ticks = 2 * self.terms.lead_ticks + self.plan.watchdog_ticks
         wasted_ns = wasted_ticks * self.terms.tick_ns + self.plan.round_trip_ns
         return super().recovery_ns_max + wasted_ns
+
+    @property
+    def calm_rejoins_max(self) -> int:
+        """Return how often the ends may rejoin after the last fault.
+
+        Every forged request that is still on the line may begin an epoch, whose answer is taken.
+        """
+        on_line = self.intrusion.rate_hz * self.plan.round_trip_ns / 1e9
+        return super().calm_rejoins_max + math.ceil(on_line)
 
     def fly(self) -> IntrudedWorld:
         """Fly as ever, in company until the faults stop."""
@@ -133,12 +142,6 @@ class IntrudedWorld(World):
                 codec.arm(Sabotage(-1, "model", 0))
         if self.endpoint is None:
             self.start_receiver()
-
-    def _plant_tick(self) -> None:
-        before = self.recovered_ns
-        super()._plant_tick()
-        if before is None and self.recovered_ns is not None:
-            self.rejoins_when_recovered = self.watch.rejoins
 
     # The second receiver
 

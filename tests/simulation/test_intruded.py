@@ -13,8 +13,6 @@ from channel.protocol.wire import encode
 from tests.simulation.forgeries import quiet_plan
 from tests.simulation.intruded import IntrudedWorld, Intrusion, draw_intrusion
 from tests.simulation.soak import fly_intruded_seed
-from tests.simulation.watch import LivenessViolation, SafetyViolation
-from transmitter.session.session import TransmitterSession
 
 SEEDS = 16
 SECOND = 1_000_000_000
@@ -76,12 +74,3 @@ def test_when_one_forged_symbol_comes_early_then_the_flight_keeps_its_schedule()
     assert receiver.counts["out_of_bounds"] == 1
     assert receiver.counts["rejoins"] == 0
     assert [e.kind for e in receiver.events].count(EventKind.STALE) == 1
-
-
-def test_when_commands_moved_motors_before_their_digest_agreed_then_the_harness_would_find_out(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(TransmitterSession, "_on_desync", lambda _session, _done: [])
-    world = IntrudedWorld(quiet_plan(3), Intrusion(rate_hz=50.0, replayed_share=0.0))
-    with pytest.raises((SafetyViolation, LivenessViolation)):
-        world.fly()

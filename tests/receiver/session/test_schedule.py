@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import random
 
-from tests.channel.codec.parts import terms
-
 from receiver.session.schedule import EARLY_SAMPLES, RIVALS, Schedule, Timing
+from tests.channel.codec.parts import terms
 
 PERIOD_NS = 100_000_000
 ALLOWANCE_NS = 20_000_000

@@ -36,7 +36,7 @@ COUNTER_MAX = 3 * 2**30
 """Three quarters of what 32 bits count: slots beyond are left to the flight that goes on."""
 TIME_NS_MAX = 3 * 2**61
 FIRST_SHARE = 2.0 / 3.0
-"""A transmitter that has not flown may be sent so far into these: what it asks for later is within them."""
+"""How far into these a first flight may begin, so that what is asked for later is within them."""
 
 TEXT_CHARACTERS_MAX = 2000
 """Four bytes each at most, so that a text that is quoted in an answer still fits a frame."""
@@ -91,13 +91,20 @@ class Bounds:
             return f"a state of {len(report.state)} bytes"
         return None
 
-    def of_commands(self, commands: Commands, sample: int, next_sample: int) -> str | None:
-        """Check a command frame; the clock stands in `sample`, and `next_sample` is sent next."""
+    def of_commands(
+        self, commands: Commands, sample: int, confirmed: int, next_sample: int
+    ) -> str | None:
+        """Check a command frame, but for the echoes that were had before.
+
+        The clock stands in `sample`; `confirmed` is to be confirmed next, `next_sample` to be sent.
+        """
         if len(commands.echoes) > self._echoes_max:
             return f"{len(commands.echoes)} echoes, where at most {self._echoes_max} are agreed"
         if commands.echoes[-1].sample > sample + self._reach:
             return f"an echo of sample {commands.echoes[-1].sample} during sample {sample}"
         for echo in commands.echoes:
+            if echo.sample < confirmed:
+                continue
             problem = self._of_echo(echo)
             if problem is not None:
                 return problem

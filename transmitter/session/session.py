@@ -306,7 +306,8 @@ class TransmitterSession:
             # A copy, or a recording: it brings nothing, and proves nobody alive.
             self.counts["stale_frames"] += 1
             return []
-        problem = self._bounds.of_commands(frame, self._sample, self.copies.next_sample)
+        sent = (self.copies.confirmed.sample, self.copies.next_sample)
+        problem = self._bounds.of_commands(frame, self._sample, *sent)
         if self._bounds.drops(problem):
             return []
         self.heard_tick = self._tick

@@ -56,7 +56,7 @@ def test_when_frames_are_what_the_other_end_sends_then_they_are_within_bounds() 
     ours = bounds()
     assert ours.of_welcome(welcome(), SAMPLE) is None
     assert ours.of_welcome(Welcome(7, 0, 0, 5), None) is None
-    assert ours.of_commands(Commands(7, 1, (echo(98), echo(99), echo(100))), SAMPLE, 101) is None
+    assert ours.of_commands(Commands(7, 1, (echo(98), echo(99), echo(100))), SAMPLE, 98, 101) is None
     assert ours.of_symbol(Symbol(7, 1, SAMPLE, 1)) is None
     assert ours.of_hello(Hello(5, "1", bytes(16), bytes(8), sample=SAMPLE)) is None
     assert ours.of_report(Desync(7, 1, 99, 1, 2, packed()), 1, SAMPLE) is None
@@ -119,7 +119,7 @@ def test_when_the_first_answer_comes_then_only_the_counters_bound_its_start() ->
 def test_when_commands_are_out_of_bounds_then_it_is_said_in_what(
     echoes: tuple[Echo, ...], text: str
 ) -> None:
-    problem = bounds().of_commands(Commands(7, 1, echoes), SAMPLE, 101)
+    problem = bounds().of_commands(Commands(7, 1, echoes), SAMPLE, 90, 101)
     assert problem is not None
     assert text in problem
 

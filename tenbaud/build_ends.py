@@ -24,7 +24,8 @@ from tenbaud.build_gauge import build_gauge
 from tenbaud.build_rig import build_rig
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig, ReferenceSection
-from tenbaud.plugins import CONTROLLER, build_plugin, is_plugin
+from tenbaud.outside_code import is_plugin
+from tenbaud.plugins import CONTROLLER, build_plugin
 from transmitter.guard import Guard, GuardSettings
 from transmitter.node import TransmitterNode
 from transmitter.scores import Scores
@@ -163,6 +164,7 @@ def build_controller(config: FlightConfig, reference: Reference | None = None) -
             config.limits.initial_volts,
         )
         plugin: Controller = build_plugin(
+            config,
             "receiver.controller",
             section.controller,
             context,

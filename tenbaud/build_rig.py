@@ -11,7 +11,8 @@ from tenbaud.build import REAL_RIGS, read_flight_log
 from tenbaud.config.load import ConfigError
 from tenbaud.config.rig_schema import AxisSection
 from tenbaud.config.schema import FlightConfig, PitchModelSection
-from tenbaud.plugins import PLANT, build_plugin, is_plugin
+from tenbaud.outside_code import is_plugin
+from tenbaud.plugins import PLANT, build_plugin
 from transmitter.rigs.axes import Axis, Motors
 from transmitter.rigs.base import Rig
 from transmitter.rigs.device import DeviceRig, DeviceSettings
@@ -77,7 +78,7 @@ def build_plant(config: FlightConfig, step_s: float) -> Plant:
             section.initial_angle_rad,
         )
         plugin: Plant = build_plugin(
-            "transmitter.plant.kind", section.kind, context, section.options, PLANT
+            config, "transmitter.plant.kind", section.kind, context, section.options, PLANT
         )
         return plugin
     return PitchPlant(

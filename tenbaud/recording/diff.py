@@ -87,6 +87,7 @@ def files_to_compare(first: Path, second: Path | None = None) -> list[Comparison
     """Which files `first_difference` would open. Ends recorded in one folder only are left out."""
     if second is None:
         run = RunFolder(first)
+        run.recordings()  # refuses links
         return [Comparison(run.transmitter, run.receiver, lockstep=True)]
     if first.is_dir() != second.is_dir():
         raise RecordingError(

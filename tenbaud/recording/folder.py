@@ -51,8 +51,31 @@ class RunFolder:
         return self.path / FIGURE_NAME
 
     def recordings(self) -> list[Path]:
-        """The recordings that exist, the transmitter's first."""
-        return [path for path in (self.transmitter, self.receiver) if path.is_file()]
+        """The recordings that exist, the transmitter's first; RecordingError for a symbolic link."""
+        return [path for path in (self.transmitter, self.receiver) if is_own_file(path)]
+
+    def text_of(self, path: Path) -> str | None:
+        """The text of a file of this folder, None where there is none to be read.
+
+        RecordingError for a symbolic link.
+        """
+        try:
+            return path.read_text() if is_own_file(path) else None
+        except (OSError, UnicodeDecodeError):
+            return None
+
+
+def is_own_file(path: Path) -> bool:
+    """Whether there is such a file in a run folder; RecordingError if it is a symbolic link.
+
+    A run folder may come from anybody, and a link in it would have this machine's files read.
+    """
+    if path.is_symlink():
+        raise RecordingError(
+            f"{path} is a symbolic link, and links within a run folder are not followed. "
+            "If you know where it leads, put a copy of that file in its place."
+        )
+    return path.is_file()
 
 
 def create_run_folder(

@@ -57,9 +57,13 @@ def describe_json(path: Path) -> list[dict[str, Any]]:
 
 def _headline(path: Path) -> str:
     """Return what `summary.json` says in one line; empty without it."""
+    folder = RunFolder(path)
+    text = folder.text_of(folder.summary)
     try:
-        summary = json.loads(RunFolder(path).summary.read_text())
-    except (OSError, ValueError):
+        summary = json.loads(text or "null")
+    except ValueError:
+        return ""
+    if not isinstance(summary, dict):
         return ""
     parts = [
         f"{summary.get('preset')}: {summary.get('outcome')}",

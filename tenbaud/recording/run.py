@@ -19,7 +19,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tenbaud.recording.errors import RecordingError
-from tenbaud.recording.folder import RECEIVER_NAME, TRANSMITTER_NAME, RunFolder, find_recordings
+from tenbaud.recording.folder import (
+    RECEIVER_NAME,
+    TRANSMITTER_NAME,
+    RunFolder,
+    find_recordings,
+    is_own_file,
+)
 from tenbaud.recording.signals import SIGNALS, Signal, Source, TimeBase
 from tenbaud.recording.table import Series, Table, Tables, read_tables
 
@@ -158,18 +164,22 @@ class Run:
     @cached_property
     def summary(self) -> dict[str, Any]:
         """The figures in `summary.json`; empty without it."""
+        text = self.folder.text_of(self.folder.summary)
         try:
-            summary: dict[str, Any] = json.loads(self.folder.summary.read_text())
-        except (OSError, ValueError):
+            summary = json.loads(text or "{}")
+        except ValueError:
             return {}
-        return summary
+        return summary if isinstance(summary, dict) else {}
 
     @cached_property
     def config(self) -> FlightConfig:
-        """The configuration that was flown, checked anew."""
+        """The configuration that was flown, checked anew.
+
+        Classes from outside that it names are not imported: `config.allowing_code()` permits that.
+        """
         from tenbaud.config.load import load_config
 
-        if not self.folder.config.is_file():
+        if not is_own_file(self.folder.config):
             raise RecordingError(f"{self.folder.path} holds no {self.folder.config.name}.")
         return load_config(path=self.folder.config)
 
@@ -214,18 +224,18 @@ class Run:
         else:
             raise RecordingError(f"{self.path} holds no ticks: the run ended before it flew.")
         known = tables.topics["tick"]["tick"].astype(np.int64)
-        tick_s, per_sample = _timing(tables.metadata, self.folder.config)
+        tick_s, per_sample = _timing(tables.metadata, self.folder)
         return TimeBase(np.arange(known.min(), known.max() + 1), tick_s, per_sample)
 
 
-def _timing(metadata: dict[str, str], config: Path) -> tuple[float, int]:
+def _timing(metadata: dict[str, str], folder: RunFolder) -> tuple[float, int]:
     """Return tick and ticks per sample, from the recording's own head or the folder's file."""
     try:
         timing = json.loads(metadata["shared_config"])["timing"]
     except (KeyError, ValueError):
         try:
-            timing = tomllib.loads(config.read_text())["timing"]
-        except (OSError, KeyError, ValueError):
+            timing = tomllib.loads(folder.text_of(folder.config) or "")["timing"]
+        except (KeyError, ValueError):
             timing = {"tick_s": float(metadata.get("tick_s", 0.01)), "symbol_period_s": 0.1}
     tick_s = float(timing["tick_s"])
     return tick_s, max(1, round(float(timing["symbol_period_s"]) / tick_s))

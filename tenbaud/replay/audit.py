@@ -52,9 +52,12 @@ class Audit:
         return not self.leaks and not self.gaps
 
 
-def audit(path: Path, other: Path | None = None) -> Audit:
-    """Audit the run at `path`; `other` is the folder of the other machine, where each kept its end."""
-    record = load_record(path, other)
+def audit(path: Path, other: Path | None = None, *, allow_code: bool = False) -> Audit:
+    """Audit the run at `path`; `other` is the folder of the other machine, where each kept its end.
+
+    `allow_code`: classes from outside that its configuration names may run.
+    """
+    record = load_record(path, other, allow_code=allow_code)
     result = Audit(record, count(record))
     result.leaks, result.gaps = check_slots(record)
     _check_whole(record, result)

@@ -9,6 +9,7 @@ from typing import Any
 from channel.codec import CodecState, Vector
 from channel.words import Word
 from tenbaud.build import Agreement, agree
+from tenbaud.outside_code import require_allowed, require_regular_files
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.run import Run
 from tenbaud.recording.table import Table, Tables
@@ -48,9 +49,10 @@ class FlightRecord:
         return [(name, tables) for name, tables in both if tables is not None]
 
 
-def load_record(path: Path, other: Path | None = None) -> FlightRecord:
+def load_record(path: Path, other: Path | None = None, *, allow_code: bool = False) -> FlightRecord:
     """Read the recordings of a flight; `other` is the folder of the other machine, if there is one.
 
+    CodeNotAllowed if the configuration names classes from outside, unless `allow_code` permits them.
     Raises RecordingError for what cannot be read, and where this machine or this version of the
     configuration is not the one that was flown.
     """
@@ -63,18 +65,21 @@ def load_record(path: Path, other: Path | None = None) -> FlightRecord:
                 raise RecordingError(f"{path} and {other} both hold a {end}'s recording. Give one.")
             tables[end], summaries[end], homes[end] = run.tables(end), run.summary, run
     home = homes.get("receiver") or homes["transmitter"]
-    agreement = _agreement(home, next(iter(tables.values())))
+    agreement = _agreement(home, next(iter(tables.values())), allow_code)
     for end, one in tables.items():
         _check_same(one, agreement, end)
     return FlightRecord(agreement, tables.get("transmitter"), tables.get("receiver"), summaries)
 
 
-def _agreement(run: Run, tables: Tables) -> Agreement:
+def _agreement(run: Run, tables: Tables, allow_code: bool) -> Agreement:
+    config = run.config.allowing_code() if allow_code else run.config
+    require_allowed(config)
+    require_regular_files(config)
     clock = tables.metadata.get("clock", "")
     if clock == "real":
-        return agree(run.config, "real")
+        return agree(config, "real")
     if clock == "virtual":
-        return agree(run.config, "virtual")
+        return agree(config, "virtual")
     raise RecordingError(f"{tables.path} does not say on which clock it was flown.")
 
 

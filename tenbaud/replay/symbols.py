@@ -23,6 +23,7 @@ from channel.codec import Codec, CodecState
 from channel.words import ERASED, Alphabet, Word
 from tenbaud.build import Agreement, agree
 from tenbaud.config.schema import FlightConfig
+from tenbaud.outside_code import require_allowed, require_regular_files
 from tenbaud.recording.errors import RecordingError
 from tenbaud.replay.record import Epoch
 
@@ -88,8 +89,11 @@ def pack(
     )
 
 
-def unpack(path: Path) -> Unpacked:
-    """Read a symbols file; RecordingError for a file that is none, or not a whole one."""
+def unpack(path: Path, *, allow_code: bool = False) -> Unpacked:
+    """Read a symbols file; RecordingError for a file that is none, or not a whole one.
+
+    CodeNotAllowed if its configuration names classes from outside, unless `allow_code` permits them.
+    """
     try:
         data = path.read_bytes()
         head_at = len(MAGIC) + _LENGTH.size
@@ -98,6 +102,10 @@ def unpack(path: Path) -> Unpacked:
         (length,) = _LENGTH.unpack_from(data, len(MAGIC))
         head: dict[str, Any] = json.loads(zlib.decompress(data[head_at : head_at + length]))
         config = FlightConfig.model_validate(head["config"])
+        if allow_code:
+            config = config.allowing_code()
+        require_allowed(config)
+        require_regular_files(config)
         clock: Literal["real", "virtual"] = "real" if head["clock"] == "real" else "virtual"
         agreement = agree(config, clock)
         epochs = _epochs(head["epochs"], data[head_at + length :], agreement.codec)

@@ -8,20 +8,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from typing import Annotated, Any, Literal, Self, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import (
-    AfterValidator,
-    Discriminator,
-    Field,
-    PrivateAttr,
-    Tag,
-    field_validator,
-    model_validator,
-)
+from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
 
 from channel.impairments import parse_impairments
 from channel.sabotage import parse_sabotage
+from tenbaud.config.permission import CodePermission
 from tenbaud.config.rig_schema import BridgeSection, HilSection, QuarcSection, SerialSection
 from tenbaud.config.section import NotNegative, Options, PluginName, Positive, Section
 
@@ -375,7 +368,7 @@ class TelemetrySection(Section):
     """messages per second of each end"""
 
 
-class FlightConfig(Section):
+class FlightConfig(CodePermission):
     """Everything about a flight."""
 
     preset: str = "paper-10baud"
@@ -393,22 +386,6 @@ class FlightConfig(Section):
     flight_log: FlightLogSection = FlightLogSection()
     link: LinkSection = LinkSection()
     telemetry: TelemetrySection = TelemetrySection()
-    _code_allowed: bool = PrivateAttr(default=False)
-
-    @property
-    def code_allowed(self) -> bool:
-        """Return whether the classes from outside that it names may be imported."""
-        return self._code_allowed
-
-    def allowing_code(self) -> Self:
-        """Return the same configuration, its classes from outside allowed to run."""
-        allowed = self.model_copy()
-        allowed._code_allowed = True
-        return allowed
-
-    def __eq__(self, other: object) -> bool:
-        """Return whether two configurations say the same; what is allowed is no part of that."""
-        return isinstance(other, FlightConfig) and self.model_dump() == other.model_dump()
 
     def shared_json(self, lead_ticks: int) -> str:
         """Return the shared part as canonical JSON, with the command lead that was chosen."""

@@ -1,33 +1,30 @@
 """Whether a flight was flown on what it paid for, shown from its recordings.
 
-Three questions. Did each slot carry at most one symbol, on the grid? Do the states of both ends follow
-from symbols and slots alone, so that the same symbols at other times within their deadlines give the
-same states? Do the commands, the codec's other input, follow from the states, so that nothing came
-down by them that had not gone up? What cannot be shown counts as not shown, and fails too.
+Did each slot carry at most one symbol, on the grid? Do the states of both ends follow from symbols and
+slots alone? Do the commands, the codec's other input, follow from the states, so that nothing came down
+by them that had not gone up? Did both ends record the same flight, all of it? What is checked, field by
+field, is in the table in `claims/table.py`. What cannot be shown counts as not shown, and fails too.
 """
 
 from __future__ import annotations
 
-import random
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 
-from channel.codec import CodecState, Vector
-from channel.errors import TenbaudError
+from channel.errors import CodecDiverged, TenbaudError
 from receiver.controllers.base import Controller
-from receiver.rejoin import carried_to
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.recover import RECOVERED_NOTE
+from tenbaud.replay.claims.base import Evidence, Findings, Place
+from tenbaud.replay.claims.table import CLAIMS
 from tenbaud.replay.control import controller_of, recorded_commands, steps_by_hand
-from tenbaud.replay.record import Epoch, FlightRecord, epochs_of, load_record
-from tenbaud.replay.refly import Reflown
-from tenbaud.replay.replay import compare, fly_again
-from tenbaud.replay.slots import Counted, check_slots, count
+from tenbaud.replay.counted import Counted, count
+from tenbaud.replay.expected import expect
+from tenbaud.replay.record import FlightRecord, epochs_of, load_record
+from tenbaud.replay.refly import Reflown, refly
+from tenbaud.replay.replay import compare
 
-JITTERED_FLIGHTS = 2
-JITTER_SEED = 20260
+WHOLE = Place("flight", "all topics", "all samples")
 
 
 @dataclass(slots=True)
@@ -58,181 +55,87 @@ def audit(path: Path, other: Path | None = None, *, allow_code: bool = False) ->
     `allow_code`: classes from outside that its configuration names may run.
     """
     record = load_record(path, other, allow_code=allow_code)
-    result = Audit(record, count(record))
-    result.leaks, result.gaps = check_slots(record)
-    _check_whole(record, result)
-    _check_counts(record, result)
+    evidence, findings = Evidence(record), Findings()
+    _fly(evidence, findings)
+    for claim in CLAIMS:
+        claim.check(evidence, findings)
+    compared = compare(record, evidence.flown)[1]
+    if not compared:
+        findings.gap(WHOLE, "no state could be compared with a recorded one")
+    codec = record.agreement.codec
+    starts = [epoch.start for epoch in evidence.epochs]
+    carried = [one for one in starts if one != codec.initial()._replace(sample=one.sample)]
+    return Audit(
+        record,
+        count(evidence),
+        findings.leaks,
+        findings.gaps,
+        _notes(record),
+        compared,
+        evidence.jittered_states,
+        sum(len(codec.pack(start)) for start in carried),
+    )
+
+
+def _fly(evidence: Evidence, findings: Findings) -> None:
+    """Fly the flight again from its words, if these are all here, as well as that can be done."""
+    record = evidence.record
     try:
-        epochs = epochs_of(record.consumer, record.agreement)
+        evidence.epochs = epochs_of(record)
     except RecordingError as error:
-        result.gaps.append(str(error))
-        return result
-    _check_states(record, epochs, result)
-    return result
-
-
-def _check_whole(record: FlightRecord, result: Audit) -> None:
-    if record.transmitter is None:
-        result.notes.append("only the receiver's recording is here: when each symbol left is not shown")
-    if record.receiver is None:
-        result.notes.append(
-            "only the transmitter's recording is here: what arrived, and when, is not shown"
-        )
-    for end, tables in record.ends():
-        dropped = int(tables.end.get("rows_dropped", "0"))
-        if dropped:
-            result.gaps.append(f"the {end}'s recorder dropped {dropped} rows")
-        if not tables.end:
-            result.notes.append(f"the {end}'s recording was cut: audited up to the cut")
-        if RECOVERED_NOTE in tables.end:
-            result.notes.append(f"the {end}'s recording was recovered: audited up to the cut")
-    for end, section in (
-        ("transmitter", record.agreement.config.transmitter),
-        ("receiver", record.agreement.config.receiver),
-    ):
-        if section.sabotage:
-            result.notes.append(f"the {end} was sabotaged on purpose: {section.sabotage}")
-
-
-def _check_counts(record: FlightRecord, result: Audit) -> None:
-    """The summary must claim the coder bits that the recording shows."""
-    counted = result.counted
-    summary = record.summaries.get("transmitter", {})
-    whole = record.transmitter is not None and bool(record.transmitter.end)
-    if not whole or counted.symbols_sent is None or "coder_bits_up" not in summary:
+        findings.gap(WHOLE, str(error))
         return
-    bits = counted.symbols_sent * counted.bits_per_symbol
-    if abs(summary["coder_bits_up"] - bits) > 1e-6 * max(1.0, bits):
-        result.leaks.append(
-            f"the summary says {summary['coder_bits_up']:g} coder bits, the recording holds {bits:g}"
-        )
-
-
-def _check_states(record: FlightRecord, epochs: list[Epoch], result: Audit) -> None:
-    commands = recorded_commands(record)
     try:
-        rebuilt: Controller | None = _controller(record)
+        evidence.steps = steps_by_hand(record)
+        rebuilt: Controller | None = controller_of(record.agreement.config, evidence.steps)
     except (TenbaudError, ValueError) as error:
         rebuilt = None
-        result.gaps.append(f"whether the commands follow from the states: {error}")
-    flown: list[Reflown] = []
-    if rebuilt is not None:
-        flown = fly_again(record, rebuilt, epochs, lambda _slot: 0)
-        found, result.digests_compared = compare(record, flown)
-        if found and commands is not None:
-            # Which of the two is it? With the recorded commands only the codec is left.
-            alone = fly_again(record, commands, epochs, lambda _slot: 0)
-            states, _ = compare(record, alone)
-            if not states:
-                found.append(
-                    "given the recorded commands the states do follow from the symbols: it is the "
-                    "controller that used something else than the states and the set-point"
-                )
-        result.leaks += found
-    elif commands is not None:
-        flown = fly_again(record, commands, epochs, lambda _slot: 0)
-        found, result.digests_compared = compare(record, flown)
-        result.leaks += found
-    if not flown or not result.digests_compared:
-        result.gaps.append("no state could be compared with a recorded one")
-        return
-    _check_length(epochs, flown, result)
-    _check_starts(record, epochs, flown, result)
-    _check_jitter(record, epochs, flown, result)
-
-
-def _controller(record: FlightRecord) -> Controller:
-    return controller_of(record.agreement.config, steps_by_hand(record))
-
-
-def _check_length(epochs: list[Epoch], flown: Sequence[Reflown], result: Audit) -> None:
-    words = sum(len(epoch.words) for epoch in epochs)
-    if words != len(flown):
-        result.leaks.append(f"{words} samples were recorded, {len(flown)} came of their symbols")
-
-
-def _check_jitter(
-    record: FlightRecord, epochs: list[Epoch], flown: Sequence[Reflown], result: Audit
-) -> None:
-    """Fly again with the symbols at other times within their deadlines: nothing may change."""
-    allowance_ns = record.agreement.terms.deadline_allowance_ns
-    expected = [one.digest for one in flown]
-    # Given what each flight commanded, so that a controller without a place here is no hindrance.
-    for seed in range(JITTERED_FLIGHTS):
-        noise = random.Random(JITTER_SEED + seed)
-        delay = partial(_within, noise, allowance_ns)
-        repeated = _Repeated(flown, record.agreement.terms.initial_command)
-        again = fly_again(record, repeated, epochs, delay)
-        digests = [one.digest for one in again]
-        if digests != expected:
-            at = next(
-                (
-                    one.sample
-                    for one, other in zip(flown, again, strict=False)
-                    if one.digest != other.digest
-                ),
-                len(digests),
+        findings.gap(WHOLE, "whether the commands follow from the states", str(error))
+    flown = None if rebuilt is None else _flown(evidence, rebuilt)
+    commands = recorded_commands(record)
+    if commands is not None and (flown is None or compare(record, flown)[0]):
+        # Which of the two is it? With the recorded commands only the codec is left.
+        alone = _flown(evidence, commands)
+        if flown is None:
+            flown = alone
+        elif alone is not None and not _states_differ(record, alone):
+            findings.leak(
+                WHOLE,
+                "given the recorded commands the states do follow from the symbols",
+                "it is the controller that used something else than the states and the set-point",
             )
-            result.leaks.append(f"other arrival times give another state, first after sample {at}")
-        result.jittered_states += len(digests)
+    if flown is None:
+        findings.gap(WHOLE, "the flight cannot be flown again from its symbols")
+        return
+    evidence.flown = flown
+    evidence.expected = expect(record.agreement, evidence.epochs, flown)
 
 
-def _within(noise: random.Random, allowance_ns: int, slot: int) -> int:
-    return noise.randint(0, allowance_ns)
-
-
-class _Repeated:
-    """A `Controller` that commands what an earlier flight commanded."""
-
-    def __init__(self, flown: Sequence[Reflown], initial: Vector) -> None:
-        self._commands = {tick: command for one in flown for tick, _, _, command in one.ticks}
-        self._initial = initial
-
-    def command(self, tick: int, state: tuple[float, ...]) -> tuple[float, ...]:
-        """Return the earlier command of `tick`."""
-        return self._commands.get(tick, self._initial)
-
-    def reference_rad(self, tick: int) -> None:
-        """Return None: nothing is followed."""
+def _flown(evidence: Evidence, controller: Controller) -> list[Reflown] | None:
+    """Return the flight flown again, None where it leads to states that no codec has."""
+    try:
+        return list(refly(evidence.agreement, controller, evidence.epochs))
+    except (CodecDiverged, OverflowError):
         return None
 
 
-def _check_starts(
-    record: FlightRecord, epochs: list[Epoch], flown: Sequence[Reflown], result: Audit
-) -> None:
-    """Every epoch must start from the initial state, or from the one before it carried on.
-
-    Only the receiver knows how far it had come; a transmitter's recording alone cannot show it.
-    """
-    codec, lead = record.agreement.codec, record.agreement.terms.lead_ticks
-    last: dict[int, Reflown] = {one.epoch: one for one in flown}
-    commands: dict[int, list[Vector]] = {}
-    for one in flown:
-        commands.setdefault(one.epoch, []).extend(command for _, _, _, command in one.ticks)
-    before: tuple[CodecState, list[Vector]] | None = None
-    for epoch in epochs:
-        initial = codec.initial()._replace(sample=epoch.start.sample)
-        if epoch.start != initial:
-            result.rejoin_bytes += len(codec.pack(epoch.start))
-            if before is None or record.receiver is None:
-                result.gaps.append(
-                    f"epoch {epoch.number} starts from a state whose past is not recorded here"
-                )
-            elif not _is_carried(record, epoch, *before):
-                result.leaks.append(
-                    f"epoch {epoch.number} starts at sample {epoch.start.sample} from a state "
-                    "that does not follow from the one before it"
-                )
-        reached = last.get(epoch.number)
-        known = ([epoch.hold] * lead + commands.get(epoch.number, []))[-lead:] if lead else []
-        state = epoch.start
-        if reached is not None:
-            state = CodecState(reached.sample + 1, reached.model, reached.coder)
-        before = (state, known)
+def _states_differ(record: FlightRecord, flown: list[Reflown]) -> bool:
+    return any("state" in found for found in compare(record, flown)[0])
 
 
-def _is_carried(record: FlightRecord, epoch: Epoch, state: CodecState, known: list[Vector]) -> bool:
-    codec = record.agreement.codec
-    carried = carried_to(codec, state, epoch.start.sample, known, epoch.hold, 0)
-    # After a long pause the coder starts anew.
-    return epoch.start in (carried, carried._replace(coder=codec.coder.initial()))
+def _notes(record: FlightRecord) -> list[str]:
+    notes = []
+    if record.transmitter is None:
+        notes.append("only the receiver's recording is here: when each symbol left is not shown")
+    if record.receiver is None:
+        notes.append("only the transmitter's recording is here: what arrived, and when, is not shown")
+    for end, tables in record.ends():
+        if not tables.end:
+            notes.append(f"the {end}'s recording was cut: audited up to the cut")
+        if RECOVERED_NOTE in tables.end:
+            notes.append(f"the {end}'s recording was recovered: audited up to the cut")
+    config = record.agreement.config
+    for end, section in (("transmitter", config.transmitter), ("receiver", config.receiver)):
+        if section.sabotage:
+            notes.append(f"the {end} was sabotaged on purpose: {section.sabotage}")
+    return notes

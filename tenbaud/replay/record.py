@@ -6,13 +6,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from channel.codec import CodecState, Vector
+from channel.codec import Codec, CodecState, Vector
 from channel.words import Word
 from tenbaud.build import Agreement, agree
 from tenbaud.outside_code import require_allowed, require_regular_files
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.run import Run
-from tenbaud.recording.table import Table, Tables
+from tenbaud.recording.table import Tables
+from tenbaud.replay.rows import EndRows, EpochStart, read_rows
 
 
 @dataclass(slots=True)
@@ -34,6 +35,13 @@ class FlightRecord:
     receiver: Tables | None
     summaries: dict[str, dict[str, Any]]
     """of each end that left one"""
+    rows: dict[str, EndRows]
+    """of each end that is here"""
+
+    @property
+    def consumer_rows(self) -> EndRows:
+        """The same recording's rows."""
+        return self.rows["receiver" if self.receiver is not None else "transmitter"]
 
     @property
     def consumer(self) -> Tables:
@@ -68,7 +76,8 @@ def load_record(path: Path, other: Path | None = None, *, allow_code: bool = Fal
     agreement = _agreement(home, next(iter(tables.values())), allow_code)
     for end, one in tables.items():
         _check_same(one, agreement, end)
-    return FlightRecord(agreement, tables.get("transmitter"), tables.get("receiver"), summaries)
+    rows = {end: read_rows(end, one) for end, one in tables.items()}
+    return FlightRecord(agreement, tables.get("transmitter"), tables.get("receiver"), summaries, rows)
 
 
 def _agreement(run: Run, tables: Tables, allow_code: bool) -> Agreement:
@@ -103,41 +112,58 @@ def _check_same(tables: Tables, agreement: Agreement, end: str) -> None:
         )
 
 
-def epochs_of(tables: Tables, agreement: Agreement) -> list[Epoch]:
-    """Return the epochs of one end's recording with the words consumed in each.
+def epochs_of(record: FlightRecord) -> list[Epoch]:
+    """Return the epochs of a flight with the words consumed in each.
 
-    Raises RecordingError where samples are missing within an epoch: what came after cannot be
-    computed.
+    They are the receiver's, if its recording is here. Raises RecordingError where samples are missing
+    within an epoch: what came after cannot be computed.
     """
-    codec, terms = agreement.codec, agreement.terms
-    samples = tables.topic("sample").rows
-    epochs = [_epoch(row) for row in tables.topics["epoch"].rows] if "epoch" in tables.topics else []
+    agreement = record.agreement
+    codec = agreement.codec
+    samples = record.consumer_rows.topic("sample").rows
+    epochs = [_epoch(row, codec) for row in record.consumer_rows.topic("epoch")]
     if not epochs:
         # From before epochs were recorded: one of them, from the common initial state.
-        first = samples[0]["sample"] if samples else 0
-        epochs = [Epoch(0, codec.initial()._replace(sample=first), terms.initial_command)]
+        first = samples[0].sample if samples else 0
+        initial = codec.initial()._replace(sample=first)
+        epochs = [Epoch(0, initial, agreement.terms.initial_command)]
+    path = record.consumer.path
+    symbols = frozenset(codec.coder.alphabet.symbols)
     index = 0
     for row in samples:
-        sample = row["sample"]
-        while index + 1 < len(epochs) and epochs[index + 1].start.sample <= sample:
+        while index + 1 < len(epochs) and epochs[index + 1].start.sample <= row.sample:
             index += 1
         epoch = epochs[index]
         expected = epoch.start.sample + len(epoch.words)
-        if sample != expected:
+        if row.sample > expected:
             raise RecordingError(
-                f"{tables.path} lacks sample {expected}: the next one recorded is {sample}. "
+                f"{path} lacks sample {expected}: the next one recorded is {row.sample}. "
                 "Rows were lost, so what follows cannot be computed from the symbols."
             )
-        epoch.words.append(None if row["word"] is None else tuple(row["word"]))
+        if row.sample < expected:
+            raise RecordingError(
+                f"{path} holds sample {row.sample} where sample {expected} is due: a row is doubled or "
+                "out of order, so what follows cannot be computed from the symbols."
+            )
+        if row.word is not None and not _is_word(row.word, symbols, agreement):
+            raise RecordingError(
+                f"{path}, sample {row.sample}: {row.word} is no word of the coder, so what follows "
+                "cannot be computed from the symbols."
+            )
+        epoch.words.append(row.word)
     return epochs
 
 
-def _epoch(row: dict[str, Any]) -> Epoch:
-    start = CodecState(row["sample"], tuple(row["state"]), tuple(row["coder"]))
-    return Epoch(row["epoch"], start, tuple(row["hold_volts"]))
+def _is_word(word: tuple[int, ...], symbols: frozenset[int], agreement: Agreement) -> bool:
+    return len(word) == agreement.terms.symbols_per_word and symbols.issuperset(word)
 
 
-def by_key(table: Table) -> dict[int, dict[str, Any]]:
-    """Return the rows of a topic by their first field."""
-    key = table.names[0]
-    return {row[key]: row for row in table.rows}
+def _epoch(row: EpochStart, codec: Codec) -> Epoch:
+    initial = codec.initial()
+    sizes = (len(initial.model), len(initial.coder), codec.model.input_size)
+    if (len(row.state), len(row.coder), len(row.hold_volts)) != sizes:
+        raise RecordingError(
+            f"Epoch {row.epoch} starts from a state or a command that is not of this codec: "
+            f"{row.state}, {row.coder}, {row.hold_volts}."
+        )
+    return Epoch(row.epoch, CodecState(row.sample, row.state, row.coder), row.hold_volts)

@@ -1,0 +1,145 @@
+"""The two accounts of one flight against each other, and each against its own epochs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from tenbaud.replay.claims.base import Claim, Evidence, Findings, Place, is_same
+
+EPOCH_FIELDS = ("sample", "epoch", "state", "coder", "hold_volts")
+SAMPLE_FIELDS = ("word", "range", "state", "coder", "digest")
+
+
+def check_accounts(evidence: Evidence, findings: Findings) -> None:
+    """A sample that both recorded has the same word, range, state and digest in both."""
+    theirs = evidence.topic("receiver", "sample").by_key()
+    receiver = evidence.end("receiver")
+    epochs = _epochs_of_both(evidence)
+    for row in evidence.topic("transmitter", "sample"):
+        place = Place("transmitter", "sample", f"sample {row.sample}")
+        other = theirs.get(row.sample)
+        if row.digest != row.peer_digest:
+            findings.leak(
+                place._replace(field="peer_digest"),
+                "the two ends differed here",
+                f"{row.digest} and {row.peer_digest}",
+            )
+        if other is None:
+            if receiver is not None and receiver.complete and _covers(epochs, evidence, row.sample):
+                findings.gap(
+                    Place("receiver", "sample", f"sample {row.sample}", "sample"),
+                    "it is missing, and the transmitter has its echo",
+                )
+            continue
+        for name in SAMPLE_FIELDS:
+            ours, received = getattr(row, name), getattr(other, name)
+            if not is_same(ours, received):
+                findings.leak(
+                    place._replace(field=name),
+                    "the receiver recorded something else",
+                    f"{ours} and {received}",
+                )
+        if row.peer_digest != other.digest:
+            findings.leak(
+                place._replace(field="peer_digest"),
+                "the receiver recorded something else",
+                f"{row.peer_digest} and {other.digest}",
+            )
+
+
+def check_epochs(evidence: Evidence, findings: Findings) -> None:
+    """Epochs are counted by ones, and the transmitter's begin as the receiver's do."""
+    for end in evidence.rows:
+        before: Any = None
+        for row in evidence.topic(end, "epoch"):
+            place = Place(end, "epoch", f"epoch {row.epoch}")
+            # An epoch 0 again is another receiver's, or the same one started again.
+            if before is not None and row.epoch not in (0, before.epoch + 1) and end == "receiver":
+                findings.gap(place._replace(field="epoch"), "it follows another than the one before")
+            if before is not None and (
+                row.sample < before.sample or (row.epoch != 0 and row.epoch <= before.epoch)
+            ):
+                findings.leak(place._replace(field="sample"), "it is out of order")
+            if row == before:
+                findings.leak(place, "it is recorded twice")
+            before = row
+    theirs = {row.epoch: row for row in evidence.topic("receiver", "epoch")}
+    first = min((row.sample for row in theirs.values()), default=0)
+    for row in evidence.topic("transmitter", "epoch"):
+        other = theirs.get(row.epoch)
+        if other is None:
+            receiver = evidence.end("receiver")
+            if receiver is not None and receiver.complete and row.sample >= first and theirs:
+                findings.gap(
+                    Place("receiver", "epoch", f"epoch {row.epoch}"),
+                    "it is missing, and the transmitter began it",
+                )
+            continue
+        if other.sample != row.sample and _is_another_receiver(evidence, row):
+            continue
+        for name in EPOCH_FIELDS:
+            ours, received = getattr(row, name), getattr(other, name)
+            if not is_same(ours, received):
+                findings.leak(
+                    Place("transmitter", "epoch", f"epoch {row.epoch}", name),
+                    "the receiver recorded something else",
+                    f"{ours} and {received}",
+                )
+
+
+def check_confirmed(evidence: Evidence, findings: Findings) -> None:
+    """The transmitter confirms the samples of each epoch one after another, from its first one."""
+    epochs = [row.sample for row in evidence.topic("transmitter", "epoch")]
+    if not epochs:
+        return
+    place = 0
+    expected: int | None = None
+    for row in evidence.topic("transmitter", "sample"):
+        while place < len(epochs) and epochs[place] <= row.sample:
+            expected = epochs[place]
+            place += 1
+        if expected is None or row.sample > expected:
+            findings.gap(
+                Place("transmitter", "sample", f"sample {expected}", "sample"),
+                "it is missing",
+                f"the next one is {row.sample}",
+            )
+        expected = row.sample + 1
+
+
+def _epochs_of_both(evidence: Evidence) -> list[tuple[int, int]]:
+    """Return (first sample, first sample of the next epoch) of the epochs that both recorded."""
+    ours = {(row.epoch, row.sample) for row in evidence.topic("transmitter", "epoch")}
+    starts = [(row.epoch, row.sample) for row in evidence.topic("receiver", "epoch")]
+    ends = [sample for _, sample in starts[1:]] + [2**62]
+    return [(one[1], end) for one, end in zip(starts, ends, strict=True) if one in ours]
+
+
+def _covers(epochs: list[tuple[int, int]], evidence: Evidence, sample: int) -> bool:
+    return any(first <= sample < end for first, end in epochs)
+
+
+def _is_another_receiver(evidence: Evidence, row: Any) -> bool:
+    """Whether an epoch of the transmitter is one with a receiver whose recording is another one."""
+    numbers = [one.epoch for one in evidence.topic("transmitter", "epoch")]
+    return numbers.count(0) > 1 or numbers.count(row.epoch) > 1
+
+
+ACCOUNTS = Claim(
+    "both ends recorded the same samples",
+    check_accounts,
+    (
+        ("transmitter", "sample", (*SAMPLE_FIELDS, "peer_digest")),
+        ("receiver", "sample", SAMPLE_FIELDS),
+    ),
+)
+EPOCHS = Claim(
+    "both ends recorded the same epochs",
+    check_epochs,
+    (("transmitter", "epoch", EPOCH_FIELDS), ("receiver", "epoch", EPOCH_FIELDS)),
+)
+CONFIRMED = Claim(
+    "the transmitter confirmed sample by sample",
+    check_confirmed,
+    (("transmitter", "sample", ("sample",)),),
+)

@@ -54,7 +54,11 @@ def audit(path: Path, other: Path | None = None, *, allow_code: bool = False) ->
 
     `allow_code`: classes from outside that its configuration names may run.
     """
-    record = load_record(path, other, allow_code=allow_code)
+    return audit_record(load_record(path, other, allow_code=allow_code))
+
+
+def audit_record(record: FlightRecord) -> Audit:
+    """Audit what was recorded of a flight."""
     evidence, findings = Evidence(record), Findings()
     _fly(evidence, findings)
     for claim in CLAIMS:
@@ -80,6 +84,7 @@ def audit(path: Path, other: Path | None = None, *, allow_code: bool = False) ->
 def _fly(evidence: Evidence, findings: Findings) -> None:
     """Fly the flight again from its words, if these are all here, as well as that can be done."""
     record = evidence.record
+    record.consumer.topic("sample")  # or there is nothing to audit
     try:
         evidence.epochs = epochs_of(record)
     except RecordingError as error:
@@ -129,6 +134,8 @@ def _notes(record: FlightRecord) -> list[str]:
         notes.append("only the receiver's recording is here: when each symbol left is not shown")
     if record.receiver is None:
         notes.append("only the transmitter's recording is here: what arrived, and when, is not shown")
+    if "transmitter" in record.rows and not record.summaries.get("transmitter"):
+        notes.append("there is no summary: how many symbols left in all is not shown")
     for end, tables in record.ends():
         if not tables.end:
             notes.append(f"the {end}'s recording was cut: audited up to the cut")

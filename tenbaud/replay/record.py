@@ -130,6 +130,11 @@ def epochs_of(record: FlightRecord) -> list[Epoch]:
     path = record.consumer.path
     symbols = frozenset(codec.coder.alphabet.symbols)
     index = 0
+    if samples and samples[0].sample < epochs[0].start.sample:
+        raise RecordingError(
+            f"{path} holds sample {samples[0].sample}, and the first epoch in it begins at sample "
+            f"{epochs[0].start.sample}: what the samples before it start from is missing."
+        )
     for row in samples:
         while index + 1 < len(epochs) and epochs[index + 1].start.sample <= row.sample:
             index += 1

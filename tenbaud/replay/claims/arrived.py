@@ -65,7 +65,7 @@ def check_words(evidence: Evidence, findings: Findings) -> None:
             findings.leak(
                 Place("receiver", "sample", f"sample {row.sample}", "word"),
                 "it is not what its slots brought",
-                f"{row.word} and {brought}",
+                f"{row.word}; symbol, slot {row.sample * count} and on: {brought}",
             )
     last = max(known, default=-1)
     partial = _begun_words(evidence)
@@ -113,7 +113,8 @@ def check_times(evidence: Evidence, findings: Findings) -> None:
         exact = last in arrivals or (evidence.is_virtual and last < final)
         if exact and allowed and row.arrival_s not in {one / 1e9 for one in allowed}:
             said = ", ".join(f"{one / 1e9!r} s" for one in sorted(allowed))
-            findings.leak(place, "its slots say another time", f"{row.arrival_s!r} s, not {said}")
+            detail = f"{row.arrival_s!r} s; symbol, slot {last}, field arrived_ns: {said}"
+            findings.leak(place, "its slots say another time", detail)
 
 
 def check_origin(evidence: Evidence, findings: Findings) -> None:

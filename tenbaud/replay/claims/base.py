@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple
 
 from tenbaud.build import Agreement
@@ -14,6 +15,9 @@ from tenbaud.replay.rows import EndRows, Topic
 
 FILED = "(time)"
 """The flight time that a row is filed under, as if it were a field of each topic."""
+
+ORDER = "(order)"
+"""The place of a row among the others of its topic, as if it were a field."""
 
 
 class Place(NamedTuple):
@@ -71,7 +75,7 @@ class Findings:
         return self._lines(True)
 
 
-@dataclass(slots=True)
+@dataclass
 class Evidence:
     """All that an audit has of a flight."""
 
@@ -109,12 +113,12 @@ class Evidence:
         """Return the figures in the folder of an end."""
         return self.record.summaries.get(end, {})
 
-    @property
+    @cached_property
     def is_virtual(self) -> bool:
         """Whether both ends flew on one clock, the transmitter's virtual one."""
         return self.agreement.clock == "virtual" and not self.agreement.faults.bad_clock
 
-    @property
+    @cached_property
     def is_steered(self) -> bool:
         """Whether somebody changed something in flight, as the recordings say themselves."""
         return any(event.kind == "control" for end in self.rows for event in self.topic(end, "event"))

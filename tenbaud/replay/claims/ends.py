@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from typing import Any
 
 from tenbaud.replay.claims.base import Claim, Evidence, Findings, Place, is_same
+from tenbaud.replay.rows import KEY_MAX, EpochStart
 
 EPOCH_FIELDS = ("sample", "epoch", "state", "coder", "hold_volts")
 SAMPLE_FIELDS = ("word", "range", "state", "coder", "digest")
@@ -107,12 +109,30 @@ def check_confirmed(evidence: Evidence, findings: Findings) -> None:
         expected = row.sample + 1
 
 
+def check_begun(evidence: Evidence, findings: Findings) -> None:
+    """The transmitter recorded each of the receiver's epochs of which it confirmed samples."""
+    ours = {(row.epoch, row.sample) for row in evidence.topic("transmitter", "epoch")}
+    theirs = evidence.topic("receiver", "epoch").rows
+    confirmed = sorted(evidence.topic("transmitter", "sample").by_key())
+    for row, end in zip(theirs, _ends_of(theirs), strict=True):
+        first = bisect_left(confirmed, row.sample)
+        begun = first < len(confirmed) and confirmed[first] < end
+        if begun and (row.epoch, row.sample) not in ours:
+            place = Place("transmitter", "epoch", f"epoch {row.epoch}", "sample")
+            findings.gap(place, "it is missing, and samples of it were confirmed")
+
+
 def _epochs_of_both(evidence: Evidence) -> list[tuple[int, int]]:
     """Return (first sample, first sample of the next epoch) of the epochs that both recorded."""
     ours = {(row.epoch, row.sample) for row in evidence.topic("transmitter", "epoch")}
-    starts = [(row.epoch, row.sample) for row in evidence.topic("receiver", "epoch")]
-    ends = [sample for _, sample in starts[1:]] + [2**62]
-    return [(one[1], end) for one, end in zip(starts, ends, strict=True) if one in ours]
+    theirs = evidence.topic("receiver", "epoch").rows
+    pairs = zip(theirs, _ends_of(theirs), strict=True)
+    return [(row.sample, end) for row, end in pairs if (row.epoch, row.sample) in ours]
+
+
+def _ends_of(epochs: list[EpochStart]) -> list[int]:
+    """Return where each epoch ends: the last one nowhere."""
+    return [*(row.sample for row in epochs[1:]), *[KEY_MAX + 1] * bool(epochs)]
 
 
 def _covers(epochs: list[tuple[int, int]], evidence: Evidence, sample: int) -> bool:
@@ -137,6 +157,11 @@ EPOCHS = Claim(
     "both ends recorded the same epochs",
     check_epochs,
     (("transmitter", "epoch", EPOCH_FIELDS), ("receiver", "epoch", EPOCH_FIELDS)),
+)
+BEGUN = Claim(
+    "the transmitter recorded the epochs that it flew",
+    check_begun,
+    (("transmitter", "epoch", ("sample", "epoch")),),
 )
 CONFIRMED = Claim(
     "the transmitter confirmed sample by sample",

@@ -44,6 +44,39 @@ def check_rows(evidence: Evidence, findings: Findings) -> None:
             _check_summary(evidence, end, held, findings)
 
 
+def check_figures(evidence: Evidence, findings: Findings) -> None:
+    """The summary counts as many samples, epochs and late symbols as were recorded."""
+    for end, topic, name, counted in _figures(evidence):
+        said = evidence.summary(end).get(name)
+        if evidence.rows[end].complete and said is not None and said != counted:
+            findings.gap(
+                Place(end, topic, "all rows"),
+                f"the summary's {name} is another",
+                f"{said} said, {counted} recorded",
+            )
+
+
+def _figures(evidence: Evidence) -> list[tuple[str, str, str, int]]:
+    """Return (end, topic, name in the summary, number recorded)."""
+    found = []
+    if evidence.end("transmitter") is not None:
+        samples = evidence.topic("transmitter", "sample").rows
+        erased = sum(row.word is None for row in samples)
+        rejoins = len(evidence.topic("transmitter", "epoch")) - 1
+        found += [
+            ("transmitter", "sample", "digest_checks", len(samples)),
+            ("transmitter", "sample", "erasures", erased),
+            ("transmitter", "epoch", "rejoins", max(0, rejoins)),
+        ]
+        if "coder_bits_up" not in evidence.summary("transmitter"):
+            found.clear()  # they are the receiver's
+    if evidence.end("receiver") is not None and evidence.agreement.config.link.kind != "serial":
+        # A serial line's receiver does not write down what came after its deadline.
+        late = sum(not row.taken for row in evidence.topic("receiver", "symbol"))
+        found.append(("receiver", "symbol", "symbols_late", late))
+    return found
+
+
 def check_lockstep(evidence: Evidence, findings: Findings) -> None:
     """Two copies that differ are written down as such; a sample that did not differ is not."""
     for end in evidence.rows:
@@ -74,6 +107,7 @@ def _count(text: str) -> int:
 
 HEADS = Claim("files of this flight", check_heads, ())
 ROWS = Claim("all rows that were written", check_rows, ())
+FIGURES = Claim("the summary's figures", check_figures, ())
 LOCKSTEP = Claim(
     "differences are differences",
     check_lockstep,

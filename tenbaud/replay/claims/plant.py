@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 from plant_sim.encoder import Encoder
@@ -36,9 +37,8 @@ def check_ticks(evidence: Evidence, findings: Findings) -> None:
         if before is not None and row.tick > before.tick + 1:
             missed += row.tick - before.tick - 1
             if evidence.agreement.clock == "virtual":
-                findings.gap(
-                    _place(row, "tick"), "ticks are missing before it", f"from {before.tick + 1} on"
-                )
+                lacking = _place(before, "tick")._replace(row=f"tick {before.tick + 1}")
+                findings.gap(lacking, "it is missing", f"the next one is {row.tick}")
     end = evidence.end("transmitter")
     if end is None or not end.complete or not rows:
         return
@@ -101,6 +101,7 @@ def check_guard(evidence: Evidence, findings: Findings) -> None:
     told = {round(row.time_s * 1e9) for row in evidence.topic("transmitter", "event")}
     tick_ns = evidence.agreement.terms.tick_ns
     passed = _Passed(evidence.agreement)
+    changes: list[int] = []
     for row in evidence.topic(*TICK):
         place = _place(row, "guard")
         now_ns = row.tick * tick_ns
@@ -114,12 +115,28 @@ def check_guard(evidence: Evidence, findings: Findings) -> None:
                 "it is not what the guard lets pass",
                 f"recorded {row.applied_volts}, computed {passed.volts}",
             )
-        if passed.changed and row.guard != "running" and now_ns not in told:
-            findings.gap(place, "no event tells of this change", row.guard)
+        if passed.changed and row.guard != "running":
+            changes.append(now_ns)
         if passed.armed_again and not {now_ns, now_ns - tick_ns} & told:
             findings.gap(place, "no event tells that it was armed again", row.guard)
         if row.late and (row.commanded_volts is not None or passed.stays_stopped):
             findings.leak(place._replace(field="late"), "no command was owed, or it had come")
+    _check_told(evidence, changes, findings)
+
+
+def _check_told(evidence: Evidence, changes: list[int], findings: Findings) -> None:
+    """Each change of the guard, but that to passing commands, is one event, and no other is."""
+    guards = [row for row in evidence.topic("transmitter", "event") if row.kind == "guard"]
+    told = Counter(round(row.time_s * 1e9) for row in guards)
+    changed = Counter(changes)
+    complete = evidence.rows["transmitter"].complete if guards or changes else True
+    for now_ns in sorted(told.keys() | changed.keys()):
+        if told[now_ns] != changed[now_ns] and (complete or now_ns < max(changes, default=0)):
+            findings.gap(
+                Place("transmitter", "event", f"time {now_ns / 1e9:.3f} s", "kind"),
+                "the guard's state in the ticks tells of another number of changes",
+                f"{told[now_ns]} events, {changed[now_ns]} changes",
+            )
 
 
 class _Passed:
@@ -217,7 +234,10 @@ COMMANDED = Claim(
 GUARD = Claim(
     "voltages as the guard let them pass",
     check_guard,
-    ((*TICK, ("commanded_volts", "applied_volts", "guard", "late")),),
+    (
+        (*TICK, ("commanded_volts", "applied_volts", "guard", "late")),
+        ("transmitter", "event", ("time_s", "kind")),
+    ),
 )
 ANGLES = Claim(
     "angles as the encoder reads them", check_angles, ((*TICK, ("measured_rad", "true_rad")),)

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from tenbaud.replay.claims.base import Claim, Evidence, Findings, Place, is_same
+from transmitter.gap import GAP_EVERY_S
 
 DIFFERS = "it is not what the symbols give"
 MISSING = "it is missing"
@@ -42,7 +43,7 @@ def check_estimates(evidence: Evidence, findings: Findings) -> None:
     count = evidence.agreement.terms.ticks_per_sample
     confirmed = {row.sample for row in evidence.topic("transmitter", "sample")}
     ticks = (k * count + tick for k in sorted(confirmed) for tick in range(count))
-    _check_ticks(evidence, "transmitter", "estimate", ticks, findings)
+    _check_keys(evidence, ("transmitter", "estimate", "tick"), ticks, findings)
     for row in evidence.topic("transmitter", "estimate"):
         wanted = expected.estimates.get(row.tick)
         place = Place("transmitter", "estimate", f"tick {row.tick}")
@@ -55,12 +56,22 @@ def check_commands(evidence: Evidence, findings: Findings) -> None:
     expected = evidence.expected
     if expected is None or evidence.end("receiver") is None:
         return
-    _check_ticks(evidence, "receiver", "tick", expected.commands, findings)
+    _check_keys(evidence, ("receiver", "tick", "tick"), expected.commands, findings)
     for row in evidence.topic("receiver", "tick"):
         wanted = expected.commands.get(row.tick)
         place = Place("receiver", "tick", f"tick {row.tick}")
         if wanted is not None:
             _compare(place, row, wanted, COMMAND_FIELDS, findings)
+
+
+def check_gauge(evidence: Evidence, findings: Findings) -> None:
+    """The gauge is read once a second, at confirmed samples, if there is one."""
+    if not evidence.topic("transmitter", "gap").recorded:
+        return
+    every = max(1, round(GAP_EVERY_S * 1e9 / evidence.agreement.terms.sample_ns))
+    samples = (row.sample for row in evidence.topic("transmitter", "sample"))
+    due = [sample for sample in samples if (sample + 1) % every == 0]
+    _check_keys(evidence, ("transmitter", "gap", "sample"), due, findings)
 
 
 def check_steering(evidence: Evidence, findings: Findings) -> None:
@@ -71,20 +82,21 @@ def check_steering(evidence: Evidence, findings: Findings) -> None:
         findings.leak(place, "nobody was recorded to have moved the set-point", f"{angle!r} rad")
 
 
-def _check_ticks(
-    evidence: Evidence, end: str, topic: str, ticks: Iterable[int], findings: Findings
+def _check_keys(
+    evidence: Evidence, where: tuple[str, str, str], keys: Iterable[int], findings: Findings
 ) -> None:
-    """Each of these ticks has a row, and no other has; a recording that was cut may end early."""
+    """Each of these keys has a row, and no other has; a recording that was cut may end early."""
+    end, topic, name = where
     found = set(evidence.topic(end, topic).by_key())
-    wanted = set(ticks)
-    rows = evidence.rows[end]
+    wanted = set(keys)
+    complete = evidence.rows[end].complete
     last = max(found, default=-1)
-    for tick in sorted(wanted - found):
-        if rows.complete or tick < last:
-            findings.gap(Place(end, topic, f"tick {tick}", "tick"), MISSING)
-    for tick in sorted(found - wanted):
-        if rows.complete:
-            findings.leak(Place(end, topic, f"tick {tick}", "tick"), ORPHAN)
+    for key in sorted(wanted - found):
+        if complete or key < last:
+            findings.gap(Place(end, topic, f"{name} {key}", name), MISSING)
+    for key in sorted(found - wanted):
+        if complete:
+            findings.leak(Place(end, topic, f"{name} {key}", name), ORPHAN)
 
 
 def _is_flown_here(evidence: Evidence, sample: int) -> bool:
@@ -122,4 +134,5 @@ COMMANDS = Claim(
     check_commands,
     (("receiver", "tick", COMMAND_FIELDS),),
 )
+GAUGE = Claim("the gauge was read", check_gauge, (("transmitter", "gap", ("sample",)),))
 STEERING = Claim("a set-point moved by hand is an event", check_steering, ())

@@ -10,12 +10,13 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from tenbaud.replay.claims import arrived, ends, events, files, flights, keys, plant, sent, states
-from tenbaud.replay.claims.base import FILED, Claim, Evidence
+from tenbaud.replay.claims.base import FILED, ORDER, Claim, Evidence
 from tenbaud.replay.rows import KINDS
 
 CLAIMS: tuple[Claim, ...] = (
     files.HEADS,
     files.ROWS,
+    files.FIGURES,
     keys.SHAPE,
     keys.ORDER,
     keys.FILED_TIME,
@@ -30,11 +31,13 @@ CLAIMS: tuple[Claim, ...] = (
     arrived.ORIGIN,
     arrived.RATE,
     ends.EPOCHS,
+    ends.BEGUN,
     ends.CONFIRMED,
     ends.ACCOUNTS,
     states.SAMPLES,
     states.ESTIMATES,
     states.COMMANDS,
+    states.GAUGE,
     states.STEERING,
     flights.LENGTH,
     flights.STARTS,
@@ -120,7 +123,7 @@ UNCLAIMED: tuple[Unclaimed, ...] = (
     Unclaimed(
         "transmitter",
         "gap",
-        _all_fields("transmitter", "gap"),
+        _all_fields("transmitter", "gap")[1:],
         "a gauge for people, worked out afterwards; nothing rests on it",
     ),
     Unclaimed(
@@ -135,12 +138,19 @@ UNCLAIMED: tuple[Unclaimed, ...] = (
         ("text", "sample"),
         "for people; where the confirmed copy stood is in the samples",
     ),
+    Unclaimed(
+        "transmitter",
+        "event",
+        (ORDER,),
+        "a session stamps its events with the last tick that it measured, a guard with the present one",
+    ),
     Unclaimed("receiver", "event", ("text",), "for people"),
     Unclaimed(
         "transmitter",
         "event",
         ("kind", "time_s", FILED),
-        "of what only an event tells; times are in order, kinds are known ones",
+        "of what only an event tells: kinds are known ones, and the summary has the number of all rows",
+        lambda row, _evidence: row.kind not in ("guard", "started"),
     ),
     Unclaimed(
         "receiver",

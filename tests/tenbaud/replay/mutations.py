@@ -42,11 +42,11 @@ class Original:
     def __init__(self, run: Path) -> None:
         self.run = run
         self.messages: dict[str, list[Message]] = {}
-        self._streams: dict[str, MessageStream] = {}
+        self.streams: dict[str, MessageStream] = {}
         for end in ("transmitter", "receiver"):
             stream = MessageStream(run / f"{end}.mcap")
             self.messages[end] = list(stream)
-            self._streams[end] = stream
+            self.streams[end] = stream
 
     def rows(self, end: str, topic: str) -> list[int]:
         """Return the places of a topic's rows among all messages of an end."""
@@ -65,7 +65,8 @@ class Original:
                 if not count:
                     continue
                 names = [*(field.name for field in kind.channel.fields), FILED]
-                for what, fields in (("edit", names), ("null", names[:-1])):
+                nullable = [name for name in names if name in kind.nullable]
+                for what, fields in (("edit", names), ("null", nullable)):
                     for field in fields:
                         for row in _some(count, rows_per_topic, noise):
                             mutation = Mutation(end, topic, row, what, field)
@@ -100,7 +101,7 @@ class Original:
                 other = places[mutation.row + 1]
                 messages[at], messages[other] = messages[other], messages[at]
         path = folder / f"{mutation.end}.mcap"
-        write_recording(path, messages, self._streams[mutation.end])
+        write_recording(path, messages, self.streams[mutation.end])
 
 
 def _some(count: int, most: int, noise: random.Random) -> list[int]:

@@ -66,18 +66,16 @@ def check_epochs(evidence: Evidence, findings: Findings) -> None:
                 findings.leak(place, "it is recorded twice")
             before = row
     theirs = {row.epoch: row for row in evidence.topic("receiver", "epoch")}
+    receiver = evidence.end("receiver")
     first = min((row.sample for row in theirs.values()), default=0)
-    for row in evidence.topic("transmitter", "epoch"):
+    for row in _of_this_receiver(evidence):
         other = theirs.get(row.epoch)
         if other is None:
-            receiver = evidence.end("receiver")
             if receiver is not None and receiver.complete and row.sample >= first and theirs:
                 findings.gap(
                     Place("receiver", "epoch", f"epoch {row.epoch}"),
                     "it is missing, and the transmitter began it",
                 )
-            continue
-        if other.sample != row.sample and _is_another_receiver(evidence, row):
             continue
         for name in EPOCH_FIELDS:
             ours, received = getattr(row, name), getattr(other, name)
@@ -139,10 +137,20 @@ def _covers(epochs: list[tuple[int, int]], evidence: Evidence, sample: int) -> b
     return any(first <= sample < end for first, end in epochs)
 
 
-def _is_another_receiver(evidence: Evidence, row: Any) -> bool:
-    """Whether an epoch of the transmitter is one with a receiver whose recording is another one."""
-    numbers = [one.epoch for one in evidence.topic("transmitter", "epoch")]
-    return numbers.count(0) > 1 or numbers.count(row.epoch) > 1
+def _of_this_receiver(evidence: Evidence) -> list[EpochStart]:
+    """Return the transmitter's epochs with the receiver whose recording is here.
+
+    Each receiver, and one that was started again, counts its epochs from 0.
+    """
+    flights: list[list[EpochStart]] = []
+    for row in evidence.topic("transmitter", "epoch"):
+        if not flights or row.epoch == 0:
+            flights.append([])
+        flights[-1].append(row)
+    if len(flights) == 1:
+        return flights[0]
+    theirs = {(row.epoch, row.sample) for row in evidence.topic("receiver", "epoch")}
+    return [row for one in flights if any((e.epoch, e.sample) in theirs for e in one) for row in one]
 
 
 ACCOUNTS = Claim(

@@ -19,7 +19,7 @@ from tenbaud.build_ends import check_parts
 from tenbaud.config.load import ConfigError, load_config, nested
 from tenbaud.outside_code import CodeNotAllowed, find_origin
 from tenbaud.recording.convert import convert
-from tenbaud.recording.diff import first_difference
+from tenbaud.recording.diff import compare_runs
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.inspect import describe_text
 from tenbaud.replay.audit import audit
@@ -78,7 +78,7 @@ def test_nothing_that_opens_a_recording_imports_what_it_names(
     openers: list[Callable[[], object]] = [
         lambda: audit(run),
         lambda: replay(load_record(run)),
-        lambda: first_difference(run),
+        lambda: compare_runs(run),
         lambda: describe_text(run),
         lambda: convert(Run(run), "csv"),
         lambda: Run(run).plot(),
@@ -212,7 +212,7 @@ def test_links_within_a_run_folder_are_not_followed(here: Path, name: str, dangl
     with pytest.raises(RecordingError, match=rf"{name} is a symbolic link"):
         audit(run)
     if name.endswith(".mcap"):
-        for opener in (first_difference, describe_text, lambda path: convert(Run(path), "csv")):
+        for opener in (compare_runs, describe_text, lambda path: convert(Run(path), "csv")):
             with pytest.raises(RecordingError, match=rf"{name} is a symbolic link"):
                 opener(run)
 

@@ -1,4 +1,4 @@
-"""Flights that are healthy, however rough, pass their audit; no claim is stricter than the nodes are."""
+"""Flights that are healthy, however rough, pass their audit: no claim is stricter than the nodes."""
 
 from __future__ import annotations
 

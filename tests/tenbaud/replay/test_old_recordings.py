@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from tenbaud import Run
-from tenbaud.recording.diff import first_difference
+from tenbaud.recording.comparison import Verdict
+from tenbaud.recording.diff import compare_runs
 from tenbaud.replay.audit import audit
 from tenbaud.replay.record import load_record
 from tenbaud.replay.replay import replay
@@ -42,4 +43,6 @@ def test_its_audit_passes() -> None:
 
 
 def test_its_ends_do_not_differ() -> None:
-    assert first_difference(TWO_EPOCHS) is None
+    compared = compare_runs(TWO_EPOCHS)
+    assert compared.verdict is Verdict.EQUAL, str(compared)
+    assert compared.rows == 63

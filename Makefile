@@ -2,7 +2,9 @@
 
 VENV := .venv
 BIN := $(VENV)/bin
-STAMP := $(VENV)/.installed
+# What flying needs, and beside it what development needs: a first flight does not wait for the second.
+FLY := $(VENV)/.installed
+DEVELOP := $(VENV)/.installed-dev
 MINUTES ?= 10
 
 # The first interpreter that is new enough and able to build an environment (Debian ships python3
@@ -18,7 +20,7 @@ help: ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /|/' \
 	| awk -F'|' '{ printf "  make %-11s %s\n", $$1, $$2 }'
 
-demo: $(STAMP) ## fly: both processes on this machine, the plant simulated
+demo: $(FLY) ## fly: both processes on this machine, the plant simulated
 	$(BIN)/tenbaud demo
 
 # Flights in real time need the cores to themselves; everything else shares them, two by two.
@@ -26,20 +28,20 @@ REAL_TIME := tests/network $(addprefix tests/tenbaud/,flight telemetry view test
 	test_emulated_flights.py test_many_rigs.py test_processes.py test_restarts.py \
 	test_serial_flight.py test_serial_line.py)
 
-test: $(STAMP) ## run the tests: most on two cores at once, then the flights in real time
+test: chromium $(DEVELOP) ## run the tests: most on two cores at once, then the flights in real time
 	$(BIN)/python -m pytest -n 2 --dist loadgroup $(addprefix --ignore=,$(REAL_TIME)) tests
 	$(BIN)/python -m pytest $(REAL_TIME)
 
-check: $(STAMP) ## lint, format, types, and the project's own rules
+check: $(DEVELOP) ## lint, format, types, and the project's own rules
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest tests/rules
 
-bench: $(STAMP) ## measure speed, and write bench.json
+bench: $(DEVELOP) ## measure speed, and write bench.json
 	$(BIN)/python -m benchmarks
 
-soak: $(STAMP) ## fly seeds under faults for MINUTES=n (10) into soak.json, then the long tests
+soak: $(DEVELOP) ## fly seeds under faults for MINUTES=n (10) into soak.json, then the long tests
 	$(BIN)/python -m tests.simulation.soak --minutes $(MINUTES)
 	MINUTES=$(MINUTES) $(BIN)/python -m pytest -m soak
 
@@ -50,7 +52,7 @@ chromium: ## install Debian's Chromium if it is missing and this is root's machi
 		apt-get -qq update && apt-get -qq install --yes --no-install-recommends chromium; } || \
 		echo "no Chromium and no way to install it here: the tests of the page will skip" >&2
 
-screenshots: $(STAMP) ## fly with the live page, and make its pictures in docs/figures
+screenshots: $(DEVELOP) ## fly with the live page, and make its pictures in docs/figures
 	$(BIN)/python -m benchmarks.screenshots
 
 # Material for MkDocs advertises its successor at every start; nothing else is silenced.
@@ -58,19 +60,26 @@ docs: reference ## build the documentation into site/, strictly
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 	@echo "written to site/; read it: $(BIN)/python -m http.server --directory site --bind 127.0.0.1"
 
-reference: $(STAMP) ## write the pages in docs/reference that follow from the code
+reference: $(DEVELOP) ## write the pages in docs/reference that follow from the code
 	$(BIN)/python docs/tools/reference.py
 
 clean: ## remove the environment and everything that was generated
 	rm -rf $(VENV) runs dist site bench.json soak.json .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
-# The environment is built again whenever pyproject.toml changes.
-$(STAMP): pyproject.toml
+# The environment is brought up to date whenever pyproject.toml changes. Without --no-compile pip
+# compiles every module of every package, most of which no flight ever imports.
+INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile --editable
+
+$(FLY): pyproject.toml
 	@test -n "$(PYTHON)" || { \
 		echo "tenbaud needs Python 3.11 or newer with venv and ensurepip; none was found on PATH." >&2; \
 		echo "Install one (Debian: python3 and python3-venv) or name it: make PYTHON=/path/to/python" >&2; \
 		exit 1; }
 	@test -x $(BIN)/python || "$(PYTHON)" -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	$(INSTALL) .
+	@touch $@
+
+$(DEVELOP): $(FLY)
+	$(INSTALL) '.[dev]'
 	@touch $@

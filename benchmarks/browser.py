@@ -16,6 +16,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
+
+from tenbaud.view.server import LOOK_ONLY, SERVING
 
 CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or "/usr/bin/chromium"
 ARGUMENTS = (
@@ -43,12 +46,13 @@ def why_no_browser() -> str | None:
 
 
 @contextmanager
-def browser() -> Iterator[Any]:
-    """Within the `with`, a headless Chromium."""
+def browser(*arguments: str) -> Iterator[Any]:
+    """Within the `with`, a headless Chromium; `arguments` go to it beside the usual ones."""
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        words = [*ARGUMENTS, *arguments]
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=words)
         try:
             yield chromium
         finally:
@@ -61,6 +65,10 @@ class Served:
 
     process: subprocess.Popen[str]
     url: str = ""
+    """with the secret that steers"""
+    look_url: str = ""
+    """with the secret of who may only look"""
+    folder: Path = Path()
     said: list[str] = field(default_factory=list)
     _up: threading.Event = field(default_factory=threading.Event)
 
@@ -69,9 +77,17 @@ class Served:
         assert self.process.stderr is not None
         for line in self.process.stderr:
             self.said.append(line.rstrip())
-            if line.startswith("tenbaud view: "):
+            if line.startswith(SERVING):
                 self.url = line.split()[-1]
+            if line.startswith(LOOK_ONLY):
+                self.look_url = line.split()[-1]
+            if self.url and (self.look_url or "--view-only" in self.process.args):
                 self._up.set()
+
+    @property
+    def port(self) -> int:
+        """Where the page is served."""
+        return int(urlsplit(self.url).port or 0)
 
     def wait_until_up(self) -> None:
         """Return when the page is served; RuntimeError with what was said if that never happens."""
@@ -94,7 +110,9 @@ class Served:
 
 
 @contextmanager
-def served(folder: Path, *arguments: str) -> Iterator[Served]:
+def served(
+    folder: Path, *arguments: str, environment: dict[str, str] | None = None
+) -> Iterator[Served]:
     """Within the `with`, `tenbaud` with these arguments serves a page; they name a port of 0."""
     top = Path(__file__).parents[1]
     path = os.pathsep.join([str(top), os.environ.get("PYTHONPATH", "")])
@@ -103,13 +121,13 @@ def served(folder: Path, *arguments: str) -> Iterator[Served]:
     process = subprocess.Popen(
         [sys.executable, "-m", "tenbaud", *arguments],
         cwd=folder,
-        env={**own, "PYTHONPATH": path},
+        env={**own, "PYTHONPATH": path, **(environment or {})},
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     )
-    one = Served(process)
+    one = Served(process, folder=folder)
     threading.Thread(target=one.read, daemon=True).start()
     try:
         one.wait_until_up()

@@ -84,8 +84,8 @@ class ReceiverSession:
         self.epoch = 0
         self.meter = BaudMeter()
         self.counts: Counter[str] = Counter()
-        """erasures, symbols_late, symbols_misplaced, stale_frames, malformed, refused_hellos,
-        bad_commands, bad_references, desyncs, rejoins"""
+        """samples (flown), samples_skipped (between epochs), erasures, symbols_late, symbols_misplaced,
+        stale_frames, malformed, refused_hellos, bad_commands, bad_references, desyncs, rejoins"""
         self.end_reason = ""
         self.refusal: str | None = None
         self.desync: Desync | None = None
@@ -221,6 +221,7 @@ class ReceiverSession:
         else:
             self.epoch += 1
             self.counts["rejoins"] += 1
+            self.counts["samples_skipped"] += first - self.state.sample
             if hello.incarnation == last.incarnation:
                 self._commander.carry_on(first, self._silent_slots // count)
                 state = self.codec.pack(self.state)
@@ -323,6 +324,7 @@ class ReceiverSession:
         whole = len(symbols) == len(self._word)
         self._word = []
         word = tuple(symbols) if whole else ERASED
+        self.counts["samples"] += 1
         echoes = self._commander.fly(word, self.epoch, now_ns)
         return [Commands(self.session_number, self.epoch, echoes)]
 

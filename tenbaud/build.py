@@ -18,6 +18,7 @@ from channel.terms import Clock, Terms
 from tenbaud.build_codec import build_codec
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
+from tenbaud.liveness import RoundTrip, check_liveness, round_trip
 from tenbaud.serial_terms import on_serial_line
 
 REAL_RIGS = ("serial", "quarc", "hil")
@@ -56,6 +57,11 @@ class Agreement:
         return parse_impairments(self.config.link.impairments)
 
     @property
+    def trip(self) -> RoundTrip:
+        """Return how long commands take, as far as the configuration knows."""
+        return round_trip(self.terms, self.faults, self.clock)
+
+    @property
     def desyncs_expected(self) -> float:
         """Return how many lockstep failures were asked for.
 
@@ -91,13 +97,27 @@ def agree(config: FlightConfig, clock: Clock) -> Agreement:
         )
     try:
         codec = build_codec(config)
-        terms = build_terms(config, codec, clock)
-        terms.check(clock)
+        terms = checked_terms(config, codec, clock)
     except ValueError as error:
         raise ConfigError(str(error)) from error
     shared = config.shared_json(terms.lead_ticks)
     identity = Identity(software_version(), shared, numerics_probe(codec))
     return Agreement(config, clock, codec, terms, identity)
+
+
+def watchdog_wanted_s(config: FlightConfig) -> float | None:
+    """Return the watchdog's time-out as configured, None where it is "auto"."""
+    wanted = config.transmitter.watchdog_s
+    return None if wanted == "auto" else wanted
+
+
+def checked_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:
+    """Return the terms of a flight; ValueError, with the arithmetic, where they cannot be flown."""
+    terms = build_terms(config, codec, clock)
+    terms.check(clock)
+    trip = round_trip(terms, parse_impairments(config.link.impairments), clock)
+    check_liveness(watchdog_wanted_s(config), terms, trip)
+    return terms
 
 
 def build_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:

@@ -19,11 +19,12 @@ from receiver.controllers.recorded import RecordedController
 from receiver.endpoint import ReceiverEndpoint
 from receiver.references import Constant, Csv, Reference, Sine, Square, Step
 from receiver.session import ReceiverSession
-from tenbaud.build import Agreement, read_flight_log, ticks_of
+from tenbaud.build import Agreement, read_flight_log, ticks_of, watchdog_wanted_s
 from tenbaud.build_gauge import build_gauge
 from tenbaud.build_rig import build_rig
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig, ReferenceSection
+from tenbaud.liveness import overtaking_ticks, watchdog_ticks
 from tenbaud.outside_code import is_plugin
 from tenbaud.plugins import CONTROLLER, build_plugin
 from transmitter.guard import Guard, GuardSettings
@@ -44,6 +45,7 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
         recorder,
         stop_on_desync=config.transmitter.on_desync == "stop",
         sight=build_sight(agreement),
+        overtaking_ticks=overtaking_ticks(terms, agreement.faults),
     )
     reference = build_reference(config)
     gauge = build_gauge(agreement)
@@ -140,11 +142,9 @@ def guard_settings(agreement: Agreement) -> GuardSettings:
     """Return when the guard steps in, and how."""
     section = agreement.config.transmitter
     terms = agreement.terms
-    wanted_s = section.watchdog_s
-    timeout_s = max(5 * terms.sample_ns / 1e9, 0.1) if wanted_s == "auto" else wanted_s
     soft = () if section.soft_limit_rad is None else (section.soft_limit_rad,)
     return GuardSettings(
-        timeout_ticks=ticks_of(timeout_s, agreement.config),
+        timeout_ticks=watchdog_ticks(watchdog_wanted_s(agreement.config), terms, agreement.trip),
         ramp_ticks=ticks_of(section.ramp_s, agreement.config),
         safe_volts=section.safe_volts,
         soft_limits_rad=soft,

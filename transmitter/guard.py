@@ -5,6 +5,8 @@ clamp and the slew limit; with soft angle limits exceeded, or a sensor that cann
 passes. When commands stay away the last one is held; after the time-out the voltage is taken to the
 safe one along a ramp, and there it stays, latched: while it is latched no symbol leaves. It is
 re-armed on purpose only.
+
+The age of a command counts the ticks that were owed one (`transmitter.owing`) and had none.
 """
 
 from __future__ import annotations
@@ -102,25 +104,28 @@ class Guard:
         self.timed_out = False
         self._age_ticks = 0
 
-    def apply(self, tick: int, command: Vector | None) -> Vector:
-        """Return the voltages of this tick; `command` is None when none has come."""
+    def apply(self, tick: int, command: Vector | None, owed: bool = True) -> Vector:
+        """Return the voltages of this tick; `command` is None when none has come.
+
+        `owed`: whether one should have come by now. Where it should not, none is missed.
+        """
         if command is not None:
             for value in command:
                 if not math.isfinite(value):
                     self.trip(f"the command of tick {tick} is not a number: {command}")
         if not self.stopped:
-            self._take(tick, command)
+            self._take(tick, command, owed)
         if self.state is GuardState.RAMPING:
             self._ramp()
         return self.volts
 
-    def _take(self, tick: int, command: Vector | None) -> None:
+    def _take(self, tick: int, command: Vector | None, owed: bool) -> None:
         if command is not None:
             self.state = GuardState.RUNNING
             self._age_ticks = 0
             self.volts = self._limits.apply(command, self.volts)
             return
-        self._age_ticks += 1
+        self._age_ticks = self._age_ticks + 1 if owed else 0
         if self.state is GuardState.RUNNING:
             self.state = GuardState.HOLDING
         if self._age_ticks > self._settings.timeout_ticks:

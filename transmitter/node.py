@@ -51,6 +51,10 @@ class TransmitterNode:
         self.scores = scores
         self.gauge = gauge
         self.commands_late = 0
+        self.ticks_commanded = 0
+        """whose own command passed the guard"""
+        self.ticks_down = 0
+        """with the guard at the safe voltage, or on its way there"""
         self.sensor_fault: str | None = None
         self.tick = 0
         self.rearmed = 0
@@ -128,7 +132,9 @@ class TransmitterNode:
         owed = session.phase is Phase.FLYING and tick >= session.epoch_tick
         late = command is None and owed and not self.guard.stopped
         self.commands_late += late
-        volts = self.guard.apply(tick, command)
+        volts = self.guard.apply(tick, command, session.owing.is_owed(tick))
+        self.ticks_down += self.guard.stopped
+        self.ticks_commanded += command is not None and not self.guard.stopped
         self.rig.write(tick, volts)
         self._applied = volts if reading.applied_volts is None else reading.applied_volts
         time_ns = tick * self.session.terms.tick_ns

@@ -41,6 +41,8 @@ from channel.wire import WIRE_VERSION
 from channel.words import ERASED
 from transmitter.claims import Claims
 from transmitter.copies import Confirmed, Copies
+from transmitter.echo_order import EchoOrder
+from transmitter.owing import Owing
 from transmitter.records import write_sample
 from transmitter.rejoin import Asking, start_of
 from transmitter.sight import Sight
@@ -64,6 +66,7 @@ class TransmitterSession:
     `incarnation` is drawn by the caller (32 bits), so that the session itself stays deterministic.
     `stop_on_desync`: end the flight at the first digest that differs, instead of rejoining.
     `sight`: gives a coder that uses rates its measurements; None: one with the usual bandwidth.
+    `overtaking_ticks`: how long after a command frame one may come that was sent before it.
     """
 
     def __init__(
@@ -76,6 +79,7 @@ class TransmitterSession:
         *,
         stop_on_desync: bool = False,
         sight: Sight | None = None,
+        overtaking_ticks: int = 0,
     ) -> None:
         self.codec = codec
         self.terms = terms
@@ -88,6 +92,7 @@ class TransmitterSession:
         self.counts: Counter[str] = Counter()
         """digest_checks, desyncs, rejoins, stale_frames, words_missed, erasures, claims_refused,
         take_overs"""
+        self.rejoins_asked: Counter[Why] = Counter()
         self.end_reason = ""
         self.refusal: str | None = None
         self.desync: Desync | None = None
@@ -96,6 +101,7 @@ class TransmitterSession:
         """when the receiver last told something new in the present epoch"""
         self.epoch_tick = 0
         """first tick of the present epoch"""
+        self.owing = Owing(terms)
         self.confirmed: deque[Confirmed] = deque(maxlen=2 * LAG_SAMPLES_MAX)
         """samples confirmed and not yet written down (`take_confirmed`)"""
         self.events: deque[Event] = deque(maxlen=1000)
@@ -103,6 +109,7 @@ class TransmitterSession:
         self._asking = Asking(identity, incarnation, terms)
         self._claims = Claims(terms)
         self._stop_on_desync = stop_on_desync
+        self._echoes = EchoOrder(overtaking_ticks)
         self._sight = (sight or Sight(codec.model, terms.tick_ns / 1e9)) if codec.uses_rates else None
         self._recorder = recorder or NullRecorder()
         self._due: deque[tuple[int, Vector]] = deque(
@@ -137,6 +144,8 @@ class TransmitterSession:
         sample, offset = divmod(tick, self.terms.ticks_per_sample)
         if sample - self.copies.confirmed.sample > LAG_SAMPLES_MAX:
             return self.rejoin(Why.LAG, f"no echo for {LAG_SAMPLES_MAX} samples")
+        if problem := self._check_gap():
+            return problem
         while self.copies.next_sample < sample:
             self.counts["words_missed"] += 1
             self.copies.sent(ERASED)
@@ -152,6 +161,7 @@ class TransmitterSession:
         if self.phase is not Phase.FLYING:
             return []
         self.phase = Phase.REJOINING
+        self.rejoins_asked[why] += 1
         self._asking.begin(why, self._tick)
         self._tell(EventKind.REJOIN, f"{text}: asking for a new epoch after {self.epoch}")
         return self._ask()
@@ -261,8 +271,10 @@ class TransmitterSession:
         self.epoch = welcome.epoch
         self.heard_tick = self._tick
         self.copies.restart(state, hold)
+        self._echoes.clear()
         self.epoch_tick = state.sample * self.terms.ticks_per_sample
-        self._due = deque(enumerate([hold] * self.terms.lead_ticks, self.epoch_tick))
+        held = self.owing.begin(self.epoch_tick, self._tick, self._asking.why)
+        self._due = deque(enumerate([hold] * held, self.epoch_tick))
         self.phase = Phase.FLYING
         begins_ns = state.sample * self.terms.sample_ns
         self._recorder.write(EPOCH_CHANNEL, begins_ns, epoch_row(self.epoch, state, hold))
@@ -295,20 +307,16 @@ class TransmitterSession:
             return []
         self.heard_tick = self._tick
         self._claims.on_command()
-        for echo in frame.echoes:
-            expected = self.copies.confirmed.sample
-            if echo.sample < expected:
-                continue
-            if echo.sample > expected:
-                return self.rejoin(
-                    Why.GAP,
-                    f"the echo of sample {expected} never came (got {echo.sample}), more than "
-                    f"{self.terms.repeats} command frames in a row were lost",
-                )
-            problem = self._confirm(echo)
-            if problem:
+        self._echoes.add(frame.echoes, self.copies.confirmed.sample, self._tick)
+        while (echo := self._echoes.take(self.copies.confirmed.sample)) is not None:
+            if problem := self._confirm(echo):
                 return problem
-        return []
+        return self._check_gap()
+
+    def _check_gap(self) -> list[Frame]:
+        if not self._echoes.is_lost(expected := self.copies.confirmed.sample, self._tick):
+            return []
+        return self.rejoin(Why.GAP, f"the echo of sample {expected} never came, nor a repetition of it")
 
     def _confirm(self, echo: Echo) -> list[Frame]:
         """Advance the confirmed copy by one echo; return the report of a desync, if it is one."""
@@ -331,6 +339,7 @@ class TransmitterSession:
         ]
         done = self.copies.confirm(word, commands, echo.digest)
         self.confirmed.append(done)
+        self.owing.on_confirmed()
         self._due.extend(enumerate(commands, echo.sample * per_sample + self.terms.lead_ticks))
         self.history.add(self.epoch, word, done.flown.state)
         self.counts["digest_checks"] += 1

@@ -40,6 +40,7 @@ EXIT_MEANINGS = {
     ExitCode.LINK_LOST: "the other end is not there, or was lost",
     ExitCode.DESYNC: "the codecs differed and nobody had spoilt them on purpose; or `--on-desync stop`",
     ExitCode.SAFETY_STOP: "the rig or the guard beside the motors ended the flight",
+    ExitCode.NOT_FLOWN: "the flight went to its end and [did not fly](../RELIABILITY.md#did-it-fly)",
     ExitCode.INTERRUPTED: "Ctrl-C",
 }
 

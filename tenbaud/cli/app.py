@@ -75,7 +75,9 @@ app.add_typer(bench.bench, name="bench", rich_help_panel="Models, coders, studie
 def main() -> None:
     """Run the command line; errors become one message and an exit code."""
     from channel.errors import TenbaudError
+    from tenbaud.flight.lifeline import follow_parent
 
+    follow_parent()
     try:
         app()
     except (TenbaudError, ValueError) as error:

@@ -29,13 +29,19 @@ def view(
         bool, typer.Option("--open", help="Open the page in the browser of this machine.")
     ] = False,
     insecure: Annotated[
-        bool, typer.Option(help="Allow other machines to reach the page; it has no password.")
+        bool, typer.Option(help="Allow other machines to reach the page, which is not encrypted.")
+    ] = False,
+    view_only: Annotated[
+        bool, typer.Option("--view-only", help="Print no address that steers, only one for looking.")
     ] = False,
     schema: Annotated[
         bool, typer.Option("--schema", help="Print the JSON schema of the telemetry and end.")
     ] = False,
 ) -> None:
     """Serve a live page of a flight, for the browser: picture, curves, bits, lockstep, controls.
+
+    Two addresses are printed: one that steers, where the flight allows it, and one for looking only.
+    Each holds a secret; without one of them nothing of the page is served.
 
     [dim]tenbaud demo --view[/dim]
 
@@ -70,4 +76,5 @@ def view(
         credentials = usable(keys, NodeRole.VIEWER).credentials
     protected = tuple(one for one in connect or () if not one.startswith("unixsock"))
     check_endpoints(protected, insecure=True, secured=credentials is not None)
-    serve(Feed(tuple(connect or ()), session, credentials), address, open_browser=open_browser)
+    feed = Feed(tuple(connect or ()), session, credentials)
+    serve(feed, address, open_browser=open_browser, view_only=view_only)

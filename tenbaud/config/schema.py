@@ -270,7 +270,8 @@ class TransmitterSection(Section):
     encoder_zero_counts: int = 0
     plant: PlantSection = PlantSection()
     watchdog_s: Positive | Literal["auto"] = "auto"
-    """age of the last command after which the voltage is taken down; "auto": max(5 T_s, 0.1 s)"""
+    """age of the last command after which the voltage is taken down; "auto": the largest of 5 T_s,
+    0.1 s, command lead + 2 T_s and round trip + 2 T_s"""
     ramp_s: Positive = 1.0
     """time from the held voltage to the safe one"""
     safe_volts: tuple[float, float] = (0.0, 0.0)

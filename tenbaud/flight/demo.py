@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import signal
 import subprocess
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -23,6 +22,7 @@ from channel.links.endpoints import free_endpoint
 from tenbaud.build import Agreement
 from tenbaud.config.load import dump_config
 from tenbaud.flight.ends import run_in_memory
+from tenbaud.flight.lifeline import start_child
 from tenbaud.flight.outcome import ExitCode
 from tenbaud.flight.report import draw_run, figure_title, write_summary
 from tenbaud.flight.status import Status
@@ -66,10 +66,10 @@ def fly_demo(
         messages = [] if outcome.code is ExitCode.OK else [outcome.text]
         result = DemoResult(joined(upper, lower), outcome.code, messages)
     else:
-        with page_beside(view) as viewing:
+        with StopFlag() as stop, page_beside(view, stop) as viewing:
             if pace is not None:
                 viewing.transmitter += ["--pace", str(pace)]
-            result = _fly_processes(agreement, folder, on_status, viewing)
+            result = _fly_processes(agreement, folder, on_status, viewing, stop)
     write_summary(folder, result.summary)
     problem = draw_run(folder, figure_title(agreement.config, result.summary)) if draw else None
     if problem is not None:
@@ -78,9 +78,9 @@ def fly_demo(
 
 
 def _fly_processes(
-    agreement: Agreement, folder: RunFolder, on_status: OnStatus, viewing: Viewing
+    agreement: Agreement, folder: RunFolder, on_status: OnStatus, viewing: Viewing, stop: StopFlag
 ) -> DemoResult:
-    with StopFlag() as stop, _meeting_place(agreement) as (up, down):
+    with _meeting_place(agreement) as (up, down):
         down, up = down + viewing.receiver, up + viewing.transmitter
         receiver = _Child("receiver", agreement, folder, down, on_status)
         transmitter = _Child("transmitter", agreement, folder, up, on_status)
@@ -170,18 +170,9 @@ class _Child:
     def __post_init__(self) -> None:
         verb = "transmit" if self.role == "transmitter" else "receive"
         folder: Path = self.folder.path
-        command = [sys.executable, "-m", "tenbaud", verb, "--json", "--status", "lines"]
-        command += ["--config", str(self.folder.config), "--run-folder", str(folder)]
-        command += ["--clock", self.agreement.clock, *self.link]
-        # Its own group: a Ctrl-C at the terminal comes once, through the parent.
-        self.process = subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-        )
+        words = [verb, "--json", "--status", "lines", "--clock", self.agreement.clock, *self.link]
+        words += ["--config", str(self.folder.config), "--run-folder", str(folder)]
+        self.process = start_child(*words, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         for target, stream in (
             (self._read_summary, self.process.stdout),
             (self._read_status, self.process.stderr),

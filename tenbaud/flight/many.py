@@ -222,7 +222,7 @@ class ManyHost:
     def _finish(self, flight: Flight, served: Served, error: Exception | None) -> None:
         try:
             endpoint = served.service.endpoint
-            outcome = _outcome(endpoint.session.end_reason, served, error)
+            outcome = _outcome(flight.agreement, served, error)
             flight.recorder.close()
             flight.summary = {
                 "session": flight.name,
@@ -248,12 +248,13 @@ class ManyHost:
                 self.summaries.append(flight.summary)
 
 
-def _outcome(end_reason: str, served: Served, error: Exception | None) -> Outcome:
+def _outcome(agreement: Agreement, served: Served, error: Exception | None) -> Outcome:
+    session = served.service.endpoint.session
     if error is not None:
         return outcome_of(error)
-    if end_reason == STOPPED:
-        return Outcome(ExitCode.INTERRUPTED, end_reason)
-    return ended_outcome(served.service.endpoint.session)
+    if session.end_reason == STOPPED:
+        return Outcome(ExitCode.INTERRUPTED, session.end_reason)
+    return ended_outcome(agreement, session)
 
 
 def _new_folder(root: Path, name: str) -> Path:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from channel.errors import ConfigMismatch, DesyncError, LinkLost, SafetyStop, TenbaudError
+from tenbaud.flight.verdict import NotFlown
 
 
 class ExitCode(IntEnum):
@@ -18,6 +19,7 @@ class ExitCode(IntEnum):
     LINK_LOST = 4
     DESYNC = 5
     SAFETY_STOP = 6
+    NOT_FLOWN = 7
     INTERRUPTED = 130
 
 
@@ -27,6 +29,8 @@ class Outcome:
 
     code: ExitCode
     text: str
+    not_flown: tuple[NotFlown, ...] = ()
+    """in what the flight fell short, for NOT_FLOWN"""
 
 
 FLIGHT_OVER = "the flight is over"

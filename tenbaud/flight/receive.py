@@ -16,6 +16,7 @@ from tenbaud.build import Agreement
 from tenbaud.build_ends import build_line
 from tenbaud.flight.outcome import FLIGHT_OVER, ExitCode, Outcome
 from tenbaud.flight.transmit import Stop, desync_text
+from tenbaud.flight.verdict import FlightCounts, faults_of, settings_of, verdict_text
 from transmitter.node import STOPPED
 
 
@@ -45,12 +46,30 @@ def serve(
         raise ConfigMismatch(f"refused the transmitter: {session.refusal}")
     if should_stop():
         return Outcome(ExitCode.INTERRUPTED, STOPPED)
-    return ended_outcome(session)
+    return ended_outcome(agreement, session)
 
 
-def ended_outcome(session: ReceiverSession) -> Outcome:
+def ended_outcome(agreement: Agreement, session: ReceiverSession) -> Outcome:
     """Return the outcome of a session that has ended."""
     if session.desync is not None and not session.end_reason.endswith(FLIGHT_OVER):
         return Outcome(ExitCode.DESYNC, desync_text(session.desync))
     over = session.end_reason.endswith((FLIGHT_OVER, STOPPED))
-    return Outcome(ExitCode.OK if over else ExitCode.LINK_LOST, session.end_reason)
+    if not over:
+        return Outcome(ExitCode.LINK_LOST, session.end_reason)
+    return _not_flown(agreement, session) or Outcome(ExitCode.OK, session.end_reason)
+
+
+def _not_flown(agreement: Agreement, session: ReceiverSession) -> Outcome | None:
+    """Return the outcome of a session whose flight did not fly, as far as this end can see."""
+    flown = session.counts["samples"]
+    counts = FlightCounts(
+        samples=flown + session.counts["samples_skipped"],
+        confirmed=flown,
+        erased=min(flown, session.counts["erasures"] // agreement.terms.symbols_per_word),
+        rejoins=session.counts["rejoins"],
+    )
+    faults = faults_of(counts)
+    if not faults:
+        return None
+    text = verdict_text(faults, counts, settings_of(agreement), {})
+    return Outcome(ExitCode.NOT_FLOWN, text, faults)

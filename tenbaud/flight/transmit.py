@@ -19,6 +19,7 @@ from channel.wire import Wire
 from tenbaud.build import Agreement
 from tenbaud.build_ends import build_line, build_transmitter, build_uplink
 from tenbaud.flight.outcome import FLIGHT_OVER, ExitCode, Outcome
+from tenbaud.flight.verdict import FlightCounts, faults_of, settings_of, verdict_text
 from transmitter.node import STOPPED, TransmitterNode
 from transmitter.real_flight import RealFlight
 from transmitter.session import Phase
@@ -153,7 +154,19 @@ class _Ending:
         """Settle the outcome, now that the last echoes are in; return what the receiver is told."""
         if self.outcome.code is ExitCode.OK:
             self.outcome = _desync_outcome(self._run) or self.outcome
-        return FLIGHT_OVER if self.outcome.code is ExitCode.OK else self.outcome.text
+        if self.outcome.code is ExitCode.OK or self._went_to_its_end:
+            self.outcome = _not_flown(self._run) or self.outcome
+        # Whether it has flown, the receiver judges for itself.
+        over = self.outcome.code in (ExitCode.OK, ExitCode.NOT_FLOWN)
+        return FLIGHT_OVER if over else self.outcome.text
+
+    @property
+    def _went_to_its_end(self) -> bool:
+        """Return whether nothing but the end of its time ended the flight, in whatever state it was."""
+        run, session, guard = self._run, self._run.node.session, self._run.node.guard
+        harmless = not guard.stopped or guard.timed_out
+        flown = run.ticks >= run.agreement.flight_ticks
+        return flown and harmless and session.desync is None and session.phase is not Phase.ENDED
 
 
 def _outcome(run: TransmitterRun, peer_present: bool) -> Outcome:
@@ -179,6 +192,31 @@ def _outcome(run: TransmitterRun, peer_present: bool) -> Outcome:
             ExitCode.LINK_LOST, "the flight ended while the transmitter was asking for a common state"
         )
     return _desync_outcome(run) or Outcome(ExitCode.OK, FLIGHT_OVER)
+
+
+def _not_flown(run: TransmitterRun) -> Outcome | None:
+    """Return the outcome of a flight that went to its end without flying; None: it has flown."""
+    counts = flight_counts(run)
+    faults = faults_of(counts)
+    if not faults:
+        return None
+    asked = {why.name.lower(): number for why, number in run.node.session.rejoins_asked.items()}
+    text = verdict_text(faults, counts, settings_of(run.agreement), asked)
+    return Outcome(ExitCode.NOT_FLOWN, text, faults)
+
+
+def flight_counts(run: TransmitterRun) -> FlightCounts:
+    """Return what the verdict on a flight rests on."""
+    node, session = run.node, run.node.session
+    return FlightCounts(
+        samples=run.ticks // run.agreement.terms.ticks_per_sample,
+        confirmed=session.counts["digest_checks"],
+        erased=session.counts["erasures"],
+        rejoins=session.counts["rejoins"],
+        ticks=run.ticks,
+        ticks_down=node.ticks_down,
+        ticks_commanded=node.ticks_commanded,
+    )
 
 
 def _desync_outcome(run: TransmitterRun) -> Outcome | None:

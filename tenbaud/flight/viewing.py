@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,11 +15,13 @@ from tempfile import TemporaryDirectory
 from typing import IO
 
 from channel.errors import LinkLost
+from tenbaud.flight.lifeline import start_child
 from tenbaud.telemetry.place import SOCKET
 
 START_TIMEOUT_S = 30.0
 LAST_WORD_S = 0.5
 """Time for the page to hear that the flight is over."""
+ENDING_TIMEOUT_S = 3.0
 SERVING = "tenbaud view: "
 
 
@@ -39,8 +42,11 @@ class Viewing:
 
 
 @contextmanager
-def page_beside(wish: ViewWish | None) -> Iterator[Viewing]:
-    """Within the `with`, the page is served; yields options for both ends. Raises LinkLost."""
+def page_beside(wish: ViewWish | None, should_stop: Callable[[], bool]) -> Iterator[Viewing]:
+    """Within the `with`, the page is served; yields options for both ends.
+
+    Raises LinkLost when it cannot be served, and KeyboardInterrupt when it is asked to stop meanwhile.
+    """
     if wish is None:
         yield Viewing()
         return
@@ -48,38 +54,55 @@ def page_beside(wish: ViewWish | None) -> Iterator[Viewing]:
         places = [f"{SOCKET}{Path(folder) / name}.sock" for name in ("transmitter", "receiver")]
         process = _start(places, wish)
         try:
+            _wait_until_served(process, should_stop)
             yield Viewing(
                 ["--telemetry", places[0], "--allow-control"],
                 ["--telemetry", places[1], "--allow-control"],
             )
-            time.sleep(LAST_WORD_S)
+            if process.poll() is None:
+                time.sleep(LAST_WORD_S)
+            else:
+                how = _how_ended(process)
+                sys.stderr.write(f"tenbaud: the live page ended before the flight, by {how}\n")
         finally:
-            process.terminate()
-            try:
-                process.wait(5.0)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+            _end(process)
 
 
 def _start(places: list[str], wish: ViewWish) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "tenbaud", "view", "--port", str(wish.port)]
-    command += [part for place in places for part in ("--connect", place)]
-    command += ["--open"] if wish.open_browser else []
-    # Its own group: a Ctrl-C ends the flight first, and the page afterwards.
-    process = subprocess.Popen(
-        command, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True
-    )
+    words = ["view", "--port", str(wish.port)]
+    words += [part for place in places for part in ("--connect", place)]
+    words += ["--open"] if wish.open_browser else []
+    return start_child(*words, stderr=subprocess.PIPE)
+
+
+def _wait_until_served(process: subprocess.Popen[str], should_stop: Callable[[], bool]) -> None:
     assert process.stderr is not None
     serving = threading.Event()
     threading.Thread(target=_pass_on, args=(process.stderr, serving), daemon=True).start()
     until_s = time.monotonic() + START_TIMEOUT_S
     while not serving.wait(0.05):
+        if should_stop():
+            raise KeyboardInterrupt
         if process.poll() is not None or time.monotonic() > until_s:
-            process.kill()
-            process.wait()
             raise LinkLost("the live page could not be served; the lines above say why")
-    return process
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """End the page's process and wait for it, so that its port is free again."""
+    if process.poll() is None:
+        process.terminate()
+        if hasattr(signal, "SIGCONT"):
+            process.send_signal(signal.SIGCONT)  # one that was stopped would not hear the other
+    try:
+        process.wait(ENDING_TIMEOUT_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
+def _how_ended(process: subprocess.Popen[str]) -> str:
+    code = process.returncode
+    return f"exit code {code}" if code >= 0 else f"signal {-code}"
 
 
 def _pass_on(stream: IO[str], serving: threading.Event) -> None:

@@ -17,6 +17,7 @@ from channel.lockstep import LOCKSTEP_CHANNEL
 from channel.recording import Field, RecordChannel
 from channel.words import Word
 from receiver import records as receiver_records
+from tenbaud.recording.recover import RECOVERED_NOTE
 from tenbaud.recording.table import Table, Tables
 from transmitter import records as transmitter_records
 from transmitter.gap import GAP_CHANNEL
@@ -258,7 +259,8 @@ def read_rows(end: str, tables: Tables) -> EndRows:
         table = tables.topics.get(name)
         topics[name] = Topic() if table is None else _typed(name, kind, table, misfits)
     foreign = [name for name in tables.topics if name not in KINDS[end]]
-    return EndRows(end, bool(tables.end), topics, misfits, foreign)
+    complete = bool(tables.end) and RECOVERED_NOTE not in tables.end
+    return EndRows(end, complete, topics, misfits, foreign)
 
 
 def _typed(name: str, kind: Kind, table: Table, misfits: list[Misfit]) -> Topic[Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from channel.identity import Identity
-from tenbaud.build import REAL_RIGS, Agreement, build_terms
+from tenbaud.build import REAL_RIGS, Agreement, checked_terms
 from tenbaud.build_codec import build_codec
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
@@ -38,8 +38,7 @@ def shared_parts(config: FlightConfig) -> Agreement:
         )
     try:
         codec = build_codec(config)
-        terms = build_terms(config, codec, "virtual")
-        terms.check("virtual")
+        terms = checked_terms(config, codec, "virtual")
     except ValueError as error:
         raise ConfigError(str(error)) from error
     return Agreement(config, "virtual", codec, terms, Identity("", "", b""))

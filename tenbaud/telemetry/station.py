@@ -19,7 +19,7 @@ from tenbaud.build_ends import build_reference
 from tenbaud.flight.transmit import Stop, TransmitterRun
 from tenbaud.telemetry.commands import CommandQueue
 from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
-from tenbaud.telemetry.place import endpoint_for
+from tenbaud.telemetry.place import SOCKET, endpoint_for
 from tenbaud.telemetry.publisher import Composer, Publisher
 from tenbaud.telemetry.tap import Tap
 
@@ -139,6 +139,11 @@ def open_station(
             raise
         sys.stderr.write(f"tenbaud: no telemetry: {error}\n")
         endpoint = None
+    if agreement.live and endpoint is not None and not endpoint.startswith((SOCKET, "tls/")):
+        sys.stderr.write(
+            f"tenbaud: whoever reaches {endpoint} can steer this flight, every user of this machine "
+            "included; leave --telemetry out, or use tls/, to decide who may\n"
+        )
     tap = Tap(recorder) if endpoint is not None else None
     steerable = agreement.live and agreement.config.receiver.controller == "pid"
     return Station(

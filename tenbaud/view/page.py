@@ -15,17 +15,27 @@ REFRESH_S = 0.25
 SET_POINT_STEP_DEG = 5
 PACES = {0.25: "¼", 1.0: "1", 5.0: "5", 25.0: "25"}
 
+LOOK_ONLY = "This address is for looking only: whoever opens it cannot steer."
+
 Send = Callable[..., None]
 
 
-def build_page(board: Board, feed: Feed) -> None:
-    """Build the page for one browser."""
+def build_page(board: Board, feed: Feed, *, steers: bool) -> None:
+    """Build the page for one browser; `steers`: whether its visitor may ask anything of the flight."""
     from tenbaud.view.server import STATIC
 
-    ui.add_head_html('<link rel="stylesheet" href="/view/view.css">')
+    # Relative: the page is served below a path of its visitor's own.
+    ui.add_head_html('<link rel="stylesheet" href="view/view.css">')
     ui.add_body_html((STATIC / "instruments.html").read_text(encoding="utf-8"))
     ui.dark_mode(value=None)
+    if steers:
+        _add_controls(board, feed)
+    else:
+        with ui.element("section").classes("controls").props('aria-label="Controls"'):
+            ui.label(LOOK_ONLY).classes("controls-note").props('role="status"')
 
+
+def _add_controls(board: Board, feed: Feed) -> None:
     def send(**command: object) -> None:
         head = board.heads.get("transmitter") or board.heads.get("receiver")
         if head is not None and head["takes_commands"]:

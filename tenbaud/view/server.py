@@ -1,7 +1,8 @@
 """The page's server: NiceGUI for the page and its controls, one stream of telemetry beside it.
 
-It listens on this machine unless told otherwise, answers only to its own names, and asks nothing of
-the internet: every script, style and font comes from the installed packages.
+It listens on this machine unless told otherwise, answers nobody without a secret of its printed
+addresses (`gate.py`), and asks nothing of the internet: every script, style and font comes from the
+installed packages.
 """
 
 from __future__ import annotations
@@ -10,15 +11,18 @@ import asyncio
 import socket
 import sys
 import time
+from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from urllib.parse import urlsplit
-from urllib.request import urlopen
+from typing import Any
+from urllib.request import Request, urlopen
 
 from channel.errors import TenbaudError
 from channel.links.endpoints import is_loopback
+from tenbaud.view.access import COOKIE, Access, draw_access
 from tenbaud.view.board import Board
+from tenbaud.view.browser import open_privately
 from tenbaud.view.feed import Feed
 
 STREAM_PERIOD_S = 0.05
@@ -27,6 +31,9 @@ FIRST_LOOKS = 100
 EVERYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}
 """Hosts that stand for every address of this machine, and by which one it finds itself there."""
 STATIC = Path(__file__).parent / "static"
+SERVING = "tenbaud view: "
+"""begins the line with the address of the page"""
+LOOK_ONLY = "tenbaud view, to look only: "
 
 
 class PageUnavailable(TenbaudError):
@@ -48,7 +55,7 @@ class Address:
 
     @property
     def url(self) -> str:
-        """Return what to type into a browser on this machine."""
+        """Return how this machine reaches the server, without any secret."""
         return f"http://{self.name}:{self.port}"
 
     @property
@@ -61,9 +68,9 @@ class Address:
         """Refuse an address that is taken, or that others can reach unless told to allow it."""
         if not self.is_local and not self.insecure:
             raise PageUnavailable(
-                f"{self.host} is reachable from other machines, and the page has no password: whoever "
-                "opens it sees the flight, and steers it if it takes commands. On a network that you "
-                "trust with that, add --insecure"
+                f"{self.host} is reachable from other machines, and the page is not encrypted: whoever "
+                "listens on the network reads its secret, sees the flight, and steers it if it takes "
+                "commands. On a network that you trust with that, add --insecure"
             )
         try:
             with _socket_for(self.host) as probe:
@@ -86,39 +93,57 @@ def require_nicegui() -> None:
         ) from error
 
 
-def serve(feed: Feed, address: Address, *, open_browser: bool = False) -> None:
-    """Serve the page until the process is asked to stop. Raises PageUnavailable."""
+def serve(feed: Feed, address: Address, *, open_browser: bool = False, view_only: bool = False) -> None:
+    """Serve the page until the process is asked to stop. Raises PageUnavailable.
+
+    `view_only`: no address is printed that lets anybody steer.
+    """
     require_nicegui()
     address.check()
+    import uvicorn
+    from fastapi import FastAPI
     from nicegui import app, ui
-    from starlette.middleware.trustedhost import TrustedHostMiddleware
 
+    from tenbaud.view.gate import GRANT, Gate
     from tenbaud.view.page import build_page
 
     board = Board()
-    if address.is_local:
-        names = ["127.0.0.1", "localhost", address.name]
-        app.add_middleware(TrustedHostMiddleware, allowed_hosts=names)
+    access = draw_access(address.host, address.is_local, view_only=view_only)
     app.add_static_files("/view", STATIC, max_cache_age=0)
     _add_stream(app, feed, board)
-    ui.page("/", title="tenbaud", favicon=STATIC / "favicon.svg")(lambda: build_page(board, feed))
-    app.on_startup(lambda: _first_look(address.url))
+
+    def page() -> None:
+        build_page(board, feed, steers=ui.context.client.request.scope[GRANT].steers)
+
+    ui.page("/", title="tenbaud", favicon=STATIC / "favicon.svg")(page)
+    outer = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+    ui.run_with(
+        outer,
+        tailwind=False,
+        show_welcome_message=False,
+        gzip_middleware_factory=None,  # packing half a megabyte takes longer than loopback does
+        reconnect_timeout=5.0,
+    )
+    # The gate is the outermost: NiceGUI answers nobody whom it has not let in.
+    config = uvicorn.Config(
+        Gate(outer, access),
+        host=address.host,
+        port=address.port,
+        ws="wsproto",
+        log_level="warning",
+        access_log=False,  # an address holds a secret
+        proxy_headers=False,
+        server_header=False,
+        timeout_graceful_shutdown=1,  # an open page would otherwise hold the server up
+    )
     with ExitStack() as stack:
         stack.enter_context(feed)
-        ui.run(
-            host=address.host,
-            port=address.port,
-            reload=False,
-            show=open_browser,
-            tailwind=False,
-            show_welcome_message=False,
-            gzip_middleware_factory=None,  # packing half a megabyte takes longer than loopback does
-            reconnect_timeout=5.0,
-            timeout_graceful_shutdown=1,  # an open page would otherwise hold the server up
-        )
+        shown = stack.enter_context(open_privately()) if open_browser else None
+        app.on_startup(lambda: _first_look(address.url, access, shown))
+        uvicorn.Server(config).run()
 
 
-def _add_stream(app: object, feed: Feed, board: Board) -> None:
+def _add_stream(app: Any, feed: Feed, board: Board) -> None:
     from fastapi import WebSocket, WebSocketDisconnect
 
     fresh = asyncio.Condition()
@@ -134,9 +159,6 @@ def _add_stream(app: object, feed: Feed, board: Board) -> None:
             await asyncio.sleep(due_s - time.monotonic())
 
     async def stream(browser: WebSocket) -> None:
-        if not _same_origin(browser.headers.get("origin"), browser.headers.get("host")):
-            await browser.close(1008)
-            return
         await browser.accept()
         index = 0
         try:
@@ -154,24 +176,27 @@ def _add_stream(app: object, feed: Feed, board: Board) -> None:
 
     # Annotations are strings here and WebSocket is a local name, which FastAPI could not look up.
     stream.__annotations__["browser"] = WebSocket
-    app.on_startup(drain)  # type: ignore[attr-defined]
-    app.websocket("/stream")(stream)  # type: ignore[attr-defined]
+    app.on_startup(drain)
+    app.websocket("/stream")(stream)
 
 
-async def _first_look(url: str) -> None:
-    """Fetch the page once, so that the first visitor does not wait for what is only made once."""
+async def _first_look(url: str, access: Access, shown: Callable[[str], None] | None) -> None:
+    """Fetch the page once, so that the first visitor does not wait for what is only made once.
+
+    Then print the addresses. `shown` opens the first of them in this machine's browser.
+    """
+    first, *others = access.grants
+    page = Request(f"{url}{first.path}/", headers={"Cookie": f"{COOKIE}={first.key}"})
     for _ in range(FIRST_LOOKS):
         with suppress(OSError):
-            await asyncio.to_thread(lambda: urlopen(url, timeout=5.0).read())
+            await asyncio.to_thread(lambda: urlopen(page, timeout=5.0).read())
             break
         await asyncio.sleep(0.05)
-    sys.stderr.write(f"tenbaud view: {url}\n")
+    lines = [f"{SERVING}{first.address(url)}", *(f"{LOOK_ONLY}{one.address(url)}" for one in others)]
+    sys.stderr.write("\n".join(lines) + "\n")
     sys.stderr.flush()
-
-
-def _same_origin(origin: str | None, host: str | None) -> bool:
-    """Return whether a browser asks from this very page; other sites may not listen in."""
-    return origin is None or urlsplit(origin).netloc == host
+    if shown is not None:
+        await asyncio.to_thread(shown, first.address(url))
 
 
 def _socket_for(host: str) -> socket.socket:

@@ -66,7 +66,8 @@ class Sandbox:
             program.write_text(f'#!/bin/sh\nexec "{sys.executable}" {how} "$@"\n')
             program.chmod(0o755)
         (programs / "activate").write_text(f'PATH="{programs}:$PATH"\n')
-        (self.top / ".venv" / ".installed").touch()
+        for stamp in (".installed", ".installed-dev"):  # in this order: the second needs the first
+            (self.top / ".venv" / stamp).touch()
         return self
 
     def __exit__(self, *problem: object) -> None:

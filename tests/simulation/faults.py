@@ -13,11 +13,14 @@ from channel.coders.zoom import ZoomParameters
 from channel.impairments import Impairments, LineFaults
 from channel.sabotage import Sabotage
 from channel.terms import Terms
-from tests.channel.parts import IMPULSE, PAPER, THREE_SIGNS, TICK_NS, terms
+from tenbaud.liveness import check_liveness, overtaking_ticks, round_trip, watchdog_ticks
+from tests.channel.parts import IMPULSE, PAPER, THREE_SIGNS, TICK_NS, TICK_S, terms
 
 FAULTY_S = 20.0
 QUIET_S = 25.0
 """With faults, then without; the second part must be enough to be locked again and accurate."""
+SLOW_SAMPLES = 10
+"""A longer command lead than this, and the plant runs away between a decision and its effect."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,17 @@ class Plan:
     """how long each restart takes"""
     sabotage: tuple[tuple[str, Sabotage], ...]
     mismatch: float
+    watchdog_ticks: int = 50
+
+    @property
+    def overtaking_ticks(self) -> int:
+        """How long command frames overtake each other, as a configuration would know it."""
+        return overtaking_ticks(self.terms, LineFaults(self.up, self.down))
+
+    @property
+    def is_slow(self) -> bool:
+        """Whether the loop over this line is too slow for the estimate to be held to its bound."""
+        return self.terms.lead_ticks * TICK_NS > SLOW_SAMPLES * self.terms.sample_ns
 
     @property
     def round_trip_ns(self) -> int:
@@ -50,6 +64,37 @@ class Plan:
 
 def draw(seed: int) -> Plan:
     """Return the plan of a seed."""
+    plan = _draw_faults(seed)
+    # Drawn apart, so that the faults of a seed stay what they were.
+    chance = random.Random(f"{seed} liveness")
+    stretch = chance.uniform(1.0, 6.0) if chance.random() < 0.25 else 1.0
+    up, down = (_stretched(one, stretch) for one in (plan.up, plan.down))
+    return with_liveness(replace(plan, up=up, down=down), chance)
+
+
+def with_liveness(plan: Plan, chance: random.Random) -> Plan:
+    """Return the plan with a lead and a watchdog of every kind that a configuration may have."""
+    faults = LineFaults(plan.up, plan.down)
+    needed = plan.terms.lead_needed_ticks + -(-faults.longest_delay_ns // TICK_NS)
+    trip = round_trip(replace(plan.terms, lead_ticks=needed), faults, "real")
+    shortest = max(plan.terms.lead_needed_ticks, trip.in_time_ticks - plan.terms.ticks_per_sample + 1)
+    lead = chance.choice(
+        (needed, needed, chance.randint(min(shortest, needed), needed), needed + chance.randint(1, 200))
+    )
+    plan_terms = replace(plan.terms, lead_ticks=lead)
+    trip = round_trip(plan_terms, faults, "real")
+    least = max(0, trip.longest_ticks - lead) + 1
+    auto = watchdog_ticks(None, plan_terms, trip)
+    watchdog = chance.choice((auto, auto, least, chance.randint(least, least + 100)))
+    check_liveness(watchdog * TICK_S, plan_terms, trip)
+    return replace(plan, terms=plan_terms, watchdog_ticks=watchdog)
+
+
+def _stretched(one: Impairments, factor: float) -> Impairments:
+    return replace(one, delay_ns=round(one.delay_ns * factor), jitter_ns=round(one.jitter_ns * factor))
+
+
+def _draw_faults(seed: int) -> Plan:
     chance = random.Random(seed)
     ticks = chance.choice((5, 10))
     period_ns = ticks * TICK_NS

@@ -10,13 +10,12 @@ from channel.impairments import Impairments, LineFaults
 from channel.sabotage import Sabotage
 from tests.simulation.faults import Plan, draw
 from tests.simulation.soak import CANARY_SEED, fly_canary, fly_seed
-from tests.simulation.watch import SafetyViolation
+from tests.simulation.watch import LivenessViolation, SafetyViolation
 from tests.simulation.world import World
+from transmitter.owing import Owing
 from transmitter.session import TransmitterSession
 
 SEEDS = 24
-RECOVERY_SAMPLES_MAX = 20
-"""From the last fault to lockstep, a round trip of up to ten samples included."""
 
 
 @pytest.mark.parametrize("seed", range(SEEDS))
@@ -24,8 +23,22 @@ def test_when_everything_goes_wrong_then_nothing_is_unsafe_and_it_comes_back(see
     result = fly_seed(seed)
     assert result.problem is None, result.problem
     assert result.desyncs_missed == 0
-    assert result.recovery_samples is not None
-    assert result.recovery_samples <= RECOVERY_SAMPLES_MAX
+    assert result.recovery_samples is not None, "the watch holds it to its bound"
+
+
+def test_when_the_watchdog_counted_ticks_that_are_owed_nothing_then_the_harness_would_find_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    base = _plan(up=Impairments(), down=Impairments())
+    plan = replace(
+        base,
+        terms=replace(base.terms, lead_ticks=60),
+        sabotage=(("transmitter", Sabotage(60, "coder", 0)),),
+    )
+    assert World(plan).fly().watch.rejoins == 1
+    monkeypatch.setattr(Owing, "is_owed", lambda _owing, _tick: True)
+    with pytest.raises(LivenessViolation):
+        World(plan).fly()
 
 
 def test_when_the_same_seed_flies_twice_then_everything_is_the_same() -> None:

@@ -25,6 +25,12 @@ if TYPE_CHECKING:
 ERROR_BOUND_RAD = 0.5
 """After the quiet phase; the plant may be 20 % off the model."""
 
+RECOVERY_SAMPLES_MAX = 13
+"""From the last fault to lockstep, beside the round trip and the command lead."""
+
+CALM_REJOINS_MAX = 4
+"""After the last fault."""
+
 SLACK_NS = 2_000_000
 
 
@@ -79,6 +85,11 @@ class Watch:
         self.desyncs_raised = 0
         self.desyncs_missed = 0
         self.rejoins = 0
+        self.rejoins_calm = 0
+        """since the faults stopped"""
+        self.last_rejoin_ns = 0
+        """how long after the faults stopped"""
+        self._rejoins_at_calm: int | None = None
         self._desyncs_seen = 0
         self._rejoins_seen = 0
         self._sent_ns: deque[int] = deque(maxlen=2)
@@ -145,6 +156,32 @@ class Watch:
 
     # Liveness
 
+    def on_calm_tick(self, world: World) -> None:
+        """Count the rejoins that come after the last fault."""
+        if self._rejoins_at_calm is None:
+            self._rejoins_at_calm = self.rejoins
+        calm = self.rejoins - self._rejoins_at_calm
+        if calm > self.rejoins_calm:
+            self.rejoins_calm = calm
+            self.last_rejoin_ns = world.now_ns - world.calm_ns
+
+    def check_recovery(self, world: World) -> None:
+        """Raise unless lockstep came back in time, and with a few rejoins."""
+        plan = world.plan
+        bound_ns = RECOVERY_SAMPLES_MAX * self.terms.sample_ns + plan.round_trip_ns
+        bound_ns += self.terms.lead_ticks * self.terms.tick_ns
+        recovered_ns = world.recovered_ns
+        if recovered_ns is None or recovered_ns > bound_ns:
+            raise LivenessViolation(
+                f"lockstep came back {recovered_ns and recovered_ns / 1e9} s after the last fault; at "
+                f"most {bound_ns / 1e9:g} s are allowed"
+            )
+        if self.rejoins_calm > CALM_REJOINS_MAX or self.last_rejoin_ns > bound_ns:
+            raise LivenessViolation(
+                f"{self.rejoins_calm} rejoins after the last fault, the last one "
+                f"{self.last_rejoin_ns / 1e9:g} s after it"
+            )
+
     def is_locked(self, world: World) -> bool:
         """Return whether both ends fly the same epoch and echoes come as fast as the line allows."""
         if world.node is None or world.endpoint is None:
@@ -170,6 +207,9 @@ class Watch:
                 f"{node and node.session.copies.lag_samples}; last events "
                 f"{node and [event.text for event in list(node.session.events)[-3:]]}"
             )
+        self.check_recovery(world)
+        if world.plan.is_slow:
+            return
         assert world.node is not None
         error = world.node.scores.last_coded_error_rad
         if error is None or abs(error) > ERROR_BOUND_RAD:

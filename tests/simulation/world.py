@@ -122,9 +122,14 @@ class World:
         recorder = self.watch.transmitter_started()
         kind = BlindSession if self.blind else TransmitterSession
         session = kind(
-            self._codec_of("transmitter"), self.terms, self.identity, self._started, recorder
+            self._codec_of("transmitter"),
+            self.terms,
+            self.identity,
+            self._started,
+            recorder,
+            overtaking_ticks=self.plan.overtaking_ticks,
         )
-        guard = Guard(self.terms.limits, GuardSettings(50, 50, (0.0, 0.0)))
+        guard = Guard(self.terms.limits, GuardSettings(self.plan.watchdog_ticks, 50, (0.0, 0.0)))
         scores = Scores(self.codec.model, 0, 2000, REFERENCE.angle_rad)
         self.node = TransmitterNode(session, self.rig, guard, scores, recorder, ALIVE_TICKS)
         self.watch.node = self.node
@@ -187,8 +192,10 @@ class World:
 
     def _plant_tick(self) -> None:
         self.rig.plant.advance(self.rig.volts)
-        if self.recovered_ns is None and self.now_ns > self.calm_ns and self.watch.is_locked(self):
-            self.recovered_ns = self.now_ns - self.calm_ns
+        if self.now_ns > self.calm_ns:
+            self.watch.on_calm_tick(self)
+            if self.recovered_ns is None and self.watch.is_locked(self):
+                self.recovered_ns = self.now_ns - self.calm_ns
 
     # The transmitter's driver
 

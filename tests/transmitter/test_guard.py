@@ -55,6 +55,19 @@ def test_when_no_command_ever_comes_then_it_latches_too() -> None:
     assert one.state is GuardState.LATCHED
 
 
+def test_when_no_command_is_owed_then_the_last_one_is_held_and_does_not_age() -> None:
+    one = guard()
+    one.apply(0, (1.0, 1.0))
+    for tick in range(1, 50):
+        assert one.apply(tick, None, owed=False) == (1.0, 1.0)
+    assert one.state is GuardState.HOLDING
+    for tick in range(50, 53):
+        assert one.apply(tick, None) == (1.0, 1.0)
+    one.apply(53, None)
+    assert one.state is GuardState.RAMPING
+    assert "no command for 4 ticks up to tick 53" in one.reason
+
+
 def test_when_it_ramps_or_is_latched_then_no_command_passes_any_more() -> None:
     one = guard()
     one.apply(0, (4.5, 3.5))

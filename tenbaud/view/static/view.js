@@ -1,6 +1,6 @@
 // The page's own script: takes the stream in, keeps the last thirty seconds, and draws them.
 
-import { colours, drawError, drawPitch, drawTape } from "/view/draw.js";
+import { colours, drawError, drawPitch, drawTape } from "./draw.js";
 
 const KEPT_S = 32, SAMPLES_KEPT = 160, EVENTS_SHOWN = 7, STALE_MS = 1500, BROKEN_SHOWN_MS = 2500, TEXT_MS = 200;
 const DEGREES = 180 / Math.PI;
@@ -15,7 +15,9 @@ let connected = false, heardAt = 0, everHeard = false, brokenAt = -1e9, brokenTe
 // ---- the stream
 
 function listen() {
-  const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/stream`);
+  const address = new URL("stream", location.href);
+  address.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+  const socket = new WebSocket(address);
   socket.onopen = () => { connected = true; dirty = true; };
   socket.onmessage = (event) => take(JSON.parse(event.data));
   socket.onclose = () => { connected = false; dirty = true; setTimeout(listen, 1000); };
@@ -184,7 +186,7 @@ function showText(now) {
 function showBanner(now) {
   const ended = Object.values(memory.heads).some((head) => head.phase === "ended");
   let text = "";
-  if (!connected && everHeard) text = ended ? "The flight is over, and its page's server has gone." : "The page's server does not answer. Trying again every second.";
+  if (!connected && everHeard) text = ended ? "The flight is over, and its page's server has gone." : "The page's server does not answer. Trying again every second. If it was started anew, open the address that it has printed.";
   else if (!connected) text = "Connecting to the page's server.";
   else if (!everHeard) text = "No flight is heard. Start one with <code>tenbaud demo --view</code>, or with <code>tenbaud receive</code> and <code>tenbaud transmit</code>.";
   else if (ended) text = "The flight is over. What is shown is its end.";

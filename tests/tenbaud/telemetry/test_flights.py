@@ -130,6 +130,8 @@ def test_when_a_flight_is_watched_and_could_be_steered_then_it_is_the_same_fligh
         upper, lower = pair.ended()
         assert (upper.code, lower.code) == (0, 0)
         assert pair.received
+    for end in (upper, lower):
+        assert "every user of this machine" in end.err
     unwatched = run(
         *("demo", *flown, *alone, "--out", "alone", "--json", "--link", "memory"), cwd=tmp_path
     )

@@ -8,6 +8,7 @@ import signal
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import pytest
 
@@ -79,7 +80,7 @@ def test_it_loads_and_goes_on_by_itself_without_any_request_beyond_loopback(
         )
         assert drawn, canvas
     assert page.locator("#banner").is_hidden()
-    host = flight.url.removeprefix("http://")
+    host = urlsplit(flight.url).netloc
     own = (f"http://{host}/", f"ws://{host}/", "data:")
     assert [url for url in page.asked if not url.startswith(own)] == []
     assert len(page.asked) > 5

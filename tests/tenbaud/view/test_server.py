@@ -12,7 +12,7 @@ from urllib.request import Request, urlopen
 import pytest
 
 from benchmarks.browser import served
-from tenbaud.view.server import Address, PageUnavailable, _same_origin, free_port
+from tenbaud.view.server import Address, PageUnavailable, free_port
 from tests.tenbaud.processes import run
 
 
@@ -36,7 +36,7 @@ main()
 
 
 def test_an_address_that_others_reach_needs_insecure() -> None:
-    with pytest.raises(PageUnavailable, match="no password"):
+    with pytest.raises(PageUnavailable, match="not encrypted"):
         Address("0.0.0.0", 0).check()
     Address("0.0.0.0", 0, insecure=True).check()
     Address("127.0.0.1", 0).check()
@@ -79,7 +79,7 @@ def test_when_the_host_is_an_ipv6_address_then_the_page_is_served_there(
             assert answer.status == 200
             assert "tenbaud" in answer.read().decode()
         foreign = Request(page.url, headers={"Host": "example.org"})
-        with pytest.raises(HTTPError, match="400"):
+        with pytest.raises(HTTPError, match="403"):
             urlopen(foreign, timeout=10.0)
 
 
@@ -91,20 +91,6 @@ def test_when_a_port_at_an_ipv6_address_is_taken_then_it_is_named() -> None:
         port = other.getsockname()[1]
         with pytest.raises(PageUnavailable, match=rf"\[::1\]:{port}.*another --port"):
             Address("::1", port).check()
-
-
-@pytest.mark.parametrize(
-    ("origin", "host", "allowed"),
-    [
-        (None, "127.0.0.1:8710", True),
-        ("http://127.0.0.1:8710", "127.0.0.1:8710", True),
-        ("http://127.0.0.1:9999", "127.0.0.1:8710", False),
-        ("https://example.org", "127.0.0.1:8710", False),
-        ("null", "127.0.0.1:8710", False),
-    ],
-)
-def test_other_sites_may_not_listen_in(origin: str | None, host: str, allowed: bool) -> None:
-    assert _same_origin(origin, host) is allowed
 
 
 @pytest.mark.parametrize("arguments", [("view",), ("demo", "--view")])

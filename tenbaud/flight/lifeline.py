@@ -1,0 +1,44 @@
+"""Child processes that end when their parent has gone, however that came about.
+
+The parent holds a pipe to the child's standard input and never writes to it. The operating system
+closes it with the parent, also when that was killed and could tell nobody.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from typing import Any
+
+VARIABLE = "TENBAUD_ENDS_WITH_STDIN"
+
+
+def start_child(*arguments: str, **more: Any) -> subprocess.Popen[str]:
+    """Start `tenbaud` with these arguments as a child that ends when this process does.
+
+    It has a group of its own: a Ctrl-C at the terminal reaches it through its parent only. `more` goes
+    to `subprocess.Popen`.
+    """
+    return subprocess.Popen(
+        [sys.executable, "-m", "tenbaud", *arguments],
+        stdin=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env={**os.environ, VARIABLE: "1"},
+        **more,
+    )
+
+
+def follow_parent() -> None:
+    """In a process of `start_child`: ask this process to end when its parent has gone."""
+    if os.environ.pop(VARIABLE, None) is not None:
+        threading.Thread(target=_follow, name="lifeline", daemon=True).start()
+
+
+def _follow() -> None:
+    while os.read(0, 4096):
+        pass
+    os.kill(os.getpid(), signal.SIGTERM)

@@ -1,0 +1,156 @@
+"""Whether a flight that went to its end has flown: from counts, and for people in words.
+
+A process that came to the end of its flight has shown nothing by that. What counts is that samples were
+confirmed, that most of them brought a word, that the motors had commands, and that epochs lasted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+from tenbaud.build import Agreement, watchdog_wanted_s
+from tenbaud.liveness import watchdog_ticks
+
+CONFIRMED_SHARE_MIN = 0.5
+"""of the samples that the flight had time for"""
+WORDS_SHARE_MIN = 0.1
+"""of the confirmed samples, whose word was not erased"""
+DOWN_SHARE_MAX = 0.5
+"""of the ticks, with the guard at the safe voltage or on its way there"""
+COMMANDED_SHARE_MIN = 0.1
+"""of the ticks, with a command of their own"""
+REJOINS_MIN = 10
+EPOCH_SAMPLES_MIN = 20
+"""So many rejoins, with fewer confirmed samples than this to each of them, are rejoins without end."""
+
+
+class NotFlown(StrEnum):
+    """In what a flight fell short."""
+
+    NEVER_LOCKED = "never locked"
+    REJOINING = "rejoins without end"
+    UNCONFIRMED = "too few samples confirmed"
+    GUARD_DOWN = "guard down"
+    NO_COMMANDS = "no commands in time"
+    NO_WORDS = "no words"
+
+
+@dataclass(frozen=True, slots=True)
+class FlightCounts:
+    """What the verdict rests on, as far as an end knows it."""
+
+    samples: int
+    """that the flight had time for"""
+    confirmed: int
+    """by the transmitter from echoes; at the receiver: samples flown"""
+    erased: int
+    rejoins: int
+    ticks: int = 0
+    """0: this end does not see the motors"""
+    ticks_down: int = 0
+    ticks_commanded: int = 0
+
+
+def faults_of(counts: FlightCounts) -> tuple[NotFlown, ...]:
+    """Return in what a flight fell short; nothing where it has flown."""
+    confirmed, ticks = counts.confirmed, counts.ticks
+    holds = {
+        NotFlown.NEVER_LOCKED: counts.samples > 0 and confirmed == 0,
+        NotFlown.REJOINING: counts.rejoins >= REJOINS_MIN
+        and confirmed < EPOCH_SAMPLES_MIN * counts.rejoins,
+        NotFlown.UNCONFIRMED: confirmed < CONFIRMED_SHARE_MIN * counts.samples,
+        NotFlown.GUARD_DOWN: counts.ticks_down > DOWN_SHARE_MAX * ticks,
+        NotFlown.NO_COMMANDS: counts.ticks_commanded < COMMANDED_SHARE_MIN * ticks,
+        NotFlown.NO_WORDS: confirmed - counts.erased < WORDS_SHARE_MIN * confirmed,
+    }
+    return tuple(fault for fault, applies in holds.items() if applies)
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """What a person could change, as it was."""
+
+    lead_s: float
+    watchdog_s: float
+    round_trip_s: float
+    """as far as the configuration knows"""
+    deadline_allowance_s: float
+    uplink_spread_s: float
+    repeats: int
+
+
+def settings_of(agreement: Agreement) -> Settings:
+    """Return what can be changed about a flight."""
+    terms, up = agreement.terms, agreement.faults.up
+    tick_s = terms.tick_ns / 1e9
+    watchdog = watchdog_ticks(watchdog_wanted_s(agreement.config), terms, agreement.trip)
+    return Settings(
+        lead_s=terms.lead_ticks * tick_s,
+        watchdog_s=watchdog * tick_s,
+        round_trip_s=agreement.trip.longest_ticks * tick_s,
+        deadline_allowance_s=terms.deadline_allowance_ns / 1e9,
+        uplink_spread_s=2 * up.jitter_ns / 1e9,
+        repeats=terms.repeats,
+    )
+
+
+def verdict_text(
+    faults: tuple[NotFlown, ...], counts: FlightCounts, settings: Settings, asked: Mapping[str, int]
+) -> str:
+    """Return the verdict with its numbers and what to change, for people.
+
+    `asked`: how often a new epoch was asked for, by reason.
+    """
+    numbers = [f"{counts.confirmed} of {counts.samples} samples confirmed"]
+    numbers.append(f"{counts.erased} of these erased")
+    if counts.ticks:
+        numbers.append(f"guard down for {counts.ticks_down / counts.ticks:.0%} of the flight")
+        numbers.append(
+            f"a command in time for {counts.ticks_commanded / counts.ticks:.0%} of the ticks"
+        )
+    reasons = ", ".join(f"{why} {number}" for why, number in asked.items())
+    numbers.append(f"{counts.rejoins} rejoins" + (f" (asked for: {reasons})" if reasons else ""))
+    lines = [f"the flight did not fly ({', '.join(faults)}): " + ", ".join(numbers)]
+    # One fault brings others with it: what to change follows from the first one that has an answer.
+    lines += [ADVICE[fault](settings) for fault in faults if fault in ADVICE][:1]
+    return "\n  ".join(lines)
+
+
+def _on_words(one: Settings) -> str:
+    if one.uplink_spread_s > one.deadline_allowance_s:
+        return (
+            f"symbols spread by {one.uplink_spread_s:g} s on this line, and one that is more than "
+            f"channel.deadline_allowance_s = {one.deadline_allowance_s:g} late is erased: set it to at "
+            f'least {one.uplink_spread_s:g} at both ends, and leave timing.lead_ticks at "auto"'
+        )
+    return (
+        "nearly all symbols are lost, or later than channel.deadline_allowance_s = "
+        f"{one.deadline_allowance_s:g} allows: look at the uplink, or raise it at both ends"
+    )
+
+
+def _on_commands(one: Settings) -> str:
+    return (
+        f"the command lead is {one.lead_s:g} s, the watchdog {one.watchdog_s:g} s, and the "
+        f"configuration knows of a round trip of {one.round_trip_s:g} s; if the line takes longer, "
+        "raise timing.lead_ticks (--lead) at both ends to what it takes, and leave "
+        'transmitter.watchdog_s at "auto"'
+    )
+
+
+def _on_rejoins(one: Settings) -> str:
+    return (
+        f"each command frame repeats channel.repeats = {one.repeats} samples: raise it at both ends if "
+        "command frames are lost; " + _on_commands(one)
+    )
+
+
+ADVICE: Mapping[NotFlown, Callable[[Settings], str]] = {
+    NotFlown.NO_WORDS: _on_words,
+    NotFlown.NO_COMMANDS: _on_commands,
+    NotFlown.REJOINING: _on_rejoins,
+    NotFlown.GUARD_DOWN: _on_commands,
+    NotFlown.UNCONFIRMED: _on_rejoins,
+}

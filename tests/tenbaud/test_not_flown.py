@@ -1,0 +1,59 @@
+"""A flight that went to its end without flying: exit code, summary, and what a person is told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from channel.wire import DATAGRAM
+from tenbaud.build import agree
+from tenbaud.build_ends import build_receiver
+from tenbaud.config.load import load_config
+from tenbaud.flight import transmit
+from tenbaud.flight.outcome import ExitCode, Outcome
+from tenbaud.flight.receive import ended_outcome
+from tenbaud.flight.verdict import NotFlown
+from tests.tenbaud.processes import run
+
+NO_WORDS = "delay=400ms±300ms"
+
+
+def outcomes(seconds: float, **changes: Any) -> tuple[Outcome, Outcome]:
+    """Fly in memory; return the outcome of each end by itself."""
+    agreement = agree(load_config("paper-10baud", None, {"duration_s": seconds, **changes}), "virtual")
+    endpoint = build_receiver(agreement, None, DATAGRAM)
+    run_ = transmit.prepare(agreement, None, DATAGRAM)
+    upper = transmit.fly_virtual(run_, endpoint, lambda: False)
+    return upper, ended_outcome(agreement, endpoint.session)
+
+
+def test_when_a_flight_did_not_fly_then_exit_code_summary_and_message_say_so(tmp_path: Path) -> None:
+    flight = ("--duration", "20", "--mismatch", "0.1", "--impair", NO_WORDS, "--out", "run")
+    ended = run("demo", "--json", *flight, cwd=tmp_path)
+    assert ended.code == ExitCode.NOT_FLOWN, ended.err
+    assert ended.summary["exit_code"] == ExitCode.NOT_FLOWN
+    assert ended.summary["not_flown"] == [NotFlown.NO_WORDS.value]
+    assert "the flight did not fly (no words)" in ended.err
+    assert "set it to at least 0.6 at both ends" in ended.err
+    shown = run("demo", "--link", "memory", *flight[:-1], "two", cwd=tmp_path)
+    assert shown.code == ExitCode.NOT_FLOWN
+    assert "did not fly" in shown.out
+
+
+def test_when_each_end_is_asked_then_both_say_that_it_did_not_fly() -> None:
+    upper, lower = outcomes(20.0, link={"impairments": NO_WORDS})
+    assert upper.not_flown == lower.not_flown == (NotFlown.NO_WORDS,)
+    assert upper.code is lower.code is ExitCode.NOT_FLOWN
+
+
+def test_when_command_frames_are_lost_for_ever_then_rejoins_without_end_are_no_flight() -> None:
+    upper, lower = outcomes(60.0, link={"impairments": "down:loss=0.6"})
+    assert NotFlown.REJOINING in upper.not_flown
+    assert NotFlown.REJOINING in lower.not_flown
+    assert "gap" in upper.text
+
+
+def test_when_half_the_symbols_are_lost_then_that_is_a_flight() -> None:
+    assert [one.code for one in outcomes(60.0, link={"impairments": "up:loss=0.5"})] == [
+        ExitCode.OK
+    ] * 2

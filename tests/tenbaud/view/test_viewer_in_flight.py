@@ -1,0 +1,93 @@
+"""A viewer that is killed, stopped or slow, beside a flight on the real clock."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tenbaud.view.server import free_port
+from tests.tenbaud.processes import finish, start
+from tests.tenbaud.view.viewers import beside, is_free
+
+pytest.importorskip("nicegui")
+pytestmark = pytest.mark.skipif(not Path("/proc").is_dir(), reason="finds processes in /proc")
+
+DURATION_S = 5
+STOPPED_S, RUNNING_S = 0.4, 0.1
+PATIENCE_S = 30.0
+
+
+@contextlib.contextmanager
+def killed(viewer: int) -> Iterator[None]:
+    os.kill(viewer, signal.SIGKILL)
+    yield
+
+
+@contextlib.contextmanager
+def stopped(viewer: int) -> Iterator[None]:
+    os.kill(viewer, signal.SIGSTOP)
+    yield
+
+
+@contextlib.contextmanager
+def slow(viewer: int) -> Iterator[None]:
+    """Let it run for a fifth of the time only."""
+    ended = threading.Event()
+
+    def hamper() -> None:
+        # It ends with the flight, in the middle of this.
+        with contextlib.suppress(ProcessLookupError):
+            while not ended.is_set():
+                os.kill(viewer, signal.SIGSTOP)
+                ended.wait(STOPPED_S)
+                os.kill(viewer, signal.SIGCONT)
+                ended.wait(RUNNING_S)
+
+    thread = threading.Thread(target=hamper)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+
+
+@pytest.mark.parametrize("trouble", [killed, stopped, slow])
+def test_a_viewer_in_trouble_costs_the_flight_no_sample_no_tick_and_no_command(
+    tmp_path: Path, trouble: contextlib.AbstractContextManager[None]
+) -> None:
+    port = free_port("127.0.0.1")
+    arguments = ("--view-port", str(port), "--clock", "real", "--duration", str(DURATION_S))
+    process = start("demo", "--view", *arguments, "--out", "run", cwd=tmp_path)
+    _wait_until_flying(tmp_path / "run" / "transmitter.mcap")
+    (viewer,) = beside(port)
+    with trouble(viewer):
+        began_s = time.monotonic()
+        ended = finish(process, PATIENCE_S)
+        took_s = time.monotonic() - began_s
+    assert ended.code == 0, ended.err
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert summary["samples"] == summary["digest_checks"] == 10 * DURATION_S
+    assert summary["erasures"] == summary["desyncs"] == summary["rejoins"] == 0
+    assert summary["ticks_missed"] == summary["commands_late"] == 0
+    said = "the live page ended before the flight, by signal 9" in ended.err
+    assert said is (trouble is killed)
+    assert took_s < 2.0 * DURATION_S
+    assert beside(port) == []
+    assert is_free(port)
+
+
+def _wait_until_flying(recording: Path) -> None:
+    until_s = time.monotonic() + PATIENCE_S
+    while not recording.exists() or recording.stat().st_size == 0:
+        assert time.monotonic() < until_s, "no flight"
+        time.sleep(0.02)
+    time.sleep(1.0)

@@ -1,0 +1,31 @@
+"""Finds the processes and ports of viewers, for the tests of what becomes of them."""
+
+from __future__ import annotations
+
+import socket
+from pathlib import Path
+
+
+def beside(port: int) -> list[int]:
+    """Return the processes that serve, or are about to serve, a page at this port."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            words = path.read_text(errors="replace").split("\0")
+        except OSError:
+            continue
+        if "view" in words and str(port) in words:
+            found.append(int(path.parent.name))
+    return found
+
+
+def is_free(port: int) -> bool:
+    """Return whether somebody else can listen at this port of loopback."""
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind(("127.0.0.1", port))
+            probe.listen()
+        except OSError:
+            return False
+    return True

@@ -1,9 +1,9 @@
 """Many transmitters in one process, without plants: what loads a receiver, at little cost of its own.
 
 Each has a session, a link and a Zenoh session of its own, and keeps its slots; only the measurement is
-a sine wave, and nothing is recorded. `python -m benchmarks.light_rigs ENDPOINT RIGS SECONDS` prints
-what
-they saw as JSON.
+a sine wave, and nothing is recorded. `python -m benchmarks.light_rigs ENDPOINT RIGS SECONDS SHARDS`
+prints what they saw as JSON. With SHARDS above 0 the endpoint is a router's, and the names of the rigs
+spread them over so many receivers.
 """
 
 from __future__ import annotations
@@ -61,11 +61,11 @@ class LightRig:
             self.link.send(encode(frame))
 
 
-def fly_all(endpoint: str, rigs: int, seconds: float) -> dict[str, float]:
+def fly_all(endpoint: str, rigs: int, seconds: float, shards: int = 0) -> dict[str, float]:
     """Fly so many rigs for so long, their slots spread over the symbol period."""
     agreement = agree(load_config("tuned-10baud"), "real")
     with ExitStack() as stack:
-        fleet = [_greeted(stack, agreement, endpoint, index) for index in range(rigs)]
+        fleet = [_greeted(stack, agreement, endpoint, index, shards) for index in range(rigs)]
         period_ns = agreement.terms.sample_ns
         print("flying", flush=True)
         start_ns = time.monotonic_ns() + period_ns
@@ -92,9 +92,20 @@ def fly_all(endpoint: str, rigs: int, seconds: float) -> dict[str, float]:
         }
 
 
-def _greeted(stack: ExitStack, agreement: Agreement, endpoint: str, index: int) -> LightRig:
+def session_pattern(shard: int) -> str:
+    """Return the pattern of the names that a shard serves."""
+    return f"{NAME}/{shard}/*"
+
+
+def _greeted(
+    stack: ExitStack, agreement: Agreement, endpoint: str, index: int, shards: int
+) -> LightRig:
     session = TransmitterSession(agreement.codec, agreement.terms, agreement.identity, index + 1)
-    link = stack.enter_context(ZenohLink("transmitter", f"{NAME}/{index}", connect=(endpoint,)))
+    if shards:
+        name = session_pattern(index % shards).replace("*", str(index))
+        link = stack.enter_context(ZenohLink("transmitter", name, router=(endpoint,)))
+    else:
+        link = stack.enter_context(ZenohLink("transmitter", f"{NAME}/{index}", connect=(endpoint,)))
     rig = LightRig(session, link, Inlet())
     give_up_s = time.monotonic() + STARTED_S
     while session.phase is not Phase.FLYING:
@@ -109,5 +120,5 @@ def _greeted(stack: ExitStack, agreement: Agreement, endpoint: str, index: int) 
 
 
 if __name__ == "__main__":
-    where, number, duration = sys.argv[1:]
-    print(json.dumps(fly_all(where, int(number), float(duration))))
+    where, number, duration, parts = sys.argv[1:]
+    print(json.dumps(fly_all(where, int(number), float(duration), int(parts))))

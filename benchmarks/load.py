@@ -1,7 +1,9 @@
-"""How many 10-baud rigs one receiver process serves in real time, and what each of them costs.
+"""How many 10-baud rigs a receiver process serves in real time, and what each of them costs.
 
-The receiver is `tenbaud receive --sessions`, recording every flight; the rigs are `light_rigs`, on the
-same cores. CPU is that of the receiver's process, in percent of one core, while all are flying.
+The receivers are `tenbaud receive --sessions`, recording every flight; the rigs are `light_rigs`, on
+the same cores, and what they take of these is shown beside. CPU is in percent of one core.
+Then the same with two receivers behind a router, the rigs spread over them by the names of their
+sessions, for what a fleet costs (docs/fleet.md).
 """
 
 from __future__ import annotations
@@ -13,84 +15,130 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
 from benchmarks.figures import Figure
-from benchmarks.light_rigs import NAME
+from benchmarks.light_rigs import NAME, session_pattern
 from channel.links.endpoints import free_endpoint
 
-RIGS = (5, 25, 50, 75, 100)
+RIGS = (5, 25, 50, 100, 150, 200, 300)
+SHARDED = (50, 100)
+SHARDS = 2
 SECONDS = 10.0
 SETTLE_S = 2.0
 TIMEOUT_S = 90.0
+LATE_MS = 5.0
+SYMBOLS_PER_S = 10
+LINEAR_RIGS = 100
+"""Up to here a receiver keeps up, and the cost of one rig follows from the slope."""
 
 
-def load_figures(rigs: tuple[int, ...] = RIGS, seconds: float = SECONDS) -> list[Figure]:
-    """Return CPU, memory and lateness for each number of rigs, and how straight the two curves are."""
-    points = [measure(number, seconds) for number in rigs]
-    figures = []
-    for number, point in zip(rigs, points, strict=True):
-        figures += [
-            Figure(f"load_{number}_rigs_cpu_percent", point["cpu_percent"], "% of a core"),
-            Figure(f"load_{number}_rigs_memory_mb", point["memory_mb"], "MB"),
-            Figure(
-                f"load_{number}_rigs_loop_late_ms_p99",
-                point["loop_late_ms_p99"],
-                "ms",
-                "below 5" if number <= 50 else "",
-            ),
-            Figure(f"load_{number}_rigs_erased", point["erasures"] / point["samples"], "of symbols"),
-            Figure(f"load_{number}_rigs_desyncs", point["desyncs"], "", "0"),
-        ]
-    for name, unit in (("cpu_percent", "% of a core"), ("memory_mb", "MB")):
-        slope, straightness = line_through(rigs, [point[name] for point in points])
+def load_figures(
+    rigs: tuple[int, ...] = RIGS, sharded: tuple[int, ...] = SHARDED, seconds: float = SECONDS
+) -> list[Figure]:
+    """Return CPU, memory and lateness for each number of rigs, and what one of them costs."""
+    points = {number: measure(number, seconds) for number in rigs}
+    figures = [figure for number in rigs for figure in _shown(f"load_{number}_rigs", points[number])]
+    linear = tuple(number for number in rigs if number <= LINEAR_RIGS)
+    for name, unit in (
+        ("cpu_percent", "% of a core"),
+        ("memory_mb", "MB"),
+        ("rigs_cpu_percent", "% of a core"),
+        ("bytes_up_per_s", "bytes/s"),
+        ("bytes_down_per_s", "bytes/s"),
+    ):
+        slope, straightness = line_through(linear, [points[number][name] for number in linear])
         figures.append(Figure(f"load_{name}_per_rig", slope, unit))
         figures.append(Figure(f"load_{name}_linear_r2", straightness, "", "near 1"))
-    within = [
-        number
-        for number, point in zip(rigs, points, strict=True)
-        if point["loop_late_ms_p99"] < 5.0 and point["desyncs"] == 0
-    ]
-    return [*figures, Figure("load_rigs_within_5_ms", max(within, default=0), "rigs", "at least 50")]
-
-
-def measure(rigs: int, seconds: float) -> dict[str, float]:
-    """Fly so many rigs against one receiver process; return what they and the receiver saw."""
-    endpoint = free_endpoint()
-    with tempfile.TemporaryDirectory() as folder:
-        receiver = _start(
-            folder,
-            *("tenbaud", "receive", "--sessions", f"{NAME}/*", "--preset", "tuned-10baud"),
-            *("--listen", endpoint, "--rigs-max", str(rigs), "--out", "many", "--json"),
+    within = [number for number, point in points.items() if kept(point)]
+    figures.append(Figure("load_rigs_within_5_ms", max(within, default=0), "rigs", "at least 50"))
+    for number in sharded:
+        point = measure(number, seconds, SHARDS)
+        figures += _shown(f"load_{number}_rigs_{SHARDS}_shards", point)
+        figures.append(
+            Figure(
+                f"load_{number}_rigs_{SHARDS}_shards_router_cpu_percent",
+                point["router_cpu_percent"],
+                "% of a core",
+            )
         )
-        fleet = _start(folder, "benchmarks.light_rigs", endpoint, str(rigs), str(seconds))
-        try:
-            if fleet.stdout is None or fleet.stdout.readline() != "flying\n":
-                raise RuntimeError("the rigs did not get their sessions")
-            time.sleep(SETTLE_S)
-            cpu_s, since_s = _cpu_s(receiver.pid), time.monotonic()
-            time.sleep(seconds - 2 * SETTLE_S)
-            cpu_percent = 100.0 * (_cpu_s(receiver.pid) - cpu_s) / (time.monotonic() - since_s)
-            memory_mb = _resident_mb(receiver.pid)
-            seen: dict[str, Any] = json.loads(fleet.communicate(timeout=TIMEOUT_S)[0])
-            receiver.send_signal(signal.SIGINT)
-            out, err = receiver.communicate(timeout=TIMEOUT_S)
-        finally:
-            for process in (fleet, receiver):
-                if process.poll() is None:
-                    process.kill()
-        if not out:
-            raise RuntimeError(f"the receiver ended without a summary: {err}")
-        summary = json.loads(out)
-    lost = sum(flight["recording_rows_lost"] for flight in summary["flights"])
-    if len(summary["flights"]) != rigs or lost:
-        raise RuntimeError(f"{len(summary['flights'])} of {rigs} flights, {lost} rows lost")
+    return figures
+
+
+def kept(point: dict[str, float]) -> bool:
+    """Return whether all was in time: the loop, and every symbol."""
+    return point["loop_late_ms_p99"] < LATE_MS and not point["desyncs"] and not point["erasures"]
+
+
+def _shown(name: str, point: dict[str, float]) -> list[Figure]:
+    return [
+        Figure(f"{name}_cpu_percent", point["cpu_percent"], "% of a core"),
+        Figure(f"{name}_rigs_cpu_percent", point["rigs_cpu_percent"], "% of a core"),
+        Figure(f"{name}_memory_mb", point["memory_mb"], "MB"),
+        Figure(f"{name}_loop_late_ms_p99", point["loop_late_ms_p99"], "ms", "below 5"),
+        Figure(f"{name}_erased", point["erasures"] / point["samples"], "of symbols"),
+        Figure(f"{name}_desyncs", point["desyncs"], "", "0"),
+    ]
+
+
+def measure(rigs: int, seconds: float, shards: int = 0) -> dict[str, float]:
+    """Fly so many rigs against one receiver, or against shards behind a router; return what was seen.
+
+    CPU and memory are those of all receivers together, lateness that of the latest.
+    """
+    endpoint = free_endpoint()
+    with tempfile.TemporaryDirectory() as folder, ExitStack() as started:
+
+        def start(*arguments: str) -> subprocess.Popen[str]:
+            return started.enter_context(_started(folder, *arguments))
+
+        router: list[subprocess.Popen[str]] = []
+        if shards:
+            most = ("--connections-max", str(2 * rigs + shards))
+            router = [start("tenbaud", "router", "--listen", endpoint, *most)]
+        receivers = [
+            start(
+                *("tenbaud", "receive", "--sessions", pattern, "--preset", "tuned-10baud"),
+                *("--router" if shards else "--listen", endpoint),
+                *("--rigs-max", str(rigs), "--out", f"many-{index}", "--json"),
+                # The first rig has its session long before the last, and waits for it without a word.
+                *("--set", f"link.peer_timeout_s={TIMEOUT_S}"),
+            )
+            for index, pattern in enumerate(
+                [session_pattern(shard) for shard in range(shards)] or [f"{NAME}/*"]
+            )
+        ]
+        fleet = start("benchmarks.light_rigs", endpoint, str(rigs), str(seconds), str(shards))
+        if fleet.stdout is None or fleet.stdout.readline() != "flying\n":
+            raise RuntimeError("the rigs did not get their sessions")
+        time.sleep(SETTLE_S)
+        groups = {"cpu_percent": receivers, "rigs_cpu_percent": [fleet], "router_cpu_percent": router}
+        since_s, before = time.monotonic(), {name: _cpu_s(group) for name, group in groups.items()}
+        time.sleep(seconds - 2 * SETTLE_S)
+        span_s = time.monotonic() - since_s
+        cpu = {name: 100.0 * (_cpu_s(group) - before[name]) / span_s for name, group in groups.items()}
+        memory_mb = sum(_resident_mb(one.pid) for one in receivers)
+        seen: dict[str, Any] = json.loads(fleet.communicate(timeout=TIMEOUT_S)[0])
+        summaries = [_ended(receiver) for receiver in receivers]
+    flights = [flight for summary in summaries for flight in summary["flights"]]
+    lost = sum(flight["recording_rows_lost"] for flight in flights)
+    flown = round(seconds * SYMBOLS_PER_S) * rigs
+    if seen["samples"] != flown:
+        raise RuntimeError(
+            f"the rigs flew {seen['samples']} of {flown} samples: some lost their sessions"
+        )
+    if len(flights) != rigs or lost:
+        raise RuntimeError(f"{len(flights)} of {rigs} flights, {lost} rows lost")
     return {
         **seen,
-        "cpu_percent": cpu_percent,
+        **cpu,
         "memory_mb": memory_mb,
-        "loop_late_ms_p99": summary["loop_late_ms_p99"],
+        "loop_late_ms_p99": max(summary["loop_late_ms_p99"] for summary in summaries),
+        "bytes_up_per_s": sum(flight["wire_bytes_up"] for flight in flights) / seconds,
+        "bytes_down_per_s": sum(flight["wire_bytes_down"] for flight in flights) / seconds,
     }
 
 
@@ -104,21 +152,42 @@ def line_through(x: tuple[int, ...], y: list[float]) -> tuple[float, float]:
     return products / squares_x, products**2 / (squares_x * squares_y) if squares_y else 1.0
 
 
-def _start(folder: str, *arguments: str) -> subprocess.Popen[str]:
+@contextmanager
+def _started(folder: str, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """Within a `with`, a process runs; one that is left over at the end is killed."""
     path = os.pathsep.join([str(Path(__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
-    return subprocess.Popen(
+    quiet = subprocess.DEVNULL if arguments[0] == "tenbaud" else None
+    process = subprocess.Popen(
         [sys.executable, "-m", *arguments],
         cwd=folder,
         env={**os.environ, "PYTHONPATH": path},
         stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE if arguments[0] == "tenbaud" else None,
+        stderr=quiet,
         text=True,
     )
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            process.kill()
+            process.communicate()
 
 
-def _cpu_s(pid: int) -> float:
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+def _ended(receiver: subprocess.Popen[str]) -> dict[str, Any]:
+    receiver.send_signal(signal.SIGINT)
+    out, _ = receiver.communicate(timeout=TIMEOUT_S)
+    if not out:
+        raise RuntimeError("a receiver ended without a summary")
+    summary: dict[str, Any] = json.loads(out)
+    return summary
+
+
+def _cpu_s(processes: list[subprocess.Popen[str]]) -> float:
+    ticks = 0
+    for process in processes:
+        fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(")")[2].split()
+        ticks += int(fields[11]) + int(fields[12])
+    return ticks / os.sysconf("SC_CLK_TCK")
 
 
 def _resident_mb(pid: int) -> float:

@@ -35,6 +35,48 @@ print(opened - started, time.perf_counter() - started)
 """
 
 
+LONG_TICKS = 1_000_000
+LONG = """
+import math, resource, sys, time
+from pathlib import Path
+from receiver import records as receiver
+from tenbaud.flight.report import draw_run
+from tenbaud.recording.folder import RunFolder
+from tenbaud.recording.gather import OverviewRecorder
+from tenbaud.recording.writer import McapRecorder
+from transmitter import records as transmitter
+
+def peak_mib():
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+folder, ticks = RunFolder(Path(sys.argv[1])), int(sys.argv[2])
+upper, lower = (
+    McapRecorder(path, {}, wait_when_full=True, overview=OverviewRecorder())
+    for path in (folder.transmitter, folder.receiver)
+)
+begin_mib, digest = None, "0123456789abcdef"
+for tick in range(ticks):
+    if tick == ticks // 100:
+        begin_mib = peak_mib()
+    at, pitch = tick * 10_000_000, math.sin(tick * 0.003)
+    row = (tick, tick / 100, (pitch,), (pitch,), (0.5, -0.5), (0.5, -0.5), False, 0.1, "running")
+    upper.write(transmitter.TICK_CHANNEL, at, row)
+    states = ((pitch + 0.01, 0.1, 0.2, 0.3), (pitch + 0.02, 0.1, 0.2, 0.3))
+    upper.write(transmitter.ESTIMATE_CHANNEL, at, (tick, *states))
+    lower.write(receiver.TICK_CHANNEL, at, (tick, 0.3, states[0], (0.5, -0.5)))
+    if tick % 10 == 0:
+        word = (1 if tick % 3 else -1,)
+        end = ((0.1,), states[0], (0.1, 1.0), digest)
+        upper.write(transmitter.SAMPLE_CHANNEL, at, (tick // 10, word, word, *end, digest, 1))
+        lower.write(receiver.SAMPLE_CHANNEL, at, (tick // 10, word, *end, tick / 100))
+flown = time.perf_counter()
+upper.close()
+lower.close()
+assert not (upper.error or lower.error or draw_run(folder, "a long flight"))
+print(time.perf_counter() - flown, peak_mib() - begin_mib)
+"""
+
+
 def recording_figures() -> list[Figure]:
     """Return sizes and times of a ten-minute run, and what a killed pair of processes lost."""
     with tempfile.TemporaryDirectory() as name:
@@ -56,7 +98,29 @@ def recording_figures() -> list[Figure]:
         figures.append(Figure("run_all_signals_s", everything, "s", ""))
         figures.append(_timed(folder, "replay_s", "replay", "run"))
         figures.append(_timed(folder, "audit_s", "audit", "run"))
+        figures += long_flight_end(folder)
         return figures + _killed(folder)
+
+
+def long_flight_end(folder: Path, ticks: int = LONG_TICKS) -> list[Figure]:
+    """Record a long flight without flying it; return what its end takes: both files and the figure.
+
+    The memory is what the process has at its end over what it had after the first hundredth.
+    """
+    run = folder / "long"
+    run.mkdir()
+    done = subprocess.run(
+        [sys.executable, "-c", LONG, str(run), str(ticks)],
+        env=_environment(),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    end_s, more_mib = map(float, done.stdout.split())
+    return [
+        Figure("long_flight_end_s", end_s, "s", "at most 20"),
+        Figure("long_flight_more_mib", more_mib, "MiB", "at most 150"),
+    ]
 
 
 def _conversion(folder: Path, form: str) -> Figure:

@@ -25,6 +25,7 @@ class EventKind(StrEnum):
     CONTROLLER = "controller"
     PEER = "peer"
     CONTROL = "control"
+    RATE = "rate"
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,6 +37,12 @@ class CommandLimits:
         """Return the voltages clamped, then moved at most one slew step away from `previous`."""
         largest = self.volts_max
         step = self.slew_volts_per_tick
+        if len(volts) == 2 and len(previous) == 2:
+            # Twice a tick in every flight: written out, it takes half the time.
+            return (
+                limited(volts[0], previous[0], largest, step),
+                limited(volts[1], previous[1], largest, step),
+            )
         return tuple(
             [
                 limited(wanted, before, largest, step)

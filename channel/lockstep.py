@@ -14,8 +14,10 @@ from channel.recording import Field, RecordChannel
 from channel.words import Word
 
 HISTORY_SAMPLES = 64
-"""Bound on history: echoes may lag, and symbols may jump ahead, by this many samples; past it the
-ends rejoin instead of catching up."""
+HISTORY_NS = 250_000_000
+"""Bound on history, whichever is longer: echoes may lag, and symbols may jump ahead, by this many
+samples or this time; past it the ends rejoin instead of catching up. In samples alone, the bound of a
+fast flight would be shorter than an ordinary pause of a process."""
 
 STATES_KEPT = 2 * HISTORY_SAMPLES
 INPUTS_KEPT = 64
@@ -46,9 +48,9 @@ class _Kept(NamedTuple):
 class History:
     """The last samples of one copy: word consumed and state after it."""
 
-    def __init__(self, codec: Codec) -> None:
+    def __init__(self, codec: Codec, states_kept: int = STATES_KEPT) -> None:
         self._codec = codec
-        self._kept: deque[_Kept] = deque(maxlen=STATES_KEPT)
+        self._kept: deque[_Kept] = deque(maxlen=states_kept)
 
     def add(self, epoch: int, word: Word, state: CodecState) -> None:
         """Keep one sample; `state` is the one after it."""

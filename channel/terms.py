@@ -12,6 +12,7 @@ from typing import Literal
 
 from channel.codec import Vector
 from channel.limits import CommandLimits
+from channel.lockstep import HISTORY_NS, HISTORY_SAMPLES
 
 Delivery = Literal["start", "end"]
 Clock = Literal["real", "virtual"]
@@ -69,7 +70,16 @@ class Terms:
 
     def slot_ns(self, slot: int) -> int:
         """Return the flight time at which a slot begins."""
-        return slot * self.sample_ns // self.symbols_per_word
+        return slot * self.tick_ns * self.ticks_per_sample // self.symbols_per_word
+
+    def samples_in(self, time_ns: int, at_least: int) -> int:
+        """Return a time as a number of samples, rounded up, and no fewer than `at_least`."""
+        return max(at_least, -(-time_ns // self.sample_ns))
+
+    @property
+    def history_samples(self) -> int:
+        """Return by how many samples echoes may lag and symbols may jump ahead."""
+        return self.samples_in(HISTORY_NS, HISTORY_SAMPLES)
 
     @property
     def lead_needed_ticks(self) -> int:

@@ -41,9 +41,10 @@ class Encoder:
 
         Raises ValueError when the angle is not finite.
         """
-        if not math.isfinite(angle_rad / math.tau * self.counts_per_turn):
-            raise ValueError(f"angle_rad is {angle_rad}; it must be finite")
-        return counts_of(angle_rad, self.counts_per_turn, self.sign, self.zero_counts)
+        try:
+            return counts_of(angle_rad, self.counts_per_turn, self.sign, self.zero_counts)
+        except (ValueError, OverflowError):
+            raise ValueError(f"angle_rad is {angle_rad}; it must be finite") from None
 
     def angle_rad(self, counts: int) -> float:
         """Return the angle in the middle of the range of angles that read `counts`."""

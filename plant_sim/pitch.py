@@ -108,8 +108,15 @@ def pitch_step(
     """
     theta, omega, front, rear = state
     a_w, a_th, k_v, theta_0, volts_max, h, left_half, left_whole = constants
-    v_f = min(max(volts[0], -volts_max), volts_max)
-    v_r = min(max(volts[1], -volts_max), volts_max)
+    v_f, v_r = volts
+    if v_f > volts_max:
+        v_f = volts_max
+    elif v_f < -volts_max:
+        v_f = -volts_max
+    if v_r > volts_max:
+        v_r = volts_max
+    elif v_r < -volts_max:
+        v_r = -volts_max
 
     # Both motors share one lag, so mu itself obeys (12) with the voltage difference.
     mu_held = v_f - v_r

@@ -56,7 +56,7 @@ class Commander:
         self.codec = codec
         self.terms = terms
         self.state = codec.initial()
-        self.history = History(codec)
+        self.history = History(codec, 2 * terms.history_samples)
         self.hold = terms.initial_command
         """last command decided"""
         self._controller = controller
@@ -66,6 +66,8 @@ class Commander:
         self._commands: deque[Vector] = deque([self.hold] * terms.lead_ticks)
         """of the next `D` ticks"""
         self._echoes: deque[Echo] = deque(maxlen=terms.repeats + 1)
+        self._millivolts: list[int] = []
+        """decided for the sample that is being flown"""
         self._unwritten: list[_Flown] = []
 
     def restart(self, sample: int) -> None:
@@ -79,7 +81,15 @@ class Commander:
         `silent_samples` had no symbol before.
         """
         known = tuple(self._commands)
-        self.state = carried_to(self.codec, self.state, sample, known, self.hold, silent_samples)
+        self.state = carried_to(
+            self.codec,
+            self.state,
+            sample,
+            known,
+            self.hold,
+            silent_samples,
+            self.terms.history_samples,
+        )
         self._hold(self.hold)
 
     def _hold(self, command: Vector) -> None:
@@ -90,6 +100,7 @@ class Commander:
     def fly(self, word: Word, epoch: int, now_ns: int) -> tuple[Echo, ...]:
         """Consume the word of the next sample; return its echo after those that it repeats."""
         before = self.state
+        self._millivolts = []
         flown = fly_sample(self.codec, before, word, tuple(self._commands), self._decide)
         self._commands.extend(flown.commands)
         for _ in range(len(self._commands) - self.terms.lead_ticks):
@@ -97,9 +108,8 @@ class Commander:
         self.state = flown.state
         self.history.add(epoch, word, self.state)
         digest = self.codec.digest(self.state)
-        millivolts = [mv for command in flown.commands for mv in to_millivolts(command)]
         number = self.codec.coder.alphabet.word_number(word)
-        self._echoes.append(Echo(before.sample, number, digest, tuple(millivolts)))
+        self._echoes.append(Echo(before.sample, number, digest, tuple(self._millivolts)))
         self._unwritten.append(_Flown(before, word, flown, digest, now_ns))
         if len(self._unwritten) >= UNWRITTEN_MAX:
             self.write_down()
@@ -117,7 +127,9 @@ class Commander:
         """Ask the controller, limit what it wants, and return it as the wire will carry it."""
         volts = self._ask(tick, state)
         limited = self.terms.limits.apply(volts, self.hold)
-        self.hold = from_millivolts(to_millivolts(limited))
+        millivolts = to_millivolts(limited)
+        self._millivolts += millivolts
+        self.hold = from_millivolts(millivolts)
         return self.hold
 
     def _reference_rad(self, tick: int) -> float | None:

@@ -118,8 +118,7 @@ class ManyService:
         probe_ns = now_ns + PROBE_NS
         poll_ns = now_ns + POLL_NS
         while not should_stop():
-            due_ns = min(probe_ns, self._due[0][0] if self._due else probe_ns)
-            self._take_in(due_ns)
+            self._take_in(self._earliest_ns(now_ns, probe_ns))
             now_ns = time.monotonic_ns()
             if now_ns >= probe_ns:
                 self.lateness.add(now_ns - probe_ns)
@@ -162,7 +161,31 @@ class ManyService:
         if due_ns is not None and (served.queued_ns is None or due_ns < served.queued_ns):
             served.queued_ns = due_ns
             heapq.heappush(self._due, (due_ns, served.name))
-        # A deadline that moved on is found out when the earlier one is reached.
+        # A deadline that has moved on stays in the heap until it comes to its top.
+
+    def _earliest_ns(self, now_ns: int, latest_ns: int) -> int:
+        """Return the earliest deadline, `latest_ns` at the latest.
+
+        Almost every deadline moves on, with the symbol that it waited for. These are put back here:
+        woken for each of them, the loop would wait for the interpreter twice per symbol.
+        """
+        while self._due:
+            queued_ns, name = self._due[0]
+            if queued_ns >= latest_ns:
+                break
+            served = self._served.get(name)
+            if served is None or served.queued_ns != queued_ns:
+                heapq.heappop(self._due)
+                continue
+            due_ns = served.service.next_due_ns(now_ns)
+            if due_ns is not None and due_ns <= queued_ns:
+                return queued_ns
+            served.queued_ns = due_ns
+            if due_ns is None:
+                heapq.heappop(self._due)
+            else:
+                heapq.heapreplace(self._due, (due_ns, name))
+        return latest_ns
 
     def _keep_deadlines(self, now_ns: int) -> None:
         while self._due and self._due[0][0] <= now_ns:

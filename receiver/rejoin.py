@@ -28,8 +28,10 @@ from channel.terms import Terms
 from channel.words import ERASED
 
 ANSWER_AGE_SAMPLES_MAX = 4
-"""A start that lies further back than this is not offered again: the motors would have no command for
-so long."""
+ANSWER_AGE_NS = 50_000_000
+"""A start that lies further back than both is not offered again: the motors would have no command for
+so long. In samples alone, every request of a fast flight would begin an epoch of its own before the
+answer to the one before can have arrived."""
 
 SILENT_SLOTS = 2
 """Slots missed in a row after which a transmitter may be taken for gone, if another one asks."""
@@ -57,7 +59,8 @@ class Verdict(Enum):
 class Greeter:
     """Judges requests; remembers who is flown with and what was answered."""
 
-    def __init__(self) -> None:
+    def __init__(self, terms: Terms) -> None:
+        self._answer_age_max = terms.samples_in(ANSWER_AGE_NS, ANSWER_AGE_SAMPLES_MAX)
         self.welcome: Welcome | None = None
         """last answer given"""
         self._stranger: int | None = None
@@ -77,7 +80,7 @@ class Greeter:
             return Verdict.IGNORE
         if hello.request == last.request:
             age = hello.sample - last.first_sample
-            return Verdict.REPEAT if age <= ANSWER_AGE_SAMPLES_MAX else Verdict.BEGIN
+            return Verdict.REPEAT if age <= self._answer_age_max else Verdict.BEGIN
         return _admitted(hello, identity)
 
     def on_symbol(self) -> None:
@@ -142,15 +145,16 @@ def carried_to(
     known: Sequence[Vector],
     hold: Vector,
     silent_samples: int,
+    carried_samples_max: int = HISTORY_SAMPLES,
 ) -> CodecState:
     """Return a state carried on without corrections to a later sample.
 
     `known` are the commands of its first ticks, `hold` that of all others; `silent_samples` had no
-    symbol before. At most `HISTORY_SAMPLES` samples are computed; beyond, as for a state that
+    symbol before. At most `carried_samples_max` samples are computed; beyond, as for a state that
     diverges, only the index moves on, and the initial state is what is left.
     """
     paused = sample - state.sample
-    if paused > HISTORY_SAMPLES:
+    if paused > carried_samples_max:
         return codec.initial()._replace(sample=sample)
     commands = chain(known, repeat(hold))
     try:

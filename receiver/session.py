@@ -31,7 +31,7 @@ from channel.frames import (
 )
 from channel.identity import Identity
 from channel.limits import to_millivolts
-from channel.lockstep import HISTORY_SAMPLES, History
+from channel.lockstep import History
 from channel.recording import NullRecorder, Recorder
 from channel.shaper import BaudMeter
 from channel.terms import Terms
@@ -43,9 +43,6 @@ from receiver.records import write_epoch, write_failure, write_symbol
 from receiver.rejoin import Greeter, Verdict, desync_answer, difference, first_sample
 from receiver.short_slots import SlotFinder
 from receiver.stranger import Stranger
-
-GAP_SAMPLES_MAX = HISTORY_SAMPLES
-"""A symbol this far ahead is no gap any more; after as many erasures in a row none are counted on."""
 
 EPOCH_MAX = 0xFFFF
 
@@ -90,7 +87,7 @@ class ReceiverSession:
         self.refusal: str | None = None
         self.desync: Desync | None = None
         self.events: deque[Event] = deque(maxlen=1000)
-        self._greeter = Greeter()
+        self._greeter = Greeter(terms)
         self._stranger = Stranger(session_number, take_over)
         self._recorder = recorder or NullRecorder()
         self._commander = Commander(codec, terms, controller, self._recorder, self.counts, self._tell)
@@ -103,6 +100,8 @@ class ReceiverSession:
         self._silent_slots = 0
         self._reported: tuple[int, int] | None = None
         self._slots = SlotFinder(terms)
+        self._gap_samples_max = terms.history_samples
+        """A symbol this far ahead is no gap any more; after as many erasures in a row none are due."""
 
     @property
     def state(self) -> CodecState:
@@ -160,9 +159,10 @@ class ReceiverSession:
         while deadline is not None and deadline <= now_ns:
             self._silent_slots += 1
             frames += self._settle(None, now_ns)
-            if self._silent_slots >= GAP_SAMPLES_MAX * self.terms.symbols_per_word:
+            if self._silent_slots >= self._gap_samples_max * self.terms.symbols_per_word:
                 self._anchor = None
-                self._tell(EventKind.PEER, f"no symbol for {GAP_SAMPLES_MAX} samples: waiting for one")
+                text = f"no symbol for {self._gap_samples_max} samples: waiting for one"
+                self._tell(EventKind.PEER, text)
             deadline = self.next_deadline()
         return frames
 
@@ -266,7 +266,7 @@ class ReceiverSession:
             write_symbol(self._recorder, self.terms, symbol, now_ns, taken=False)
             self._tell(EventKind.LATE_SYMBOL, f"slot {symbol.slot} was settled already: dropped")
             return []
-        if ahead > GAP_SAMPLES_MAX * self.terms.symbols_per_word:
+        if ahead > self._gap_samples_max * self.terms.symbols_per_word:
             self.counts["stale_frames"] += 1
             self._tell(EventKind.STALE, f"slot {symbol.slot} is {ahead} ahead: dropped")
             return [Unknown(symbol.session, symbol.epoch)]

@@ -30,7 +30,7 @@ from tenbaud.plugins import CONTROLLER, build_plugin
 from transmitter.guard import Guard, GuardSettings
 from transmitter.node import TransmitterNode
 from transmitter.scores import Scores
-from transmitter.session import LAG_SAMPLES_MAX, TransmitterSession
+from transmitter.session import TransmitterSession
 from transmitter.sight import Sight
 
 
@@ -52,7 +52,7 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
     scores = Scores(
         agreement.codec.model,
         agreement.window_start_tick,
-        (LAG_SAMPLES_MAX + 2) * terms.ticks_per_sample,
+        (terms.history_samples + 2) * terms.ticks_per_sample,
         (lambda _tick: None) if config.receiver.controller == "recorded" else reference.angle_rad,
         gauge.on_error if gauge is not None else lambda _error: None,
     )

@@ -10,7 +10,6 @@ import math
 from dataclasses import dataclass
 
 from channel.impairments import LineFaults
-from channel.lockstep import HISTORY_SAMPLES
 from channel.terms import Clock, Terms
 
 AUTO_SAMPLES = 5
@@ -59,12 +58,12 @@ def check_liveness(wanted_s: float | None, terms: Terms, trip: RoundTrip) -> Non
     """Raise ValueError, with what was set, what the least is and what to set, where nothing can fly."""
     tick_ms = terms.tick_ns / 1e6
     trip_samples = trip.longest_ticks / terms.ticks_per_sample
-    if trip_samples > HISTORY_SAMPLES:
+    if trip_samples > terms.history_samples:
         raise ValueError(
             f"the round trip takes up to {trip.longest_ticks * tick_ms:g} ms, which is "
-            f"{trip_samples:.1f} samples; both ends remember {HISTORY_SAMPLES}, so every echo would "
-            f"come too late: shorten it to {HISTORY_SAMPLES * terms.sample_ns / 1e6:g} ms, or lengthen "
-            "timing.symbol_period_s"
+            f"{trip_samples:.1f} samples; both ends remember {terms.history_samples}, so every echo "
+            "would come too late: shorten it to "
+            f"{terms.history_samples * terms.sample_ns / 1e6:g} ms, or lengthen timing.symbol_period_s"
         )
     last_ticks = terms.lead_ticks + terms.ticks_per_sample - 1
     if trip.in_time_ticks > last_ticks:

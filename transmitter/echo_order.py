@@ -10,17 +10,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from channel.frames import Echo
-from channel.lockstep import HISTORY_SAMPLES
 
 
 class EchoOrder:
     """Holds what came early; times are ticks.
 
-    `overtaking_ticks`: how long after a frame one may come that was sent before it.
+    `overtaking_ticks`: how long after a frame one may come that was sent before it. `ahead_samples`:
+    an echo that is further ahead of the expected one is not kept.
     """
 
-    def __init__(self, overtaking_ticks: int) -> None:
+    def __init__(self, overtaking_ticks: int, ahead_samples: int) -> None:
         self._overtaking_ticks = overtaking_ticks
+        self._ahead_samples = ahead_samples
         self._early: dict[int, Echo] = {}
         self._missing: int | None = None
         """sample whose echo a later frame has shown to be lost or overtaken"""
@@ -30,7 +31,7 @@ class EchoOrder:
     def add(self, echoes: Sequence[Echo], expected: int, tick: int) -> None:
         """Take the echoes of a frame; `expected` is the sample whose echo is next."""
         for echo in echoes:
-            if expected <= echo.sample <= expected + HISTORY_SAMPLES:
+            if expected <= echo.sample <= expected + self._ahead_samples:
                 self._early[echo.sample] = echo
         if echoes[0].sample > expected and self._missing != expected:
             self._missing, self._until_tick = expected, tick + self._overtaking_ticks

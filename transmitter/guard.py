@@ -68,7 +68,7 @@ class Guard:
     @property
     def stopped(self) -> bool:
         """Return whether the guard no longer passes commands."""
-        return self.state in (GuardState.RAMPING, GuardState.LATCHED)
+        return self.state is GuardState.RAMPING or self.state is GuardState.LATCHED
 
     def check_angles(self, tick: int, measured_rad: Vector) -> None:
         """Trip when an angle is beyond its soft limit or not a number."""

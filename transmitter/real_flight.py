@@ -2,7 +2,8 @@
 
 The time until the next deadline is spent taking frames in, so that a tick itself only reads, sends
 and writes. A tick is `floor((t - t0) / h)`: after a pause the ticks that passed are gone, their slots
-become erasures at the receiver, and nothing is sent in a burst afterwards.
+become erasures at the receiver, and nothing is sent in a burst afterwards. A loop that is behind its
+ticks still takes in what has come before it goes on: without the echoes it could never catch up.
 """
 
 from __future__ import annotations
@@ -21,12 +22,16 @@ from channel.uplink import Uplink
 from channel.virtual import is_envelope
 from transmitter.landing import Landing
 from transmitter.node import STOPPED, TransmitterNode
+from transmitter.rate_watch import RateWatch
+from transmitter.rejoin import ASK_AGAIN_NS
 from transmitter.session import Phase
 
 HELLO_PERIOD_S = 0.2
-"""Longest time between two requests for a session; a sample period if that is shorter."""
+"""Longest time between two requests for a session."""
 LEAD_IN_NS = 20_000_000
 """Between the handshake and tick 0."""
+CATCH_UP_MESSAGES_MAX = 64
+"""Messages taken in a row by a loop that is behind its ticks."""
 
 
 class RealFlight:
@@ -48,6 +53,7 @@ class RealFlight:
         self._peer_told = True
         """what was last told about the receiver: it is there"""
         self.lateness = LatenessMeter()
+        self.rate = RateWatch(node.session.terms)
         self.ticks_missed = 0
         self.inlet = Inlet(uplink.wire, node.on_malformed)
 
@@ -56,7 +62,7 @@ class RealFlight:
         session = self._node.session
         self._start_ns = asked_ns = time.monotonic_ns()
         next_hello_ns = asked_ns
-        period_ns = min(session.terms.sample_ns, round(HELLO_PERIOD_S * 1e9))
+        period_ns = min(max(session.terms.sample_ns, ASK_AGAIN_NS), round(HELLO_PERIOD_S * 1e9))
         while session.phase is Phase.GREETING and session.refusal is None:
             now_ns = time.monotonic_ns()
             if self._should_stop():
@@ -86,6 +92,8 @@ class RealFlight:
             if self._should_stop():
                 node.guard.trip(STOPPED)
             self._wait_until(tick * tick_ns)
+            if self._now_ns() - tick * tick_ns >= tick_ns:
+                self._catch_up()
             now_ns = self._now_ns()
             lateness_ns = now_ns - tick * tick_ns
             if lateness_ns >= tick_ns:
@@ -101,6 +109,7 @@ class RealFlight:
             node.actuate(tick, lateness_ns)
             node.rest()
             self._watch_peer()
+            self._watch_rate(tick)
             tick += 1
         return tick
 
@@ -156,6 +165,12 @@ class RealFlight:
                 wake_ns = deadline_ns if due_ns is None else min(deadline_ns, due_ns)
                 time.sleep(max(0.0, wake_ns - self._now_ns()) / 1e9)
 
+    def _catch_up(self) -> None:
+        """Take in what has come, within bounds: whoever floods this end must not stop its ticks."""
+        for _ in range(CATCH_UP_MESSAGES_MAX):
+            if not self._take_in(0.0):
+                return
+
     @property
     def _answer_due(self) -> bool:
         session = self._node.session
@@ -191,6 +206,11 @@ class RealFlight:
     def _send_due(self) -> None:
         for data, is_symbol in self._outbox.take(self._now_ns()):
             self._link.send(data, is_symbol)
+
+    def _watch_rate(self, tick: int) -> None:
+        text = self.rate.look(tick, self._node.session)
+        if text is not None:
+            self._node.tell(EventKind.RATE, text)
 
     def _watch_peer(self) -> None:
         present = self._link.peer_present()

@@ -1,8 +1,8 @@
 """How the transmitter asks for a session: at the start, and again whenever lockstep is gone.
 
-A request has a number and is repeated every sample period until an answer with this number comes: both
-the request and its answer may be lost, late or doubled. Nothing of the codec's state travels up the
-link; the answer brings the state to start from.
+A request has a number and is repeated every sample period, or every 10 ms if that is longer, until an
+answer with this number comes: both the request and its answer may be lost, late or doubled. Nothing of
+the codec's state travels up the link; the answer brings the state to start from.
 """
 
 from __future__ import annotations
@@ -13,6 +13,9 @@ from channel.identity import Identity
 from channel.limits import from_millivolts
 from channel.terms import Terms
 
+ASK_AGAIN_NS = 10_000_000
+"""Shortest time between two requests: a sample period may be shorter than the way to the receiver."""
+
 
 class Asking:
     """The request that is open, and when it is to be repeated."""
@@ -21,6 +24,7 @@ class Asking:
         self._identity = identity
         self._incarnation = incarnation
         self._terms = terms
+        self._period_ticks = terms.ticks_per_sample * terms.samples_in(ASK_AGAIN_NS, 1)
         self._request = 0
         self._why = Why.START
         self._next_tick = 0
@@ -40,7 +44,7 @@ class Asking:
         """Return whether the request is to be sent at this tick, and count it as sent."""
         if tick < self._next_tick:
             return False
-        self._next_tick = tick + self._terms.ticks_per_sample
+        self._next_tick = tick + self._period_ticks
         return True
 
     def hello(self, session: int, epoch: int, tick: int) -> Hello:

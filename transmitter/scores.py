@@ -29,7 +29,9 @@ class ErrorMeter:
     def add(self, error: float) -> None:
         """Take one error."""
         self.count += 1
-        self.largest = max(self.largest, abs(error))
+        size = error if error >= 0.0 else -error
+        if size > self.largest:
+            self.largest = size
         self._sum_of_squares += error * error
 
     @property
@@ -78,10 +80,12 @@ class Scores:
         angle = angles_rad[0]
         self.last_angle_rad = angle
         if tick >= self.window_start_tick:
-            self.angle_max_rad = max(self.angle_max_rad, abs(angle))
+            if angle > self.angle_max_rad or -angle > self.angle_max_rad:
+                self.angle_max_rad = abs(angle)
             reference = self._reference(tick)
             if reference is not None:
-                self.reference_max_rad = max(self.reference_max_rad, abs(reference))
+                if reference > self.reference_max_rad or -reference > self.reference_max_rad:
+                    self.reference_max_rad = abs(reference)
                 self.tracking.add(reference - angle)
         self._angles.append((tick, angle))
         self._join()

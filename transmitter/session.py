@@ -34,7 +34,7 @@ from channel.frames import (
 )
 from channel.identity import Identity, differing_fields
 from channel.limits import from_millivolts
-from channel.lockstep import HISTORY_SAMPLES, LOCKSTEP_CHANNEL, History
+from channel.lockstep import LOCKSTEP_CHANNEL, History
 from channel.recording import NullRecorder, Recorder
 from channel.terms import Terms
 from channel.wire import WIRE_VERSION
@@ -46,9 +46,6 @@ from transmitter.owing import Owing
 from transmitter.records import write_sample
 from transmitter.rejoin import Asking, start_of
 from transmitter.sight import Sight
-
-LAG_SAMPLES_MAX = HISTORY_SAMPLES
-"""Echoes may be this many samples behind before a rejoin is asked for."""
 
 
 class Phase(Enum):
@@ -102,14 +99,16 @@ class TransmitterSession:
         self.epoch_tick = 0
         """first tick of the present epoch"""
         self.owing = Owing(terms)
-        self.confirmed: deque[Confirmed] = deque(maxlen=2 * LAG_SAMPLES_MAX)
+        self.confirmed: deque[Confirmed] = deque(maxlen=2 * terms.history_samples)
         """samples confirmed and not yet written down (`take_confirmed`)"""
         self.events: deque[Event] = deque(maxlen=1000)
-        self.history = History(codec)
+        self.history = History(codec, 2 * terms.history_samples)
         self._asking = Asking(identity, incarnation, terms)
         self._claims = Claims(terms)
         self._stop_on_desync = stop_on_desync
-        self._echoes = EchoOrder(overtaking_ticks)
+        self._echoes = EchoOrder(overtaking_ticks, terms.history_samples)
+        self._lag_samples_max = terms.history_samples
+        """Echoes may be this many samples behind before a rejoin is asked for."""
         self._sight = (sight or Sight(codec.model, terms.tick_ns / 1e9)) if codec.uses_rates else None
         self._recorder = recorder or NullRecorder()
         self._due: deque[tuple[int, Vector]] = deque(
@@ -142,8 +141,8 @@ class TransmitterSession:
         if self.phase is not Phase.FLYING:
             return []
         sample, offset = divmod(tick, self.terms.ticks_per_sample)
-        if sample - self.copies.confirmed.sample > LAG_SAMPLES_MAX:
-            return self.rejoin(Why.LAG, f"no echo for {LAG_SAMPLES_MAX} samples")
+        if sample - self.copies.confirmed.sample > self._lag_samples_max:
+            return self.rejoin(Why.LAG, f"no echo for {self._lag_samples_max} samples")
         if problem := self._check_gap():
             return problem
         while self.copies.next_sample < sample:

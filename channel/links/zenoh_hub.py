@@ -50,6 +50,8 @@ class ZenohHub:
             )
         self.counts = LinkCounts()
         self._joined: dict[str, tuple[zenoh.Publisher, zenoh.LivelinessToken]] = {}
+        self._names: dict[str, str] = {}
+        """session names by the keys of those joined, which nearly all messages have"""
         self._inbox: ChannelInbox | None = None
         self._closed = False
         self._gate: Gate | None = None
@@ -71,9 +73,10 @@ class ZenohHub:
         sample = self._inbox.sample(timeout_s) if self._inbox is not None else None
         if sample is None:
             return None
-        name = str(sample.key_expr).removeprefix(f"{KEY_ROOT}/").rpartition("/up/")[0]
+        key = str(sample.key_expr)
+        name = self._names.get(key) or key.removeprefix(f"{KEY_ROOT}/").rpartition("/up/")[0]
         # The key is the sender's choice, and a name leads to a configuration and a folder.
-        if not is_session_name(name):
+        if key not in self._names and not is_session_name(name):
             self.counts.dropped["no session's name"] += 1
             return None
         data = sample.payload.to_bytes()
@@ -103,11 +106,14 @@ class ZenohHub:
             f"{KEY_ROOT}/{name}/alive/receiver/{secrets.token_hex(4)}"
         )
         self._joined[name] = (publisher, token)
+        self._names |= dict.fromkeys(_inbound_keys(name), name)
 
     def leave(self, name: str) -> None:
         """Take back what `join` did."""
         joined = self._joined.pop(name, None)
         if joined is not None:
+            for key in _inbound_keys(name):
+                self._names.pop(key, None)
             publisher, token = joined
             token.undeclare()
             publisher.undeclare()
@@ -143,6 +149,10 @@ class ZenohHub:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _inbound_keys(name: str) -> tuple[str, str]:
+    return f"{KEY_ROOT}/{name}/up/symbol", f"{KEY_ROOT}/{name}/up/control"
 
 
 def _command_key(name: str) -> str:

@@ -12,27 +12,46 @@ from typing import Self
 from channel.errors import LinkError
 from channel.links.endpoints import check_endpoints
 from channel.links.security import Security
-from channel.links.zenoh_config import as_file, open_session, zenoh_config, zenoh_settings
+from channel.links.zenoh_config import (
+    SESSIONS_MAX,
+    as_file,
+    open_session,
+    zenoh_config,
+    zenoh_settings,
+)
 from channel.links.zenoh_gate import Gate
 
 
-def router_file(listen: tuple[str, ...], security: Security | None) -> str:
+def router_file(
+    listen: tuple[str, ...], security: Security | None, connections_max: int = SESSIONS_MAX
+) -> str:
     """Return the settings of such a router as a file for a stand-alone one."""
-    return as_file(zenoh_settings("router", listen, (), security=security))
+    return as_file(_settings(listen, security, connections_max))
+
+
+def _settings(
+    listen: tuple[str, ...], security: Security | None, connections_max: int
+) -> dict[str, object]:
+    return zenoh_settings("router", listen, (), security=security, connections_max=connections_max)
 
 
 class ZenohRouter:
     """Within a `with`, routes between the nodes that connect to `listen`; LinkError if it cannot."""
 
     def __init__(
-        self, listen: tuple[str, ...], *, security: Security | None = None, insecure: bool = False
+        self,
+        listen: tuple[str, ...],
+        *,
+        security: Security | None = None,
+        insecure: bool = False,
+        connections_max: int = SESSIONS_MAX,
     ) -> None:
         if not listen:
             raise LinkError("a router needs an endpoint to listen on")
         check_endpoints(listen, insecure, security is not None)
         self.refused: Counter[str] = Counter()
         """nodes turned away, by reason"""
-        settings = zenoh_settings("router", listen, (), security=security)
+        settings = _settings(listen, security, connections_max)
         self._session = open_session(zenoh_config(settings), ", ".join(listen))
         self._gate = Gate(self._session, security, self.refused)
         self._closed = False

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import zenoh
 
@@ -51,6 +52,15 @@ class TelemetryPort:
                 self._session.declare_subscriber(
                     f"{KEY_ROOT}/{session_name}/control", _handler(on_command, 4096)
                 )
+
+    def is_watched(self) -> bool:
+        """Return whether anybody subscribes to this end's telemetry. Raises LinkError."""
+        try:
+            # Zenoh's annotation says bool; it is an object with this one field.
+            status: Any = self._publisher.matching_status
+            return bool(status.matching)
+        except zenoh.ZError as error:
+            raise LinkError(f"telemetry could not be sent: {error}") from error
 
     def publish(self, data: bytes) -> None:
         """Send one message to whoever listens. Raises LinkError."""

@@ -81,7 +81,16 @@ def motor_volts(constants: PidConstants, pitch_volts: float) -> tuple[float, flo
     largest = constants.volts_max
     front = (constants.normal_force_volts + pitch_volts) / 2.0
     rear = (constants.normal_force_volts - pitch_volts) / 2.0
-    return min(max(front, -largest), largest), min(max(rear, -largest), largest)
+    # Comparisons: in plain Python they take a third of the time of `min` and `max`.
+    if front > largest:
+        front = largest
+    elif front < -largest:
+        front = -largest
+    if rear > largest:
+        rear = largest
+    elif rear < -largest:
+        rear = -largest
+    return front, rear
 
 
 class Pid:

@@ -41,17 +41,21 @@ def convert(
     from tenbaud.recording.convert import convert as convert_run
     from tenbaud.recording.run import Run
 
-    for path in convert_run(Run(run), to.value, out, overwrite=force):
+    opened = Run(run)
+    for note in opened.notes:
+        typer.echo(f"note: {note}", err=True)
+    for path in convert_run(opened, to.value, out, overwrite=force):
         typer.echo(str(path))
 
 
 def recover(
     run: RunArgument,
     out: Annotated[
-        Path | None, typer.Option(help="Where the whole file goes; the cut one then stays as it is.")
+        Path | None,
+        typer.Option(help="Where the whole file goes; the damaged one then stays."),
     ] = None,
 ) -> None:
-    """Make whole files of recordings that a crash has cut; the cut ones are kept.
+    """Make whole files of recordings that were cut or damaged; the damaged ones are kept.
 
     [dim]tenbaud recover runs/2026-11-23T10-00-00_paper-10baud[/dim]
     """

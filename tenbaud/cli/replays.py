@@ -44,7 +44,11 @@ def replay(
     from tenbaud.replay.replay import replay as fly_again
     from tenbaud.replay.replay import save_symbols
 
-    replayed = fly_again(load_record(run, other, allow_code=allow_code))
+    record = load_record(run, other, allow_code=allow_code)
+    for _, tables in record.ends():
+        for note in tables.notes:
+            typer.echo(f"note: {note}", err=True)
+    replayed = fly_again(record)
     typer.echo(replay_text(replayed))
     if save is not None:
         try:

@@ -30,6 +30,10 @@ def router(
     ] = None,
     keys: Annotated[Path | None, typer.Option(help="This router's key folder.")] = None,
     insecure: options.Insecure = False,
+    connections_max: Annotated[
+        int,
+        typer.Option(min=1, help="Nodes connected at a time at most: rigs, receivers, viewers."),
+    ] = 64,
     print_config: Annotated[
         bool,
         typer.Option("--print-config", help="Do not route: print the settings for a zenohd that does."),
@@ -52,9 +56,9 @@ def router(
     if insecure and security is None:
         typer.echo(INSECURE, err=True)
     if print_config:
-        typer.echo(router_file(addresses, security), nl=False)
+        typer.echo(router_file(addresses, security, connections_max), nl=False)
         return
-    _route(addresses, security, insecure)
+    _route(addresses, security, insecure, connections_max)
 
 
 def _security(keys: Path | None, flights: list[str]) -> Security | None:
@@ -77,7 +81,9 @@ def _security(keys: Path | None, flights: list[str]) -> Security | None:
     return Security(node.credentials, tuple(one for text in flights for one in _invited(text)))
 
 
-def _route(addresses: tuple[str, ...], security: Security | None, insecure: bool) -> None:
+def _route(
+    addresses: tuple[str, ...], security: Security | None, insecure: bool, connections_max: int
+) -> None:
     from channel.links.zenoh_gate import HandshakeLog
     from channel.links.zenoh_router import ZenohRouter
     from tenbaud.flight.stop import StopFlag
@@ -85,7 +91,9 @@ def _route(addresses: tuple[str, ...], security: Security | None, insecure: bool
     with (
         StopFlag() as stop,
         HandshakeLog() as log,
-        ZenohRouter(addresses, security=security, insecure=insecure) as running,
+        ZenohRouter(
+            addresses, security=security, insecure=insecure, connections_max=connections_max
+        ) as running,
     ):
         typer.echo(f"tenbaud router at {', '.join(addresses)}", err=True)
         _tell_until(stop, running)

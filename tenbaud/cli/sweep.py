@@ -42,9 +42,7 @@ def sweep(
 ) -> None:
     """Fly a study: settings swept on a grid or sampled, many seeds, results as Parquet and plots.
 
-    The same command goes on with what is missing after a stop or a kill. Four or more seeds of a point
-    are flown side by side; flights of different points are not, so many seeds of few points are flown
-    sooner than few seeds of many.
+    The same command goes on with what is missing after a stop or a kill.
     """
     from tenbaud.studies.run import run_study
     from tenbaud.studies.settings import StudyError

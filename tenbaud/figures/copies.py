@@ -13,7 +13,7 @@ from plant_sim.pitch import PitchPlant
 from tenbaud.build_codec import build_codec
 from tenbaud.build_rig import nominal_plant
 from tenbaud.config.load import load_config
-from tenbaud.recording.figure import Series
+from tenbaud.recording.envelope import Series
 
 DURATION_S = 60.0
 FLIPPED = 0.05

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tenbaud.figures.flights import Curves
-from tenbaud.recording.figure import Series
+from tenbaud.recording.envelope import Series
 from tenbaud.recording.reader import Recording
 
 

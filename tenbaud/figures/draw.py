@@ -24,7 +24,7 @@ from tenbaud.figures.style import (
     new_figure,
     save,
 )
-from tenbaud.recording.figure import Series
+from tenbaud.recording.envelope import Series
 
 TICK_S = 0.01
 PERIOD_S = 25.0

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from channel.errors import TenbaudError
-from tenbaud.recording.figure import Series
+from tenbaud.recording.envelope import Series
 
 WORKERS = 2
 GRACE_S = 3.0

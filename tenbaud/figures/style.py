@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tenbaud.recording.figure import Series, decimate
+from tenbaud.recording.envelope import Series, thin
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,7 +44,7 @@ def legend_above(panel: Axes) -> None:
 
 def decimated(times: Series, values: Series) -> tuple[Series, Series]:
     """Return a curve of few enough points for a small file, its extremes kept."""
-    return decimate(np.asarray(times), np.asarray(values), POINTS)
+    return thin(np.asarray(times), np.asarray(values), POINTS)
 
 
 def save(figure: Figure, paths: Sequence[Path]) -> None:

@@ -21,7 +21,7 @@ from tenbaud.figures.curves import read_curves
 from tenbaud.figures.flights import Curves
 from tenbaud.figures.style import FAINT, LINE_A, LINE_B, LINE_C, legend_above, new_figure, save
 from tenbaud.limits.closed import DOUBLE_INTEGRATOR
-from tenbaud.recording.figure import Series
+from tenbaud.recording.envelope import Series
 
 TORQUE_DENSITY = 2e-3
 """q of the white torque in rad^2/s^3, where a figure has one."""

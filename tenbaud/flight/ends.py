@@ -25,6 +25,7 @@ from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, gap_part, link_part, receiver_part, transmitter_part
 from tenbaud.flight.transmit import Stop
 from tenbaud.recording.folder import RunFolder
+from tenbaud.recording.gather import OverviewRecorder
 from tenbaud.recording.shared import SharedWriter
 from tenbaud.recording.writer import McapRecorder
 from tenbaud.telemetry.compose import ReceiverComposer, TransmitterComposer
@@ -187,8 +188,11 @@ def open_recorder(
         "seed": str(agreement.config.seed),
         "impairments": agreement.config.link.impairments,
     }
+    # Of many rigs no figures are drawn at the end.
+    overview = OverviewRecorder() if writer is None else None
     # Virtual time can outrun the disk and is not disturbed by waiting for it.
-    return McapRecorder(path, metadata, wait_when_full=agreement.clock == "virtual", shared=writer)
+    wait = agreement.clock == "virtual"
+    return McapRecorder(path, metadata, wait_when_full=wait, shared=writer, overview=overview)
 
 
 def transmitter_status(run: transmit.TransmitterRun) -> Status:
@@ -211,6 +215,7 @@ def transmitter_status(run: transmit.TransmitterRun) -> Status:
         "rejoins": node.session.counts["rejoins"],
         "words": node.session.history.last_words(WORDS_SHOWN),
         "guard": node.guard.state.value,
+        "kept_symbols_per_s": run.rate and run.rate.kept_symbols_per_s,
         **gap_part(node.gauge.now if node.gauge is not None else None),
     }
 

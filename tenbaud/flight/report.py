@@ -19,6 +19,7 @@ ROWS: tuple[tuple[str, str, str], ...] = (
     ("coder bits up", "coder_bits_up", "{:g}"),
     ("baud: configured", "baud_configured", "{:g}"),
     ("baud: measured by the receiver", "baud_measured", "{:.3f}"),
+    ("symbols/s asked for / in time / missing", "rate", "{}"),
     ("wire bytes up / down", "wire_bytes", "{}"),
     ("erasures / late symbols", "lost", "{}"),
     ("bytes on the serial line up / down", "line_bytes", "{}"),
@@ -111,6 +112,11 @@ def _value(summary: Summary, name: str) -> Any:
         case "lost":
             late = get("symbols_late")
             return f"{get('erasures')} / {'-' if late is None else late}"
+        case "rate":
+            asked, kept = get("symbols_per_s_asked"), get("symbols_per_s_kept")
+            if kept is None or get("loop_late_ms_p50") is None:
+                return None
+            return f"{asked:g} / {kept:.1f} / {get('symbols_missing_share'):.2%}"
         case "rejoins":
             return f"{get('rejoins')}, {get('rejoin_bytes')} control bytes" if get("rejoins") else None
         case "impairments":

@@ -109,6 +109,7 @@ def status_line(status: Status) -> str:
         ("rms_over_floor", "floor x", "{:.1f}"),
         ("erasures", "erased", "{}"),
         ("guard", "guard", "{}"),
+        ("kept_symbols_per_s", "TOO SLOW: symbols/s in time", "{:.0f}"),
     ):
         if status.get(name) is not None:
             words.append(f"{label} {form.format(status[name])}")

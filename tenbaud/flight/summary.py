@@ -59,12 +59,28 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         "commands_late": node.commands_late,
         "symbols_refused": run.uplink.shaper.refused,
         "words_missed": session.counts["words_missed"],
+        **_rate(run),
         "sensor_fault": node.sensor_fault,
         "loop_late_ms_p50": None,
         "loop_late_ms_p99": None,
         "loop_late_ms_max": None,
         "realtime_factor": flown_s / run.flight_s if run.flight_s else None,
         **run.extra,
+    }
+
+
+def _rate(run: TransmitterRun) -> Summary:
+    """Return the symbol rate asked for, the one kept, and the share that is missing."""
+    terms, counts = run.agreement.terms, run.node.session.counts
+    asked = 1e9 * terms.symbols_per_word / terms.sample_ns
+    if not run.ticks:
+        return {"symbols_per_s_asked": asked, "symbols_per_s_kept": None, "symbols_missing_share": None}
+    samples = run.ticks / terms.ticks_per_sample
+    share = min(1.0, (counts["digest_checks"] - counts["erasures"]) / samples)
+    return {
+        "symbols_per_s_asked": asked,
+        "symbols_per_s_kept": share * asked,
+        "symbols_missing_share": 1.0 - share,
     }
 
 

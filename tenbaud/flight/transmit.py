@@ -21,6 +21,7 @@ from tenbaud.build_ends import build_line, build_transmitter, build_uplink
 from tenbaud.flight.outcome import FLIGHT_OVER, ExitCode, Outcome
 from tenbaud.flight.verdict import FlightCounts, faults_of, settings_of, verdict_text
 from transmitter.node import STOPPED, TransmitterNode
+from transmitter.rate_watch import RateWatch
 from transmitter.real_flight import RealFlight
 from transmitter.session import Phase
 from transmitter.virtual_flight import VirtualFlight
@@ -47,6 +48,8 @@ class TransmitterRun:
     wire_bytes_down: int = 0
     desyncs_asked: float = 0.0
     """lockstep failures that were asked for while the flight went on"""
+    rate: RateWatch | None = None
+    """whether the symbol rate is kept; on a real clock"""
     extra: dict[str, Any] = field(default_factory=dict)
     """figures of the clock that was flown on"""
 
@@ -86,6 +89,7 @@ def fly_virtual(run: TransmitterRun, peer: Peer, should_stop: Stop) -> Outcome:
 def fly_real(run: TransmitterRun, link: Link, should_stop: Stop) -> Outcome:
     """Fly on the real clock over a link."""
     flight = RealFlight(run.node, run.uplink, link, should_stop)
+    run.rate = flight.rate
     with run.node.rig:
         flight.greet(run.agreement.config.link.peer_timeout_s)
         if should_stop():

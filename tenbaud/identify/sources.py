@@ -74,8 +74,8 @@ def from_run(folder: Path) -> PitchRecord:
     recording = Recording(find_recordings(folder)[0])
     ticks, rows = [], []
     for _, row in recording.rows("tick"):
-        if "measured_rad" not in row:
-            break
+        if not row.get("measured_rad") or len(row.get("applied_volts") or ()) != 2:
+            continue  # a tick without a reading: a gap, told below
         ticks.append(row["tick"])
         rows.append((row["measured_rad"][0], *row["applied_volts"]))
     if not ticks:
@@ -89,7 +89,10 @@ def from_run(folder: Path) -> PitchRecord:
                 "identified across them: choose a stretch with --from and --to"
             )
     columns = np.array(rows, dtype=np.float64)
-    step_s = float(recording.metadata["tick_s"])
+    try:
+        step_s = float(recording.metadata["tick_s"])
+    except (KeyError, ValueError):
+        raise IdentificationError(f"{recording.path} does not say how long its ticks are") from None
     return PitchRecord(step_s, columns[:, 0], columns[:, 1], columns[:, 2])
 
 

@@ -13,7 +13,8 @@ from typing import NamedTuple
 from tenbaud.recording.comparison import Compared, Difference, unlike_field
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import TRANSMITTER_NAME
-from tenbaud.recording.reader import Recording, Row
+from tenbaud.recording.reader import Recording
+from tenbaud.recording.rows import Row
 
 TOPIC, KEY = "sample", "sample"
 Epoch = tuple[object, object]

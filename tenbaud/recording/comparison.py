@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 
-from tenbaud.recording.reader import Row
+from tenbaud.recording.rows import Row
 
 NO_FIELD = "(no such field)"
 MISSING_SHOWN = 8

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import orjson
+from numpy.typing import NDArray
 
 from channel.recording import Field, RecordChannel
 from tenbaud.recording.columns import TABLES, Column, all_columns, flight_columns
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.layouts import flight_layouts, layout_paths
 from tenbaud.recording.run import Run
+
+ROWS_AT_ONCE = 10_000
 
 
 def convert(run: Run, form: str, output: Path | None = None, overwrite: bool = False) -> list[Path]:
@@ -92,14 +95,22 @@ def _write_csv(run: Run, folder: Path) -> None:
     """A line of names, then a line per row; numbers read back to the same bits, nothing for NaN."""
     folder.mkdir()
     for name, columns in all_columns(run).items():
-        cells = [_csv_cells(column) for column in columns]
         with (folder / f"{name}.csv").open("w", encoding="utf-8", newline="") as stream:
             stream.write(",".join(column.name for column in columns) + "\r\n")
-            stream.writelines(",".join(row) + "\r\n" for row in zip(*cells, strict=True))
+            for rows in _stretches(columns):
+                cells = [_csv_cells(column, rows) for column in columns]
+                stream.writelines(",".join(row) + "\r\n" for row in zip(*cells, strict=True))
 
 
-def _csv_cells(column: Column) -> list[str]:
-    values = column.values.tolist()
+def _stretches(columns: list[Column]) -> Iterator[slice]:
+    """Yield the rows of a table a stretch at a time: as objects they take ten times the memory."""
+    count = len(columns[0].values)
+    for start in range(0, count, ROWS_AT_ONCE):
+        yield slice(start, min(count, start + ROWS_AT_ONCE))
+
+
+def _csv_cells(column: Column, rows: slice) -> list[str]:
+    values = column.values[rows].tolist()
     if column.is_text:
         return ["" if value is None else _quoted(value) for value in values]
     if column.values.dtype == np.float64:
@@ -168,26 +179,26 @@ def _write_parquet(run: Run, folder: Path) -> None:
 def _write_json(run: Run, path: Path) -> None:
     """The signals by name with unit, description and values; null where there is no value."""
     tables = all_columns(run)
-    document = {
-        "run": {**run.metadata, "path": str(run.path), "tick_s": run.base.tick_s},
-        "time_s": run.time_s,
-        "signals": {
-            signal.name: {
-                "unit": signal.unit,
-                "description": signal.description,
-                "values": signal.values,
-            }
-            for signal in run.signals.values()
-        },
-        "samples": {
-            column.name: column.values.tolist()
-            if column.is_text
-            else np.ascontiguousarray(column.values)
-            for column in tables.get("samples", [])
-        },
-        "events": run.events,
-    }
-    path.write_bytes(orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY))
+    samples = {column.name: column for column in tables.get("samples", [])}
+    with path.open("wb") as stream:
+        about = {**run.metadata, "path": str(run.path), "tick_s": run.base.tick_s}
+        stream.write(b'{"run":' + orjson.dumps(about) + b',"time_s":' + _json_values(run.time_s))
+        stream.write(b',"signals":{')
+        for number, signal in enumerate(run.signals.values()):
+            told = {"unit": signal.unit, "description": signal.description}
+            stream.write(b"," if number else b"")
+            stream.write(orjson.dumps(signal.name) + b":" + orjson.dumps(told)[:-1] + b',"values":')
+            stream.write(_json_values(signal.values) + b"}")
+        stream.write(b'},"samples":{')
+        for number, (name, column) in enumerate(samples.items()):
+            stream.write(b"," if number else b"")
+            stream.write(orjson.dumps(name) + b":" + _json_values(column.values))
+        stream.write(b'},"events":' + orjson.dumps(run.events) + b"}")
+
+
+def _json_values(values: NDArray[Any]) -> bytes:
+    plain = values.tolist() if values.dtype == object else np.ascontiguousarray(values)
+    return orjson.dumps(plain, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
 def _write_mcap(run: Run, path: Path) -> None:
@@ -207,11 +218,11 @@ def _write_mcap(run: Run, path: Path) -> None:
             for column in columns
         ),
     )
-    rows = zip(*(column.values.tolist() for column in columns), strict=True)
     tick_ns = run.base.tick_s * 1e9
     with McapRecorder(path, run.metadata, wait_when_full=True) as recorder:
-        for row in rows:
-            recorder.write(channel, round(row[0] * tick_ns), row)
+        for part in _stretches(columns):
+            for row in zip(*(column.values[part].tolist() for column in columns), strict=True):
+                recorder.write(channel, round(row[0] * tick_ns), row)
     if recorder.error is not None:
         raise RecordingError(recorder.error)
 

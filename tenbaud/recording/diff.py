@@ -14,10 +14,11 @@ from pathlib import Path
 from channel.recording import RecordChannel
 from tenbaud.recording.both_ends import compare_ends
 from tenbaud.recording.comparison import Compared, Difference, unlike_field
+from tenbaud.recording.encoding import END_METADATA
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RECEIVER_NAME, TRANSMITTER_NAME, RunFolder
-from tenbaud.recording.reader import Recording, Row
-from tenbaud.recording.writer import END_METADATA
+from tenbaud.recording.reader import Recording
+from tenbaud.recording.rows import Row
 
 IGNORED_TOPIC = "event"
 

@@ -15,6 +15,12 @@ import orjson
 
 from channel.recording import Field, FieldType, RecordChannel
 
+RUN_METADATA = "run"
+"""Metadata of a recording: what the run said about itself when it began."""
+END_METADATA = "recorder"
+"""Written when a recording is finished only: how many rows were written and dropped, and why."""
+OVERVIEW_METADATA = "overview"
+"""What the figure of a long flight shows (`overview.py`)."""
 KEY_PROPERTY = "key"
 """In a schema: the name of the field that counts the rows (tick or sample)."""
 
@@ -64,7 +70,7 @@ def _field_schema(field: Field) -> dict[str, object]:
 
 def channel_from_schema(topic: str, data: bytes) -> RecordChannel:
     """The inverse of `channel_schema`; raises ValueError or KeyError for a foreign schema."""
-    schema = json.loads(data)
+    schema = orjson.loads(data)
     return RecordChannel(
         topic,
         tuple(_field_from_schema(name, entry) for name, entry in schema["properties"].items()),

@@ -2,27 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from itertools import pairwise
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from channel.impairments import parse_impairments
+from tenbaud.recording.encoding import OVERVIEW_METADATA, RUN_METADATA
+from tenbaud.recording.envelope import Series
 from tenbaud.recording.errors import RecordingError
-from tenbaud.recording.reader import Recording
+from tenbaud.recording.overview import (
+    FIELDS,
+    Columns,
+    Overview,
+    marks_of,
+    unpacked,
+)
+from tenbaud.recording.reader import MessageStream, rows_in_blocks, stored_metadata
+from tenbaud.recording.rows import Row
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-Series = NDArray[np.float64]
-
-POINTS_PER_CURVE = 4000
-SYMBOLS_DRAWN_SINGLY = 1200
-"""Beyond these the bits of a flight merge into a solid block; their mean is drawn instead."""
 
 PITCH_COLOUR = "#1b1b1b"
 REFERENCE_COLOUR = "#8a8a8a"
@@ -33,56 +36,38 @@ FLIP_COLOUR = "#8e3fb0"
 REJOIN_COLOUR = "#2a8c4a"
 
 
-@dataclass(slots=True)
-class _Curve:
-    """Values over flight time, NaN where there is none."""
-
-    times_s: list[float] = field(default_factory=list)
-    values: list[float] = field(default_factory=list)
-
-    def add(self, time_s: float, value: float) -> None:
-        self.times_s.append(time_s)
-        self.values.append(value)
-
-
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class _Flight:
-    """What the figure shows, read from the recordings."""
+    """What the figure shows."""
 
-    pitch: _Curve = field(default_factory=_Curve)
-    reference: _Curve = field(default_factory=_Curve)
-    coded: _Curve = field(default_factory=_Curve)
-    live: _Curve = field(default_factory=_Curve)
-    error_coded: _Curve = field(default_factory=_Curve)
-    error_live: _Curve = field(default_factory=_Curve)
-    range: _Curve = field(default_factory=_Curve)
-    symbols: _Curve = field(default_factory=_Curve)
-    erasures_s: list[float] = field(default_factory=list)
-    flips_s: list[float] = field(default_factory=list)
-    """samples whose word arrived as another one"""
-    desyncs_s: list[float] = field(default_factory=list)
-    rejoins_s: list[float] = field(default_factory=list)
-    cuts_s: list[tuple[float, float]] = field(default_factory=list)
+    curves: dict[str, tuple[Series, Series]]
+    marks: dict[str, Series]
+    symbols: tuple[Series, Series]
+    symbols_are_means: bool
+    cuts_s: list[tuple[float, float]]
     """times in which nothing was to pass, on purpose"""
 
     @property
     def live_is_coded(self) -> bool:
         """Whether both estimates are one, as without a command lead: one curve hides the other."""
-        return np.array_equal(self.live.values, self.coded.values, equal_nan=True)
+        return np.array_equal(self.curves["live"][1], self.curves["coded"][1], equal_nan=True)
 
 
 def draw_flight(transmitter: Path, receiver: Path | None, output: Path, title: str) -> None:
-    """Draw the first measured axis of a flight into the PNG file `output`.
+    """Draw the first measured axis of a flight that was just flown into the PNG file `output`.
 
     The pitch is the true one where the rig knows it, else the measured one; the errors are taken
     from it. The receiver's recording adds the reference. Raises RecordingError if the
     transmitter's recording holds no flight.
     """
-    draw_run(transmitter, receiver, title).savefig(output, dpi=150, format="png")
+    draw_run(transmitter, receiver, title, own=True).savefig(output, dpi=150, format="png")
 
 
-def draw_run(transmitter: Path | None, receiver: Path | None, title: str) -> Figure:
-    """Return the same as a matplotlib figure. Raises RecordingError without a transmitter's file."""
+def draw_run(transmitter: Path | None, receiver: Path | None, title: str, own: bool = False) -> Figure:
+    """Return the same as a matplotlib figure. Raises RecordingError without a transmitter's file.
+
+    `own`: the recordings were made just now, and what they store for the figure is believed.
+    """
     from matplotlib.figure import Figure  # takes half a second, which other commands need not pay
 
     if transmitter is None:
@@ -90,7 +75,7 @@ def draw_run(transmitter: Path | None, receiver: Path | None, title: str) -> Fig
             "There is no transmitter's recording here, and the pitch is recorded there. Give the "
             "folder of the transmitter's run."
         )
-    flight = _read_flight(transmitter, receiver)
+    flight = _read_flight(transmitter, receiver, own)
     figure = Figure(figsize=(9.0, 9.0), layout="constrained")
     panels = figure.subplots(4, 1, sharex=True, height_ratios=[3.0, 2.0, 1.6, 1.0])
     _draw_pitch(panels[0], flight)
@@ -102,99 +87,90 @@ def draw_run(transmitter: Path | None, receiver: Path | None, title: str) -> Fig
         panel.grid(visible=True, color="#e6e6e6", linewidth=0.6)
         panel.set_axisbelow(True)
         panel.spines[["top", "right"]].set_visible(False)
-    panels[0].set_xlim(flight.pitch.times_s[0], max(flight.pitch.times_s[-1], 1e-3))
+    times_s, _ = flight.curves["pitch"]
+    panels[0].set_xlim(times_s[0], max(times_s[-1], 1e-3))
     panels[-1].set_xlabel("time, s")
     figure.suptitle(title, fontsize=11)
     figure.align_ylabels(panels)
     return figure
 
 
-def _read_flight(transmitter: Path, receiver: Path | None) -> _Flight:
-    flight = _Flight()
-    recording = Recording(transmitter)
-    pitch_of_tick: dict[int, float] = {}
-    for time_ns, row in recording.rows("tick"):
-        pitch_rad = _first(row.get("true_rad"))
-        if np.isnan(pitch_rad):
-            pitch_rad = _first(row.get("measured_rad"))
-        flight.pitch.add(time_ns / 1e9, pitch_rad)
-        pitch_of_tick[row["tick"]] = pitch_rad
-    if not flight.pitch.times_s:
+def _read_flight(transmitter: Path, receiver: Path | None, own: bool) -> _Flight:
+    overview, metadata = _read_overview(transmitter, own)
+    times_s, _ = overview.curves["pitch"].curve()
+    if not len(times_s):
         raise RecordingError(
             f"The recording {transmitter} holds no ticks, so there is no flight to draw. "
             "Give a transmitter's recording."
         )
-    for time_ns, row in recording.rows("estimate"):
-        time_s = time_ns / 1e9
-        pitch_rad = pitch_of_tick.get(row["tick"], np.nan)
-        coded_rad, live_rad = _first(row.get("coded_state")), _first(row.get("live_state"))
-        flight.coded.add(time_s, coded_rad)
-        flight.live.add(time_s, live_rad)
-        flight.error_coded.add(time_s, pitch_rad - coded_rad)
-        flight.error_live.add(time_s, pitch_rad - live_rad)
-    _read_samples(recording, flight)
-    _read_faults(recording, flight)
     if receiver is not None:
-        for time_ns, row in Recording(receiver).rows("tick"):
-            flight.reference.add(time_ns / 1e9, _first(row.get("reference_rad")))
-    return flight
+        overview.curves["reference"] = _read_overview(receiver, own)[0].curves["reference"]
+    return _Flight(
+        {name: one.curve() for name, one in overview.curves.items()},
+        {name: marks_of(one) for name, one in overview.marks.items()},
+        overview.symbols.curve(),
+        overview.symbols.thinned,
+        _cuts(metadata.get("impairments", ""), times_s[-1]),
+    )
 
 
-def _read_samples(recording: Recording, flight: _Flight) -> None:
-    words: list[tuple[float, list[float]]] = []
-    for time_ns, row in recording.rows("sample"):
-        time_s = time_ns / 1e9
-        flight.range.add(time_s, _first(row.get("range")))
-        if row.get("word") is None:
-            flight.erasures_s.append(time_s)
-        elif row.get("word_sent") not in (None, row["word"]):
-            flight.flips_s.append(time_s)
-        words.append((time_s, row.get("word") or [np.nan]))
-    for index, (time_s, word) in enumerate(words):
-        # The symbols of a word fill its sample period evenly; the last period is not recorded.
-        period_s = words[index + 1][0] - time_s if index + 1 < len(words) else 0.0
-        for slot, symbol in enumerate(word):
-            flight.symbols.add(time_s + period_s * slot / len(word), symbol)
+def _read_overview(path: Path, own: bool = False) -> tuple[Overview, dict[str, str]]:
+    """Return the overview of a recording and what the run said about itself, in one pass over its rows.
+
+    `own`: the recording was made just now, and the overview that it stores is believed, if it has one.
+    """
+    stored = stored_metadata(path, (OVERVIEW_METADATA, RUN_METADATA)) if own else {}
+    if OVERVIEW_METADATA in stored:
+        found = unpacked(stored[OVERVIEW_METADATA])
+        if found is not None:
+            return found, stored.get(RUN_METADATA, {})
+    overview = Overview()
+    stream = MessageStream(path)
+    for block in rows_in_blocks(stream, FIELDS):
+        for topic, (times, rows) in block.items():
+            names = {one.name for one in stream.channels[topic].fields}
+            overview.add(topic, times, _columns_of(rows, names))
+    overview.finish()
+    return overview, stream.metadata.get(RUN_METADATA, {})
 
 
-def _read_faults(recording: Recording, flight: _Flight) -> None:
-    if "event" in recording.topics:
-        for time_ns, row in recording.rows("event"):
-            if row.get("kind") == "desync":
-                flight.desyncs_s.append(time_ns / 1e9)
-            elif row.get("kind") == "rejoin" and "begins" in str(row.get("text")):
-                flight.rejoins_s.append(time_ns / 1e9)
-    faults = parse_impairments(str(recording.metadata.get("impairments", "")))
-    end_s = flight.pitch.times_s[-1]
-    for start_ns, end_ns in {*faults.up.cuts, *faults.down.cuts}:
-        if start_ns / 1e9 < end_s:
-            flight.cuts_s.append((start_ns / 1e9, min(end_ns / 1e9, end_s)))
+def _columns_of(rows: Sequence[Row], names: set[str]) -> Columns:
+    return lambda name: [row[name] for row in rows] if name in names else None
 
 
-def _first(value: Any) -> float:
-    """The first axis of a recorded number or list of numbers; NaN for null."""
-    if isinstance(value, list):
-        value = value[0] if value else None
-    return float("nan") if value is None else float(value)
+def _cuts(impairments: str, end_s: float) -> list[tuple[float, float]]:
+    try:
+        faults = parse_impairments(impairments)
+    except ValueError:  # of another version
+        return []
+    cuts = sorted({*faults.up.cuts, *faults.down.cuts})
+    return [(start / 1e9, min(end / 1e9, end_s)) for start, end in cuts if start / 1e9 < end_s]
 
 
 def _draw_pitch(panel: Axes, flight: _Flight) -> None:
-    _plot(panel, flight.reference, "reference", color=REFERENCE_COLOUR, linewidth=1.1, linestyle="-.")
+    _plot(
+        panel,
+        flight.curves["reference"],
+        "reference",
+        color=REFERENCE_COLOUR,
+        linewidth=1.1,
+        linestyle="-.",
+    )
     # Good estimates lie on the pitch: only thin lines over a thick one can all be seen.
-    _plot(panel, flight.pitch, r"pitch $\theta$", color=PITCH_COLOUR, linewidth=2.2)
+    _plot(panel, flight.curves["pitch"], r"pitch $\theta$", color=PITCH_COLOUR, linewidth=2.2)
     if flight.live_is_coded:
-        _plot(panel, flight.coded, "estimate", color=CODED_COLOUR, linewidth=0.8)
+        _plot(panel, flight.curves["coded"], "estimate", color=CODED_COLOUR, linewidth=0.8)
     else:
-        _plot(panel, flight.live, "live estimate", color=LIVE_COLOUR, linewidth=0.8)
-        _plot(panel, flight.coded, "coded estimate", color=CODED_COLOUR, linewidth=0.8)
+        _plot(panel, flight.curves["live"], "live estimate", color=LIVE_COLOUR, linewidth=0.8)
+        _plot(panel, flight.curves["coded"], "coded estimate", color=CODED_COLOUR, linewidth=0.8)
     for index, (start_s, end_s) in enumerate(flight.cuts_s):
         label = "line cut" if index == 0 else ""
         panel.axvspan(start_s, end_s, color=ERASURE_COLOUR, alpha=0.12, linewidth=0, label=label)
     for name, times_s, colour in (
-        ("rejoin", flight.rejoins_s, REJOIN_COLOUR),
-        ("desync", flight.desyncs_s, ERASURE_COLOUR),
+        ("rejoin", flight.marks["rejoin"], REJOIN_COLOUR),
+        ("desync", flight.marks["desync"], ERASURE_COLOUR),
     ):
-        if times_s:
+        if len(times_s):
             places = [0.04] * len(times_s)
             across = panel.get_xaxis_transform()
             style: dict[str, Any] = {
@@ -209,40 +185,36 @@ def _draw_pitch(panel: Axes, flight: _Flight) -> None:
 
 
 def _draw_errors(panel: Axes, flight: _Flight) -> None:
+    coded, live = flight.curves["error_coded"], flight.curves["error_live"]
     if flight.live_is_coded:
-        _plot(panel, flight.error_coded, "error of the estimate", color=CODED_COLOUR, linewidth=0.9)
+        _plot(panel, coded, "error of the estimate", color=CODED_COLOUR, linewidth=0.9)
     else:
-        _plot(panel, flight.error_live, "error of the live estimate", color=LIVE_COLOUR, linewidth=0.9)
-        _plot(
-            panel, flight.error_coded, "error of the coded estimate", color=CODED_COLOUR, linewidth=0.9
-        )
+        _plot(panel, live, "error of the live estimate", color=LIVE_COLOUR, linewidth=0.9)
+        _plot(panel, coded, "error of the coded estimate", color=CODED_COLOUR, linewidth=0.9)
     panel.axhline(0.0, color="#999999", linewidth=0.6)
     panel.set_ylabel("error, rad")
     _legend_above(panel)
 
 
 def _draw_range(panel: Axes, flight: _Flight) -> None:
-    _plot(panel, flight.range, "", color=CODED_COLOUR, linewidth=0.9, drawstyle="steps-post")
+    _plot(panel, flight.curves["range"], "", color=CODED_COLOUR, linewidth=0.9, drawstyle="steps-post")
     panel.set_ylim(bottom=0.0)
     panel.set_ylabel("range $M_k$, rad")
 
 
 def _draw_symbols(panel: Axes, flight: _Flight) -> None:
-    times_s, symbols = _arrays(flight.symbols)
-    if len(symbols) <= SYMBOLS_DRAWN_SINGLY:
+    times_s, symbols = flight.symbols
+    if not flight.symbols_are_means:
         label = "bits"
         panel.vlines(times_s, 0.0, symbols, color=PITCH_COLOUR, linewidth=0.8)
     else:
         label = "mean of bits"
-        times_s, symbols = _bucket_means(times_s, symbols, SYMBOLS_DRAWN_SINGLY)
-        panel.fill_between(times_s, symbols, step="post", color=PITCH_COLOUR, linewidth=0.0)
+        means = np.nan_to_num(symbols)
+        panel.fill_between(times_s, means, step="post", color=PITCH_COLOUR, linewidth=0.0)
     panel.axhline(0.0, color="#999999", linewidth=0.6)
-    erasures_s = np.unique(flight.erasures_s[:: 1 + len(flight.erasures_s) // POINTS_PER_CURVE])
-    if len(erasures_s):
-        panel.vlines(erasures_s, -1.0, 1.0, color=ERASURE_COLOUR, linewidth=0.9, label="erased")
-    if flight.flips_s:
-        flips_s = flight.flips_s[:: 1 + len(flight.flips_s) // POINTS_PER_CURVE]
-        panel.vlines(flips_s, -1.0, 1.0, color=FLIP_COLOUR, linewidth=0.9, label="flipped")
+    for name, colour in (("erased", ERASURE_COLOUR), ("flipped", FLIP_COLOUR)):
+        if len(flight.marks[name]):
+            panel.vlines(flight.marks[name], -1.0, 1.0, color=colour, linewidth=0.9, label=name)
     _legend_above(panel)
     panel.set_ylim(-1.35, 1.35)
     panel.set_yticks([-1.0, 0.0, 1.0])
@@ -263,55 +235,6 @@ def _legend_above(panel: Axes) -> None:
         )
 
 
-def _plot(panel: Axes, curve: _Curve, label: str, **style: Any) -> None:
-    times_s, values = interrupt_gaps(*_arrays(curve))
-    if np.isnan(values).all():
-        return
-    panel.plot(*decimate(times_s, values, POINTS_PER_CURVE), label=label, **style)
-
-
-def _arrays(curve: _Curve) -> tuple[Series, Series]:
-    return np.array(curve.times_s, dtype=np.float64), np.array(curve.values, dtype=np.float64)
-
-
-def interrupt_gaps(times: Series, values: Series) -> tuple[Series, Series]:
-    """Put a NaN into every gap of more than five usual steps, where rows were lost or none came.
-
-    Without it a straight line would pass for a flight.
-    """
-    if len(times) < 3:
-        return times, values
-    steps = np.diff(times)
-    after = np.flatnonzero(steps > 5.0 * np.median(steps)) + 1
-    return np.insert(times, after, times[after - 1]), np.insert(values, after, np.nan)
-
-
-def decimate(times: Series, values: Series, points: int) -> tuple[Series, Series]:
-    """Thin a curve to at most `points` points, keeping each bucket's lowest and highest.
-
-    A bucket with a NaN keeps one, so that the curve stays interrupted there; such a bucket may have
-    three points.
-    """
-    if len(values) <= points:
-        return times, values
-    kept: list[int] = []
-    edges = np.linspace(0, len(values), points // 2 + 1).astype(int)
-    for start, end in pairwise(edges):
-        bucket = values[start:end]
-        if np.isnan(bucket).all():
-            kept.append(int(start))
-            continue
-        chosen = {int(start + np.nanargmin(bucket)), int(start + np.nanargmax(bucket))}
-        gaps = np.flatnonzero(np.isnan(bucket))
-        if len(gaps):
-            chosen.add(int(start + gaps[0]))
-        kept.extend(sorted(chosen))
-    return times[kept], values[kept]
-
-
-def _bucket_means(times: Series, values: Series, buckets: int) -> tuple[Series, Series]:
-    edges = np.linspace(0, len(values), buckets + 1).astype(int)[:-1]
-    known = ~np.isnan(values)
-    sums = np.add.reduceat(np.where(known, values, 0.0), edges)
-    counts = np.add.reduceat(known.astype(np.float64), edges)
-    return times[edges], sums / np.maximum(counts, 1.0)
+def _plot(panel: Axes, curve: tuple[Series, Series], label: str, **style: Any) -> None:
+    if not np.isnan(curve[1]).all():
+        panel.plot(*curve, label=label, **style)

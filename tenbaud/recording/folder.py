@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import re
+import stat
 from dataclasses import dataclass
 from datetime import datetime
 from itertools import count
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
+
+import orjson
 
 from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.lock import hold
 
 DEFAULT_ROOT = Path("runs")
 CONFIG_NAME = "config.toml"
@@ -17,6 +23,8 @@ TRANSMITTER_NAME = "transmitter.mcap"
 RECEIVER_NAME = "receiver.mcap"
 SUMMARY_NAME = "summary.json"
 FIGURE_NAME = "flight.png"
+SMALL_BYTES_MAX = 4 << 20
+"""Of a configuration or a summary that is read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,16 +61,6 @@ class RunFolder:
     def recordings(self) -> list[Path]:
         """The recordings that exist, the transmitter's first; RecordingError for a symbolic link."""
         return [path for path in (self.transmitter, self.receiver) if is_own_file(path)]
-
-    def text_of(self, path: Path) -> str | None:
-        """The text of a file of this folder, None where there is none to be read.
-
-        RecordingError for a symbolic link.
-        """
-        try:
-            return path.read_text() if is_own_file(path) else None
-        except (OSError, UnicodeDecodeError):
-            return None
 
 
 def is_own_file(path: Path) -> bool:
@@ -140,17 +138,49 @@ def find_recordings(path: Path) -> list[Path]:
     return found
 
 
-def open_new_recording(path: Path) -> BinaryIO:
-    """Open a file for writing; RecordingError if it holds data or cannot be made."""
+def read_small(path: Path) -> str:
+    """Return the text of a small file of a run folder.
+
+    Raises OSError for what is missing, no plain file or too large, ValueError for what is no text, and
+    RecordingError for a symbolic link.
+    """
+    is_own_file(path)
+    handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
+    with open(handle, "rb") as stream:
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
+            raise OSError(errno.EINVAL, "it is no plain file", str(path))
+        data = stream.read(SMALL_BYTES_MAX + 1)
+    if len(data) > SMALL_BYTES_MAX:
+        raise OSError(errno.EFBIG, f"it has more than {SMALL_BYTES_MAX} bytes", str(path))
+    return data.decode()
+
+
+def read_summary(path: Path) -> dict[str, Any]:
+    """Return the figures in a `summary.json`; empty where there is none that can be read."""
     try:
-        if path.exists() and path.stat().st_size > 0:
-            raise RecordingError(
-                f"The recording {path} exists already and is not overwritten. "
-                "Choose another folder or move the file away."
-            )
-        return path.open("wb")
+        summary = orjson.loads(read_small(path))
+    except (OSError, ValueError):
+        return {}
+    return summary if isinstance(summary, dict) else {}
+
+
+def open_new_recording(path: Path) -> BinaryIO:
+    """Open a file for writing, and hold its lock; RecordingError if it holds data or cannot be made.
+
+    A link is not followed: what it leads to is nobody's recording.
+    """
+    flags = os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC | getattr(os, "O_NOFOLLOW", 0)
+    try:
+        stream = os.fdopen(os.open(path, flags, 0o666), "wb")
     except OSError as error:
         raise RecordingError(
             f"The recording {path} cannot be created: {error.strerror or error}. "
             "Check that its folder exists and may be written to."
         ) from error
+    if not hold(stream.fileno()) or os.fstat(stream.fileno()).st_size > 0:
+        stream.close()
+        raise RecordingError(
+            f"The recording {path} exists already and is not overwritten. "
+            "Choose another folder or move the file away."
+        )
+    return stream

@@ -8,10 +8,15 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+import orjson
+
 from channel.recording import Field, RecordChannel
-from tenbaud.recording.folder import RunFolder, find_recordings
-from tenbaud.recording.reader import Recording, Row, TopicSummary
-from tenbaud.recording.writer import END_METADATA
+from tenbaud.recording.encoding import END_METADATA
+from tenbaud.recording.folder import RunFolder, find_recordings, read_summary
+from tenbaud.recording.holes import Hole
+from tenbaud.recording.notes import hole_notes, printable, stray_notes, version_notes
+from tenbaud.recording.reader import Recording, TopicSummary
+from tenbaud.recording.rows import Row
 
 EVENT_TOPIC = "event"
 EVENTS_SHOWN = 20
@@ -27,6 +32,9 @@ class Description:
     metadata: dict[str, str]
     rows_dropped: int | None
     error: str | None
+    holes: list[Hole]
+    notes: list[str]
+    """another version, holes"""
     topics: dict[str, TopicSummary]
     events: list[Row]
     """The first twenty."""
@@ -44,10 +52,9 @@ def describe_text(path: Path) -> str:
     """The same for a person, as plain text; for a run folder headed by the run's figures."""
     described = describe(path)
     parts = [_headline(path), *(_text(description) for description in described)]
-    cut = [description.path for description in described if not description.complete]
-    if cut:
-        parts.append(f"`tenbaud recover {path}` makes whole files of what was cut")
-    return "\n\n".join(part for part in parts if part)
+    if not all(description.complete for description in described):
+        parts.append(f"`tenbaud recover {path}` makes whole files of what was cut or damaged")
+    return printable("\n\n".join(part for part in parts if part))
 
 
 def describe_json(path: Path) -> list[dict[str, Any]]:
@@ -57,21 +64,19 @@ def describe_json(path: Path) -> list[dict[str, Any]]:
 
 def _headline(path: Path) -> str:
     """Return what `summary.json` says in one line; empty without it."""
-    folder = RunFolder(path)
-    text = folder.text_of(folder.summary)
-    try:
-        summary = json.loads(text or "null")
-    except ValueError:
+    summary = read_summary(RunFolder(path).summary)
+    if not summary:
         return ""
-    if not isinstance(summary, dict):
-        return ""
-    parts = [
-        f"{summary.get('preset')}: {summary.get('outcome')}",
-        f"{summary['duration_s']:g} s" if "duration_s" in summary else "",
-        f"{summary['coder_bits_up']:g} bits up" if "coder_bits_up" in summary else "",
-        f"{summary['erasures']} erasures" if summary.get("erasures") else "",
-        f"{summary['desyncs']} desyncs" if summary.get("desyncs") else "",
-    ]
+    parts = [f"{summary.get('preset')}: {summary.get('outcome')}"]
+    for name, form in (
+        ("duration_s", "{:g} s"),
+        ("coder_bits_up", "{:g} bits up"),
+        ("erasures", "{:g} erasures"),
+        ("desyncs", "{:g} desyncs"),
+    ):
+        value = summary.get(name)
+        if isinstance(value, int | float) and (value or name not in ("erasures", "desyncs")):
+            parts.append(form.format(value))
     return ", ".join(part for part in parts if part)
 
 
@@ -82,6 +87,8 @@ def _plain(description: Description) -> dict[str, Any]:
         "complete": description.complete,
         "rows_dropped": description.rows_dropped,
         "error": description.error,
+        "notes": description.notes,
+        "holes": [asdict(hole) for hole in description.holes],
         "metadata": description.metadata,
         "topics": {
             topic: {
@@ -104,20 +111,36 @@ def _describe_file(path: Path) -> Description:
         size_bytes=path.stat().st_size,
         complete=recording.complete,
         metadata=recording.metadata,
-        rows_dropped=int(end["rows_dropped"]) if "rows_dropped" in end else None,
+        rows_dropped=_count(end.get("rows_dropped")),
         error=end.get("error"),
+        holes=recording.holes,
+        notes=[
+            *version_notes(path, recording.metadata),
+            *hole_notes(path, recording.holes),
+            *stray_notes(path, recording.strays),
+        ],
         topics=recording.topics,
         events=[row for _, row in islice(recording.rows(EVENT_TOPIC), EVENTS_SHOWN)],
     )
 
 
+def _count(text: str | None) -> int | None:
+    """Return a number that the recorder wrote at the end."""
+    return int(text) if text is not None and text.isascii() and text.isdigit() else None
+
+
 def _text(description: Description) -> str:
-    state = "complete" if description.complete else "cut: these are the rows up to the cut"
+    state = "complete"
+    if not description.complete:
+        state = "damaged: these are the rows that are whole"
+        if not description.holes:
+            state = "cut: these are the rows up to the cut"
     lines = [str(description.path), f"  {description.size_bytes / 1e6:.2f} MB, {state}"]
     if description.rows_dropped:
         lines.append(f"  {description.rows_dropped} rows were dropped")
     if description.error is not None:
         lines.append(f"  {description.error}")
+    lines += [f"  {note}" for note in description.notes]
     for name, value in description.metadata.items():
         lines.extend(_metadata_lines(name, value))
     for topic, summary in description.topics.items():
@@ -136,13 +159,16 @@ def _text(description: Description) -> str:
 def _metadata_lines(name: str, value: str) -> list[str]:
     """Return one line; for a configuration, which is JSON, one per section."""
     try:
-        sections = json.loads(value) if value.startswith("{") else None
+        sections = orjson.loads(value) if value.startswith("{") else None
     except ValueError:
         sections = None
     if not isinstance(sections, dict):
         return [f"  {name} = {value}"]
     lines = [f"  {name}"]
     for section, fields in sections.items():
+        if not isinstance(fields, dict):
+            lines.append(f"    {section}: {json.dumps(fields)}")
+            continue
         told = ", ".join(f"{field} {json.dumps(one)}" for field, one in fields.items())
         lines.append(f"    {section}: {told}")
     return lines

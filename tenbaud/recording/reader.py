@@ -1,98 +1,174 @@
-"""Reads recordings, whole ones and those cut by a crash.
+"""Reads recordings: whole ones, those cut by a crash, and those that somebody else gave you.
 
 Every file is read from its beginning: of one without an end, a reader that starts from the index at
-the end gets nothing.
+the end gets nothing. What is damaged is left out and told of (`MessageStream.holes`); what was never
+written by tenbaud is a RecordingError. Every command that reads a recording does it through here.
 """
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Iterator
+import os
+import stat
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import BinaryIO
 
-import orjson
-from mcap.exceptions import McapError
-from mcap.records import Channel, Footer, Metadata, Schema
+from mcap.records import Channel, Footer, Metadata, MetadataIndex, Schema
 from mcap.writer import MCAP0_MAGIC
-from zstandard import ZstdError
 
 from channel.recording import RecordChannel
-from tenbaud.recording.chunks import Record, records_of_file
-from tenbaud.recording.encoding import channel_from_schema
+from tenbaud.recording.chunks import (
+    Damage,
+    Described,
+    RawMessage,
+    blocks_of_file,
+    metadata_at,
+    summary_of_file,
+)
+from tenbaud.recording.encoding import END_METADATA, RUN_METADATA, channel_from_schema
 from tenbaud.recording.errors import RecordingError
-from tenbaud.recording.writer import RUN_METADATA
+from tenbaud.recording.gaps import HoleFinder
+from tenbaud.recording.holes import HOLES_METADATA, Hole, unpacked_holes
+from tenbaud.recording.rows import Row, RowDecoder, channel_of_names, check_channel
 
-Row = dict[str, Any]
-"""Field name to value; the values are those of JSON."""
-
-# What a torn end looks like to the reader, depending on where the cut fell: too few bytes for a
-# number, for a record, for a compressed chunk, or (a failed checksum, ValueError) blocks that the
-# file system had promised and never filled.
-_CUT_ERRORS = (McapError, struct.error, ZstdError, ValueError, OverflowError, MemoryError)
+METADATA_RECORDS_MAX = 100
 
 
 class MessageStream:
     """Iterates over (topic, time in ns, row) in the order of the file, in bounded memory.
 
-    What it has met so far is in `channels` and `metadata`. After the last message, `complete`
-    tells whether the file was finished properly; False means that it was cut and that the
-    messages are those up to the cut.
+    What it has met so far is in `channels` and `metadata`. After the last message, `complete` tells
+    whether the file was finished properly and all of it could be read, and `holes` what is missing
+    between rows that are there.
     """
 
-    def __init__(self, path: Path, topic: str | None = None) -> None:
-        """`topic` restricts the stream to one topic; raises RecordingError for a wrong file."""
-        _check_head(path)
+    def __init__(self, path: Path, topic: str | None = None, size: int | None = None) -> None:
+        """`topic` restricts the stream to one topic, `size` to so many bytes of a file that grows.
+
+        Raises RecordingError for a wrong file.
+        """
+        with open_recording(path) as stream:
+            _check_head(path, stream.read(len(MCAP0_MAGIC)))
         self.path = path
         self.complete = False
         self.channels: dict[str, RecordChannel] = {}
         self.metadata: dict[str, dict[str, str]] = {}
+        self.strays = 0
+        """rows of channels that the file does not describe"""
         self._topic = topic
+        self._size = size
+        self._schemas: dict[int, Schema] = {}
+        self._topics: dict[int, str | None] = {}
+        self._finder = HoleFinder()
+        self._ended = False
+
+    @property
+    def holes(self) -> list[Hole]:
+        """What is missing, also where an earlier recovery has found it."""
+        found = self._finder.holes(self._topics, self.channels, self._ended)
+        return unpacked_holes(self.metadata.get(HOLES_METADATA, {})) + found
 
     def __iter__(self) -> Iterator[tuple[str, int, Row]]:
+        decoders: dict[str, RowDecoder] = {}
         for topic, time_ns, data in self.undecoded():
-            yield topic, time_ns, orjson.loads(data)
+            if topic not in decoders:
+                decoders[topic] = RowDecoder(str(self.path), self.channels[topic])
+            yield topic, time_ns, decoders[topic].decode((data,))[0]
 
     def undecoded(self) -> Iterator[tuple[str, int, bytes]]:
         """The same messages as the bytes in the file: for counting, where decoding is wasted."""
-        schemas: dict[int, Schema] = {}
-        topics: dict[int, str] = {}
         wanted = self._topic
-        for record in self._records():
-            if isinstance(record, tuple):
-                topic = topics[record[0]]
-                if wanted is None or wanted == topic:
-                    yield topic, record[1], record[2]
-            elif isinstance(record, Schema):
-                schemas[record.id] = record
-            elif isinstance(record, Channel):
-                topics[record.id] = record.topic
-                self.channels.setdefault(record.topic, self._channel(record, schemas))
-            elif isinstance(record, Metadata):
-                self.metadata[record.name] = dict(record.metadata)
+        for messages in self._blocks():
+            for channel_id, time_ns, data in messages:
+                topic = self._topics[channel_id]
+                if topic is not None and (wanted is None or wanted == topic):
+                    yield topic, time_ns, data
 
-    def _records(self) -> Iterator[Record]:
-        footer_seen = False
-        with self.path.open("rb") as stream:
-            try:
-                for record in records_of_file(stream, self.path.stat().st_size):
+    def texts(self) -> Iterator[dict[str, tuple[list[int], list[bytes]]]]:
+        """Yield block by block what each topic has there: times in ns and undecoded rows."""
+        for messages in self._blocks():
+            found: dict[int, tuple[list[int], list[bytes]]] = {}
+            for channel_id, time_ns, data in messages:
+                if channel_id not in found:
+                    found[channel_id] = ([], [])
+                times, texts = found[channel_id]
+                times.append(time_ns)
+                texts.append(data)
+            block: dict[str, tuple[list[int], list[bytes]]] = {}
+            for channel_id, (times, texts) in found.items():
+                topic = self._topics[channel_id]
+                if topic is not None and self._topic in (None, topic):
+                    before = block.setdefault(topic, ([], []))
+                    before[0].extend(times)
+                    before[1].extend(texts)
+            yield block
+
+    def _blocks(self) -> Iterator[list[RawMessage]]:
+        """Yield the messages of each block, its channels known."""
+        footer_seen = damaged = False
+        with open_recording(self.path) as stream:
+            there = os.fstat(stream.fileno()).st_size
+            size = there if self._size is None else min(there, self._size)
+            for block in blocks_of_file(stream, size):
+                if isinstance(block, Damage):
+                    damaged = True
+                    # The recorder says that last: no row comes behind it.
+                    if END_METADATA not in self.metadata:
+                        self._finder.on_damage(block)
+                    continue
+                for record in block.described:
                     footer_seen = footer_seen or isinstance(record, Footer)
-                    yield record
-            except _CUT_ERRORS:
-                return
-        self.complete = footer_seen
+                    self._describe(record)
+                if block.messages:
+                    self._finder.on_messages(block.messages)
+                    self._know(block.messages)
+                    yield block.messages
+        self._ended = footer_seen
+        self.complete = footer_seen and not damaged
 
-    def _channel(self, record: Channel, schemas: dict[int, Schema]) -> RecordChannel:
+    def _describe(self, record: Described) -> None:
+        if isinstance(record, Schema):
+            self._schemas[record.id] = record
+        elif isinstance(record, Channel):
+            self._topics[record.id] = record.topic
+            if record.topic not in self.channels:
+                self.channels[record.topic] = self._channel(record)
+        elif isinstance(record, Metadata) and len(self.metadata) < METADATA_RECORDS_MAX:
+            self.metadata[record.name] = dict(record.metadata)
+
+    def _know(self, messages: list[RawMessage]) -> None:
+        """Find out what the rows of a channel are whose description is lost."""
+        there = {message[0] for message in messages}
+        if there - self._topics.keys():
+            with open_recording(self.path) as stream:
+                for record in summary_of_file(stream, os.fstat(stream.fileno()).st_size):
+                    if isinstance(record, Schema) or (
+                        isinstance(record, Channel) and record.id not in self._topics
+                    ):
+                        self._describe(record)
+        for channel_id in there - self._topics.keys():
+            data = next(message[2] for message in messages if message[0] == channel_id)
+            channel = channel_of_names(data)
+            self._topics[channel_id] = None if channel is None else channel.topic
+            if channel is not None:
+                self.channels.setdefault(channel.topic, channel)
+        unknown = {channel_id for channel_id in there if self._topics[channel_id] is None}
+        if unknown:
+            self.strays += sum(message[0] in unknown for message in messages)
+
+    def _channel(self, record: Channel) -> RecordChannel:
         try:
-            return channel_from_schema(record.topic, schemas[record.schema_id].data)
+            channel = channel_from_schema(record.topic, self._schemas[record.schema_id].data)
+            check_channel(channel)
         except (ValueError, KeyError, AttributeError, TypeError) as error:
             raise RecordingError(
                 f"The recording {self.path} was not written by tenbaud: its topic "
                 f"{record.topic!r} is not described as tenbaud does ({error}). "
                 "Open it with the program that wrote it."
             ) from error
+        return channel
 
 
 @dataclass(slots=True)
@@ -108,6 +184,9 @@ class TopicSummary:
 @dataclass(slots=True)
 class _Survey:
     complete: bool
+    holes: list[Hole]
+    strays: int
+    size: int
     metadata: dict[str, dict[str, str]]
     topics: dict[str, TopicSummary] = field(default_factory=dict)
 
@@ -117,13 +196,23 @@ class Recording:
 
     def __init__(self, path: Path) -> None:
         """Raises RecordingError if there is no such file, or if it is empty or no MCAP file."""
-        _check_head(path)
+        MessageStream(path)
         self.path = path
 
     @property
     def complete(self) -> bool:
-        """False if the file was cut; its rows are then those up to the cut."""
+        """False if the file was cut or damaged; its rows are then those that are whole."""
         return self._survey.complete
+
+    @property
+    def holes(self) -> list[Hole]:
+        """What is missing between rows that are there."""
+        return self._survey.holes
+
+    @property
+    def strays(self) -> int:
+        """Rows that nothing in the file describes, and that are left out."""
+        return self._survey.strays
 
     @property
     def metadata(self) -> dict[str, str]:
@@ -145,38 +234,98 @@ class Recording:
             raise RecordingError(
                 f"The recording {self.path} has no topic {topic!r}. "
                 f"It has: {', '.join(self.topics) or 'none at all'}."
+                + ("" if self.complete else " It was cut or damaged before one.")
             )
         return self.topics[topic].channel
 
     def rows(self, topic: str) -> Iterator[tuple[int, Row]]:
         """Stream (flight time in ns, row) of one topic; nothing if the topic is absent."""
-        for _, time_ns, row in MessageStream(self.path, topic):
-            yield time_ns, row
+        for times, rows in self.blocks(topic):
+            yield from zip(times, rows, strict=True)
+
+    def blocks(
+        self, topic: str, names: Sequence[str] | None = None
+    ) -> Iterator[tuple[list[int], list[Row]]]:
+        """Stream times and rows of one topic many at a time; only fields in `names` are checked."""
+        stream = MessageStream(self.path, topic, self._size)
+        for block in rows_in_blocks(stream, {topic: names}):
+            yield block[topic]
+
+    @property
+    def _size(self) -> int | None:
+        # All passes end where the first one did, also in a file that still grows.
+        return self.__dict__["_survey"].size if "_survey" in self.__dict__ else None
 
     @cached_property
     def _survey(self) -> _Survey:
-        stream = MessageStream(self.path)
+        size = self.path.stat().st_size
+        stream = MessageStream(self.path, size=size)
         topics: dict[str, TopicSummary] = {}
-        for topic, time_ns, _ in stream.undecoded():
-            summary = topics.get(topic)
-            if summary is None:
-                summary = TopicSummary(stream.channels[topic], first_time_ns=time_ns)
-                topics[topic] = summary
-            summary.rows += 1
-            summary.first_time_ns = min(summary.first_time_ns, time_ns)
-            summary.last_time_ns = max(summary.last_time_ns, time_ns)
-        return _Survey(stream.complete, stream.metadata, topics)
+        for block in stream.texts():
+            for topic, (times, _) in block.items():
+                summary = topics.get(topic)
+                if summary is None:
+                    summary = TopicSummary(stream.channels[topic], first_time_ns=times[0])
+                    topics[topic] = summary
+                summary.rows += len(times)
+                summary.first_time_ns = min(summary.first_time_ns, *times)
+                summary.last_time_ns = max(summary.last_time_ns, *times)
+        return _Survey(stream.complete, stream.holes, stream.strays, size, stream.metadata, topics)
 
 
-def _check_head(path: Path) -> None:
+def rows_in_blocks(
+    stream: MessageStream, wanted: Mapping[str, Sequence[str] | None]
+) -> Iterator[dict[str, tuple[list[int], list[Row]]]]:
+    """Yield block by block the times and rows of some topics, in one pass over the file.
+
+    `wanted` gives for each topic the fields that will be used, which alone are checked; None: all.
+    """
+    decoders: dict[str, RowDecoder] = {}
+    for block in stream.texts():
+        found = {}
+        for topic, (times, texts) in block.items():
+            if topic in wanted:
+                if topic not in decoders:
+                    channel = stream.channels[topic]
+                    decoders[topic] = RowDecoder(str(stream.path), channel, wanted[topic])
+                found[topic] = (times, decoders[topic].decode(texts))
+        if found:
+            yield found
+
+
+def stored_metadata(path: Path, names: Sequence[str]) -> dict[str, dict[str, str]]:
+    """Return metadata of a finished recording by way of its index, without reading its rows."""
+    found: dict[str, dict[str, str]] = {}
+    with open_recording(path) as stream:
+        size = os.fstat(stream.fileno()).st_size
+        for index in list(summary_of_file(stream, size)):
+            if isinstance(index, MetadataIndex) and index.name in names:
+                record = metadata_at(stream, index.offset, size)
+                if record is not None and record.name == index.name:
+                    found[record.name] = dict(record.metadata)
+    return found
+
+
+def open_recording(path: Path) -> BinaryIO:
+    """Open a recording for reading. Raises RecordingError for what is missing or no plain file."""
     try:
-        with path.open("rb") as stream:
-            head = stream.read(len(MCAP0_MAGIC))
+        # Without O_NONBLOCK a pipe laid in a recording's place would be waited for.
+        handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
+            os.close(handle)
+            raise RecordingError(
+                f"The recording {path} cannot be read: it is no file. "
+                "Check the path; `runs/` holds one folder per run."
+            )
+        return open(handle, "rb")
     except OSError as error:
         raise RecordingError(
             f"The recording {path} cannot be read: {error.strerror or error}. "
             "Check the path; `runs/` holds one folder per run."
         ) from error
+
+
+def _check_head(path: Path, head: bytes) -> None:
     if not head:
         raise RecordingError(
             f"The recording {path} is empty: its run ended before anything reached the disk. "

@@ -1,23 +1,31 @@
-"""A whole file from a recording that was cut by a crash.
+"""A whole file from a recording that was cut by a crash, or damaged.
 
-Our own commands read a cut recording as it is; other tools start from the index at its end, which a
+Our own commands read a damaged recording as it is; other tools start from the index at its end, which a
 killed process never wrote.
 """
 
 from __future__ import annotations
 
+import contextlib
+import os
+import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
-from mcap.writer import CompressionType, Writer
-
-from tenbaud.recording.encoding import channel_schema
+from tenbaud.recording.chunk_writer import ChunkWriter
+from tenbaud.recording.encoding import END_METADATA, RUN_METADATA, channel_schema
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import find_recordings
-from tenbaud.recording.reader import MessageStream
-from tenbaud.recording.writer import CHUNK_BYTES, END_METADATA, PROFILE, RUN_METADATA
+from tenbaud.recording.holes import HOLES_METADATA, Hole, packed_holes
+from tenbaud.recording.lock import in_use
+from tenbaud.recording.reader import MessageStream, open_recording
+from tenbaud.recording.writer import CHUNK_BYTES, PROFILE
 
 RECOVERED_NOTE = "recovered"
+RECOVERED_TEXT = "from a recording that was cut or damaged; what is missing is lost"
+HOLES_SHOWN = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,25 +35,35 @@ class Recovered:
     path: Path
     """the whole file"""
     kept: Path | None
-    """where the cut one is now; None: it was whole, and nothing was done"""
+    """where the damaged one is now; None: it was whole, and nothing was done"""
     rows: int
     last_time_ns: int
+    holes: tuple[Hole, ...] = ()
+    strays: int = 0
+    """rows that nothing in the file describes"""
 
     def __str__(self) -> str:
         if self.kept is None:
             return f"{self.path} is whole; nothing to do"
-        return (
-            f"{self.path}: {self.rows} rows up to {self.last_time_ns / 1e9:.3f} s; the cut file is "
+        lines = [
+            f"{self.path}: {self.rows} rows up to {self.last_time_ns / 1e9:.3f} s; the damaged file is "
             f"kept as {self.kept.name}"
-        )
+        ]
+        lines += [f"  hole at {hole}" for hole in self.holes[:HOLES_SHOWN]]
+        if len(self.holes) > HOLES_SHOWN:
+            lines.append(f"  and {len(self.holes) - HOLES_SHOWN} holes more")
+        if self.strays:
+            lines.append(f"  {self.strays} rows are left out: nothing in the file describes them")
+        return "\n".join(lines)
 
 
 def recover(path: Path, output: Path | None = None) -> list[Recovered]:
-    """Mend a recording, or each recording of a run folder that was cut.
+    """Recover a recording, or each recording of a run folder that was cut or damaged.
 
-    The whole file takes the name of the cut one, which is kept beside it as `NAME.cut.mcap`; with
-    `output`, which is for a single file, it goes there and the cut one stays as it is. Raises
-    RecordingError where there is nothing to recover or no room to write.
+    The whole file takes the name of the damaged one, which is kept beside it as `NAME.cut.mcap`; with
+    `output`, which is for a single file, it goes there and the damaged one stays as it is. Raises
+    RecordingError where there is nothing to recover, no room to write, a flight that still writes the
+    file, or a link in its place.
     """
     files = find_recordings(path)
     if output is not None and len(files) > 1:
@@ -57,56 +75,105 @@ def recover(path: Path, output: Path | None = None) -> list[Recovered]:
 
 def _recover_file(path: Path, output: Path | None) -> Recovered:
     target = output or path
-    unfinished = target.with_name(f".{target.name}.unfinished")
     kept = None if output is not None else path.with_name(f"{path.stem}.cut{path.suffix}")
-    stream = MessageStream(path)
-    try:
-        rows, last_ns = _copy(stream, unfinished)
-        if stream.complete:
-            return Recovered(path, None, rows, last_ns)
-        for taken in (output, kept):
-            if taken is not None and taken.exists():
-                raise RecordingError(
-                    f"{taken} exists already and is not overwritten. Move it away, or choose another "
-                    "place with --out."
-                )
-        if kept is not None:
-            path.rename(kept)
-        unfinished.replace(target)
-    except OSError as error:
+    with _held(path) as damaged:
+        stream = MessageStream(path)
+        try:
+            with _unfinished(target) as (whole, unfinished):
+                rows, last_ns = _copy(stream, whole)
+                if stream.complete:
+                    return Recovered(path, None, rows, last_ns)
+                for taken in (output, kept):
+                    if taken is not None and os.path.lexists(taken):
+                        raise _exists(taken)
+                os.fchmod(whole.fileno(), os.fstat(damaged.fileno()).st_mode & 0o777)
+                os.fsync(whole.fileno())
+                if kept is not None:
+                    _keep(path, kept)
+                unfinished.replace(target)
+        except OSError as error:
+            raise RecordingError(
+                f"{target} cannot be written: {error.strerror or error}. "
+                "Choose another place with --out."
+            ) from error
+    return Recovered(target, kept or path, rows, last_ns, tuple(stream.holes), stream.strays)
+
+
+@contextlib.contextmanager
+def _held(path: Path) -> Iterator[BinaryIO]:
+    """Open a recording that nobody writes and that is no link; it stays locked within the `with`."""
+    if path.is_symlink():
         raise RecordingError(
-            f"{target} cannot be written: {error.strerror or error}. Choose another place with --out."
-        ) from error
+            f"{path} is a link, and recover follows none: it would replace what the link leads to. "
+            "Give the recording itself."
+        )
+    with open_recording(path) as stream:
+        if in_use(stream.fileno(), path):
+            raise RecordingError(
+                f"{path} is in use: a flight still records into it. Its rows can be read meanwhile; "
+                "recover it when the flight has ended."
+            )
+        if not os.path.samestat(os.fstat(stream.fileno()), path.lstat()):
+            raise RecordingError(f"{path} was replaced while it was opened. Look at it and try again.")
+        yield stream
+
+
+@contextlib.contextmanager
+def _unfinished(target: Path) -> Iterator[tuple[BinaryIO, Path]]:
+    """A new file beside `target`, under a name that nobody else has; removed if it is still there."""
+    handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".unfinished", dir=target.parent)
+    path = Path(name)
+    try:
+        with open(handle, "wb") as stream:
+            yield stream, path
     finally:
-        unfinished.unlink(missing_ok=True)
-    return Recovered(target, kept or path, rows, last_ns)
+        path.unlink(missing_ok=True)
 
 
-def _copy(stream: MessageStream, path: Path) -> tuple[int, int]:
+def _keep(path: Path, kept: Path) -> None:
+    """Give the damaged file its second name; RecordingError if that is taken meanwhile."""
+    try:
+        kept.hardlink_to(path)
+    except FileExistsError:
+        raise _exists(kept) from None
+    except OSError:  # a file system without hard links
+        path.rename(kept)
+
+
+def _exists(path: Path) -> RecordingError:
+    return RecordingError(
+        f"{path} exists already and is not overwritten. Move it away, or choose another place with "
+        "--out."
+    )
+
+
+def _copy(stream: MessageStream, output: BinaryIO) -> tuple[int, int]:
     """Write every message of a stream into a finished file; return their number and last time."""
     rows, last_ns = 0, 0
     channels: dict[str, int] = {}
-    with path.open("wb") as output:
-        writer = Writer(output, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
-        writer.start(profile=PROFILE, library="tenbaud")
-        headed = False
-        for topic, time_ns, data in stream.undecoded():
-            if not headed:
-                headed = True
-                writer.add_metadata(RUN_METADATA, stream.metadata.get(RUN_METADATA, {}))
-            if topic not in channels:
-                channel = stream.channels[topic]
-                schema = writer.register_schema(topic, "jsonschema", channel_schema(channel))
-                channels[topic] = writer.register_channel(topic, "json", schema)
-            writer.add_message(channels[topic], time_ns, data, time_ns)
-            rows += 1
-            last_ns = max(last_ns, time_ns)
+    writer = ChunkWriter(output, CHUNK_BYTES)
+    writer.start(profile=PROFILE, library="tenbaud")
+    headed = False
+    for topic, time_ns, data in stream.undecoded():
         if not headed:
+            headed = True
             writer.add_metadata(RUN_METADATA, stream.metadata.get(RUN_METADATA, {}))
-        end = stream.metadata.get(END_METADATA) or {
-            "rows_written": str(rows),
-            RECOVERED_NOTE: "from a recording that was cut; what came after is lost",
-        }
-        writer.add_metadata(END_METADATA, end)
-        writer.finish()
+        if topic not in channels:
+            channel = stream.channels[topic]
+            schema = writer.register_schema(topic, "jsonschema", channel_schema(channel))
+            channels[topic] = writer.register_channel(topic, "json", schema)
+        writer.add_message(channels[topic], time_ns, data)
+        rows += 1
+        last_ns = max(last_ns, time_ns)
+    if not headed:
+        writer.add_metadata(RUN_METADATA, stream.metadata.get(RUN_METADATA, {}))
+    writer.flush()
+    if stream.holes:
+        writer.add_metadata(HOLES_METADATA, packed_holes(stream.holes))
+    end = stream.metadata.get(END_METADATA, {"rows_written": str(rows)})
+    if not stream.complete:
+        end = {**end, "rows_recovered": str(rows), RECOVERED_NOTE: RECOVERED_TEXT}
+    writer.add_metadata(END_METADATA, end)
+    writer.finish()
+    output.flush()
     return rows, last_ns

@@ -10,13 +10,14 @@ run.plot()
 
 from __future__ import annotations
 
-import json
 import tomllib
+from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import orjson
 
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import (
@@ -25,6 +26,8 @@ from tenbaud.recording.folder import (
     RunFolder,
     find_recordings,
     is_own_file,
+    read_small,
+    read_summary,
 )
 from tenbaud.recording.signals import SIGNALS, Signal, Source, TimeBase
 from tenbaud.recording.table import Series, Table, Tables, read_tables
@@ -35,6 +38,11 @@ if TYPE_CHECKING:
     from tenbaud.config.schema import FlightConfig
 
 ENDS = ("transmitter", "receiver")
+
+SPAN_FREE, SPAN_PER_ROW = 1_000_000, 10
+"""Ticks that a time base may span, flat and per recorded tick: hours without a row are no damage."""
+TICK_S_MIN = 1e-6
+TICKS_PER_SAMPLE_MAX = 1_000_000
 
 
 class Run:
@@ -161,15 +169,15 @@ class Run:
         """False if a recording was cut; what it held up to the cut is here."""
         return all(self.tables(end).complete for end in self.ends)
 
+    @property
+    def notes(self) -> list[str]:
+        """What to know before believing the recordings: another version, a cut, holes."""
+        return [note for end in self.ends for note in self.tables(end).notes]
+
     @cached_property
     def summary(self) -> dict[str, Any]:
         """The figures in `summary.json`; empty without it."""
-        text = self.folder.text_of(self.folder.summary)
-        try:
-            summary = json.loads(text or "{}")
-        except ValueError:
-            return {}
-        return summary if isinstance(summary, dict) else {}
+        return read_summary(self.folder.summary)
 
     @cached_property
     def config(self) -> FlightConfig:
@@ -223,19 +231,31 @@ class Run:
                 break
         else:
             raise RecordingError(f"{self.path} holds no ticks: the run ended before it flew.")
-        known = tables.topics["tick"]["tick"].astype(np.int64)
-        tick_s, per_sample = _timing(tables.metadata, self.folder)
-        return TimeBase(np.arange(known.min(), known.max() + 1), tick_s, per_sample)
+        known = tables.topics["tick"].keys
+        first, last = int(known.min()), int(known.max())
+        if last - first > SPAN_FREE + SPAN_PER_ROW * len(known):
+            raise RecordingError(
+                f"{tables.path} holds {len(known)} ticks between tick {first} and tick {last}: too few "
+                "for signals on one time base. The rows themselves are in the tables: "
+                f'Run(...).table("{end}", "tick").'
+            )
+        tick_s, per_sample = _timing(tables.metadata, self.folder.config)
+        return TimeBase(np.arange(first, last + 1), tick_s, per_sample)
 
 
-def _timing(metadata: dict[str, str], folder: RunFolder) -> tuple[float, int]:
+def _timing(metadata: dict[str, str], config: Path) -> tuple[float, int]:
     """Return tick and ticks per sample, from the recording's own head or the folder's file."""
-    try:
-        timing = json.loads(metadata["shared_config"])["timing"]
-    except (KeyError, ValueError):
+    sources: tuple[Callable[[], Any], ...] = (
+        lambda: orjson.loads(metadata["shared_config"])["timing"],
+        lambda: tomllib.loads(read_small(config))["timing"],
+        lambda: {"tick_s": metadata["tick_s"], "symbol_period_s": 0.1},
+    )
+    for source in sources:
         try:
-            timing = tomllib.loads(folder.text_of(folder.config) or "")["timing"]
-        except (KeyError, ValueError):
-            timing = {"tick_s": float(metadata.get("tick_s", 0.01)), "symbol_period_s": 0.1}
-    tick_s = float(timing["tick_s"])
-    return tick_s, max(1, round(float(timing["symbol_period_s"]) / tick_s))
+            timing = source()
+            tick_s, symbol_s = float(timing["tick_s"]), float(timing["symbol_period_s"])
+        except (OSError, KeyError, ValueError, TypeError, OverflowError, RecursionError):
+            continue
+        if TICK_S_MIN <= tick_s <= symbol_s <= TICKS_PER_SAMPLE_MAX * tick_s:
+            return tick_s, max(1, round(symbol_s / tick_s))
+    return 0.01, 10

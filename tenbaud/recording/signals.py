@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tenbaud.recording.table import Series, Table, Tables
 
@@ -41,13 +42,13 @@ class TimeBase:
 
     def place(self, table: Table, values: Series) -> Series:
         """Return per-tick values of a table (its first column is the tick) on this base."""
-        return self._scatter(np.asarray(table[table.names[0]]), values)
+        return _scattered(table.keys, values, int(self.ticks[0]), len(self.ticks))
 
     def hold(self, table: Table, values: Series) -> Series:
         """Return per-sample values of a table, held over the ticks of each sample."""
         first = int(self.ticks[0]) // self.ticks_per_sample
         count = int(self.ticks[-1]) // self.ticks_per_sample - first + 1
-        held = _scattered(np.asarray(table[table.names[0]]), values, first, count)
+        held = _scattered(table.keys, values, first, count)
         kept: Series = held[self.ticks // self.ticks_per_sample - first]
         return kept
 
@@ -60,13 +61,10 @@ class TimeBase:
         chosen: Series = np.choose(slots, each)
         return chosen
 
-    def _scatter(self, ticks: Series, values: Series) -> Series:
-        return _scattered(ticks, values, int(self.ticks[0]), len(self.ticks))
 
-
-def _scattered(keys: Series, values: Series, first: int, count: int) -> Series:
+def _scattered(keys: NDArray[np.int64], values: Series, first: int, count: int) -> Series:
     placed = np.full(count, np.nan)
-    at = keys.astype(np.int64) - first
+    at = keys - first
     inside = (at >= 0) & (at < count)
     placed[at[inside]] = values[inside]
     return placed
@@ -113,8 +111,8 @@ class Source:
         if table is None or name not in table.names:
             return None
         values = table[name]
-        if axis is not None:
-            if values.shape[1] <= axis:
+        if values.ndim == 2:
+            if axis is None or values.shape[1] <= axis:
                 return None
             values = values[:, axis]
         return table, values
@@ -164,7 +162,7 @@ def _gap(source: Source) -> Series | None:
     if table is None or not len(table):
         return None
     samples = source.base.ticks // source.base.ticks_per_sample
-    last = np.searchsorted(table["sample"], samples, side="right") - 1
+    last = np.searchsorted(table.keys, samples, side="right") - 1
     held: Series = np.where(last < 0, np.nan, table["rms_over_floor"][np.maximum(last, 0)])
     return held
 
@@ -173,8 +171,9 @@ def _erased(source: Source) -> Series | None:
     for end in (source.transmitter, source.receiver):
         table = None if end is None else end.topics.get("sample")
         if table is not None:
-            missing = [row.get("word") is None for row in table.rows]
-            return source.base.hold(table, np.array(missing, dtype=np.float64))
+            words = table["word"] if "word" in table.names else np.zeros((len(table), 0))
+            known = np.count_nonzero(~np.isnan(words), axis=1)
+            return source.base.hold(table, np.where(known == 0, 1.0, 0.0))
     return None
 
 

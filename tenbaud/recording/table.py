@@ -3,49 +3,64 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import orjson
 from numpy.typing import NDArray
 
-from channel.recording import Field, RecordChannel
+from channel.recording import Field
+from tenbaud.recording.encoding import END_METADATA
 from tenbaud.recording.errors import RecordingError
-from tenbaud.recording.reader import MessageStream, Row
-from tenbaud.recording.writer import END_METADATA, RUN_METADATA
+from tenbaud.recording.holes import Hole
+from tenbaud.recording.notes import recording_notes
+from tenbaud.recording.reader import Recording
+from tenbaud.recording.rows import KEYS, Row
 
 Series = NDArray[np.float64]
 
+CELLS_PER_ROW_MAX = 1024
+"""Values in a list, each a column; a codec's state has some ten."""
+
+
+class MissingColumn(RecordingError, KeyError):
+    """A topic has no such column; the text names those that it has."""
+
+    __str__ = RecordingError.__str__
+
 
 class Table:
-    """The rows of one topic; they are decoded when the first of them is asked for.
+    """The rows of one topic, read from the file when they are first asked for.
 
     `table["digest"]` is a column: numbers as float64 (null is NaN), booleans as 0 and 1, a list of
-    numbers as a row of a two-dimensional array, texts as an object array (null is None).
+    numbers as a row of a two-dimensional array, texts as an object array (null is None). All columns
+    take some tenth of the memory of `rows`.
     """
 
-    def __init__(self, channel: RecordChannel, times_ns: list[int], texts: list[bytes]) -> None:
-        self.channel = channel
-        self.times_ns = times_ns
-        self._texts = texts
+    def __init__(self, recording: Recording, topic: str) -> None:
+        self.channel = recording.topics[topic].channel
+        self._recording = recording
+        self._count = recording.topics[topic].rows
         self._columns: dict[str, NDArray[Any]] = {}
+        self._times_ns: NDArray[np.uint64] | None = None
 
     @cached_property
     def rows(self) -> list[Row]:
-        """The rows as they were recorded, in the order of the file."""
+        """The rows as they were recorded, in the order of the file: all of them as objects."""
         with _collector_paused():
-            # One parse for all rows of a topic takes half the time of one per row.
-            rows: list[Row] = orjson.loads(b"[" + b",".join(self._texts) + b"]")
-        self._texts = []
-        return rows
+            return [row for rows in self.blocks() for row in rows]
+
+    def blocks(self) -> Iterator[list[Row]]:
+        """Stream the rows, many at a time."""
+        for _, rows in self._recording.blocks(self.channel.topic):
+            yield rows
 
     def __len__(self) -> int:
-        return len(self.times_ns)
+        return self._count
 
     @property
     def names(self) -> list[str]:
@@ -57,40 +72,91 @@ class Table:
         """The unit of each column; empty where it has none."""
         return {one.name: one.unit for one in self.channel.fields}
 
+    @property
+    def times_ns(self) -> NDArray[np.uint64]:
+        """The flight time of each row, as the file has it."""
+        if self._times_ns is None:
+            self._read([self.channel.fields[0]])
+        assert self._times_ns is not None
+        return self._times_ns
+
+    @property
+    def keys(self) -> NDArray[np.int64]:
+        """The ticks, samples or slots of the rows; RecordingError where the topic has none."""
+        name = self.names[0]
+        if name not in KEYS:
+            raise MissingColumn(f"{self.channel.topic!r} counts its rows by no tick, sample or slot")
+        return self[name].astype(np.int64)
+
     def __getitem__(self, name: str) -> NDArray[Any]:
         if name not in self._columns:
-            self._columns[name] = column(self.rows, self._field(name))
+            self._field(name)
+            # The cost is in the pass over the file: one for all columns, texts apart, which are large.
+            texts = self._field(name).type == "string"
+            self._read([one for one in self.channel.fields if (one.type == "string") == texts])
         return self._columns[name]
 
     def _field(self, name: str) -> Field:
         for one in self.channel.fields:
             if one.name == name:
                 return one
-        raise KeyError(f"{self.channel.topic!r} has no column {name!r}; it has {', '.join(self.names)}")
+        raise MissingColumn(
+            f"{self.channel.topic!r} has no column {name!r}; it has {', '.join(self.names)}"
+        )
 
+    def _read(self, fields: Sequence[Field]) -> None:
+        topic = self.channel.topic
+        parts: dict[str, list[NDArray[Any]]] = {one.name: [] for one in fields}
+        times: list[NDArray[np.uint64]] = []
+        for times_ns, rows in self._recording.blocks(topic, list(parts)):
+            times.append(np.array(times_ns, dtype=np.uint64))
+            for one in fields:
+                parts[one.name].append(self._part(rows, one))
+        self._times_ns = np.concatenate(times) if times else np.zeros(0, dtype=np.uint64)
+        for one in fields:
+            self._columns[one.name] = self._joined(parts.pop(one.name), one)
 
-def column(rows: list[Row], one: Field) -> NDArray[Any]:
-    """Return one field of many rows as an array."""
-    name = one.name
-    values = [row.get(name) for row in rows]
-    if one.type == "string":
-        return np.array(values, dtype=object)
-    if one.type in ("numbers", "integers"):
-        return _lists(values)
-    return np.array(values, dtype=np.float64)
-
-
-def _lists(values: list[Any]) -> Series:
-    """Return lists of numbers as the rows of an array, NaN where there is none."""
-    try:
-        whole = np.array(values, dtype=np.float64)
-    except ValueError:  # some rows are null or shorter than others
+    def _part(self, rows: list[Row], one: Field) -> NDArray[Any]:
+        values = [row[one.name] for row in rows]
+        if one.type == "string":
+            return np.array(values, dtype=object)
+        if one.type not in ("numbers", "integers"):
+            return np.array(values, dtype=np.float64)
         width = max((len(value) for value in values if value is not None), default=0)
-        whole = np.full((len(values), width), np.nan)
+        if width > CELLS_PER_ROW_MAX:
+            raise RecordingError(
+                f"{self._recording.path}: a row of the topic {self.channel.topic!r} has {width} values "
+                f"in its field {one.name!r}, at most {CELLS_PER_ROW_MAX} are read."
+            )
+        if width and all(value is not None and len(value) == width for value in values):
+            return np.array(values, dtype=np.float64)
+        self._check_cells(one, width, len(values), sum(len(value) for value in values if value))
+        part = np.full((len(values), width), np.nan)  # some rows are null or shorter than others
         for index, value in enumerate(values):
-            if value is not None:
-                whole[index, : len(value)] = value
-    return whole if whole.ndim == 2 else np.full((len(values), 0), np.nan)
+            if value:
+                part[index, : len(value)] = value
+        return part
+
+    def _joined(self, parts: list[NDArray[Any]], one: Field) -> NDArray[Any]:
+        if one.type not in ("numbers", "integers"):
+            return np.concatenate(parts) if parts else np.zeros(0)
+        width = max((part.shape[1] for part in parts), default=0)
+        self._check_cells(one, width, self._count, sum(part.size for part in parts))
+        whole = np.full((sum(len(part) for part in parts), width), np.nan)
+        at = 0
+        for part in parts:
+            whole[at : at + len(part), : part.shape[1]] = part
+            at += len(part)
+        return whole
+
+    def _check_cells(self, one: Field, width: int, rows: int, items: int) -> None:
+        """All lists of a recorded field have one length; single long ones would ask for much memory."""
+        if width > 16 and width * rows > 4 * items + (1 << 20):
+            raise RecordingError(
+                f"{self._recording.path}: the lists in the field {one.name!r} of the topic "
+                f"{self.channel.topic!r} have up to {width} values, and most far fewer. tenbaud writes "
+                "no such field: the file was changed, or another program wrote it."
+            )
 
 
 @dataclass(slots=True)
@@ -103,6 +169,14 @@ class Tables:
     end: dict[str, str]
     """what the recorder said when it finished: rows written and dropped; empty if the file was cut"""
     topics: dict[str, Table]
+    holes: list[Hole] = field(default_factory=list)
+    strays: int = 0
+    """rows that nothing in the file describes, and that are left out"""
+
+    @property
+    def notes(self) -> list[str]:
+        """What a person should know before believing what is computed from this recording."""
+        return recording_notes(self.path, self.metadata, self.complete, self.holes, self.strays)
 
     def topic(self, name: str) -> Table:
         """Return a topic; RecordingError if there is none."""
@@ -116,27 +190,31 @@ class Tables:
 
 
 def read_tables(path: Path) -> Tables:
-    """Read a whole recording; one that was cut gives its rows up to the cut.
+    """Return the topics of a recording; of one that was cut or damaged, with the rows that are whole.
 
     Raises RecordingError for a file that is missing, empty or no recording of ours.
     """
-    stream = MessageStream(path)
-    times: dict[str, list[int]] = {}
-    texts: dict[str, list[bytes]] = {}
-    with _collector_paused():
-        for topic, time_ns, data in stream.undecoded():
-            if topic not in times:
-                times[topic], texts[topic] = [], []
-            times[topic].append(time_ns)
-            texts[topic].append(data)
-    topics = {topic: Table(stream.channels[topic], times[topic], texts[topic]) for topic in times}
+    recording = Recording(path)
     return Tables(
         path,
-        stream.complete,
-        stream.metadata.get(RUN_METADATA, {}),
-        stream.metadata.get(END_METADATA, {}),
-        topics,
+        recording.complete,
+        recording.metadata,
+        _checked_end(path, recording.metadata_record(END_METADATA)),
+        {topic: Table(recording, topic) for topic in recording.topics},
+        recording.holes,
+        recording.strays,
     )
+
+
+def _checked_end(path: Path, end: dict[str, str]) -> dict[str, str]:
+    for name in ("rows_written", "rows_dropped", "rows_recovered"):
+        count = end.get(name, "0")
+        if not (count.isascii() and count.isdigit() and len(count) < 19):
+            raise RecordingError(
+                f"{path}: its end says {count!r:.40} for {name}, which is no count. "
+                "tenbaud writes no such end: the file was changed, or another program wrote it."
+            )
+    return end
 
 
 @contextmanager

@@ -1,7 +1,7 @@
 """Writes a flight into an MCAP file from a thread of its own.
 
 The flight only appends to a queue. The thread takes the rows out ten times a second, encodes them
-and hands them to the `mcap` package in chunks; what a killed process loses is the chunk that was
+and writes them in chunks; what a killed process loses is the chunk that was
 still open, at most one second. Trouble with the disk ends the recording, never the flight.
 """
 
@@ -13,27 +13,36 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Self
-
-from mcap.writer import CompressionType, Writer
+from typing import TYPE_CHECKING, Self
 
 from channel.recording import RecordChannel
-from tenbaud.recording.encoding import channel_schema, row_encoder
+from tenbaud.recording.chunk_writer import ChunkWriter
+from tenbaud.recording.encoding import (
+    END_METADATA,
+    OVERVIEW_METADATA,
+    RUN_METADATA,
+    channel_schema,
+    row_encoder,
+)
 from tenbaud.recording.folder import open_new_recording
 from tenbaud.recording.shared import SharedWriter
 
+if TYPE_CHECKING:
+    from tenbaud.recording.gather import OverviewRecorder
+
 PROFILE = "tenbaud"
-RUN_METADATA = "run"
-END_METADATA = "recorder"
-"""Written by `close` only: how many rows were written and dropped, and why."""
 
 POLL_PERIOD_S = 0.1
 # Together with one poll period and the time of a batch this stays below the promised second.
 FLUSH_PERIOD_S = 0.8
-CHUNK_BYTES = 1 << 20
-# A batch holds the interpreter for some 2 ms. The pause after it lets a waiting 100 Hz loop run at
-# once instead of after the interpreter's own 5 ms switch interval.
+# A damaged byte costs a chunk: here some ten seconds of a flight at 100 Hz.
+CHUNK_BYTES = 1 << 18
+# While a batch is written, a loop waits for the interpreter each time that it sends, receives or wakes,
+# some six times a tick. In real time a batch is therefore shorter than a fast flight's tick, and the
+# pause after it lets the loop run.
 BATCH_ROWS = 200
+REAL_TIME_BATCH_ROWS = 20
+SHARED_BATCH_ROWS = 50
 BATCH_PAUSE_S = 0.0005
 FULL_PAUSE_S = 0.002
 CLOSE_TIMEOUT_S = 10.0
@@ -54,30 +63,32 @@ class McapRecorder:
         queue_limit: int = 65536,
         wait_when_full: bool = False,
         shared: SharedWriter | None = None,
+        overview: OverviewRecorder | None = None,
     ) -> None:
         """Create the file; raises RecordingError if that is impossible or it holds data.
 
         `wait_when_full` is for flights in virtual time only, which a wait does not disturb and
         which can outrun the disk: `write` then waits for room instead of dropping the row.
-        `shared` is a thread that writes for many recorders, in place of one of its own.
+        `shared` is a thread that writes for many recorders, in place of one of its own. `overview`
+        gathers what the figure of a long flight shows, and is stored at the end of the file.
         """
         self.path = path
         self._queue: deque[tuple[RecordChannel, int, Sequence[object]]] = deque()
         self._queue_limit = queue_limit
         self._wait_when_full = wait_when_full
+        in_real_time = REAL_TIME_BATCH_ROWS if shared is None else SHARED_BATCH_ROWS
+        self._batch_rows = BATCH_ROWS if wait_when_full else in_real_time
         self._dropped_at_queue = 0
         self._dropped_in_thread = 0
         self._rows_written = 0
         self._rows_unflushed = 0
         self._metadata = metadata
+        self._overview = overview
         self._error: str | None = None
         self._failed = False
         self._writers: dict[int, _ChannelWriter] = {}
         self._stream = open_new_recording(path)
-        # Compressed, a row of twelve fields takes a third of the bytes for about 1 us more. The
-        # message indexes stay, though they cost about as much time: viewers that find chunk
-        # indexes in a file look a topic's rows up in the message indexes.
-        self._writer = Writer(self._stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+        self._writer = ChunkWriter(self._stream, CHUNK_BYTES)
         self._flushed_s = time.monotonic()
         self._closing = threading.Event()
         self._writing = threading.Lock()
@@ -195,13 +206,13 @@ class McapRecorder:
             waiting = len(self._queue)
             if not waiting:
                 return
-            # With the queue half full losing rows is the worse evil, so no more pauses.
-            if waiting < self._queue_limit // 2:
+            # With the queue half full losing rows is the worse evil, and at the end nobody is held up.
+            if waiting < self._queue_limit // 2 and not self._closing.is_set():
                 time.sleep(BATCH_PAUSE_S)
 
     def _write_batch(self) -> None:
         queue = self._queue
-        for _ in range(min(BATCH_ROWS, len(queue))):
+        for _ in range(min(self._batch_rows, len(queue))):
             channel, time_ns, row = queue.popleft()
             if self._failed:
                 self._dropped_in_thread += 1
@@ -216,13 +227,17 @@ class McapRecorder:
                 continue
             self._rows_unflushed += 1
             # MCAP times are unsigned; what happens before tick 0 is filed at zero.
-            log_time_ns = max(0, time_ns)
-            self._writer.add_message(entry.channel_id, log_time_ns, data, log_time_ns)
+            log_time_ns = time_ns if time_ns > 0 else 0
+            self._writer.add_message(entry.channel_id, log_time_ns, data)
+            if entry.gather is not None:
+                entry.gather(channel.topic, log_time_ns, row)
 
     def _register(self, channel: RecordChannel) -> _ChannelWriter:
         schema_id = self._writer.register_schema(channel.topic, "jsonschema", channel_schema(channel))
         channel_id = self._writer.register_channel(channel.topic, "json", schema_id)
         entry = _ChannelWriter(channel, channel_id)
+        if self._overview is not None and self._overview.wants(channel):
+            entry.gather = self._overview.add
         self._writers[id(channel)] = entry
         return entry
 
@@ -245,6 +260,9 @@ class McapRecorder:
         counts = {"rows_written": str(self._rows_written), "rows_dropped": str(self.rows_dropped)}
         if self._error is not None:
             counts["error"] = self._error
+        overview = self._overview.metadata() if self._overview is not None else None
+        if overview is not None:
+            self._writer.add_metadata(OVERVIEW_METADATA, overview)
         self._writer.add_metadata(END_METADATA, counts)
         self._writer.finish()
 
@@ -276,6 +294,7 @@ class _ChannelWriter:
         self.channel = channel
         self.channel_id = channel_id
         self.encode = row_encoder(channel)
+        self.gather: Callable[[str, int, Sequence[object]], None] | None = None
 
 
 def _bad_row_text(path: Path, channel: RecordChannel, row: Sequence[object], error: Exception) -> str:

@@ -14,6 +14,7 @@ from pathlib import Path
 from channel.errors import CodecDiverged, TenbaudError
 from receiver.controllers.base import Controller
 from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.notes import version_notes
 from tenbaud.recording.recover import RECOVERED_NOTE
 from tenbaud.replay.claims.base import Evidence, Findings, Place
 from tenbaud.replay.claims.table import CLAIMS
@@ -137,6 +138,7 @@ def _notes(record: FlightRecord) -> list[str]:
     if "transmitter" in record.rows and not record.summaries.get("transmitter"):
         notes.append("there is no summary: how many symbols left in all is not shown")
     for end, tables in record.ends():
+        notes += version_notes(tables.path, tables.metadata)
         if not tables.end:
             notes.append(f"the {end}'s recording was cut: audited up to the cut")
         if RECOVERED_NOTE in tables.end:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from channel.codec import Codec, CodecState, Vector
+from channel.codec import CodecState, Vector
 from channel.words import Word
 from tenbaud.build import Agreement, agree
 from tenbaud.outside_code import require_allowed, require_regular_files
@@ -14,6 +14,9 @@ from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.run import Run
 from tenbaud.recording.table import Tables
 from tenbaud.replay.rows import EndRows, EpochStart, read_rows
+
+NUMBER_MAX = 1e9
+"""Of a state or a command, in rad, rad/s or V."""
 
 
 @dataclass(slots=True)
@@ -118,23 +121,23 @@ def epochs_of(record: FlightRecord) -> list[Epoch]:
     They are the receiver's, if its recording is here. Raises RecordingError where samples are missing
     within an epoch: what came after cannot be computed.
     """
-    agreement = record.agreement
-    codec = agreement.codec
-    samples = record.consumer_rows.topic("sample").rows
-    epochs = [_epoch(row, codec) for row in record.consumer_rows.topic("epoch")]
+    agreement, codec = record.agreement, record.agreement.codec
+    tables, samples = record.consumer, record.consumer_rows.topic("sample").rows
+    epochs = [_epoch(row) for row in record.consumer_rows.topic("epoch")]
+    before = bool(epochs and samples) and samples[0].sample < epochs[0].start.sample
+    if before or (tables.holes and not epochs):
+        raise RecordingError(
+            f"{tables.path} lacks the epoch of its first samples, and with it the state that "
+            "they start from: nothing can be computed from its symbols."
+        )
     if not epochs:
         # From before epochs were recorded: one of them, from the common initial state.
         first = samples[0].sample if samples else 0
         initial = codec.initial()._replace(sample=first)
         epochs = [Epoch(0, initial, agreement.terms.initial_command)]
-    path = record.consumer.path
-    symbols = frozenset(codec.coder.alphabet.symbols)
+    for epoch in epochs:
+        check_epoch(epoch, agreement, str(tables.path))
     index = 0
-    if samples and samples[0].sample < epochs[0].start.sample:
-        raise RecordingError(
-            f"{path} holds sample {samples[0].sample}, and the first epoch in it begins at sample "
-            f"{epochs[0].start.sample}: what the samples before it start from is missing."
-        )
     for row in samples:
         while index + 1 < len(epochs) and epochs[index + 1].start.sample <= row.sample:
             index += 1
@@ -142,33 +145,43 @@ def epochs_of(record: FlightRecord) -> list[Epoch]:
         expected = epoch.start.sample + len(epoch.words)
         if row.sample > expected:
             raise RecordingError(
-                f"{path} lacks sample {expected}: the next one recorded is {row.sample}. "
+                f"{tables.path} lacks sample {expected}: the next one recorded is {row.sample}. "
                 "Rows were lost, so what follows cannot be computed from the symbols."
             )
         if row.sample < expected:
             raise RecordingError(
-                f"{path} holds sample {row.sample} where sample {expected} is due: a row is doubled or "
-                "out of order, so what follows cannot be computed from the symbols."
+                f"{tables.path} holds sample {row.sample} where sample {expected} is due: a row is "
+                "doubled or out of order, so what follows cannot be computed from the symbols."
             )
-        if row.word is not None and not _is_word(row.word, symbols, agreement):
+        if row.word is not None and not _is_word(row.word, agreement):
             raise RecordingError(
-                f"{path}, sample {row.sample}: {row.word} is no word of the coder, so what follows "
-                "cannot be computed from the symbols."
+                f"{tables.path}: sample {row.sample} consumed {list(row.word)!r:.60}, which is no word "
+                "of the flight's coder. The file was changed, or its configuration is another one."
             )
         epoch.words.append(row.word)
     return epochs
 
 
-def _is_word(word: tuple[int, ...], symbols: frozenset[int], agreement: Agreement) -> bool:
-    return len(word) == agreement.terms.symbols_per_word and symbols.issuperset(word)
+def check_epoch(epoch: Epoch, agreement: Agreement, where: str) -> None:
+    """Raise RecordingError where an epoch starts from no state and command of this flight's codec."""
+    initial = agreement.codec.initial()
+    for name, values, like in (
+        ("state", epoch.start.model, initial.model),
+        ("coder state", epoch.start.coder, initial.coder),
+        ("held command", epoch.hold, agreement.terms.initial_command),
+    ):
+        if len(values) != len(like) or not all(abs(one) <= NUMBER_MAX for one in values):
+            raise RecordingError(
+                f"{where}: epoch {epoch.number} starts with the {name} {list(values)!r:.60}, and the "
+                f"flight's has {len(like)} numbers up to {NUMBER_MAX:g}. The file was changed, or its "
+                "configuration is another one."
+            )
 
 
-def _epoch(row: EpochStart, codec: Codec) -> Epoch:
-    initial = codec.initial()
-    sizes = (len(initial.model), len(initial.coder), codec.model.input_size)
-    if (len(row.state), len(row.coder), len(row.hold_volts)) != sizes:
-        raise RecordingError(
-            f"Epoch {row.epoch} starts from a state or a command that is not of this codec: "
-            f"{row.state}, {row.coder}, {row.hold_volts}."
-        )
+def _is_word(word: tuple[int, ...], agreement: Agreement) -> bool:
+    alphabet = agreement.codec.coder.alphabet
+    return len(word) == alphabet.symbols_per_word and all(one in alphabet.symbols for one in word)
+
+
+def _epoch(row: EpochStart) -> Epoch:
     return Epoch(row.epoch, CodecState(row.sample, row.state, row.coder), row.hold_volts)

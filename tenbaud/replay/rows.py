@@ -271,7 +271,9 @@ def _typed(name: str, kind: Kind, table: Table, misfits: list[Misfit]) -> Topic[
         return topic
     fields = kind.channel.fields
     make = kind.record._make
-    for index, (row, time_ns) in enumerate(zip(table.rows, table.times_ns, strict=True)):
+    times_ns = table.times_ns.tolist()
+    rows = (row for block in table.blocks() for row in block)
+    for index, (row, time_ns) in enumerate(zip(rows, times_ns, strict=True)):
         values = [_frozen(row.get(one.name)) for one in fields]
         wrong = next((one for one, value in zip(fields, values, strict=True)
                       if not _fits(value, one, kind.nullable)), None)  # fmt: skip

@@ -25,7 +25,7 @@ from tenbaud.build import Agreement, agree
 from tenbaud.config.schema import FlightConfig
 from tenbaud.outside_code import require_allowed, require_regular_files
 from tenbaud.recording.errors import RecordingError
-from tenbaud.replay.record import Epoch
+from tenbaud.replay.record import Epoch, check_epoch
 
 MAGIC = b"tenbaud symbols 1\n"
 _LENGTH = struct.Struct("<I")
@@ -89,6 +89,14 @@ def pack(
     )
 
 
+_DAMAGED = (
+    *(ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError),
+    *(struct.error, zlib.error),
+)
+HEAD_BYTES_MAX = 16 << 20
+NUMBER_MAX = 1 << 53
+
+
 def unpack(path: Path, *, allow_code: bool = False) -> Unpacked:
     """Read a symbols file; RecordingError for a file that is none, or not a whole one.
 
@@ -100,7 +108,7 @@ def unpack(path: Path, *, allow_code: bool = False) -> Unpacked:
         if not data.startswith(MAGIC):
             raise ValueError("it begins otherwise")
         (length,) = _LENGTH.unpack_from(data, len(MAGIC))
-        head: dict[str, Any] = json.loads(zlib.decompress(data[head_at : head_at + length]))
+        head: dict[str, Any] = json.loads(_unpacked_head(data[head_at : head_at + length]))
         config = FlightConfig.model_validate(head["config"])
         if allow_code:
             config = config.allowing_code()
@@ -110,15 +118,32 @@ def unpack(path: Path, *, allow_code: bool = False) -> Unpacked:
         agreement = agree(config, clock)
         epochs = _epochs(head["epochs"], data[head_at + length :], agreement.codec)
         steps = tuple((int(tick), float(angle)) for tick, angle in head["set_points"])
+        for epoch in epochs:
+            check_epoch(epoch, agreement, str(path))
         return Unpacked(agreement, epochs, steps, str(head["last_digest"]))
-    except (OSError, ValueError, KeyError, TypeError, struct.error, zlib.error) as error:
+    except (*_DAMAGED, OSError) as error:
         raise RecordingError(f"{path} is no symbols file of a flight: {error}.") from error
+
+
+def _unpacked_head(packed: bytes) -> bytes:
+    head = zlib.decompressobj().decompress(packed, HEAD_BYTES_MAX + 1)
+    if len(head) > HEAD_BYTES_MAX:
+        raise ValueError(f"its head unpacks to more than {HEAD_BYTES_MAX} bytes")
+    return head
 
 
 def _epochs(described: list[list[Any]], data: bytes, codec: Codec) -> list[Epoch]:
     alphabet = codec.coder.alphabet
     count, width = _per_word(alphabet), _width(alphabet)
+    for number, first, words, hold, _ in described:
+        if not all(type(one) in (int, float) and abs(one) < NUMBER_MAX for one in hold):
+            raise ValueError("the held command of an epoch is no list of numbers")
+        if not all(type(one) is int and 0 <= one < NUMBER_MAX for one in (number, first, words)):
+            raise ValueError("an epoch has no number, first sample and length")
     total = sum(row[2] for row in described)
+    # Of an alphabet of one symbol any number of words fits into no byte at all.
+    if total > 8 * len(data):
+        raise ValueError(f"{total} words cannot be in {len(data)} bytes")
     size = -(-total * count * width // 8)
     erasures_size = -(-total // 8)
     if len(data) not in (size, size + erasures_size):

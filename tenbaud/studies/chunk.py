@@ -65,10 +65,10 @@ def fly_point(config: FlightConfig, seeds: Sequence[int], engine: str) -> list[F
     if engine != "plain":
         from tenbaud.studies.flights import CompiledPoint
         from tenbaud.studies.schedule import Uncommon
-        from tenbaud.studies.side_by_side import fly_seeds
 
         try:
-            flown = fly_seeds(CompiledPoint(config), seeds)
+            point = CompiledPoint(config)
+            flown = [point.figures(seed) for seed in seeds]
         except Uncommon as error:
             if engine == "compiled":
                 raise StudyError(f'engine = "compiled" cannot fly {error}; use auto') from error

@@ -22,11 +22,13 @@ from types import FunctionType
 from typing import Any
 
 from channel.errors import TenbaudError
+from channel.numerics import refuse
 
 PACKAGES = ("channel", "plant_sim", "receiver", "transmitter", "tenbaud")
 
-OPTIONS = {"fastmath": False, "error_model": "python", "nogil": True}
-"""How everything is compiled: divisions by zero are errors and nothing is reordered, as in Python."""
+OPTIONS = {"fastmath": False, "error_model": "python", "nogil": True, "_nrt": False}
+"""How everything is compiled: divisions by zero are errors and nothing is reordered, as in Python; no
+memory is allocated, and so none is counted."""
 
 SOURCES = (*PACKAGES[:-1], "tenbaud.config", "tenbaud.flight", "tenbaud.studies")
 """Packages that the figures of a flight depend on; beside them, what builds its parts."""
@@ -36,9 +38,6 @@ BESIDE = (
     *("plots.py", "run.py", "table.py", "study.py", "study_file.py", "points.py", "settings.py"),
 )
 """Modules of the studies that no figure of a flight depends on."""
-
-LOOPS = ("tenbaud.studies.lane_ticks", "tenbaud.studies.lane_samples")
-"""Modules whose functions are loops over lanes, each compiled on its own; see `apart`."""
 
 Parts = tuple[tuple[str, Any], ...]
 """What stands for the placeholders of the flight: (name, compiled function)."""
@@ -72,18 +71,17 @@ def compiled(function: Callable[..., Any], parts: Parts = (), inline: bool = Fal
         if name in names or not isinstance(value, FunctionType):
             continue
         package, _, rest = value.__module__.partition(".")
-        if package in PACKAGES:
+        if value is refuse:
+            names[name] = _jit(_refuse, inline="never")
+        elif package in PACKAGES:
             ours = rest.startswith("studies")
-            inner = ours and value.__module__ not in LOOPS
-            names[name] = compiled(value, parts if ours else (), inner)
+            names[name] = compiled(value, parts if ours else (), ours)
     scope = {**function.__globals__, **names}
     copy = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
     copy.__module__ = function.__module__
     # The cache knows a function by its name: with other parts it is another function.
     own = "_".join([function.__qualname__, *(part.__name__ for _, part in parts)])
     copy.__qualname__ = copy.__name__ = own
-    if function.__module__ in LOOPS:
-        return _jit(copy, pipeline_class=import_module("tenbaud.studies.apart").ApartCompiler)
     return _jit(copy, inline="always" if inline else "never", forceinline=True)
 
 
@@ -98,39 +96,9 @@ def reader(size: int) -> Any:
     return _named(read, f"read_{size}")
 
 
-@cache
-def lane_reader(size: int) -> Any:
-    """Return a compiled function that makes a tuple of one lane's `size` values."""
-    if size == 0:
-
-        def nothing(values: Any, lane: int) -> Any:
-            return ()
-
-        return _named(nothing, "read_lane_0")
-    shorter, last = lane_reader(size - 1), size - 1
-
-    def read(values: Any, lane: int) -> Any:
-        return (*shorter(values, lane), values[last, lane])
-
-    return _named(read, f"read_lane_{size}")
-
-
-@cache
-def lane_writer(size: int) -> Any:
-    """Return a compiled function that puts a tuple of `size` values into an array's lane."""
-    if size == 0:
-
-        def nothing(values: Any, lane: int, state: Any) -> None:
-            return
-
-        return _named(nothing, "write_lane_0")
-    shorter, last = lane_writer(size - 1), size - 1
-
-    def write(values: Any, lane: int, state: Any) -> None:
-        shorter(values, lane, state)
-        values[last, lane] = state[last]
-
-    return _named(write, f"write_lane_{size}")
+def _refuse(what: str, x: float) -> None:
+    """Stand for `channel.numerics.refuse`: writing the number down would take memory."""
+    raise ValueError("an argument of sin, cos or exp is out of range")
 
 
 def _named(function: Callable[..., Any], name: str) -> Any:

@@ -131,6 +131,13 @@ class CompiledPoint:
         figures = flight_figures(errors, motion, schedule.erasures, self._samples)
         return figures, Trace(work.models, work.coders, work.coded, work.live, work.front, work.rear)
 
+    def figures(self, seed: int) -> FlightFigures | None:
+        """Fly with one seed; None for a flight that only the nodes can fly."""
+        try:
+            return self.fly(seed)[0]
+        except Uncommon:
+            return None
+
     def schedule(self, agreement: Agreement) -> Schedule:
         """Return what the line does; on one without faults the same for all seeds."""
         if self._clean is None or agreement.faults.any:

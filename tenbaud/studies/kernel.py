@@ -22,8 +22,7 @@ from plant_sim.pitch import pitch_step
 from receiver.controllers.pid import motor_volts, pid_integral, pid_volts
 from tenbaud.studies.flight_data import DONE, LEFT, Errors, Given, Motion, Numbers, Work
 from tenbaud.studies.parts import decode, encode, held_of, sine, state_of, tick
-from tenbaud.studies.sensor_side import act, angle_at, count_at, guess, score
-from tenbaud.studies.uncounted import bare_given, bare_work
+from tenbaud.studies.sensor_side import act, angle_at, count_at, guess, put, score
 
 
 def fly(
@@ -37,8 +36,6 @@ def fly(
     `constants` are those of (model, coder, plant, PID).
     """
     model_constants, coder_constants, plant_constants, pid_constants = constants
-    given = bare_given(given)
-    work = bare_work(work)
     integral = 0.0
     plant = (given.start[0], given.start[1], 0.0, 0.0)
     motion = Motion(numbers.safe_front, numbers.safe_rear, 0, 0, 0, 0)
@@ -49,23 +46,39 @@ def fly(
         well = _measure(sample, plant[0], numbers, model_constants, coder_constants, given, work)
         erased = _receive(sample, given, work)
         held = _open(sample, erased, numbers, coder_constants, work)
-        answered, integral = _answer(
-            sample, held, integral, numbers, model_constants, pid_constants, given, work
-        )
-        if not (well and answered):
-            return LEFT, motion, errors
+        state = state_of(work.model)
         first = sample * numbers.per_sample
-        for at in range(first, min(first + numbers.per_sample, numbers.ticks)):
-            well, motion = act(at, plant[0], motion, numbers, model_constants, given, work)
-            if not well:
-                return LEFT, motion, errors
-            if at >= numbers.window_start:
-                angle = angle_at(motion.counts, numbers) if numbers.replay else plant[0]
-                errors = score(at, sample, angle, errors, numbers, given, work)
-            if not numbers.replay:
-                torque = given.torque[at] if given.torque.shape[0] > 0 else 0.0
-                volts = (motion.front, motion.rear)
-                plant = pitch_step(plant, volts, torque, plant_constants, sine)
+        after = first + numbers.per_sample
+        # Codec and plant in one loop: neither waits for the other within a tick, so that the processor
+        # works on both at once.
+        for at in range(first, after + numbers.lead):
+            if at == after:
+                well = _close(sample, state, work) and well
+                held = held_of(work.nothing)
+            if at < after:
+                work.coded[at] = state[0]
+            if at >= first + numbers.lead:
+                work.live[at] = state[0]
+                decided, integral = _decide(
+                    at, state[0], state[1], integral, numbers, pid_constants, given, work
+                )
+                well = well and decided
+            volts = (work.front[at], work.rear[at])
+            state = tick(state, volts, held, model_constants)
+            if at < after and at < numbers.ticks:
+                untripped, motion = act(at, plant[0], motion, numbers, model_constants, given, work)
+                well = well and untripped
+                if at >= numbers.window_start:
+                    angle = angle_at(motion.counts, numbers) if numbers.replay else plant[0]
+                    errors = score(at, sample, angle, errors, numbers, given, work)
+                if not numbers.replay:
+                    torque = given.torque[at] if given.torque.shape[0] > 0 else 0.0
+                    volts = (motion.front, motion.rear)
+                    plant = pitch_step(plant, volts, torque, plant_constants, sine)
+        if numbers.lead == 0:
+            well = _close(sample, state, work) and well
+        if not well:
+            return LEFT, motion, errors
     return DONE, motion, errors
 
 
@@ -81,8 +94,8 @@ def _measure(
     """Measure at a sample's beginning and send its word; return whether the estimate is one."""
     first = sample * numbers.per_sample
     known = given.known[first]
-    work.model[:] = work.models[known]
-    work.coder[:] = work.coders[known]
+    put(work.models[known], work.model)
+    put(work.coders[known], work.coder)
     well = True
     if known < sample:
         well = guess(sample, numbers, model_constants, coder_constants, given, work)
@@ -135,46 +148,11 @@ def _open(
         work.correction,
         work.coders[sample + 1],
     )
-    work.model[:] = model
+    put(model, work.model)
     if numbers.impulse:
         add_correction(work.model, work.correction)
         return held_of(work.nothing)
     return held_of(work.correction)
-
-
-def _answer(
-    sample: int,
-    held: Any,
-    integral: float,
-    numbers: Numbers,
-    model_constants: Any,
-    pid_constants: Any,
-    given: Given,
-    work: Work,
-) -> tuple[bool, float]:
-    """Fly the opened sample and decide its commands, as `channel.lead.fly_sample` does.
-
-    Return whether all is well, and the controller's integral.
-    """
-    first = sample * numbers.per_sample
-    state = state_of(work.model)
-    good = True
-    for at in range(first, first + numbers.per_sample + numbers.lead):
-        if at == first + numbers.per_sample:
-            good = good and _close(sample, state, work)
-            held = held_of(work.nothing)
-        if at < first + numbers.per_sample:
-            work.coded[at] = state[0]
-        if at >= first + numbers.lead:
-            work.live[at] = state[0]
-            decided, integral = _decide(
-                at, state[0], state[1], integral, numbers, pid_constants, given, work
-            )
-            good = good and decided
-        state = tick(state, (work.front[at], work.rear[at]), held, model_constants)
-    if numbers.lead == 0:
-        good = good and _close(sample, state, work)
-    return good, integral
 
 
 def _close(sample: int, state: Any, work: Work) -> bool:

@@ -52,20 +52,5 @@ def held_of(values: Sequence[float]) -> State:
 
 
 def sine(x: float) -> float:
-    """Stand for the plant's sine: that of `channel.numerics`, or the one for lanes."""
-    raise AssertionError("a flight is compiled before it is flown")
-
-
-def lane_state(values: Any, lane: int) -> State:
-    """Stand for what reads one lane's model state."""
-    raise AssertionError("a flight is compiled before it is flown")
-
-
-def lane_held(values: Any, lane: int) -> State:
-    """Stand for what reads one lane's correction."""
-    raise AssertionError("a flight is compiled before it is flown")
-
-
-def keep_state(values: Any, lane: int, state: State) -> None:
-    """Stand for what writes one lane's model state."""
+    """Stand for the plant's sine, that of `channel.numerics`."""
     raise AssertionError("a flight is compiled before it is flown")

@@ -17,7 +17,6 @@ import numpy as np
 from channel.errors import FrameError
 from channel.frames import Frame, Symbol
 from channel.line import Delivery
-from channel.lockstep import HISTORY_SAMPLES
 from tenbaud.build import Agreement
 from tenbaud.build_ends import build_line
 from transmitter.virtual_flight import GREETINGS_MAX
@@ -71,7 +70,7 @@ def _arrays(
     at = np.arange(ticks, dtype=np.int64)
     known = np.searchsorted(echo_ns, at * tick_ns, side="right").astype(np.int64)
     known[::per_sample] = known_first
-    if np.any(np.arange(len(echo_ns)) - known_first > HISTORY_SAMPLES):
+    if np.any(np.arange(len(echo_ns)) - known_first > terms.history_samples):
         raise Uncommon("echoes lag by more than the ends allow")
     scored = echo_ns <= ticks * tick_ns + _linger_ns(agreement)
     erased = (shifts.reshape(-1, terms.symbols_per_word) < 0).any(axis=1)
@@ -142,7 +141,10 @@ class _LineFlight:
         self._order = count()
         self._slot = 0
         self._silent = 0
-        self._anchor: tuple[int, int] | None = None
+        self._shift_ns: int | None = None
+        """deadline of a slot less its own time, by the last symbol in time; None: no deadline"""
+        self._deadline_ns = _NEVER_NS
+        """of the slot that is due"""
         self._expected = 0
         """sample whose echo is due at the transmitter"""
 
@@ -193,8 +195,8 @@ class _LineFlight:
     def _pass_to(self, now_ns: int, deadlines: bool = True) -> None:
         while True:
             arrival_ns = self._arrivals[0].time_ns if self._arrivals else _NEVER_NS
-            deadline_ns = self._deadline_ns() if deadlines else _NEVER_NS
-            if min(arrival_ns, deadline_ns) > now_ns:
+            deadline_ns = self._deadline_ns if deadlines else _NEVER_NS
+            if arrival_ns > now_ns and deadline_ns > now_ns:
                 return
             if deadline_ns < arrival_ns:
                 self._on_deadline(deadline_ns)
@@ -207,35 +209,31 @@ class _LineFlight:
                     self._on_symbol(arrival)
                 self._on_deadline(arrival.time_ns)
 
-    def _deadline_ns(self) -> int:
-        if self._anchor is None:
-            return _NEVER_NS
-        slot, anchor_ns = self._anchor
-        due_ns = self._terms.slot_ns(self._slot) - self._terms.slot_ns(slot)
-        return anchor_ns + due_ns + self._terms.deadline_allowance_ns
-
     def _on_deadline(self, now_ns: int) -> None:
-        while self._deadline_ns() <= now_ns:
+        while self._deadline_ns <= now_ns:
             self._silent += 1
             self._settle(-1, now_ns)
-            if self._silent >= HISTORY_SAMPLES * self._terms.symbols_per_word:
+            if self._silent >= self._terms.history_samples * self._terms.symbols_per_word:
                 raise Uncommon("the line is silent for longer than the receiver waits")
 
     def _on_symbol(self, arrival: _Arrival) -> None:
         if arrival.slot < self._slot:
             return
-        if arrival.slot - self._slot > HISTORY_SAMPLES * self._terms.symbols_per_word:
+        if arrival.slot - self._slot > self._terms.history_samples * self._terms.symbols_per_word:
             raise Uncommon("a gap that is longer than the receiver bridges")
         self._silent = 0
         while self._slot < arrival.slot:
             self._settle(-1, arrival.time_ns)
-        self._anchor = (arrival.slot, arrival.time_ns)
+        late_ns = arrival.time_ns - self._terms.slot_ns(arrival.slot)
+        self._shift_ns = late_ns + self._terms.deadline_allowance_ns
         self._settle(arrival.shift, arrival.time_ns)
 
     def _settle(self, shift: int, now_ns: int) -> None:
         if self._slot < len(self.shifts):
             self.shifts[self._slot] = shift
         self._slot += 1
+        if self._shift_ns is not None:
+            self._deadline_ns = self._terms.slot_ns(self._slot) + self._shift_ns
         sample, left = divmod(self._slot, self._terms.symbols_per_word)
         if left == 0:
             self._push_all(self._down.carry(b"", False, now_ns), -1, sample - 1)

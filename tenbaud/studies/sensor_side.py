@@ -13,6 +13,12 @@ from tenbaud.studies.parts import decode, held_of, state_of, tick
 from transmitter.encoder_watch import MOTION_RAD
 
 
+def put(values: Any, target: Any) -> None:
+    """Copy an array's values into another: a slice assignment would allocate memory for them first."""
+    for index in range(values.shape[0]):
+        target[index] = values[index]
+
+
 def count_at(angle: float, numbers: Numbers) -> int:
     """Return what the encoder reads."""
     return counts_of(angle, numbers.counts_per_turn, numbers.sign, numbers.zero_counts)
@@ -43,7 +49,7 @@ def guess(
     for one in range(known, sample):
         word = work.sent[one * size : (one + 1) * size]
         decode(coder_constants, work.coder, work.model, word, False, work.correction, work.spare)
-        work.coder[:] = work.spare
+        put(work.spare, work.coder)
         if numbers.impulse:
             add_correction(work.model, work.correction)
         held = held_of(work.nothing) if numbers.impulse else held_of(work.correction)

@@ -57,6 +57,10 @@ class _Composer:
         self._measured = agreement.codec.model.measured
         self._stride = max(1, round(POINT_PERIOD_S / (agreement.terms.tick_ns / 1e9)))
 
+    def watch(self, watched: bool) -> None:
+        """Have rows kept only while anybody watches."""
+        self.tap.watch(watched)
+
     def _common(self, session: Any, impairments: str, rows: list[tuple[str, Row]]) -> dict[str, Any]:
         self._number += 1
         events = [row for topic, row in rows if topic == "event"][-EVENTS_MAX:]

@@ -15,6 +15,9 @@ from channel.errors import LinkError
 class Port(Protocol):
     """Where messages go."""
 
+    def is_watched(self) -> bool:
+        """Return whether anybody would get a message."""
+
     def publish(self, data: bytes) -> None:
         """Send one message; LinkError when it cannot be."""
 
@@ -27,12 +30,15 @@ class Composer(Protocol):
 
     skipped: int
 
+    def watch(self, watched: bool) -> None:
+        """Hear whether anybody watches; while nobody does, no message is asked for."""
+
     def compose(self) -> dict[str, object]:
         """Return the message of this moment."""
 
 
 class Publisher:
-    """Within a `with`, publishes `rate_hz` times a second. It has one last word when it ends.
+    """Within a `with`, publishes `rate_hz` times a second while anybody watches, and once at the end.
 
     A period that passed unused, because the machine or the network held the thread up, is counted in
     the composer's `skipped`. An error ends the telemetry and nothing else; `error` then says why.
@@ -75,6 +81,10 @@ class Publisher:
             self._guard(self._send)
 
     def _send(self) -> None:
+        watched = self._port.is_watched()
+        self._composer.watch(watched)
+        if not watched:
+            return
         message = orjson.dumps(self._composer.compose())
         try:
             self._port.publish(message)

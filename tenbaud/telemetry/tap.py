@@ -1,13 +1,14 @@
 """Where telemetry leaves the loop: a recorder that also keeps the newest rows, in a bounded queue.
 
 Everything worth telling passes through the recorder already. The loop appends one reference to a
-deque and goes on; when nobody empties it in time the oldest rows fall out and are counted.
+deque and goes on; when nobody empties it in time the oldest rows fall out and are counted. While nobody
+watches, rows go straight to the recorder.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from channel.recording import RecordChannel, Recorder
 
@@ -22,8 +23,15 @@ class Tap:
         self.rows: deque[tuple[str, Sequence[object]]] = deque(maxlen=ROWS_MAX)
         self.dropped = 0
         self._write = recorder.write
+        self.write: Callable[[RecordChannel, int, Sequence[object]], None] = self._write_and_keep
 
-    def write(self, channel: RecordChannel, time_ns: int, row: Sequence[object]) -> None:
+    def watch(self, watched: bool) -> None:
+        """Keep rows from now on, or no more. Called by the thread that takes them."""
+        self.write = self._write_and_keep if watched else self._write
+        if not watched:
+            self.rows.clear()
+
+    def _write_and_keep(self, channel: RecordChannel, time_ns: int, row: Sequence[object]) -> None:
         """Pass one row on, and keep it for the telemetry."""
         topic = channel.topic
         if topic in TOPICS:

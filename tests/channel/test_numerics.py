@@ -112,6 +112,30 @@ def test_sin_is_odd_and_cos_is_even_to_the_last_bit() -> None:
         assert numerics.cos(-x) == numerics.cos(x)
 
 
+def general_sin(x: float) -> float:
+    """Return the sine the general way, for angles that `sin` has written out."""
+    if abs(x) <= numerics._EIGHTH_TURN:
+        return numerics._sin_reduced(x, 0.0)
+    quarters, remainder, tail = numerics._reduce_angle(x)
+    assert quarters in (-1, 1)
+    cosine = numerics._cos_reduced(remainder, tail)
+    return cosine if quarters == 1 else -cosine
+
+
+def test_the_ranges_written_out_have_the_bits_of_the_general_way() -> None:
+    rng = random.Random(13)
+    angles = [rng.uniform(0.0, 2.35) for _ in range(20_000)]
+    angles += [10.0 ** rng.uniform(-320.0, 0.0) for _ in range(2_000)]
+    for edge in (numerics._EIGHTH_TURN, math.pi / 2, numerics._ONE_QUARTER_MAX):
+        below = above = edge
+        for _ in range(50):
+            angles += [below, above]
+            below, above = math.nextafter(below, 0.0), math.nextafter(above, 4.0)
+    for angle in angles:
+        assert numerics.sin(angle).hex() == general_sin(angle).hex(), angle.hex()
+        assert numerics.sin(-angle).hex() == general_sin(-angle).hex(), angle.hex()
+
+
 def test_results_at_zero_are_exact_and_positive() -> None:
     for zero in (0.0, -0.0):
         assert numerics.sin(zero).hex() == "0x0.0p+0"
@@ -185,7 +209,14 @@ def test_compiled_functions_give_the_same_bits() -> None:
     numba = pytest.importorskip("numba", reason="needs the extra 'studies'")
     compiled = dict(vars(numerics))
     # Helpers first: compiled code finds the functions it calls among its globals.
-    for name in ("_power_of_two", "_sin_reduced", "_cos_reduced", "_reduce_angle", *FUNCTIONS):
+    for name in (
+        "refuse",
+        "_power_of_two",
+        "_sin_reduced",
+        "_cos_reduced",
+        "_reduce_angle",
+        *FUNCTIONS,
+    ):
         function: FunctionType = getattr(numerics, name)
         compiled[name] = numba.njit(FunctionType(function.__code__, compiled, name))
     for name, pairs in json.loads(GOLDEN.read_text(encoding="utf-8")).items():

@@ -118,3 +118,8 @@ def test_when_a_command_frame_cannot_carry_the_repeats_then_the_terms_are_refuse
 ) -> None:
     with pytest.raises(ValueError):
         terms(repeats=repeats, ticks_per_sample=ticks).check("virtual")
+
+
+@pytest.mark.parametrize(("period_ns", "samples"), [(100 * MS, 64), (2 * MS, 125), (MS // 2, 500)])
+def test_when_samples_are_short_then_the_bound_on_lag_is_a_time(period_ns: int, samples: int) -> None:
+    assert terms(tick_ns=period_ns, ticks_per_sample=1).history_samples == samples

@@ -99,6 +99,18 @@ def test_when_a_viewer_stands_still_then_the_other_still_sees_and_nothing_waits_
         port.close()
 
 
+def test_a_port_knows_whether_anybody_watches_it(tmp_path: Path) -> None:
+    port = TelemetryPort("transmitter", "lab", endpoint_in(tmp_path))
+    try:
+        assert not port.is_watched()
+        viewer = TelemetryFeed(endpoint_in(tmp_path), "lab", lambda data: None)
+        wait_until(port.is_watched)
+        viewer.close()
+        wait_until(lambda: not port.is_watched())
+    finally:
+        port.close()
+
+
 def test_when_nobody_watches_then_publishing_costs_nothing_and_raises_nothing(tmp_path: Path) -> None:
     port = TelemetryPort("transmitter", "lab", endpoint_in(tmp_path))
     try:

@@ -6,8 +6,9 @@ from dataclasses import replace
 from typing import Any
 
 from channel.frames import Bye, Commands, Frame, Hello, Refuse, Symbol, Unknown, Welcome, Why
+from channel.lockstep import HISTORY_SAMPLES
 from receiver.rejoin import ANSWER_AGE_SAMPLES_MAX, KEEP_CODER_SAMPLES, carried_to
-from receiver.session import GAP_SAMPLES_MAX, ReceiverSession
+from receiver.session import ReceiverSession
 from tests.receiver.sessions import CODEC, MS, PEER, SESSION, flying, hello, receiver, symbol
 
 VOLTS = (1.0, -1.0)
@@ -63,6 +64,13 @@ def test_when_the_request_is_repeated_then_so_is_the_answer_until_it_is_used_or_
     assert session.on_frame(request(1, 41), 0) == []
 
 
+def test_when_samples_are_short_then_an_answer_on_its_way_is_not_replaced_by_another() -> None:
+    session = flown(10, tick_ns=MS // 20, rate_baud=2000.0)
+    first = only_welcome(session.on_frame(request(1, 12), 0))
+    assert session.on_frame(request(1, 12 + 90), 0) == [first]
+    assert only_welcome(session.on_frame(request(1, 13 + 100), 0)).epoch == 2
+
+
 def test_when_symbols_are_of_an_old_epoch_then_they_are_not_consumed() -> None:
     session = flown(10)
     welcome = only_welcome(session.on_frame(request(1, 12), 0))
@@ -113,7 +121,7 @@ def test_when_the_transmitter_was_started_again_then_it_flies_on_in_the_receiver
 def test_when_nothing_comes_for_long_then_erasures_are_not_counted_for_ever() -> None:
     session = flown(5)
     session.on_deadline(10**15)
-    assert session.counts["erasures"] == GAP_SAMPLES_MAX
+    assert session.counts["erasures"] == HISTORY_SAMPLES
     assert session.next_deadline() is None
     assert session.on_frame(symbol(10_000), 0) == [Unknown(SESSION, 0)]
 
@@ -128,8 +136,8 @@ def test_when_the_pause_is_long_then_the_coder_begins_again_but_not_the_model() 
     assert long.model == CODEC.step(short, None, [VOLTS] * 10).model
     silent = carried_to(CODEC, state, 40, (), VOLTS, KEEP_CODER_SAMPLES + 1)
     assert silent == state._replace(coder=CODEC.coder.initial())
-    far = carried_to(CODEC, state, 41 + GAP_SAMPLES_MAX, (), VOLTS, 0)
-    assert far == CODEC.initial()._replace(sample=41 + GAP_SAMPLES_MAX)
+    far = carried_to(CODEC, state, 41 + HISTORY_SAMPLES, (), VOLTS, 0)
+    assert far == CODEC.initial()._replace(sample=41 + HISTORY_SAMPLES)
 
 
 def test_when_the_request_comes_in_the_middle_of_a_word_then_the_word_is_given_up() -> None:

@@ -17,8 +17,8 @@ from channel.frames import (
     Welcome,
 )
 from channel.limits import CommandLimits, from_millivolts
+from channel.lockstep import HISTORY_SAMPLES
 from channel.words import WIRE_ERASED
-from receiver.session import GAP_SAMPLES_MAX
 from tests.receiver.sessions import (
     CODEC,
     MS,
@@ -98,10 +98,10 @@ def test_when_a_symbol_is_of_another_flight_then_it_is_dropped_and_counted(stale
 
 def test_when_a_slot_is_far_ahead_then_it_is_dropped_and_not_a_gap() -> None:
     session = flying()
-    assert session.on_frame(symbol(GAP_SAMPLES_MAX + 1), 0) == [Unknown(SESSION, 0)]
+    assert session.on_frame(symbol(HISTORY_SAMPLES + 1), 0) == [Unknown(SESSION, 0)]
     assert session.counts["stale_frames"] == 1
     assert kinds(session)[-1] is EventKind.STALE
-    assert len(session.on_frame(symbol(GAP_SAMPLES_MAX), 0)) == GAP_SAMPLES_MAX + 1
+    assert len(session.on_frame(symbol(HISTORY_SAMPLES), 0)) == HISTORY_SAMPLES + 1
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ def taken(order: EchoOrder, expected: int) -> list[int]:
 
 
 def test_when_frames_come_in_order_then_each_echo_is_taken_once() -> None:
-    order, got = EchoOrder(0), 0
+    order, got = EchoOrder(0, 64), 0
     for newest in range(20):
         order.add(frame(newest), got, newest)
         got += len(taken(order, got))
@@ -31,7 +31,7 @@ def test_when_frames_come_in_order_then_each_echo_is_taken_once() -> None:
 
 
 def test_when_more_frames_are_lost_than_each_repeats_then_the_echo_is_lost_at_once() -> None:
-    order = EchoOrder(0)
+    order = EchoOrder(0, 64)
     order.add(frame(7), 5, 70)
     assert not order.is_lost(5, 70)
     assert taken(order, 5) == [5, 6, 7]
@@ -40,7 +40,7 @@ def test_when_more_frames_are_lost_than_each_repeats_then_the_echo_is_lost_at_on
 
 
 def test_when_frames_may_overtake_each_other_then_an_echo_is_lost_when_it_can_no_longer_come() -> None:
-    order = EchoOrder(30)
+    order = EchoOrder(30, 64)
     order.add(frame(11), 5, 100)
     order.add(frame(12), 5, 110)
     assert [order.is_lost(5, tick) for tick in (100, 129, 130)] == [False, False, True]
@@ -52,7 +52,7 @@ def test_when_frames_may_overtake_each_other_then_an_echo_is_lost_when_it_can_no
 def test_when_frames_overtake_each_other_in_their_time_then_none_is_lost() -> None:
     chance = random.Random(3)
     spread_ticks, per_sample = 60, 10
-    order, got, tick = EchoOrder(spread_ticks), 0, 0
+    order, got, tick = EchoOrder(spread_ticks, 64), 0, 0
     arrivals = sorted(
         (newest * per_sample + chance.randrange(spread_ticks), newest) for newest in range(400)
     )
@@ -66,6 +66,6 @@ def test_when_frames_overtake_each_other_in_their_time_then_none_is_lost() -> No
 
 
 def test_when_an_echo_is_further_ahead_than_the_history_then_it_is_not_kept() -> None:
-    order = EchoOrder(0)
+    order = EchoOrder(0, 64)
     order.add(frame(1000), 5, 0)
     assert order.take(1000) is None

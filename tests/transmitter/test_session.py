@@ -23,10 +23,11 @@ from channel.frames import (
     Welcome,
     Why,
 )
+from channel.lockstep import HISTORY_SAMPLES
 from channel.words import ERASED, WIRE_ERASED, Word
 from tests.channel.parts import identity_of, pitch_codec, terms
 from tests.channel.two_axes import TWO_AXES_ZOOM, TwoAxes
-from transmitter.session import LAG_SAMPLES_MAX, Phase, TransmitterSession
+from transmitter.session import Phase, TransmitterSession
 
 CODEC = pitch_codec()
 IDENTITY = identity_of(CODEC)
@@ -190,6 +191,15 @@ def test_when_the_first_tick_of_a_word_was_missed_then_none_of_its_symbols_leave
     assert session.counts["words_missed"] == 1
 
 
+def test_when_samples_are_short_then_echoes_may_lag_by_a_time_and_requests_are_spaced() -> None:
+    session = flying(lead_ticks=13, tick_ns=50_000, rate_baud=2000.0)
+    sent = [symbol for tick in range(5000) for symbol in session.on_measurement(tick, (1.0,))]
+    assert len(sent) == 500
+    asked = [session.on_measurement(tick, (1.0,)) for tick in range(5000, 5450)]
+    assert session.phase is Phase.REJOINING
+    assert sum(isinstance(one, Hello) for frames in asked for one in frames) == 3
+
+
 def test_when_echoes_stay_away_then_slots_do_not_wait_until_a_rejoin_is_asked_for() -> None:
     session = flying(lead_ticks=13)
     sent = [symbol for tick in range(640) for symbol in session.on_measurement(tick, (1.0,))]
@@ -197,9 +207,9 @@ def test_when_echoes_stay_away_then_slots_do_not_wait_until_a_rejoin_is_asked_fo
     for tick in range(640, 660):
         sent += session.on_measurement(tick, (1.0,))
     assert session.phase is Phase.REJOINING
-    assert f"no echo for {LAG_SAMPLES_MAX} samples" in session.events[-1].text
+    assert f"no echo for {HISTORY_SAMPLES} samples" in session.events[-1].text
     symbols = [one for one in sent if isinstance(one, Symbol)]
-    assert len(symbols) <= LAG_SAMPLES_MAX + 1
+    assert len(symbols) <= HISTORY_SAMPLES + 1
     requests = [one for one in sent if isinstance(one, Hello)]
     assert requests
     assert {request.why for request in requests} == {Why.LAG}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, Self
+from typing import NamedTuple, Protocol, Self
 
 from channel.codec import Vector
 
@@ -22,9 +22,8 @@ class DeviceNote:
     """samples that are missing in its sequence so far"""
 
 
-@dataclass(frozen=True, slots=True)
-class Reading:
-    """One look at the rig."""
+class Reading(NamedTuple):
+    """One look at the rig. There is one for every tick, so it is a plain tuple."""
 
     counts: tuple[int, ...]
     """of the encoders, unwrapped"""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from channel.codec import Vector
 from transmitter.rigs.base import Reading, Rig, RigBase
 
@@ -26,7 +24,7 @@ class DryRig(RigBase):
         reading = self._rig.read(tick)
         if reading is None or reading.applied_volts is not None:
             return reading
-        return replace(reading, applied_volts=self._nothing)
+        return reading._replace(applied_volts=self._nothing)
 
     def write(self, tick: int, volts: Vector) -> None:
         """Do nothing."""

@@ -16,6 +16,7 @@ class SimulatedRig(RigBase):
     def __init__(self, plant: Plant, encoders: tuple[Encoder, ...], safe_volts: Vector) -> None:
         self._plant = plant
         self._encoders = encoders
+        self._encoder = encoders[0] if len(encoders) == 1 else None
         self._safe_volts = safe_volts
         self._volts = safe_volts
         self._tick = 0
@@ -26,6 +27,9 @@ class SimulatedRig(RigBase):
             self._plant.advance(self._volts)
             self._tick += 1
         true = self._plant.measured_rad
+        if len(true) == 1 and self._encoder is not None:
+            count = self._encoder.counts(true[0])
+            return Reading((count,), (self._encoder.angle_rad(count),), true)
         pairs = zip(self._encoders, true, strict=True)
         counts = tuple(encoder.counts(angle) for encoder, angle in pairs)
         return Reading(counts, angles_rad(self._encoders, counts), true)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from tenbaud.recording.notes import hole_notes, stray_notes
 from tenbaud.recording.recover import RECOVERED_NOTE
 from tenbaud.replay.claims.base import Claim, Evidence, Findings, Place
 
@@ -29,6 +30,8 @@ def check_rows(evidence: Evidence, findings: Findings) -> None:
     for end, tables in evidence.record.ends():
         place = Place(end, "all topics", "all rows")
         held = sum(len(table) for table in tables.topics.values())
+        for note in hole_notes(tables.path, tables.holes) + stray_notes(tables.path, tables.strays):
+            findings.gap(place, note)
         dropped = _count(tables.end.get("rows_dropped", "0"))
         if dropped:
             findings.gap(place, "the recorder lost rows", f"{dropped}")

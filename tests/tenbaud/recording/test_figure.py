@@ -3,12 +3,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from tenbaud import fly as fly_once
 from tenbaud.recording.errors import RecordingError
-from tenbaud.recording.figure import decimate, draw_flight, interrupt_gaps
+from tenbaud.recording.figure import draw_flight
 from tenbaud.recording.folder import RunFolder
 from tests.tenbaud.recording.rows import EVENT, Rows
 
@@ -33,30 +32,6 @@ def test_recording_without_ticks_is_refused(
     with pytest.raises(RecordingError, match="holds no ticks"):
         draw_flight(path, None, tmp_path / "a.png", "")
     assert not (tmp_path / "a.png").exists()
-
-
-def test_curve_is_interrupted_where_rows_are_missing() -> None:
-    times = np.array([0.0, 0.1, 0.2, 1.5, 1.6, 1.7])
-    new_times, values = interrupt_gaps(times, np.ones(6))
-    assert np.isnan(values).tolist() == [False, False, False, True, False, False, False]
-    assert new_times.tolist() == [0.0, 0.1, 0.2, 0.2, 1.5, 1.6, 1.7]
-
-
-def test_thinned_curve_keeps_its_peaks_its_order_and_its_gaps() -> None:
-    times = np.arange(100_000.0)
-    values = np.sin(times / 5000.0)
-    values[31_234], values[77_777] = 9.0, -9.0
-    values[50_000:51_000] = np.nan
-    thin_times, thin_values = decimate(times, values, 4000)
-    assert len(thin_values) <= 4000
-    assert (np.diff(thin_times) > 0).all()
-    assert thin_values[thin_times == 31_234.0] == 9.0
-    assert thin_values[thin_times == 77_777.0] == -9.0
-    gap = (thin_times >= 50_050) & (thin_times < 50_950)
-    assert gap.any()
-    assert np.isnan(thin_values[gap]).all()
-    short = (times[:10], values[:10])
-    assert decimate(*short, 4000) == short
 
 
 @pytest.mark.parametrize(

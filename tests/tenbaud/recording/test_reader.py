@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
 from tenbaud.recording.encoding import channel_schema, row_encoder
@@ -62,14 +63,52 @@ def test_blocks_that_were_never_filled_count_as_a_cut(chunked: tuple[Path, list[
     assert not stream.complete
 
 
-def test_damaged_chunk_is_not_believed(chunked: tuple[Path, list[int]]) -> None:
+def test_damaged_chunk_is_left_out_and_the_hole_is_told(chunked: tuple[Path, list[int]]) -> None:
     path, ends = chunked
     damaged = bytearray(path.read_bytes())
     damaged[ends[1] + 200] ^= 1
     path.write_bytes(damaged)
     stream = MessageStream(path)
-    assert len(list(stream)) == 2 * ROWS_PER_CHUNK
+    ticks = [row["tick"] for _, _, row in stream]
+    assert ticks == [*range(100), *range(150, 300)]
     assert not stream.complete
+    (hole,) = stream.holes
+    assert hole.missing == {"tick": (100, 149)}
+    assert "tick of ticks 100 to 149" in str(hole)
+
+
+@pytest.mark.parametrize("place", [0, 1, 4, 9, 17, 25, 33, 37, 41, 45, 49, 57, 60, 200])
+@pytest.mark.parametrize("chunk", [0, 2, CHUNKS - 1])
+def test_a_changed_byte_costs_one_chunk_at_most(
+    chunked: tuple[Path, list[int]], place: int, chunk: int
+) -> None:
+    """Also in the lengths and names of the chunk, and in the first one, which describes the topic."""
+    path, _ = chunked
+    whole = path.read_bytes()
+    start = chunk_starts(path)[chunk]
+    for flip in (1, 0x40, 0xFF):
+        damaged = bytearray(whole)
+        damaged[start + place] ^= flip
+        path.write_bytes(damaged)
+        stream = MessageStream(path)
+        ticks = [row["tick"] for _, _, row in stream]
+        lost = set(range(CHUNKS * ROWS_PER_CHUNK)) - set(ticks)
+        first = chunk * ROWS_PER_CHUNK
+        assert lost in (set(), set(range(first, first + ROWS_PER_CHUNK))), (flip, sorted(lost)[:3])
+        assert ticks == sorted(set(ticks))
+        if lost and chunk != CHUNKS - 1:
+            (hole,) = stream.holes
+            assert hole.missing == {"tick": (first or None, first + ROWS_PER_CHUNK - 1)}
+        elif lost:
+            assert not stream.complete
+
+
+def chunk_starts(path: Path) -> list[int]:
+    """Where the chunks of a whole file begin, from its index."""
+    with path.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+        assert summary is not None
+        return [index.chunk_start_offset for index in summary.chunk_indexes]
 
 
 def test_complete_file_says_so_only_after_its_end(chunked: tuple[Path, list[int]]) -> None:

@@ -1,6 +1,8 @@
 from __future__ import annotations
 
+import shutil
 import signal
+import threading
 from pathlib import Path
 
 import pytest
@@ -8,11 +10,16 @@ from mcap.reader import make_reader
 
 from channel.links.endpoints import free_endpoint
 from tenbaud import Run
+from tenbaud.recording import lock
 from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.inspect import describe_text
+from tenbaud.recording.reader import MessageStream
 from tenbaud.recording.recover import recover
+from tenbaud.recording.writer import McapRecorder
 from tests.tenbaud.ends import End, wait_for
 from tests.tenbaud.flown import flown
 from tests.tenbaud.processes import run as run_command
+from tests.tenbaud.recording.rows import TICK, tick_row
 
 LOSS_MAX_S = 1.0
 FLOWN_S = 2.5
@@ -71,6 +78,126 @@ def test_a_whole_file_is_left_alone_and_nothing_is_overwritten(flight: Run, tmp_
     assert again.kept is None
     with pytest.raises(RecordingError, match="Give one recording"):
         recover(flight.path, tmp_path / "both.mcap")
+
+
+def damaged(flight: Run, folder: Path, share: float) -> Path:
+    """A copy of the receiver's recording with one bit changed at this share of it."""
+    data = bytearray(flight.folder.receiver.read_bytes())
+    data[int(share * len(data))] ^= 4
+    path = folder / "receiver.mcap"
+    path.write_bytes(data)
+    return path
+
+
+@pytest.mark.parametrize("share", [0.01, 0.1, 0.5, 0.8])
+def test_a_changed_bit_costs_the_chunk_it_is_in_and_the_hole_is_told(
+    flight: Run, tmp_path: Path, share: float
+) -> None:
+    path = damaged(flight, tmp_path, share)
+    (recovered,) = recover(path)
+    (hole,) = recovered.holes
+    first, last = hole.missing["tick"]
+    whole = flight.table("receiver", "tick").keys
+    assert Run(path).table("receiver", "tick").keys.tolist() == [
+        tick for tick in whole.tolist() if not (first or 0) <= tick <= last
+    ]
+    # A chunk holds some ten of the sixty seconds.
+    assert recovered.rows > 0.6 * whole_rows(flight.folder.receiver)
+    assert whole_rows(path) == recovered.rows
+    samples = hole.missing["sample"]
+    assert f"sample of samples {samples[0]} to {samples[1]}" in str(recovered) or samples[0] is None
+    # Whoever reads the recovered file later is told too.
+    run = Run(path)
+    assert run.complete
+    assert [str(one) for one in run.tables("receiver").holes] == [str(hole)]
+    assert any("has a hole" in note for note in run.notes)
+    assert "has a hole" in describe_text(path)
+
+
+def test_replay_and_audit_say_that_a_recording_has_holes(flight: Run, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(flight.path, folder)
+    damaged(flight, folder, 0.5)
+    for mend in (False, True):
+        if mend:
+            recover(folder)
+        audited = run_command("audit", str(folder), cwd=tmp_path)
+        assert audited.code == 1
+        assert "receiver.mcap has a hole at" in audited.out
+        replayed = run_command("replay", str(folder), cwd=tmp_path)
+        assert replayed.code != 0
+        assert "receiver.mcap has a hole at" in replayed.err
+
+
+def test_a_file_in_use_is_refused_and_its_flight_goes_on(
+    flight: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "transmitter.mcap"
+    with McapRecorder(path, {}) as recorder:
+        recorder.write(TICK, 0, tick_row(0, 0.1))
+        with pytest.raises(RecordingError, match="is in use"):
+            recover(path)
+        with pytest.raises(RecordingError, match="not overwritten"):
+            McapRecorder(path, {})
+        recorder.write(TICK, 1, tick_row(1, 0.1))
+    assert [row["tick"] for _, _, row in MessageStream(path)] == [0, 1]
+    assert [entry.name for entry in tmp_path.iterdir()] == ["transmitter.mcap"]
+    assert recover(path)[0].kept is None
+
+
+def test_without_locks_a_file_that_grows_is_in_use(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lock, "fcntl", None)
+    monkeypatch.setattr(lock, "QUIET_S", 1.3)
+    path = tmp_path / "transmitter.mcap"
+    flying = threading.Event()
+    with McapRecorder(path, {}) as recorder:
+
+        def fly() -> None:
+            tick = 0
+            while not flying.wait(0.02):
+                recorder.write(TICK, tick, tick_row(tick, 0.1))
+                tick += 1
+
+        thread = threading.Thread(target=fly)
+        thread.start()
+        try:
+            with pytest.raises(RecordingError, match="is in use"):
+                recover(path)
+        finally:
+            flying.set()
+            thread.join()
+    assert recover(path)[0].kept is None
+
+
+def test_no_link_is_followed(flight: Run, tmp_path: Path) -> None:
+    """Neither one in a recording's place, nor one where the whole or the damaged file is to go."""
+    precious = tmp_path / "precious"
+    precious.write_bytes(flight.folder.transmitter.read_bytes()[:-100])
+    before = precious.read_bytes()
+    folder = tmp_path / "run"
+    folder.mkdir()
+    path = folder / "transmitter.mcap"
+    path.symlink_to(precious)
+    with pytest.raises(RecordingError, match="link"):
+        recover(path)
+    with pytest.raises(RecordingError):
+        McapRecorder(path, {})
+    path.unlink()
+    path.write_bytes(before)
+    for name in ("transmitter.cut.mcap", "out.mcap"):
+        (folder / name).symlink_to(tmp_path / "nowhere")
+    (folder / ".transmitter.mcap.unfinished").symlink_to(precious)
+    with pytest.raises(RecordingError, match="exists already"):
+        recover(path)
+    with pytest.raises(RecordingError, match="exists already"):
+        recover(path, folder / "out.mcap")
+    (folder / "transmitter.cut.mcap").unlink()
+    recover(path)
+    assert precious.read_bytes() == before
+    assert not (tmp_path / "nowhere").exists()
+    assert (folder / "transmitter.cut.mcap").read_bytes() == before
 
 
 def test_nothing_to_recover_is_said(tmp_path: Path) -> None:

@@ -10,12 +10,12 @@ import tracemalloc
 from pathlib import Path
 
 import pytest
-from mcap.writer import Writer
 
 from channel.recording import Field, RecordChannel
+from tenbaud.recording.chunk_writer import ChunkWriter
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.reader import MessageStream, Recording
-from tenbaud.recording.writer import McapRecorder
+from tenbaud.recording.writer import REAL_TIME_BATCH_ROWS, McapRecorder
 from tests.tenbaud.recording.rows import SAMPLE, TICK, sample_row, tick_row
 
 AWKWARD_FLOATS = [0.1, 1 / 3, -0.0, 5e-324, 1.7976931348623157e308, 1e22, 2**53 + 2.0, 1e-7]
@@ -156,27 +156,28 @@ def test_disk_that_fills_up_leaves_what_was_written(
 ) -> None:
     path = tmp_path / "a.mcap"
     calls = 0
-    flush = Writer.flush
+    flush = ChunkWriter.flush
 
-    def flush_until_full(writer: Writer) -> None:
+    def flush_until_full(writer: ChunkWriter) -> None:
         nonlocal calls
         calls += 1
         if calls > 4:  # the head and three batches
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         flush(writer)
 
-    monkeypatch.setattr(Writer, "flush", flush_until_full)
+    monkeypatch.setattr(ChunkWriter, "flush", flush_until_full)
     monkeypatch.setattr("tenbaud.recording.writer.FLUSH_PERIOD_S", 0.0)
     recorder = McapRecorder(path, {})
     for tick in range(2000):
         recorder.write(TICK, tick, tick_row(tick, 0.0))
     still.set()
     recorder.close()
-    assert (recorder.rows_written, recorder.rows_dropped) == (600, 1400)
+    kept = 3 * REAL_TIME_BATCH_ROWS
+    assert (recorder.rows_written, recorder.rows_dropped) == (kept, 2000 - kept)
     assert recorder.error is not None
     assert "The flight goes on" in recorder.error
     stream = MessageStream(path)
-    assert [row["tick"] for _, _, row in stream] == list(range(600))
+    assert [row["tick"] for _, _, row in stream] == list(range(kept))
     assert not stream.complete
 
 

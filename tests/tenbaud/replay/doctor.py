@@ -7,8 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from tenbaud.recording.encoding import RUN_METADATA
 from tenbaud.recording.reader import MessageStream
-from tenbaud.recording.writer import RUN_METADATA, McapRecorder
+from tenbaud.recording.writer import McapRecorder
 
 Row = dict[str, Any]
 Edit = Callable[[Row], list[Row]]

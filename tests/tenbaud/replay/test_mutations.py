@@ -47,7 +47,7 @@ def is_named(mutation: Mutation, original: Original, result: Audit) -> bool:
         return bool(lines)
     names = [f"{key} {row[key]}", f"row {mutation.row}"]
     if mutation.topic == "epoch":
-        names += [f"epoch {row['epoch']}", "first epoch"]
+        names += [f"epoch {row['epoch']}", "lacks the epoch"]
     return any(name in line for line in lines for name in names)
 
 
@@ -130,13 +130,10 @@ def test_the_records_have_the_fields_that_the_nodes_write() -> None:
 def test_a_row_that_no_node_writes_is_told_by_row_and_field(tmp_path: Path) -> None:
     original = Original(TWO_EPOCHS)
     wrong: list[tuple[str, str, object]] = [
-        ("sample", "digest", None),
-        ("sample", "word", "up"),
-        ("tick", "command_volts", [1.0, None]),
+        ("sample", "range", None),
+        ("sample", "arrival_s", None),
+        ("event", "kind", None),
         ("symbol", "slot", -1),
-        ("symbol", "slot", 2**60),
-        ("symbol", "taken", 1),
-        ("epoch", "state", [1.0]),
     ]
     for topic, field, value in wrong:
         folder = tmp_path / f"{topic} {field} {value}"
@@ -146,11 +143,9 @@ def test_a_row_that_no_node_writes_is_told_by_row_and_field(tmp_path: Path) -> N
         messages[at] = (topic, messages[at][1], {**messages[at][2], field: value})
         write_recording(folder / "receiver.mcap", messages, original.streams["receiver"])
         result = audit(folder)
-        expected = "is not of this codec" if topic == "epoch" else f"row 1, field {field}"
-        assert any(expected in one.replace("that are not", "that is not") for one in result.gaps)
-        if topic != "epoch":
-            with pytest.raises(RecordingError, match=f"row 1, field {field}"):
-                replay(load_record(folder))
+        assert any(f"row 1, field {field}" in one for one in result.gaps)
+        with pytest.raises(RecordingError, match=f"row 1, field {field}"):
+            replay(load_record(folder))
 
 
 # What was passed before

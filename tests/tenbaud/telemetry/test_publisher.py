@@ -16,6 +16,10 @@ class Counting:
 
     def __init__(self) -> None:
         self.number = 0
+        self.watched = False
+
+    def watch(self, watched: bool) -> None:
+        self.watched = watched
 
     def compose(self) -> dict[str, object]:
         self.number += 1
@@ -26,7 +30,11 @@ class Port:
     def __init__(self, act: Callable[[], None] = lambda: None) -> None:
         self.sent: list[dict[str, object]] = []
         self.closed = False
+        self.watched = True
         self._act = act
+
+    def is_watched(self) -> bool:
+        return self.watched
 
     def publish(self, data: bytes) -> None:
         self._act()
@@ -52,6 +60,19 @@ def test_messages_leave_from_a_thread_of_their_own_and_the_last_word_is_said() -
     assert publisher.sent == len(port.sent) == composer.number
     assert {message["thread"] for message in port.sent} == {"telemetry"}
     assert port.closed
+
+
+def test_while_nobody_watches_nothing_is_composed_until_somebody_does() -> None:
+    composer, port = Counting(), Port()
+    port.watched = False
+    composer.watched = True
+    with Publisher(composer, port, 200.0) as publisher:
+        wait_until(lambda: not composer.watched)
+        assert composer.number == 0
+        port.watched = True
+        wait_until(lambda: len(port.sent) >= 2)
+    assert composer.watched
+    assert publisher.sent == composer.number == len(port.sent)
 
 
 def test_when_the_network_holds_it_up_then_periods_are_left_out_and_counted() -> None:

@@ -29,6 +29,20 @@ def test_every_row_reaches_the_recorder_and_the_known_ones_the_telemetry() -> No
     assert tap.take() == []
 
 
+def test_while_nobody_watches_rows_reach_the_recorder_and_none_is_kept() -> None:
+    recorder = Kept()
+    tap = Tap(recorder)
+    tap.write(TICK, 0, (0,))
+    tap.watch(False)
+    tap.write(TICK, 1, (1,))
+    assert tap.take() == []
+    tap.watch(True)
+    tap.write(TICK, 2, (2,))
+    assert tap.take() == [("tick", (2,))]
+    assert recorder.rows == [("tick", 0, 0), ("tick", 1, 1), ("tick", 2, 2)]
+    assert tap.dropped == 0
+
+
 def test_when_nobody_takes_then_the_oldest_rows_are_dropped_and_counted() -> None:
     recorder = Kept()
     tap = Tap(recorder)

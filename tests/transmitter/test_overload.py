@@ -1,0 +1,115 @@
+"""Flights whose processes are too slow for their symbol rate: they say so, and fly at what they can."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+
+from channel.codec import Vector
+from channel.events import EventKind
+from channel.limits import CommandLimits
+from channel.line import Line
+from channel.links.memory import MemoryLink, memory_pair
+from channel.shaper import SlotShaper, UplinkMeter
+from channel.uplink import Uplink
+from plant_sim.encoder import Encoder
+from plant_sim.pitch import PitchParameters, PitchPlant
+from receiver.endpoint import ReceiverEndpoint
+from receiver.real_service import serve_real
+from receiver.session import ReceiverSession
+from tests.channel.parts import THREE_SIGNS, ConstantController, identity_of, pitch_codec, terms
+from transmitter.guard import Guard, GuardSettings
+from transmitter.node import TransmitterNode
+from transmitter.real_flight import RealFlight
+from transmitter.rigs.simulated import SimulatedRig
+from transmitter.scores import Scores
+from transmitter.session import TransmitterSession
+
+TICK_S = 0.001
+TICKS = 2500
+TOO_LONG_S = 0.003
+CODEC = pitch_codec(THREE_SIGNS, ticks_per_sample=1, tick_s=TICK_S)
+TERMS = terms(
+    tick_ns=1_000_000,
+    ticks_per_sample=1,
+    rate_baud=1000.0,
+    deadline_allowance_ns=3_000_000,
+    downlink_budget_ns=2_000_000,
+    lead_ticks=5,
+)
+IDENTITY = identity_of(CODEC)
+
+
+class SlowRig(SimulatedRig):
+    """Takes three periods to put a tick's voltages on the motors."""
+
+    def write(self, tick: int, volts: Vector) -> None:
+        time.sleep(TOO_LONG_S)
+        super().write(tick, volts)
+
+
+class SlowController(ConstantController):
+    """Takes one and a half periods for each command."""
+
+    def command(self, tick: int, state: Vector) -> Vector:
+        time.sleep(TOO_LONG_S / 2)
+        return super().command(tick, state)
+
+
+def flight_over(link: MemoryLink, kind: type[SimulatedRig]) -> RealFlight:
+    node = TransmitterNode(
+        TransmitterSession(CODEC, TERMS, IDENTITY, 5),
+        kind(PitchPlant(PitchParameters(), TICK_S), (Encoder(4096),), (0.0, 0.0)),
+        Guard(CommandLimits(5.0), GuardSettings(100, 50, (0.0, 0.0))),
+        Scores(CODEC.model, 0, 1000, lambda _: None),
+        rearm_ticks=10_000,
+    )
+    uplink = Uplink(SlotShaper(TERMS), Line(0), UplinkMeter(CODEC.coder.alphabet))
+    return RealFlight(node, uplink, link)
+
+
+def flown(rig: type[SimulatedRig], controller: ConstantController) -> RealFlight:
+    near, far = memory_pair()
+    end = ReceiverEndpoint(ReceiverSession(CODEC, TERMS, controller, IDENTITY, 77))
+    thread = threading.Thread(target=serve_real, args=(end, far, 20.0))
+    flight = flight_over(near, rig)
+    thread.start()
+    try:
+        flight.greet(peer_timeout_s=10.0)
+        flight.run(TICKS)
+    finally:
+        flight.leave("the flight is over")
+        thread.join(timeout=20.0)
+    assert not thread.is_alive()
+    return flight
+
+
+@pytest.mark.parametrize(
+    ("rig", "controller"),
+    [(SlowRig, ConstantController(1.0, -1.0)), (SimulatedRig, SlowController(1.0, -1.0))],
+    ids=["transmitter", "receiver"],
+)
+def test_when_an_end_is_too_slow_then_it_is_said_and_the_flight_goes_on(
+    rig: type[SimulatedRig], controller: ConstantController
+) -> None:
+    flight = flown(rig, controller)
+    session = flight._node.session
+    told = [event.text for event in session.events if event.kind is EventKind.RATE]
+    assert told
+    assert "1000 symbols/s are asked for" in told[0]
+    assert flight.rate.kept_symbols_per_s is not None
+    assert 0.0 < flight.rate.kept_symbols_per_s < 950.0
+    assert session.counts["desyncs"] == 0
+    # Without the common state there is no flight: it is asked for now and then, not all the time.
+    assert session.counts["digest_checks"] > TICKS // 25
+    assert session.counts["rejoins"] <= TICKS * TICK_S / 0.05, "at most one answer's age apart"
+
+
+def test_when_only_the_transmitter_is_too_slow_then_no_common_state_is_asked_for() -> None:
+    flight = flown(SlowRig, ConstantController(1.0, -1.0))
+    session = flight._node.session
+    assert flight.ticks_missed > TICKS // 2
+    assert session.counts["rejoins"] == 0
+    assert session.counts["digest_checks"] > TICKS * 9 // 10

@@ -87,6 +87,9 @@ class Coder(Protocol):
     def ranges(self, coder: Vector) -> Vector:
         """Return the range `M` of each measured axis, for display."""
 
+    # A coder may have `is_state(coder: Vector) -> bool` too: whether it can be in a state that came
+    # over a line. Without it, any finite one is taken.
+
 
 class CodecState(NamedTuple):
     """Everything that a copy of the codec is, between two samples."""
@@ -122,6 +125,12 @@ def is_estimate(model: Sequence[float]) -> bool:
         if not -STATE_MAX < value < STATE_MAX:
             return False
     return True
+
+
+def is_coder_state(coder: Coder, state: Vector) -> bool:
+    """Return whether a coder can be in this state, finite as it is; one that does not say can."""
+    check = getattr(coder, "is_state", None)
+    return check is None or bool(check(state))
 
 
 class Codec:

@@ -10,6 +10,7 @@ from collections import deque
 from typing import NamedTuple
 
 from channel.codec import Codec, CodecState
+from channel.frames import Desync
 from channel.recording import Field, RecordChannel
 from channel.words import Word
 
@@ -88,6 +89,14 @@ class History:
             [kept.state.sample - 1 for kept in inputs],
             [word_number(kept.word) for kept in inputs],
         )
+
+
+def difference_text(report: Desync) -> str:
+    """Return the sentence that tells of a lockstep failure."""
+    return (
+        f"the codecs differ after sample {report.sample}: transmitter "
+        f"{report.transmitter_digest:016x}, receiver {report.receiver_digest:016x}"
+    )
 
 
 def unpacked(codec: Codec, data: bytes) -> CodecState | None:

@@ -95,6 +95,14 @@ class DatagramWire:
 DATAGRAM = DatagramWire()
 
 
+def foreign_version_text(peer: str, version: int) -> str:
+    """Return what to do about a peer whose frames are of another wire version."""
+    return (
+        f"the {peer} speaks wire version {version}, this end {WIRE_VERSION}: install the same tenbaud "
+        "on both"
+    )
+
+
 def encode(frame: Frame) -> bytes:
     """Return the bytes of a frame; ValueError for values that no frame can carry."""
     try:

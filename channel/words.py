@@ -69,6 +69,10 @@ class Alphabet:
             number = number * len(self.symbols) + self.symbol_number(symbol)
         return number
 
+    def has_word(self, number: int) -> bool:
+        """Return whether this is the wire number of a word or of an erasure."""
+        return 0 <= number < self._words or number == WIRE_ERASED
+
     def word(self, number: int) -> Word:
         """Return the word with this wire number; ValueError when there is none."""
         if number == WIRE_ERASED:

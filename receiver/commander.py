@@ -12,6 +12,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from channel.codec import Codec, CodecState, Vector
+from channel.errors import CodecDiverged
 from channel.events import EventKind
 from channel.frames import Echo
 from channel.lead import FlownSample, fly_sample
@@ -28,6 +29,14 @@ Tell = Callable[[EventKind, str], None]
 
 UNWRITTEN_MAX = 32
 """Samples that may be flown before they are recorded even if nobody finds the time."""
+
+
+class Standing(NamedTuple):
+    """Where a flight stands: all that the next epoch follows from."""
+
+    state: CodecState
+    hold: Vector
+    commands: tuple[Vector, ...]
 
 
 class _Flown(NamedTuple):
@@ -70,6 +79,17 @@ class Commander:
         """decided for the sample that is being flown"""
         self._unwritten: list[_Flown] = []
 
+    @property
+    def standing(self) -> Standing:
+        """Return where the flight stands, to be gone back to."""
+        return Standing(self.state, self.hold, tuple(self._commands))
+
+    def go_back(self, standing: Standing) -> None:
+        """Stand where the flight stood before."""
+        self.state, self.hold, commands = standing
+        self._commands = deque(commands)
+        self._echoes.clear()
+
     def restart(self, sample: int) -> None:
         """Begin afresh at a sample, from the codec's initial state and command."""
         self.state = self.codec.initial()._replace(sample=sample)
@@ -101,7 +121,10 @@ class Commander:
         """Consume the word of the next sample; return its echo after those that it repeats."""
         before = self.state
         self._millivolts = []
-        flown = fly_sample(self.codec, before, word, tuple(self._commands), self._decide)
+        try:
+            flown = fly_sample(self.codec, before, word, tuple(self._commands), self._decide)
+        except (ArithmeticError, ValueError) as error:
+            raise CodecDiverged(f"the estimate diverged in sample {before.sample}: {error}") from error
         self._commands.extend(flown.commands)
         for _ in range(len(self._commands) - self.terms.lead_ticks):
             self._commands.popleft()

@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections import Counter, deque
 from enum import Enum
 
+from channel.bounds import Bounds, within_text_bounds
 from channel.codec import Codec, CodecState
 from channel.events import EVENT_CHANNEL, Event, EventKind, event_row
 from channel.frames import (
@@ -31,16 +32,17 @@ from channel.frames import (
 )
 from channel.identity import Identity
 from channel.limits import to_millivolts
-from channel.lockstep import History
+from channel.lockstep import History, difference_text
 from channel.recording import NullRecorder, Recorder
 from channel.shaper import BaudMeter
 from channel.terms import Terms
-from channel.wire import WIRE_VERSION
+from channel.wire import foreign_version_text
 from channel.words import ERASED
 from receiver.commander import Commander
 from receiver.controllers.base import Controller
 from receiver.records import write_epoch, write_failure, write_symbol
 from receiver.rejoin import Greeter, Verdict, desync_answer, difference, first_sample
+from receiver.schedule import Proven, Schedule, Timing
 from receiver.short_slots import SlotFinder
 from receiver.stranger import Stranger
 
@@ -82,7 +84,8 @@ class ReceiverSession:
         self.meter = BaudMeter()
         self.counts: Counter[str] = Counter()
         """samples (flown), samples_skipped (between epochs), erasures, symbols_late, symbols_misplaced,
-        stale_frames, malformed, refused_hellos, bad_commands, bad_references, desyncs, rejoins"""
+        stale_frames, malformed, refused_hellos, bad_commands, bad_references, desyncs, rejoins,
+        out_of_bounds"""
         self.end_reason = ""
         self.refusal: str | None = None
         self.desync: Desync | None = None
@@ -93,13 +96,13 @@ class ReceiverSession:
         self._commander = Commander(codec, terms, controller, self._recorder, self.counts, self._tell)
         self._slot = 0
         self._word: list[int | None] = []
-        self._anchor: tuple[int, int] | None = None
-        """slot and arrival of the last symbol in time; None: no slot is due by the clock"""
         self._advanced = False
         """whether a symbol of this epoch has been received"""
         self._silent_slots = 0
-        self._reported: tuple[int, int] | None = None
         self._slots = SlotFinder(terms)
+        self._bounds = Bounds(codec, terms, self.counts, self._tell)
+        self._schedule = Schedule(terms)
+        self._proven = Proven(self._commander.standing, self._schedule, 0, None)
         self._gap_samples_max = terms.history_samples
         """A symbol this far ahead is no gap any more; after as many erasures in a row none are due."""
 
@@ -117,13 +120,14 @@ class ReceiverSession:
 
     def on_frame(self, frame: Frame, now_ns: int) -> list[Frame]:
         """Take one frame that arrived at `now_ns` of this end's clock; return the frames to send."""
+        frame = within_text_bounds(frame)
         match frame:
             case Symbol():
                 return self._on_symbol(frame, now_ns)
             case ShortSymbol():
                 return self._on_short_symbol(frame, now_ns)
             case Hello():
-                answer = self._on_hello(frame)
+                answer = self._on_hello(frame, now_ns)
                 self._slots.greeted(now_ns)
                 return answer
             case Desync() if self._is_current(frame.session):
@@ -136,21 +140,14 @@ class ReceiverSession:
                 self.refusal = f"{self.refusal}\n  as the transmitter sees it: {frame.reason}"
                 self._end("refused")
             case ForeignVersion() if self.phase is Phase.WAITING:
-                self._refuse(
-                    f"the transmitter speaks wire version {frame.version}, this end {WIRE_VERSION}: "
-                    "install the same tenbaud on both"
-                )
+                self._refuse(foreign_version_text("transmitter", frame.version))
             case _:
                 self.counts["stale_frames"] += 1
         return []
 
     def next_deadline(self) -> int | None:
         """Return when the slot that is due is taken for erased; None while none is."""
-        if self._anchor is None or self.phase is not Phase.FLYING:
-            return None
-        anchor_slot, anchor_ns = self._anchor
-        due = self.terms.slot_ns(self._slot) - self.terms.slot_ns(anchor_slot)
-        return anchor_ns + due + self.terms.deadline_allowance_ns
+        return self._schedule.deadline_ns(self._slot) if self.phase is Phase.FLYING else None
 
     def on_deadline(self, now_ns: int) -> list[Frame]:
         """Erase the slots whose deadline has passed by `now_ns`; return the frames to send."""
@@ -160,7 +157,7 @@ class ReceiverSession:
             self._silent_slots += 1
             frames += self._settle(None, now_ns)
             if self._silent_slots >= self._gap_samples_max * self.terms.symbols_per_word:
-                self._anchor = None
+                self._schedule.anchor(None)
                 text = f"no symbol for {self._gap_samples_max} samples: waiting for one"
                 self._tell(EventKind.PEER, text)
             deadline = self.next_deadline()
@@ -183,30 +180,38 @@ class ReceiverSession:
 
     # The handshake
 
-    def _on_hello(self, hello: Hello) -> list[Frame]:
+    def _on_hello(self, hello: Hello, now_ns: int) -> list[Frame]:
         if self.phase is Phase.ENDED:
             return [Refuse(hello.incarnation, f"this receiver has ended: {self.end_reason}", "")]
-        verdict = self._greeter.judge(hello, self.identity, self._advanced, self._silent_slots)
+        if self._bounds.drops(self._bounds.of_hello(hello)):
+            return []
+        schedule = self._schedule if self._advanced else self._proven.schedule
+        in_reach = schedule.reaches(hello.sample, now_ns)
+        silent = self._silent_slots
+        verdict = self._greeter.judge(hello, self.identity, self._advanced, silent, in_reach)
         if verdict is Verdict.REPEAT and self._greeter.welcome is not None:
             return [self._greeter.welcome]
         if verdict is Verdict.BEGIN:
-            return self._begin(hello)
+            return self._begin(hello, now_ns)
         self.counts["refused_hellos"] += 1
         match verdict:
             case Verdict.BUSY:
                 return [Refuse(hello.incarnation, "this receiver is flying with another", "")]
+            case Verdict.IGNORE if not in_reach:
+                self._bounds.drops(f"a request for sample {hello.sample}, ahead of the clock")
             case Verdict.REFUSE:
                 problem = difference(hello, self.identity) or ""
                 self._refuse(problem)
                 return [Refuse(hello.incarnation, problem, self.identity.config)]
         return []
 
-    def _begin(self, hello: Hello) -> list[Frame]:
+    def _begin(self, hello: Hello, now_ns: int) -> list[Frame]:
         """Begin a session, or a new epoch of it; return the answer."""
         last = self._greeter.welcome
         state = b""
-        own = self.state.sample + (1 if self._word else 0)
-        first = first_sample(hello, own, self.terms, begun=last is not None)
+        own = self._stand_where_proven(last)
+        proven = self._proven.incarnation
+        first = first_sample(hello, own, self.terms, begun=proven is not None)
         count = self.terms.symbols_per_word
         if last is None or hello.incarnation != last.incarnation:
             ahead = first - hello.sample if hello.sample else 0
@@ -221,31 +226,36 @@ class ReceiverSession:
         else:
             self.epoch += 1
             self.counts["rejoins"] += 1
-            self.counts["samples_skipped"] += first - self.state.sample
-            if hello.incarnation == last.incarnation:
-                self._commander.carry_on(first, self._silent_slots // count)
+            self.counts["samples_skipped"] += max(0, first - self.state.sample)
+            if hello.incarnation == (last.incarnation if proven is None else proven):
+                self._commander.carry_on(first, self._proven.silent_slots // count)
                 state = self.codec.pack(self.state)
             else:
                 # A rig that was started again is at rest, and so is what is known of it.
                 self._commander.restart(first)
-        self._slot, self._word, self._anchor = first * count, [], None
+        self._slot, self._word = first * count, []
         self._advanced, self._silent_slots = False, 0
+        self._schedule = Schedule(self.terms)
+        self._schedule.begin(self._slot, now_ns)
         hold = self._commander.hold
-        welcome = Welcome(
-            self.session_number,
-            self.epoch,
-            first,
-            hello.incarnation,
-            hello.request,
-            () if hold == self.terms.initial_command else to_millivolts(hold),
-            state,
-        )
+        told = () if hold == self.terms.initial_command else to_millivolts(hold)
+        asked = (hello.incarnation, hello.request)
+        welcome = Welcome(self.session_number, self.epoch, first, *asked, told, state)
         self._greeter.welcome = welcome
         self._commander.write_down()
         write_epoch(self._recorder, self.terms, self.epoch, self.state, hold)
         text = f"session {self.session_number:08x}, epoch {self.epoch}, begins at sample {first}"
         self._tell(EventKind.STARTED if last is None else EventKind.REJOIN, text)
         return [welcome]
+
+    def _stand_where_proven(self, last: Welcome | None) -> int:
+        """Take back what was offered and never flown; return this end's next sample."""
+        if self._advanced and last is not None:
+            standing, silent = self._commander.standing, self._silent_slots
+            self._proven = Proven(standing, self._schedule, silent, last.incarnation)
+            return self.state.sample + (1 if self._word else 0)
+        self._commander.go_back(self._proven.standing)
+        return self.state.sample
 
     def _refuse(self, problem: str) -> None:
         if self.refusal is None:
@@ -256,16 +266,22 @@ class ReceiverSession:
     # Symbols, slots, words
 
     def _on_symbol(self, symbol: Symbol, now_ns: int) -> list[Frame]:
-        value = self.codec.coder.alphabet.symbol(symbol.number)
-        ahead = symbol.slot - self._slot
-        if not self._is_current(symbol.session) or symbol.epoch != self.epoch or value is None:
+        if not self._is_current(symbol.session) or symbol.epoch != self.epoch:
             self.counts["stale_frames"] += 1
             return self._on_foreign_symbol(symbol)
-        if ahead < 0:
-            self.counts["symbols_late"] += 1
-            write_symbol(self._recorder, self.terms, symbol, now_ns, taken=False)
-            self._tell(EventKind.LATE_SYMBOL, f"slot {symbol.slot} was settled already: dropped")
+        if self._bounds.drops(self._bounds.of_symbol(symbol)):
             return []
+        if symbol.slot < self._slot:
+            return self._on_late_symbol(symbol, now_ns)
+        timing = self._schedule.timing(symbol.slot, now_ns)
+        if timing is Timing.EARLY:
+            self._bounds.drops(f"slot {symbol.slot} is not due yet")
+            return []
+        return self._take_symbol(symbol, now_ns, anew=timing is Timing.NEW)
+
+    def _take_symbol(self, symbol: Symbol, now_ns: int, *, anew: bool) -> list[Frame]:
+        """Consume a symbol of a slot that is due. `anew`: it replaces the schedule."""
+        ahead = symbol.slot - self._slot
         if ahead > self._gap_samples_max * self.terms.symbols_per_word:
             self.counts["stale_frames"] += 1
             self._tell(EventKind.STALE, f"slot {symbol.slot} is {ahead} ahead: dropped")
@@ -276,17 +292,32 @@ class ReceiverSession:
         frames: list[Frame] = []
         while self._slot < symbol.slot:
             frames += self._settle(None, now_ns)
-        self._anchor = (symbol.slot, now_ns)
+        self._schedule.take(symbol.slot, now_ns, anew=anew)
         self.meter.on_symbol(now_ns)
         write_symbol(self._recorder, self.terms, symbol, now_ns, taken=True)
+        value = self.codec.coder.alphabet.symbols[symbol.number]
         return frames + self._settle(value, now_ns)
+
+    def _on_late_symbol(self, symbol: Symbol, now_ns: int) -> list[Frame]:
+        """Drop a symbol of a slot that is settled; a row of them means that the schedule is wrong."""
+        self.counts["symbols_late"] += 1
+        write_symbol(self._recorder, self.terms, symbol, now_ns, taken=False)
+        self._tell(EventKind.LATE_SYMBOL, f"slot {symbol.slot} was settled already: dropped")
+        within = self._slot - symbol.slot <= self._gap_samples_max * self.terms.symbols_per_word
+        if within and self._schedule.is_replaced_by(symbol.slot, now_ns):
+            self._schedule.take(symbol.slot, now_ns, anew=True)
+        return []
 
     def _on_foreign_symbol(self, symbol: Symbol) -> list[Frame]:
         """Answer a transmitter that flies in a session or an epoch that is not the present one."""
         if self.phase is Phase.WAITING and self.refusal is None:
             return self._stranger.on_symbol(symbol)
         welcome = self._greeter.welcome
-        missed = self._is_current(symbol.session) and symbol.epoch < self.epoch
+        current = self._is_current(symbol.session)
+        if current and symbol.epoch > self.epoch:
+            # This end has begun no such epoch: somebody else has answered in its name.
+            return [Unknown(symbol.session, symbol.epoch)]
+        missed = current and symbol.epoch < self.epoch
         if missed and not self._advanced and welcome is not None:
             # It flies on without knowing of the new epoch: the answer was lost.
             return [welcome]
@@ -304,11 +335,12 @@ class ReceiverSession:
             self._tell(EventKind.STALE, f"a symbol of slot ...{short.slot_low} is not due: dropped")
         elif place.in_time:
             symbol = Symbol(self.session_number, self.epoch, place.slot, short.number)
-            frames = self._on_symbol(symbol, now_ns)
+            frames = self._take_symbol(symbol, now_ns, anew=True)
         else:
             self.counts["symbols_late"] += 1
             self._tell(EventKind.LATE_SYMBOL, f"slot {place.slot} came after its deadline: dropped")
-        self._anchor = place.anchor or self._anchor
+        if place.anchor is not None:
+            self._schedule.anchor(place.anchor)
         return frames
 
     def _settle(self, symbol: int | None, now_ns: int) -> list[Frame]:
@@ -332,19 +364,15 @@ class ReceiverSession:
 
     def _on_desync(self, theirs: Desync) -> list[Frame]:
         """Write a failure down and answer with this end's state; the request that follows rejoins."""
+        if self._bounds.drops(self._bounds.of_report(theirs, self.epoch, self.state.sample)):
+            return []
         answer = desync_answer(theirs, self.history, self.codec)
-        if self._reported == (theirs.epoch, theirs.sample):
-            return [answer]
-        self._reported = (theirs.epoch, theirs.sample)
-        self.desync = theirs
-        self.counts["desyncs"] += 1
-        self._tell(
-            EventKind.DESYNC,
-            f"the codecs differ after sample {theirs.sample}: transmitter "
-            f"{theirs.transmitter_digest:016x}, receiver {theirs.receiver_digest:016x}",
-            theirs.sample,
-        )
-        write_failure(self._recorder, self.terms, self.history, theirs)
+        last = self.desync
+        if last is None or (theirs.epoch, theirs.sample) > (last.epoch, last.sample):
+            self.desync = theirs
+            self.counts["desyncs"] += 1
+            self._tell(EventKind.DESYNC, difference_text(theirs), theirs.sample)
+            write_failure(self._recorder, self.terms, self.history, theirs)
         return [answer]
 
     def _is_current(self, session: int) -> bool:

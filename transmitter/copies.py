@@ -12,9 +12,13 @@ from collections import deque
 from typing import NamedTuple
 
 from channel.codec import Codec, CodecState, Vector
+from channel.errors import CodecDiverged
 from channel.lead import FlownSample, fly_sample
 from channel.terms import Terms
 from channel.words import ERASED, Word
+
+CANNOT_FLY = (CodecDiverged, ArithmeticError, LookupError, ValueError)
+"""What a copy raises in a state that it cannot go on from."""
 
 
 class Confirmed(NamedTuple):

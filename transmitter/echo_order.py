@@ -28,10 +28,17 @@ class EchoOrder:
         self._until_tick = 0
         """when it can no longer come"""
 
-    def add(self, echoes: Sequence[Echo], expected: int, tick: int) -> None:
-        """Take the echoes of a frame; `expected` is the sample whose echo is next."""
+    def add(self, echoes: Sequence[Echo], expected: int, tick: int, sample: int) -> None:
+        """Take the echoes of a frame; `expected` is the sample whose echo is next.
+
+        `sample` is the one that the clock stands in: no later one waits here for its turn, or a forged
+        echo would lie in wait for long.
+        """
+        latest = expected + self._ahead_samples
+        if echoes[0].sample > expected:
+            latest = min(latest, sample)
         for echo in echoes:
-            if expected <= echo.sample <= expected + self._ahead_samples:
+            if expected <= echo.sample <= latest:
                 self._early[echo.sample] = echo
         if echoes[0].sample > expected and self._missing != expected:
             self._missing, self._until_tick = expected, tick + self._overtaking_ticks

@@ -189,9 +189,9 @@ class TransmitterNode:
         self.tell(EventKind.MALFORMED, f"dropped a frame: {why}")
 
     def _check(self, tick: int, reading: Reading) -> None:
-        fault = reading.fault or self._watch.check(
-            reading.counts, self._applied, self.session.copies.confirmed.model
-        )
+        session = self.session
+        estimate = session.copies.confirmed.model if session.is_proven else None
+        fault = reading.fault or self._watch.check(reading.counts, self._applied, estimate)
         if fault is not None and not self.guard.stopped:
             self.sensor_fault = f"tick {tick}: {fault}"
             self.tell(EventKind.SENSOR, self.sensor_fault)

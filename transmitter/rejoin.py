@@ -8,7 +8,7 @@ the codec's state travels up the link; the answer brings the state to start from
 from __future__ import annotations
 
 from channel.codec import Codec, CodecState, Vector
-from channel.frames import Hello, Welcome, Why
+from channel.frames import Echo, Hello, Welcome, Why
 from channel.identity import Identity
 from channel.limits import from_millivolts
 from channel.terms import Terms
@@ -67,15 +67,19 @@ class Asking:
 
 
 def start_of(welcome: Welcome, codec: Codec, terms: Terms) -> tuple[CodecState, Vector]:
-    """Return the common state of a Welcome and the command to hold; ValueError if it makes no sense."""
+    """Return the common state of a Welcome within bounds, and the command to hold."""
     hold = terms.initial_command
     if welcome.hold_millivolts:
         hold = from_millivolts(welcome.hold_millivolts)
-    if len(hold) != codec.model.input_size:
-        raise ValueError(f"a command to hold for {len(hold)} motors, not {codec.model.input_size}")
     if not welcome.state:
         return codec.initial()._replace(sample=welcome.first_sample), hold
-    state = codec.unpack(welcome.state)
-    if state.sample != welcome.first_sample:
-        raise ValueError(f"state of sample {state.sample} for sample {welcome.first_sample}")
-    return state, hold
+    return codec.unpack(welcome.state), hold
+
+
+def commands_of(echo: Echo, ticks_per_sample: int) -> list[Vector]:
+    """Return the commands of an echo within bounds, one for each tick."""
+    inputs = len(echo.millivolts) // ticks_per_sample
+    return [
+        from_millivolts(echo.millivolts[index * inputs : (index + 1) * inputs])
+        for index in range(ticks_per_sample)
+    ]

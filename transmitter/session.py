@@ -12,9 +12,11 @@ symbol leaves any more; the session asks for a new epoch, and goes on from the s
 from __future__ import annotations
 
 from collections import Counter, deque
+from dataclasses import replace
 from enum import Enum
 
 from channel.audit_trail import EPOCH_CHANNEL, epoch_row
+from channel.bounds import Bounds, shown, within_text_bounds
 from channel.codec import Codec, Vector
 from channel.events import EVENT_CHANNEL, Event, EventKind, event_row
 from channel.frames import (
@@ -33,18 +35,17 @@ from channel.frames import (
     Why,
 )
 from channel.identity import Identity, differing_fields
-from channel.limits import from_millivolts
-from channel.lockstep import LOCKSTEP_CHANNEL, History
+from channel.lockstep import History, difference_text
 from channel.recording import NullRecorder, Recorder
 from channel.terms import Terms
-from channel.wire import WIRE_VERSION
+from channel.wire import foreign_version_text
 from channel.words import ERASED
 from transmitter.claims import Claims
-from transmitter.copies import Confirmed, Copies
+from transmitter.copies import CANNOT_FLY, Confirmed, Copies
 from transmitter.echo_order import EchoOrder
 from transmitter.owing import Owing
-from transmitter.records import write_sample
-from transmitter.rejoin import Asking, start_of
+from transmitter.records import write_failure, write_sample
+from transmitter.rejoin import Asking, commands_of, start_of
 from transmitter.sight import Sight
 
 
@@ -88,12 +89,13 @@ class TransmitterSession:
         self.copies = Copies(codec, terms)
         self.counts: Counter[str] = Counter()
         """digest_checks, desyncs, rejoins, stale_frames, words_missed, erasures, claims_refused,
-        take_overs"""
+        take_overs, out_of_bounds, diverged"""
         self.rejoins_asked: Counter[Why] = Counter()
         self.end_reason = ""
         self.refusal: str | None = None
         self.desync: Desync | None = None
         """the last one"""
+        self._report_answered = False
         self.heard_tick = 0
         """when the receiver last told something new in the present epoch"""
         self.epoch_tick = 0
@@ -105,6 +107,7 @@ class TransmitterSession:
         self.history = History(codec, 2 * terms.history_samples)
         self._asking = Asking(identity, incarnation, terms)
         self._claims = Claims(terms)
+        self._bounds = Bounds(codec, terms, self.counts, self._tell)
         self._stop_on_desync = stop_on_desync
         self._echoes = EchoOrder(overtaking_ticks, terms.history_samples)
         self._lag_samples_max = terms.history_samples
@@ -143,17 +146,22 @@ class TransmitterSession:
         sample, offset = divmod(tick, self.terms.ticks_per_sample)
         if sample - self.copies.confirmed.sample > self._lag_samples_max:
             return self.rejoin(Why.LAG, f"no echo for {self._lag_samples_max} samples")
-        if problem := self._check_gap():
-            return problem
+        if frames := self._check_gap():
+            return frames
         while self.copies.next_sample < sample:
             self.counts["words_missed"] += 1
             self.copies.sent(ERASED)
         if offset != 0 or self.copies.next_sample != sample:
             return []
-        word = self.codec.encode(self.copies.state_before_next(), measurement)
+        try:
+            word = self.codec.encode(self.copies.state_before_next(), measurement)
+        except CANNOT_FLY as error:
+            return self._on_diverged(error)
         self.copies.sent(word)
         first = sample * self.terms.symbols_per_word
-        return [self._symbol(slot, symbol) for slot, symbol in enumerate(word, first)]
+        number = self.codec.coder.alphabet.symbol_number
+        here = (self.session_number, self.epoch)
+        return [Symbol(*here, slot, number(symbol)) for slot, symbol in enumerate(word, first)]
 
     def rejoin(self, why: Why, text: str) -> list[Frame]:
         """Stop sending symbols and ask for a new epoch; return the frames that do."""
@@ -170,10 +178,6 @@ class TransmitterSession:
             return []
         report = self.desync if self._asking.why is Why.DESYNC else None
         return [self.hello()] if report is None else [report, self.hello()]
-
-    def _symbol(self, slot: int, symbol: int) -> Symbol:
-        number = self.codec.coder.alphabet.symbol_number(symbol)
-        return Symbol(self.session_number, self.epoch, slot, number)
 
     def command(self, tick: int) -> Vector | None:
         """Return the command of this tick, None when it has not come; earlier ones are forgotten."""
@@ -199,6 +203,7 @@ class TransmitterSession:
 
     def on_frame(self, frame: Frame) -> list[Frame]:
         """Take one frame; return the frames to send."""
+        frame = within_text_bounds(frame)
         match frame:
             case Commands() if self._is_current(frame.session) and frame.epoch == self.epoch:
                 return self._on_commands(frame)
@@ -208,17 +213,15 @@ class TransmitterSession:
                 return self._on_unknown()
             case Claim() if self._is_current(frame.session) and frame.epoch == self.epoch:
                 return self._on_claim(frame)
-            case Desync() if frame.session == self.session_number and self.desync is not None:
-                self._record_failure(self.desync, frame)
+            case Desync() if self._is_answer(frame):
+                self._report_answered = True
+                write_failure(self._recorder, self.terms, self.history, frame, frame.state)
             case Refuse() if frame.incarnation == self.incarnation:
                 return self._on_refuse(frame)
             case Bye() if self._has_session and frame.session == self.session_number:
                 self._end(f"the receiver ended the flight: {frame.reason}")
             case ForeignVersion() if self.phase is Phase.GREETING:
-                self.refusal = (
-                    f"the receiver speaks wire version {frame.version}, this end {WIRE_VERSION}: "
-                    "install the same tenbaud on both"
-                )
+                self.refusal = foreign_version_text("receiver", frame.version)
             case _:
                 self.counts["stale_frames"] += 1
         return []
@@ -254,13 +257,10 @@ class TransmitterSession:
         if foreign or self.phase is Phase.ENDED or (self.phase is Phase.FLYING and not newer):
             self.counts["stale_frames"] += 1
             return []
-        try:
-            state, hold = start_of(welcome, self.codec, self.terms)
-        except ValueError as error:
-            self.counts["stale_frames"] += 1
-            self._tell(EventKind.STALE, f"dropped a welcome: {error}")
-            return []
         again = self.phase is not Phase.GREETING
+        if self._bounds.drops(self._bounds.of_welcome(welcome, self._sample if again else None)):
+            return []
+        state, hold = start_of(welcome, self.codec, self.terms)
         farewell: list[Frame] = []
         if successor is not None and welcome.session != self.session_number:
             self.counts["take_overs"] += 1
@@ -293,7 +293,7 @@ class TransmitterSession:
         lines = [refuse.reason]
         if refuse.config and refuse.config != self.identity.config:
             lines += differing_fields(self.identity.config, refuse.config)
-        self.refusal = "\n  ".join(lines)
+        self.refusal = shown("\n  ".join(lines))
         self._tell(EventKind.REFUSED, self.refusal)
         if self.phase is Phase.REJOINING:
             self._end(f"the receiver refused to go on: {refuse.reason}")
@@ -304,12 +304,15 @@ class TransmitterSession:
             # A copy, or a recording: it brings nothing, and proves nobody alive.
             self.counts["stale_frames"] += 1
             return []
+        problem = self._bounds.of_commands(frame, self._sample, self.copies.next_sample)
+        if self._bounds.drops(problem):
+            return []
         self.heard_tick = self._tick
         self._claims.on_command()
-        self._echoes.add(frame.echoes, self.copies.confirmed.sample, self._tick)
+        self._echoes.add(frame.echoes, self.copies.confirmed.sample, self._tick, self._sample)
         while (echo := self._echoes.take(self.copies.confirmed.sample)) is not None:
-            if problem := self._confirm(echo):
-                return problem
+            if frames := self._confirm(echo):
+                return frames
         return self._check_gap()
 
     def _check_gap(self) -> list[Frame]:
@@ -319,57 +322,62 @@ class TransmitterSession:
 
     def _confirm(self, echo: Echo) -> list[Frame]:
         """Advance the confirmed copy by one echo; return the report of a desync, if it is one."""
-        inputs = self.codec.model.input_size
-        per_sample = self.terms.ticks_per_sample
+        word = self.codec.coder.alphabet.word(echo.word_number)
+        commands = commands_of(echo, self.terms.ticks_per_sample)
         try:
-            word = self.codec.coder.alphabet.word(echo.word_number)
-        except ValueError:
-            word, known = ERASED, False
-        else:
-            # A held-up transmitter may hear of an erasure before it notices that it sent nothing;
-            # a word for a sample that has not been sent is nobody's.
-            known = word is ERASED or echo.sample < self.copies.next_sample
-        if not known or len(echo.millivolts) != inputs * per_sample:
-            self.counts["stale_frames"] += 1
-            return []
-        commands = [
-            from_millivolts(echo.millivolts[index * inputs : (index + 1) * inputs])
-            for index in range(per_sample)
-        ]
-        done = self.copies.confirm(word, commands, echo.digest)
+            done = self.copies.confirm(word, commands, echo.digest)
+        except CANNOT_FLY as error:
+            return self._on_diverged(error)
         self.confirmed.append(done)
-        self.owing.on_confirmed()
-        self._due.extend(enumerate(commands, echo.sample * per_sample + self.terms.lead_ticks))
         self.history.add(self.epoch, word, done.flown.state)
         self.counts["digest_checks"] += 1
         self.counts["erasures"] += word is ERASED
-        return [] if done.digest == echo.digest else self._on_desync(done)
+        if done.digest != echo.digest:
+            return self._on_desync(done)
+        # Only now: whoever does not hold the same state moves no motor.
+        self.owing.on_confirmed()
+        first_tick = echo.sample * self.terms.ticks_per_sample + self.terms.lead_ticks
+        self._due.extend(enumerate(commands, first_tick))
+        return []
 
     def _on_desync(self, done: Confirmed) -> list[Frame]:
         self.counts["desyncs"] += 1
-        self.desync = Desync(
-            self.session_number,
-            self.epoch,
-            done.sample,
-            done.digest,
-            done.peer_digest,
-            self.codec.pack(done.flown.state),
-        )
-        self._tell(
-            EventKind.DESYNC,
-            f"the codecs differ after sample {done.sample}: transmitter {done.digest:016x}, "
-            f"receiver {done.peer_digest:016x}",
-            done.sample,
-        )
-        self._record_failure(self.desync, None)
+        self._report_answered = False
+        state = self.codec.pack(done.flown.state)
+        digests = (done.digest, done.peer_digest)
+        self.desync = Desync(self.session_number, self.epoch, done.sample, *digests, state)
+        self._tell(EventKind.DESYNC, difference_text(self.desync), done.sample)
+        write_failure(self._recorder, self.terms, self.history, self.desync, b"")
+        text = "the two copies of the codec disagree"
         if self._stop_on_desync:
-            return [self.desync, *self.bye("the two copies of the codec disagree")]
-        return self.rejoin(Why.DESYNC, "the two copies of the codec disagree")
+            return [self.desync, *self.bye(text)]
+        return self.rejoin(Why.DESYNC, text)
+
+    def _on_diverged(self, error: Exception) -> list[Frame]:
+        """Ask for another state: the receiver flies on from its own, so this one is not the same."""
+        self.counts["diverged"] += 1
+        return self.rejoin(Why.LAG, f"this end's copy of the codec cannot go on ({error!r})")
 
     # Reports
 
+    @property
+    def _sample(self) -> int:
+        """Return the sample that this end's clock stands in."""
+        return max(0, self._tick) // self.terms.ticks_per_sample
+
+    def _is_answer(self, frame: Desync) -> bool:
+        """Return whether this is the first answer to our last report: the same, with another state."""
+        own = self.desync
+        return own is not None and not self._report_answered and own == replace(frame, state=own.state)
+
     def _is_current(self, session: int) -> bool:
         return self.phase is Phase.FLYING and session == self.session_number
+
+    @property
+    def is_proven(self) -> bool:
+        """Return whether the confirmed state has been compared with the receiver's, and is equal."""
+        flown = self.copies.confirmed.sample * self.terms.ticks_per_sample > self.epoch_tick
+        return self.phase is Phase.FLYING and flown
 
     @property
     def _has_session(self) -> bool:
@@ -387,13 +395,3 @@ class TransmitterSession:
         event = Event(kind, now_ns, at, text)
         self.events.append(event)
         self._recorder.write(EVENT_CHANNEL, now_ns, event_row(event))
-
-    def _record_failure(self, own: Desync, theirs: Desync | None) -> None:
-        """Write a lockstep failure down: when it is found, and once more with the receiver's state."""
-        if theirs is not None and (theirs.epoch, theirs.sample) != (own.epoch, own.sample):
-            return
-        peer = b"" if theirs is None else theirs.state
-        row = self.history.failure_row(
-            own.epoch, own.sample, own.transmitter_digest, own.receiver_digest, peer
-        )
-        self._recorder.write(LOCKSTEP_CHANNEL, own.sample * self.terms.sample_ns, row)

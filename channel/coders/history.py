@@ -210,6 +210,12 @@ class HistoryCoder(FunctionCoder):
         """Return the first range, and a history of alternating signs."""
         return (self.parameters.initial_range, float(0b0101010101 & len(self.parameters.rows) - 1))
 
+    def is_state(self, coder: Vector) -> bool:
+        """Return whether this is a range within its limits, and a history that has a row."""
+        reach, history = coder
+        known = history in range(len(self.parameters.rows))
+        return self.parameters.minimum_range <= reach <= self.parameters.maximum_range and known
+
     def ranges(self, coder: Vector) -> Vector:
         """Return the range."""
         return coder[:1]

@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from channel.codec import Vector
+from channel.codec import STATE_MAX, Vector
 from channel.coders.base import (
     CoderFunctions,
     FunctionCoder,
@@ -98,6 +98,10 @@ class TimedCoder(FunctionCoder):
     def initial(self) -> Vector:
         """Return `M_0` for every axis."""
         return (self.parameters.initial_range,) * self.axes
+
+    def is_state(self, coder: Vector) -> bool:
+        """Return whether these are ranges."""
+        return all(0.0 <= value < STATE_MAX for value in coder)
 
     def ranges(self, coder: Vector) -> Vector:
         """Return the range `M_k` of each axis."""

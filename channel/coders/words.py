@@ -15,7 +15,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from channel.codec import Vector
+from channel.codec import STATE_MAX, Vector
 from channel.coders.base import (
     CoderFunctions,
     FunctionCoder,
@@ -120,6 +120,12 @@ class WordsCoder(FunctionCoder):
     def initial(self) -> Vector:
         """Return that no angle has come yet."""
         return (0.0, 0.0)
+
+    def is_state(self, coder: Vector) -> bool:
+        """Return whether this is an angle within the words' range and a count of samples."""
+        last, age = coder
+        within = -self.parameters.range <= last <= self.parameters.range
+        return within and 0.0 <= age < STATE_MAX and age == math.floor(age)
 
     def ranges(self, coder: Vector) -> Vector:
         """Return half a step, the largest error of an angle within the range."""

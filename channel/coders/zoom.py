@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from channel.codec import Vector
+from channel.codec import STATE_MAX, Vector
 from channel.coders.base import (
     CoderFunctions,
     FunctionCoder,
@@ -125,6 +125,11 @@ class ZoomCoder(FunctionCoder):
         """Return `M_0` for every axis and an empty (zero) sign history."""
         history = self.axes * (self.parameters.window - 1)
         return (self.parameters.initial_range,) * self.axes + (0.0,) * history
+
+    def is_state(self, coder: Vector) -> bool:
+        """Return whether these are ranges, and signs or the zeros of erased words."""
+        ranges = all(0.0 <= value < STATE_MAX for value in coder[: self.axes])
+        return ranges and all(value in (-1.0, 0.0, 1.0) for value in coder[self.axes :])
 
     def ranges(self, coder: Vector) -> Vector:
         """Return the range `M_k` of each axis."""

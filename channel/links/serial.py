@@ -21,7 +21,7 @@ import serial
 
 from channel.errors import LinkError
 from channel.links.base import LinkBase, Role
-from channel.links.serial_port import check_port, open_port
+from channel.links.serial_port import check_port, open_port, reason_of
 from channel.serial_budget import LINE_BITS_PER_BYTE
 from channel.serial_stream import Deframer, Received
 from channel.serial_wire import SerialWire, stuff, stuff_notice
@@ -79,6 +79,7 @@ class SerialLink(LinkBase):
         self._last_message = (b"", 0.0)
         self._heard_at: float | None = None
         self._leaving = False
+        self._lost = ""
         self._stop = threading.Event()
         self._writing = threading.Lock()
         self._port: serial.SerialBase | None = open_port(port, line_rate_baud)
@@ -128,6 +129,10 @@ class SerialLink(LinkBase):
         if self._port is None or heard_at is None:
             return False
         return time.monotonic() - heard_at < self._quiet_s
+
+    def trouble(self) -> str:
+        """Return that the port went, and why, while it has not come back."""
+        return self._lost
 
     def close(self) -> None:
         """Take leave, let what was sent go out, and give the port back."""
@@ -191,8 +196,8 @@ class SerialLink(LinkBase):
                 data = port.read(1)
                 if data:
                     data += port.read(port.in_waiting)  # type: ignore[attr-defined]
-            except _PORT_ERRORS:
-                self._lose(port)
+            except _PORT_ERRORS as error:
+                self._lose(port, error)
                 continue
             self.counts.line_bytes_in += len(data)
             for received in self._deframer.feed(data):
@@ -211,7 +216,11 @@ class SerialLink(LinkBase):
         else:
             self._inbox.put((now, received.message))
 
-    def _lose(self, port: serial.SerialBase) -> None:
+    def _lose(self, port: serial.SerialBase, error: Exception) -> None:
+        if not self._stop.is_set():
+            self._lost = (
+                f"the serial port {self._url} was lost ({reason_of(error)}) and did not come back"
+            )
         with self._writing:
             self._port = None
         _close(port)
@@ -230,6 +239,7 @@ class SerialLink(LinkBase):
             self._busy_until = 0.0
             with self._writing:
                 self._port = port
+            self._lost = ""
             self._notify(_ASK)
             return
 

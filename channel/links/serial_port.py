@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from urllib.parse import urlsplit
 
 import serial
@@ -45,6 +46,12 @@ def open_port(url: str, line_rate_baud: int) -> serial.SerialBase:
     with contextlib.suppress(Exception):
         port.set_low_latency_mode(True)
     return port
+
+
+def reason_of(error: Exception) -> str:
+    """Return why a port went, in the system's words where there are any."""
+    number = getattr(error, "errno", None)
+    return os.strerror(number) if number else str(error) or "it is gone"
 
 
 def _explained(error: Exception) -> str:

@@ -69,6 +69,10 @@ class SplitLink:
         """Return whether the peer is known to be there on the inward line."""
         return self._in.peer_present()
 
+    def trouble(self) -> str:
+        """Return what is wrong with either line."""
+        return self._out.trouble() or self._in.trouble()
+
     def close(self) -> None:
         """Give both lines back."""
         self._out.close()

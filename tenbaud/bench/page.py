@@ -20,6 +20,7 @@ from tenbaud.limits.encoder import (
     floor_behind_encoder,
 )
 from tenbaud.limits.linear import linear_model, rate_needed
+from tenbaud.whole import write_whole
 
 PICTURE = "figures/limits.png"
 DISTURBANCE_PICTURE = "figures/limits-disturbance.png"
@@ -62,7 +63,7 @@ def write_page(path: Path, outcome: Outcome, recorded: Sequence[Row], quick: boo
         closed_seeds=outcome.scale.closed_seeds,
         closed_seconds=outcome.scale.closed_seconds,
     )
-    path.write_text(text, encoding="utf-8")
+    write_whole(path, text)
 
 
 def _summary(outcome: Outcome) -> str:

@@ -38,6 +38,7 @@ def coders(
     from tenbaud.bench.page import DISTURBANCE_PICTURE, PICTURE, write_page
     from tenbaud.bench.plan import FULL, QUICK, fly_all
     from tenbaud.bench.recorded import fly_recorded
+    from tenbaud.whole import make_folder
 
     found = found_data(data)
     columns = (
@@ -54,7 +55,7 @@ def coders(
         )
         bar.update(task, description="recorded flights")
         recorded = fly_recorded(found) if found else []
-    (docs / "figures").mkdir(parents=True, exist_ok=True)
+    make_folder(docs / "figures")
     write_page(docs / "LIMITS.md", outcome, recorded, quick)
     draw_rates(docs / PICTURE, outcome)
     draw_disturbances(docs / DISTURBANCE_PICTURE, outcome)

@@ -107,13 +107,15 @@ def _view_wish(
         if open_browser:
             raise typer.BadParameter("--open opens the live page; it goes with --view")
         return None
+    from channel.links.endpoints import loopback_host
     from tenbaud.flight.viewing import ViewWish
     from tenbaud.view.server import Address, free_port, require_nicegui
 
     if len(agreements) > 1 or agreements[0].config.link.kind == "memory":
         raise typer.BadParameter("--view shows one flight of two processes: one --mismatch, no memory")
     require_nicegui()
-    address = Address(port=port or free_port("127.0.0.1"))
+    host = loopback_host()
+    address = Address(host, port or free_port(host))
     address.check()
     return ViewWish(address.port, open_browser)
 

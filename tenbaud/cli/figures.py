@@ -49,6 +49,7 @@ def figures(
     """
     from tenbaud.figures.make import NUMBERS
     from tenbaud.recording.folder import create_run_folder
+    from tenbaud.whole import make_folder
 
     drawings = [name for name in which or () if name in DRAWINGS]
     wanted = _wanted([name for name in which or ["all"] if name not in drawings], NUMBERS)
@@ -56,7 +57,7 @@ def figures(
     # A run's folder is for flights; the pages' drawings leave none.
     folder = create_run_folder(None, "figures", out) if wanted or docs is None else docs
     pictures = (docs or folder) / "figures"
-    pictures.mkdir(parents=True, exist_ok=True)
+    make_folder(pictures)
     if drawings:
         _draw_documentation(drawings, pictures)
     if wanted:

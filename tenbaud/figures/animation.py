@@ -16,6 +16,7 @@ import numpy as np
 from tenbaud.figures.curves import read_curves
 from tenbaud.figures.flights import Curves
 from tenbaud.figures.style import LINE_A, LINE_B
+from tenbaud.whole import whole_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -223,15 +224,17 @@ def _write(pictures: list[Image], path: Path) -> None:
     palette = Pillow.new("P", (1, 1))
     palette.putpalette(_shades())
     flat = [picture.quantize(palette=palette, dither=Pillow.Dither.NONE) for picture in pictures]
-    flat[0].save(
-        path,
-        save_all=True,
-        append_images=flat[1:],
-        duration=FRAME_MS,
-        loop=0,
-        optimize=True,
-        disposal=1,
-    )
+    with whole_file(path) as stream:
+        flat[0].save(
+            stream,
+            format="GIF",
+            save_all=True,
+            append_images=flat[1:],
+            duration=FRAME_MS,
+            loop=0,
+            optimize=True,
+            disposal=1,
+        )
 
 
 def _shades() -> list[int]:

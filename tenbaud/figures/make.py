@@ -20,6 +20,7 @@ from tenbaud.figures.identified import (
     noisy_trial,
 )
 from tenbaud.identify.figures import draw_estimates, draw_excitation
+from tenbaud.whole import make_folder
 
 NUMBERS = ("3", "4", "5", "6", "7", "8")
 OnProgress = Callable[[float, float, str], None]
@@ -96,7 +97,7 @@ def _jobs(
     data: Path | None,
     first_half: real.FirstHalf | None,
 ) -> list[Job]:
-    (folder / "flights").mkdir(parents=True, exist_ok=True)
+    make_folder(folder / "flights")
     if whole:
         jobs = plan.pitch_jobs() + plan.unit_jobs() + plan.rate_jobs() + plan.zooming_jobs()
         if data is not None and first_half is not None:

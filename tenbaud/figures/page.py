@@ -8,13 +8,14 @@ from tenbaud.figures import draw, identified, plan, real, tables
 from tenbaud.figures.make import Results
 from tenbaud.figures.misprints import MISPRINTS
 from tenbaud.identify.run import FIELDS
+from tenbaud.whole import write_whole
 
 
 def write_page(path: Path, results: Results) -> None:
     """Write the page; its pictures are expected in `figures/` beside it."""
     parts = [_head(), _claims(results), _identification(results), _loop(results)]
     parts += [_rates(results), _zooming(results), _recorded(results), _misprints()]
-    path.write_text("\n\n".join(parts) + "\n", encoding="utf-8")
+    write_whole(path, "\n\n".join(parts) + "\n")
 
 
 def _head() -> str:

@@ -8,6 +8,7 @@ continuation of the first.
 from __future__ import annotations
 
 import csv
+import io
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,7 @@ from tenbaud.config.load import load_config
 from tenbaud.figures.flights import Job, Overrides
 from tenbaud.identify.run import model_section
 from tenbaud.identify.sources import LogColumns, from_csv
+from tenbaud.whole import write_whole
 
 UIUC_FILE = "uiuc_closed_loop.csv"
 NTNU_FILES = ("ntnu_travel_step.csv", "ntnu_elevation_obstacle.csv")
@@ -139,8 +141,9 @@ def convert_ntnu(source: Path, target: Path) -> float:
         angles = np.array([float(row[column]) for row in reader])[::5]
     turns = angles / (360.0 if in_degrees else math.tau)
     counts = np.floor(turns * 4096.0 + 0.5).astype(int)
-    with target.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(("step", "pitch_counts", "right_volts", "left_volts"))
-        writer.writerows((step, count, 0, 0) for step, count in enumerate(counts.tolist()))
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(("step", "pitch_counts", "right_volts", "left_volts"))
+    writer.writerows((step, count, 0, 0) for step, count in enumerate(counts.tolist()))
+    write_whole(target, text.getvalue())
     return len(counts) * 0.01

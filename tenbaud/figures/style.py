@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tenbaud.recording.envelope import Series, thin
+from tenbaud.whole import whole_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -52,4 +53,5 @@ def save(figure: Figure, paths: Sequence[Path]) -> None:
     for path in paths:
         # A fixed salt and no date: the same data give the same file.
         metadata = {"Date": None} if path.suffix == ".svg" else {"Software": None}
-        figure.savefig(path, dpi=100, metadata=metadata)
+        with whole_file(path) as stream:
+            figure.savefig(stream, dpi=100, metadata=metadata, format=path.suffix[1:])

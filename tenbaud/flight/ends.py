@@ -19,11 +19,12 @@ from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build import Agreement
 from tenbaud.build_ends import build_receiver
 from tenbaud.flight import receive, transmit
-from tenbaud.flight.outcome import Outcome, outcome_of
+from tenbaud.flight.outcome import SAFE, Outcome, outcome_of
 from tenbaud.flight.status import Status, StatusMode, StatusReporter
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, gap_part, link_part, receiver_part, transmitter_part
 from tenbaud.flight.transmit import Stop
+from tenbaud.flight.trouble import Trouble
 from tenbaud.recording.folder import RunFolder
 from tenbaud.recording.gather import OverviewRecorder
 from tenbaud.recording.shared import SharedWriter
@@ -102,13 +103,15 @@ def run_transmitter(
     with _end(agreement, "transmitter", folder) as (recorder, stop):
         station = _station(agreement, "transmitter", recorder, endpoints)
         with knocks(endpoints) as refused, open_link(agreement, "transmitter", endpoints, stop) as link:
+            trouble = Trouble(link, endpoints.security, refused, stop)
             run = transmit.prepare(agreement, station.recorder, link.wire)
-            live = station.fly_transmitter(run, stop)
+            live = station.fly_transmitter(run, trouble.should_stop)
             with (
                 station.publishing(lambda tap: TransmitterComposer(run, tap, live)),
                 StatusReporter(lambda: transmitter_status(run), status),
             ):
-                outcome = _guarded(lambda: _fly(run, link, stop, recorder, live))
+                outcome = _guarded(lambda: _fly(run, link, trouble.should_stop, recorder, live))
+                outcome = trouble.first_cause(outcome, SAFE)
             run.node.rest()
         summary = transmitter_part(run, outcome) | link_part(link, refused) | station.summary()
         return outcome, _with_recording(summary, recorder)
@@ -121,10 +124,11 @@ def run_receiver(
     with _end(agreement, "receiver", folder) as (recorder, stop):
         station = _station(agreement, "receiver", recorder, endpoints)
         with knocks(endpoints) as refused, open_link(agreement, "receiver", endpoints, stop) as link:
+            trouble = Trouble(link, endpoints.security, refused, stop)
             endpoint = build_receiver(
                 agreement, station.recorder, link.wire, endpoints.take_over, station.steering
             )
-            live = station.fly_receiver(endpoint, stop)
+            live = station.fly_receiver(endpoint, trouble.should_stop)
             with (
                 station.publishing(lambda tap: ReceiverComposer(agreement, endpoint, tap, live)),
                 StatusReporter(lambda: receiver_status(agreement, endpoint), status),
@@ -132,6 +136,7 @@ def run_receiver(
                 outcome = _guarded(
                     lambda: receive.serve(agreement, endpoint, link, live, recorder.help_out)
                 )
+                outcome = trouble.first_cause(outcome)
             endpoint.session.rest()
         summary = receiver_part(agreement, endpoint, outcome) | link_part(link, refused)
         summary |= station.summary()
@@ -268,7 +273,7 @@ def _station(agreement: Agreement, role: Role, recorder: McapRecorder, endpoints
 def _fly(
     run: transmit.TransmitterRun,
     link: Link,
-    stop: StopFlag,
+    stop: Stop,
     recorder: McapRecorder,
     live: LiveTransmitter,
 ) -> Outcome:

@@ -6,6 +6,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+from channel.bounds import COUNTER
 from channel.impairments import ImpairedLine
 from channel.line import Line
 from channel.links.base import Link
@@ -40,6 +41,7 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         "rejoins": session.counts["rejoins"],
         "rejoin_bytes": run.rejoin_bytes,
         "stale_commands": session.counts["stale_frames"],
+        COUNTER: session.counts[COUNTER],
         "claims_refused": session.counts["claims_refused"],
         "take_overs": session.counts["take_overs"],
         "rejoins_asked": {why.name.lower(): n for why, n in session.rejoins_asked.items()},
@@ -106,6 +108,7 @@ def receiver_part(agreement: Agreement, endpoint: ReceiverEndpoint, outcome: Out
         "symbols_late": session.counts["symbols_late"],
         "symbols_misplaced": session.counts["symbols_misplaced"],
         "stale_frames": session.counts["stale_frames"],
+        COUNTER: session.counts[COUNTER],
         "bad_commands": session.counts["bad_commands"],
         "malformed": endpoint.inlet.malformed,
         "desyncs": session.counts["desyncs"],
@@ -130,14 +133,20 @@ def link_part(link: Link, refused: Counter[str] | None = None) -> Summary:
 
 
 def joined(transmitter: Summary, receiver: Summary) -> Summary:
-    """Return one summary: the transmitter's figures, and those that only the receiver has."""
+    """Return one summary: the transmitter's figures, and those that only the receiver has.
+
+    Of an end that was killed there is none; without the transmitter's the receiver's figures stand.
+    """
+    if not transmitter:
+        return dict(receiver)
     own = ("baud_measured", "symbols_late", "symbols_misplaced", "stale_frames", "bad_commands")
     both: Summary = {
         name: dict(Counter(transmitter.get(name, {})) + Counter(receiver.get(name, {})))
         for name in ("link_dropped", "connections_refused")
     }
-    for name in ("reconnects", "malformed"):
+    for name in ("reconnects", "malformed", "recording_rows_lost", COUNTER):
         both[name] = transmitter.get(name, 0) + receiver.get(name, 0)
+    both["recording_error"] = transmitter.get("recording_error") or receiver.get("recording_error")
     if receiver.get("impaired_down"):
         both["impaired_down"] = receiver["impaired_down"]
     return {**transmitter, **both, **{name: receiver.get(name) for name in own}}

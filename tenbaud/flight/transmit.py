@@ -18,7 +18,7 @@ from channel.virtual import Peer
 from channel.wire import Wire
 from tenbaud.build import Agreement
 from tenbaud.build_ends import build_line, build_transmitter, build_uplink
-from tenbaud.flight.outcome import FLIGHT_OVER, ExitCode, Outcome
+from tenbaud.flight.outcome import FLIGHT_OVER, SAFE, ExitCode, Outcome
 from tenbaud.flight.verdict import FlightCounts, faults_of, settings_of, verdict_text
 from transmitter.node import STOPPED, TransmitterNode
 from transmitter.rate_watch import RateWatch
@@ -184,7 +184,7 @@ def _outcome(run: TransmitterRun, peer_present: bool) -> Outcome:
     if session.phase is Phase.ENDED or (node.guard.stopped and not peer_present):
         return Outcome(
             ExitCode.LINK_LOST,
-            f"{session.end_reason or 'the receiver is gone'}; the motors are at their safe voltage",
+            f"{session.end_reason or 'the receiver is gone'}; {SAFE}",
         )
     if node.guard.stopped:
         return Outcome(
@@ -212,10 +212,14 @@ def _not_flown(run: TransmitterRun) -> Outcome | None:
 def flight_counts(run: TransmitterRun) -> FlightCounts:
     """Return what the verdict on a flight rests on."""
     node, session = run.node, run.node.session
+    samples = run.ticks // run.agreement.terms.ticks_per_sample
+    confirmed = session.counts["digest_checks"]
+    # While the line rests at the end, the receiver may erase samples that were never flown.
+    beyond = max(0, confirmed - samples)
     return FlightCounts(
-        samples=run.ticks // run.agreement.terms.ticks_per_sample,
-        confirmed=session.counts["digest_checks"],
-        erased=session.counts["erasures"],
+        samples=samples,
+        confirmed=confirmed - beyond,
+        erased=session.counts["erasures"] - beyond,
         rejoins=session.counts["rejoins"],
         ticks=run.ticks,
         ticks_down=node.ticks_down,

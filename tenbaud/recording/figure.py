@@ -22,6 +22,7 @@ from tenbaud.recording.overview import (
 )
 from tenbaud.recording.reader import MessageStream, rows_in_blocks, stored_metadata
 from tenbaud.recording.rows import Row
+from tenbaud.whole import whole_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -60,7 +61,9 @@ def draw_flight(transmitter: Path, receiver: Path | None, output: Path, title: s
     from it. The receiver's recording adds the reference. Raises RecordingError if the
     transmitter's recording holds no flight.
     """
-    draw_run(transmitter, receiver, title, own=True).savefig(output, dpi=150, format="png")
+    figure = draw_run(transmitter, receiver, title, own=True)
+    with whole_file(output) as stream:
+        figure.savefig(stream, dpi=150, format="png")
 
 
 def draw_run(transmitter: Path | None, receiver: Path | None, title: str, own: bool = False) -> Figure:

@@ -22,6 +22,7 @@ from tenbaud.recording.holes import HOLES_METADATA, Hole, packed_holes
 from tenbaud.recording.lock import in_use
 from tenbaud.recording.reader import MessageStream, open_recording
 from tenbaud.recording.writer import CHUNK_BYTES, PROFILE
+from tenbaud.whole import write_error
 
 RECOVERED_NOTE = "recovered"
 RECOVERED_TEXT = "from a recording that was cut or damaged; what is missing is lost"
@@ -92,10 +93,7 @@ def _recover_file(path: Path, output: Path | None) -> Recovered:
                     _keep(path, kept)
                 unfinished.replace(target)
         except OSError as error:
-            raise RecordingError(
-                f"{target} cannot be written: {error.strerror or error}. "
-                "Choose another place with --out."
-            ) from error
+            raise write_error(target, error) from error
     return Recovered(target, kept or path, rows, last_ns, tuple(stream.holes), stream.strays)
 
 

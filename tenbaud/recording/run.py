@@ -31,6 +31,7 @@ from tenbaud.recording.folder import (
 )
 from tenbaud.recording.signals import SIGNALS, Signal, Source, TimeBase
 from tenbaud.recording.table import Series, Table, Tables, read_tables
+from tenbaud.whole import whole_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -199,7 +200,9 @@ class Run:
 
         figure = draw_run(self._files.get("transmitter"), self._files.get("receiver"), self._title())
         if output is not None:
-            figure.savefig(output, dpi=150)
+            path = Path(output)
+            with whole_file(path) as stream:
+                figure.savefig(stream, dpi=150, format=path.suffix[1:] or "png")
         return figure
 
     def _title(self) -> str:

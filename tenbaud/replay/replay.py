@@ -13,6 +13,7 @@ from tenbaud.replay.record import FlightRecord, epochs_of
 from tenbaud.replay.refly import Reflown, refly
 from tenbaud.replay.rows import EndRows
 from tenbaud.replay.symbols import Packed, Unpacked, pack
+from tenbaud.whole import make_folder, write_whole
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,6 +152,10 @@ def _compare_commands(rows: EndRows, flown: Sequence[Reflown]) -> list[str]:
 
 
 def save_symbols(replayed: Replayed, path: Path) -> None:
-    """Write the packed flight; the file must not exist yet."""
-    with path.open("xb") as stream:
-        stream.write(replayed.packed.data)
+    """Write the packed flight. Raises WriteError, and RecordingError where the file exists already."""
+    if path.exists():
+        raise RecordingError(
+            f"{path} exists already and is not overwritten. Name another file with --save."
+        )
+    make_folder(path.parent)
+    write_whole(path, replayed.packed.data)

@@ -137,10 +137,10 @@ def figure_sources() -> list[Path]:
 @cache
 def _cache_folder() -> Path | None:
     """Return where machine code is kept, None when that cannot be written."""
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    folder = Path(base) / "tenbaud" / sources_digest()
     try:
+        base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        folder = Path(base) / "tenbaud" / sources_digest()
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
+    except (OSError, RuntimeError):  # the latter for a user without a home, as in containers
         return None
     return folder if os.access(folder, os.W_OK) else None

@@ -23,6 +23,7 @@ from tenbaud.build_ends import build_controller, guard_settings, reference_of
 from tenbaud.build_rig import nominal_plant
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig, FlightLogSection, ReferenceSection
+from tenbaud.flight.verdict import FlightCounts, faults_of
 from tenbaud.studies.compiled import compiled, reader
 from tenbaud.studies.figures import FlightFigures, shared_parts
 from tenbaud.studies.flight_data import DONE, Errors, Given, Motion, Numbers, Work
@@ -128,8 +129,22 @@ class CompiledPoint:
             raise Uncommon(str(error)) from error
         if status != DONE:
             raise Uncommon("the flight left its ordinary course")
+        if faults_of(self._counts(schedule, motion)):
+            raise Uncommon("what does not count as flown, for the reason that the nodes give")
         figures = flight_figures(errors, motion, schedule.erasures, self._samples)
         return figures, Trace(work.models, work.coders, work.coded, work.live, work.front, work.rear)
+
+    def _counts(self, schedule: Schedule, motion: Motion) -> FlightCounts:
+        """Return what the verdict on a flight rests on; a compiled one has no rejoin and no stop."""
+        ticks = self.numbers.ticks
+        return FlightCounts(
+            samples=self._samples,
+            confirmed=int(np.count_nonzero(schedule.scored)),
+            erased=schedule.erasures,
+            rejoins=0,
+            ticks=ticks,
+            ticks_commanded=ticks - motion.late,
+        )
 
     def figures(self, seed: int) -> FlightFigures | None:
         """Fly with one seed; None for a flight that only the nodes can fly."""

@@ -35,7 +35,7 @@ def only_welcome(frames: list[Frame]) -> Welcome:
 
 def test_when_a_rejoin_is_asked_for_then_a_new_epoch_begins_ahead_of_both() -> None:
     session = flown(10, lead_ticks=13)
-    welcome = only_welcome(session.on_frame(request(1, 12), 0))
+    welcome = only_welcome(session.on_frame(request(1, 12), 12 * 100 * MS))
     # 13 ticks of lead are two samples.
     assert (welcome.epoch, welcome.first_sample, welcome.request) == (1, 14, 1)
     assert welcome.hold_millivolts == (1000, -1000)
@@ -46,43 +46,43 @@ def test_when_a_rejoin_is_asked_for_then_a_new_epoch_begins_ahead_of_both() -> N
 
 def test_when_the_receiver_is_ahead_then_the_start_is_its_own_next_sample() -> None:
     session = flown(30)
-    assert only_welcome(session.on_frame(request(1, 12), 0)).first_sample == 30
+    assert only_welcome(session.on_frame(request(1, 12), 12 * 100 * MS)).first_sample == 30
 
 
 def test_when_the_request_is_repeated_then_so_is_the_answer_until_it_is_used_or_old() -> None:
     session = flown(10)
-    first = only_welcome(session.on_frame(request(1, 12), 0))
+    first = only_welcome(session.on_frame(request(1, 12), 12 * 100 * MS))
     for later in range(1, ANSWER_AGE_SAMPLES_MAX + 1):
-        assert session.on_frame(request(1, 12 + later), 0) == [first]
-    second = only_welcome(session.on_frame(request(1, 13 + ANSWER_AGE_SAMPLES_MAX), 0))
+        assert session.on_frame(request(1, 12 + later), (12 + later) * 100 * MS) == [first]
+    second = only_welcome(session.on_frame(request(1, 13 + ANSWER_AGE_SAMPLES_MAX), 1_800 * MS))
     assert second.epoch == 2
     assert second.first_sample == 13 + ANSWER_AGE_SAMPLES_MAX
-    session.on_frame(symbol(second.first_sample, epoch=2), 0)
-    assert session.on_frame(request(1, 40), 0) == []
+    session.on_frame(symbol(second.first_sample, epoch=2), 1_900 * MS)
+    assert session.on_frame(request(1, 40), 40 * 100 * MS) == []
     assert session.epoch == 2
-    assert only_welcome(session.on_frame(request(2, 40), 0)).epoch == 3
-    assert session.on_frame(request(1, 41), 0) == []
+    assert only_welcome(session.on_frame(request(2, 40), 40 * 100 * MS)).epoch == 3
+    assert session.on_frame(request(1, 41), 41 * 100 * MS) == []
 
 
 def test_when_samples_are_short_then_an_answer_on_its_way_is_not_replaced_by_another() -> None:
     session = flown(10, tick_ns=MS // 20, rate_baud=2000.0)
-    first = only_welcome(session.on_frame(request(1, 12), 0))
-    assert session.on_frame(request(1, 12 + 90), 0) == [first]
-    assert only_welcome(session.on_frame(request(1, 13 + 100), 0)).epoch == 2
+    first = only_welcome(session.on_frame(request(1, 12), 902 * MS))
+    assert session.on_frame(request(1, 12 + 90), 947 * MS) == [first]
+    assert only_welcome(session.on_frame(request(1, 13 + 100), 953 * MS)).epoch == 2
 
 
 def test_when_symbols_are_of_an_old_epoch_then_they_are_not_consumed() -> None:
     session = flown(10)
-    welcome = only_welcome(session.on_frame(request(1, 12), 0))
+    welcome = only_welcome(session.on_frame(request(1, 12), 12 * 100 * MS))
     before = session.state
     # The transmitter seems not to have the answer, so it gets it again.
-    assert session.on_frame(symbol(12, epoch=0), 0) == [welcome]
+    assert session.on_frame(symbol(12, epoch=0), 12 * 100 * MS) == [welcome]
     assert session.state == before
-    (commands,) = session.on_frame(symbol(12, epoch=1), 0)
+    (commands,) = session.on_frame(symbol(12, epoch=1), 12 * 100 * MS)
     assert isinstance(commands, Commands)
     assert commands.epoch == 1
     assert [echo.sample for echo in commands.echoes] == [12]
-    assert session.on_frame(symbol(13, epoch=0), 0) == []
+    assert session.on_frame(symbol(13, epoch=0), 13 * 100 * MS) == []
 
 
 def test_when_a_fresh_receiver_hears_a_symbol_then_it_says_that_it_knows_nothing() -> None:
@@ -123,7 +123,7 @@ def test_when_nothing_comes_for_long_then_erasures_are_not_counted_for_ever() ->
     session.on_deadline(10**15)
     assert session.counts["erasures"] == HISTORY_SAMPLES
     assert session.next_deadline() is None
-    assert session.on_frame(symbol(10_000), 0) == [Unknown(SESSION, 0)]
+    assert session.on_frame(symbol(10_000), 10**15) == [Unknown(SESSION, 0)]
 
 
 def test_when_the_pause_is_long_then_the_coder_begins_again_but_not_the_model() -> None:
@@ -145,4 +145,4 @@ def test_when_the_request_comes_in_the_middle_of_a_word_then_the_word_is_given_u
 
     session = two_axes()
     session.on_frame(symbol(0), 0)
-    assert only_welcome(session.on_frame(request(1, 0), 0)).first_sample == 1
+    assert only_welcome(session.on_frame(request(1, 0), 0 * 100 * MS)).first_sample == 1

@@ -56,7 +56,7 @@ def test_when_symbols_come_in_order_then_each_flies_one_sample() -> None:
 def test_when_command_frames_are_sent_then_each_repeats_the_last_samples(repeats: int) -> None:
     session = flying(repeats=repeats)
     for slot in range(10):
-        (answer,) = session.on_frame(symbol(slot), 0)
+        (answer,) = session.on_frame(symbol(slot), slot * 100 * MS)
         assert isinstance(answer, Commands)
         expected = list(range(max(0, slot - repeats), slot + 1))
         assert [echo.sample for echo in answer.echoes] == expected
@@ -86,8 +86,8 @@ def test_when_a_symbol_is_late_or_doubled_then_it_is_dropped_and_counted(slot: i
 
 @pytest.mark.parametrize(
     "stale",
-    [symbol(0, session=SESSION + 1), symbol(0, epoch=1), symbol(0, number=2), symbol(0, session=0)],
-    ids=["session", "epoch", "number", "no session"],
+    [symbol(0, session=SESSION + 1), symbol(0, session=0)],
+    ids=["session", "no session"],
 )
 def test_when_a_symbol_is_of_another_flight_then_it_is_dropped_and_counted(stale: Symbol) -> None:
     session = flying()
@@ -96,12 +96,26 @@ def test_when_a_symbol_is_of_another_flight_then_it_is_dropped_and_counted(stale
     assert session.counts["stale_frames"] == 1
 
 
+def test_when_a_symbol_is_of_an_epoch_that_was_never_begun_then_its_sender_is_told() -> None:
+    session = flying()
+    assert session.on_frame(symbol(0, epoch=1), 0) == [Unknown(SESSION, 1)]
+    assert session.state == CODEC.initial()
+
+
+def test_when_a_symbol_is_not_of_the_alphabet_then_it_is_dropped_and_counted() -> None:
+    session = flying()
+    assert session.on_frame(symbol(0, number=2), 0) == []
+    assert session.counts["out_of_bounds"] == 1
+    assert session.state == CODEC.initial()
+
+
 def test_when_a_slot_is_far_ahead_then_it_is_dropped_and_not_a_gap() -> None:
     session = flying()
-    assert session.on_frame(symbol(HISTORY_SAMPLES + 1), 0) == [Unknown(SESSION, 0)]
+    at_ns = (HISTORY_SAMPLES + 1) * 100 * MS
+    assert session.on_frame(symbol(HISTORY_SAMPLES + 1), at_ns) == [Unknown(SESSION, 0)]
     assert session.counts["stale_frames"] == 1
     assert kinds(session)[-1] is EventKind.STALE
-    assert len(session.on_frame(symbol(HISTORY_SAMPLES), 0)) == HISTORY_SAMPLES + 1
+    assert len(session.on_frame(symbol(HISTORY_SAMPLES), at_ns)) == HISTORY_SAMPLES + 1
 
 
 @pytest.mark.parametrize(

@@ -39,6 +39,12 @@ from transmitter.session import Phase, TransmitterSession
 
 ALIVE_TICKS = 10**6
 
+RECOVERY_SAMPLES_MAX = 13
+"""From the last fault to lockstep, beside the round trip and the command lead."""
+
+CALM_REJOINS_MAX = 4
+"""After the last fault."""
+
 
 class WorldRig(RigBase):
     """A plant that outlives the transmitter's process: its ticks are counted from true time 0."""
@@ -102,6 +108,17 @@ class World:
         self._greeted = False
         self.recovered_ns: int | None = None
         """from then until both ends were locked"""
+
+    @property
+    def recovery_ns_max(self) -> int:
+        """Return how long lockstep may take to come back after the last fault."""
+        waiting_ns = self.plan.round_trip_ns + self.terms.lead_ticks * self.terms.tick_ns
+        return RECOVERY_SAMPLES_MAX * self.terms.sample_ns + waiting_ns
+
+    @property
+    def calm_rejoins_max(self) -> int:
+        """Return how often the ends may rejoin after the last fault."""
+        return CALM_REJOINS_MAX
 
     # The two processes
 

@@ -311,7 +311,7 @@ def test_when_an_echo_makes_no_sense_then_it_is_dropped_and_counted(echo: Echo) 
     session = flying()
     session.on_measurement(0, (1.0,))
     assert session.on_frame(frame(echo)) == []
-    assert session.counts["stale_frames"] == 1
+    assert session.counts["out_of_bounds"] == 1
     assert session.copies.confirmed == CODEC.initial()
     assert session.phase is Phase.FLYING
 
@@ -319,7 +319,7 @@ def test_when_an_echo_makes_no_sense_then_it_is_dropped_and_counted(echo: Echo) 
 def test_when_a_word_is_echoed_that_was_never_sent_then_it_is_dropped() -> None:
     session, far = flying(), Far()
     assert session.on_frame(frame(far.echo((1,)))) == []
-    assert session.counts["stale_frames"] == 1
+    assert session.counts["out_of_bounds"] == 1
     assert session.copies.confirmed == CODEC.initial()
 
 

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from tenbaud.bench import plan
 from tenbaud.bench.entrants import ENTRANTS, TUNED
 from tenbaud.bench.plan import DENSITIES, Scale
-from tenbaud.cli.app import app
+from tenbaud.cli.commands import app
 
 SMALL = Scale(2, 14.0, 2, 30.0)
 

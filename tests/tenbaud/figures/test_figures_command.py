@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from tenbaud.cli.app import app
+from tenbaud.cli.commands import app
 from tests.rules.sources import TOP
 from tests.tenbaud.figures.recorded_data import FOLDER, needs_data
 

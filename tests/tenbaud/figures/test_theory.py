@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from tenbaud.cli.app import app
+from tenbaud.cli.commands import app
 from tenbaud.figures import animation, theory
 from tenbaud.figures.copies import fly_copies
 from tenbaud.limits.closed import DOUBLE_INTEGRATOR

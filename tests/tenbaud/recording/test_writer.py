@@ -16,6 +16,7 @@ from tenbaud.recording.chunk_writer import ChunkWriter
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.reader import MessageStream, Recording
 from tenbaud.recording.writer import REAL_TIME_BATCH_ROWS, McapRecorder
+from tenbaud.whole import WriteError
 from tests.tenbaud.recording.rows import SAMPLE, TICK, sample_row, tick_row
 
 AWKWARD_FLOATS = [0.1, 1 / 3, -0.0, 5e-324, 1.7976931348623157e308, 1e22, 2**53 + 2.0, 1e-7]
@@ -202,7 +203,7 @@ def test_existing_recording_is_never_overwritten(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="not overwritten"):
         McapRecorder(path, {})
     assert path.read_bytes() == b"precious"
-    with pytest.raises(RecordingError, match="cannot be created"):
+    with pytest.raises(WriteError, match="cannot be written"):
         McapRecorder(tmp_path / "nowhere" / "a.mcap", {})
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from channel.codec import Codec, Vector
+from channel.codec.codec import Codec, Vector
 
 MOTION_RAD = 1.0
 """Predicted motion that a standing encoder contradicts. Prediction from an estimate 10 % off the

@@ -10,7 +10,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Literal, Protocol, Self
 
-from channel.wire import DATAGRAM, Wire
+from channel.protocol.wire import DATAGRAM, Wire
 
 Role = Literal["transmitter", "receiver"]
 

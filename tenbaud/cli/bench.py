@@ -34,11 +34,11 @@ def coders(
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-    from tenbaud.bench.draw import draw_disturbances, draw_rates
-    from tenbaud.bench.page import DISTURBANCE_PICTURE, PICTURE, write_page
-    from tenbaud.bench.plan import FULL, QUICK, fly_all
-    from tenbaud.bench.recorded import fly_recorded
-    from tenbaud.whole import make_folder
+    from reproduction.limits.draw import draw_disturbances, draw_rates
+    from reproduction.limits.page import DISTURBANCE_PICTURE, PICTURE, write_page
+    from reproduction.limits.plan import FULL, QUICK, fly_all
+    from reproduction.limits.recorded import fly_recorded
+    from tenbaud.files.whole import make_folder
 
     found = found_data(data)
     columns = (

@@ -40,7 +40,7 @@ app = typer.Typer(
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        from tenbaud.build import software_version
+        from tenbaud.build.flight import software_version
 
         typer.echo(f"tenbaud {software_version()}")
         raise typer.Exit

@@ -10,7 +10,7 @@ import typer
 from tenbaud.cli import options
 
 if TYPE_CHECKING:
-    from tenbaud.build import Agreement
+    from tenbaud.build.flight import Agreement
     from tenbaud.flight.demo import DemoResult
     from tenbaud.flight.viewing import ViewWish
     from tenbaud.recording.folder import RunFolder
@@ -127,8 +127,8 @@ def _agree_all(
     clock: options.ClockOption,
 ) -> list[Agreement]:
     """Return the flights, each checked as far as it can be before anything starts."""
-    from tenbaud.build import agree
-    from tenbaud.build_ends import check_parts
+    from tenbaud.build.ends import check_parts
+    from tenbaud.build.flight import agree
     from tenbaud.config.load import load_config
 
     configs = [load_config(preset, config, change, allow_code=True) for change in changes]

@@ -47,9 +47,9 @@ def figures(
 
     [dim]tenbaud figures theory animation --docs docs[/dim]
     """
-    from tenbaud.figures.make import NUMBERS
+    from reproduction.paper.make import NUMBERS
+    from tenbaud.files.whole import make_folder
     from tenbaud.recording.folder import create_run_folder
-    from tenbaud.whole import make_folder
 
     drawings = [name for name in which or () if name in DRAWINGS]
     wanted = _wanted([name for name in which or ["all"] if name not in drawings], NUMBERS)
@@ -69,7 +69,7 @@ def _draw_paper(wanted: set[str], folder: Path, pictures: Path, data: Path | Non
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    from tenbaud.figures.make import NUMBERS, make_figures
+    from reproduction.paper.make import NUMBERS, make_figures
 
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
@@ -84,7 +84,7 @@ def _draw_paper(wanted: set[str], folder: Path, pictures: Path, data: Path | Non
     typer.echo(f"SVG and recordings in {folder}")
     if wanted != set(NUMBERS):
         return
-    from tenbaud.figures.page import write_page
+    from reproduction.paper.page import write_page
 
     page = pictures.parent / "REPRODUCTION.md"
     write_page(page, results)
@@ -98,8 +98,8 @@ def _draw_paper(wanted: set[str], folder: Path, pictures: Path, data: Path | Non
 
 def _draw_documentation(drawings: list[str], pictures: Path) -> None:
     """Draw what belongs to no figure of the paper."""
-    from tenbaud.figures.animation import draw_animation
-    from tenbaud.figures.theory import draw_theory
+    from reproduction.paper.animation import draw_animation
+    from reproduction.paper.theory import draw_theory
 
     if "theory" in drawings:
         for path in draw_theory(pictures, lambda name: typer.echo(f"drawing {name}", err=True)):
@@ -120,8 +120,8 @@ def _wanted(names: list[str], known: tuple[str, ...]) -> set[str]:
 
 def found_data(given: Path | None) -> Path | None:
     """Return the folder of the recorded flights; ConfigError when it was named and holds none."""
+    from reproduction.paper.real import UIUC_FILE
     from tenbaud.config.load import ConfigError
-    from tenbaud.figures.real import UIUC_FILE
 
     if given is None:
         beside = Path("..") / "shared" / "data"

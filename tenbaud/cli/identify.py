@@ -178,7 +178,7 @@ def _write(
 
 
 def _true_values(config: FlightConfig) -> tuple[float, ...]:
-    from tenbaud.build_rig import nominal_plant
+    from tenbaud.build.rig import nominal_plant
 
     plant = nominal_plant(config).mismatched(config.transmitter.plant.mismatch)
     return plant.rate_damping_per_s, plant.stiffness_per_s2, plant.torque_gain_rad_per_v_s2

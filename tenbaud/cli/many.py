@@ -15,8 +15,8 @@ import typer
 from tenbaud.cli import options
 
 if TYPE_CHECKING:
-    from channel.terms import Clock
-    from tenbaud.build import Agreement
+    from channel.protocol.terms import Clock
+    from tenbaud.build.flight import Agreement
     from tenbaud.flight.many import ManyHost
     from tenbaud.flight.summary import Summary
 
@@ -35,11 +35,12 @@ def serve(
     many: Many, node: options.NodeOptions, addresses: options.Addresses, changed: dict[str, Any]
 ) -> None:
     """Serve until interrupted, or until so many flights have ended; see `docs/many-rigs.md`."""
-    from channel.links.zenoh_config import SESSIONS_MAX
-    from channel.links.zenoh_hub import ZenohHub
-    from receiver.many_service import ManyService
-    from tenbaud.build_ends import check_parts
+    from channel.links.zenoh.config import SESSIONS_MAX
+    from channel.links.zenoh.hub import ZenohHub
+    from receiver.loops.many import ManyService
+    from tenbaud.build.ends import check_parts
     from tenbaud.cli.addresses import endpoints_of
+    from tenbaud.files.whole import write_whole
     from tenbaud.flight.ends import SWITCH_INTERVAL_S, knocks
     from tenbaud.flight.many import ManyHost
     from tenbaud.flight.many_status import ManyStatus
@@ -47,7 +48,6 @@ def serve(
     from tenbaud.flight.stop import StopFlag
     from tenbaud.flight.trouble import Certificate
     from tenbaud.recording.folder import create_run_folder
-    from tenbaud.whole import write_whole
 
     agreement_of = agreements(node.preset, node.config, many.configs, changed, node.clock.value)
     common = agreement_of("")
@@ -110,8 +110,8 @@ def agreements(
 
     A file is read anew when it has changed.
     """
-    from tenbaud.build import agree
-    from tenbaud.build_ends import check_parts
+    from tenbaud.build.ends import check_parts
+    from tenbaud.build.flight import agree
     from tenbaud.config.load import load_config
 
     known: dict[Path | None, tuple[float, Agreement]] = {}

@@ -112,16 +112,16 @@ def _run(
 ) -> None:
     from dataclasses import replace
 
-    from tenbaud.build import agree
-    from tenbaud.build_ends import check_parts
+    from tenbaud.build.ends import check_parts
+    from tenbaud.build.flight import agree
     from tenbaud.cli.addresses import endpoints_of
     from tenbaud.config.load import dump_config, load_config
+    from tenbaud.files.whole import write_whole
     from tenbaud.flight import ends
     from tenbaud.flight.outcome import ExitCode, first_code
     from tenbaud.flight.report import write_up
     from tenbaud.recording.folder import RunFolder, create_run_folder
     from tenbaud.telemetry.station import Wish
-    from tenbaud.whole import write_whole
 
     config = load_config(node.preset, node.config, changed, allow_code=True)
     _check_link(config, addresses.insecure)
@@ -161,7 +161,7 @@ def _check_link(config: FlightConfig, insecure: bool) -> None:
             "link.kind = memory joins two ends in one process: `tenbaud demo --link memory`"
         )
     if config.link.kind == "serial":
-        from channel.links.serial_port import check_port
+        from channel.links.serial.port import check_port
 
         check_port(config.link.port, insecure)
 

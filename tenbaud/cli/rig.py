@@ -70,7 +70,7 @@ def rig(
 
     [dim]tenbaud rig --format quarc --port tcp:127.0.0.1:18000 --fault silent@10[/dim]
     """
-    from tenbaud.build_emulator import build_emulator
+    from tenbaud.build.emulator import build_emulator
     from tenbaud.config.load import load_config
 
     changed = options.overrides(
@@ -144,8 +144,8 @@ def rig_check(
 
     [dim]tenbaud rig-check --rig cobs:/dev/ttyACM0[/dim]
     """
+    from tenbaud.checks.rigcheck import check_rig, show_check
     from tenbaud.config.load import load_config
-    from tenbaud.rigcheck import check_rig, show_check
 
     changed = options.overrides(rig=rig, settings=settings)
     result = check_rig(load_config(preset, config, changed), seconds, live=not json)

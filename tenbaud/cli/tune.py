@@ -140,8 +140,8 @@ def tune(
 
 def _make_room(out: Path) -> None:
     """Make the folder of the preset; an error where none can be written, before anything is flown."""
+    from tenbaud.files.whole import check_room, make_folder
     from tenbaud.studies.settings import StudyError
-    from tenbaud.whole import check_room, make_folder
 
     if out.exists():
         raise StudyError(f"{out} exists already; name another file")
@@ -151,7 +151,7 @@ def _make_room(out: Path) -> None:
 
 def _leave(tuned: Tuned, preset: str, out: Path, as_json: bool) -> None:
     """Print what was found, and write it."""
-    from tenbaud.whole import write_whole
+    from tenbaud.files.whole import write_whole
 
     if not as_json:
         _tell(tuned)

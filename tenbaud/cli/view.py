@@ -62,7 +62,7 @@ def view(
         typer.echo(json.dumps(schema_json(), indent=2))
         return
     from channel.links.endpoints import check_endpoints, loopback_host
-    from channel.links.zenoh_hub import is_session_pattern
+    from channel.links.zenoh.hub import is_session_pattern
     from tenbaud.view.feed import Feed
     from tenbaud.view.server import Address, free_port, serve
 

@@ -12,8 +12,8 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
 
-from channel.impairments import parse_impairments
-from channel.sabotage import parse_sabotage
+from channel.line.impairments import parse_impairments
+from channel.protocol.sabotage import parse_sabotage
 from tenbaud.config.permission import CodePermission
 from tenbaud.config.rig_schema import BridgeSection, HilSection, QuarcSection, SerialSection
 from tenbaud.config.section import (

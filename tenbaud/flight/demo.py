@@ -18,19 +18,19 @@ from typing import IO
 
 from channel.links.base import Role
 from channel.links.endpoints import free_endpoint
-from tenbaud.build import Agreement
+from tenbaud.build.flight import Agreement
 from tenbaud.config.load import dump_config
+from tenbaud.files.whole import write_whole
 from tenbaud.flight.ends import run_in_memory
 from tenbaud.flight.lifeline import start_child
 from tenbaud.flight.outcome import ExitCode, Outcome, first_code, outcome_of_status
 from tenbaud.flight.report import write_up
+from tenbaud.flight.serial_line import EmulatedLine
 from tenbaud.flight.status import Status
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, joined
 from tenbaud.flight.viewing import Viewing, ViewWish, page_beside
 from tenbaud.recording.folder import RunFolder
-from tenbaud.serial_line import EmulatedLine
-from tenbaud.whole import write_whole
 
 OnStatus = Callable[[Status], None]
 ENDING_TIMEOUT_S = 15.0

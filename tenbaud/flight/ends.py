@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 
 from channel.links.base import Link, Role
 from channel.links.security import Security
-from channel.wire import DATAGRAM
+from channel.protocol.wire import DATAGRAM
 from receiver.endpoint import ReceiverEndpoint
-from tenbaud.build import Agreement
-from tenbaud.build_ends import build_receiver
+from tenbaud.build.ends import build_receiver
+from tenbaud.build.flight import Agreement
 from tenbaud.flight import receive, transmit
 from tenbaud.flight.outcome import SAFE, Outcome, outcome_of
 from tenbaud.flight.status import Status, StatusMode, StatusReporter
@@ -34,7 +34,7 @@ from tenbaud.telemetry.live import LiveTransmitter
 from tenbaud.telemetry.station import NO_WISH, Station, Wish, open_station
 
 if TYPE_CHECKING:
-    from channel.links.zenoh_node import NodePlace
+    from channel.links.zenoh.node import NodePlace
 
 SWITCH_INTERVAL_S = 0.0002
 """A busy recorder thread may keep the loop waiting this long; Python's default is 5 ms."""
@@ -75,7 +75,7 @@ def open_link(
 ) -> Link:
     """Return an open link for one end: over a serial line if it is configured so, else over Zenoh."""
     if agreement.config.link.kind == "serial":
-        from tenbaud.serial_terms import open_serial
+        from tenbaud.build.serial_terms import open_serial
 
         return open_serial(
             agreement, role, endpoints.insecure, lambda: _zenoh(agreement, role, endpoints, stop)
@@ -84,7 +84,7 @@ def open_link(
 
 
 def _zenoh(agreement: Agreement, role: Role, endpoints: Endpoints, stop: Stop) -> Link:
-    from channel.links.zenoh import ZenohLink
+    from channel.links.zenoh.link import ZenohLink
 
     return ZenohLink(
         role,
@@ -149,7 +149,7 @@ def knocks(endpoints: Endpoints) -> Iterator[Counter[str]]:
     if endpoints.security is None or not endpoints.listen:
         yield Counter()
         return
-    from channel.links.zenoh_gate import HandshakeLog
+    from channel.links.zenoh.gate import HandshakeLog
 
     with HandshakeLog() as log:
         yield log.refused

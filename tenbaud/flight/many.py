@@ -13,29 +13,29 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from channel.clocks import SkewedClock
 from channel.errors import FrameError, LinkLost
-from channel.frames import Bye, Frame, Hello, Refuse, Symbol, Unknown
-from channel.links.zenoh_hub import ZenohHub
-from channel.virtual import Reply, decode_step, encode_reply, is_envelope
-from channel.wire import DATAGRAM, decode, encode
-from receiver.many_service import SURPLUS, Served
-from receiver.real_service import RealService
-from receiver.rejoin import difference
-from receiver.virtual_service import VirtualService
-from tenbaud.build import Agreement
-from tenbaud.build_ends import build_line, build_receiver
+from channel.line.clocks import SkewedClock
+from channel.line.virtual import Reply, decode_step, encode_reply, is_envelope
+from channel.links.zenoh.hub import ZenohHub
+from channel.protocol.frames import Bye, Frame, Hello, Refuse, Symbol, Unknown
+from channel.protocol.wire import DATAGRAM, decode, encode
+from receiver.loops.many import SURPLUS, Served
+from receiver.loops.real import RealService
+from receiver.loops.virtual import VirtualService
+from receiver.session.rejoin import difference
+from tenbaud.build.ends import build_line, build_receiver
+from tenbaud.build.flight import Agreement
 from tenbaud.config.load import dump_config
+from tenbaud.files.whole import WriteError, write_error, write_whole
 from tenbaud.flight.ends import open_recorder
 from tenbaud.flight.outcome import ExitCode, Outcome, outcome_of
+from tenbaud.flight.rate_limited_log import SparingTeller
 from tenbaud.flight.receive import ended_outcome
 from tenbaud.flight.report import write_summary
-from tenbaud.flight.sparing import SparingTeller
 from tenbaud.flight.summary import Summary, receiver_part
 from tenbaud.recording.folder import RunFolder
 from tenbaud.recording.shared import SharedWriter
 from tenbaud.recording.writer import McapRecorder
-from tenbaud.whole import WriteError, write_error, write_whole
 
 Tell = Callable[[str], None]
 AgreementOf = Callable[[str], Agreement]
@@ -58,7 +58,7 @@ class Flight:
 
 
 class ManyHost:
-    """Opens and closes the services of `receiver.many_service`; see the module's text.
+    """Opens and closes the services of `receiver.loops.many`; see the module's text.
 
     `root` is the folder for the run folders; at most `rigs_max` flights at a time.
     """

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from channel.errors import ConfigMismatch, DesyncError, LinkLost, SafetyStop, TenbaudError
+from tenbaud.files.whole import WriteError
 from tenbaud.flight.verdict import NotFlown
-from tenbaud.whole import WriteError
 
 
 class ExitCode(IntEnum):

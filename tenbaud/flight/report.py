@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from typing import Any
 
 from tenbaud.config.schema import FlightConfig
+from tenbaud.files.whole import WriteError, write_whole
 from tenbaud.flight.outcome import ExitCode, Outcome, outcome_of
 from tenbaud.flight.summary import Summary
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RunFolder
-from tenbaud.whole import WriteError, write_whole
 
 ROWS: tuple[tuple[str, str, str], ...] = (
     ("plant", "plant", "{}"),

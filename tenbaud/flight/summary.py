@@ -6,17 +6,17 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from channel.bounds import COUNTER
-from channel.impairments import ImpairedLine
-from channel.line import Line
+from channel.line.impairments import ImpairedLine
+from channel.line.line import Line
 from channel.links.base import Link
+from channel.protocol.bounds import COUNTER
 from receiver.endpoint import ReceiverEndpoint
-from tenbaud.build import Agreement
+from tenbaud.build.flight import Agreement
 from tenbaud.config.schema import TransmitterSection
 from tenbaud.flight.outcome import Outcome
 from tenbaud.flight.transmit import TransmitterRun
-from transmitter.gap import Gap
-from transmitter.scores import ErrorMeter
+from transmitter.metrics.gap import Gap
+from transmitter.metrics.scores import ErrorMeter
 
 Summary = dict[str, Any]
 

@@ -7,25 +7,25 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from channel.clocks import SkewedClock, SkewedPeer
 from channel.errors import ConfigMismatch, LinkLost
-from channel.frames import Desync
-from channel.line import Line
+from channel.line.clocks import SkewedClock, SkewedPeer
+from channel.line.line import Line
+from channel.line.uplink import Uplink
+from channel.line.virtual import Peer
 from channel.links.base import Link
-from channel.recording import Recorder
-from channel.uplink import Uplink
-from channel.virtual import Peer
-from channel.wire import Wire
-from tenbaud.build import Agreement
-from tenbaud.build_ends import build_line, build_transmitter, build_uplink
+from channel.protocol.frames import Desync
+from channel.protocol.recording import Recorder
+from channel.protocol.wire import Wire
+from tenbaud.build.ends import build_line, build_transmitter, build_uplink
+from tenbaud.build.flight import Agreement
 from tenbaud.flight.outcome import FLIGHT_OVER, SAFE, ExitCode, Outcome
 from tenbaud.flight.verdict import FlightCounts, faults_of, settings_of, verdict_text
+from transmitter.loops.real import RealFlight
+from transmitter.loops.virtual import VirtualFlight
+from transmitter.loops.virtual_peer import LinkPeer
 from transmitter.node import STOPPED, TransmitterNode
-from transmitter.rate_watch import RateWatch
-from transmitter.real_flight import RealFlight
-from transmitter.session import Phase
-from transmitter.virtual_flight import VirtualFlight
-from transmitter.virtual_peer import LinkPeer
+from transmitter.session.rate_watch import RateWatch
+from transmitter.session.session import Phase
 
 Stop = Callable[[], bool]
 

@@ -12,7 +12,7 @@ from channel.links.security import Security
 from tenbaud.flight.outcome import ExitCode, Outcome, first_cause
 
 PEER_EXPIRED = "expired certificate"
-"""As `channel.links.zenoh_gate` counts it."""
+"""As `channel.links.zenoh.gate` counts it."""
 
 
 class Certificate:

@@ -16,7 +16,7 @@ from plant_sim.identification.record import (
     quiescent_angle,
 )
 from tenbaud.config.schema import FlightConfig
-from tenbaud.whole import write_whole
+from tenbaud.files.whole import write_whole
 
 FIELDS = (
     ("rate_damping_per_s", "a_w", "1/s"),

@@ -21,6 +21,7 @@ from shlex import quote
 
 from channel.errors import TenbaudError
 from channel.links.security import Credentials
+from tenbaud.files.whole import whole_file, whole_path, write_error, write_whole
 from tenbaud.keys.authority import (
     NODE_DAYS,
     Certified,
@@ -33,7 +34,6 @@ from tenbaud.keys.authority import (
     new_authority,
     read_certificate,
 )
-from tenbaud.whole import whole_file, whole_path, write_error, write_whole
 
 AUTHORITY = "authority"
 AUTHORITY_NAME = "tenbaud authority"

@@ -11,12 +11,12 @@ import numpy as np
 import orjson
 from numpy.typing import NDArray
 
-from channel.recording import Field, RecordChannel
+from channel.protocol.recording import Field, RecordChannel
+from tenbaud.files.whole import make_folder, whole_path
 from tenbaud.recording.columns import TABLES, Column, all_columns, flight_columns
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.layouts import flight_layouts, layout_paths
 from tenbaud.recording.run import Run
-from tenbaud.whole import make_folder, whole_path
 
 ROWS_AT_ONCE = 10_000
 

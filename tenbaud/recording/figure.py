@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from channel.impairments import parse_impairments
+from channel.line.impairments import parse_impairments
+from tenbaud.files.whole import whole_file
 from tenbaud.recording.encoding import OVERVIEW_METADATA, RUN_METADATA
 from tenbaud.recording.envelope import Series
 from tenbaud.recording.errors import RecordingError
@@ -22,7 +23,6 @@ from tenbaud.recording.overview import (
 )
 from tenbaud.recording.reader import MessageStream, rows_in_blocks, stored_metadata
 from tenbaud.recording.rows import Row
-from tenbaud.whole import whole_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

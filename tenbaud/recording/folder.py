@@ -14,9 +14,9 @@ from typing import Any, BinaryIO
 
 import orjson
 
+from tenbaud.files.whole import write_error
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.lock import hold
-from tenbaud.whole import write_error
 
 DEFAULT_ROOT = Path("runs")
 CONFIG_NAME = "config.toml"

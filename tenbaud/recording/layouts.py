@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
-from tenbaud.whole import write_whole
+from tenbaud.files.whole import write_whole
 
 if TYPE_CHECKING:
     from tenbaud.recording.run import Run

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
+from tenbaud.files.whole import write_error
 from tenbaud.recording.chunk_writer import ChunkWriter
 from tenbaud.recording.encoding import END_METADATA, RUN_METADATA, channel_schema
 from tenbaud.recording.errors import RecordingError
@@ -22,7 +23,6 @@ from tenbaud.recording.holes import HOLES_METADATA, Hole, packed_holes
 from tenbaud.recording.lock import in_use
 from tenbaud.recording.reader import MessageStream, open_recording
 from tenbaud.recording.writer import CHUNK_BYTES, PROFILE
-from tenbaud.whole import write_error
 
 RECOVERED_NOTE = "recovered"
 RECOVERED_TEXT = "from a recording that was cut or damaged; what is missing is lost"

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import orjson
 
+from tenbaud.files.whole import whole_file
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import (
     RECEIVER_NAME,
@@ -31,7 +32,6 @@ from tenbaud.recording.folder import (
 )
 from tenbaud.recording.signals import SIGNALS, Signal, Source, TimeBase
 from tenbaud.recording.table import Series, Table, Tables, read_tables
-from tenbaud.whole import whole_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

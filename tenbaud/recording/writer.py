@@ -17,7 +17,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from channel.recording import RecordChannel
+from channel.protocol.recording import RecordChannel
 from tenbaud.recording.chunk_writer import ChunkWriter
 from tenbaud.recording.encoding import (
     END_METADATA,
@@ -51,7 +51,7 @@ CLOSE_TIMEOUT_S = 10.0
 
 
 class McapRecorder:
-    """A `channel.recording.Recorder` that writes one MCAP file.
+    """A `channel.protocol.recording.Recorder` that writes one MCAP file.
 
     `metadata` describes the run (text to text) and is stored in the file's head. A row handed to
     `write` must not be changed afterwards, nor the lists in it: it is encoded later. Rows come

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tenbaud.files.whole import make_folder, write_whole
 from tenbaud.recording.errors import RecordingError
 from tenbaud.replay.control import controller_of, steps_by_hand
 from tenbaud.replay.record import FlightRecord, epochs_of
 from tenbaud.replay.refly import Reflown, refly
 from tenbaud.replay.rows import EndRows
 from tenbaud.replay.symbols import Packed, Unpacked, pack
-from tenbaud.whole import make_folder, write_whole
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,8 +21,8 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any
 
+from channel.codec.numerics import refuse
 from channel.errors import TenbaudError
-from channel.numerics import refuse
 
 PACKAGES = ("channel", "plant_sim", "receiver", "transmitter", "tenbaud")
 
@@ -97,7 +97,7 @@ def reader(size: int) -> Any:
 
 
 def _refuse(what: str, x: float) -> None:
-    """Stand for `channel.numerics.refuse`: writing the number down would take memory."""
+    """Stand for `channel.codec.numerics.refuse`: writing the number down would take memory."""
     raise ValueError("an argument of sin, cos or exp is out of range")
 
 

@@ -10,17 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from channel.codec import Codec
-from channel.coders.base import FunctionCoder
+from channel.codec.codec import Codec
+from channel.codec.coders.base import FunctionCoder
+from channel.codec.numerics import sin
 from channel.flight_log import FlightLog
-from channel.numerics import sin
 from plant_sim.disturbance import parse_disturbance
 from plant_sim.pitch import pitch_constants
 from receiver.controllers.pid import Pid, PidConstants
 from receiver.controllers.recorded import RecordedController
-from tenbaud.build import Agreement, read_flight_log
-from tenbaud.build_ends import build_controller, guard_settings, reference_of
-from tenbaud.build_rig import nominal_plant
+from tenbaud.build.ends import build_controller, guard_settings, reference_of
+from tenbaud.build.flight import Agreement, read_flight_log
+from tenbaud.build.rig import nominal_plant
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig, FlightLogSection, ReferenceSection
 from tenbaud.flight.verdict import FlightCounts, faults_of

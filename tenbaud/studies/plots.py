@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tenbaud.whole import whole_file
+from tenbaud.files.whole import whole_file
 
 LABELS = {
     "rate": "R in symbols per second (baud)",

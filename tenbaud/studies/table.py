@@ -9,12 +9,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from tenbaud.files.whole import make_folder, whole_file
 from tenbaud.studies.chunk import ChunkResult
 from tenbaud.studies.compiled import require, sources_digest
 from tenbaud.studies.figures import FlightFigures
 from tenbaud.studies.settings import StudyError
 from tenbaud.studies.study import Study
-from tenbaud.whole import make_folder, whole_file
 
 STUDY_KEY, SOURCES_KEY = b"tenbaud.study", b"tenbaud.sources"
 

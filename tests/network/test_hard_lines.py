@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from channel.links.endpoints import free_endpoint
-from channel.links.zenoh_config import LEASE_MS
+from channel.links.zenoh.config import LEASE_MS
 from tenbaud.flight.outcome import ExitCode
 from tenbaud.keys.authority import NodeRole
 from tenbaud.keys.store import add_node, create_authority

@@ -28,7 +28,7 @@ ONLY_IN = {
 }
 """A transport is replaceable as long as only its adapter knows it."""
 
-LAZY = ("zenoh", "channel.links.zenoh")
+LAZY = ("zenoh", "channel.links.zenoh.link")
 """Imported inside functions only, except by the adapter: a memory or serial flight needs no Zenoh,
 and loading it takes time and starts threads."""
 
@@ -105,27 +105,30 @@ def test_every_package_is_there() -> None:
 @pytest.mark.parametrize(
     ("name", "source"),
     [
-        ("channel/codec.py", "import transmitter.session"),
-        ("channel/codec.py", "from plant_sim import pitch"),
-        ("channel/codec.py", "def f():\n    import tenbaud"),
-        ("channel/codec.py", "import numpy as np"),
+        ("channel/codec/codec.py", "import transmitter.session.session"),
+        ("channel/codec/codec.py", "from plant_sim import pitch"),
+        ("channel/codec/codec.py", "def f():\n    import tenbaud"),
+        ("channel/codec/codec.py", "import numpy as np"),
         ("channel/links/memory.py", "from scipy.linalg import expm"),
         ("channel/links/memory.py", "def f():\n    import zenoh"),
         ("channel/links/memory.py", "from . import zenoh"),
         ("channel/links/memory.py", "import serial.tools"),
-        ("plant_sim/pitch.py", "from channel.numerics import sin"),
+        ("plant_sim/pitch.py", "from channel.codec.numerics import sin"),
         ("plant_sim/pitch.py", "import tests.golden"),
-        ("transmitter/session.py", "from receiver import session"),
-        ("transmitter/session.py", "import importlib\nimportlib.import_module('receiver.loop')"),
+        ("transmitter/session/session.py", "from receiver import session"),
+        (
+            "transmitter/session/session.py",
+            "import importlib\nimportlib.import_module('receiver.loop')",
+        ),
         ("transmitter/rigs/quarc.py", "from ...tenbaud import config"),
         ("transmitter/loop.py", "import serial"),
         ("transmitter/loop.py", "from channel.links import zenoh"),
-        ("receiver/session.py", "import plant_sim"),
-        ("receiver/session.py", "import numpy"),
-        ("receiver/real_service.py", "if True:\n    import numpy"),
+        ("receiver/session/session.py", "import plant_sim"),
+        ("receiver/session/session.py", "import numpy"),
+        ("receiver/loops/real.py", "if True:\n    import numpy"),
         ("receiver/controllers/pid.py", "from numpy import clip"),
-        ("tenbaud/cli.py", "from channel.links.zenoh import ZenohLink"),
-        ("tenbaud/doctor.py", "def f():\n    import zenoh"),
+        ("tenbaud/cli.py", "from channel.links.zenoh.link import ZenohLink"),
+        ("tenbaud/checks/doctor.py", "def f():\n    import zenoh"),
     ],
 )
 def test_a_bad_import_is_caught(name: str, source: str) -> None:
@@ -135,14 +138,14 @@ def test_a_bad_import_is_caught(name: str, source: str) -> None:
 @pytest.mark.parametrize(
     ("name", "source"),
     [
-        ("channel/codec.py", "import math\nfrom channel import numerics\nfrom . import words"),
-        ("channel/links/zenoh.py", "import zenoh\nfrom .base import Link"),
-        ("channel/links/serial.py", "import serial"),
-        ("transmitter/session.py", "import channel.codec\nimport plant_sim"),
+        ("channel/codec/codec.py", "import math\nfrom channel import numerics\nfrom . import words"),
+        ("channel/links/zenoh/link.py", "import zenoh\nfrom .base import Link"),
+        ("channel/links/serial/link.py", "import serial"),
+        ("transmitter/session/session.py", "import channel.codec.codec\nimport plant_sim"),
         ("transmitter/rigs/bridge.py", "from serial import Serial\nimport numpy"),
-        ("receiver/session.py", "from receiver.controllers import pid"),
-        ("tenbaud/cli.py", "def f():\n    from channel.links.zenoh import ZenohLink"),
-        ("tenbaud/a.py", "if TYPE_CHECKING:\n    from channel.links.zenoh import ZenohLink"),
+        ("receiver/session/session.py", "from receiver.controllers import pid"),
+        ("tenbaud/cli.py", "def f():\n    from channel.links.zenoh.link import ZenohLink"),
+        ("tenbaud/a.py", "if TYPE_CHECKING:\n    from channel.links.zenoh.link import ZenohLink"),
         ("tenbaud/cli.py", "import transmitter, receiver, plant_sim, numpy"),
     ],
 )

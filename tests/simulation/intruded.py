@@ -10,9 +10,9 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass
 
-from channel.impairments import ImpairedLine
+from channel.line.impairments import ImpairedLine
 from receiver.endpoint import ReceiverEndpoint
-from receiver.session import Phase
+from receiver.session.session import Phase
 from tests.simulation.faults import FAULTY_S, Plan
 from tests.simulation.intruder import Intruder
 from tests.simulation.world import World

@@ -12,10 +12,10 @@ import struct
 from collections import Counter, deque
 from collections.abc import Callable
 
-from channel import wire
-from channel.codec import STATE_MAX, Codec
+from channel.codec.codec import STATE_MAX, Codec
 from channel.errors import FrameError
-from channel.frames import (
+from channel.protocol import wire
+from channel.protocol.frames import (
     Bye,
     Claim,
     Commands,
@@ -29,8 +29,8 @@ from channel.frames import (
     Welcome,
     Why,
 )
-from channel.identity import Identity
-from channel.terms import Terms
+from channel.protocol.identity import Identity
+from channel.protocol.terms import Terms
 
 HEARD_MAX = 400
 """Messages kept to be played back."""

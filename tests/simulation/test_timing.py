@@ -6,12 +6,12 @@ import random
 
 import pytest
 
-from channel.frames import Commands, Symbol
+from channel.protocol.frames import Commands, Symbol
 from receiver.controllers.pid import PAPER_GAINS, Pid
-from receiver.schedule import EARLY_SAMPLES
-from receiver.session import ReceiverSession
-from tests.channel.parts import TICK_S, pitch_codec, terms
-from tests.receiver.sessions import IDENTITY, SESSION, hello
+from receiver.session.schedule import EARLY_SAMPLES
+from receiver.session.session import ReceiverSession
+from tests.channel.codec.parts import TICK_S, pitch_codec, terms
+from tests.receiver.session.sessions import IDENTITY, SESSION, hello
 from tests.simulation.flight import REFERENCE
 
 PERIOD_NS = 100_000_000

@@ -11,14 +11,14 @@ from collections import deque
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from channel.codec import Codec, Vector
-from channel.recording import RecordChannel
-from channel.terms import Terms
+from channel.codec.codec import Codec, Vector
+from channel.protocol.recording import RecordChannel
+from channel.protocol.terms import Terms
 from transmitter.guard import GuardState
-from transmitter.session import Phase
+from transmitter.session.session import Phase
 
 if TYPE_CHECKING:
-    from receiver.session import ReceiverSession
+    from receiver.session.session import ReceiverSession
     from tests.simulation.world import World
     from transmitter.node import TransmitterNode
 

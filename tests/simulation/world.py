@@ -12,30 +12,30 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import count
 
-from channel.clocks import SkewedClock
-from channel.codec import Codec, Vector
+from channel.codec.codec import Codec, Vector
 from channel.errors import FrameError
-from channel.frames import Frame, Symbol
-from channel.impairments import ImpairedLine, Impairments
-from channel.sabotage import SabotagedCodec
-from channel.shaper import SlotShaper, UplinkMeter
-from channel.uplink import Uplink
-from channel.wire import decode
+from channel.line.clocks import SkewedClock
+from channel.line.impairments import ImpairedLine, Impairments
+from channel.line.shaper import SlotShaper, UplinkMeter
+from channel.line.uplink import Uplink
+from channel.protocol.frames import Frame, Symbol
+from channel.protocol.sabotage import SabotagedCodec
+from channel.protocol.wire import decode
 from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters, PitchPlant
 from receiver.controllers.pid import PAPER_GAINS, Pid
 from receiver.endpoint import ReceiverEndpoint
-from receiver.session import ReceiverSession
-from tests.channel.parts import TICK_NS, TICK_S, identity_of, pitch_codec
+from receiver.session.session import ReceiverSession
+from tests.channel.codec.parts import TICK_NS, TICK_S, identity_of, pitch_codec
 from tests.simulation.faults import FAULTY_S, QUIET_S, Plan
 from tests.simulation.flight import COUNTS_PER_TURN, REFERENCE
 from tests.simulation.watch import Watch
-from transmitter.copies import Confirmed
 from transmitter.guard import Guard, GuardSettings
+from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode
 from transmitter.rigs.base import Reading, RigBase
-from transmitter.scores import Scores
-from transmitter.session import Phase, TransmitterSession
+from transmitter.session.copies import Confirmed
+from transmitter.session.session import Phase, TransmitterSession
 
 ALIVE_TICKS = 10**6
 

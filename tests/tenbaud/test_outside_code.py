@@ -14,8 +14,8 @@ import pytest
 import tomli_w
 
 from tenbaud import Run
-from tenbaud.build import agree
-from tenbaud.build_ends import check_parts
+from tenbaud.build.ends import check_parts
+from tenbaud.build.flight import agree
 from tenbaud.config.load import ConfigError, load_config, nested
 from tenbaud.outside_code import CodeNotAllowed, find_origin
 from tenbaud.recording.convert import convert

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from channel.links.endpoints import free_endpoint
+from tenbaud.flight.serial_line import EmulatedLine
 from tenbaud.recording.reader import Recording
-from tenbaud.serial_line import EmulatedLine
 from tests.tenbaud.ends import Pair, Relay, over_serial, over_zenoh
 
 SEED = 20240619

@@ -19,7 +19,7 @@ import numpy as np
 from transmitter.rigs.axes import Axis, Motors
 from transmitter.rigs.device import DeviceRig, DeviceSettings
 from transmitter.rigs.errors import RigError
-from transmitter.rigs.samples import RawSample, Wraps
+from transmitter.rigs.formats.samples import RawSample, Wraps
 
 FAKE_CARD = "fake"
 OPTIONS_LENGTH_MAX = 255

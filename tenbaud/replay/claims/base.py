@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
-from tenbaud.build import Agreement
+from tenbaud.build.flight import Agreement
 from tenbaud.replay.expected import Expected
 from tenbaud.replay.record import Epoch, FlightRecord
 from tenbaud.replay.refly import Reflown

@@ -6,8 +6,8 @@ import random
 from collections.abc import Sequence
 from functools import partial
 
-from channel.codec import CodecState, Vector
-from receiver.rejoin import carried_to
+from channel.codec.codec import CodecState, Vector
+from receiver.session.rejoin import carried_to
 from tenbaud.replay.claims.base import Claim, Evidence, Findings, Place
 from tenbaud.replay.record import Epoch
 from tenbaud.replay.refly import Reflown, refly

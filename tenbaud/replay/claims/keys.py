@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from channel.terms import Terms
+from channel.protocol.terms import Terms
 from tenbaud.replay.claims.base import FILED, Claim, Evidence, Findings, Place
 from tenbaud.replay.rows import KINDS
 

@@ -6,8 +6,8 @@ from collections import Counter
 from typing import Any
 
 from plant_sim.encoder import Encoder
-from tenbaud.build import Agreement
-from tenbaud.build_ends import guard_settings
+from tenbaud.build.ends import guard_settings
+from tenbaud.build.flight import Agreement
 from tenbaud.replay.claims.base import Claim, Evidence, Findings, Place, is_same
 from tenbaud.replay.rows import PlantTick
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Any
 
-from channel.words import Word
-from tenbaud.build import Agreement
+from channel.codec.words import Word
+from tenbaud.build.flight import Agreement
 from tenbaud.replay.claims.base import Claim, Evidence, Findings, Place
 
 SYMBOL_FIELDS = ("slot", "symbol", "left_ns", "wire_bytes")

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from tenbaud.replay.claims.base import Claim, Evidence, Findings, Place, is_same
-from transmitter.gap import GAP_EVERY_S
+from transmitter.metrics.gap import GAP_EVERY_S
 
 DIFFERS = "it is not what the symbols give"
 MISSING = "it is missing"

@@ -15,7 +15,7 @@ from annotated_types import Ge, Le, Lt
 from pydantic import BaseModel
 
 from channel.errors import TenbaudError
-from tenbaud.build import agree
+from tenbaud.build.flight import agree
 from tenbaud.cli.app import run
 from tenbaud.cli.commands import app
 from tenbaud.config.load import load_config, nested

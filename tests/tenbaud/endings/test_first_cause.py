@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tenbaud.flight.outcome import SAFE, ExitCode, Outcome, first_cause
-from tenbaud.serial_line import EmulatedLine
+from tenbaud.flight.serial_line import EmulatedLine
 from tests.tenbaud.ends import Pair, over_serial
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from tenbaud.build import agree
+from tenbaud.build.flight import agree
 from tenbaud.config.load import load_config
 from tenbaud.flight import demo
 from tenbaud.flight.outcome import ExitCode, outcome_of_status

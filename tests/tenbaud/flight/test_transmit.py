@@ -9,15 +9,15 @@ from typing import Any
 import pytest
 
 from channel.links.memory import memory_pair
-from channel.wire import DATAGRAM
+from channel.protocol.wire import DATAGRAM
 from receiver.endpoint import ReceiverEndpoint
-from tenbaud.build import Agreement, agree
-from tenbaud.build_ends import build_receiver
+from tenbaud.build.ends import build_receiver
+from tenbaud.build.flight import Agreement, agree
 from tenbaud.config.load import load_config
 from tenbaud.flight import receive, transmit
 from tenbaud.flight.outcome import ExitCode, Outcome
 from transmitter.node import STOPPED
-from transmitter.session import Phase
+from transmitter.session.session import Phase
 
 SECONDS = 2.0
 PATIENCE_S = 20.0

@@ -11,9 +11,9 @@ import pytest
 from scipy.io import loadmat
 
 from tenbaud import Run
+from tenbaud.files.whole import WriteError
 from tenbaud.recording.convert import FORMS, convert
 from tenbaud.recording.errors import RecordingError
-from tenbaud.whole import WriteError
 from tests.tenbaud.flown import flown
 from tests.tenbaud.processes import run as run_command
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from tenbaud.files.whole import WriteError
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RunFolder, create_run_folder, find_recordings
-from tenbaud.whole import WriteError
 
 NOW = datetime(2026, 11, 22, 10, 15, 3)
 

@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 import pytest
 
 from tenbaud import Run
+from tenbaud.files.whole import WriteError
 from tenbaud.recording.convert import convert
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.layouts import (
@@ -23,7 +24,6 @@ from tenbaud.recording.layouts import (
     plotjuggler_layout,
 )
 from tenbaud.recording.reader import Recording
-from tenbaud.whole import WriteError
 from tests.tenbaud.flown import flown
 from tests.tenbaud.processes import REPOSITORY
 

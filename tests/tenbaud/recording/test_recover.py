@@ -10,13 +10,13 @@ from mcap.reader import make_reader
 
 from channel.links.endpoints import free_endpoint
 from tenbaud import Run
+from tenbaud.files.whole import WriteError
 from tenbaud.recording import lock
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.inspect import describe_text
 from tenbaud.recording.reader import MessageStream
 from tenbaud.recording.recover import recover
 from tenbaud.recording.writer import McapRecorder
-from tenbaud.whole import WriteError
 from tests.tenbaud.ends import End, wait_for
 from tests.tenbaud.flown import flown
 from tests.tenbaud.processes import run as run_command

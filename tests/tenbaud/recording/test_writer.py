@@ -11,19 +11,19 @@ from pathlib import Path
 
 import pytest
 
-from channel.recording import Field, RecordChannel
+from channel.protocol.recording import Field, RecordChannel
+from tenbaud.files.whole import WriteError
 from tenbaud.recording.chunk_writer import ChunkWriter
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.reader import MessageStream, Recording
 from tenbaud.recording.writer import REAL_TIME_BATCH_ROWS, McapRecorder
-from tenbaud.whole import WriteError
 from tests.tenbaud.recording.rows import SAMPLE, TICK, sample_row, tick_row
 
 AWKWARD_FLOATS = [0.1, 1 / 3, -0.0, 5e-324, 1.7976931348623157e308, 1e22, 2**53 + 2.0, 1e-7]
 KILLED_PROGRAM = """
 import sys, time
 from pathlib import Path
-from channel.recording import Field, RecordChannel
+from channel.protocol.recording import Field, RecordChannel
 from tenbaud.recording.writer import McapRecorder
 
 channel = RecordChannel("tick", (Field("tick", "integer"),))

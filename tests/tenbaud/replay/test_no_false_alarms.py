@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tenbaud.flying import FlightFailed
+from tenbaud.flight.fly import FlightFailed
 from tenbaud.replay.audit import audit
 from tests.tenbaud.flown import flown
 from tests.tenbaud.processes import run as run_command

@@ -11,12 +11,12 @@ from typing import Any
 
 import pytest
 
-from channel.codec import CodecState
-from channel.numerics import sin
-from channel.wire import DATAGRAM
-from tenbaud.build import agree
-from tenbaud.build_codec import CODERS, MODELS
-from tenbaud.build_ends import build_receiver
+from channel.codec.codec import CodecState
+from channel.codec.numerics import sin
+from channel.protocol.wire import DATAGRAM
+from tenbaud.build.codec import CODERS, MODELS
+from tenbaud.build.ends import build_receiver
+from tenbaud.build.flight import agree
 from tenbaud.config.load import load_config
 from tenbaud.config.schema import FlightConfig
 from tenbaud.flight import transmit
@@ -25,8 +25,8 @@ from tenbaud.studies.compiled import compiled
 from tenbaud.studies.flights import CompiledPoint
 from tenbaud.studies.plain import fly_plain
 from tenbaud.studies.schedule import Uncommon
-from tests.channel.parts import ListRecorder
-from transmitter.records import SAMPLE_CHANNEL
+from tests.channel.codec.parts import ListRecorder
+from transmitter.session.records import SAMPLE_CHANNEL
 
 PRESETS = ("paper-10baud", "tuned-20baud", "timed-10baud", "static-10baud", "usual-1000baud")
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from channel.links.endpoints import free_endpoint
+from tenbaud.files.whole import WriteError
 from tenbaud.studies.run import run_study
 from tenbaud.studies.table import Results
-from tenbaud.whole import WriteError
 from tests.tenbaud.endings.commands import fill, left_below, small_disk
 from tests.tenbaud.studies.small import study_of
 from tests.tenbaud.studies.test_run import cluster, flown, ignore

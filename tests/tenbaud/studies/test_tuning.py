@@ -14,7 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from channel.errors import TenbaudError
-from tenbaud.build_rig import nominal_plant
+from tenbaud.build.rig import nominal_plant
 from tenbaud.cli.commands import app
 from tenbaud.config.load import load_config
 from tenbaud.flight.outcome import ExitCode

@@ -11,13 +11,13 @@ from pathlib import Path
 import pytest
 
 from channel.errors import LinkError
-from channel.links.zenoh_telemetry import TelemetryPort
+from channel.links.zenoh.telemetry import TelemetryPort
 from tenbaud.telemetry import place
 from tests.tenbaud.processes import REPOSITORY
 
 LISTENS = """
 import sys, time
-from channel.links.zenoh_telemetry import TelemetryPort
+from channel.links.zenoh.telemetry import TelemetryPort
 port = TelemetryPort("transmitter", "lab", sys.argv[1])
 print("ready", flush=True)
 time.sleep(60)

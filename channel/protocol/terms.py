@@ -17,7 +17,7 @@ from channel.protocol.lockstep import HISTORY_NS, HISTORY_SAMPLES
 Delivery = Literal["start", "end"]
 Clock = Literal["real", "virtual"]
 
-# What a command frame can hold (channel/protocol/wire.py): 16 KiB in all, its echoes counted in one byte.
+# What a command frame can hold (channel/protocol/wire.py): 16 KiB, its echoes counted in one byte.
 ECHO_BYTES = 10
 ECHOES_MAX = 255
 ECHOES_BYTES_MAX = 16_000

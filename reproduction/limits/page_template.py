@@ -99,9 +99,9 @@ nearly all of that distance.
   pattern. *Steady range*: told once and kept. *Finds itself*: rows that let the range grow and shrink
   follow whatever the disturbance is (`channel/codec/coders/history.py`).
 
-The tables and rows of constants are those of `reproduction/limits/candidates.py`, found by searches over
-simulated double integrators under white torque: the flights above have other seeds, but the kind of
-disturbance is the one that the constants were made for.
+The tables and rows of constants are those of `reproduction/limits/candidates.py`, found by searches
+over simulated double integrators under white torque: the flights above have other seeds, but the kind
+of disturbance is the one that the constants were made for.
 
 ## The presets
 

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reproduction.paper.curves import read_curves
-from reproduction.paper.flights import Curves
+from reproduction.paper.curves import Curves, read_curves
 from tenbaud.files.whole import whole_file
 from tenbaud.recording.style import LINE_A, LINE_B
 

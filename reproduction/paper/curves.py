@@ -2,14 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from reproduction.paper.flights import Curves
 from tenbaud.recording.envelope import Series
 from tenbaud.recording.reader import Recording
+
+
+@dataclass(frozen=True, slots=True)
+class Curves:
+    """What a figure draws, on the transmitter's ticks; the reference on the receiver's."""
+
+    times_s: Series
+    pitch_rad: Series
+    measured_rad: Series
+    coded_rad: Series
+    coded_rate: Series
+    live_rad: Series
+    range_times_s: Series
+    range_rad: Series
+    reference_rad: Series
 
 
 def read_curves(transmitter: Path, receiver: Path) -> Curves:

@@ -12,8 +12,8 @@ from scipy.signal import lfilter
 from plant_sim.pitch import PitchParameters, PitchPlant
 from receiver.controllers.pid import PAPER_GAINS, Pid
 from receiver.controllers.references import Square
-from reproduction.paper.curves import true_rate
-from reproduction.paper.flights import Curves, Flown
+from reproduction.paper.curves import Curves, true_rate
+from reproduction.paper.flights import Flown
 from tenbaud.recording.envelope import Series
 from tenbaud.recording.style import (
     FAINT,

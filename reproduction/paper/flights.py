@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from channel.errors import TenbaudError
-from tenbaud.recording.envelope import Series
+from reproduction.paper.curves import Curves
 
 WORKERS = 2
 GRACE_S = 3.0
@@ -44,21 +44,6 @@ class Job:
     def weight(self) -> float:
         """Return roughly how long it takes, for the progress bar."""
         return 10.0 if self.processes else 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class Curves:
-    """What a figure draws, on the transmitter's ticks; the reference on the receiver's."""
-
-    times_s: Series
-    pitch_rad: Series
-    measured_rad: Series
-    coded_rad: Series
-    coded_rate: Series
-    live_rad: Series
-    range_times_s: Series
-    range_rad: Series
-    reference_rad: Series
 
 
 @dataclass(frozen=True, slots=True)

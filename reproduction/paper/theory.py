@@ -15,8 +15,7 @@ import numpy as np
 
 from channel.errors import TenbaudError
 from reproduction.paper.copies import CopiesApart, fly_copies
-from reproduction.paper.curves import read_curves
-from reproduction.paper.flights import Curves
+from reproduction.paper.curves import Curves, read_curves
 from tenbaud.bounds.closed import DOUBLE_INTEGRATOR
 from tenbaud.build.flight import agree
 from tenbaud.config.load import load_config

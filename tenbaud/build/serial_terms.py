@@ -1,20 +1,18 @@
-"""What a configured serial line means for a flight: refusals, times on the line, the links."""
+"""What a configured serial line means for the terms of a flight: refusals, and times on the line."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from channel.codec.codec import Codec
-from channel.links.base import Link, Role
 from channel.links.serial.budget import check_slot_counter, serial_budget
 from channel.links.serial.wire import SerialWire
 from channel.protocol.terms import Terms
 from tenbaud.config.schema import LinkSection
 
 if TYPE_CHECKING:
-    from tenbaud.build.flight import Agreement
+    pass
 
 ZENOH = "zenoh"
 
@@ -38,34 +36,3 @@ def on_serial_line(link: LinkSection, codec: Codec, terms: Terms) -> Terms:
     return replace(
         terms, uplink_line_ns=budget.symbol_ns(link.line_rate_baud), downlink_line_ns=down_ns
     )
-
-
-def open_serial(
-    agreement: Agreement, role: Role, insecure: bool, open_zenoh: Callable[[], Link]
-) -> Link:
-    """Return the open link of one end, the downlink on a line of its own if so configured."""
-    from channel.links.serial.link import SerialLink
-    from channel.links.serial.split import SplitLink
-
-    section, terms = agreement.config.link, agreement.terms
-    wire = SerialWire(len(agreement.codec.coder.alphabet.symbols))
-    slot_s = terms.sample_ns / terms.symbols_per_word / 1e9
-    age_s = slot_s * wire.slot_modulus / 2
-
-    def on_port(port: str, rate_baud: int) -> SerialLink:
-        return SerialLink(
-            role, port, wire, line_rate_baud=rate_baud, symbol_age_max_s=age_s, insecure=insecure
-        )
-
-    up = on_port(section.port, section.line_rate_baud)
-    if not section.downlink:
-        return up
-    try:
-        if section.downlink == ZENOH:
-            down = open_zenoh()
-        else:
-            down = on_port(section.downlink, section.downlink_rate_baud)
-    except BaseException:
-        up.close()
-        raise
-    return SplitLink(role, up, down)

@@ -175,7 +175,7 @@ def _fly_shown(
 ) -> DemoResult:
     """Fly once, and show how it goes."""
     from tenbaud.flight.demo import fly_demo
-    from tenbaud.flight.status import StatusDisplay
+    from tenbaud.flight.display import StatusDisplay
 
     with StatusDisplay() as display:
         return fly_demo(agreement, folder, display.show, view=wish, pace=pace)

@@ -18,12 +18,13 @@ from channel.protocol.wire import DATAGRAM
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build.ends import build_receiver
 from tenbaud.build.flight import Agreement
+from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.flight import receive, transmit
+from tenbaud.flight.display import StatusReporter
 from tenbaud.flight.outcome import SAFE, Outcome, outcome_of
-from tenbaud.flight.status import Status, StatusMode, StatusReporter
+from tenbaud.flight.status import Status, StatusMode
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, gap_part, link_part, receiver_part, transmitter_part
-from tenbaud.flight.transmit import Stop
 from tenbaud.flight.trouble import Trouble
 from tenbaud.recording.folder import RunFolder
 from tenbaud.recording.gather import OverviewRecorder
@@ -75,7 +76,7 @@ def open_link(
 ) -> Link:
     """Return an open link for one end: over a serial line if it is configured so, else over Zenoh."""
     if agreement.config.link.kind == "serial":
-        from tenbaud.build.serial_terms import open_serial
+        from tenbaud.flight.serial_ends import open_serial
 
         return open_serial(
             agreement, role, endpoints.insecure, lambda: _zenoh(agreement, role, endpoints, stop)
@@ -200,7 +201,7 @@ def open_recorder(
     return McapRecorder(path, metadata, wait_when_full=wait, shared=writer, overview=overview)
 
 
-def transmitter_status(run: transmit.TransmitterRun) -> Status:
+def transmitter_status(run: TransmitterRun) -> Status:
     """Return what a person wants to know of a running transmitter."""
     node = run.node
     coder = run.agreement.codec.coder
@@ -271,7 +272,7 @@ def _station(agreement: Agreement, role: Role, recorder: McapRecorder, endpoints
 
 
 def _fly(
-    run: transmit.TransmitterRun,
+    run: TransmitterRun,
     link: Link,
     stop: Stop,
     recorder: McapRecorder,

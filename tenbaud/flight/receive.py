@@ -14,8 +14,9 @@ from receiver.loops.virtual import serve_virtual
 from receiver.session.session import Phase, ReceiverSession
 from tenbaud.build.ends import build_line
 from tenbaud.build.flight import Agreement
+from tenbaud.build.transmitter_run import Stop
 from tenbaud.flight.outcome import FLIGHT_OVER, ExitCode, Outcome
-from tenbaud.flight.transmit import Stop, desync_text
+from tenbaud.flight.transmit import desync_text
 from tenbaud.flight.verdict import FlightCounts, faults_of, settings_of, verdict_text
 from transmitter.node import STOPPED
 

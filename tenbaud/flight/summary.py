@@ -12,9 +12,9 @@ from channel.links.base import Link
 from channel.protocol.bounds import COUNTER
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build.flight import Agreement
+from tenbaud.build.transmitter_run import TransmitterRun
 from tenbaud.config.schema import TransmitterSection
 from tenbaud.flight.outcome import Outcome
-from tenbaud.flight.transmit import TransmitterRun
 from transmitter.metrics.gap import Gap
 from transmitter.metrics.scores import ErrorMeter
 

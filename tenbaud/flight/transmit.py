@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any
 
 from channel.errors import ConfigMismatch, LinkLost
 from channel.line.clocks import SkewedClock, SkewedPeer
-from channel.line.line import Line
-from channel.line.uplink import Uplink
 from channel.line.virtual import Peer
 from channel.links.base import Link
 from channel.protocol.frames import Desync
@@ -18,40 +14,14 @@ from channel.protocol.recording import Recorder
 from channel.protocol.wire import Wire
 from tenbaud.build.ends import build_line, build_transmitter, build_uplink
 from tenbaud.build.flight import Agreement
+from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.flight.outcome import FLIGHT_OVER, SAFE, ExitCode, Outcome
 from tenbaud.flight.verdict import FlightCounts, faults_of, settings_of, verdict_text
 from transmitter.loops.real import RealFlight
 from transmitter.loops.virtual import VirtualFlight
 from transmitter.loops.virtual_peer import LinkPeer
-from transmitter.node import STOPPED, TransmitterNode
-from transmitter.session.rate_watch import RateWatch
+from transmitter.node import STOPPED
 from transmitter.session.session import Phase
-
-Stop = Callable[[], bool]
-
-
-@dataclass(slots=True)
-class TransmitterRun:
-    """The parts of one transmitter, before, during and after its flight."""
-
-    agreement: Agreement
-    node: TransmitterNode
-    uplink: Uplink
-    downlink: Line
-    """on the virtual clock; on a real one the receiver has its own"""
-    ticks: int = 0
-    """flown by this process"""
-    rejoin_bytes: int = 0
-    """what rejoins cost: control frames of both directions, without greeting and farewell"""
-    flight_s: float = 0.0
-    """wall-clock time of the flight itself"""
-    wire_bytes_down: int = 0
-    desyncs_asked: float = 0.0
-    """lockstep failures that were asked for while the flight went on"""
-    rate: RateWatch | None = None
-    """whether the symbol rate is kept; on a real clock"""
-    extra: dict[str, Any] = field(default_factory=dict)
-    """figures of the clock that was flown on"""
 
 
 def prepare(agreement: Agreement, recorder: Recorder | None, wire: Wire) -> TransmitterRun:

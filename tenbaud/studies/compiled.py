@@ -30,8 +30,8 @@ OPTIONS = {"fastmath": False, "error_model": "python", "nogil": True, "_nrt": Fa
 """How everything is compiled: divisions by zero are errors and nothing is reordered, as in Python; no
 memory is allocated, and so none is counted."""
 
-SOURCES = (*PACKAGES[:-1], "tenbaud.config", "tenbaud.flight", "tenbaud.studies")
-"""Packages that the figures of a flight depend on; beside them, what builds its parts."""
+SOURCES = (*PACKAGES[:-1], "tenbaud.build", "tenbaud.config", "tenbaud.flight", "tenbaud.studies")
+"""Packages that the figures of a flight depend on."""
 
 BESIDE = (
     *("constants.py", "judging.py", "tuning.py"),
@@ -125,7 +125,7 @@ def sources_digest() -> str:
 
 def figure_sources() -> list[Path]:
     """Return the files that the figures of a flight depend on, always in the same order."""
-    found = sorted(Path(__file__).parents[1].glob("build*.py"))
+    found: list[Path] = []
     for package in SOURCES:
         spec = find_spec(package)
         for place in (spec and spec.submodule_search_locations) or ():

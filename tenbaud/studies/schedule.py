@@ -2,8 +2,8 @@
 
 Loss, delay and erasure do not depend on what a symbol says. So the line is flown once on its own, in
 the order of events of the virtual clock (`transmitter.loops.virtual`) and with the receiver's rule
-for what was received in time (`receiver.session.session`), over the very lines that an ordinary flight would
-use and with their seeds. What comes out are arrays that a compiled flight reads.
+for what was received in time (`receiver.session.session`), over the lines that a flight would use
+and with their seeds. What comes out are arrays that a compiled flight reads.
 """
 
 from __future__ import annotations

@@ -39,7 +39,8 @@ def guess(
 ) -> bool:
     """Carry `work.model` and `work.coder` from the confirmed copy to a sample's beginning.
 
-    The words are those sent, the commands those known, a missing one the last (`transmitter.session.copies`).
+    The words are those sent, the commands those known, a missing one the last
+    (`transmitter.session.copies`).
     Return whether the estimate is one.
     """
     size = work.word.shape[0]

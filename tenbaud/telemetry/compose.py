@@ -11,7 +11,7 @@ from receiver.endpoint import ReceiverEndpoint
 from receiver.session.records import SAMPLE_CHANNEL as TAKEN
 from receiver.session.records import TICK_CHANNEL as DECIDED
 from tenbaud.build.flight import Agreement
-from tenbaud.flight.transmit import TransmitterRun
+from tenbaud.build.transmitter_run import TransmitterRun
 from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
 from tenbaud.telemetry.schema import SCHEMA_VERSION
 from tenbaud.telemetry.tap import Tap

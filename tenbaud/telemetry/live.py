@@ -23,7 +23,7 @@ from channel.protocol.recording import Recorder
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
 from receiver.controllers.steered import SteeredReference
 from receiver.endpoint import ReceiverEndpoint
-from tenbaud.flight.transmit import Stop, TransmitterRun
+from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.telemetry.commands import CommandQueue
 from tenbaud.telemetry.schema import Command, Impair, Pace, Pause, SetPoint, Spoil, Step
 

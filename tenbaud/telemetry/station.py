@@ -16,7 +16,7 @@ from receiver.controllers.steered import SteeredReference
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build.ends import build_reference
 from tenbaud.build.flight import Agreement
-from tenbaud.flight.transmit import Stop, TransmitterRun
+from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.telemetry.commands import CommandQueue
 from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
 from tenbaud.telemetry.place import SOCKET, endpoint_for

@@ -17,7 +17,7 @@ TOPICS = frozenset(("tick", "estimate", "sample", "event"))
 
 
 class Tap:
-    """A `channel.protocol.recording.Recorder` in front of another; `rows` is emptied by one other thread."""
+    """A `Recorder` in front of another; `rows` is emptied by one other thread."""
 
     def __init__(self, recorder: Recorder) -> None:
         self.rows: deque[tuple[str, Sequence[object]]] = deque(maxlen=ROWS_MAX)

@@ -1,8 +1,8 @@
 """The link over a serial line: /dev/tty..., COM..., socket://, rfc2217://, loop://.
 
-A thread reads the port, cuts the stream into messages (`channel.links.serial.stream`) and puts them into a
-bounded queue. When the port goes, as a USB adapter does when it is pulled out, the thread tries to
-open it again until it is back; what is sent meanwhile is dropped and counted, as on any line.
+A thread reads the port, cuts the stream into messages (`channel.links.serial.stream`) and puts them
+into a bounded queue. When the port goes, as a USB adapter does when it is pulled out, the thread
+tries to open it again until it is back; what is sent meanwhile is dropped and counted, as on any line.
 
 A serial line does not tell who is at its other end, so the two links tell each other, in seven bytes
 each time: a link that opens asks, the other answers, and one that closes says so. On a line so slow

@@ -8,7 +8,7 @@ How it finds its feet again:
 
 * A frame that turns out damaged may have lost its closing zero, so the zero that ended it counts as
   the next one's beginning too.
-* A byte from 0x80 on directly after a zero begins no frame (see `channel.links.serial.wire`): it is a symbol.
+* A byte from 0x80 on directly after a zero begins no frame (see `channel.links.serial.wire`): a symbol.
 * Symbols that follow a half frame would be swallowed for ever, since no zero comes any more. A row of
   `RUN` symbol bytes with consecutive slot counters ends such a frame.
 """

@@ -12,9 +12,9 @@ of `slot, number` times x^3 or x^2 by a polynomial, x^3 + x + 1 or x^2 + x + 1, 
 With three check bits any one or two wrong bits of the seven are found, with two any single one. The
 xor makes 0x80 and 0xFF, what a disturbed idle line likes to show, no symbols.
 
-All other frames are those of `channel.protocol.wire`; their own CRC-16/CCITT-FALSE, low byte first at the end,
-is the CRC of the line. Between two zeros they are COBS-encoded, so that a zero is a delimiter wherever
-it is seen, and a byte is a symbol only outside such a frame:
+All other frames are those of `channel.protocol.wire`; their own CRC-16/CCITT-FALSE, low byte first at
+the end, is the CRC of the line. Between two zeros they are COBS-encoded, so that a zero is a delimiter
+wherever it is seen, and a byte is a symbol only outside such a frame:
 
     0x00 | COBS of the frame | 0x00
 

@@ -11,10 +11,10 @@ import pytest
 from channel.protocol.wire import DATAGRAM
 from tenbaud.build.ends import build_receiver, guard_settings
 from tenbaud.build.flight import agree
+from tenbaud.build.transmitter_run import TransmitterRun
 from tenbaud.config.load import ConfigError, load_config
 from tenbaud.flight import transmit
 from tenbaud.flight.outcome import ExitCode, Outcome
-from tenbaud.flight.transmit import TransmitterRun
 from tenbaud.flight.verdict import NotFlown
 
 SECONDS = 30.0

@@ -25,8 +25,8 @@ from tenbaud.build.liveness import overtaking_ticks, watchdog_ticks
 from tenbaud.build.plugins import CONTROLLER, build_plugin
 from tenbaud.build.rig import build_rig
 from tenbaud.config.load import ConfigError
+from tenbaud.config.outside_code import is_plugin
 from tenbaud.config.schema import FlightConfig, ReferenceSection
-from tenbaud.outside_code import is_plugin
 from transmitter.guard import Guard, GuardSettings
 from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode

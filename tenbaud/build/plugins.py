@@ -17,8 +17,8 @@ from importlib import import_module
 from typing import Any
 
 from tenbaud.config.load import ConfigError
+from tenbaud.config.outside_code import require_allowed
 from tenbaud.config.schema import FlightConfig
-from tenbaud.outside_code import require_allowed
 
 Interface = Mapping[str, int | None]
 """What an object must have: methods with their number of arguments, attributes with None."""

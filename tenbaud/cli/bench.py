@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from tenbaud.cli.checkout import need_checkout
 from tenbaud.cli.figures import DATA_VARIABLE, found_data
 
 bench = typer.Typer(no_args_is_help=True, help="Measure coders against what is possible.")
@@ -31,6 +32,7 @@ def coders(
     ] = None,
 ) -> None:
     """Fly every coder on the same seeds, write the table and the pictures."""
+    need_checkout("bench coders")
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 

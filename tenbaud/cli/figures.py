@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from tenbaud.cli import options
+from tenbaud.cli.checkout import need_checkout
 
 DRAWINGS = ("theory", "animation")
 DATA_VARIABLE = "TENBAUD_FLIGHT_DATA"
@@ -47,6 +48,7 @@ def figures(
 
     [dim]tenbaud figures theory animation --docs docs[/dim]
     """
+    need_checkout("figures")
     from reproduction.paper.make import NUMBERS
     from tenbaud.files.whole import make_folder
     from tenbaud.recording.folder import create_run_folder

@@ -80,8 +80,8 @@ def audit(
 
     [dim]tenbaud audit runs/2026-11-23T10-00-00_paper-10baud[/dim]
     """
-    from tenbaud.replay.audit import audit as audit_run
-    from tenbaud.replay.text import audit_text
+    from tenbaud.audit.audit import audit as audit_run
+    from tenbaud.audit.text import audit_text
 
     result = audit_run(run, other, allow_code=allow_code)
     typer.echo(audit_text(result))

@@ -7,6 +7,15 @@ from typing import Annotated
 
 import typer
 
+Host = Annotated[
+    str | None,
+    typer.Option(
+        help="Address of the page; one beyond this machine needs --insecure. Not given: 127.0.0.1, or "
+        "::1 where there is no IPv4.",
+        show_default=False,
+    ),
+]
+
 
 def view(
     connect: Annotated[
@@ -22,14 +31,7 @@ def view(
     ] = None,
     session: Annotated[str, typer.Option(help="Session name; any if not given.")] = "**",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Of the page; 0: any free one.")] = 8710,
-    host: Annotated[
-        str | None,
-        typer.Option(
-            help="Address of the page; one beyond this machine needs --insecure. Not given: 127.0.0.1, "
-            "or ::1 where there is no IPv4.",
-            show_default=False,
-        ),
-    ] = None,
+    host: Host = None,
     open_browser: Annotated[
         bool, typer.Option("--open", help="Open the page in the browser of this machine.")
     ] = False,

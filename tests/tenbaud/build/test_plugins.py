@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 
 from tenbaud import Run
+from tenbaud.audit.audit import audit
 from tenbaud.build.ends import build_controller, check_parts
 from tenbaud.build.flight import agree
 from tenbaud.config.load import ConfigError, load_config, nested
 from tenbaud.config.schema import FlightConfig
 from tenbaud.flight.fly import fly
-from tenbaud.replay.audit import audit
 from tests.tenbaud.processes import run as run_command
 
 OUTSIDE = '''

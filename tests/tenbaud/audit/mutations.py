@@ -15,10 +15,10 @@ from typing import Any, NamedTuple
 import orjson
 from mcap.writer import CompressionType, Writer
 
+from tenbaud.audit.base import FILED
 from tenbaud.recording.encoding import channel_schema
 from tenbaud.recording.reader import MessageStream
 from tenbaud.recording.writer import END_METADATA, RUN_METADATA
-from tenbaud.replay.claims.base import FILED
 from tenbaud.replay.rows import KINDS
 
 Message = tuple[str, int, dict[str, Any]]

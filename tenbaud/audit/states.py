@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from tenbaud.replay.claims.base import Claim, Evidence, Findings, Place, is_same
+from tenbaud.audit.base import Claim, Evidence, Findings, Place, is_same
 from transmitter.metrics.gap import GAP_EVERY_S
 
 DIFFERS = "it is not what the symbols give"

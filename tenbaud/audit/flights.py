@@ -8,7 +8,7 @@ from functools import partial
 
 from channel.codec.codec import CodecState, Vector
 from receiver.session.rejoin import carried_to
-from tenbaud.replay.claims.base import Claim, Evidence, Findings, Place
+from tenbaud.audit.base import Claim, Evidence, Findings, Place
 from tenbaud.replay.record import Epoch
 from tenbaud.replay.refly import Reflown, refly
 

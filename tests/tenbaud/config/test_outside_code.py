@@ -14,15 +14,15 @@ import pytest
 import tomli_w
 
 from tenbaud import Run
+from tenbaud.audit.audit import audit
 from tenbaud.build.ends import check_parts
 from tenbaud.build.flight import agree
 from tenbaud.config.load import ConfigError, load_config, nested
-from tenbaud.outside_code import CodeNotAllowed, find_origin
+from tenbaud.config.outside_code import CodeNotAllowed, find_origin
 from tenbaud.recording.convert import convert
 from tenbaud.recording.diff import compare_runs
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.inspect import describe_text
-from tenbaud.replay.audit import audit
 from tenbaud.replay.record import load_record
 from tenbaud.replay.replay import replay
 from tenbaud.replay.symbols import Packed, unpack

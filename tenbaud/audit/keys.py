@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from channel.protocol.terms import Terms
-from tenbaud.replay.claims.base import FILED, Claim, Evidence, Findings, Place
+from tenbaud.audit.base import FILED, Claim, Evidence, Findings, Place
 from tenbaud.replay.rows import KINDS
 
 Filed = Callable[[Any, Terms], int | None]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from channel.protocol.events import EventKind
-from tenbaud.replay.claims.base import Claim, Evidence, Findings, Place
+from tenbaud.audit.base import Claim, Evidence, Findings, Place
 
 KINDS = frozenset(str(kind) for kind in EventKind)
 

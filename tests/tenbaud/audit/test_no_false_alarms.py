@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tenbaud.audit.audit import audit
 from tenbaud.flight.fly import FlightFailed
-from tenbaud.replay.audit import audit
 from tests.tenbaud.flown import flown
 from tests.tenbaud.processes import run as run_command
 

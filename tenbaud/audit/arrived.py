@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from bisect import bisect_right
 
-from tenbaud.replay.claims.base import Claim, Evidence, Findings, Place
-from tenbaud.replay.claims.sent import symbol_place
+from tenbaud.audit.base import Claim, Evidence, Findings, Place
+from tenbaud.audit.sent import symbol_place
 
 SLACK_S = 1.0
 """By how much a line may hold symbols up and then deliver them closely after each other."""

@@ -13,13 +13,13 @@ from pathlib import Path
 
 from channel.errors import CodecDiverged, TenbaudError
 from receiver.controllers.base import Controller
+from tenbaud.audit.base import Evidence, Findings, Place
+from tenbaud.audit.counted import Counted, count
+from tenbaud.audit.table import CLAIMS
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.notes import version_notes
 from tenbaud.recording.recover import RECOVERED_NOTE
-from tenbaud.replay.claims.base import Evidence, Findings, Place
-from tenbaud.replay.claims.table import CLAIMS
 from tenbaud.replay.control import controller_of, recorded_commands, steps_by_hand
-from tenbaud.replay.counted import Counted, count
 from tenbaud.replay.expected import expect
 from tenbaud.replay.record import FlightRecord, epochs_of, load_record
 from tenbaud.replay.refly import Reflown, refly

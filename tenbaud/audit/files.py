@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from tenbaud.audit.base import Claim, Evidence, Findings, Place
 from tenbaud.recording.notes import hole_notes, stray_notes
 from tenbaud.recording.recover import RECOVERED_NOTE
-from tenbaud.replay.claims.base import Claim, Evidence, Findings, Place
 
 
 def check_heads(evidence: Evidence, findings: Findings) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from typing import Any
 
-from tenbaud.replay.claims.base import Claim, Evidence, Findings, Place, is_same
+from tenbaud.audit.base import Claim, Evidence, Findings, Place, is_same
 from tenbaud.replay.rows import KEY_MAX, EpochStart
 
 EPOCH_FIELDS = ("sample", "epoch", "state", "coder", "hold_volts")

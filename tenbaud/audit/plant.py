@@ -6,9 +6,9 @@ from collections import Counter
 from typing import Any
 
 from plant_sim.encoder import Encoder
+from tenbaud.audit.base import Claim, Evidence, Findings, Place, is_same
 from tenbaud.build.ends import guard_settings
 from tenbaud.build.flight import Agreement
-from tenbaud.replay.claims.base import Claim, Evidence, Findings, Place, is_same
 from tenbaud.replay.rows import PlantTick
 
 TICK = ("transmitter", "tick")

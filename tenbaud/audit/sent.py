@@ -6,8 +6,8 @@ from itertools import pairwise
 from typing import Any
 
 from channel.codec.words import Word
+from tenbaud.audit.base import Claim, Evidence, Findings, Place
 from tenbaud.build.flight import Agreement
-from tenbaud.replay.claims.base import Claim, Evidence, Findings, Place
 
 SYMBOL_FIELDS = ("slot", "symbol", "left_ns", "wire_bytes")
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import log2
 from typing import Any
 
-from tenbaud.replay.claims.base import Evidence
+from tenbaud.audit.base import Evidence
 
 
 @dataclass(frozen=True, slots=True)

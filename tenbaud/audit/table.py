@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from tenbaud.replay.claims import arrived, ends, events, files, flights, keys, plant, sent, states
-from tenbaud.replay.claims.base import FILED, ORDER, Claim, Evidence
+from tenbaud.audit import arrived, ends, events, files, flights, keys, plant, sent, states
+from tenbaud.audit.base import FILED, ORDER, Claim, Evidence
 from tenbaud.replay.rows import KINDS
 
 CLAIMS: tuple[Claim, ...] = (

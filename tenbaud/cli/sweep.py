@@ -24,10 +24,7 @@ def sweep(
     workers: Annotated[
         int | None,
         typer.Option(
-            min=1,
-            max=1024,
-            help="Processes on this machine; all cores if not given.",
-            show_default=False,
+            min=1, max=1024, help="Processes on this machine; default: all cores.", show_default=False
         ),
     ] = None,
     scheduler: Annotated[

@@ -37,7 +37,6 @@ def replay(
     if run.is_file() and run.suffix != ".mcap":
         _replay_file(run)
         return
-    from tenbaud.recording.errors import RecordingError
     from tenbaud.replay.record import load_record
     from tenbaud.replay.replay import replay as fly_again
     from tenbaud.replay.replay import save_symbols
@@ -49,10 +48,7 @@ def replay(
     replayed = fly_again(record)
     typer.echo(replay_text(replayed))
     if save is not None:
-        try:
-            save_symbols(replayed, save)
-        except OSError as error:
-            raise RecordingError(f"{save} cannot be written: {error.strerror}.") from error
+        save_symbols(replayed, save)
         typer.echo(f"the flight is in {save}: {len(replayed.packed.data)} bytes")
     if not replayed.equal:
         raise typer.Exit(int(ExitCode.FAILED))

@@ -22,7 +22,10 @@ def sweep(
     workers: Annotated[
         int | None,
         typer.Option(
-            min=1, help="Processes on this machine; all cores if not given.", show_default=False
+            min=1,
+            max=1024,
+            help="Processes on this machine; all cores if not given.",
+            show_default=False,
         ),
     ] = None,
     scheduler: Annotated[
@@ -30,7 +33,8 @@ def sweep(
         typer.Option(help="Dask scheduler to fly on, such as tcp://HOST:8786.", show_default=False),
     ] = None,
     seeds: Annotated[
-        int | None, typer.Option(min=1, help="Seeds of each point, instead of the study's.")
+        int | None,
+        typer.Option(min=1, max=1_000_000, help="Seeds of each point, instead of the study's."),
     ] = None,
     plots: Annotated[bool, typer.Option(help="Draw the plots.")] = True,
     as_json: Annotated[

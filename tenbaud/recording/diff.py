@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from channel.recording import RecordChannel
+from channel.protocol.recording import RecordChannel
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RECEIVER_NAME, TRANSMITTER_NAME, RunFolder
 from tenbaud.recording.reader import Recording

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from mcap.writer import CompressionType, Writer
-
+from tenbaud.files.whole import write_error
+from tenbaud.recording.chunk_writer import ChunkWriter
 from tenbaud.recording.encoding import END_METADATA, RUN_METADATA, channel_schema
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import find_recordings
@@ -93,10 +93,7 @@ def _recover_file(path: Path, output: Path | None) -> Recovered:
                     _keep(path, kept)
                 unfinished.replace(target)
         except OSError as error:
-            raise RecordingError(
-                f"{target} cannot be written: {error.strerror or error}. "
-                "Choose another place with --out."
-            ) from error
+            raise write_error(target, error) from error
     return Recovered(target, kept or path, rows, last_ns, tuple(stream.holes), stream.strays)
 
 
@@ -152,7 +149,7 @@ def _copy(stream: MessageStream, output: BinaryIO) -> tuple[int, int]:
     """Write every message of a stream into a finished file; return their number and last time."""
     rows, last_ns = 0, 0
     channels: dict[str, int] = {}
-    writer = Writer(output, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+    writer = ChunkWriter(output, CHUNK_BYTES)
     writer.start(profile=PROFILE, library="tenbaud")
     headed = False
     for topic, time_ns, data in stream.undecoded():
@@ -163,11 +160,12 @@ def _copy(stream: MessageStream, output: BinaryIO) -> tuple[int, int]:
             channel = stream.channels[topic]
             schema = writer.register_schema(topic, "jsonschema", channel_schema(channel))
             channels[topic] = writer.register_channel(topic, "json", schema)
-        writer.add_message(channels[topic], time_ns, data, time_ns)
+        writer.add_message(channels[topic], time_ns, data)
         rows += 1
         last_ns = max(last_ns, time_ns)
     if not headed:
         writer.add_metadata(RUN_METADATA, stream.metadata.get(RUN_METADATA, {}))
+    writer.flush()
     if stream.holes:
         writer.add_metadata(HOLES_METADATA, packed_holes(stream.holes))
     end = stream.metadata.get(END_METADATA, {"rows_written": str(rows)})

@@ -14,10 +14,10 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from channel.codec import CodecState, Vector
+from channel.codec.codec import CodecState, Vector
 from channel.errors import TenbaudError
 from receiver.controllers.base import Controller
-from receiver.rejoin import carried_to
+from receiver.session.rejoin import carried_to
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.notes import hole_notes, version_notes
 from tenbaud.recording.recover import RECOVERED_NOTE

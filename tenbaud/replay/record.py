@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from channel.codec import CodecState, Vector
-from channel.words import Word
-from tenbaud.build import Agreement, agree
+from channel.codec.codec import CodecState, Vector
+from channel.codec.words import Word
+from tenbaud.build.flight import Agreement, agree
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.run import Run
 from tenbaud.recording.table import Table, Tables
@@ -84,7 +84,7 @@ def _agreement(run: Run, tables: Tables) -> Agreement:
 def _check_same(tables: Tables, agreement: Agreement, end: str) -> None:
     identity = agreement.identity
     if tables.metadata.get("shared_config") != identity.config:
-        from channel.identity import differing_fields
+        from channel.protocol.identity import differing_fields
 
         recorded = tables.metadata.get("shared_config", "")
         lines = "\n  ".join(differing_fields(identity.config, recorded)[:6])
@@ -110,6 +110,12 @@ def epochs_of(tables: Tables, agreement: Agreement) -> list[Epoch]:
     codec, terms = agreement.codec, agreement.terms
     samples = tables.topic("sample").rows
     epochs = [_epoch(row) for row in tables.topics["epoch"].rows] if "epoch" in tables.topics else []
+    before = bool(epochs and samples) and samples[0]["sample"] < epochs[0].start.sample
+    if tables.holes and (not epochs or before):
+        raise RecordingError(
+            f"{tables.path} lacks the state that its first epoch starts from: it is in a hole, "
+            "so nothing can be computed from its symbols."
+        )
     if not epochs:
         # From before epochs were recorded: one of them, from the common initial state.
         first = samples[0]["sample"] if samples else 0

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from receiver.controllers.base import Controller
+from tenbaud.files.whole import make_folder, write_whole
+from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.table import Tables
 from tenbaud.replay.control import controller_of, steps_by_hand
 from tenbaud.replay.record import Epoch, FlightRecord, by_key, epochs_of
@@ -150,6 +152,10 @@ def _compare_commands(tables: Tables, flown: Sequence[Reflown]) -> list[str]:
 
 
 def save_symbols(replayed: Replayed, path: Path) -> None:
-    """Write the packed flight; the file must not exist yet."""
-    with path.open("xb") as stream:
-        stream.write(replayed.packed.data)
+    """Write the packed flight. Raises WriteError, and RecordingError where the file exists already."""
+    if path.exists():
+        raise RecordingError(
+            f"{path} exists already and is not overwritten. Name another file with --save."
+        )
+    make_folder(path.parent)
+    write_whole(path, replayed.packed.data)

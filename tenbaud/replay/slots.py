@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from math import log2
 from typing import Any
 
-from channel.words import Word
-from tenbaud.build import Agreement
+from channel.codec.words import Word
+from tenbaud.build.flight import Agreement
 from tenbaud.recording.table import Tables
 from tenbaud.replay.record import FlightRecord
 

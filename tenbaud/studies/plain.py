@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 
 from channel.errors import TenbaudError
-from channel.wire import DATAGRAM
-from tenbaud.build import agree
-from tenbaud.build_ends import build_receiver
+from channel.protocol.wire import DATAGRAM
+from tenbaud.build.ends import build_receiver
+from tenbaud.build.flight import agree
 from tenbaud.config.schema import FlightConfig
 from tenbaud.flight import transmit
 from tenbaud.flight.outcome import ExitCode, Outcome, outcome_of
 from tenbaud.flight.verdict import NotFlown
 from tenbaud.studies.figures import FlightFigures
-from transmitter.scores import ErrorMeter
+from transmitter.metrics.scores import ErrorMeter
 
 
 def fly_plain(config: FlightConfig, window_start: int | None = None) -> FlightFigures:

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 
 from channel.errors import TenbaudError
-from tenbaud.build_codec import build_codec
+from tenbaud.build.codec import build_codec
 from tenbaud.config.load import load_config
 from tenbaud.config.schema import KINDS, FlightConfig
 

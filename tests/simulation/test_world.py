@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import pytest
 
-from channel.impairments import Impairments, LineFaults
-from channel.sabotage import Sabotage
+from channel.line.impairments import Impairments, LineFaults
+from channel.protocol.sabotage import Sabotage
 from tests.simulation.faults import Plan, draw
 from tests.simulation.soak import CANARY_SEED, fly_canary, fly_seed
 from tests.simulation.watch import LivenessViolation, SafetyViolation
 from tests.simulation.world import World
-from transmitter.owing import Owing
-from transmitter.session import TransmitterSession
+from transmitter.session.owing import Owing
+from transmitter.session.session import TransmitterSession
 
 SEEDS = 24
 

@@ -15,7 +15,6 @@ from tenbaud.build.transmitter_run import TransmitterRun
 from tenbaud.config.load import ConfigError, load_config
 from tenbaud.flight import transmit
 from tenbaud.flight.outcome import ExitCode, Outcome
-from tenbaud.flight.verdict import NotFlown
 
 SECONDS = 30.0
 DESYNC = "sample=100,field=range"
@@ -91,14 +90,7 @@ def test_when_lockstep_is_lost_once_under_a_long_lead_then_one_rejoin_brings_it_
 
 def test_when_command_frames_overtake_each_other_then_that_is_no_lost_lockstep() -> None:
     flown = fly(**line("delay=400ms±300ms"))
-    assert flown.rejoins == 0
-    assert flown.outcome.code is ExitCode.NOT_FLOWN, "nearly every symbol misses its deadline"
-    assert flown.outcome.not_flown == (NotFlown.NO_WORDS,)
-    assert "channel.deadline_allowance_s = 0.02 late is erased: set it to at least 0.6" in (
-        flown.outcome.text
-    )
-    wider = fly(**line("delay=400ms±300ms"), channel={"deadline_allowance_s": 0.6})
-    assert (wider.rejoins, wider.outcome.code) == (0, ExitCode.OK)
+    assert (flown.rejoins, flown.outcome.code) == (0, ExitCode.OK)
 
 
 def drawn(seed: int) -> dict[str, Any]:

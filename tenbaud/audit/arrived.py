@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections import deque
+from typing import Any
 
+from receiver.session.schedule import Schedule, Timing
 from tenbaud.audit.base import Claim, Evidence, Findings, Place
 from tenbaud.audit.sent import symbol_place
 
@@ -83,38 +86,50 @@ def check_times(evidence: Evidence, findings: Findings) -> None:
     """A word is decided when its last symbol comes, or when nothing can come any more."""
     terms = evidence.agreement.terms
     count = terms.symbols_per_word
-    taken = [row for row in evidence.topic("receiver", "symbol") if row.taken]
+    symbols = deque(evidence.topic("receiver", "symbol"))
+    taken = [row for row in symbols if row.taken]
     arrivals = {row.slot: row.arrived_ns for row in taken}
     starts = {row.sample * count for row in evidence.topic("receiver", "epoch")}
     slots = [row.slot for row in taken]
     final = max(slots, default=-1)
-    anchor: int | None = None
+    schedule = Schedule(terms)
     before_s: float | None = None
     for row in evidence.topic("receiver", "sample"):
         place = Place("receiver", "sample", f"sample {row.sample}", "arrival_s")
         first, last = row.sample * count, (row.sample + 1) * count - 1
         if first in starts:
-            anchor = None
+            schedule = Schedule(terms)
         if before_s is not None and row.arrival_s < before_s:
             findings.leak(place, "it was decided before the one before it")
         before_s = row.arrival_s
-        for slot in range(first, last):
-            anchor = slot if slot in arrivals else anchor
+        _follow(schedule, symbols, last, row.arrival_s)
         if last in arrivals:
             allowed = {arrivals[last]}
         else:
             later = bisect_right(slots, last)
             allowed = {taken[later].arrived_ns} if later < len(taken) else set()
-            if anchor is not None:
-                due = terms.slot_ns(last) - terms.slot_ns(anchor) + terms.deadline_allowance_ns
-                allowed.add(arrivals[anchor] + due)
-        anchor = last if last in arrivals else anchor
+            due_ns = schedule.deadline_ns(last)
+            if due_ns is not None:
+                allowed.add(due_ns)
         # After the last symbol erasures are noticed as the flight ends.
         exact = last in arrivals or (evidence.is_virtual and last < final)
         if exact and allowed and row.arrival_s not in {one / 1e9 for one in allowed}:
             said = ", ".join(f"{one / 1e9!r} s" for one in sorted(allowed))
             detail = f"{row.arrival_s!r} s; symbol, slot {last}, field arrived_ns: {said}"
             findings.leak(place, "its slots say another time", detail)
+
+
+def _follow(schedule: Schedule, symbols: deque[Any], last: int, until_s: float) -> None:
+    """Show the receiver's schedule what came before a word was decided whose last slot is `last`."""
+    while symbols and (
+        symbols[0].slot <= last if symbols[0].taken else symbols[0].arrived_ns / 1e9 <= until_s
+    ):
+        row = symbols.popleft()
+        if row.taken:
+            fits = schedule.timing(row.slot, row.arrived_ns) is Timing.DUE
+            schedule.take(row.slot, row.arrived_ns, anew=not fits)
+        elif schedule.is_replaced_by(row.slot, row.arrived_ns):
+            schedule.take(row.slot, row.arrived_ns, anew=True)
 
 
 def check_origin(evidence: Evidence, findings: Findings) -> None:

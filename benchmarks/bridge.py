@@ -23,14 +23,14 @@ import tty
 from pathlib import Path
 
 from channel.links.endpoints import free_endpoint
-from channel.links.zenoh import ZenohLink
-from tenbaud.build import agree
-from tenbaud.build_rig import build_device
+from channel.links.zenoh.link import ZenohLink
+from tenbaud.build.flight import agree
+from tenbaud.build.rig import build_device
 from tenbaud.config.load import dump_config, load_config
 from transmitter.rigs.device import DeviceRig
 from transmitter.rigs.emulator.speech import CobsSpeech
-from transmitter.rigs.samples import RawSample
-from transmitter.session import Phase, TransmitterSession
+from transmitter.rigs.formats.samples import RawSample
+from transmitter.session.session import Phase, TransmitterSession
 
 PERIOD_S = 0.01
 SAMPLES = 500

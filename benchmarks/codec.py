@@ -7,7 +7,7 @@ import timeit
 import numpy as np
 
 from benchmarks.figures import Figure
-from tenbaud.build import build_codec
+from tenbaud.build.flight import build_codec
 from tenbaud.config.load import load_config
 
 SAMPLES = 300

@@ -40,7 +40,7 @@ def open_zenoh(
 
 
 def publisher(session: zenoh.Session, key: str) -> zenoh.Publisher:
-    """Return a publisher with the settings of `channel.links.zenoh`."""
+    """Return a publisher with the settings of `channel.links.zenoh.link`."""
     return session.declare_publisher(
         key,
         congestion_control=zenoh.CongestionControl.BLOCK,
@@ -84,11 +84,11 @@ def bare(address: str, reply: bytes, settings: dict[str, Any]) -> None:
 
 def receiver(address: str, _: bytes, settings: dict[str, Any]) -> None:
     """Be a receiver, recording or not; it is configured as a receiver is."""
-    from channel.links.zenoh import ZenohLink
-    from channel.recording import Recorder
-    from receiver.real_service import serve_real
-    from tenbaud.build import agree
-    from tenbaud.build_ends import build_receiver
+    from channel.links.zenoh.link import ZenohLink
+    from channel.protocol.recording import Recorder
+    from receiver.loops.real import serve_real
+    from tenbaud.build.ends import build_receiver
+    from tenbaud.build.flight import agree
     from tenbaud.config.load import load_config
     from tenbaud.flight.ends import SWITCH_INTERVAL_S, open_recorder
 

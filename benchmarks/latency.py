@@ -26,13 +26,13 @@ import zenoh
 from benchmarks.echoes import DOWN, UP, open_zenoh, publisher
 from benchmarks.figures import Figure
 from benchmarks.throwaway_keys import tls_settings
-from channel.frames import Bye
 from channel.links.endpoints import free_endpoint
-from channel.links.zenoh import ZenohLink
-from channel.wire import decode, encode
-from tenbaud.build import agree
+from channel.links.zenoh.link import ZenohLink
+from channel.protocol.frames import Bye
+from channel.protocol.wire import decode, encode
+from tenbaud.build.flight import agree
 from tenbaud.config.load import load_config
-from transmitter.session import Phase, TransmitterSession
+from transmitter.session.session import Phase, TransmitterSession
 
 ROUNDS = 10
 PINGS = 250

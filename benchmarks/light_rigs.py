@@ -16,12 +16,12 @@ import time
 from contextlib import ExitStack
 from dataclasses import dataclass
 
-from channel.inlet import Inlet
-from channel.links.zenoh import ZenohLink
-from channel.wire import encode
-from tenbaud.build import Agreement, agree
+from channel.line.inlet import Inlet
+from channel.links.zenoh.link import ZenohLink
+from channel.protocol.wire import encode
+from tenbaud.build.flight import Agreement, agree
 from tenbaud.config.load import load_config
-from transmitter.session import Phase, TransmitterSession
+from transmitter.session.session import Phase, TransmitterSession
 
 NAME = "load"
 STARTED_S = 60.0

@@ -39,12 +39,12 @@ LONG_TICKS = 1_000_000
 LONG = """
 import math, resource, sys, time
 from pathlib import Path
-from receiver import records as receiver
+from receiver.session import records as receiver
 from tenbaud.flight.report import draw_run
 from tenbaud.recording.folder import RunFolder
 from tenbaud.recording.gather import OverviewRecorder
 from tenbaud.recording.writer import McapRecorder
-from transmitter import records as transmitter
+from transmitter.session import records as transmitter
 
 def peak_mib():
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

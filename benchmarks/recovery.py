@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from channel.frames import Commands, Frame, Symbol
-from channel.impairments import Impairments, LineFaults
-from channel.sabotage import Sabotage
-from channel.wire import decode
-from tests.channel.parts import THREE_SIGNS, terms
+from channel.line.impairments import Impairments, LineFaults
+from channel.protocol.frames import Commands, Frame, Symbol
+from channel.protocol.sabotage import Sabotage
+from channel.protocol.wire import decode
+from tests.channel.codec.parts import THREE_SIGNS, terms
 from tests.simulation.faults import Plan
 from tests.simulation.world import World
 from transmitter.node import TransmitterNode
-from transmitter.session import Phase
+from transmitter.session.session import Phase
 
 SAMPLE_NS = 100_000_000
 TICK_NS = 10_000_000

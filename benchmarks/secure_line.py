@@ -19,12 +19,12 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from channel.frames import Commands, Echo, Symbol
 from channel.links.endpoints import free_endpoint, with_protocol
 from channel.links.security import Invited, Part, Security
-from channel.links.zenoh import ZenohLink
-from channel.links.zenoh_router import ZenohRouter
-from channel.wire import encode
+from channel.links.zenoh.link import ZenohLink
+from channel.links.zenoh.router import ZenohRouter
+from channel.protocol.frames import Commands, Echo, Symbol
+from channel.protocol.wire import encode
 from tenbaud.keys.authority import NodeRole
 from tenbaud.keys.store import add_node, create_authority, read_node
 

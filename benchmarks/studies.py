@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.figures import Figure
-from channel.limits import from_millivolts, to_millivolts
-from channel.numerics import sin
+from channel.codec.numerics import sin
+from channel.protocol.limits import from_millivolts, to_millivolts
 from plant_sim.encoder import angle_of, counts_of
 from plant_sim.pitch import Sine, pitch_step
 from receiver.controllers.pid import motor_volts, pid_integral, pid_volts
@@ -81,7 +81,7 @@ def _python_control(point: CompiledPoint, sine: Sine) -> tuple[float, float]:
 
     One discrete-time system whose update is written with the nodes' own functions in plain Python,
     which is kinder to it than numpy would be. With `math.sin` for the plant it is faster, with that of
-    `channel.numerics` its bits are those of a study.
+    `channel.codec.numerics` its bits are those of a study.
     """
     import control
 

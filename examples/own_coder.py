@@ -6,8 +6,8 @@ numbers: no numpy, no `math.sin`.    python examples/own_coder.py
 
 import numpy as np
 
-from channel.plugin_context import CoderContext
-from channel.words import ERASED, Alphabet, Word
+from channel.codec.plugin_context import CoderContext
+from channel.codec.words import ERASED, Alphabet, Word
 from tenbaud import fly
 
 Vector = tuple[float, ...]

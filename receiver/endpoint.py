@@ -5,12 +5,12 @@ Both drivers of the receiver, and a flight within one process, go through it.
 
 from __future__ import annotations
 
-from channel.frames import Frame
-from channel.inlet import Inlet
-from channel.line import Line
-from channel.virtual import Reply
-from channel.wire import DATAGRAM, Wire
-from receiver.session import ReceiverSession
+from channel.line.inlet import Inlet
+from channel.line.line import Line
+from channel.line.virtual import Reply
+from channel.protocol.frames import Frame
+from channel.protocol.wire import DATAGRAM, Wire
+from receiver.session.session import ReceiverSession
 
 
 class ReceiverEndpoint:
@@ -40,7 +40,7 @@ class ReceiverEndpoint:
         return self._encode(self.session.bye(reason))
 
     def step(self, time_ns: int, data: bytes | None) -> Reply:
-        """Do one step of the virtual clock within this process (`channel.virtual.Peer`).
+        """Do one step of the virtual clock within this process (`channel.line.virtual.Peer`).
 
         A symbol that arrives exactly at its deadline is in time, so it is taken first.
         """

@@ -9,12 +9,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tenbaud.flying import fly
+    from tenbaud.flight.fly import fly
     from tenbaud.recording.run import Run
 
 __all__ = ["Run", "fly"]
 
-_HOMES = {"Run": "tenbaud.recording.run", "fly": "tenbaud.flying"}
+_HOMES = {"Run": "tenbaud.recording.run", "fly": "tenbaud.flight.fly"}
 
 
 def __getattr__(name: str) -> object:

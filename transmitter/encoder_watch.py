@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from channel.codec import Codec, Vector
+from channel.codec.codec import Codec, Vector
 
 MOTION_RAD = 1.0
 """Predicted motion that a standing encoder contradicts. Prediction from an estimate 10 % off the
@@ -34,10 +34,11 @@ class EncoderWatch:
         self._applied: deque[Vector] = deque()
         """voltages of its ticks that the model has not been carried over yet"""
 
-    def check(self, counts: tuple[int, ...], applied: Vector, estimate: Vector) -> str | None:
+    def check(self, counts: tuple[int, ...], applied: Vector, estimate: Vector | None) -> str | None:
         """Take one tick; return what is wrong, or None.
 
-        `applied` are the voltages of the tick, `estimate` the model state to start a window from.
+        `applied` are the voltages of the tick, `estimate` the model state to start a window from;
+        None: there is none that could be relied on.
         """
         before, self._counts = self._counts, counts
         if len(before) != len(counts):
@@ -52,6 +53,8 @@ class EncoderWatch:
             self._age_ticks = 0
             return None
         if self._age_ticks == 0:
+            if estimate is None:
+                return None
             self._start = self._state = estimate
             self._applied.clear()
         self._age_ticks += 1
@@ -61,7 +64,11 @@ class EncoderWatch:
         if 2 * self._age_ticks > self._window_ticks:
             for _ in range(min(2, len(self._applied))):
                 volts = self._applied.popleft()
-                self._state = self._model.tick(self._state, volts, self._nothing_held)
+                try:
+                    self._state = self._model.tick(self._state, volts, self._nothing_held)
+                except (ArithmeticError, ValueError):  # beyond what the model can say
+                    self._age_ticks = 0
+                    return None
         if self._age_ticks < self._window_ticks:
             return None
         self._age_ticks = 0

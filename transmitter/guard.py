@@ -6,7 +6,7 @@ passes. When commands stay away the last one is held; after the time-out the vol
 safe one along a ramp, and there it stays, latched: while it is latched no symbol leaves. It is
 re-armed on purpose only.
 
-The age of a command counts the ticks that were owed one (`transmitter.owing`) and had none.
+The age of a command counts the ticks that were owed one (`transmitter.session.owing`) and had none.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-from channel.codec import Vector
-from channel.limits import CommandLimits
+from channel.codec.codec import Vector
+from channel.protocol.limits import CommandLimits
 
 
 class GuardState(StrEnum):

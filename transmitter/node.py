@@ -8,18 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from channel.codec import Vector
-from channel.events import EVENT_CHANNEL, Event, EventKind, event_row
-from channel.frames import Frame, Why
-from channel.recording import NullRecorder, Recorder
-from transmitter.copies import Confirmed
+from channel.codec.codec import Vector
+from channel.protocol.events import EVENT_CHANNEL, Event, EventKind, event_row
+from channel.protocol.frames import Frame, Why
+from channel.protocol.recording import NullRecorder, Recorder
 from transmitter.encoder_watch import EncoderWatch
-from transmitter.gap import GAP_CHANNEL, GAP_EVERY_S, GapGauge
 from transmitter.guard import Guard, GuardState
-from transmitter.records import DEVICE_CHANNEL, TICK_CHANNEL, device_row
+from transmitter.metrics.gap import GAP_CHANNEL, GAP_EVERY_S, GapGauge
+from transmitter.metrics.scores import Scores
 from transmitter.rigs.base import Reading, Rig
-from transmitter.scores import Scores
-from transmitter.session import Phase, TransmitterSession
+from transmitter.session.copies import Confirmed
+from transmitter.session.records import DEVICE_CHANNEL, TICK_CHANNEL, device_row
+from transmitter.session.session import Phase, TransmitterSession
 
 STOPPED = "stopped by the user"
 
@@ -189,9 +189,9 @@ class TransmitterNode:
         self.tell(EventKind.MALFORMED, f"dropped a frame: {why}")
 
     def _check(self, tick: int, reading: Reading) -> None:
-        fault = reading.fault or self._watch.check(
-            reading.counts, self._applied, self.session.copies.confirmed.model
-        )
+        session = self.session
+        estimate = session.copies.confirmed.model if session.is_proven else None
+        fault = reading.fault or self._watch.check(reading.counts, self._applied, estimate)
         if fault is not None and not self.guard.stopped:
             self.sensor_fault = f"tick {tick}: {fault}"
             self.tell(EventKind.SENSOR, self.sensor_fault)

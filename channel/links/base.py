@@ -10,7 +10,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Literal, Protocol, Self
 
-from channel.wire import DATAGRAM, Wire
+from channel.protocol.wire import DATAGRAM, Wire
 
 Role = Literal["transmitter", "receiver"]
 
@@ -55,6 +55,9 @@ class Link(Protocol):
     def peer_present(self) -> bool:
         """Return whether the other end is known to be there now."""
 
+    def trouble(self) -> str:
+        """Return what is wrong with this end's line itself, such as a port that went; else nothing."""
+
     def close(self) -> None:
         """Give the line back; may be called more than once."""
 
@@ -71,6 +74,10 @@ class LinkBase:
 
     def __init__(self) -> None:
         self.counts = LinkCounts()
+
+    def trouble(self) -> str:
+        """Return nothing: this kind of line does not know."""
+        return ""
 
     def close(self) -> None:
         """Give the line back."""

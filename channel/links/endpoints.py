@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import ipaddress
 import socket
 
 from channel.errors import LinkError
 
-DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
+DEFAULT_PORT = 7447
+DEFAULT_ENDPOINT = f"tcp/127.0.0.1:{DEFAULT_PORT}"
 
 
 def is_loopback(endpoint: str) -> bool:
@@ -69,8 +71,28 @@ def _open_to_all(what: str) -> str:
     )
 
 
+def loopback_host() -> str:
+    """Return this machine's own address: 127.0.0.1, or ::1 where there is no IPv4."""
+    for family, host in ((socket.AF_INET, "127.0.0.1"), (socket.AF_INET6, "::1")):
+        with contextlib.suppress(OSError), socket.socket(family) as probe:
+            probe.bind((host, 0))
+            return host
+    raise LinkError("this machine has no loopback address, 127.0.0.1 or ::1; is its interface lo up?")
+
+
+def default_endpoint() -> str:
+    """Return where both ends meet on this machine if nothing else is said."""
+    return _on_loopback(DEFAULT_PORT)
+
+
 def free_endpoint() -> str:
     """Return a loopback TCP endpoint with a port that was free a moment ago."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    host = loopback_host()
+    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
+        probe.bind((host, 0))
+        return _on_loopback(probe.getsockname()[1])
+
+
+def _on_loopback(port: int) -> str:
+    host = loopback_host()
+    return f"tcp/[{host}]:{port}" if ":" in host else f"tcp/{host}:{port}"

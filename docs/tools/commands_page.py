@@ -12,7 +12,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 import typer
 from typer.models import ArgumentInfo, OptionInfo
 
-from tenbaud.cli.app import app
+from tenbaud.cli.commands import app
 from tenbaud.flight.outcome import ExitCode
 
 INTRODUCTION = """# Commands
@@ -41,7 +41,8 @@ EXIT_MEANINGS = {
     ExitCode.DESYNC: "the codecs differed and nobody had spoilt them on purpose; or `--on-desync stop`",
     ExitCode.SAFETY_STOP: "the rig or the guard beside the motors ended the flight",
     ExitCode.NOT_FLOWN: "the flight went to its end and [did not fly](../RELIABILITY.md#did-it-fly)",
-    ExitCode.INTERRUPTED: "Ctrl-C",
+    ExitCode.NOT_WRITTEN: "a file, the recording or standard output could not be written",
+    ExitCode.INTERRUPTED: "Ctrl-C, or another signal that asks to end",
 }
 
 

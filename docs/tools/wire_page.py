@@ -11,7 +11,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from channel.frames import (
+from channel.line.virtual import Reply, Step, encode_reply, encode_step
+from channel.links.serial.wire import SerialWire, stuff
+from channel.protocol.frames import (
     Bye,
     Claim,
     Commands,
@@ -25,9 +27,7 @@ from channel.frames import (
     Welcome,
     Why,
 )
-from channel.serial_wire import SerialWire, stuff
-from channel.virtual import Reply, Step, encode_reply, encode_step
-from channel.wire import encode
+from channel.protocol.wire import encode
 
 TEXT = Path(__file__).with_name("wire_page.md")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from receiver.references import Reference
+from receiver.controllers.references import Reference
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple, get_args
 
-from receiver.references import Reference
+from receiver.controllers.references import Reference
 
 GainUnit = Literal["V/rad", "V/deg"]
 AntiWindup = Literal["conditional", "none"]

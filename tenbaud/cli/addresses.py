@@ -31,7 +31,7 @@ def endpoints_of(
 
     `sessions` is the pattern of session names of an end that serves many.
     """
-    from channel.links.endpoints import DEFAULT_ENDPOINT, check_endpoints, with_protocol
+    from channel.links.endpoints import check_endpoints, default_endpoint, with_protocol
     from tenbaud.flight.ends import Endpoints
 
     listen, connect = tuple(addresses.listen or ()), tuple(addresses.connect or ())
@@ -44,7 +44,7 @@ def endpoints_of(
             )
     elif not listen and not connect and not router and not addresses.scout:
         # Without any address both ends meet on this machine: the receiver listens.
-        here = DEFAULT_ENDPOINT if security is None else with_protocol(DEFAULT_ENDPOINT, "tls")
+        here = with_protocol(default_endpoint(), "tcp" if security is None else "tls")
         listen = (here,) if role == "receiver" else ()
         connect = () if role == "receiver" else (here,)
     if router and (listen or connect or addresses.scout):

@@ -1,88 +1,72 @@
-"""The commands, gathered. Each lives in a module of its own beside this one."""
+"""The process of a command, from its first moment to its exit code."""
 
 from __future__ import annotations
 
+import errno
+import os
+import signal
 import sys
-from typing import Annotated
 
-import typer
-
-from tenbaud.cli import (
-    bench,
-    demo,
-    doctor,
-    figures,
-    files,
-    identify,
-    keys,
-    nodes,
-    replays,
-    rig,
-    router,
-    runs,
-    sweep,
-    tune,
-    view,
-)
-from tenbaud.flight.outcome import ExitCode, outcome_of
-
-app = typer.Typer(
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
-    help="""Fly a helicopter over a ten-baud wire.
-
-    Both ends on this machine:   [bold]tenbaud demo[/bold]
-
-    One end per terminal:        [bold]tenbaud receive[/bold]   and   [bold]tenbaud transmit[/bold]
-    """,
-)
-
-
-def _show_version(wanted: bool) -> None:
-    if wanted:
-        from tenbaud.build import software_version
-
-        typer.echo(f"tenbaud {software_version()}")
-        raise typer.Exit
-
-
-@app.callback()
-def _root(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show version.")
-    ] = False,
-) -> None:
-    """Take the options that come before the command."""
-
-
-for panel, commands in (
-    ("Fly", (demo.demo, nodes.transmit, nodes.receive, view.view, runs.presets)),
-    (
-        "What was flown",
-        (runs.inspect, runs.diff, replays.replay, replays.audit, files.convert, files.recover),
-    ),
-    ("Rigs and machines", (doctor.doctor, rig.rig, rig.rig_check, router.router)),
-    ("Models, coders, studies", (identify.identify, figures.figures, sweep.sweep, tune.tune)),
-):
-    for command in commands:
-        app.command(rich_help_panel=panel)(command)
-app.add_typer(keys.app, name="keys", rich_help_panel="Rigs and machines")
-app.add_typer(bench.bench, name="bench", rich_help_panel="Models, coders, studies")
+NOT_WRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO)
+"""What only happens to who writes."""
 
 
 def main() -> None:
     """Run the command line; errors become one message and an exit code."""
-    from channel.errors import TenbaudError
+    # Until the imports below are done, some tenths of a second, Ctrl-C ends this process as any other.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    from tenbaud.cli.streams import leave, lost_output, prepare_streams
     from tenbaud.flight.lifeline import follow_parent
 
+    prepare_streams()
     follow_parent()
+    code = run(sys.argv[1:])
+    error = lost_output()
+    if error is not None:
+        from tenbaud.flight.outcome import ExitCode
+
+        _say(f"standard output cannot be written: {_reason(error)}; what belongs there is lost")
+        code = code or int(ExitCode.NOT_WRITTEN)
+    leave(code)
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command in this process, say what went wrong, and return its exit code."""
+    from channel.errors import TenbaudError
+    from tenbaud.cli.commands import app
+    from tenbaud.flight.outcome import ExitCode, outcome_of
+    from tenbaud.flight.stop import Interruptions
+
+    interruptions = Interruptions()
     try:
-        app()
-    except (TenbaudError, ValueError) as error:
-        typer.echo(f"tenbaud: {error}", err=True)
-        code = outcome_of(error).code
-        sys.exit(ExitCode.USAGE if code is ExitCode.FAILED else code)
+        with interruptions:
+            app(arguments, prog_name="tenbaud")
+    except SystemExit as ended:
+        code = ended.code if isinstance(ended.code, int) else int(ExitCode.FAILED)
     except KeyboardInterrupt:
-        sys.exit(ExitCode.INTERRUPTED)
+        code = int(ExitCode.INTERRUPTED)
+    except (TenbaudError, ValueError) as error:
+        _say(str(error))
+        outcome = outcome_of(error)
+        code = int(ExitCode.USAGE if outcome.code is ExitCode.FAILED else outcome.code)
+    except OSError as error:
+        what = f"{_shown(error.filename)}: " if error.filename is not None else ""
+        _say(f"{what}{_reason(error)}")
+        code = int(ExitCode.NOT_WRITTEN if error.errno in NOT_WRITABLE else ExitCode.USAGE)
+    else:
+        code = 0
+    if interruptions.received is not None:
+        _say(f"interrupted by {interruptions.received.name}")
+    return code
+
+
+def _say(text: str) -> None:
+    sys.stderr.write(f"tenbaud: {text}\n")
+
+
+def _reason(error: OSError) -> str:
+    return os.strerror(error.errno) if error.errno else str(error)
+
+
+def _shown(name: object) -> str:
+    return os.fsdecode(name) if isinstance(name, bytes) else str(name)

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from tenbaud.cli.checkout import need_checkout
 from tenbaud.cli.figures import DATA_VARIABLE, found_data
 
 bench = typer.Typer(no_args_is_help=True, help="Measure coders against what is possible.")
@@ -31,13 +32,15 @@ def coders(
     ] = None,
 ) -> None:
     """Fly every coder on the same seeds, write the table and the pictures."""
+    need_checkout("bench coders")
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-    from tenbaud.bench.draw import draw_disturbances, draw_rates
-    from tenbaud.bench.page import DISTURBANCE_PICTURE, PICTURE, write_page
-    from tenbaud.bench.plan import FULL, QUICK, fly_all
-    from tenbaud.bench.recorded import fly_recorded
+    from reproduction.limits.draw import draw_disturbances, draw_rates
+    from reproduction.limits.page import DISTURBANCE_PICTURE, PICTURE, write_page
+    from reproduction.limits.plan import FULL, QUICK, fly_all
+    from reproduction.limits.recorded import fly_recorded
+    from tenbaud.files.whole import make_folder
 
     found = found_data(data)
     columns = (
@@ -54,7 +57,7 @@ def coders(
         )
         bar.update(task, description="recorded flights")
         recorded = fly_recorded(found) if found else []
-    (docs / "figures").mkdir(parents=True, exist_ok=True)
+    make_folder(docs / "figures")
     write_page(docs / "LIMITS.md", outcome, recorded, quick)
     draw_rates(docs / PICTURE, outcome)
     draw_disturbances(docs / DISTURBANCE_PICTURE, outcome)

@@ -10,7 +10,7 @@ import typer
 from tenbaud.cli import options
 
 if TYPE_CHECKING:
-    from tenbaud.build import Agreement
+    from tenbaud.build.flight import Agreement
     from tenbaud.flight.demo import DemoResult
     from tenbaud.flight.viewing import ViewWish
     from tenbaud.recording.folder import RunFolder
@@ -107,13 +107,15 @@ def _view_wish(
         if open_browser:
             raise typer.BadParameter("--open opens the live page; it goes with --view")
         return None
+    from channel.links.endpoints import loopback_host
     from tenbaud.flight.viewing import ViewWish
     from tenbaud.view.server import Address, free_port, require_nicegui
 
     if len(agreements) > 1 or agreements[0].config.link.kind == "memory":
         raise typer.BadParameter("--view shows one flight of two processes: one --mismatch, no memory")
     require_nicegui()
-    address = Address(port=port or free_port("127.0.0.1"))
+    host = loopback_host()
+    address = Address(host, port or free_port(host))
     address.check()
     return ViewWish(address.port, open_browser)
 
@@ -125,8 +127,8 @@ def _agree_all(
     clock: options.ClockOption,
 ) -> list[Agreement]:
     """Return the flights, each checked as far as it can be before anything starts."""
-    from tenbaud.build import agree
-    from tenbaud.build_ends import check_parts
+    from tenbaud.build.ends import check_parts
+    from tenbaud.build.flight import agree
     from tenbaud.config.load import load_config
 
     configs = [load_config(preset, config, change, allow_code=True) for change in changes]
@@ -173,7 +175,7 @@ def _fly_shown(
 ) -> DemoResult:
     """Fly once, and show how it goes."""
     from tenbaud.flight.demo import fly_demo
-    from tenbaud.flight.status import StatusDisplay
+    from tenbaud.flight.display import StatusDisplay
 
     with StatusDisplay() as display:
         return fly_demo(agreement, folder, display.show, view=wish, pace=pace)

@@ -26,8 +26,8 @@ def doctor(
 
     [dim]tenbaud doctor --connect tcp/192.168.1.20:7447[/dim]
     """
+    from tenbaud.checks.doctor import examine, report
     from tenbaud.config.load import load_config
-    from tenbaud.doctor import examine, report
 
     findings = examine(load_config(preset, config, allow_code=allow_code), tuple(connect or ()))
     if json:

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from tenbaud.cli import options
+from tenbaud.cli.checkout import need_checkout
 
 DRAWINGS = ("theory", "animation")
 DATA_VARIABLE = "TENBAUD_FLIGHT_DATA"
@@ -47,7 +48,9 @@ def figures(
 
     [dim]tenbaud figures theory animation --docs docs[/dim]
     """
-    from tenbaud.figures.make import NUMBERS
+    need_checkout("figures")
+    from reproduction.paper.make import NUMBERS
+    from tenbaud.files.whole import make_folder
     from tenbaud.recording.folder import create_run_folder
 
     drawings = [name for name in which or () if name in DRAWINGS]
@@ -56,7 +59,7 @@ def figures(
     # A run's folder is for flights; the pages' drawings leave none.
     folder = create_run_folder(None, "figures", out) if wanted or docs is None else docs
     pictures = (docs or folder) / "figures"
-    pictures.mkdir(parents=True, exist_ok=True)
+    make_folder(pictures)
     if drawings:
         _draw_documentation(drawings, pictures)
     if wanted:
@@ -68,7 +71,7 @@ def _draw_paper(wanted: set[str], folder: Path, pictures: Path, data: Path | Non
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    from tenbaud.figures.make import NUMBERS, make_figures
+    from reproduction.paper.make import NUMBERS, make_figures
 
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
@@ -83,7 +86,7 @@ def _draw_paper(wanted: set[str], folder: Path, pictures: Path, data: Path | Non
     typer.echo(f"SVG and recordings in {folder}")
     if wanted != set(NUMBERS):
         return
-    from tenbaud.figures.page import write_page
+    from reproduction.paper.page import write_page
 
     page = pictures.parent / "REPRODUCTION.md"
     write_page(page, results)
@@ -97,8 +100,8 @@ def _draw_paper(wanted: set[str], folder: Path, pictures: Path, data: Path | Non
 
 def _draw_documentation(drawings: list[str], pictures: Path) -> None:
     """Draw what belongs to no figure of the paper."""
-    from tenbaud.figures.animation import draw_animation
-    from tenbaud.figures.theory import draw_theory
+    from reproduction.paper.animation import draw_animation
+    from reproduction.paper.theory import draw_theory
 
     if "theory" in drawings:
         for path in draw_theory(pictures, lambda name: typer.echo(f"drawing {name}", err=True)):
@@ -119,8 +122,8 @@ def _wanted(names: list[str], known: tuple[str, ...]) -> set[str]:
 
 def found_data(given: Path | None) -> Path | None:
     """Return the folder of the recorded flights; ConfigError when it was named and holds none."""
+    from reproduction.paper.real import UIUC_FILE
     from tenbaud.config.load import ConfigError
-    from tenbaud.figures.real import UIUC_FILE
 
     if given is None:
         beside = Path("..") / "shared" / "data"

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 EXCITATIONS = ("square:0.2,0,2.5", "square:0.25,0.1,3")
 PRINTED_EVERY_S = 10.0
+DURATION_S = 60.0
+TICKS_MAX = 10_000_000
+"""of an experiment, which is in memory as a whole"""
 
 
 class UnitOption(StrEnum):
@@ -26,6 +29,19 @@ class UnitOption(StrEnum):
     COUNTS = "counts"
     RAD = "rad"
     DEG = "deg"
+
+
+Start = Annotated[
+    float, typer.Option("--from", help="Use the record from here on, s.", min=0.0, max=1e7)
+]
+End = Annotated[
+    float | None, typer.Option("--to", help="Use the record up to here, s.", min=0.0, max=1e7)
+]
+Bandwidth = Annotated[
+    float, typer.Option(help="Pass band w_f of the filters, rad/s.", min=0.001, max=1000.0)
+]
+Damping = Annotated[float, typer.Option(help="Damping rho of the filters.", min=0.01, max=100.0)]
+Forgetting = Annotated[float, typer.Option(help="alpha of (10), 1/s.", min=0.0, max=100.0)]
 
 
 def identify(
@@ -56,14 +72,14 @@ def identify(
     unit: Annotated[
         UnitOption, typer.Option(help="Unit of the log's angle column.")
     ] = UnitOption.COUNTS,
-    start: Annotated[float, typer.Option("--from", help="Use the record from here on, s.")] = 0.0,
-    end: Annotated[float | None, typer.Option("--to", help="Use the record up to here, s.")] = None,
+    start: Start = 0.0,
+    end: End = None,
     equilibrium: Annotated[
         str, typer.Option(help="theta_0: auto, quiet (a stretch at rest), estimate, or rad.")
     ] = "auto",
-    bandwidth: Annotated[float, typer.Option(help="Pass band w_f of the filters, rad/s.")] = 1.0,
-    damping: Annotated[float, typer.Option(help="Damping rho of the filters.")] = 0.7,
-    forgetting: Annotated[float, typer.Option(help="alpha of (10), 1/s.")] = 0.01,
+    bandwidth: Bandwidth = 1.0,
+    damping: Damping = 0.7,
+    forgetting: Forgetting = 0.01,
     settings: options.Settings = None,
     allow_code: options.AllowCode = False,
     out: options.Out = None,
@@ -117,7 +133,10 @@ def _records(
             update={"transmitter": config.transmitter.model_copy(update={"plant": rest})}
         )
         signals = excitation or list(EXCITATIONS)
-        return [(signal, from_rig(at_rest, signal, duration or 60.0)) for signal in signals]
+        ticks = (duration or DURATION_S) / config.timing.tick_s
+        if ticks > TICKS_MAX:
+            raise typer.BadParameter(f"--duration: {ticks:.3g} ticks; at most {TICKS_MAX:.3g}")
+        return [(signal, from_rig(at_rest, signal, duration or DURATION_S)) for signal in signals]
     if source.is_dir() or source.suffix == ".mcap":
         return [(source.name, from_run(source))]
     log = config.flight_log
@@ -159,7 +178,7 @@ def _write(
 
 
 def _true_values(config: FlightConfig) -> tuple[float, ...]:
-    from tenbaud.build_rig import nominal_plant
+    from tenbaud.build.rig import nominal_plant
 
     plant = nominal_plant(config).mismatched(config.transmitter.plant.mismatch)
     return plant.rate_damping_per_s, plant.stiffness_per_s2, plant.torque_gain_rad_per_v_s2

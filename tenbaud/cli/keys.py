@@ -28,7 +28,7 @@ Hosts = Annotated[
     list[str] | None,
     typer.Option("--host", help="Address or name at which others connect to it; repeatable."),
 ]
-Days = Annotated[float, typer.Option(help="How long the certificate is valid.", min=0.01)]
+Days = Annotated[float, typer.Option(help="How long the certificate is valid.", min=0.01, max=3650.0)]
 Name = Annotated[str, typer.Argument(help="Name of the node, such as rig.")]
 DEFAULT_FOLDER = Path("keys")
 

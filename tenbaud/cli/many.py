@@ -15,8 +15,8 @@ import typer
 from tenbaud.cli import options
 
 if TYPE_CHECKING:
-    from channel.terms import Clock
-    from tenbaud.build import Agreement
+    from channel.protocol.terms import Clock
+    from tenbaud.build.flight import Agreement
     from tenbaud.flight.many import ManyHost
     from tenbaud.flight.summary import Summary
 
@@ -35,15 +35,18 @@ def serve(
     many: Many, node: options.NodeOptions, addresses: options.Addresses, changed: dict[str, Any]
 ) -> None:
     """Serve until interrupted, or until so many flights have ended; see `docs/many-rigs.md`."""
-    from channel.links.zenoh_config import SESSIONS_MAX
-    from channel.links.zenoh_hub import ZenohHub
-    from receiver.many_service import ManyService
-    from tenbaud.build_ends import check_parts
+    from channel.links.zenoh.config import SESSIONS_MAX
+    from channel.links.zenoh.hub import ZenohHub
+    from receiver.loops.many import ManyService
+    from tenbaud.build.ends import check_parts
     from tenbaud.cli.addresses import endpoints_of
+    from tenbaud.files.whole import write_whole
     from tenbaud.flight.ends import SWITCH_INTERVAL_S, knocks
     from tenbaud.flight.many import ManyHost
     from tenbaud.flight.many_status import ManyStatus
+    from tenbaud.flight.outcome import ExitCode
     from tenbaud.flight.stop import StopFlag
+    from tenbaud.flight.trouble import Certificate
     from tenbaud.recording.folder import create_run_folder
 
     agreement_of = agreements(node.preset, node.config, many.configs, changed, node.clock.value)
@@ -64,6 +67,7 @@ def serve(
             should_stop=stop,
         ) as hub,
     ):
+        certificate = Certificate(where.security)
         root = create_run_folder(None, "receiver-many", node.out)
         lines: list[Callable[[str], None]] = [lambda text: typer.echo(text, err=True)]
         host = ManyHost(hub, agreement_of, root, many.rigs_max, lambda text: lines[-1](text))
@@ -80,17 +84,23 @@ def serve(
         try:
             with ManyStatus(service, many.sessions, shown=not node.json) as status:
                 lines.append(status.tell)
-                service.run(lambda: stop() or _enough(host, many.flights))
+                service.run(lambda: stop() or certificate.expired() or _enough(host, many.flights))
         finally:
             lines[1:] = []
             host.close()
     summary = _summary(host, service.lateness.percentile_ms, many.sessions)
     summary["turned_away"] = dict(refused + hub.counts.refused)
-    (root / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    write_whole(root / "summary.json", json.dumps(summary, indent=2) + "\n")
     if node.json:
         sys.stdout.write(json.dumps(summary, indent=2) + "\n")
     else:
         _show(host.summaries, root)
+    if certificate.expired() and not stop.raised:
+        typer.echo(f"tenbaud: {certificate.text()}", err=True)
+        raise typer.Exit(int(ExitCode.LINK_LOST))
+    if host.counts["not_written"]:
+        typer.echo(f"tenbaud: {host.counts['not_written']} files below {root} are not whole", err=True)
+        raise typer.Exit(int(ExitCode.NOT_WRITTEN))
 
 
 def agreements(
@@ -100,8 +110,8 @@ def agreements(
 
     A file is read anew when it has changed.
     """
-    from tenbaud.build import agree
-    from tenbaud.build_ends import check_parts
+    from tenbaud.build.ends import check_parts
+    from tenbaud.build.flight import agree
     from tenbaud.config.load import load_config
 
     known: dict[Path | None, tuple[float, Agreement]] = {}

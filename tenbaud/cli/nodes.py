@@ -112,12 +112,14 @@ def _run(
 ) -> None:
     from dataclasses import replace
 
-    from tenbaud.build import agree
-    from tenbaud.build_ends import check_parts
+    from tenbaud.build.ends import check_parts
+    from tenbaud.build.flight import agree
     from tenbaud.cli.addresses import endpoints_of
     from tenbaud.config.load import dump_config, load_config
+    from tenbaud.files.whole import write_whole
     from tenbaud.flight import ends
-    from tenbaud.flight.outcome import ExitCode
+    from tenbaud.flight.outcome import ExitCode, first_code
+    from tenbaud.flight.report import write_up
     from tenbaud.recording.folder import RunFolder, create_run_folder
     from tenbaud.telemetry.station import Wish
 
@@ -131,22 +133,25 @@ def _run(
     whole = node.run_folder is None
     folder = RunFolder(node.run_folder or create_run_folder(None, f"{role}-{config.preset}", node.out))
     if whole:
-        folder.config.write_text(dump_config(config))
+        write_whole(folder.config, dump_config(config))
         _introduce(role, agreement.identity, config, endpoints, folder)
     run_end = ends.run_transmitter if role == "transmitter" else ends.run_receiver
     mode = node.status if node.status in ("lines", "none") else "auto"
     outcome, summary = run_end(agreement, endpoints, folder, mode)  # type: ignore[arg-type]
-    if whole:
-        _write_up(role, config, folder, summary)
+    draw = role == "transmitter" and bool(summary["samples"])
+    problems = write_up(folder, config, summary, draw) if whole else []
     if node.json:
         ends.write_json(summary)
     elif whole and summary["samples"]:
         from tenbaud.flight.report import show_summary
 
         show_summary(summary, folder)
-    if outcome.code is not ExitCode.OK:
-        typer.echo(f"tenbaud {role}: {outcome.text}", err=True)
-        raise typer.Exit(int(outcome.code))
+    # What ended the flight is said last.
+    for one in (*problems, *([outcome] if outcome.code is not ExitCode.OK else [])):
+        typer.echo(f"tenbaud {role}: {one.text}", err=True)
+    code = first_code(outcome.code, *(problem.code for problem in problems))
+    if code is not ExitCode.OK:
+        raise typer.Exit(int(code))
 
 
 def _check_link(config: FlightConfig, insecure: bool) -> None:
@@ -156,19 +161,9 @@ def _check_link(config: FlightConfig, insecure: bool) -> None:
             "link.kind = memory joins two ends in one process: `tenbaud demo --link memory`"
         )
     if config.link.kind == "serial":
-        from channel.links.serial_port import check_port
+        from channel.links.serial.port import check_port
 
         check_port(config.link.port, insecure)
-
-
-def _write_up(role: Role, config: FlightConfig, folder: RunFolder, summary: dict[str, Any]) -> None:
-    from tenbaud.flight.report import draw_run, figure_title, write_summary
-
-    write_summary(folder, summary)
-    if role == "transmitter" and summary["samples"]:
-        problem = draw_run(folder, figure_title(config, summary))
-        if problem is not None:
-            typer.echo(problem, err=True)
 
 
 def _introduce(

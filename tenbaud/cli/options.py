@@ -33,8 +33,14 @@ AllowCode = Annotated[
         help="Import and run the classes from outside (module:Class) that the configuration names.",
     ),
 ]
-Duration = Annotated[float | None, typer.Option(help="Flight time in seconds.", show_default=False)]
-Seed = Annotated[int | None, typer.Option(help="Seed of everything random.", show_default=False)]
+Duration = Annotated[
+    float | None,
+    typer.Option(help="Flight time in seconds.", min=1e-5, max=1e7, show_default=False),
+]
+Seed = Annotated[
+    int | None,
+    typer.Option(help="Seed of everything random.", min=0, max=2**63 - 1, show_default=False),
+]
 Lead = Annotated[
     int | None,
     typer.Option(help="Command lead D in ticks; chosen from the delivery times if not given."),
@@ -73,10 +79,14 @@ Configs = Annotated[
         show_default=False,
     ),
 ]
-RigsMax = Annotated[int, typer.Option(help="With --sessions: flights at a time, at most.", min=1)]
+RigsMax = Annotated[
+    int, typer.Option(help="With --sessions: flights at a time, at most.", min=1, max=100_000)
+]
 Flights = Annotated[
     int | None,
-    typer.Option(help="With --sessions: end after so many flights.", min=1, show_default=False),
+    typer.Option(
+        help="With --sessions: end after so many flights.", min=1, max=10**9, show_default=False
+    ),
 ]
 Listen = Annotated[list[str] | None, typer.Option(help="Zenoh endpoint to listen on; repeatable.")]
 Connect = Annotated[list[str] | None, typer.Option(help="Zenoh endpoint to connect to; repeatable.")]
@@ -196,7 +206,12 @@ AllowControl = Annotated[
 ]
 Pace = Annotated[
     float | None,
-    typer.Option(min=0.05, help="Virtual clock: at most so many times real time.", show_default=False),
+    typer.Option(
+        min=0.05,
+        max=1e6,
+        help="Virtual clock: at most so many times real time.",
+        show_default=False,
+    ),
 ]
 View = Annotated[
     bool,

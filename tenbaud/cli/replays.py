@@ -39,7 +39,6 @@ def replay(
     if run.is_file() and run.suffix != ".mcap":
         _replay_file(run, allow_code)
         return
-    from tenbaud.recording.errors import RecordingError
     from tenbaud.replay.record import load_record
     from tenbaud.replay.replay import replay as fly_again
     from tenbaud.replay.replay import save_symbols
@@ -51,10 +50,7 @@ def replay(
     replayed = fly_again(record)
     typer.echo(replay_text(replayed))
     if save is not None:
-        try:
-            save_symbols(replayed, save)
-        except OSError as error:
-            raise RecordingError(f"{save} cannot be written: {error.strerror}.") from error
+        save_symbols(replayed, save)
         typer.echo(f"the flight is in {save}: {len(replayed.packed.data)} bytes")
     if not replayed.equal:
         raise typer.Exit(int(ExitCode.FAILED))
@@ -84,8 +80,8 @@ def audit(
 
     [dim]tenbaud audit runs/2026-11-23T10-00-00_paper-10baud[/dim]
     """
-    from tenbaud.replay.audit import audit as audit_run
-    from tenbaud.replay.text import audit_text
+    from tenbaud.audit.audit import audit as audit_run
+    from tenbaud.audit.text import audit_text
 
     result = audit_run(run, other, allow_code=allow_code)
     typer.echo(audit_text(result))

@@ -40,21 +40,25 @@ def rig(
         str | None, typer.Option(help="Recorded flight that turns the encoder instead of a body.")
     ] = None,
     samples_per_s: Annotated[
-        float | None, typer.Option("--rate", help="Samples per second; 480 for cobs.")
+        float | None,
+        typer.Option("--rate", help="Samples per second; 480 for cobs.", min=1.0, max=5000.0),
     ] = None,
     lines: Annotated[
         str, typer.Option(help="ascii: checked (E,...*HH), plain (t_us,c0,c1,c2), counts (c0 c1 c2).")
     ] = "checked",
     polled: Annotated[bool, typer.Option(help="ascii: a sample for every line `e`.")] = False,
     watchdog: Annotated[
-        float, typer.Option(help="Seconds without a command after which the outputs go off.")
+        float,
+        typer.Option(
+            help="Seconds without a command after which the outputs go off.", min=0.001, max=3600.0
+        ),
     ] = 0.1,
     fault: Annotated[
         list[str] | None,
         typer.Option(help="Such as stuck@5..8, silent@5, unplug@5..7, reset@5, drop=0.01; repeatable."),
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(help="Seconds to run; for ever if not given.")
+        float | None, typer.Option(help="Seconds to run; for ever if not given.", min=0.0, max=1e7)
     ] = None,
     settings: options.Settings = None,
     allow_code: options.AllowCode = False,
@@ -66,7 +70,7 @@ def rig(
 
     [dim]tenbaud rig --format quarc --port tcp:127.0.0.1:18000 --fault silent@10[/dim]
     """
-    from tenbaud.build_emulator import build_emulator
+    from tenbaud.build.emulator import build_emulator
     from tenbaud.config.load import load_config
 
     changed = options.overrides(
@@ -130,7 +134,7 @@ def rig_check(
     rig: options.Rig = None,
     preset: options.Preset = None,
     config: options.ConfigFile = None,
-    seconds: Annotated[float, typer.Option(help="How long to look.")] = 10.0,
+    seconds: Annotated[float, typer.Option(help="How long to look.", min=0.1, max=86_400.0)] = 10.0,
     settings: options.Settings = None,
     json: options.AsJson = False,
 ) -> None:
@@ -140,8 +144,8 @@ def rig_check(
 
     [dim]tenbaud rig-check --rig cobs:/dev/ttyACM0[/dim]
     """
+    from tenbaud.checks.rigcheck import check_rig, show_check
     from tenbaud.config.load import load_config
-    from tenbaud.rigcheck import check_rig, show_check
 
     changed = options.overrides(rig=rig, settings=settings)
     result = check_rig(load_config(preset, config, changed), seconds, live=not json)

@@ -22,7 +22,7 @@ def settings_of(rig: str) -> dict[str, object]:
             return {
                 "transmitter.rig": "quarc",
                 "transmitter.quarc.role": "client" if kind == "quarc" else "server",
-                "transmitter.quarc.host": host or "127.0.0.1",
+                "transmitter.quarc.host": host.strip("[]") or "127.0.0.1",
                 "transmitter.quarc.port": int(port),
             }
         case "cobs" | "ascii" | "qsb":

@@ -13,7 +13,7 @@ from tenbaud.cli import options
 
 if TYPE_CHECKING:
     from channel.links.security import Invited, Security
-    from channel.links.zenoh_router import ZenohRouter
+    from channel.links.zenoh.router import ZenohRouter
 
 POLL_S = 0.2
 TELL_S = 1.0
@@ -32,7 +32,9 @@ def router(
     insecure: options.Insecure = False,
     connections_max: Annotated[
         int,
-        typer.Option(min=1, help="Nodes connected at a time at most: rigs, receivers, viewers."),
+        typer.Option(
+            min=1, max=100_000, help="Nodes connected at a time at most: rigs, receivers, viewers."
+        ),
     ] = 64,
     print_config: Annotated[
         bool,
@@ -45,13 +47,13 @@ def router(
 
     The ends connect with `--router tls/10.0.0.9:7447 --peer hub`.
     """
-    from channel.links.endpoints import DEFAULT_ENDPOINT, check_endpoints, with_protocol
-    from channel.links.zenoh_router import router_file
+    from channel.links.endpoints import check_endpoints, default_endpoint, with_protocol
+    from channel.links.zenoh.router import router_file
     from tenbaud.cli.addresses import INSECURE
 
     security = _security(keys, flight or [])
     protocol = "tcp" if security is None else "tls"
-    addresses = tuple(listen or [with_protocol(DEFAULT_ENDPOINT, protocol)])
+    addresses = tuple(listen or [with_protocol(default_endpoint(), protocol)])
     check_endpoints(addresses, insecure, security is not None)
     if insecure and security is None:
         typer.echo(INSECURE, err=True)
@@ -84,8 +86,8 @@ def _security(keys: Path | None, flights: list[str]) -> Security | None:
 def _route(
     addresses: tuple[str, ...], security: Security | None, insecure: bool, connections_max: int
 ) -> None:
-    from channel.links.zenoh_gate import HandshakeLog
-    from channel.links.zenoh_router import ZenohRouter
+    from channel.links.zenoh.gate import HandshakeLog
+    from channel.links.zenoh.router import ZenohRouter
     from tenbaud.flight.stop import StopFlag
 
     with (

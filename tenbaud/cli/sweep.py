@@ -24,7 +24,10 @@ def sweep(
     workers: Annotated[
         int | None,
         typer.Option(
-            min=1, help="Processes on this machine; all cores if not given.", show_default=False
+            min=1,
+            max=1024,
+            help="Processes on this machine; all cores if not given.",
+            show_default=False,
         ),
     ] = None,
     scheduler: Annotated[
@@ -32,13 +35,12 @@ def sweep(
         typer.Option(help="Dask scheduler to fly on, such as tcp://HOST:8786.", show_default=False),
     ] = None,
     seeds: Annotated[
-        int | None, typer.Option(min=1, help="Seeds of each point, instead of the study's.")
+        int | None,
+        typer.Option(min=1, max=1_000_000, help="Seeds of each point, instead of the study's."),
     ] = None,
     allow_code: options.AllowCode = False,
     plots: Annotated[bool, typer.Option(help="Draw the plots.")] = True,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Summary on standard output as JSON, nothing else there.")
-    ] = False,
+    as_json: options.AsJson = False,
 ) -> None:
     """Fly a study: settings swept on a grid or sampled, many seeds, results as Parquet and plots.
 

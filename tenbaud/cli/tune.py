@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 import re
 from dataclasses import replace
 from enum import StrEnum
@@ -46,9 +45,12 @@ Model = Annotated[
         "--model", help="Fit the pitch model's damping, stiffness, gain, lag and equilibrium as well."
     ),
 ]
-Seeds = Annotated[int, typer.Option(min=1, help="Simulated flights for the fit.")]
+Seeds = Annotated[int, typer.Option(min=1, max=100_000, help="Simulated flights for the fit.")]
 TestSeeds = Annotated[
-    int, typer.Option(min=1, help="Simulated flights for the judgement, of the seeds after those.")
+    int,
+    typer.Option(
+        min=1, max=100_000, help="Simulated flights for the judgement, of the seeds after those."
+    ),
 ]
 TrainShare = Annotated[
     float,
@@ -61,11 +63,12 @@ Evaluations = Annotated[
     int,
     typer.Option(
         min=1,
+        max=10_000_000,
         help="Sets of constants to fly at most, those configured included; each is flown on all "
         "flights for the fit.",
     ),
 ]
-Seed = Annotated[int, typer.Option(min=0, help="Seed of the search.")]
+Seed = Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Seed of the search.")]
 
 
 def tune(
@@ -129,29 +132,35 @@ def tune(
             progress.update(task, completed=count, description=f"best {math.degrees(error):.4g}°")
 
         tuned = fit(tuning, told, stop)
-    out.write_text(preset_text(tuning, tuned), encoding="utf-8")
-    if as_json:
-        typer.echo(json.dumps({**tuned._asdict(), "preset_file": str(out)}, indent=2))
-    else:
-        _tell(tuned)
-        typer.echo(f"{out}: fly it with --config {out}")
+    _leave(tuned, preset_text(tuning, tuned), out, as_json)
     if stop.raised:
         typer.echo(f"stopped after {tuned.evaluations} of {evaluations} evaluations", err=True)
         raise typer.Exit(ExitCode.INTERRUPTED)
 
 
 def _make_room(out: Path) -> None:
-    """Make the folder of the preset; StudyError where none can be written, before anything is flown."""
+    """Make the folder of the preset; an error where none can be written, before anything is flown."""
+    from tenbaud.files.whole import check_room, make_folder
     from tenbaud.studies.settings import StudyError
 
     if out.exists():
         raise StudyError(f"{out} exists already; name another file")
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StudyError(f"cannot write {out}: {error.strerror}") from error
-    if not os.access(out.parent, os.W_OK):
-        raise StudyError(f"cannot write {out}: its folder may not be written to")
+    make_folder(out.parent)
+    check_room(out)
+
+
+def _leave(tuned: Tuned, preset: str, out: Path, as_json: bool) -> None:
+    """Print what was found, and write it."""
+    from tenbaud.files.whole import write_whole
+
+    if not as_json:
+        _tell(tuned)
+    # After the figures, which a full disk must not take along.
+    write_whole(out, preset)
+    if as_json:
+        typer.echo(json.dumps({**tuned._asdict(), "preset_file": str(out)}, indent=2))
+    else:
+        typer.echo(f"{out}: fly it with --config {out}")
 
 
 def _tell(tuned: Tuned) -> None:

@@ -7,6 +7,15 @@ from typing import Annotated
 
 import typer
 
+Host = Annotated[
+    str | None,
+    typer.Option(
+        help="Address of the page; one beyond this machine needs --insecure. Not given: 127.0.0.1, or "
+        "::1 where there is no IPv4.",
+        show_default=False,
+    ),
+]
+
 
 def view(
     connect: Annotated[
@@ -22,9 +31,7 @@ def view(
     ] = None,
     session: Annotated[str, typer.Option(help="Session name; any if not given.")] = "**",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Of the page; 0: any free one.")] = 8710,
-    host: Annotated[
-        str, typer.Option(help="Address of the page; one beyond this machine needs --insecure.")
-    ] = "127.0.0.1",
+    host: Host = None,
     open_browser: Annotated[
         bool, typer.Option("--open", help="Open the page in the browser of this machine.")
     ] = False,
@@ -56,8 +63,8 @@ def view(
 
         typer.echo(json.dumps(schema_json(), indent=2))
         return
-    from channel.links.endpoints import check_endpoints
-    from channel.links.zenoh_hub import is_session_pattern
+    from channel.links.endpoints import check_endpoints, loopback_host
+    from channel.links.zenoh.hub import is_session_pattern
     from tenbaud.view.feed import Feed
     from tenbaud.view.server import Address, free_port, serve
 
@@ -66,7 +73,7 @@ def view(
             f"--session {session!r}: a session's name as in rig/7, with * for any one part"
         )
     # As in a URL, or bare.
-    host = host.removeprefix("[").removesuffix("]")
+    host = loopback_host() if host is None else host.removeprefix("[").removesuffix("]")
     address = Address(host, port or free_port(host), insecure)
     credentials = None
     if keys is not None:

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from tenbaud.config.section import Positive, Section
+from tenbaud.config.section import Counts, Positive, Section
 
 Channel = Annotated[int, Field(ge=0, le=9)]
 Sign = Literal[-1, 1]
@@ -18,7 +18,7 @@ class AxisSection(Section):
     channel: Channel = 0
     counts_per_turn: Annotated[int, Field(ge=2, le=10_000_000)] = 4096
     sign: Sign = 1
-    zero_counts: int | Literal["first"] = 0
+    zero_counts: Counts | Literal["first"] = 0
     """counts at 0 rad; "first": those of the first sample, with the body at 0 rad then"""
 
 
@@ -51,7 +51,7 @@ class MotorsSection(Section):
     channels: tuple[Channel, Channel] = (0, 1)
     """output of the front motor, of the rear motor"""
     signs: tuple[Sign, Sign] = (1, 1)
-    device_volts_max: Annotated[float, Field(gt=0.0, le=32.0)] = 10.0
+    device_volts_max: Annotated[float, Field(ge=0.001, le=32.0)] = 10.0
     """what the device's output can give, in its own unit"""
 
 
@@ -64,9 +64,9 @@ class BridgeSection(Section):
     axes: tuple[Literal["travel", "pitch", "elevation"], ...] = ("travel", "pitch", "elevation")
     """those that are wired; pitch must be among them"""
     motors: MotorsSection = MotorsSection()
-    stale_s: Annotated[float, Field(gt=0.0, le=10.0)] = 0.1
+    stale_s: Annotated[float, Field(ge=0.001, le=10.0)] = 0.1
     """age of the newest sample beyond which the sensor counts as lost"""
-    first_sample_timeout_s: Annotated[float, Field(gt=0.0, le=120.0)] = 5.0
+    first_sample_timeout_s: Annotated[float, Field(ge=0.01, le=120.0)] = 5.0
     rate_max_rad_per_s: Positive = 20.0
     """faster than any axis turns; a step of the counts beyond it is a jump"""
 
@@ -112,11 +112,11 @@ class HilSection(Section):
 
     card_type: str = "q8_usb"
     card_identifier: str = "0"
-    sample_rate_hz: Annotated[float, Field(gt=0.0, le=8000.0)] = 500.0
+    sample_rate_hz: Annotated[float, Field(ge=0.1, le=8000.0)] = 500.0
     encoder_channels: tuple[Annotated[int, Field(ge=0, le=31)], ...] = (0, 1, 2)
     """of the board; the axes' channels count within this list"""
     analog_channels: tuple[Annotated[int, Field(ge=0, le=31)], ...] = (0, 1)
     enable_channels: tuple[Annotated[int, Field(ge=0, le=31)], ...] = ()
     """digital outputs that switch the amplifiers on"""
-    watchdog_s: Annotated[float, Field(gt=0.0, le=5.0)] = 0.1
+    watchdog_s: Annotated[float, Field(ge=0.001, le=5.0)] = 0.1
     card_options: str = ""

@@ -12,11 +12,23 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
 
-from channel.impairments import parse_impairments
-from channel.sabotage import parse_sabotage
+from channel.line.impairments import parse_impairments
+from channel.protocol.sabotage import parse_sabotage
 from tenbaud.config.permission import CodePermission
 from tenbaud.config.rig_schema import BridgeSection, HilSection, QuarcSection, SerialSection
-from tenbaud.config.section import NotNegative, Options, PluginName, Positive, Section
+from tenbaud.config.section import (
+    AngleRange,
+    Counts,
+    Factor,
+    Gain,
+    Mismatch,
+    NotNegative,
+    Options,
+    PluginName,
+    Positive,
+    Section,
+    Volts,
+)
 
 
 def _checked_sabotage(text: str) -> str:
@@ -33,9 +45,9 @@ SHARED_SECTIONS = ("timing", "channel", "model", "coder", "limits")
 class Timing(Section):
     """Ticks, samples and lead."""
 
-    tick_s: Annotated[float, Field(gt=0.0, le=1.0)] = 0.01
+    tick_s: Annotated[float, Field(ge=1e-5, le=1.0)] = 0.01
     """h: control tick"""
-    symbol_period_s: Annotated[float, Field(gt=0.0, le=60.0)] = 0.1
+    symbol_period_s: Annotated[float, Field(ge=1e-5, le=60.0)] = 0.1
     """T_s: one word per this time; a whole number of ticks"""
     lead_ticks: Annotated[int, Field(ge=0, le=10_000)] | Literal["auto"] = "auto"
     """D: command lead; "auto": 0 where the virtual clock allows it, else the smallest that is safe"""
@@ -54,13 +66,13 @@ class Timing(Section):
 class ChannelSection(Section):
     """What the line carries, and when."""
 
-    rate_baud: Annotated[float, Field(gt=0.0, le=100_000.0)] = 10.0
+    rate_baud: Annotated[float, Field(ge=0.001, le=100_000.0)] = 10.0
     """R: symbols per second that may go up the link"""
     delivery: Literal["start", "end"] = "start"
     """a symbol is there when its slot begins (the paper), or when its slot is over (a real wire)"""
-    deadline_allowance_s: NotNegative = 0.02
+    deadline_allowance_s: Annotated[float, Field(ge=0.0, le=3600.0)] = 0.02
     """how long after its due time a symbol may come before its slot is erased"""
-    downlink_budget_s: NotNegative = 0.01
+    downlink_budget_s: Annotated[float, Field(ge=0.0, le=3600.0)] = 0.01
     """time set aside for a command frame to reach the plant"""
     repeats: Annotated[int, Field(ge=0, le=32)] = 2
     """W: earlier samples that each command frame repeats"""
@@ -98,12 +110,12 @@ class ZoomCoderSection(Section):
     kind: Literal["zoom"] = "zoom"
     window_signs: Annotated[int, Field(ge=1, le=16)] = 2
     """how many signs the saturation test of (19) looks at; the paper's has two"""
-    initial_range_rad: Positive = 0.5
-    minimum_range_rad: Positive = 0.05
-    decay: Annotated[float, Field(gt=0.0, le=1.0)] = 0.95
+    initial_range_rad: AngleRange = 0.5
+    minimum_range_rad: AngleRange = 0.05
+    decay: Annotated[float, Field(ge=1e-6, le=1.0)] = 0.95
     correction: Literal["held", "impulse"] = "held"
     """held over the sample as in (22), or added to the state at once"""
-    gains: tuple[float, float] = (4.1, 8.6)
+    gains: tuple[Factor, Factor] = (4.1, 8.6)
     """l1 and l2 of (23): 1/s and 1/s^2 when held, per unit when impulse"""
 
 
@@ -111,20 +123,20 @@ class FixedCoderSection(Section):
     """One sign per sample and a range that never changes."""
 
     kind: Literal["fixed"] = "fixed"
-    range_rad: Positive = 0.1
+    range_rad: AngleRange = 0.1
     correction: Literal["held", "impulse"] = "held"
-    gains: tuple[float, float] = (4.1, 8.6)
+    gains: tuple[Factor, Factor] = (4.1, 8.6)
 
 
 class TimedCoderSection(Section):
     """One sign per sample and a range that shrinks with time: time-based zooming."""
 
     kind: Literal["timed"] = "timed"
-    initial_range_rad: Positive = 0.5
-    minimum_range_rad: Positive = 0.05
-    decay: Annotated[float, Field(gt=0.0, le=1.0)] = 0.95
+    initial_range_rad: AngleRange = 0.5
+    minimum_range_rad: AngleRange = 0.05
+    decay: Annotated[float, Field(ge=1e-6, le=1.0)] = 0.95
     correction: Literal["held", "impulse"] = "held"
-    gains: tuple[float, float] = (4.1, 8.6)
+    gains: tuple[Factor, Factor] = (4.1, 8.6)
 
 
 class StaticCoderSection(Section):
@@ -132,10 +144,10 @@ class StaticCoderSection(Section):
 
     kind: Literal["static"] = "static"
     bits: Annotated[int, Field(ge=1, le=15)] = 1
-    range_rad: Positive = 3.141592653589793
+    range_rad: AngleRange = 3.141592653589793
     """half the width that the cells cover"""
     correction: Literal["held", "impulse"] = "held"
-    gains: tuple[float, float] = (4.1, 8.6)
+    gains: tuple[Factor, Factor] = (4.1, 8.6)
 
 
 class WordsCoderSection(Section):
@@ -143,7 +155,7 @@ class WordsCoderSection(Section):
 
     kind: Literal["words"] = "words"
     bits: Annotated[int, Field(ge=1, le=15)] = 10
-    range_rad: Positive = 3.141592653589793
+    range_rad: AngleRange = 3.141592653589793
     rate_filter_s: NotNegative = 0.0
     """tau of a low-pass behind the differentiator; 0: none"""
 
@@ -152,16 +164,16 @@ class HistoryCoderSection(Section):
     """One sign that looks ahead when it is formed and back when it is read; ranges in rad."""
 
     kind: Literal["history"] = "history"
-    rows: Annotated[tuple[tuple[float, float, float], ...], Field(min_length=1, max_length=512)] = (
+    rows: Annotated[tuple[tuple[Factor, Factor, Factor], ...], Field(min_length=1, max_length=512)] = (
         (1.0, 0.75, 1.0),
     )
     """(angle, rate, range) of each pattern of the last signs: corrections in units of the range, the
     rate's per symbol period, and what the range is multiplied by. Bit j of a row's number says that the
     sign j + 1 samples ago was the present one"""
-    initial_range_rad: Positive = 0.01
-    minimum_range_rad: Positive = 0.001
-    maximum_range_rad: Positive = 3.0
-    weights: tuple[float, float, float] = (0.7, 0.45, 0.75)
+    initial_range_rad: AngleRange = 0.01
+    minimum_range_rad: AngleRange = 0.001
+    maximum_range_rad: AngleRange = 3.0
+    weights: tuple[Factor, Factor, Factor] = (0.7, 0.45, 0.75)
     """of the error that is left after the look-ahead: angle, angle times swing, swing"""
     lookahead: Annotated[int, Field(ge=0, le=6)] = 1
     """samples that the transmitter looks ahead"""
@@ -225,9 +237,9 @@ PLUGIN_SECTIONS: dict[str, type[Section]] = {"model": PluginModelSection, "coder
 class Limits(Section):
     """What a command may be; the receiver keeps to it and the guard beside the motors checks it."""
 
-    volts_max: Annotated[float, Field(gt=0.0, le=32.0)] = 5.0
+    volts_max: Annotated[float, Field(ge=0.001, le=32.0)] = 5.0
     slew_volts_per_s: Positive = 1000.0
-    initial_volts: tuple[float, float] = (0.0, 0.0)
+    initial_volts: tuple[Volts, Volts] = (0.0, 0.0)
     """command of the ticks before the first one decided"""
 
 
@@ -242,19 +254,11 @@ class PlantSection(Section):
     """the codec's model, so that the plant moves with it; or the constants in `pitch`"""
     pitch: PitchModelSection = PitchModelSection()
     """what the plant is relative to where the codec's model is none, or `relative_to` says so"""
-    mismatch: float | tuple[float, float, float] = 0.0
+    mismatch: Mismatch | tuple[Mismatch, Mismatch, Mismatch] = 0.0
     """fraction by which damping, stiffness and gain are off the model: 0.1 is 10 % more of each"""
     disturbance: str = ""
     """such as "q=2e-3,step=0.5@30": white torque density in rad^2/s^3, torque steps in rad/s^2"""
     initial_angle_rad: Annotated[float, Field(ge=-3.2, le=3.2)] = 0.0
-
-    @field_validator("mismatch")
-    @classmethod
-    def _plausible(cls, value: float | tuple[float, ...]) -> float | tuple[float, ...]:
-        for fraction in value if isinstance(value, tuple) else (value,):
-            if not -1.0 < fraction < 10.0:
-                raise ValueError("a fraction must be above -1 (nothing left) and below 10")
-        return value
 
 
 class TransmitterSection(Section):
@@ -263,18 +267,18 @@ class TransmitterSection(Section):
     rig: Literal["simulated", "replay", "serial", "quarc", "hil"] = "simulated"
     dry_run: bool = False
     """read the rig and never drive it"""
-    sight_bandwidth_rad_s: Annotated[float, Field(gt=0.0, le=10_000.0)] = 30.0
+    sight_bandwidth_rad_s: Annotated[float, Field(ge=0.001, le=10_000.0)] = 30.0
     """how fast the observer of the rate follows the encoder, for coders that use rates"""
     encoder_counts_per_turn: Annotated[int, Field(ge=2, le=10_000_000)] = 4096
     encoder_sign: Literal[-1, 1] = 1
-    encoder_zero_counts: int = 0
+    encoder_zero_counts: Counts = 0
     plant: PlantSection = PlantSection()
     watchdog_s: Positive | Literal["auto"] = "auto"
     """age of the last command after which the voltage is taken down; "auto": the largest of 5 T_s,
     0.1 s, command lead + 2 T_s and round trip + 2 T_s"""
     ramp_s: Positive = 1.0
     """time from the held voltage to the safe one"""
-    safe_volts: tuple[float, float] = (0.0, 0.0)
+    safe_volts: tuple[Volts, Volts] = (0.0, 0.0)
     soft_limit_rad: Positive | None = None
     """largest measured angle before the motors are taken down; none: no limit"""
     bridge: BridgeSection = BridgeSection()
@@ -290,13 +294,13 @@ class TransmitterSection(Section):
 class PidSection(Section):
     """PID law (24)."""
 
-    proportional: float = 0.1
-    integral: float = 0.053
-    derivative: float = 0.12
+    proportional: Gain = 0.1
+    integral: Gain = 0.053
+    derivative: Gain = 0.12
     unit: Literal["V/rad", "V/deg"] = "V/deg"
     """the paper prints no unit; only V/deg follows its reference"""
     anti_windup: Literal["conditional", "none"] = "conditional"
-    normal_force_volts: float = 0.0
+    normal_force_volts: Volts = 0.0
     """w of (1), common to both motors"""
 
 
@@ -340,7 +344,7 @@ class LinkSection(Section):
 
     kind: Literal["zenoh", "serial", "memory"] = "zenoh"
     session: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+(/[A-Za-z0-9_.-]+)*$")] = "helicopter"
-    peer_timeout_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 10.0
+    peer_timeout_s: Annotated[float, Field(ge=0.01, le=3600.0)] = 10.0
     """silence after which an end gives the other one up"""
     port: str = ""
     """serial: this end's port, /dev/ttyUSB0, COM3, socket://HOST:PORT, rfc2217://HOST:PORT"""
@@ -365,7 +369,7 @@ class LinkSection(Section):
 class TelemetrySection(Section):
     """What viewers are told while the flight goes on."""
 
-    rate_hz: Annotated[float, Field(gt=0.0, le=100.0)] = 20.0
+    rate_hz: Annotated[float, Field(ge=0.01, le=100.0)] = 20.0
     """messages per second of each end"""
 
 
@@ -376,7 +380,7 @@ class FlightConfig(CodePermission):
     """which preset the file builds on"""
     description: str = ""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
-    duration_s: Annotated[float, Field(gt=0.0, le=1e7)] = 100.0
+    duration_s: Annotated[float, Field(ge=1e-5, le=1e7)] = 100.0
     timing: Timing = Timing()
     channel: ChannelSection = ChannelSection()
     model: ModelSection = PitchModelSection()

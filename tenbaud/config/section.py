@@ -6,8 +6,15 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
+Positive = Annotated[float, Field(ge=1e-9, le=1e9)]
+AngleRange = Annotated[float, Field(ge=1e-9, le=1000.0)]
+NotNegative = Annotated[float, Field(ge=0.0, le=1e9)]
+Gain = Annotated[float, Field(ge=0.0, le=1e6)]
+Factor = Annotated[float, Field(ge=-1e6, le=1e6)]
+Mismatch = Annotated[float, Field(ge=-0.999, le=10.0)]
+"""A fraction: -1 would leave nothing of the constant."""
+Volts = Annotated[float, Field(ge=-32.0, le=32.0)]
+Counts = Annotated[int, Field(ge=-(2**31), lt=2**31)]
 
 PluginName = Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$")]
 """A class from outside, `module:Class`."""

@@ -16,21 +16,21 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import IO
 
-from channel.errors import LinkLost
 from channel.links.base import Role
 from channel.links.endpoints import free_endpoint
-from tenbaud.build import Agreement
+from tenbaud.build.flight import Agreement
 from tenbaud.config.load import dump_config
+from tenbaud.files.whole import write_whole
 from tenbaud.flight.ends import run_in_memory
 from tenbaud.flight.lifeline import start_child
-from tenbaud.flight.outcome import ExitCode
-from tenbaud.flight.report import draw_run, figure_title, write_summary
+from tenbaud.flight.outcome import ExitCode, Outcome, first_code, outcome_of_status
+from tenbaud.flight.report import write_up
+from tenbaud.flight.serial_line import EmulatedLine
 from tenbaud.flight.status import Status
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, joined
 from tenbaud.flight.viewing import Viewing, ViewWish, page_beside
 from tenbaud.recording.folder import RunFolder
-from tenbaud.serial_line import EmulatedLine
 
 OnStatus = Callable[[Status], None]
 ENDING_TIMEOUT_S = 15.0
@@ -60,7 +60,7 @@ def fly_demo(
     `view`: serve the live page beside the flight, which may then be steered from it. `pace`: on the
     virtual clock, at most so many times real time; not for the link "memory".
     """
-    folder.config.write_text(dump_config(agreement.config))
+    write_whole(folder.config, dump_config(agreement.config))
     if agreement.config.link.kind == "memory":
         outcome, upper, lower = run_in_memory(agreement, folder, "auto")
         messages = [] if outcome.code is ExitCode.OK else [outcome.text]
@@ -70,10 +70,10 @@ def fly_demo(
             if pace is not None:
                 viewing.transmitter += ["--pace", str(pace)]
             result = _fly_processes(agreement, folder, on_status, viewing, stop)
-    write_summary(folder, result.summary)
-    problem = draw_run(folder, figure_title(agreement.config, result.summary)) if draw else None
-    if problem is not None:
-        result.messages.append(problem)
+    problems = write_up(folder, agreement.config, result.summary, draw)
+    # What ended the flight is said last.
+    result.messages[:0] = [problem.text for problem in problems]
+    result.code = first_code(result.code, *(problem.code for problem in problems))
     return result
 
 
@@ -90,17 +90,29 @@ def _fly_processes(
         finally:
             for end in ends:
                 end.end()
-    if not transmitter.summary:
-        if stop():
-            # Ctrl-C came before the flight had begun, and there is nothing to sum up.
-            raise KeyboardInterrupt
-        raise LinkLost("the transmitter ended without a summary:\n  " + transmitter.last_words())
-    summary = joined(transmitter.summary, receiver.summary)
-    code = ExitCode(transmitter.process.returncode or receiver.process.returncode)
-    if code is not ExitCode.OK and summary["exit_code"] == ExitCode.OK:
-        summary["outcome"], summary["exit_code"] = receiver.last_words(), int(code)
-    messages = [end.last_words() for end in ends if end.process.returncode]
-    return DemoResult(summary, code, messages)
+    if not transmitter.summary and not receiver.summary and stop():
+        # Ctrl-C came before the flight had begun, and there is nothing to sum up.
+        raise KeyboardInterrupt
+    return _result(agreement, transmitter, receiver)
+
+
+def _result(agreement: Agreement, transmitter: _Child, receiver: _Child) -> DemoResult:
+    """Return what both said, the first cause of the end last."""
+    ends = [transmitter, receiver]
+    # Whoever was killed comes first: the other one only noticed.
+    ends.sort(key=lambda end: end.process.returncode >= 0)
+    outcomes = [outcome for end in ends if (outcome := end.outcome()).code is not ExitCode.OK]
+    config = agreement.config
+    known: Summary = {"preset": config.preset, "link": config.link.kind, "clock": agreement.clock}
+    summary = known | joined(transmitter.summary, receiver.summary)
+    if not outcomes:
+        return DemoResult(summary, ExitCode.OK, [])
+    code = first_code(*(end.outcome().code for end in ends if end.process.returncode > 0))
+    code = first_code(code, outcomes[0].code)
+    was_killed = ends[0].process.returncode < 0
+    if was_killed or not summary.get("exit_code"):
+        summary["outcome"], summary["exit_code"] = outcomes[0].text, int(code)
+    return DemoResult(summary, code, [outcome.text for outcome in reversed(outcomes)])
 
 
 @contextmanager
@@ -210,6 +222,6 @@ class _Child:
         for thread in self._threads:
             thread.join(5.0)
 
-    def last_words(self) -> str:
-        """Return what the process said last."""
-        return "\n  ".join(self.said[-6:]) or f"{self.role}: exit code {self.process.returncode}"
+    def outcome(self) -> Outcome:
+        """Return how the process ended, once it has."""
+        return outcome_of_status(self.role, self.process.returncode, "\n  ".join(self.said[-6:]))

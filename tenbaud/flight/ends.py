@@ -14,16 +14,18 @@ from typing import TYPE_CHECKING
 
 from channel.links.base import Link, Role
 from channel.links.security import Security
-from channel.wire import DATAGRAM
+from channel.protocol.wire import DATAGRAM
 from receiver.endpoint import ReceiverEndpoint
-from tenbaud.build import Agreement
-from tenbaud.build_ends import build_receiver
+from tenbaud.build.ends import build_receiver
+from tenbaud.build.flight import Agreement
+from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.flight import receive, transmit
-from tenbaud.flight.outcome import Outcome, outcome_of
-from tenbaud.flight.status import Status, StatusMode, StatusReporter
+from tenbaud.flight.display import StatusReporter
+from tenbaud.flight.outcome import SAFE, Outcome, outcome_of
+from tenbaud.flight.status import Status, StatusMode
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, gap_part, link_part, receiver_part, transmitter_part
-from tenbaud.flight.transmit import Stop
+from tenbaud.flight.trouble import Trouble
 from tenbaud.recording.folder import RunFolder
 from tenbaud.recording.gather import OverviewRecorder
 from tenbaud.recording.shared import SharedWriter
@@ -33,7 +35,7 @@ from tenbaud.telemetry.live import LiveTransmitter
 from tenbaud.telemetry.station import NO_WISH, Station, Wish, open_station
 
 if TYPE_CHECKING:
-    from channel.links.zenoh_node import NodePlace
+    from channel.links.zenoh.node import NodePlace
 
 SWITCH_INTERVAL_S = 0.0002
 """A busy recorder thread may keep the loop waiting this long; Python's default is 5 ms."""
@@ -74,7 +76,7 @@ def open_link(
 ) -> Link:
     """Return an open link for one end: over a serial line if it is configured so, else over Zenoh."""
     if agreement.config.link.kind == "serial":
-        from tenbaud.serial_terms import open_serial
+        from tenbaud.flight.serial_ends import open_serial
 
         return open_serial(
             agreement, role, endpoints.insecure, lambda: _zenoh(agreement, role, endpoints, stop)
@@ -83,7 +85,7 @@ def open_link(
 
 
 def _zenoh(agreement: Agreement, role: Role, endpoints: Endpoints, stop: Stop) -> Link:
-    from channel.links.zenoh import ZenohLink
+    from channel.links.zenoh.link import ZenohLink
 
     return ZenohLink(
         role,
@@ -102,13 +104,15 @@ def run_transmitter(
     with _end(agreement, "transmitter", folder) as (recorder, stop):
         station = _station(agreement, "transmitter", recorder, endpoints)
         with knocks(endpoints) as refused, open_link(agreement, "transmitter", endpoints, stop) as link:
+            trouble = Trouble(link, endpoints.security, refused, stop)
             run = transmit.prepare(agreement, station.recorder, link.wire)
-            live = station.fly_transmitter(run, stop)
+            live = station.fly_transmitter(run, trouble.should_stop)
             with (
                 station.publishing(lambda tap: TransmitterComposer(run, tap, live)),
                 StatusReporter(lambda: transmitter_status(run), status),
             ):
-                outcome = _guarded(lambda: _fly(run, link, stop, recorder, live))
+                outcome = _guarded(lambda: _fly(run, link, trouble.should_stop, recorder, live))
+                outcome = trouble.first_cause(outcome, SAFE)
             run.node.rest()
         summary = transmitter_part(run, outcome) | link_part(link, refused) | station.summary()
         return outcome, _with_recording(summary, recorder)
@@ -121,10 +125,11 @@ def run_receiver(
     with _end(agreement, "receiver", folder) as (recorder, stop):
         station = _station(agreement, "receiver", recorder, endpoints)
         with knocks(endpoints) as refused, open_link(agreement, "receiver", endpoints, stop) as link:
+            trouble = Trouble(link, endpoints.security, refused, stop)
             endpoint = build_receiver(
                 agreement, station.recorder, link.wire, endpoints.take_over, station.steering
             )
-            live = station.fly_receiver(endpoint, stop)
+            live = station.fly_receiver(endpoint, trouble.should_stop)
             with (
                 station.publishing(lambda tap: ReceiverComposer(agreement, endpoint, tap, live)),
                 StatusReporter(lambda: receiver_status(agreement, endpoint), status),
@@ -132,6 +137,7 @@ def run_receiver(
                 outcome = _guarded(
                     lambda: receive.serve(agreement, endpoint, link, live, recorder.help_out)
                 )
+                outcome = trouble.first_cause(outcome)
             endpoint.session.rest()
         summary = receiver_part(agreement, endpoint, outcome) | link_part(link, refused)
         summary |= station.summary()
@@ -144,7 +150,7 @@ def knocks(endpoints: Endpoints) -> Iterator[Counter[str]]:
     if endpoints.security is None or not endpoints.listen:
         yield Counter()
         return
-    from channel.links.zenoh_gate import HandshakeLog
+    from channel.links.zenoh.gate import HandshakeLog
 
     with HandshakeLog() as log:
         yield log.refused
@@ -195,7 +201,7 @@ def open_recorder(
     return McapRecorder(path, metadata, wait_when_full=wait, shared=writer, overview=overview)
 
 
-def transmitter_status(run: transmit.TransmitterRun) -> Status:
+def transmitter_status(run: TransmitterRun) -> Status:
     """Return what a person wants to know of a running transmitter."""
     node = run.node
     coder = run.agreement.codec.coder
@@ -266,9 +272,9 @@ def _station(agreement: Agreement, role: Role, recorder: McapRecorder, endpoints
 
 
 def _fly(
-    run: transmit.TransmitterRun,
+    run: TransmitterRun,
     link: Link,
-    stop: StopFlag,
+    stop: Stop,
     recorder: McapRecorder,
     live: LiveTransmitter,
 ) -> Outcome:

@@ -13,26 +13,26 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from channel.clocks import SkewedClock
 from channel.errors import FrameError, LinkLost
-from channel.frames import Bye, Frame, Hello, Refuse, Symbol, Unknown
-from channel.links.zenoh_hub import ZenohHub
-from channel.virtual import Reply, decode_step, encode_reply, is_envelope
-from channel.wire import DATAGRAM, decode, encode
-from receiver.many_service import SURPLUS, Served
-from receiver.real_service import RealService
-from receiver.rejoin import difference
-from receiver.virtual_service import VirtualService
-from tenbaud.build import Agreement
-from tenbaud.build_ends import build_line, build_receiver
+from channel.line.clocks import SkewedClock
+from channel.line.virtual import Reply, decode_step, encode_reply, is_envelope
+from channel.links.zenoh.hub import ZenohHub
+from channel.protocol.frames import Bye, Frame, Hello, Refuse, Symbol, Unknown
+from channel.protocol.wire import DATAGRAM, decode, encode
+from receiver.loops.many import SURPLUS, Served
+from receiver.loops.real import RealService
+from receiver.loops.virtual import VirtualService
+from receiver.session.rejoin import difference
+from tenbaud.build.ends import build_line, build_receiver
+from tenbaud.build.flight import Agreement
 from tenbaud.config.load import dump_config
+from tenbaud.files.whole import WriteError, write_error, write_whole
 from tenbaud.flight.ends import open_recorder
 from tenbaud.flight.outcome import ExitCode, Outcome, outcome_of
+from tenbaud.flight.rate_limited_log import SparingTeller
 from tenbaud.flight.receive import ended_outcome
 from tenbaud.flight.report import write_summary
-from tenbaud.flight.sparing import SparingTeller
 from tenbaud.flight.summary import Summary, receiver_part
-from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RunFolder
 from tenbaud.recording.shared import SharedWriter
 from tenbaud.recording.writer import McapRecorder
@@ -58,7 +58,7 @@ class Flight:
 
 
 class ManyHost:
-    """Opens and closes the services of `receiver.many_service`; see the module's text.
+    """Opens and closes the services of `receiver.loops.many`; see the module's text.
 
     `root` is the folder for the run folders; at most `rigs_max` flights at a time.
     """
@@ -88,7 +88,7 @@ class ManyHost:
         self.summaries: list[Summary] = []
         """of the flights that have ended"""
         self.counts: Counter[str] = Counter()
-        """flights, refused, strays (messages that belonged to no flight), messages_dropped"""
+        """flights, refused, strays (messages of no flight), messages_dropped, not_written"""
 
     # In the loop's thread
 
@@ -198,7 +198,7 @@ class ManyHost:
     def _serve(self, name: str, agreement: Agreement, data: bytes) -> Served:
         folder = RunFolder(_new_folder(self._root, name))
         link = agreement.config.link.model_copy(update={"session": name})
-        folder.config.write_text(dump_config(agreement.config.model_copy(update={"link": link})))
+        write_whole(folder.config, dump_config(agreement.config.model_copy(update={"link": link})))
         recorder = open_recorder(agreement, "receiver", folder.receiver, self._writer)
         try:
             endpoint = build_receiver(agreement, recorder, DATAGRAM)
@@ -233,12 +233,16 @@ class ManyHost:
                 "recording_rows_lost": flight.recorder.rows_dropped,
                 "recording_error": flight.recorder.error,
             }
+            if flight.recorder.error is not None:
+                self.counts["not_written"] += 1
+                self._tell(f"{flight.name}: {flight.recorder.error}")
             write_summary(flight.folder, flight.summary)
             self._tell(
                 f"{flight.name}: ended after {flight.summary['samples']} samples: {outcome.text}"
             )
-        except OSError as problem:
-            self._tell(f"{flight.name}: {flight.folder.path}/summary.json was not written: {problem}")
+        except WriteError as problem:
+            self.counts["not_written"] += 1
+            self._tell(f"{flight.name}: {problem}")
         finally:
             self._open.pop(flight.name, None)
             self._hub.leave(flight.name)
@@ -268,7 +272,7 @@ def _new_folder(root: Path, name: str) -> Path:
         except FileExistsError:
             number += 1
         except OSError as error:
-            raise RecordingError(f"The run folder {path} cannot be made: {error.strerror}.") from error
+            raise write_error(path, error) from error
         else:
             return path
 

@@ -14,8 +14,8 @@ from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from rich.table import Table
 
-from receiver.many_service import ManyService, Served
-from receiver.session import Phase
+from receiver.loops.many import ManyService, Served
+from receiver.session.session import Phase
 
 PERIOD_S = 1.0
 LINES_AROUND = 6

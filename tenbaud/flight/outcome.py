@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import signal
 from dataclasses import dataclass
 from enum import IntEnum
 
 from channel.errors import ConfigMismatch, DesyncError, LinkLost, SafetyStop, TenbaudError
+from tenbaud.files.whole import WriteError
 from tenbaud.flight.verdict import NotFlown
 
 
@@ -20,6 +22,7 @@ class ExitCode(IntEnum):
     DESYNC = 5
     SAFETY_STOP = 6
     NOT_FLOWN = 7
+    NOT_WRITTEN = 8
     INTERRUPTED = 130
 
 
@@ -36,6 +39,24 @@ class Outcome:
 FLIGHT_OVER = "the flight is over"
 
 
+SAFE = "the motors are at their safe voltage"
+
+
+def first_cause(outcome: Outcome, trouble: str, consequence: str = "") -> Outcome:
+    """Return the outcome, told by what was wrong with this end's own line if that was lost.
+
+    Seen from a lost line the other end is silent, which is what the outcome would blame.
+    """
+    if outcome.code is not ExitCode.LINK_LOST or not trouble:
+        return outcome
+    return Outcome(outcome.code, "; ".join(filter(None, (trouble, consequence))))
+
+
+def first_code(*codes: ExitCode) -> ExitCode:
+    """Return the first code that is no success."""
+    return next((code for code in codes if code is not ExitCode.OK), ExitCode.OK)
+
+
 def outcome_of(error: BaseException) -> Outcome:
     """Return the outcome that an exception stands for."""
     if isinstance(error, KeyboardInterrupt):
@@ -45,8 +66,29 @@ def outcome_of(error: BaseException) -> Outcome:
         (LinkLost, ExitCode.LINK_LOST),
         (DesyncError, ExitCode.DESYNC),
         (SafetyStop, ExitCode.SAFETY_STOP),
+        (WriteError, ExitCode.NOT_WRITTEN),
         (TenbaudError, ExitCode.USAGE),
     ):
         if isinstance(error, kind):
             return Outcome(code, str(error))
     return Outcome(ExitCode.FAILED, f"{type(error).__name__}: {error}")
+
+
+def outcome_of_status(name: str, status: int, last_words: str = "") -> Outcome:
+    """Return the outcome that a child process' exit status stands for; `name` is what it was.
+
+    `status` is as `subprocess` has it: negative for a signal. What the child said last is the text, but
+    not for a signal: whoever was killed could not say so.
+    """
+    if status < 0:
+        try:
+            killer = signal.Signals(-status).name
+        except ValueError:
+            killer = f"signal {-status}"
+        return Outcome(ExitCode.FAILED, f"the {name} was killed by {killer}")
+    try:
+        code = ExitCode(status)
+    except ValueError:
+        code = ExitCode.FAILED
+    fallback = FLIGHT_OVER if code is ExitCode.OK else f"the {name} ended with exit code {status}"
+    return Outcome(code, last_words or fallback)

@@ -5,17 +5,18 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from channel.clocks import SkewedClock
 from channel.errors import ConfigMismatch
+from channel.line.clocks import SkewedClock
 from channel.links.base import Link
 from receiver.endpoint import ReceiverEndpoint
-from receiver.real_service import serve_real
-from receiver.session import Phase, ReceiverSession
-from receiver.virtual_service import serve_virtual
-from tenbaud.build import Agreement
-from tenbaud.build_ends import build_line
+from receiver.loops.real import serve_real
+from receiver.loops.virtual import serve_virtual
+from receiver.session.session import Phase, ReceiverSession
+from tenbaud.build.ends import build_line
+from tenbaud.build.flight import Agreement
+from tenbaud.build.transmitter_run import Stop
 from tenbaud.flight.outcome import FLIGHT_OVER, ExitCode, Outcome
-from tenbaud.flight.transmit import Stop, desync_text
+from tenbaud.flight.transmit import desync_text
 from tenbaud.flight.verdict import FlightCounts, faults_of, settings_of, verdict_text
 from transmitter.node import STOPPED
 

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from tenbaud.config.schema import FlightConfig
+from tenbaud.files.whole import WriteError, write_whole
+from tenbaud.flight.outcome import ExitCode, Outcome, outcome_of
 from tenbaud.flight.summary import Summary
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RunFolder
@@ -25,6 +27,7 @@ ROWS: tuple[tuple[str, str, str], ...] = (
     ("bytes on the serial line up / down", "line_bytes", "{}"),
     ("dropped by the link", "link_dropped", "{}"),
     ("reconnects", "reconnects", "{}"),
+    ("frames dropped, out of bounds", "out_of_bounds", "{}"),
     ("digest checks", "digest_checks", "{}"),
     ("desyncs", "desyncs", "{}"),
     ("rejoins, and what they cost", "rejoins", "{}"),
@@ -45,26 +48,39 @@ ROWS: tuple[tuple[str, str, str], ...] = (
 )
 
 
-def write_summary(folder: RunFolder, summary: Summary) -> None:
-    """Write `summary.json`; a full disk is told, not raised."""
+def write_up(folder: RunFolder, config: FlightConfig, summary: Summary, draw: bool) -> list[Outcome]:
+    """Write `summary.json` and, if wished, the figure; return what went wrong.
+
+    The flight is over by then: what cannot be written is no reason to leave out the rest.
+    """
+    problems = []
+    recording_error = summary.get("recording_error")
+    if recording_error:
+        problems.append(Outcome(ExitCode.NOT_WRITTEN, recording_error))
     try:
-        folder.summary.write_text(json.dumps(summary, indent=2) + "\n")
-    except OSError as error:
-        import typer
+        write_summary(folder, summary)
+    except WriteError as error:
+        problems.append(outcome_of(error))
+    if draw:
+        try:
+            _draw(folder, figure_title(config, summary))
+        except (RecordingError, WriteError) as error:
+            code = ExitCode.NOT_WRITTEN if isinstance(error, WriteError) else ExitCode.OK
+            problems.append(Outcome(code, f"no figure was drawn: {error}"))
+    return problems
 
-        typer.echo(f"tenbaud: {folder.summary} could not be written: {error.strerror}", err=True)
+
+def write_summary(folder: RunFolder, summary: Summary) -> None:
+    """Write `summary.json`. Raises WriteError."""
+    write_whole(folder.summary, json.dumps(summary, indent=2) + "\n")
 
 
-def draw_run(folder: RunFolder, title: str) -> str | None:
-    """Draw the figure of a run from the recordings that are there; return what went wrong, if so."""
+def _draw(folder: RunFolder, title: str) -> None:
+    """Draw the figure of a run from the recordings that are there."""
     from tenbaud.recording.figure import draw_flight
 
     receiver = folder.receiver if folder.receiver.is_file() else None
-    try:
-        draw_flight(folder.transmitter, receiver, folder.figure, title)
-    except (RecordingError, OSError) as error:
-        return f"no figure was drawn: {error}"
-    return None
+    draw_flight(folder.transmitter, receiver, folder.figure, title)
 
 
 def figure_title(config: FlightConfig, summary: Summary) -> str:
@@ -130,8 +146,8 @@ def _value(summary: Summary, name: str) -> Any:
             return f"{up} / {down}" if up else None
         case "link_dropped":
             return ", ".join(f"{kind} {n}" for kind, n in (get("link_dropped") or {}).items()) or None
-        case "reconnects":
-            return get("reconnects") or None
+        case "reconnects" | "out_of_bounds":
+            return get(name) or None
         case "error_coded" | "error_live":
             largest, rms = get(f"{name}_max_fraction"), get(f"{name}_rms_fraction")
             if largest is None or rms is None:

@@ -6,16 +6,17 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from channel.impairments import ImpairedLine
-from channel.line import Line
+from channel.line.impairments import ImpairedLine
+from channel.line.line import Line
 from channel.links.base import Link
+from channel.protocol.bounds import COUNTER
 from receiver.endpoint import ReceiverEndpoint
-from tenbaud.build import Agreement
+from tenbaud.build.flight import Agreement
+from tenbaud.build.transmitter_run import TransmitterRun
 from tenbaud.config.schema import TransmitterSection
 from tenbaud.flight.outcome import Outcome
-from tenbaud.flight.transmit import TransmitterRun
-from transmitter.gap import Gap
-from transmitter.scores import ErrorMeter
+from transmitter.metrics.gap import Gap
+from transmitter.metrics.scores import ErrorMeter
 
 Summary = dict[str, Any]
 
@@ -40,6 +41,7 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         "rejoins": session.counts["rejoins"],
         "rejoin_bytes": run.rejoin_bytes,
         "stale_commands": session.counts["stale_frames"],
+        COUNTER: session.counts[COUNTER],
         "claims_refused": session.counts["claims_refused"],
         "take_overs": session.counts["take_overs"],
         "rejoins_asked": {why.name.lower(): n for why, n in session.rejoins_asked.items()},
@@ -106,6 +108,7 @@ def receiver_part(agreement: Agreement, endpoint: ReceiverEndpoint, outcome: Out
         "symbols_late": session.counts["symbols_late"],
         "symbols_misplaced": session.counts["symbols_misplaced"],
         "stale_frames": session.counts["stale_frames"],
+        COUNTER: session.counts[COUNTER],
         "bad_commands": session.counts["bad_commands"],
         "malformed": endpoint.inlet.malformed,
         "desyncs": session.counts["desyncs"],
@@ -130,14 +133,20 @@ def link_part(link: Link, refused: Counter[str] | None = None) -> Summary:
 
 
 def joined(transmitter: Summary, receiver: Summary) -> Summary:
-    """Return one summary: the transmitter's figures, and those that only the receiver has."""
+    """Return one summary: the transmitter's figures, and those that only the receiver has.
+
+    Of an end that was killed there is none; without the transmitter's the receiver's figures stand.
+    """
+    if not transmitter:
+        return dict(receiver)
     own = ("baud_measured", "symbols_late", "symbols_misplaced", "stale_frames", "bad_commands")
     both: Summary = {
         name: dict(Counter(transmitter.get(name, {})) + Counter(receiver.get(name, {})))
         for name in ("link_dropped", "connections_refused")
     }
-    for name in ("reconnects", "malformed"):
+    for name in ("reconnects", "malformed", "recording_rows_lost", COUNTER):
         both[name] = transmitter.get(name, 0) + receiver.get(name, 0)
+    both["recording_error"] = transmitter.get("recording_error") or receiver.get("recording_error")
     if receiver.get("impaired_down"):
         both["impaired_down"] = receiver["impaired_down"]
     return {**transmitter, **both, **{name: receiver.get(name) for name in own}}

@@ -4,54 +4,24 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any
 
-from channel.clocks import SkewedClock, SkewedPeer
 from channel.errors import ConfigMismatch, LinkLost
-from channel.frames import Desync
-from channel.line import Line
+from channel.line.clocks import SkewedClock, SkewedPeer
+from channel.line.virtual import Peer
 from channel.links.base import Link
-from channel.recording import Recorder
-from channel.uplink import Uplink
-from channel.virtual import Peer
-from channel.wire import Wire
-from tenbaud.build import Agreement
-from tenbaud.build_ends import build_line, build_transmitter, build_uplink
-from tenbaud.flight.outcome import FLIGHT_OVER, ExitCode, Outcome
+from channel.protocol.frames import Desync
+from channel.protocol.recording import Recorder
+from channel.protocol.wire import Wire
+from tenbaud.build.ends import build_line, build_transmitter, build_uplink
+from tenbaud.build.flight import Agreement
+from tenbaud.build.transmitter_run import Stop, TransmitterRun
+from tenbaud.flight.outcome import FLIGHT_OVER, SAFE, ExitCode, Outcome
 from tenbaud.flight.verdict import FlightCounts, faults_of, settings_of, verdict_text
-from transmitter.node import STOPPED, TransmitterNode
-from transmitter.rate_watch import RateWatch
-from transmitter.real_flight import RealFlight
-from transmitter.session import Phase
-from transmitter.virtual_flight import VirtualFlight
-from transmitter.virtual_peer import LinkPeer
-
-Stop = Callable[[], bool]
-
-
-@dataclass(slots=True)
-class TransmitterRun:
-    """The parts of one transmitter, before, during and after its flight."""
-
-    agreement: Agreement
-    node: TransmitterNode
-    uplink: Uplink
-    downlink: Line
-    """on the virtual clock; on a real one the receiver has its own"""
-    ticks: int = 0
-    """flown by this process"""
-    rejoin_bytes: int = 0
-    """what rejoins cost: control frames of both directions, without greeting and farewell"""
-    flight_s: float = 0.0
-    """wall-clock time of the flight itself"""
-    wire_bytes_down: int = 0
-    desyncs_asked: float = 0.0
-    """lockstep failures that were asked for while the flight went on"""
-    rate: RateWatch | None = None
-    """whether the symbol rate is kept; on a real clock"""
-    extra: dict[str, Any] = field(default_factory=dict)
-    """figures of the clock that was flown on"""
+from transmitter.loops.real import RealFlight
+from transmitter.loops.virtual import VirtualFlight
+from transmitter.loops.virtual_peer import LinkPeer
+from transmitter.node import STOPPED
+from transmitter.session.session import Phase
 
 
 def prepare(agreement: Agreement, recorder: Recorder | None, wire: Wire) -> TransmitterRun:
@@ -184,7 +154,7 @@ def _outcome(run: TransmitterRun, peer_present: bool) -> Outcome:
     if session.phase is Phase.ENDED or (node.guard.stopped and not peer_present):
         return Outcome(
             ExitCode.LINK_LOST,
-            f"{session.end_reason or 'the receiver is gone'}; the motors are at their safe voltage",
+            f"{session.end_reason or 'the receiver is gone'}; {SAFE}",
         )
     if node.guard.stopped:
         return Outcome(
@@ -212,10 +182,14 @@ def _not_flown(run: TransmitterRun) -> Outcome | None:
 def flight_counts(run: TransmitterRun) -> FlightCounts:
     """Return what the verdict on a flight rests on."""
     node, session = run.node, run.node.session
+    samples = run.ticks // run.agreement.terms.ticks_per_sample
+    confirmed = session.counts["digest_checks"]
+    # While the line rests at the end, the receiver may erase samples that were never flown.
+    beyond = max(0, confirmed - samples)
     return FlightCounts(
-        samples=run.ticks // run.agreement.terms.ticks_per_sample,
-        confirmed=session.counts["digest_checks"],
-        erased=session.counts["erasures"],
+        samples=samples,
+        confirmed=confirmed - beyond,
+        erased=session.counts["erasures"] - beyond,
         rejoins=session.counts["rejoins"],
         ticks=run.ticks,
         ticks_down=node.ticks_down,

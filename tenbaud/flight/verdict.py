@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
-from tenbaud.build import Agreement, watchdog_wanted_s
-from tenbaud.liveness import watchdog_ticks
+from tenbaud.build.flight import Agreement, watchdog_wanted_s
+from tenbaud.build.liveness import watchdog_ticks
 
 CONFIRMED_SHARE_MIN = 0.5
 """of the samples that the flight had time for"""

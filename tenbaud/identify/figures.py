@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from tenbaud.figures.style import LINE_A, LINE_B, decimated, legend_above, new_figure, save
 from tenbaud.identify.run import Identified
+from tenbaud.recording.style import LINE_A, LINE_B, decimated, legend_above, new_figure, save
 
 
 def draw_excitation(runs: Sequence[Identified], paths: Sequence[Path]) -> None:

@@ -16,6 +16,7 @@ from plant_sim.identification.record import (
     quiescent_angle,
 )
 from tenbaud.config.schema import FlightConfig
+from tenbaud.files.whole import write_whole
 
 FIELDS = (
     ("rate_damping_per_s", "a_w", "1/s"),
@@ -111,4 +112,4 @@ def write_config(
         head.append(f"# {letter} = {section[field]:.5g} +- {spread:.2g} {unit} (standard error)")
     head += [f"# Warning: {text}" for text in identified.warnings]
     body = {"preset": config.preset, "model": section}
-    path.write_text("\n".join(head) + "\n" + tomli_w.dumps(body), encoding="utf-8")
+    write_whole(path, "\n".join(head) + "\n" + tomli_w.dumps(body))

@@ -15,7 +15,7 @@ from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.excitation import parse_excitation
 from plant_sim.identification.experiment import excite
 from plant_sim.identification.record import PitchRecord
-from tenbaud.build_rig import build_rig
+from tenbaud.build.rig import build_rig
 from tenbaud.config.schema import FlightConfig
 from tenbaud.recording.folder import find_recordings
 from tenbaud.recording.reader import Recording

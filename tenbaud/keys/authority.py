@@ -129,6 +129,15 @@ def end_of(certificate_pem: bytes) -> datetime:
     return x509.load_pem_x509_certificate(certificate_pem).not_valid_after_utc
 
 
+def is_key_of(key_pem: bytes, certificate_pem: bytes) -> bool:
+    """Return whether a private key belongs to a certificate; ValueError for what is no key."""
+    from cryptography import x509
+    from cryptography.hazmat.primitives.serialization import load_pem_private_key
+
+    key = load_pem_private_key(key_pem, None)
+    return key.public_key() == x509.load_pem_x509_certificate(certificate_pem).public_key()
+
+
 def is_signed_by(certificate_pem: bytes, authority_pem: bytes) -> bool:
     """Return whether a certificate comes from this authority."""
     from cryptography import x509

@@ -11,9 +11,9 @@ Private keys have mode 0600 and their folders 0700; a key that others may read i
 
 from __future__ import annotations
 
-import os
 import re
 import stat
+from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -21,12 +21,14 @@ from shlex import quote
 
 from channel.errors import TenbaudError
 from channel.links.security import Credentials
+from tenbaud.files.whole import whole_file, whole_path, write_error, write_whole
 from tenbaud.keys.authority import (
     NODE_DAYS,
     Certified,
     NodeRole,
     Pem,
     end_of,
+    is_key_of,
     is_signed_by,
     issue,
     new_authority,
@@ -72,9 +74,10 @@ def create_authority(keys: Path) -> Path:
         )
     pem = new_authority(AUTHORITY_NAME)
     _make_private(keys)
-    _make_private(folder)
-    _write(folder / "authority.key", pem.private_key, 0o600)
-    _write(folder / "authority.pem", pem.certificate, 0o644)
+    with whole_path(folder) as part:
+        _make_private(part)
+        write_whole(part / "authority.key", pem.private_key, 0o600)
+        write_whole(part / "authority.pem", pem.certificate, 0o644)
     return folder
 
 
@@ -93,8 +96,9 @@ def add_node(
         )
     authority = read_authority(keys)
     pem = _issue(authority, name, role, hosts, days)
-    _make_private(keys / name)
-    _write_node(keys / name, authority, pem)
+    with whole_path(keys / name) as part:
+        _make_private(part)
+        _write_node(part, authority, pem)
     return read_node(keys / name)
 
 
@@ -114,8 +118,8 @@ def read_node(folder: Path) -> NodeKeys:
         certificate = (folder / "node.pem").read_bytes()
         authority = (folder / "authority.pem").read_bytes()
         mode = (folder / "node.key").stat().st_mode
-        with (folder / "node.key").open("rb"):
-            pass
+        key = (folder / "node.key").read_bytes()
+        _check_unchanged(folder)
     except OSError as error:
         raise KeysError(
             f"{folder} is no node's key folder ({error.strerror}: {error.filename}); make one with "
@@ -125,12 +129,18 @@ def read_node(folder: Path) -> NodeKeys:
     try:
         certified = read_certificate(certificate)
         signed = is_signed_by(certificate, authority)
-    except ValueError as error:
+        belongs = is_key_of(key, certificate)
+    except (TypeError, ValueError) as error:
         raise KeysError(f"{folder / 'node.pem'} cannot be used: {error}") from error
     if not signed:
         raise KeysError(
             f"{folder / 'node.pem'} was not signed by the authority beside it; copy the folder of one "
             "authority whole"
+        )
+    if not belongs:
+        raise KeysError(
+            f"{folder / 'node.key'} is not the key of node.pem beside it; where the authority is: "
+            f"`tenbaud keys renew {certified.name}`, then copy the folder again"
         )
     return NodeKeys(folder, certified)
 
@@ -139,6 +149,12 @@ def usable(folder: Path, role: NodeRole | None) -> NodeKeys:
     """Read a node's folder for use now, in this role; KeysError when expired or for another role."""
     node = read_node(folder)
     certified = node.certified
+    try:
+        str(folder.resolve()).encode()
+    except UnicodeEncodeError as error:
+        raise KeysError(
+            f"{folder.resolve()} is no text in UTF-8, and Zenoh takes no other name; move the keys"
+        ) from error
     if role is not None and certified.role is not role:
         raise KeysError(
             f"{folder} is the certificate of a {certified.role}, and this is a {role}; make one with "
@@ -214,21 +230,33 @@ def _check_private(key: Path, mode: int) -> None:
         )
 
 
+def _check_unchanged(folder: Path) -> None:
+    """Refuse a folder in which somebody else can put another authority."""
+    for path in (folder, folder / "authority.pem", folder / "node.pem"):
+        mode = path.stat().st_mode
+        sticky = path == folder and mode & stat.S_ISVTX  # there everybody keeps their own files
+        if mode & (stat.S_IWGRP | stat.S_IWOTH) and not sticky:
+            raise KeysError(
+                f"{path} can be changed by others (mode {stat.S_IMODE(mode):04o}), who could choose "
+                f"whom to trust; take that away: chmod go-w {quote(str(path))}"
+            )
+
+
 def _write_node(folder: Path, authority: Pem, pem: Pem) -> None:
-    _write(folder / "node.key", pem.private_key, 0o600)
-    _write(folder / "node.pem", pem.certificate, 0o644)
-    _write(folder / "authority.pem", authority.certificate, 0o644)
+    """Write the three files of a node: all of them new, or all as they were."""
+    with ExitStack() as written:
+        for name, data, mode in (
+            ("authority.pem", authority.certificate, 0o644),
+            ("node.pem", pem.certificate, 0o644),
+            ("node.key", pem.private_key, 0o600),
+        ):
+            stream = written.enter_context(whole_file(folder / name, mode))
+            stream.write(data)
+            stream.flush()
 
 
 def _make_private(folder: Path) -> None:
-    folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-
-
-def _write(path: Path, data: bytes, mode: int) -> None:
-    """Write a whole file at once; at no moment can it be read by more than its mode says."""
-    fresh = path.with_name(path.name + ".new")
-    fresh.unlink(missing_ok=True)
-    number = os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
-    with os.fdopen(number, "wb") as stream:
-        stream.write(data)
-    os.replace(fresh, path)
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError as error:
+        raise write_error(folder, error) from error

@@ -52,8 +52,9 @@ _READERS = {
     Opcode.METADATA: Metadata.read,
     Opcode.FOOTER: Footer.read,
 }
-_SKIPPED = (Opcode.HEADER, Opcode.ATTACHMENT, Opcode.DATA_END)
-_SUMMARY = (
+SKIPPED = (Opcode.HEADER, Opcode.ATTACHMENT, Opcode.DATA_END)
+"""Records of a file's data that bring nothing."""
+SUMMARY = (
     *(Opcode.STATISTICS, Opcode.CHUNK_INDEX, Opcode.ATTACHMENT_INDEX),
     *(Opcode.METADATA_INDEX, Opcode.SUMMARY_OFFSET),
 )
@@ -83,34 +84,6 @@ class Damage:
     start: int
     end: int
     reason: str
-
-
-def blocks_of_file(stream: BinaryIO, size: int) -> Iterator[Block | Damage]:
-    """Yield the blocks of a file of `size` bytes; after damage from the next whole chunk on."""
-    from tenbaud.recording.resync import Resync
-
-    resync = Resync(stream, size)
-    at = len(MCAP0_MAGIC)
-    # Up to here every length was confirmed by a checksum or by a second length.
-    certain = at
-    kinds: tuple[Opcode, ...] = _SKIPPED
-    while at < size:
-        try:
-            head = read_head(stream, at, size)
-            if head is None:
-                return
-            kinds = kinds + _SUMMARY if head[0] == Opcode.DATA_END else kinds
-            block, confirmed = _read_record(stream, *head, kinds)
-        except BROKEN as error:
-            found = resync.after(at, certain)
-            yield Damage(at, found, str(error) or "a record is not what was written")
-            at = certain = found
-            continue
-        if block is not None:
-            yield block
-        at = stream.tell()
-        certain = at if confirmed else certain
-    yield Damage(size, size, "the file has no end")
 
 
 def summary_of_file(stream: BinaryIO, size: int) -> Iterator[Described | MetadataIndex]:
@@ -167,7 +140,7 @@ def read_head(stream: BinaryIO, at: int, size: int) -> tuple[int, int] | None:
     return opcode, length
 
 
-def _read_record(
+def read_record(
     stream: BinaryIO, opcode: int, length: int, skipped: tuple[Opcode, ...]
 ) -> tuple[Block | None, bool]:
     """Read one record; return what it brought, and whether its length is beyond doubt."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from channel.recording import Field
+from channel.protocol.recording import Field
 from tenbaud.recording.run import Run
 from tenbaud.recording.table import Table
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import shutil
+import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,8 @@ import numpy as np
 import orjson
 from numpy.typing import NDArray
 
-from channel.recording import Field, RecordChannel
+from channel.protocol.recording import Field, RecordChannel
+from tenbaud.files.whole import make_folder, whole_path
 from tenbaud.recording.columns import TABLES, Column, all_columns, flight_columns
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.layouts import flight_layouts, layout_paths
@@ -42,24 +43,13 @@ def convert(run: Run, form: str, output: Path | None = None, overwrite: bool = F
         )
     if target.exists():
         _check_replaceable(run, form, target)
-    # Whoever is interrupted leaves no half of a file behind under the name of a whole one.
-    unfinished = target.with_name(f".{target.name}.unfinished")
-    _remove(unfinished)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        write(run, unfinished)
-        _remove(target)
-        unfinished.replace(target)
-        for layout in layouts:
-            layout.unlink(missing_ok=True)
-        if layouts:
-            flight_layouts(run, target)
-    except OSError as error:
-        raise RecordingError(
-            f"{target} cannot be written: {error.strerror or error}. Choose another place with --out."
-        ) from error
-    finally:
-        _remove(unfinished)
+    make_folder(target.parent)
+    with whole_path(target) as part:
+        write(run, part)
+    for layout in layouts:
+        layout.unlink(missing_ok=True)
+    if layouts:
+        flight_layouts(run, target)
     return sorted(target.iterdir()) if target.is_dir() else [target, *layouts]
 
 
@@ -82,13 +72,6 @@ def _check_replaceable(run: Run, form: str, target: Path) -> None:
 
 def _names_written(form: str) -> set[str]:
     return {f"{table}.{form}" for table in TABLES}
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path)
-    else:
-        path.unlink(missing_ok=True)
 
 
 def _write_csv(run: Run, folder: Path) -> None:
@@ -142,8 +125,15 @@ def _write_mat(run: Run, path: Path) -> None:
     for name in ("samples", "events"):
         if name in tables:
             contents[name] = {column.name: _matlab_cells(column) for column in tables[name]}
-    contents["run"] = {**run.metadata, "path": str(run.path), "tick_s": run.base.tick_s}
-    savemat(str(path), contents, appendmat=False, do_compression=True, oned_as="column")
+    contents["run"] = {**run.metadata, "path": _shown(run.path), "tick_s": run.base.tick_s}
+    with path.open("wb") as stream:
+        # The library's own signature leaves out that it takes streams too.
+        savemat(stream, contents, do_compression=True, oned_as="column")  # type: ignore[arg-type]
+
+
+def _shown(path: Path) -> str:
+    """Return a path as text, also where its bytes are none."""
+    return os.fsencode(path).decode("utf-8", "backslashreplace")
 
 
 def _matlab_cells(column: Column) -> Any:
@@ -173,7 +163,8 @@ def _write_parquet(run: Run, folder: Path) -> None:
             fields.append(pyarrow.field(column.name, array.type, metadata=about))
         schema = pyarrow.schema(fields, metadata=run.metadata)
         table = pyarrow.Table.from_arrays(arrays, schema=schema)
-        parquet.write_table(table, folder / f"{name}.parquet", compression="zstd")
+        with (folder / f"{name}.parquet").open("wb") as stream:
+            parquet.write_table(table, stream, compression="zstd")
 
 
 def _write_json(run: Run, path: Path) -> None:
@@ -181,7 +172,7 @@ def _write_json(run: Run, path: Path) -> None:
     tables = all_columns(run)
     samples = {column.name: column for column in tables.get("samples", [])}
     with path.open("wb") as stream:
-        about = {**run.metadata, "path": str(run.path), "tick_s": run.base.tick_s}
+        about = {**run.metadata, "path": _shown(run.path), "tick_s": run.base.tick_s}
         stream.write(b'{"run":' + orjson.dumps(about) + b',"time_s":' + _json_values(run.time_s))
         stream.write(b',"signals":{')
         for number, signal in enumerate(run.signals.values()):
@@ -223,6 +214,8 @@ def _write_mcap(run: Run, path: Path) -> None:
         for part in _stretches(columns):
             for row in zip(*(column.values[part].tolist() for column in columns), strict=True):
                 recorder.write(channel, round(row[0] * tick_ns), row)
+    if isinstance(recorder.cause, OSError):
+        raise recorder.cause
     if recorder.error is not None:
         raise RecordingError(recorder.error)
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from channel.recording import RecordChannel
+from channel.protocol.recording import RecordChannel
 from tenbaud.recording.both_ends import compare_ends
 from tenbaud.recording.comparison import Compared, Difference, unlike_field
 from tenbaud.recording.encoding import END_METADATA

@@ -13,7 +13,7 @@ from typing import get_args
 
 import orjson
 
-from channel.recording import Field, FieldType, RecordChannel
+from channel.protocol.recording import Field, FieldType, RecordChannel
 
 RUN_METADATA = "run"
 """Metadata of a recording: what the run said about itself when it began."""

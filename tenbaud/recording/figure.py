@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from channel.impairments import parse_impairments
+from channel.line.impairments import parse_impairments
+from tenbaud.files.whole import whole_file
 from tenbaud.recording.encoding import OVERVIEW_METADATA, RUN_METADATA
 from tenbaud.recording.envelope import Series
 from tenbaud.recording.errors import RecordingError
@@ -60,7 +61,9 @@ def draw_flight(transmitter: Path, receiver: Path | None, output: Path, title: s
     from it. The receiver's recording adds the reference. Raises RecordingError if the
     transmitter's recording holds no flight.
     """
-    draw_run(transmitter, receiver, title, own=True).savefig(output, dpi=150, format="png")
+    figure = draw_run(transmitter, receiver, title, own=True)
+    with whole_file(output) as stream:
+        figure.savefig(stream, dpi=150, format="png")
 
 
 def draw_run(transmitter: Path | None, receiver: Path | None, title: str, own: bool = False) -> Figure:

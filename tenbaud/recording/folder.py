@@ -14,6 +14,7 @@ from typing import Any, BinaryIO
 
 import orjson
 
+from tenbaud.files.whole import write_error
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.lock import hold
 
@@ -83,7 +84,7 @@ def create_run_folder(
 
     Without `explicit` it is `<root>/<local time>_<name>`, with -2, -3 ... appended if taken; root
     is `runs` if not given. An explicit folder must not exist yet. `now` is the clock, for tests.
-    Raises RecordingError if the folder exists or cannot be made.
+    Raises RecordingError if the folder exists, WriteError if it cannot be made.
     """
     if explicit is not None:
         if not _make(explicit):
@@ -110,10 +111,7 @@ def _make(folder: Path) -> bool:
     except OSError as error:
         if isinstance(error, FileExistsError) and folder.parent.is_dir():
             return False
-        raise RecordingError(
-            f"The run folder {folder} cannot be made: {error.strerror or error}. "
-            "Check that its parent is a folder that may be written to, or choose another place."
-        ) from error
+        raise write_error(folder, error) from error
     return True
 
 
@@ -173,10 +171,7 @@ def open_new_recording(path: Path) -> BinaryIO:
     try:
         stream = os.fdopen(os.open(path, flags, 0o666), "wb")
     except OSError as error:
-        raise RecordingError(
-            f"The recording {path} cannot be created: {error.strerror or error}. "
-            "Check that its folder exists and may be written to."
-        ) from error
+        raise write_error(path, error) from error
     if not hold(stream.fileno()) or os.fstat(stream.fileno()).st_size > 0:
         stream.close()
         raise RecordingError(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import orjson
 
-from channel.recording import RecordChannel
+from channel.protocol.recording import RecordChannel
 from tenbaud.recording.chunks import Damage, RawMessage
 from tenbaud.recording.holes import HOLES_MAX, Hole, Missing
 from tenbaud.recording.rows import KEY_MAX, KEYS

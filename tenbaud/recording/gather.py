@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from channel.recording import RecordChannel
+from channel.protocol.recording import RecordChannel
 from tenbaud.recording.overview import FIELDS, Overview, packed
 
 ROWS_OF_LONG_FLIGHT = 300_000

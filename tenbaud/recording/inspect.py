@@ -10,7 +10,7 @@ from typing import Any
 
 import orjson
 
-from channel.recording import Field, RecordChannel
+from channel.protocol.recording import Field, RecordChannel
 from tenbaud.recording.encoding import END_METADATA
 from tenbaud.recording.folder import RunFolder, find_recordings, read_summary
 from tenbaud.recording.holes import Hole

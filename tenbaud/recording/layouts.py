@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
+from tenbaud.files.whole import write_whole
+
 if TYPE_CHECKING:
     from tenbaud.recording.run import Run
 
@@ -115,8 +117,8 @@ def flight_layouts(run: Run, recording: Path) -> list[Path]:
     """Write both layouts beside a converted file; return their paths."""
     plots = flight_plots(run)
     foxglove, juggler = layout_paths(recording)
-    foxglove.write_text(foxglove_layout(plots))
-    juggler.write_text(plotjuggler_layout(plots, recording.name))
+    write_whole(foxglove, foxglove_layout(plots))
+    write_whole(juggler, plotjuggler_layout(plots, recording.name))
     return [foxglove, juggler]
 
 

@@ -18,12 +18,12 @@ from typing import BinaryIO
 from mcap.records import Channel, Footer, Metadata, MetadataIndex, Schema
 from mcap.writer import MCAP0_MAGIC
 
-from channel.recording import RecordChannel
+from channel.protocol.recording import RecordChannel
+from tenbaud.recording.blocks import blocks_of_file
 from tenbaud.recording.chunks import (
     Damage,
     Described,
     RawMessage,
-    blocks_of_file,
     metadata_at,
     summary_of_file,
 )

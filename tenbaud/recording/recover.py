@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
+from tenbaud.files.whole import write_error
 from tenbaud.recording.chunk_writer import ChunkWriter
 from tenbaud.recording.encoding import END_METADATA, RUN_METADATA, channel_schema
 from tenbaud.recording.errors import RecordingError
@@ -92,10 +93,7 @@ def _recover_file(path: Path, output: Path | None) -> Recovered:
                     _keep(path, kept)
                 unfinished.replace(target)
         except OSError as error:
-            raise RecordingError(
-                f"{target} cannot be written: {error.strerror or error}. "
-                "Choose another place with --out."
-            ) from error
+            raise write_error(target, error) from error
     return Recovered(target, kept or path, rows, last_ns, tuple(stream.holes), stream.strays)
 
 

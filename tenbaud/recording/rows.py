@@ -12,14 +12,14 @@ from typing import Any
 
 import orjson
 
-from channel.audit_trail import ARRIVED_CHANNEL, EPOCH_CHANNEL, SENT_CHANNEL
-from channel.events import EVENT_CHANNEL
-from channel.lockstep import LOCKSTEP_CHANNEL
-from channel.recording import Field, RecordChannel
-from receiver import records as receiver
+from channel.protocol.audit_trail import ARRIVED_CHANNEL, EPOCH_CHANNEL, SENT_CHANNEL
+from channel.protocol.events import EVENT_CHANNEL
+from channel.protocol.lockstep import LOCKSTEP_CHANNEL
+from channel.protocol.recording import Field, RecordChannel
+from receiver.session import records as receiver
 from tenbaud.recording.errors import RecordingError
-from transmitter import records as transmitter
-from transmitter.gap import GAP_CHANNEL
+from transmitter.metrics.gap import GAP_CHANNEL
+from transmitter.session import records as transmitter
 
 Row = dict[str, Any]
 """Field name to value; the values are those of JSON."""

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import orjson
 
+from tenbaud.files.whole import whole_file
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import (
     RECEIVER_NAME,
@@ -199,7 +200,9 @@ class Run:
 
         figure = draw_run(self._files.get("transmitter"), self._files.get("receiver"), self._title())
         if output is not None:
-            figure.savefig(output, dpi=150)
+            path = Path(output)
+            with whole_file(path) as stream:
+                figure.savefig(stream, dpi=150, format=path.suffix[1:] or "png")
         return figure
 
     def _title(self) -> str:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from channel.recording import Field
+from channel.protocol.recording import Field
 from tenbaud.recording.encoding import END_METADATA
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.holes import Hole

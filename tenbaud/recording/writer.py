@@ -7,6 +7,8 @@ still open, at most one second. Trouble with the disk ends the recording, never 
 
 from __future__ import annotations
 
+import os
+import stat
 import threading
 import time
 from collections import deque
@@ -15,7 +17,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from channel.recording import RecordChannel
+from channel.protocol.recording import RecordChannel
 from tenbaud.recording.chunk_writer import ChunkWriter
 from tenbaud.recording.encoding import (
     END_METADATA,
@@ -49,7 +51,7 @@ CLOSE_TIMEOUT_S = 10.0
 
 
 class McapRecorder:
-    """A `channel.recording.Recorder` that writes one MCAP file.
+    """A `channel.protocol.recording.Recorder` that writes one MCAP file.
 
     `metadata` describes the run (text to text) and is stored in the file's head. A row handed to
     `write` must not be changed afterwards, nor the lists in it: it is encoded later. Rows come
@@ -85,6 +87,7 @@ class McapRecorder:
         self._metadata = metadata
         self._overview = overview
         self._error: str | None = None
+        self._cause: Exception | None = None
         self._failed = False
         self._writers: dict[int, _ChannelWriter] = {}
         self._stream = open_new_recording(path)
@@ -117,6 +120,11 @@ class McapRecorder:
     def error(self) -> str | None:
         """The first trouble met, for a person; None while all is well."""
         return self._error
+
+    @property
+    def cause(self) -> Exception | None:
+        """What ended the recording before its end, None if nothing did."""
+        return self._cause
 
     def write(self, channel: RecordChannel, time_ns: int, row: Sequence[object]) -> None:
         """Queue one row; drop and count it if the queue is full or the recorder is closed."""
@@ -253,8 +261,16 @@ class McapRecorder:
         self._guard(self._flush)
         if not self._failed:
             self._guard(self._write_end)
+        if not self._failed:
+            self._guard(self._sync)
         # After a failure the stream still holds bytes that it cannot write, and says so again.
         self._guard(self._stream.close)
+
+    def _sync(self) -> None:
+        # Some file systems find out here that there was no room.
+        if stat.S_ISREG(os.fstat(self._stream.fileno()).st_mode):
+            self._stream.flush()
+            os.fsync(self._stream.fileno())
 
     def _write_end(self) -> None:
         counts = {"rows_written": str(self._rows_written), "rows_dropped": str(self.rows_dropped)}
@@ -272,6 +288,7 @@ class McapRecorder:
         # Anything at all: an exception that left this thread would end it without a word.
         except Exception as error:
             self._failed = True
+            self._cause = self._cause or error
             self._dropped_in_thread += self._rows_unflushed
             self._rows_unflushed = 0
             cause, advice = repr(error), "Please report this as a fault of tenbaud."

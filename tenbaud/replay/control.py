@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from receiver.controllers.base import Controller
-from receiver.references import Reference
-from tenbaud.build_ends import build_controller, build_reference
+from receiver.controllers.references import Reference
+from tenbaud.build.ends import build_controller, build_reference
 from tenbaud.config.schema import FlightConfig
 from tenbaud.replay.record import FlightRecord
 

@@ -10,13 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from channel.codec import Vector
-from channel.recording import RecordChannel
-from tenbaud.build import Agreement
+from channel.codec.codec import Vector
+from channel.protocol.recording import RecordChannel
+from tenbaud.build.flight import Agreement
 from tenbaud.replay.record import Epoch
 from tenbaud.replay.refly import Reflown
-from transmitter.copies import Copies
-from transmitter.records import ESTIMATE_CHANNEL, SAMPLE_CHANNEL, write_sample
+from transmitter.session.copies import Copies
+from transmitter.session.records import ESTIMATE_CHANNEL, SAMPLE_CHANNEL, write_sample
 
 
 @dataclass(slots=True)

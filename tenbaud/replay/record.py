@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from channel.codec import CodecState, Vector
-from channel.words import Word
-from tenbaud.build import Agreement, agree
-from tenbaud.outside_code import require_allowed, require_regular_files
+from channel.codec.codec import CodecState, Vector
+from channel.codec.words import Word
+from tenbaud.build.flight import Agreement, agree
+from tenbaud.build.outside_code import require_allowed, require_regular_files
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.run import Run
 from tenbaud.recording.table import Tables
@@ -98,7 +98,7 @@ def _agreement(run: Run, tables: Tables, allow_code: bool) -> Agreement:
 def _check_same(tables: Tables, agreement: Agreement, end: str) -> None:
     identity = agreement.identity
     if tables.metadata.get("shared_config") != identity.config:
-        from channel.identity import differing_fields
+        from channel.protocol.identity import differing_fields
 
         recorded = tables.metadata.get("shared_config", "")
         lines = "\n  ".join(differing_fields(identity.config, recorded)[:6])

@@ -11,14 +11,14 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from channel.codec import Codec, CodecState, Vector
-from channel.frames import Hello, Symbol, Welcome
-from channel.recording import RecordChannel
-from channel.words import Word
+from channel.codec.codec import Codec, CodecState, Vector
+from channel.codec.words import Word
+from channel.protocol.frames import Hello, Symbol, Welcome
+from channel.protocol.recording import RecordChannel
 from receiver.controllers.base import Controller
-from receiver.records import SAMPLE_CHANNEL, TICK_CHANNEL
-from receiver.session import ReceiverSession
-from tenbaud.build import Agreement
+from receiver.session.records import SAMPLE_CHANNEL, TICK_CHANNEL
+from receiver.session.session import ReceiverSession
+from tenbaud.build.flight import Agreement
 from tenbaud.replay.record import Epoch
 
 Delay = Callable[[int], int]

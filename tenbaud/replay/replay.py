@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tenbaud.files.whole import make_folder, write_whole
 from tenbaud.recording.errors import RecordingError
 from tenbaud.replay.control import controller_of, steps_by_hand
 from tenbaud.replay.record import FlightRecord, epochs_of
@@ -151,6 +152,10 @@ def _compare_commands(rows: EndRows, flown: Sequence[Reflown]) -> list[str]:
 
 
 def save_symbols(replayed: Replayed, path: Path) -> None:
-    """Write the packed flight; the file must not exist yet."""
-    with path.open("xb") as stream:
-        stream.write(replayed.packed.data)
+    """Write the packed flight. Raises WriteError, and RecordingError where the file exists already."""
+    if path.exists():
+        raise RecordingError(
+            f"{path} exists already and is not overwritten. Name another file with --save."
+        )
+    make_folder(path.parent)
+    write_whole(path, replayed.packed.data)

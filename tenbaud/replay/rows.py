@@ -10,17 +10,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from channel.audit_trail import ARRIVED_CHANNEL, EPOCH_CHANNEL, SENT_CHANNEL
-from channel.codec import Vector
-from channel.events import EVENT_CHANNEL
-from channel.lockstep import LOCKSTEP_CHANNEL
-from channel.recording import Field, RecordChannel
-from channel.words import Word
-from receiver import records as receiver_records
+from channel.codec.codec import Vector
+from channel.codec.words import Word
+from channel.protocol.audit_trail import ARRIVED_CHANNEL, EPOCH_CHANNEL, SENT_CHANNEL
+from channel.protocol.events import EVENT_CHANNEL
+from channel.protocol.lockstep import LOCKSTEP_CHANNEL
+from channel.protocol.recording import Field, RecordChannel
+from receiver.session import records as receiver_records
 from tenbaud.recording.recover import RECOVERED_NOTE
 from tenbaud.recording.table import Table, Tables
-from transmitter import records as transmitter_records
-from transmitter.gap import GAP_CHANNEL
+from transmitter.metrics.gap import GAP_CHANNEL
+from transmitter.session import records as transmitter_records
 
 KEY_MAX = 2**48
 """No flight has a tick, sample or slot beyond this."""

@@ -19,11 +19,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from channel.codec import Codec, CodecState
-from channel.words import ERASED, Alphabet, Word
-from tenbaud.build import Agreement, agree
+from channel.codec.codec import Codec, CodecState
+from channel.codec.words import ERASED, Alphabet, Word
+from tenbaud.build.flight import Agreement, agree
+from tenbaud.build.outside_code import require_allowed, require_regular_files
 from tenbaud.config.schema import FlightConfig
-from tenbaud.outside_code import require_allowed, require_regular_files
 from tenbaud.recording.errors import RecordingError
 from tenbaud.replay.record import Epoch, check_epoch
 

@@ -21,8 +21,8 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any
 
+from channel.codec.numerics import refuse
 from channel.errors import TenbaudError
-from channel.numerics import refuse
 
 PACKAGES = ("channel", "plant_sim", "receiver", "transmitter", "tenbaud")
 
@@ -30,8 +30,8 @@ OPTIONS = {"fastmath": False, "error_model": "python", "nogil": True, "_nrt": Fa
 """How everything is compiled: divisions by zero are errors and nothing is reordered, as in Python; no
 memory is allocated, and so none is counted."""
 
-SOURCES = (*PACKAGES[:-1], "tenbaud.config", "tenbaud.flight", "tenbaud.studies")
-"""Packages that the figures of a flight depend on; beside them, what builds its parts."""
+SOURCES = (*PACKAGES[:-1], "tenbaud.build", "tenbaud.config", "tenbaud.flight", "tenbaud.studies")
+"""Packages that the figures of a flight depend on."""
 
 BESIDE = (
     *("constants.py", "judging.py", "tuning.py"),
@@ -97,7 +97,7 @@ def reader(size: int) -> Any:
 
 
 def _refuse(what: str, x: float) -> None:
-    """Stand for `channel.numerics.refuse`: writing the number down would take memory."""
+    """Stand for `channel.codec.numerics.refuse`: writing the number down would take memory."""
     raise ValueError("an argument of sin, cos or exp is out of range")
 
 
@@ -125,7 +125,7 @@ def sources_digest() -> str:
 
 def figure_sources() -> list[Path]:
     """Return the files that the figures of a flight depend on, always in the same order."""
-    found = sorted(Path(__file__).parents[1].glob("build*.py"))
+    found: list[Path] = []
     for package in SOURCES:
         spec = find_spec(package)
         for place in (spec and spec.submodule_search_locations) or ():
@@ -137,10 +137,10 @@ def figure_sources() -> list[Path]:
 @cache
 def _cache_folder() -> Path | None:
     """Return where machine code is kept, None when that cannot be written."""
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    folder = Path(base) / "tenbaud" / sources_digest()
     try:
+        base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+        folder = Path(base) / "tenbaud" / sources_digest()
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
+    except (OSError, RuntimeError):  # the latter for a user without a home, as in containers
         return None
     return folder if os.access(folder, os.W_OK) else None

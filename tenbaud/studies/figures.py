@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from channel.identity import Identity
-from tenbaud.build import REAL_RIGS, Agreement, checked_terms
-from tenbaud.build_codec import build_codec
+from channel.protocol.identity import Identity
+from tenbaud.build.codec import build_codec
+from tenbaud.build.flight import REAL_RIGS, Agreement, checked_terms
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
 

@@ -108,7 +108,7 @@ class Motion(NamedTuple):
 
 
 class Errors(NamedTuple):
-    """Running figures as `transmitter.scores` keeps them."""
+    """Running figures as `transmitter.metrics.scores` keeps them."""
 
     coded_count: int = 0
     coded_squares: float = 0.0

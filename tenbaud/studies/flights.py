@@ -10,19 +10,20 @@ from typing import Any
 
 import numpy as np
 
-from channel.codec import Codec
-from channel.coders.base import FunctionCoder
+from channel.codec.codec import Codec
+from channel.codec.coders.base import FunctionCoder
+from channel.codec.numerics import sin
 from channel.flight_log import FlightLog
-from channel.numerics import sin
 from plant_sim.disturbance import parse_disturbance
 from plant_sim.pitch import pitch_constants
 from receiver.controllers.pid import Pid, PidConstants
 from receiver.controllers.recorded import RecordedController
-from tenbaud.build import Agreement, read_flight_log
-from tenbaud.build_ends import build_controller, guard_settings, reference_of
-from tenbaud.build_rig import nominal_plant
+from tenbaud.build.ends import build_controller, guard_settings, reference_of
+from tenbaud.build.flight import Agreement, read_flight_log
+from tenbaud.build.rig import nominal_plant
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig, FlightLogSection, ReferenceSection
+from tenbaud.flight.verdict import FlightCounts, faults_of
 from tenbaud.studies.compiled import compiled, reader
 from tenbaud.studies.figures import FlightFigures, shared_parts
 from tenbaud.studies.flight_data import DONE, Errors, Given, Motion, Numbers, Work
@@ -128,8 +129,22 @@ class CompiledPoint:
             raise Uncommon(str(error)) from error
         if status != DONE:
             raise Uncommon("the flight left its ordinary course")
+        if faults_of(self._counts(schedule, motion)):
+            raise Uncommon("what does not count as flown, for the reason that the nodes give")
         figures = flight_figures(errors, motion, schedule.erasures, self._samples)
         return figures, Trace(work.models, work.coders, work.coded, work.live, work.front, work.rear)
+
+    def _counts(self, schedule: Schedule, motion: Motion) -> FlightCounts:
+        """Return what the verdict on a flight rests on; a compiled one has no rejoin and no stop."""
+        ticks = self.numbers.ticks
+        return FlightCounts(
+            samples=self._samples,
+            confirmed=int(np.count_nonzero(schedule.scored)),
+            erased=schedule.erasures,
+            rejoins=0,
+            ticks=ticks,
+            ticks_commanded=ticks - motion.late,
+        )
 
     def figures(self, seed: int) -> FlightFigures | None:
         """Fly with one seed; None for a flight that only the nodes can fly."""

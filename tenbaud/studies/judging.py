@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-from tenbaud.build import ticks_of
+from tenbaud.build.flight import ticks_of
 from tenbaud.config.schema import FlightConfig
 from tenbaud.studies.chunk import fly_point
 from tenbaud.studies.figures import FlightFigures

@@ -16,8 +16,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from channel.codec import add_correction, is_estimate
-from channel.limits import as_carried, limited
+from channel.codec.codec import add_correction, is_estimate
+from channel.protocol.limits import as_carried, limited
 from plant_sim.pitch import pitch_step
 from receiver.controllers.pid import motor_volts, pid_integral, pid_volts
 from tenbaud.studies.flight_data import DONE, LEFT, Errors, Given, Motion, Numbers, Work

@@ -52,5 +52,5 @@ def held_of(values: Sequence[float]) -> State:
 
 
 def sine(x: float) -> float:
-    """Stand for the plant's sine, that of `channel.numerics`."""
+    """Stand for the plant's sine, that of `channel.codec.numerics`."""
     raise AssertionError("a flight is compiled before it is flown")

@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 
 from channel.errors import TenbaudError
-from channel.wire import DATAGRAM
-from tenbaud.build import agree
-from tenbaud.build_ends import build_receiver
+from channel.protocol.wire import DATAGRAM
+from tenbaud.build.ends import build_receiver
+from tenbaud.build.flight import agree
 from tenbaud.config.schema import FlightConfig
 from tenbaud.flight import transmit
-from tenbaud.flight.outcome import ExitCode, outcome_of
+from tenbaud.flight.outcome import ExitCode, Outcome, outcome_of
+from tenbaud.flight.verdict import NotFlown
 from tenbaud.studies.figures import FlightFigures
-from transmitter.scores import ErrorMeter
+from transmitter.metrics.scores import ErrorMeter
 
 
 def fly_plain(config: FlightConfig, window_start: int | None = None) -> FlightFigures:
@@ -41,7 +42,7 @@ def fly_plain(config: FlightConfig, window_start: int | None = None) -> FlightFi
     heard = node.session.copies.next_sample
     flown = min(heard, -(-run.ticks // agreement.terms.ticks_per_sample))
     return FlightFigures(
-        outcome="ok" if outcome.code is ExitCode.OK else outcome.text,
+        outcome="ok" if _has_flown(outcome) else outcome.text,
         engine="plain",
         error_coded_rms=_rms(scores.coded),
         error_coded_max=scores.coded.largest,
@@ -53,6 +54,16 @@ def fly_plain(config: FlightConfig, window_start: int | None = None) -> FlightFi
         commands_late=node.commands_late,
         samples=flown,
     )
+
+
+def _has_flown(outcome: Outcome) -> bool:
+    """Return whether a flight's errors are results.
+
+    A study may ask for a line that carries next to nothing: what comes of that is its result.
+    """
+    if outcome.code is ExitCode.NOT_FLOWN:
+        return set(outcome.not_flown) <= {NotFlown.NO_WORDS, NotFlown.NO_COMMANDS}
+    return outcome.code is ExitCode.OK
 
 
 def _rms(meter: ErrorMeter) -> float:

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from tenbaud.files.whole import whole_file
+
 LABELS = {
     "rate": "R in symbols per second (baud)",
     "loss": "share of messages lost",
@@ -181,6 +183,7 @@ def _file(name: str) -> str:
 def _save(figure: Any, path: Path) -> Path:
     import matplotlib.pyplot as plt
 
-    figure.savefig(path, dpi=130)
+    with whole_file(path) as stream:
+        figure.savefig(stream, dpi=130, format="png")
     plt.close(figure)
     return path

@@ -1,9 +1,9 @@
 """What becomes of every symbol and every echo of a flight, and when, before anything is computed.
 
 Loss, delay and erasure do not depend on what a symbol says. So the line is flown once on its own, in
-the order of events of the virtual clock (`transmitter.virtual_flight`) and with the receiver's rule
-for what was received in time (`receiver.session`), over the very lines that an ordinary flight would
-use and with their seeds. What comes out are arrays that a compiled flight reads.
+the order of events of the virtual clock (`transmitter.loops.virtual`) and with the receiver's rule
+for what was received in time (`receiver.session.session`), over the lines that a flight would use
+and with their seeds. What comes out are arrays that a compiled flight reads.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from channel.errors import FrameError
-from channel.frames import Frame, Symbol
-from channel.line import Delivery
-from tenbaud.build import Agreement
-from tenbaud.build_ends import build_line
-from transmitter.virtual_flight import GREETINGS_MAX
+from channel.line.line import Delivery
+from channel.protocol.frames import Frame, Symbol
+from tenbaud.build.ends import build_line
+from tenbaud.build.flight import Agreement
+from transmitter.loops.virtual import GREETINGS_MAX
 
 IntArray = Any
 

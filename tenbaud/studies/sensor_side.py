@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from channel.codec import add_correction, is_estimate
-from channel.limits import limited
+from channel.codec.codec import add_correction, is_estimate
+from channel.protocol.limits import limited
 from plant_sim.encoder import angle_of, counts_of
 from tenbaud.studies.flight_data import Errors, Given, Motion, Numbers, Work
 from tenbaud.studies.parts import decode, held_of, state_of, tick
@@ -39,7 +39,8 @@ def guess(
 ) -> bool:
     """Carry `work.model` and `work.coder` from the confirmed copy to a sample's beginning.
 
-    The words are those sent, the commands those known, a missing one the last (`transmitter.copies`).
+    The words are those sent, the commands those known, a missing one the last
+    (`transmitter.session.copies`).
     Return whether the estimate is one.
     """
     size = work.word.shape[0]
@@ -130,7 +131,7 @@ def score(
     given: Given,
     work: Work,
 ) -> Errors:
-    """Add the errors of one tick, in the order in which `transmitter.scores` adds them."""
+    """Add the errors of one tick, in the order in which `transmitter.metrics.scores` adds them."""
     coded_count, coded_squares, coded_max = errors[0], errors[1], errors[2]
     live_count, live_squares, live_max = errors[3], errors[4], errors[5]
     tracking_count, tracking_squares = errors[6], errors[7]

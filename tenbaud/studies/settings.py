@@ -18,10 +18,10 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 
 from channel.errors import TenbaudError
-from tenbaud.build_codec import build_codec
+from tenbaud.build.codec import build_codec
+from tenbaud.build.outside_code import require_allowed
 from tenbaud.config.load import load_config
 from tenbaud.config.schema import KINDS, FlightConfig
-from tenbaud.outside_code import require_allowed
 
 
 class StudyError(TenbaudError):

@@ -31,7 +31,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from channel.errors import TenbaudError
-from tenbaud.build_ends import check_parts
+from tenbaud.build.ends import check_parts
 from tenbaud.config.schema import FlightConfig
 from tenbaud.studies.figures import shared_parts
 from tenbaud.studies.points import FLIGHTS_MAX, names_of, points_of

@@ -1,15 +1,15 @@
 """Results as Parquet: a file per chunk while a study runs, one table when it is done.
 
-A file is written under another name and renamed when it is whole, so one that a killed process left
-half written is never taken for a result.
+A file stands under its name when it is whole, so one that a killed process left half written is never
+taken for a result.
 """
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
+from tenbaud.files.whole import make_folder, whole_file
 from tenbaud.studies.chunk import ChunkResult
 from tenbaud.studies.compiled import require, sources_digest
 from tenbaud.studies.figures import FlightFigures
@@ -35,11 +35,8 @@ class Results:
 
         StudyError when the folder holds the results of another study or of other sources.
         """
-        try:
-            self._chunks.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise StudyError(f"cannot write into {self.folder}: {error.strerror}") from error
-        for left in self._chunks.glob("*.part"):
+        make_folder(self._chunks)
+        for left in self._chunks.glob(".*.part"):
             left.unlink(missing_ok=True)
         done = set()
         for index in range(self.study.chunks):
@@ -69,9 +66,8 @@ class Results:
     def join(self) -> Any:
         """Write all chunks as one table; return it."""
         import pyarrow as pa
-        import pyarrow.parquet as pq
 
-        parts = [pq.read_table(self._path(index)) for index in range(self.study.chunks)]
+        parts = [_table(self._path(index)) for index in range(self.study.chunks)]
         table = pa.concat_tables(parts)
         self._store(table, self.table_path)
         return table
@@ -79,11 +75,8 @@ class Results:
     def _store(self, table: Any, path: Path) -> None:
         import pyarrow.parquet as pq
 
-        part = path.with_suffix(".part")
-        pq.write_table(table.replace_schema_metadata(self._metadata), part)
-        with part.open("rb") as file:
-            os.fsync(file.fileno())
-        part.replace(path)
+        with whole_file(path) as stream:
+            pq.write_table(table.replace_schema_metadata(self._metadata), stream)
 
     def _path(self, index: int) -> Path:
         return self._chunks / f"{index:06d}.parquet"
@@ -94,9 +87,10 @@ class Results:
         import pyarrow.parquet as pq
 
         try:
-            file = pq.read_metadata(path)
-            metadata = file.metadata or {}
-            pq.read_table(path)
+            with path.open("rb") as stream:
+                file = pq.read_metadata(stream)
+                metadata = file.metadata or {}
+                pq.read_table(stream)
         except (pa.ArrowException, OSError):
             path.unlink(missing_ok=True)
             return False
@@ -123,13 +117,20 @@ def _column(name: str, values: list[Any], study: Study) -> Any:
     return pa.array(values)
 
 
+def _table(path: Path) -> Any:
+    import pyarrow.parquet as pq
+
+    # Opened by Python, which takes names that are no text.
+    with path.open("rb") as stream:
+        return pq.read_table(stream)
+
+
 def read_results(path: Path) -> Any:
     """Return the table of a finished study; StudyError where it cannot be read."""
     require("pyarrow")
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     try:
-        return pq.read_table(path)
+        return _table(path)
     except (pa.ArrowException, OSError) as error:
         raise StudyError(f"cannot read the results {path}: {error}") from error

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections import deque
 from typing import Any
 
-from channel.codec import Vector
-from channel.recording import RecordChannel
+from channel.codec.codec import Vector
+from channel.protocol.recording import RecordChannel
 from receiver.endpoint import ReceiverEndpoint
-from receiver.records import SAMPLE_CHANNEL as TAKEN
-from receiver.records import TICK_CHANNEL as DECIDED
-from tenbaud.build import Agreement
-from tenbaud.flight.transmit import TransmitterRun
+from receiver.session.records import SAMPLE_CHANNEL as TAKEN
+from receiver.session.records import TICK_CHANNEL as DECIDED
+from tenbaud.build.flight import Agreement
+from tenbaud.build.transmitter_run import TransmitterRun
 from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
 from tenbaud.telemetry.schema import SCHEMA_VERSION
 from tenbaud.telemetry.tap import Tap
-from transmitter.records import ESTIMATE_CHANNEL, SAMPLE_CHANNEL, TICK_CHANNEL
+from transmitter.session.records import ESTIMATE_CHANNEL, SAMPLE_CHANNEL, TICK_CHANNEL
 
 POINT_PERIOD_S = 0.05
 POINTS_MAX = 16

@@ -16,14 +16,14 @@ import math
 import time
 from collections.abc import Callable
 
-from channel.events import EVENT_CHANNEL, Event, EventKind, event_row
-from channel.impairments import ImpairedLine, parse_impairments
+from channel.line.impairments import ImpairedLine, parse_impairments
 from channel.links.base import Role
-from channel.recording import Recorder
-from channel.sabotage import SabotagedCodec, parse_sabotage
+from channel.protocol.events import EVENT_CHANNEL, Event, EventKind, event_row
+from channel.protocol.recording import Recorder
+from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
+from receiver.controllers.steered import SteeredReference
 from receiver.endpoint import ReceiverEndpoint
-from receiver.steered import SteeredReference
-from tenbaud.flight.transmit import Stop, TransmitterRun
+from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.telemetry.commands import CommandQueue
 from tenbaud.telemetry.schema import Command, Impair, Pace, Pause, SetPoint, Spoil, Step
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import secrets
 import socket
 import stat
 import tempfile
@@ -42,7 +43,8 @@ def endpoint_for(
         exposed = insecure and not all(is_loopback(address) for address in addresses)
         if not wish and (exposed or not hasattr(socket, "AF_UNIX")):
             return None
-        path = private_folder() / f"{role}-{os.getpid()}.sock"
+        # By chance, since processes of two containers that share the folder may have one number.
+        path = private_folder() / f"{role}-{secrets.token_hex(4)}.sock"
         clear_stale()
         return f"{SOCKET}{path}"
     protocol = wish.partition("/")[0]
@@ -67,7 +69,7 @@ def private_folder() -> Path:
             f"{folder} is open to others than its user, and who can enter it could steer a flight; "
             "remove it, or fly with --telemetry off"
         )
-    if len(os.fsencode(folder)) > PATH_BYTES_MAX - len("/transmitter-0000000.sock"):
+    if len(os.fsencode(folder)) > PATH_BYTES_MAX - len("/transmitter-00000000.sock"):
         raise LinkError(
             f"{folder} is too long a path for sockets; set XDG_RUNTIME_DIR to a shorter one"
         )

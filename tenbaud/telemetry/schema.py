@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, field_validator
 
-from channel.impairments import parse_impairments
+from channel.line.impairments import parse_impairments
 
 SCHEMA_VERSION = 1
 ANGLE_MAX_RAD = 1.6

@@ -11,12 +11,12 @@ from typing import Any
 from channel.errors import LinkError
 from channel.links.base import Role
 from channel.links.security import Security
-from channel.recording import Recorder
+from channel.protocol.recording import Recorder
+from receiver.controllers.steered import SteeredReference
 from receiver.endpoint import ReceiverEndpoint
-from receiver.steered import SteeredReference
-from tenbaud.build import Agreement
-from tenbaud.build_ends import build_reference
-from tenbaud.flight.transmit import Stop, TransmitterRun
+from tenbaud.build.ends import build_reference
+from tenbaud.build.flight import Agreement
+from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.telemetry.commands import CommandQueue
 from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
 from tenbaud.telemetry.place import SOCKET, endpoint_for
@@ -103,7 +103,7 @@ class Station:
     def _port(self) -> Any:
         if self.endpoint is None:
             return None
-        from channel.links.zenoh_telemetry import TelemetryPort
+        from channel.links.zenoh.telemetry import TelemetryPort
 
         on_command = None if self.queue is None else self.queue.offer
         name = self.agreement.config.link.session

@@ -10,14 +10,14 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 
-from channel.recording import RecordChannel, Recorder
+from channel.protocol.recording import RecordChannel, Recorder
 
 ROWS_MAX = 8192
 TOPICS = frozenset(("tick", "estimate", "sample", "event"))
 
 
 class Tap:
-    """A `channel.recording.Recorder` in front of another; `rows` is emptied by one other thread."""
+    """A `Recorder` in front of another; `rows` is emptied by one other thread."""
 
     def __init__(self, recorder: Recorder) -> None:
         self.rows: deque[tuple[str, Sequence[object]]] = deque(maxlen=ROWS_MAX)

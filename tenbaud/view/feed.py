@@ -94,7 +94,7 @@ def _try_open(
     take: Callable[[bytes], None],
     credentials: Credentials | None,
 ) -> Any:
-    from channel.links.zenoh_telemetry import TelemetryFeed
+    from channel.links.zenoh.telemetry import TelemetryFeed
 
     try:
         return TelemetryFeed(endpoint, session_name, take, credentials)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from nicegui import ui
@@ -11,6 +12,7 @@ from nicegui import ui
 from tenbaud.view.board import Board
 from tenbaud.view.feed import Feed
 
+STATIC = Path(__file__).parent / "static"
 REFRESH_S = 0.25
 SET_POINT_STEP_DEG = 5
 PACES = {0.25: "¼", 1.0: "1", 5.0: "5", 25.0: "25"}
@@ -22,8 +24,6 @@ Send = Callable[..., None]
 
 def build_page(board: Board, feed: Feed, *, steers: bool) -> None:
     """Build the page for one browser; `steers`: whether its visitor may ask anything of the flight."""
-    from tenbaud.view.server import STATIC
-
     # Relative: the page is served below a path of its visitor's own.
     ui.add_head_html('<link rel="stylesheet" href="view/view.css">')
     ui.add_body_html((STATIC / "instruments.html").read_text(encoding="utf-8"))

@@ -14,7 +14,6 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 from urllib.request import Request, urlopen
 
@@ -30,7 +29,6 @@ IDLE_PERIOD_S = 0.5
 FIRST_LOOKS = 100
 EVERYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}
 """Hosts that stand for every address of this machine, and by which one it finds itself there."""
-STATIC = Path(__file__).parent / "static"
 SERVING = "tenbaud view: "
 """begins the line with the address of the page"""
 LOOK_ONLY = "tenbaud view, to look only: "
@@ -105,7 +103,7 @@ def serve(feed: Feed, address: Address, *, open_browser: bool = False, view_only
     from nicegui import app, ui
 
     from tenbaud.view.gate import GRANT, Gate
-    from tenbaud.view.page import build_page
+    from tenbaud.view.page import STATIC, build_page
 
     board = Board()
     access = draw_access(address.host, address.is_local, view_only=view_only)

@@ -30,7 +30,7 @@ def make_memory(_: ExitStack) -> Pair:
 
 
 def make_zenoh(stack: ExitStack) -> Pair:
-    from channel.links.zenoh import ZenohLink
+    from channel.links.zenoh.link import ZenohLink
 
     endpoint = free_endpoint()
     receiver = stack.enter_context(ZenohLink("receiver", "test/contract", listen=(endpoint,)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from channel.links.zenoh_gate import HandshakeLog
+from channel.links.zenoh.gate import HandshakeLog
 
 LINE = b"WARN zenoh_link_tls::unicast: peer sent no certificates. Hint: none\n"
 

@@ -6,8 +6,8 @@ import pytest
 
 from channel.errors import LinkError
 from channel.links.endpoints import free_endpoint
-from channel.links.zenoh import ZenohLink
-from channel.links.zenoh_hub import ZenohHub
+from channel.links.zenoh.hub import ZenohHub
+from channel.links.zenoh.link import ZenohLink
 from tests.contract.test_links import PATIENCE_S, SILENCE_S, until
 
 

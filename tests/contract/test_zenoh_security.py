@@ -12,10 +12,10 @@ import pytest
 
 from channel.errors import LinkError
 from channel.links.security import Invited, Security, access_rules
-from channel.links.zenoh import ZenohLink
-from channel.links.zenoh_gate import reason_of
-from channel.links.zenoh_hub import ZenohHub
-from channel.links.zenoh_router import ZenohRouter
+from channel.links.zenoh.gate import reason_of
+from channel.links.zenoh.hub import ZenohHub
+from channel.links.zenoh.link import ZenohLink
+from channel.links.zenoh.router import ZenohRouter
 from tests.contract.security import SESSION, credentials, free_tls_endpoint, security
 from tests.contract.test_links import PATIENCE_S, SILENCE_S, Pair, until
 

@@ -16,7 +16,7 @@ import pytest
 
 from channel.errors import LinkError
 from channel.links.security import Invited, Part, Security
-from channel.links.zenoh_telemetry import TelemetryFeed, TelemetryPort
+from channel.links.zenoh.telemetry import TelemetryFeed, TelemetryPort
 from tests.contract.security import credentials, free_tls_endpoint
 from tests.contract.test_links import PATIENCE_S, SILENCE_S
 from tests.tenbaud.processes import REPOSITORY
@@ -64,7 +64,7 @@ def test_messages_reach_every_viewer_and_commands_come_back(tmp_path: Path) -> N
 STANDS_STILL = """
 import os, signal, sys
 from channel.links.security import Invited, Part, Security
-from channel.links.zenoh_telemetry import TelemetryFeed
+from channel.links.zenoh.telemetry import TelemetryFeed
 feed = TelemetryFeed(sys.argv[1], "lab", lambda data: None)
 print("ready", flush=True)
 os.kill(os.getpid(), signal.SIGSTOP)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from tenbaud.cli.app import app
+from tenbaud.cli.commands import app
 from tests.tenbaud.processes import REPOSITORY
 
 UNITS = sorted((REPOSITORY / "deploy").glob("*.service"))

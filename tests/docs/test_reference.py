@@ -9,7 +9,7 @@ import pytest
 from docs.tools.commands_page import commands_page
 from docs.tools.configuration_page import configuration_page
 from docs.tools.reference import PAGES
-from tenbaud.cli.app import app
+from tenbaud.cli.commands import app
 from tenbaud.config.load import load_config, preset_names
 from tenbaud.config.schema import FlightConfig
 from tests.rules.sources import TOP
@@ -28,11 +28,11 @@ def section_of(page: str, title: str) -> str:
 @pytest.mark.parametrize(
     ("section", "row"),
     [
-        ("`[timing]`", "| `tick_s` | s | `0.01` | number > 0, ≤ 1 | h: control tick |"),
+        ("`[timing]`", "| `tick_s` | s | `0.01` | number ≥ 1e-05, ≤ 1 | h: control tick |"),
         ("`[link]`", "| `best_effort` |  | `false` | `true`, `false` |"),
         ("`[transmitter.bridge.pitch]`", "| `counts_per_turn` | counts/turn | `4096` |"),
         ('`[coder]` with `kind = "zoom"`', "| `window_signs` | signs | `2` | whole number ≥ 1, ≤ 16 |"),
-        ("`[transmitter]`", "| `soft_limit_rad` | rad | none | number > 0 or none |"),
+        ("`[transmitter]`", "| `soft_limit_rad` | rad | none | number ≥ 1e-09, ≤ 1000000000 or none |"),
     ],
 )
 def test_when_a_field_is_looked_up_then_unit_default_range_and_meaning_are_there(

@@ -15,12 +15,12 @@ from typing import Any
 
 import pytest
 
-from channel import wire
-from channel.cobs import cobs_decode
 from channel.errors import FrameError
-from channel.frames import Why
-from channel.serial_wire import SerialWire, unstuff
-from channel.virtual import decode_reply, decode_step
+from channel.line.virtual import decode_reply, decode_step
+from channel.links.serial.cobs import cobs_decode
+from channel.links.serial.wire import SerialWire, unstuff
+from channel.protocol import wire
+from channel.protocol.frames import Why
 from tests.rules.sources import TOP
 
 PAGE = (TOP / "docs/reference/wire-format.md").read_text(encoding="utf-8")

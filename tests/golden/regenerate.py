@@ -15,16 +15,17 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from channel import frames, numerics, wire
-from channel.codec import Codec
-from channel.coders.history import HistoryCoder, HistoryParameters
-from channel.coders.static import StaticCoder, StaticParameters
-from channel.coders.timed import TimedCoder, TimedParameters
-from channel.coders.words import WordsCoder, WordsParameters
-from channel.coders.zoom import ZoomCoder, ZoomParameters
-from channel.limits import from_millivolts
-from channel.models.hold import HoldModel
-from channel.models.pitch import PitchModel, PitchParameters
+from channel.codec import numerics
+from channel.codec.codec import Codec
+from channel.codec.coders.history import HistoryCoder, HistoryParameters
+from channel.codec.coders.static import StaticCoder, StaticParameters
+from channel.codec.coders.timed import TimedCoder, TimedParameters
+from channel.codec.coders.words import WordsCoder, WordsParameters
+from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
+from channel.codec.models.hold import HoldModel
+from channel.codec.models.pitch import PitchModel, PitchParameters
+from channel.protocol import frames, wire
+from channel.protocol.limits import from_millivolts
 
 FOLDER = Path(__file__).resolve().parent
 

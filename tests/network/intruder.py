@@ -65,11 +65,11 @@ def garbage(host: str, count: str, per_second: str) -> dict[str, object]:
 
 def insider(host: str, keys: str, transmitter: str, receiver: str) -> dict[str, object]:
     """With a valid certificate and no invitation: listen to the flight, and try to take part in it."""
-    from channel.frames import Bye, Claim, Commands, Echo, Hello, Unknown
     from channel.links.base import Role
     from channel.links.security import Invited, Part, Security
-    from channel.links.zenoh import ZenohLink
-    from channel.wire import encode
+    from channel.links.zenoh.link import ZenohLink
+    from channel.protocol.frames import Bye, Claim, Commands, Echo, Hello, Unknown
+    from channel.protocol.wire import encode
     from tenbaud.keys.store import read_node
 
     heard = 0

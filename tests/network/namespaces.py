@@ -171,7 +171,7 @@ class BadCable:
     def __init__(self, ends: tuple[int, int], delay_s: float, loss: float, seed: int) -> None:
         self._ends = ends
         self._delay_s = delay_s
-        self._loss = loss
+        self.loss = loss
         self._chooser = random.Random(seed)
         self.carried = 0
         self.lost = 0
@@ -198,7 +198,7 @@ class BadCable:
             for source in select.select(self._ends, [], [], patience_s)[0]:
                 with contextlib.suppress(OSError):
                     packet = os.read(source, 65_536)
-                    if self._chooser.random() < self._loss:
+                    if self._chooser.random() < self.loss:
                         self.lost += 1
                     else:
                         waiting.append((time.monotonic() + self._delay_s, other[source], packet))

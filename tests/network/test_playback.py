@@ -11,7 +11,7 @@ from pathlib import Path
 import zenoh
 
 from channel.links.endpoints import free_endpoint
-from channel.links.zenoh_router import ZenohRouter
+from channel.links.zenoh.router import ZenohRouter
 from tests.network.flights import Flight
 from tests.network.namespaces import Machine
 from tests.tenbaud.ends import wait_for

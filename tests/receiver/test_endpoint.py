@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from channel import wire
-from channel.frames import Commands, Hello, Symbol, Welcome
+from channel.protocol import wire
+from channel.protocol.frames import Commands, Hello, Symbol, Welcome
 from receiver.endpoint import ReceiverEndpoint
-from receiver.session import ReceiverSession
-from tests.channel.parts import ConstantController, identity_of, pitch_codec, terms
+from receiver.session.session import ReceiverSession
+from tests.channel.codec.parts import ConstantController, identity_of, pitch_codec, terms
 
 MS = 1_000_000
 CODEC = pitch_codec()

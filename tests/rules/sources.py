@@ -1,4 +1,4 @@
-"""Where the rules look: the five packages, and the text of their files."""
+"""Where the rules look: the packages, and the text of their files."""
 
 from __future__ import annotations
 
@@ -7,6 +7,10 @@ from pathlib import Path
 
 TOP = Path(__file__).resolve().parents[2]
 PACKAGES = ("channel", "transmitter", "receiver", "plant_sim", "tenbaud")
+"""What the wheel holds."""
+
+OUTSIDE = ("reproduction",)
+"""Packages of the checkout that are not in the wheel."""
 
 
 def name_of(path: Path) -> str:

@@ -7,11 +7,11 @@ import re
 
 import pytest
 
-from tests.rules.sources import PACKAGES, TOP, files_below, report
+from tests.rules.sources import OUTSIDE, PACKAGES, TOP, files_below, report
 
 FILE_LINES_MAX = 400
 FUNCTION_LINES_MAX = 70
-CODE_FOLDERS = (*PACKAGES, "tests", "benchmarks")
+CODE_FOLDERS = (*PACKAGES, *OUTSIDE, "tests", "benchmarks")
 TEXT_PATTERNS = ("*.py", "*.md", "*.toml", "*.json", "*.yml", "*.csv", "*.sh")
 TOP_FILES = ("pyproject.toml", "Makefile", ".gitignore", ".ci/run")
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass, replace
 
-from channel.coders.zoom import ZoomParameters
-from channel.impairments import Impairments, LineFaults
-from channel.sabotage import Sabotage
-from channel.terms import Terms
-from tenbaud.liveness import check_liveness, overtaking_ticks, round_trip, watchdog_ticks
-from tests.channel.parts import IMPULSE, PAPER, THREE_SIGNS, TICK_NS, TICK_S, terms
+from channel.codec.coders.zoom import ZoomParameters
+from channel.line.impairments import Impairments, LineFaults
+from channel.protocol.sabotage import Sabotage
+from channel.protocol.terms import Terms
+from tenbaud.build.liveness import check_liveness, overtaking_ticks, round_trip, watchdog_ticks
+from tests.channel.codec.parts import IMPULSE, PAPER, THREE_SIGNS, TICK_NS, TICK_S, terms
 
 FAULTY_S = 20.0
 QUIET_S = 25.0

@@ -6,28 +6,28 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from channel.codec import Codec, Vector
-from channel.coders.zoom import ZoomParameters
-from channel.line import Line
-from channel.shaper import SlotShaper, UplinkMeter
-from channel.terms import Terms
-from channel.uplink import Uplink
-from channel.wire import DATAGRAM, Wire
+from channel.codec.codec import Codec, Vector
+from channel.codec.coders.zoom import ZoomParameters
+from channel.line.line import Line
+from channel.line.shaper import SlotShaper, UplinkMeter
+from channel.line.uplink import Uplink
+from channel.protocol.terms import Terms
+from channel.protocol.wire import DATAGRAM, Wire
 from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters, PitchPlant
 from plant_sim.plant import Plant
 from receiver.controllers.base import Controller
 from receiver.controllers.pid import PAPER_GAINS, Pid
+from receiver.controllers.references import Square
 from receiver.endpoint import ReceiverEndpoint
-from receiver.references import Square
-from receiver.session import ReceiverSession
-from tests.channel.parts import PAPER, TICK_S, ListRecorder, identity_of, pitch_codec, terms
+from receiver.session.session import ReceiverSession
+from tests.channel.codec.parts import PAPER, TICK_S, ListRecorder, identity_of, pitch_codec, terms
 from transmitter.guard import Guard, GuardSettings
+from transmitter.loops.virtual import VirtualFlight
+from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode
 from transmitter.rigs.simulated import SimulatedRig
-from transmitter.scores import Scores
-from transmitter.session import TransmitterSession
-from transmitter.virtual_flight import VirtualFlight
+from transmitter.session.session import TransmitterSession
 
 SESSION_NUMBER = 7
 INCARNATION = 5

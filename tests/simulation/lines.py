@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 
-from channel.line import Delivery, Line
+from channel.line.line import Delivery, Line
 
 SEED = 20240617
 

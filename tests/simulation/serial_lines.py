@@ -5,9 +5,9 @@ from __future__ import annotations
 import random
 from collections import Counter
 
-from channel.line import Delivery
-from channel.serial_stream import Deframer
-from channel.serial_wire import SerialWire, stuff
+from channel.line.line import Delivery
+from channel.links.serial.stream import Deframer
+from channel.links.serial.wire import SerialWire, stuff
 
 
 class StreamLine:

@@ -18,8 +18,8 @@ from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from channel.sabotage import Sabotage
-from tests.channel.fuzz import fuzz_all
+from channel.protocol.sabotage import Sabotage
+from tests.channel.protocol.fuzz import fuzz_all
 from tests.simulation.clean import fly_clean
 from tests.simulation.faults import draw
 from tests.simulation.watch import LivenessViolation, SafetyViolation

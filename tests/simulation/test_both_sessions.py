@@ -8,11 +8,11 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from channel.frames import Frame, Symbol
-from channel.lockstep import HISTORY_SAMPLES
-from receiver.session import Phase as ReceiverPhase
-from receiver.session import ReceiverSession
-from tests.channel.parts import (
+from channel.protocol.frames import Frame, Symbol
+from channel.protocol.lockstep import HISTORY_SAMPLES
+from receiver.session.session import Phase as ReceiverPhase
+from receiver.session.session import ReceiverSession
+from tests.channel.codec.parts import (
     THREE_SIGNS,
     TICK_NS,
     ConstantController,
@@ -21,7 +21,7 @@ from tests.channel.parts import (
     pitch_codec,
     terms,
 )
-from transmitter.session import Phase, TransmitterSession
+from transmitter.session.session import Phase, TransmitterSession
 
 CODEC = pitch_codec(THREE_SIGNS)
 TERMS = terms(lead_ticks=13)

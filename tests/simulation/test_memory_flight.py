@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import pytest
 
-from channel import numerics
-from channel.codec import Codec
-from channel.line import Delivery, Line
-from channel.models import pitch
-from tests.channel.parts import PAPER, THREE_SIGNS
+from channel.codec import numerics
+from channel.codec.codec import Codec
+from channel.codec.models import pitch
+from channel.line.line import Delivery, Line
+from tests.channel.codec.parts import PAPER, THREE_SIGNS
 from tests.simulation.flight import assert_lockstep, pitch_flight
 from tests.simulation.lines import DelayingLine, JitterLine, LossyLine, SlowDownlink
-from transmitter.session import Phase
+from transmitter.session.session import Phase
 
 MS = 1_000_000
 

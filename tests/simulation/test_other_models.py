@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import pytest
 
-from channel.codec import Codec
-from channel.coders.zoom import ZoomCoder
-from channel.words import WIRE_ERASED, Alphabet
-from tests.channel.chua import (
+from channel.codec.codec import Codec
+from channel.codec.coders.zoom import ZoomCoder
+from channel.codec.words import WIRE_ERASED, Alphabet
+from tests.channel.codec.chua import (
     CHUA_TICK_S,
     CHUA_TICKS_PER_SAMPLE,
     CHUA_ZOOM,
     ChuaModel,
     ChuaPlant,
 )
-from tests.channel.parts import ConstantController, terms
-from tests.channel.two_axes import TWO_AXES_ZOOM, TwoAxes, TwoAxesPlant
+from tests.channel.codec.parts import ConstantController, terms
+from tests.channel.codec.two_axes import TWO_AXES_ZOOM, TwoAxes, TwoAxesPlant
 from tests.simulation.flight import assemble, assert_lockstep
 from tests.simulation.lines import LossyLine
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from channel.serial_wire import SerialWire
-from tests.channel.parts import THREE_SIGNS
+from channel.links.serial.wire import SerialWire
+from tests.channel.codec.parts import THREE_SIGNS
 from tests.simulation.flight import Flight, pitch_flight
 from tests.simulation.serial_lines import StreamLine
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from channel.codec import Codec
-from channel.coders.words import WordsCoder, WordsParameters
-from channel.models.hold import HoldModel
+from channel.codec.codec import Codec
+from channel.codec.coders.words import WordsCoder, WordsParameters
+from channel.codec.models.hold import HoldModel
 from plant_sim.pitch import PitchParameters, PitchPlant
 from receiver.controllers.pid import PAPER_GAINS, Pid
-from tests.channel.parts import TICK_S, terms
+from tests.channel.codec.parts import TICK_S, terms
 from tests.simulation.flight import REFERENCE, assemble
 
 

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import pytest
 
-from channel.impairments import Impairments, LineFaults
-from channel.sabotage import Sabotage
+from channel.line.impairments import Impairments, LineFaults
+from channel.protocol.sabotage import Sabotage
 from tests.simulation.faults import Plan, draw
 from tests.simulation.soak import CANARY_SEED, fly_canary, fly_seed
 from tests.simulation.watch import LivenessViolation, SafetyViolation
 from tests.simulation.world import World
-from transmitter.owing import Owing
-from transmitter.session import TransmitterSession
+from transmitter.session.owing import Owing
+from transmitter.session.session import TransmitterSession
 
 SEEDS = 24
 
@@ -24,6 +24,24 @@ def test_when_everything_goes_wrong_then_nothing_is_unsafe_and_it_comes_back(see
     assert result.problem is None, result.problem
     assert result.desyncs_missed == 0
     assert result.recovery_samples is not None, "the watch holds it to its bound"
+
+
+@pytest.mark.parametrize("end", ["transmitter", "receiver"])
+def test_when_an_old_recording_is_played_to_a_restarted_end_then_it_comes_back(end: str) -> None:
+    plan = replace(draw(2037), restarts=((9_000_000_000, end),), outages_ns=(1_000_000_000,))
+    world = World(plan)
+    receive, heard = world._receive, []
+
+    def tapped(data: bytes | None) -> None:
+        if data is not None and world.now_ns < 4_000_000_000:
+            heard.append(data)
+            again_ns = world.now_ns + 10_000_000_000
+            world.at(again_ns, lambda: receive(data))
+        receive(data)
+
+    world._receive = tapped  # type: ignore[method-assign]
+    world.fly()
+    assert len(heard) > 20
 
 
 def test_when_the_watchdog_counted_ticks_that_are_owed_nothing_then_the_harness_would_find_out(

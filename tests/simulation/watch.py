@@ -11,25 +11,19 @@ from collections import deque
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from channel.codec import Codec, Vector
-from channel.recording import RecordChannel
-from channel.terms import Terms
+from channel.codec.codec import Codec, Vector
+from channel.protocol.recording import RecordChannel
+from channel.protocol.terms import Terms
 from transmitter.guard import GuardState
-from transmitter.session import Phase
+from transmitter.session.session import Phase
 
 if TYPE_CHECKING:
-    from receiver.session import ReceiverSession
+    from receiver.session.session import ReceiverSession
     from tests.simulation.world import World
     from transmitter.node import TransmitterNode
 
 ERROR_BOUND_RAD = 0.5
 """After the quiet phase; the plant may be 20 % off the model."""
-
-RECOVERY_SAMPLES_MAX = 13
-"""From the last fault to lockstep, beside the round trip and the command lead."""
-
-CALM_REJOINS_MAX = 4
-"""After the last fault."""
 
 SLACK_NS = 2_000_000
 
@@ -167,16 +161,14 @@ class Watch:
 
     def check_recovery(self, world: World) -> None:
         """Raise unless lockstep came back in time, and with a few rejoins."""
-        plan = world.plan
-        bound_ns = RECOVERY_SAMPLES_MAX * self.terms.sample_ns + plan.round_trip_ns
-        bound_ns += self.terms.lead_ticks * self.terms.tick_ns
+        bound_ns = world.recovery_ns_max
         recovered_ns = world.recovered_ns
         if recovered_ns is None or recovered_ns > bound_ns:
             raise LivenessViolation(
                 f"lockstep came back {recovered_ns and recovered_ns / 1e9} s after the last fault; at "
                 f"most {bound_ns / 1e9:g} s are allowed"
             )
-        if self.rejoins_calm > CALM_REJOINS_MAX or self.last_rejoin_ns > bound_ns:
+        if self.rejoins_calm > world.calm_rejoins_max or self.last_rejoin_ns > bound_ns:
             raise LivenessViolation(
                 f"{self.rejoins_calm} rejoins after the last fault, the last one "
                 f"{self.last_rejoin_ns / 1e9:g} s after it"

@@ -12,32 +12,38 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import count
 
-from channel.clocks import SkewedClock
-from channel.codec import Codec, Vector
+from channel.codec.codec import Codec, Vector
 from channel.errors import FrameError
-from channel.frames import Frame, Symbol
-from channel.impairments import ImpairedLine, Impairments
-from channel.sabotage import SabotagedCodec
-from channel.shaper import SlotShaper, UplinkMeter
-from channel.uplink import Uplink
-from channel.wire import decode
+from channel.line.clocks import SkewedClock
+from channel.line.impairments import ImpairedLine, Impairments
+from channel.line.shaper import SlotShaper, UplinkMeter
+from channel.line.uplink import Uplink
+from channel.protocol.frames import Frame, Symbol
+from channel.protocol.sabotage import SabotagedCodec
+from channel.protocol.wire import decode
 from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters, PitchPlant
 from receiver.controllers.pid import PAPER_GAINS, Pid
 from receiver.endpoint import ReceiverEndpoint
-from receiver.session import ReceiverSession
-from tests.channel.parts import TICK_NS, TICK_S, identity_of, pitch_codec
+from receiver.session.session import ReceiverSession
+from tests.channel.codec.parts import TICK_NS, TICK_S, identity_of, pitch_codec
 from tests.simulation.faults import FAULTY_S, QUIET_S, Plan
 from tests.simulation.flight import COUNTS_PER_TURN, REFERENCE
 from tests.simulation.watch import Watch
-from transmitter.copies import Confirmed
 from transmitter.guard import Guard, GuardSettings
+from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode
 from transmitter.rigs.base import Reading, RigBase
-from transmitter.scores import Scores
-from transmitter.session import Phase, TransmitterSession
+from transmitter.session.copies import Confirmed
+from transmitter.session.session import Phase, TransmitterSession
 
 ALIVE_TICKS = 10**6
+
+RECOVERY_SAMPLES_MAX = 13
+"""From the last fault to lockstep, beside the round trip and the command lead."""
+
+CALM_REJOINS_MAX = 4
+"""After the last fault."""
 
 
 class WorldRig(RigBase):
@@ -102,6 +108,17 @@ class World:
         self._greeted = False
         self.recovered_ns: int | None = None
         """from then until both ends were locked"""
+
+    @property
+    def recovery_ns_max(self) -> int:
+        """Return how long lockstep may take to come back after the last fault."""
+        waiting_ns = self.plan.round_trip_ns + self.terms.lead_ticks * self.terms.tick_ns
+        return RECOVERY_SAMPLES_MAX * self.terms.sample_ns + waiting_ns
+
+    @property
+    def calm_rejoins_max(self) -> int:
+        """Return how often the ends may rejoin after the last fault."""
+        return CALM_REJOINS_MAX
 
     # The two processes
 

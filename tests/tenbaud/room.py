@@ -11,13 +11,13 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, Self
 
-from channel.frames import Frame
-from channel.wire import decode, encode
-from receiver.many_service import ManyService
-from tenbaud.build import Agreement, agree
+from channel.protocol.frames import Frame
+from channel.protocol.wire import decode, encode
+from receiver.loops.many import ManyService
+from tenbaud.build.flight import Agreement, agree
 from tenbaud.config.load import load_config
 from tenbaud.flight.many import ManyHost
-from transmitter.session import Phase, TransmitterSession
+from transmitter.session.session import Phase, TransmitterSession
 
 PATIENCE_S = 20.0
 UNHURRIED = {"channel": {"deadline_allowance_s": 6.0}}

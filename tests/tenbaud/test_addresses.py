@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from channel.errors import TenbaudError
 from channel.links.endpoints import free_endpoint
-from tenbaud.cli.app import app
+from tenbaud.cli.commands import app
 from tenbaud.flight.outcome import outcome_of
 from tenbaud.keys.authority import NodeRole
 from tenbaud.keys.store import add_node, create_authority

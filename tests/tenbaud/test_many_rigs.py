@@ -8,15 +8,15 @@ from typing import Any
 import pytest
 
 from channel.errors import TenbaudError
-from channel.frames import Bye, Symbol, Unknown
+from channel.line.virtual import Step, encode_step
 from channel.links.endpoints import free_endpoint
-from channel.virtual import Step, encode_step
-from channel.wire import decode, encode
-from receiver.many_service import BURST_MESSAGES
-from tenbaud.build import Agreement
+from channel.protocol.frames import Bye, Symbol, Unknown
+from channel.protocol.wire import decode, encode
+from receiver.loops.many import BURST_MESSAGES
+from tenbaud.build.flight import Agreement
 from tenbaud.flight import many
 from tenbaud.flight.ends import open_recorder
-from tenbaud.flight.sparing import LINES_AT_ONCE, PERIOD_S
+from tenbaud.flight.rate_limited_log import LINES_AT_ONCE, PERIOD_S
 from tenbaud.recording.writer import McapRecorder
 from tests.tenbaud.processes import finish, start
 from tests.tenbaud.room import PATIENCE_S, Rig, Room, agreement

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from typer.testing import CliRunner
 
-from tenbaud.cli.app import app
+from tenbaud.cli.commands import app
 
 
 @pytest.mark.parametrize(

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from channel.wire import DATAGRAM
-from tenbaud.build import agree
-from tenbaud.build_ends import build_receiver
+from channel.protocol.wire import DATAGRAM
+from tenbaud.build.ends import build_receiver
+from tenbaud.build.flight import agree
 from tenbaud.config.load import load_config
 from tenbaud.flight import transmit
 from tenbaud.flight.outcome import ExitCode, Outcome

@@ -16,7 +16,7 @@ from tests.tenbaud.processes import finish, fly_pair, start
 # Our own sine, wrong in the last place: always, or from the n-th call on. The probe of the handshake
 # calls it some 2000 times, four calls a tick.
 OTHER_SINE = """
-import math, channel.numerics as numerics
+import math, channel.codec.numerics as numerics
 right, calls = numerics.sin, 0
 def sin(x):
     global calls

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from channel.links.endpoints import free_endpoint
+from tenbaud.flight.serial_line import EmulatedLine
 from tenbaud.recording.reader import Recording
-from tenbaud.serial_line import EmulatedLine
 from tests.tenbaud.ends import Pair, Relay, over_serial, over_zenoh
 
 SEED = 20240619
@@ -101,7 +101,7 @@ def test_when_an_end_is_stopped_for_a_while_then_the_flight_goes_on(pair: Pair, 
     pair.wait_until_both_fly()
     process = (pair.receiver if verb == "receive" else pair.transmitter).process
     process.send_signal(signal.SIGSTOP)
-    time.sleep(2.5)
+    time.sleep(5.0)
     process.send_signal(signal.SIGCONT)
     time.sleep(0.3)
     pair.wait_until_both_fly()

@@ -12,17 +12,18 @@ from typing import Any
 import pytest
 
 from channel.errors import LinkLost
-from tenbaud.build import agree
-from tenbaud.build_ends import build_receiver
+from tenbaud.build.ends import build_receiver
+from tenbaud.build.flight import agree
+from tenbaud.build.transmitter_run import TransmitterRun
 from tenbaud.config.load import ConfigError, load_config
 from tenbaud.flight import receive, transmit
 from tenbaud.flight.outcome import ExitCode, Outcome
+from tenbaud.flight.serial_ends import open_serial
+from tenbaud.flight.serial_line import EmulatedLine
 from tenbaud.recording.comparison import Verdict
 from tenbaud.recording.diff import compare_runs
 from tenbaud.recording.folder import RunFolder
-from tenbaud.serial_line import EmulatedLine
-from tenbaud.serial_terms import open_serial
-from tests.channel.parts import ListRecorder
+from tests.channel.codec.parts import ListRecorder
 from tests.tenbaud.processes import run
 
 
@@ -34,7 +35,7 @@ def no_zenoh() -> Any:
 class Flown:
     """What a flight left behind."""
 
-    transmitter: transmit.TransmitterRun
+    transmitter: TransmitterRun
     receiver: Any
     outcome: Outcome
     sent: ListRecorder

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
-from channel.codec import Codec, Vector
-from channel.coders.zoom import ZoomCoder
+from channel.codec.codec import Codec, Vector
+from channel.codec.coders.zoom import ZoomCoder
 from plant_sim.encoder import QUANSER_PITCH
 from plant_sim.pitch import PitchParameters, PitchPlant
-from tests.channel.parts import TICK_S, pitch_codec
-from tests.channel.two_axes import TWO_AXES_ZOOM, TwoAxes
+from tests.channel.codec.parts import TICK_S, pitch_codec
+from tests.channel.codec.two_axes import TWO_AXES_ZOOM, TwoAxes
 from transmitter.encoder_watch import EncoderWatch
 
 CODEC = pitch_codec()

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from channel.limits import CommandLimits
+from channel.protocol.limits import CommandLimits
 from transmitter.guard import Guard, GuardSettings, GuardState
 
 SAFE = (0.5, -0.5)

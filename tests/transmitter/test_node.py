@@ -6,15 +6,15 @@ import itertools
 
 import pytest
 
-from channel.codec import Vector
-from channel.events import EventKind
-from channel.frames import Commands, Echo, Welcome
-from tests.channel.parts import ListRecorder, identity_of, pitch_codec, terms
+from channel.codec.codec import Vector
+from channel.protocol.events import EventKind
+from channel.protocol.frames import Commands, Echo, Welcome
+from tests.channel.codec.parts import ListRecorder, identity_of, pitch_codec, terms
 from transmitter.guard import Guard, GuardSettings, GuardState
+from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode
 from transmitter.rigs.base import Reading, RigBase
-from transmitter.scores import Scores
-from transmitter.session import Phase, TransmitterSession
+from transmitter.session.session import Phase, TransmitterSession
 
 CODEC = pitch_codec()
 TICKS = 200

@@ -7,25 +7,25 @@ import time
 
 import pytest
 
-from channel.codec import Vector
-from channel.events import EventKind
-from channel.limits import CommandLimits
-from channel.line import Line
+from channel.codec.codec import Vector
+from channel.line.line import Line
+from channel.line.shaper import SlotShaper, UplinkMeter
+from channel.line.uplink import Uplink
 from channel.links.memory import MemoryLink, memory_pair
-from channel.shaper import SlotShaper, UplinkMeter
-from channel.uplink import Uplink
+from channel.protocol.events import EventKind
+from channel.protocol.limits import CommandLimits
 from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters, PitchPlant
 from receiver.endpoint import ReceiverEndpoint
-from receiver.real_service import serve_real
-from receiver.session import ReceiverSession
-from tests.channel.parts import THREE_SIGNS, ConstantController, identity_of, pitch_codec, terms
+from receiver.loops.real import serve_real
+from receiver.session.session import ReceiverSession
+from tests.channel.codec.parts import THREE_SIGNS, ConstantController, identity_of, pitch_codec, terms
 from transmitter.guard import Guard, GuardSettings
+from transmitter.loops.real import RealFlight
+from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode
-from transmitter.real_flight import RealFlight
 from transmitter.rigs.simulated import SimulatedRig
-from transmitter.scores import Scores
-from transmitter.session import TransmitterSession
+from transmitter.session.session import TransmitterSession
 
 TICK_S = 0.001
 TICKS = 2500

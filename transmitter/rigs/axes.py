@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from channel.codec import Vector
+from channel.codec.codec import Vector
 from plant_sim.encoder import Encoder
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol, Self
 
-from channel.codec import Vector
+from channel.codec.codec import Vector
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,11 +20,11 @@ from abc import abstractmethod
 from collections import Counter
 from dataclasses import dataclass
 
-from channel.codec import Vector
+from channel.codec.codec import Vector
 from transmitter.rigs.axes import Axis, Motors
 from transmitter.rigs.base import DeviceNote, Reading, RigBase
 from transmitter.rigs.errors import RigError
-from transmitter.rigs.samples import DeviceFlag, DeviceSample, RawSample, Timeline, Wraps
+from transmitter.rigs.formats.samples import DeviceFlag, DeviceSample, RawSample, Timeline, Wraps
 
 REARM_TIMEOUT_S = 1.0
 """A device has this long to clear its watchdog's flag when it is told that the motors are off."""

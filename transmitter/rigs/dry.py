@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from channel.codec import Vector
+from channel.codec.codec import Vector
 from transmitter.rigs.base import Reading, Rig, RigBase
 
 

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 from plant_sim.encoder import QUANSER_PITCH
 from plant_sim.pitch import PitchParameters, PitchPlant
-from transmitter.rigs.hil import HilLibrary
+from transmitter.rigs.hil_library import HilLibrary
 
 STEP_S = 0.001
 ANALOG_OUTPUTS = 8

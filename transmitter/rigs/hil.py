@@ -19,7 +19,8 @@ import numpy as np
 from transmitter.rigs.axes import Axis, Motors
 from transmitter.rigs.device import DeviceRig, DeviceSettings
 from transmitter.rigs.errors import RigError
-from transmitter.rigs.samples import RawSample, Wraps
+from transmitter.rigs.formats.samples import RawSample, Wraps
+from transmitter.rigs.hil_library import HilLibrary
 
 FAKE_CARD = "fake"
 OPTIONS_LENGTH_MAX = 255
@@ -39,16 +40,6 @@ class HilSettings:
     """digital outputs that switch the amplifiers on"""
     watchdog_s: float = 0.1
     card_options: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class HilLibrary:
-    """The names that we use of the vendor's package, or of its double."""
-
-    hil: Callable[[str, str], Any]
-    error: type[Exception]
-    hardware_clock: Any
-    overwrite_on_overflow: Any
 
 
 def load_library(card_type: str) -> HilLibrary:

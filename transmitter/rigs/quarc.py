@@ -66,7 +66,8 @@ class QuarcBridge(DeviceRig):
     def _connect(self) -> None:
         if self._role == "server":
             try:
-                self._listener = socket.create_server(self._address, backlog=1)
+                family = socket.AF_INET6 if ":" in self._address[0] else socket.AF_INET
+                self._listener = socket.create_server(self._address, family=family, backlog=1)
             except OSError as error:
                 raise RigError(
                     f"{self.name}: cannot listen: {error}; is another program using the port?"

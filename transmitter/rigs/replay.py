@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from channel.codec import Vector
+from channel.codec.codec import Vector
 from channel.flight_log import FlightLog
 from plant_sim.encoder import Encoder, angles_rad
 from transmitter.rigs.base import Reading, RigBase

@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from channel.coders.timed import TimedCoder
-from channel.coders.words import WordsCoder
-from channel.coders.zoom import ZoomCoder
-from tenbaud.build import agree
-from tenbaud.build_codec import CODERS, MODELS
+from channel.codec.coders.timed import TimedCoder
+from channel.codec.coders.words import WordsCoder
+from channel.codec.coders.zoom import ZoomCoder
+from tenbaud.build.codec import CODERS, MODELS
+from tenbaud.build.flight import agree
 from tenbaud.config.load import ConfigError, dump_config, load_config, preset_names
 from tenbaud.config.schema import KINDS
 

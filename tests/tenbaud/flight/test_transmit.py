@@ -9,15 +9,16 @@ from typing import Any
 import pytest
 
 from channel.links.memory import memory_pair
-from channel.wire import DATAGRAM
+from channel.protocol.wire import DATAGRAM
 from receiver.endpoint import ReceiverEndpoint
-from tenbaud.build import Agreement, agree
-from tenbaud.build_ends import build_receiver
+from tenbaud.build.ends import build_receiver
+from tenbaud.build.flight import Agreement, agree
+from tenbaud.build.transmitter_run import TransmitterRun
 from tenbaud.config.load import load_config
 from tenbaud.flight import receive, transmit
 from tenbaud.flight.outcome import ExitCode, Outcome
 from transmitter.node import STOPPED
-from transmitter.session import Phase
+from transmitter.session.session import Phase
 
 SECONDS = 2.0
 PATIENCE_S = 20.0
@@ -46,9 +47,7 @@ def fly_virtual(**transmitter: Any) -> tuple[Outcome, ReceiverEndpoint]:
     return outcome, endpoint
 
 
-def fly_real(
-    endpoint: ReceiverEndpoint, should_stop: Callable[[transmit.TransmitterRun], bool]
-) -> Outcome:
+def fly_real(endpoint: ReceiverEndpoint, should_stop: Callable[[TransmitterRun], bool]) -> Outcome:
     """Fly over a memory link in real time, the receiver in a thread of its own."""
     agreement = agreement_on("real")
     near, far = memory_pair()

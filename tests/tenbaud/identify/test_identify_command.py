@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from plant_sim.identification.errors import IdentificationError
-from tenbaud.cli.app import app
+from tenbaud.cli.commands import app
 from tenbaud.config.load import load_config
 from tests.plant_sim.identification.experiments import EXCITATION_A, experiment
 

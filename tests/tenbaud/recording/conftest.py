@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from channel.recording import RecordChannel
+from channel.protocol.recording import RecordChannel
 from tenbaud.recording.folder import RECEIVER_NAME, TRANSMITTER_NAME
 from tenbaud.recording.writer import McapRecorder
 from tests.tenbaud.recording.rows import (

@@ -23,6 +23,7 @@ from typing import Any
 
 from channel.errors import TenbaudError
 from tenbaud import Run
+from tenbaud.audit.audit import audit
 from tenbaud.recording.convert import convert
 from tenbaud.recording.diff import compare_runs
 from tenbaud.recording.encoding import channel_schema
@@ -30,7 +31,6 @@ from tenbaud.recording.figure import draw_run
 from tenbaud.recording.inspect import describe_json, describe_text
 from tenbaud.recording.reader import MessageStream
 from tenbaud.recording.recover import recover
-from tenbaud.replay.audit import audit
 from tenbaud.replay.record import load_record
 from tenbaud.replay.replay import replay, replay_symbols
 from tenbaud.replay.symbols import MAGIC, unpack
@@ -266,7 +266,7 @@ def fuzz(run: Path, inputs: int, seed: int) -> dict[str, Any]:
     before = 0
 
     def told(number: int, changed: str, reader: Callable[[Path], object], path: Path) -> None:
-        started_s = time.perf_counter()
+        started_s = time.process_time()
         try:
             reader(path)
             outcomes["accepted"] += 1
@@ -274,7 +274,7 @@ def fuzz(run: Path, inputs: int, seed: int) -> dict[str, Any]:
             outcomes["refused"] += 1
         except Exception:
             faults.append(f"input {number} of seed {seed}, {changed}: {traceback.format_exc(-4)}")
-        times_s.append(time.perf_counter() - started_s)
+        times_s.append(time.process_time() - started_s)
 
     with tempfile.TemporaryDirectory(prefix="tenbaud-fuzz-") as name:
         folder = Path(name) / "run"

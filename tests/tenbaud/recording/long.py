@@ -13,10 +13,10 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, DataEnd, Footer, Header, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 
-from channel.recording import RecordChannel
-from receiver import records as receiver
+from channel.protocol.recording import RecordChannel
+from receiver.session import records as receiver
 from tenbaud.recording.encoding import END_METADATA, RUN_METADATA, channel_schema
-from transmitter import records as transmitter
+from transmitter.session import records as transmitter
 
 TICKS_PER_CHUNK = 2000
 TICK_S = 0.01

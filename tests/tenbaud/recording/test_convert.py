@@ -11,6 +11,7 @@ import pytest
 from scipy.io import loadmat
 
 from tenbaud import Run
+from tenbaud.files.whole import WriteError
 from tenbaud.recording.convert import FORMS, convert
 from tenbaud.recording.errors import RecordingError
 from tests.tenbaud.flown import flown
@@ -131,7 +132,7 @@ def test_nothing_is_overwritten_unless_asked_and_a_failure_leaves_no_half_file(
         raise OSError(28, "No space left on device")
 
     monkeypatch.setitem(FORMS, "json", ("flight.json", broken))
-    with pytest.raises(RecordingError, match="No space left on device"):
+    with pytest.raises(WriteError, match=r"flight\.json cannot be written: No space left on device"):
         convert(lossy, "json", target, overwrite=True)
     assert target.read_bytes() == before
     assert list(tmp_path.iterdir()) == [target]

@@ -24,7 +24,7 @@ from tests.tenbaud.processes import REPOSITORY
 from tests.tenbaud.processes import run as run_command
 from tests.tenbaud.recording.craft import chunk, mcap_file, messages_of
 from tests.tenbaud.recording.rows import TICK, tick_row
-from transmitter.records import TICK_CHANNEL
+from transmitter.session.records import TICK_CHANNEL
 
 DESCRIBED = [(1, "tick", channel_schema(TICK))]
 HEAD = [("run", {"role": "transmitter", "tick_s": "0.01"})]

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from tenbaud.files.whole import WriteError
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RunFolder, create_run_folder, find_recordings
 
@@ -39,7 +40,7 @@ def test_explicit_folder_is_used_if_new_and_refused_if_not(tmp_path: Path) -> No
     with pytest.raises(RecordingError, match="exists already and is not overwritten"):
         create_run_folder(tmp_path, "demo", wanted, NOW)
     assert (wanted / "summary.json").read_text() == "{}"
-    with pytest.raises(RecordingError, match="below cannot be made"):
+    with pytest.raises(WriteError, match="below cannot be written"):
         create_run_folder(tmp_path, "demo", wanted / "summary.json" / "below", NOW)
 
 

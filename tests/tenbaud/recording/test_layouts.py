@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 import pytest
 
 from tenbaud import Run
+from tenbaud.files.whole import WriteError
 from tenbaud.recording.convert import convert
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.layouts import (
@@ -122,7 +123,7 @@ def test_when_a_layout_exists_then_nothing_is_written_without_being_told_to(
 def test_when_a_layout_cannot_be_written_then_it_is_said(run: Run, tmp_path: Path) -> None:
     target = tmp_path / "flight.mcap"
     layout_paths(target)[0].mkdir()
-    with pytest.raises(RecordingError, match="cannot be written"):
+    with pytest.raises(WriteError, match="cannot be written"):
         convert(run, "mcap", target, overwrite=True)
 
 

@@ -14,7 +14,7 @@ from tenbaud.recording.reader import stored_metadata
 from tenbaud.recording.writer import McapRecorder
 from tests.tenbaud.processes import REPOSITORY
 from tests.tenbaud.recording.long import long_recording, pitch_rad
-from transmitter.records import ESTIMATE_CHANNEL, TICK_CHANNEL
+from transmitter.session.records import ESTIMATE_CHANNEL, TICK_CHANNEL
 
 MEMORY_MAX_MIB = 150
 PROGRAM = """

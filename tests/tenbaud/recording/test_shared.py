@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from channel.recording import Field, RecordChannel
+from channel.protocol.recording import Field, RecordChannel
 from tenbaud.recording.reader import Recording
 from tenbaud.recording.shared import SharedWriter
 from tenbaud.recording.writer import McapRecorder

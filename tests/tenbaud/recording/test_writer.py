@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from channel.recording import Field, RecordChannel
+from channel.protocol.recording import Field, RecordChannel
+from tenbaud.files.whole import WriteError
 from tenbaud.recording.chunk_writer import ChunkWriter
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.reader import MessageStream, Recording
@@ -22,7 +23,7 @@ AWKWARD_FLOATS = [0.1, 1 / 3, -0.0, 5e-324, 1.7976931348623157e308, 1e22, 2**53 
 KILLED_PROGRAM = """
 import sys, time
 from pathlib import Path
-from channel.recording import Field, RecordChannel
+from channel.protocol.recording import Field, RecordChannel
 from tenbaud.recording.writer import McapRecorder
 
 channel = RecordChannel("tick", (Field("tick", "integer"),))
@@ -202,7 +203,7 @@ def test_existing_recording_is_never_overwritten(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="not overwritten"):
         McapRecorder(path, {})
     assert path.read_bytes() == b"precious"
-    with pytest.raises(RecordingError, match="cannot be created"):
+    with pytest.raises(WriteError, match="cannot be written"):
         McapRecorder(tmp_path / "nowhere" / "a.mcap", {})
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from tenbaud import Run
+from tenbaud.audit.audit import audit
 from tenbaud.recording.comparison import Verdict
 from tenbaud.recording.diff import compare_runs
-from tenbaud.replay.audit import audit
 from tenbaud.replay.record import load_record
 from tenbaud.replay.replay import replay
 

@@ -9,12 +9,12 @@ from tests.rules.sources import TOP
 def test_whatever_turns_a_configuration_into_a_flight_is_among_the_sources() -> None:
     found = figure_sources()
     for name in (
-        "channel/coders/zoom.py",
-        "tenbaud/build_codec.py",
+        "channel/codec/coders/zoom.py",
+        "tenbaud/build/codec.py",
         "tenbaud/config/schema.py",
         "tenbaud/flight/transmit.py",
         "tenbaud/studies/kernel.py",
-        "transmitter/scores.py",
+        "transmitter/metrics/scores.py",
     ):
         assert TOP / name in found, f"results would outlive a change of {name}"
     assert len(found) == len(set(found))

@@ -14,8 +14,8 @@ import pytest
 from typer.testing import CliRunner
 
 from channel.errors import TenbaudError
-from tenbaud.build_rig import nominal_plant
-from tenbaud.cli.app import app
+from tenbaud.build.rig import nominal_plant
+from tenbaud.cli.commands import app
 from tenbaud.config.load import load_config
 from tenbaud.flight.outcome import ExitCode
 from tenbaud.studies import tuning as tuning_module
@@ -253,7 +253,7 @@ def test_when_the_preset_cannot_be_written_then_nothing_is_flown(tmp_path: Path)
     (tmp_path / "file").write_text("")
     result = CliRunner().invoke(app, ["tune", "--out", str(tmp_path / "file" / "found.toml")])
     assert result.exit_code != 0
-    assert "cannot write" in str(result.exception)
+    assert "cannot be written: Not a directory" in str(result.exception)
 
 
 @pytest.mark.parametrize(

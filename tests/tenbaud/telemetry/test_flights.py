@@ -24,7 +24,7 @@ class Watched:
     """Two ends and a viewer of both."""
 
     def __init__(self, folder: Path, *arguments: str, transmitter: tuple[str, ...] = ()) -> None:
-        from channel.links.zenoh_telemetry import TelemetryFeed
+        from channel.links.zenoh.telemetry import TelemetryFeed
 
         link, *places = (free_endpoint() for _ in range(3))
         shared = ["--json", *arguments]

@@ -7,16 +7,16 @@ from dataclasses import replace
 
 import pytest
 
-from channel.events import EventKind
-from channel.wire import DATAGRAM
-from tenbaud.build import agree
-from tenbaud.build_ends import build_receiver
+from channel.protocol.events import EventKind
+from channel.protocol.wire import DATAGRAM
+from tenbaud.build.ends import build_receiver
+from tenbaud.build.flight import agree
 from tenbaud.config.load import load_config
 from tenbaud.flight import transmit
 from tenbaud.flight.outcome import ExitCode
 from tenbaud.telemetry.commands import CommandQueue
 from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
-from tests.channel.parts import ListRecorder
+from tests.channel.codec.parts import ListRecorder
 
 
 @pytest.mark.parametrize("end", ["transmitter", "receiver"])

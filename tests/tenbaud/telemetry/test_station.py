@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 from channel.errors import LinkError
-from channel.links.zenoh_telemetry import TelemetryPort
+from channel.links.zenoh.telemetry import TelemetryPort
 from tenbaud.telemetry.place import endpoint_for
 from tenbaud.telemetry.station import Station, Wish, open_station
-from tests.channel.parts import ListRecorder
+from tests.channel.codec.parts import ListRecorder
 from tests.tenbaud.room import agreement
 
 

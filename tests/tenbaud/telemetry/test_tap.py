@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from channel.recording import Field, RecordChannel
+from channel.protocol.recording import Field, RecordChannel
 from tenbaud.telemetry.tap import ROWS_MAX, Tap
 
 TICK = RecordChannel("tick", (Field("tick", "integer"),))

@@ -6,7 +6,7 @@ import queue
 import time
 from pathlib import Path
 
-from channel.links.zenoh_telemetry import TelemetryPort
+from channel.links.zenoh.telemetry import TelemetryPort
 from tenbaud.view.feed import Feed
 
 PATIENCE_S = 10.0

@@ -184,7 +184,7 @@ def test_without_a_flight_it_says_so(chromium: Any, tmp_path: Path) -> None:
 
 
 def test_the_gap_to_the_limit_is_shown_when_there_is_one(chromium: Any, tmp_path: Path) -> None:
-    from channel.links.zenoh_telemetry import TelemetryPort
+    from channel.links.zenoh.telemetry import TelemetryPort
 
     place = f"unixsock-stream/{tmp_path}/t.sock"
     message = {

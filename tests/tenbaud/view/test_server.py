@@ -110,5 +110,5 @@ def test_a_flight_in_memory_has_no_page(tmp_path: Path) -> None:
 
 
 def test_nothing_of_the_page_is_loaded_by_a_flight() -> None:
-    source = "import sys, tenbaud.flight.demo, tenbaud.cli.app; sys.exit('nicegui' in sys.modules)"
+    source = "import sys, tenbaud.flight.demo, tenbaud.cli.commands; sys.exit('nicegui' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", source], check=False).returncode == 0

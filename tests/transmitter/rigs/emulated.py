@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from tenbaud.build_emulator import EmulatedFormat, build_emulator
-from tenbaud.build_rig import build_device
+from tenbaud.build.emulator import EmulatedFormat, build_emulator
+from tenbaud.build.rig import build_device
 from tenbaud.config.load import load_config
 from tenbaud.config.schema import FlightConfig
 from transmitter.rigs.device import DeviceRig

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from transmitter.rigs.formats.cobs import COMMAND, COMMAND_TYPE, CobsFormat, seal
-from transmitter.rigs.samples import DeviceFlag, RawSample
+from transmitter.rigs.formats.samples import DeviceFlag, RawSample
 
 SHIM = Path(__file__).parent / "shim"
 SKETCH = Path(__file__).parents[3] / "examples" / "firmware" / "tenbaud_cobs" / "tenbaud_cobs.ino"

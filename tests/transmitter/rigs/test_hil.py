@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from tenbaud.build_rig import build_device
+from tenbaud.build.rig import build_device
 from tests.transmitter.rigs.emulated import PATIENCE_S, fly, rig_config, wait_until
 from transmitter.rigs.device import DeviceRig
 from transmitter.rigs.errors import RigError

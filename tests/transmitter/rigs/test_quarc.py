@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from tenbaud.build_rig import build_device
+from tenbaud.build.rig import build_device
 from tests.transmitter.rigs.emulated import PATIENCE_S, emulated, fly, rig_config, wait_until
 from transmitter.rigs.device import DeviceRig
 from transmitter.rigs.errors import RigError

@@ -14,7 +14,7 @@ from channel.flight_log import FlightLog
 from plant_sim.encoder import Encoder
 from plant_sim.plant import Plant
 from transmitter.rigs.emulator.faults import Faults
-from transmitter.rigs.samples import DeviceFlag, RawSample
+from transmitter.rigs.formats.samples import DeviceFlag, RawSample
 
 NS = 1_000_000_000
 DEFAULT_WATCHDOG_S = 0.1

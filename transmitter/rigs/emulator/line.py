@@ -56,9 +56,14 @@ class PtyLine:
         if self._link is None:
             self.address = path
             return
-        if self._link.is_symlink():
-            self._link.unlink()
-        self._link.symlink_to(path)
+        try:
+            if self._link.is_symlink():
+                self._link.unlink()
+            self._link.symlink_to(path)
+        except OSError as error:
+            self.unplug()
+            # Of the two names it would give the wrong one.
+            raise OSError(error.errno, error.strerror, str(self._link)) from error
 
     def unplug(self) -> None:
         """Let it vanish."""
@@ -67,7 +72,8 @@ class PtyLine:
                 os.close(handle)
         self._master = self._slave = -1
         if self._link is not None and self._link.is_symlink():
-            self._link.unlink()
+            with contextlib.suppress(OSError):
+                self._link.unlink()
 
     def wait(self, timeout_s: float) -> None:
         """Wait for bytes."""
@@ -135,7 +141,7 @@ class TcpLine:
         self._peer: socket.socket | None = None
         self._plugged = False
         self._pending = b""
-        self.address = f"{host}:{port}"
+        self.address = self._named()
 
     def plug(self) -> None:
         """Listen, or begin to connect."""
@@ -143,12 +149,17 @@ class TcpLine:
         if self._connects:
             return
         try:
-            self._listener = socket.create_server((self._host, self._port), backlog=1)
+            family = socket.AF_INET6 if ":" in self._host else socket.AF_INET
+            self._listener = socket.create_server((self._host, self._port), family=family, backlog=1)
         except OSError as error:
             raise RigError(f"{self.address} cannot be listened on: {error}") from error
         self._listener.setblocking(False)
         self._port = self._listener.getsockname()[1]
-        self.address = f"{self._host}:{self._port}"
+        self.address = self._named()
+
+    def _named(self) -> str:
+        host = f"[{self._host}]" if ":" in self._host else self._host
+        return f"{host}:{self._port}"
 
     def unplug(self) -> None:
         """Drop the connection and do not take another."""
@@ -226,7 +237,7 @@ def parse_line(text: str, line_baud: int) -> PtyLine | SerialLine | TcpLine:
         host, _, port = rest.rpartition(":")
         if not host or not port.isdigit():
             raise ValueError(f"port {text!r}: write tcp:HOST:PORT or tcp-connect:HOST:PORT")
-        return TcpLine(host, int(port), connects=kind == "tcp-connect")
+        return TcpLine(host.strip("[]"), int(port), connects=kind == "tcp-connect")
     if not text:
         raise ValueError("port: pty, pty:LINK, /dev/NAME, tcp:HOST:PORT or tcp-connect:HOST:PORT")
     return SerialLine(text, line_baud)

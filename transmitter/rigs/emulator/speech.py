@@ -18,9 +18,9 @@ from transmitter.rigs.formats.cobs import (
     seal,
     unseal,
 )
+from transmitter.rigs.formats.framing import Cutter
 from transmitter.rigs.formats.qsb import STAMP_US
-from transmitter.rigs.framing import Cutter
-from transmitter.rigs.samples import RawSample
+from transmitter.rigs.formats.samples import RawSample
 
 COMMAND_BYTES_MAX = 200
 

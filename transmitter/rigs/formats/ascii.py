@@ -15,8 +15,8 @@ import re
 from collections import Counter
 from typing import Literal
 
-from transmitter.rigs.framing import Cutter, xor_checksum
-from transmitter.rigs.samples import RawSample, Wraps
+from transmitter.rigs.formats.framing import Cutter, xor_checksum
+from transmitter.rigs.formats.samples import RawSample, Wraps
 
 LINE_BYTES_MAX = 200
 COLUMN = re.compile(r"c\d|t_us|seq|-")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import Protocol
 
-from transmitter.rigs.samples import RawSample, Wraps
+from transmitter.rigs.formats.samples import RawSample, Wraps
 
 
 class SerialFormat(Protocol):

@@ -11,9 +11,9 @@ from __future__ import annotations
 import struct
 from collections import Counter
 
-from channel.cobs import cobs_decode, cobs_encode
-from transmitter.rigs.framing import Cutter, crc16
-from transmitter.rigs.samples import DeviceFlag, RawSample, Wraps
+from channel.links.serial.cobs import cobs_decode, cobs_encode
+from transmitter.rigs.formats.framing import Cutter, crc16
+from transmitter.rigs.formats.samples import DeviceFlag, RawSample, Wraps
 
 SAMPLE_TYPE = 0x01
 COMMAND_TYPE = 0x81

@@ -10,7 +10,7 @@ import math
 import struct
 from typing import Literal
 
-from transmitter.rigs.samples import DeviceFlag, RawSample, Wraps
+from transmitter.rigs.formats.samples import DeviceFlag, RawSample, Wraps
 
 ByteOrder = Literal["little", "big"]
 AngleUnit = Literal["counts", "rad", "deg"]

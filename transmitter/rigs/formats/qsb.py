@@ -13,8 +13,8 @@ from __future__ import annotations
 import re
 from collections import Counter
 
-from transmitter.rigs.framing import Cutter
-from transmitter.rigs.samples import RawSample, Wraps
+from transmitter.rigs.formats.framing import Cutter
+from transmitter.rigs.formats.samples import RawSample, Wraps
 
 LINE_BYTES_MAX = 80
 STAMP_US = 1_953

@@ -7,7 +7,7 @@ from plant_sim.encoder import QUANSER_PITCH
 from plant_sim.pitch import PitchParameters, PitchPlant
 from transmitter.rigs.emulator.device import EmulatedDevice, RecordedBody, SimulatedBody
 from transmitter.rigs.emulator.faults import Faults
-from transmitter.rigs.samples import DeviceFlag
+from transmitter.rigs.formats.samples import DeviceFlag
 
 MS = 1_000_000
 S = 1_000 * MS

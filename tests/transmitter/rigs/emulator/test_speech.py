@@ -8,7 +8,7 @@ from transmitter.rigs.emulator.speech import AsciiSpeech, CobsSpeech, DoublesSpe
 from transmitter.rigs.formats.ascii import AsciiFormat, checked
 from transmitter.rigs.formats.cobs import CobsFormat
 from transmitter.rigs.formats.qsb import GREETING, QsbFormat
-from transmitter.rigs.samples import DeviceFlag, RawSample
+from transmitter.rigs.formats.samples import DeviceFlag, RawSample
 
 SAMPLE = RawSample((1, -200, 70_000), 65_540, 2**32 + 5, DeviceFlag.OUTPUT_ENABLED)
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from transmitter.rigs.formats.ascii import AsciiFormat
-from transmitter.rigs.samples import RawSample
+from transmitter.rigs.formats.samples import RawSample
 
 
 def read(text: bytes, *columns: str) -> list[RawSample]:

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from transmitter.rigs.formats.cobs import SAMPLE, SAMPLE_TYPE, CobsFormat, seal
-from transmitter.rigs.samples import DeviceFlag, RawSample
+from transmitter.rigs.formats.samples import DeviceFlag, RawSample
 
 SAMPLE_VECTOR = bytes.fromhex("020102070440e201026401010738ffffff2c0101035e6800")
 COMMAND_VECTOR = bytes.fromhex("04810107010103c03f010580be346300")

@@ -1,0 +1,65 @@
+"""What every coder of this folder is: two functions over numbers, and constants for them.
+
+The nodes run these functions as they stand; a study compiles the very same ones (numba), so that each
+formula has one text. They therefore keep to what both understand: they read sequences of numbers by
+index and write their results by index into sequences that the caller provides (lists here, arrays
+there); constants come as one named tuple of numbers and of tuples of numbers; helpers are functions of
+the same kind. No lists, strings, objects or exceptions within.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, MutableSequence, Sequence
+from typing import Any, NamedTuple, TypeAlias
+
+from channel.codec.codec import Vector
+from channel.codec.words import ERASED, Alphabet, Word
+
+Numbers: TypeAlias = Sequence[float]
+Results: TypeAlias = MutableSequence[float]
+Symbols: TypeAlias = Sequence[int]
+SymbolResults: TypeAlias = MutableSequence[int]
+
+
+class CoderFunctions(NamedTuple):
+    """The arithmetic of one kind of coder."""
+
+    encode: Callable[[Any, Numbers, Numbers, Numbers, SymbolResults], None]
+    """(constants, coder, predicted, measurement, symbols): writes the word that is asked for"""
+    decode: Callable[[Any, Numbers, Numbers, Symbols, bool, Results, Results], None]
+    """(constants, coder, model, symbols, erased, correction, after): writes the correction of the
+    first model states and the next coder state; an erased word has the symbol 0 everywhere"""
+
+
+class FunctionCoder:
+    """A `Coder` made of functions. Kinds derive from it and say what is named below."""
+
+    functions: CoderFunctions
+    constants: Any
+    """the named tuple that the functions take first"""
+    alphabet: Alphabet
+    impulse: bool
+    uses_rates: bool = False
+    correction_size: int
+    """model states that a correction is for"""
+
+    def initial(self) -> Vector:
+        """Return the coder state that both ends start from."""
+        return ()
+
+    def encode(self, coder: Vector, predicted: Vector, measurement: Vector) -> tuple[int, ...]:
+        """Return the word for a measurement, given the predicted one."""
+        symbols = [0] * self.alphabet.symbols_per_word
+        self.functions.encode(self.constants, coder, predicted, measurement, symbols)
+        return tuple(symbols)
+
+    def decode(self, coder: Vector, state: Vector, word: Word) -> tuple[Vector, Vector]:
+        """Return the correction and the next coder state for a word or ERASED."""
+        correction = [0.0] * self.correction_size
+        after = [0.0] * len(coder)
+        if word is ERASED:
+            nothing = (0,) * self.alphabet.symbols_per_word
+            self.functions.decode(self.constants, coder, state, nothing, True, correction, after)
+        else:
+            self.functions.decode(self.constants, coder, state, word, False, correction, after)
+        return tuple(correction), tuple(after)

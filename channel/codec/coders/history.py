@@ -1,0 +1,247 @@
+"""One bit per sample that looks ahead when it is formed, and back when it is read.
+
+The word is a sign again. Two things make more of it than the paper's coder does:
+
+* **Reading.** What a sign means depends on the signs before it. After `+-` the error is small, after
+  `+++` it is large and going on. A table, one row for each pattern of the last signs relative to the
+  present one, holds how far angle and rate are corrected and how the range `M` is multiplied:
+
+      correction = sigma M (a[i], b[i] / T),      M <- g[i] M  within  M_min ... M_max
+
+  Rows for a run of equal signs let the range grow, those for alternating ones let it shrink: the range
+  follows disturbances of any strength, and both ends follow it by the symbols alone.
+* **Forming.** The transmitter knows angle *and rate* (from its full-rate encoder), the state of the
+  copy it shares with the receiver, and so everything the receiver will make of either sign. It
+  sends the one that leaves the least squared angle error over the next samples, taking its own best
+  answers to them into account, with no more disturbance assumed:
+
+      min over signs of  sum over samples of integral e^2 dt / T  +  w_aa e^2 + 2 w_ar e r + w_rr r^2
+
+  where `e` is the angle error at a sample and `r` the rate error times T.
+
+With one row, no look-ahead and a constant range this is the sign test on a predicted combination of
+angle and rate, which is what a sign-of-innovation Kalman filter comes to in steady state.
+
+An erased word corrects nothing and leaves range and history as they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from channel.codec.codec import Vector
+from channel.codec.coders.base import (
+    CoderFunctions,
+    FunctionCoder,
+    Numbers,
+    Results,
+    SymbolResults,
+    Symbols,
+)
+from channel.codec.words import Alphabet
+
+Row = tuple[float, float, float]
+
+MEMORY_MAX = 10
+LOOKAHEAD_MAX = 6
+"""Samples; the work doubles with each."""
+THIRD = 1.0 / 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class HistoryParameters:
+    """What the coder is told; angles in rad."""
+
+    rows: tuple[Row, ...]
+    """(a, b, g) of each pattern. Bit j of a row's number is 1 when the sign j + 1 samples ago was the
+    present one; `2^(n-1)` rows for patterns of n signs"""
+    initial_range: float
+    minimum_range: float
+    maximum_range: float
+    period_s: float
+    """T"""
+    weights: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    """w_aa, w_ar, w_rr of the error that is left after the look-ahead"""
+    lookahead: int = 1
+    """samples that are looked ahead"""
+
+
+class HistoryConstants(NamedTuple):
+    """What the functions below need."""
+
+    angle: Vector
+    rate: Vector
+    """of a swing, the rate error times T"""
+    growth: Vector
+    smallest: float
+    largest: float
+    period_s: float
+    weights: tuple[float, float, float]
+    lookahead: int
+
+
+def least_cost(
+    constants: HistoryConstants, angle: float, swing: float, reach: float, history: int, samples: int
+) -> float:
+    """Return the least cost of an error over so many samples, the best signs being sent.
+
+    `angle` is the angle error before the first sign (rad), `swing` the rate error times T, `reach` the
+    range and `history` the signs before.
+    """
+    if samples == 0:
+        weights = constants.weights
+        return (
+            weights[0] * angle * angle + 2.0 * weights[1] * angle * swing + weights[2] * swing * swing
+        )
+    last = len(constants.angle) - 1
+    # +1
+    a = angle - reach * constants.angle[history]
+    s = swing - reach * constants.rate[history]
+    r = reach * constants.growth[history]
+    r = constants.smallest if r < constants.smallest else r
+    r = constants.largest if r > constants.largest else r
+    cost = a * a + a * s + THIRD * s * s
+    cost += least_cost(constants, a + s, s, r, 2 * history + 1 & last, samples - 1)
+    # -1
+    row = last - history
+    a = angle + reach * constants.angle[row]
+    s = swing + reach * constants.rate[row]
+    here = a * a + a * s + THIRD * s * s
+    if here < cost:
+        r = reach * constants.growth[row]
+        r = constants.smallest if r < constants.smallest else r
+        r = constants.largest if r > constants.largest else r
+        here += least_cost(constants, a + s, s, r, 2 * history & last, samples - 1)
+        if here < cost:
+            return here
+    return cost
+
+
+def history_encode(
+    constants: HistoryConstants,
+    coder: Numbers,
+    predicted: Numbers,
+    measurement: Numbers,
+    symbols: SymbolResults,
+) -> None:
+    """Write the sign that leaves least error; both vectors are (angle, rate)."""
+    reach = coder[0]
+    history = int(coder[1])
+    angle = measurement[0] - predicted[0]
+    swing = (measurement[1] - predicted[1]) * constants.period_s
+    best = 0.0
+    for sign in (1, -1):
+        row = history if sign > 0 else len(constants.angle) - 1 - history
+        a = angle - sign * reach * constants.angle[row]
+        s = swing - sign * reach * constants.rate[row]
+        cost = least_cost(constants, a, s, reach, history, 0)
+        if constants.lookahead > 0:
+            next_reach, next_history = history_after(constants, reach, history, sign)
+            cost = a * a + a * s + THIRD * s * s
+            cost += least_cost(constants, a + s, s, next_reach, next_history, constants.lookahead - 1)
+        if sign > 0 or cost < best:
+            best = cost
+            symbols[0] = sign
+
+
+def history_after(
+    constants: HistoryConstants, reach: float, history: int, sign: int
+) -> tuple[float, int]:
+    """Return range and history after a sign."""
+    last = len(constants.angle) - 1
+    grown = reach * constants.growth[history if sign > 0 else last - history]
+    grown = constants.smallest if grown < constants.smallest else grown
+    grown = constants.largest if grown > constants.largest else grown
+    return grown, 2 * history + (1 if sign > 0 else 0) & last
+
+
+def history_decode(
+    constants: HistoryConstants,
+    coder: Numbers,
+    model: Numbers,
+    symbols: Symbols,
+    erased: bool,
+    correction: Results,
+    after: Results,
+) -> None:
+    """Write the correction of (angle, rate) and the coder state after it."""
+    reach = coder[0]
+    history = int(coder[1])
+    if erased:
+        correction[0] = 0.0
+        correction[1] = 0.0
+        after[0] = reach
+        after[1] = coder[1]
+        return
+    sign = symbols[0]
+    row = history if sign > 0 else len(constants.angle) - 1 - history
+    correction[0] = sign * reach * constants.angle[row]
+    correction[1] = sign * reach * constants.rate[row] / constants.period_s
+    grown, following = history_after(constants, reach, history, sign)
+    after[0] = grown
+    after[1] = 1.0 * following
+
+
+class HistoryCoder(FunctionCoder):
+    """One sign per sample for one axis. Coder state: the range, and the last signs as a number."""
+
+    functions = CoderFunctions(history_encode, history_decode)
+    impulse = True
+    uses_rates = True
+    correction_size = 2
+    alphabet = Alphabet((-1, 1), 1)
+
+    def __init__(self, parameters: HistoryParameters) -> None:
+        check(parameters)
+        self.parameters = parameters
+        self.constants = HistoryConstants(
+            tuple(row[0] for row in parameters.rows),
+            tuple(row[1] for row in parameters.rows),
+            tuple(row[2] for row in parameters.rows),
+            parameters.minimum_range,
+            parameters.maximum_range,
+            parameters.period_s,
+            parameters.weights,
+            parameters.lookahead,
+        )
+
+    def initial(self) -> Vector:
+        """Return the first range, and a history of alternating signs."""
+        return (self.parameters.initial_range, float(0b0101010101 & len(self.parameters.rows) - 1))
+
+    def is_state(self, coder: Vector) -> bool:
+        """Return whether this is a range within its limits, and a history that has a row."""
+        reach, history = coder
+        known = history in range(len(self.parameters.rows))
+        return self.parameters.minimum_range <= reach <= self.parameters.maximum_range and known
+
+    def ranges(self, coder: Vector) -> Vector:
+        """Return the range."""
+        return coder[:1]
+
+
+def check(parameters: HistoryParameters) -> None:
+    """Raise ValueError where the parameters make no coder."""
+    rows = len(parameters.rows)
+    if rows < 1 or rows & rows - 1 or rows > 1 << MEMORY_MAX - 1:
+        raise ValueError(
+            f"rows are one for each pattern of signs: 1, 2, 4 ... {1 << MEMORY_MAX - 1} of them, "
+            f"got {rows}"
+        )
+    for number, (angle, rate, growth) in enumerate(parameters.rows):
+        if not (angle > 0.0 and rate > 0.0 and growth > 0.0):
+            raise ValueError(f"row {number} is {(angle, rate, growth)}; its three must be above 0")
+    smallest, largest = parameters.minimum_range, parameters.maximum_range
+    if not 0.0 < smallest <= parameters.initial_range <= largest:
+        raise ValueError(
+            "ranges must be 0 < minimum <= initial <= maximum, got "
+            f"{smallest}, {parameters.initial_range}, {largest}"
+        )
+    if not parameters.period_s > 0.0:
+        raise ValueError(f"period_s is {parameters.period_s}; it must be above 0")
+    if not 0 <= parameters.lookahead <= LOOKAHEAD_MAX:
+        raise ValueError(f"lookahead must be 0 ... {LOOKAHEAD_MAX}, got {parameters.lookahead}")
+    angle, cross, rate = parameters.weights
+    if not (angle > 0.0 and rate > 0.0 and angle * rate >= cross * cross):
+        raise ValueError(f"weights must make a cost that is never negative, got {parameters.weights}")

@@ -1,0 +1,30 @@
+"""What the one-bit coders share: a sign per measured axis, and gains that spread it over the state."""
+
+from __future__ import annotations
+
+from channel.codec.coders.base import Numbers, Results, SymbolResults, Symbols
+
+Gains = tuple[tuple[float, ...], ...]
+
+
+def axes_of(gains: Gains) -> int:
+    """Return the number of measured axes, one column each; ValueError for rows that do not match."""
+    axes = len(gains[0]) if gains else 0
+    if axes < 1 or any(len(row) != axes for row in gains):
+        raise ValueError(f"gains need rows of equal, non-zero length, got {gains}")
+    return axes
+
+
+def write_signs(predicted: Numbers, measurement: Numbers, symbols: SymbolResults) -> None:
+    """Write the sign of the estimation error of each axis (20); the sign of zero is +1."""
+    for axis in range(len(symbols)):
+        symbols[axis] = 1 if measurement[axis] >= predicted[axis] else -1
+
+
+def spread_signs(gains: Gains, ranges: Numbers, signs: Symbols, correction: Results) -> None:
+    """Write the correction of each model state: its row of gains times `M sigma` of each axis (21)."""
+    for row in range(len(gains)):
+        total = 0.0
+        for axis in range(len(signs)):
+            total += gains[row][axis] * (ranges[axis] * signs[axis])
+        correction[row] = total

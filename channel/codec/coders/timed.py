@@ -1,0 +1,108 @@
+"""One-bit coders whose range does not listen: a fixed range, and time-based zooming.
+
+The word is that of the paper's coder, a sign per axis (20), and so is the correction (21)-(23). Only
+the range differs. It follows the clock alone:
+
+    M_{k+1} = (1 - rho) M_min + rho M_k
+
+which with rho = 1 stays at M_0: the fixed range. Such a coder can fall asleep: once the range is down,
+an error that has grown beyond what the small range corrects is never caught up. It is here to show
+what the adaptive rule (19) is for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from channel.codec.codec import STATE_MAX, Vector
+from channel.codec.coders.base import (
+    CoderFunctions,
+    FunctionCoder,
+    Numbers,
+    Results,
+    SymbolResults,
+    Symbols,
+)
+from channel.codec.coders.signs import Gains, axes_of, spread_signs, write_signs
+from channel.codec.words import Alphabet
+
+
+@dataclass(frozen=True, slots=True)
+class TimedParameters:
+    """Constants of the range and the observer gains."""
+
+    initial_range: float = 0.5
+    """M_0, in the unit of the measurement (rad)"""
+    minimum_range: float = 0.05
+    """M_min, where the range ends"""
+    decay: float = 0.95
+    """rho, in (0, 1]; 1 keeps the range as it is"""
+    gains: Gains = ((4.1,), (8.6,))
+    """a row per corrected model state, a column per measured axis"""
+    impulse: bool = False
+
+
+class TimedConstants(NamedTuple):
+    """What the functions below need."""
+
+    decay: float
+    floor: float
+    """(1 - rho) M_min"""
+    gains: Gains
+
+
+def timed_encode(
+    constants: TimedConstants,
+    coder: Numbers,
+    predicted: Numbers,
+    measurement: Numbers,
+    symbols: SymbolResults,
+) -> None:
+    """Write the sign of the estimation error of each axis (20)."""
+    write_signs(predicted, measurement, symbols)
+
+
+def timed_decode(
+    constants: TimedConstants,
+    coder: Numbers,
+    model: Numbers,
+    symbols: Symbols,
+    erased: bool,
+    correction: Results,
+    after: Results,
+) -> None:
+    """Write the correction (21),(23) and the ranges of the next sample."""
+    spread_signs(constants.gains, coder, symbols, correction)
+    for axis in range(len(symbols)):
+        after[axis] = constants.floor + constants.decay * coder[axis]
+
+
+class TimedCoder(FunctionCoder):
+    """A sign per axis, and ranges that shrink by the clock. Coder state: the ranges."""
+
+    functions = CoderFunctions(timed_encode, timed_decode)
+
+    def __init__(self, parameters: TimedParameters) -> None:
+        axes = axes_of(parameters.gains)
+        if not 0.0 < parameters.decay <= 1.0:
+            raise ValueError(f"decay must be in (0, 1], got {parameters.decay}")
+        self.parameters = parameters
+        self.impulse = parameters.impulse
+        self.axes = axes
+        self.alphabet = Alphabet((-1, 1), axes)
+        self.correction_size = len(parameters.gains)
+        floor = (1.0 - parameters.decay) * parameters.minimum_range
+        self.constants = TimedConstants(parameters.decay, floor, parameters.gains)
+
+    def initial(self) -> Vector:
+        """Return `M_0` for every axis."""
+        return (self.parameters.initial_range,) * self.axes
+
+    def is_state(self, coder: Vector) -> bool:
+        """Return whether these are ranges."""
+        return all(0.0 <= value < STATE_MAX for value in coder)
+
+    def ranges(self, coder: Vector) -> Vector:
+        """Return the range `M_k` of each axis."""
+        return coder

@@ -1,0 +1,34 @@
+"""No prediction at all: angle and rate stay as the last word said. The usual loop has no model."""
+
+from __future__ import annotations
+
+from channel.codec.codec import Vector
+
+
+def hold_tick(state: Vector, command: Vector, held: Vector, constants: Vector) -> Vector:
+    """Keep the state, but for a correction that is held over the sample; constants: (tick in s,)."""
+    return (state[0] + constants[0] * held[0], state[1] + constants[0] * held[1])
+
+
+class HoldModel:
+    """States (angle rad, rate rad/s), held between words; two motor voltages that it does not read."""
+
+    state_size = 2
+    correction_size = 2
+    input_size = 2
+    tick_function = staticmethod(hold_tick)
+
+    def __init__(self, tick_s: float) -> None:
+        self.constants: Vector = (tick_s,)
+
+    def initial(self) -> Vector:
+        """Return the body at angle zero, at rest."""
+        return (0.0, 0.0)
+
+    def measured(self, state: Vector) -> Vector:
+        """Return the angle, the one measured axis."""
+        return state[:1]
+
+    def tick(self, state: Vector, command: Vector, held: Vector) -> Vector:
+        """Advance by one tick; see `hold_tick`."""
+        return hold_tick(state, command, held, self.constants)

@@ -1,0 +1,269 @@
+"""What goes wrong on a line, on purpose: from a text, seeded, the same every time.
+
+    loss=0.2              every message is lost with this probability (also 20%)
+    burst=0.02/0.25       Gilbert-Elliott: chance per message to enter and leave a state that loses all
+    flip=0.01             a symbol arrives whole, but as another symbol (uplink)
+    raw=0.01              one bit of the message is inverted; its check then drops it
+    duplicate=0.1         a message arrives twice
+    reorder=0.1/150ms     a message is held back by up to this time (150ms if not given)
+    delay=30ms±10ms       every message takes this long, evenly spread by the second number (also +-)
+    cut=10s+2s            nothing passes for 2 s from flight time 10 s on; may be given repeatedly
+    dead=30s              nothing passes from 30 s on
+    skew=200ppm           the receiver's clock runs fast (slow: -200ppm)
+    step=50ms@10s         the receiver's clock jumps at 10 s; may be given repeatedly
+
+Items are separated by commas. `up:` or `down:` before an item keeps it to one direction.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+import re
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+from channel.codec.words import Alphabet
+from channel.errors import FrameError
+from channel.line.line import Delivery, Line
+from channel.protocol.frames import Symbol
+from channel.protocol.wire import DATAGRAM, Wire
+
+Direction = Literal["up", "down"]
+FOR_EVER_NS = 2**62
+REORDER_NS = 150_000_000
+
+_UNITS_NS = {"s": 1e9, "ms": 1e6, "us": 1e3}
+_TIME = re.compile(r"(\d+(?:\.\d*)?)(us|ms|s)")
+
+
+@dataclass(frozen=True, slots=True)
+class Impairments:
+    """What one direction suffers. Probabilities are per message."""
+
+    loss: float = 0.0
+    burst_enter: float = 0.0
+    burst_leave: float = 1.0
+    flip: float = 0.0
+    raw: float = 0.0
+    duplicate: float = 0.0
+    reorder: float = 0.0
+    reorder_ns: int = REORDER_NS
+    delay_ns: int = 0
+    jitter_ns: int = 0
+    cuts: tuple[tuple[int, int], ...] = ()
+    """(start, end) in flight time, ns"""
+
+    @property
+    def any(self) -> bool:
+        """Return whether anything is set."""
+        return self != Impairments()
+
+    def is_cut(self, now_ns: int) -> bool:
+        """Return whether nothing passes at a flight time."""
+        return any(start <= now_ns < end for start, end in self.cuts)
+
+
+@dataclass(frozen=True, slots=True)
+class LineFaults:
+    """Both directions, and the receiver's clock."""
+
+    up: Impairments = Impairments()
+    down: Impairments = Impairments()
+    skew_ppm: float = 0.0
+    clock_steps: tuple[tuple[int, int], ...] = ()
+    """(flight time, jump), ns"""
+
+    @property
+    def any(self) -> bool:
+        """Return whether anything is set."""
+        return self != LineFaults()
+
+    @property
+    def bad_clock(self) -> bool:
+        """Return whether the receiver's clock shows another time than the transmitter's."""
+        return bool(self.skew_ppm or self.clock_steps)
+
+    @property
+    def longest_delay_ns(self) -> int:
+        """Return the longest usual delay of a symbol up and its command down, together."""
+        return sum(one.delay_ns + one.jitter_ns for one in (self.up, self.down))
+
+
+def parse_impairments(text: str) -> LineFaults:
+    """Return what a text asks for; ValueError, naming the item, for one that makes no sense."""
+    faults = LineFaults()
+    for item in filter(None, (part.strip() for part in text.split(","))):
+        try:
+            faults = _with_item(faults, item)
+        except ValueError as error:
+            raise ValueError(f"impairment {item!r}: {error}") from None
+    return faults
+
+
+def _with_item(faults: LineFaults, item: str) -> LineFaults:
+    prefix, colon, rest = item.partition(":")
+    if colon and prefix not in ("up", "down"):
+        raise ValueError("only up: and down: may stand before an item")
+    name, equals, value = (rest if colon else item).partition("=")
+    if not equals:
+        raise ValueError("write NAME=VALUE")
+    if name == "skew":
+        skew_ppm = _number(value.removesuffix("ppm"))
+        if skew_ppm <= -1e6:
+            raise ValueError("such a clock would stand still or run backwards")
+        return replace(faults, skew_ppm=skew_ppm)
+    if name == "step":
+        jump, _, start = value.partition("@")
+        step = (_time_ns(start), _time_ns(jump.removeprefix("-")) * (-1 if jump[:1] == "-" else 1))
+        return replace(faults, clock_steps=tuple(sorted((*faults.clock_steps, step))))
+    changed = faults
+    if prefix != "down" or not colon:
+        changed = replace(changed, up=_with_value(faults.up, name, value))
+    if prefix != "up" or not colon:
+        changed = replace(changed, down=_with_value(faults.down, name, value))
+    return changed
+
+
+def _with_value(one: Impairments, name: str, value: str) -> Impairments:
+    first, _, second = value.partition("/")
+    match name:
+        case "loss":
+            return replace(one, loss=_probability(value))
+        case "flip":
+            return replace(one, flip=_probability(value))
+        case "raw":
+            return replace(one, raw=_probability(value))
+        case "duplicate":
+            return replace(one, duplicate=_probability(value))
+        case "burst":
+            enter, leave = _probability(first), _probability(second)
+            if leave == 0.0:
+                raise ValueError("a burst must be left some time")
+            return replace(one, burst_enter=enter, burst_leave=leave)
+        case "reorder":
+            held_ns = _time_ns(second) if second else REORDER_NS
+            return replace(one, reorder=_probability(first), reorder_ns=held_ns)
+        case "delay":
+            mean, _, spread = value.replace("+-", "±").partition("±")
+            jitter_ns = _time_ns(spread) if spread else 0
+            if jitter_ns > _time_ns(mean):
+                raise ValueError("the spread is larger than the delay itself")
+            return replace(one, delay_ns=_time_ns(mean), jitter_ns=jitter_ns)
+        case "cut":
+            start, plus, length = value.partition("+")
+            if not plus:
+                raise ValueError("write cut=START+LENGTH, such as cut=10s+2s")
+            cut = (_time_ns(start), _time_ns(start) + _time_ns(length))
+            return replace(one, cuts=(*one.cuts, cut))
+        case "dead":
+            return replace(one, cuts=(*one.cuts, (_time_ns(value), FOR_EVER_NS)))
+    raise ValueError(
+        "no such impairment; there are loss, burst, flip, raw, duplicate, reorder, delay, cut, dead, "
+        "skew and step"
+    )
+
+
+def _probability(text: str) -> float:
+    percent = text.endswith("%")
+    value = _number(text.removesuffix("%")) / (100.0 if percent else 1.0)
+    if not 0.0 <= value <= 1.0:
+        raise ValueError(f"{text} is not between 0 and 1")
+    return value
+
+
+def _number(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ValueError(f"{text!r} is no number")
+    return value
+
+
+def _time_ns(text: str) -> int:
+    match = _TIME.fullmatch(text)
+    if match is None:
+        raise ValueError(f"{text!r} is no time from 0 on; write 30ms, 1.5s or 200us")
+    return round(float(match[1]) * _UNITS_NS[match[2]])
+
+
+@dataclass(slots=True)
+class ImpairedLine(Line):
+    """A line with impairments; `counts` says what it did to how many messages."""
+
+    impairments: Impairments
+    alphabet: Alphabet
+    seed: str
+    wire: Wire = DATAGRAM
+    symbol_delay_ns: int = 0
+    counts: Counter[str] = field(default_factory=Counter)
+    _chance: random.Random = field(init=False)
+    _in_burst: bool = field(init=False, default=False)
+
+    def __post_init__(self) -> None:
+        """Seed the chance."""
+        self._chance = random.Random(self.seed)
+
+    @property
+    def longest_delay_ns(self) -> int:
+        """Return how long a message may be under way."""
+        one = self.impairments
+        held_ns = one.reorder_ns if one.reorder or one.duplicate else 0
+        return self.symbol_delay_ns + one.delay_ns + one.jitter_ns + held_ns
+
+    def carry(self, data: bytes, is_symbol: bool, now_ns: int) -> list[Delivery]:
+        """Return the arrivals of a message put on the line at flight time `now_ns`."""
+        one, chance = self.impairments, self._chance.random
+        arrival_ns = now_ns + one.delay_ns + (self.symbol_delay_ns if is_symbol else 0)
+        if one.jitter_ns:
+            arrival_ns += round((2.0 * chance() - 1.0) * one.jitter_ns)
+        if self._is_lost(now_ns):
+            return [Delivery(arrival_ns, None)]
+        if one.reorder and chance() < one.reorder:
+            self.counts["reordered"] += 1
+            arrival_ns += round(chance() * one.reorder_ns)
+        if is_symbol and one.flip and chance() < one.flip:
+            data = self._flipped(data)
+        if one.raw and chance() < one.raw:
+            self.counts["corrupted"] += 1
+            bit = self._chance.randrange(8 * len(data))
+            byte = data[bit >> 3] ^ (1 << (bit & 7))
+            data = data[: bit >> 3] + bytes((byte,)) + data[(bit >> 3) + 1 :]
+        deliveries = [Delivery(arrival_ns, data)]
+        if one.duplicate and chance() < one.duplicate:
+            self.counts["duplicated"] += 1
+            deliveries.append(Delivery(arrival_ns + round(chance() * one.reorder_ns), data))
+        return deliveries
+
+    def _is_lost(self, now_ns: int) -> bool:
+        one, chance = self.impairments, self._chance.random
+        if one.cuts and one.is_cut(now_ns):
+            self.counts["cut off"] += 1
+            return True
+        if one.burst_enter:
+            self._in_burst = (
+                chance() >= one.burst_leave if self._in_burst else chance() < one.burst_enter
+            )
+            if self._in_burst:
+                self.counts["lost in bursts"] += 1
+                return True
+        if one.loss and chance() < one.loss:
+            self.counts["lost"] += 1
+            return True
+        return False
+
+    def _flipped(self, data: bytes) -> bytes:
+        """Return the message with another symbol, its check made good again."""
+        try:
+            frame = self.wire.decode(data)
+        except FrameError:
+            return data
+        if not isinstance(frame, Symbol):
+            return data
+        self.counts["flipped"] += 1
+        kinds = len(self.alphabet.symbols)
+        other = (frame.number + 1 + self._chance.randrange(kinds - 1)) % kinds
+        return self.wire.encode(replace(frame, number=other))

@@ -1,0 +1,131 @@
+"""Which slot a symbol byte belongs to: its few counter bits, and the time at which it came.
+
+A byte of a serial line carries its slot modulo 8 or 4. The line's schedule says which slot is due now,
+and of the slots with the right remainder the nearest one is meant. A byte that fits the schedule is
+taken, one before its time is refused, one after its deadline is late. What is taken moves the schedule
+only a little, so that a byte which noise has made cannot drag it along; but a row of `RIVALS` bytes
+that fit each other and not the schedule replaces it.
+
+Before the first symbol the schedule is known from the handshake: tick 0 lies between the hello and
+`START_NS` after it. A wrong guess anywhere here is a wrong or an erased symbol, which the echo covers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from channel.protocol.frames import ShortSymbol
+from channel.protocol.terms import Terms
+
+START_NS = 250_000_000
+"""The hello is answered, the welcome travels, the transmitter begins: all within this."""
+START_SLACK_NS = 50_000_000
+
+RIVALS = 3
+RIVAL_SLOTS = 0.25
+EARLY_SLOTS = 0.5
+LATE_SLOTS = 0.5
+GAIN_MIN = 1.0 / 16.0
+
+
+class Place(NamedTuple):
+    """What became of a symbol byte."""
+
+    slot: int | None
+    """the slot, None for a byte that does not fit"""
+    in_time: bool
+    anchor: tuple[int, int] | None
+    """(slot, time in ns): where the receiver's deadlines count from now on, if that has changed"""
+
+
+@dataclass(slots=True)
+class _Rival:
+    slot: int
+    time_ns: int
+    count: int = 1
+
+
+class SlotFinder:
+    """Finds the slots of symbol bytes for one session."""
+
+    def __init__(self, terms: Terms) -> None:
+        self._slot_ns = terms.sample_ns / terms.symbols_per_word
+        self._delay_ns = terms.symbol_delay_ns
+        self._allowance = terms.deadline_allowance_ns / self._slot_ns
+        self._greeted_ns = 0
+        self._first_slot = 0
+        self._ahead_ns = 0
+        self._zero_ns: float | None = None
+        """when slot 0 would have arrived, by the schedule"""
+        self._taken = 0
+        self._rival: _Rival | None = None
+
+    def greeted(self, now_ns: int) -> None:
+        """Note the time of a hello that was answered with a welcome."""
+        if self._zero_ns is None:
+            self._greeted_ns = now_ns
+
+    def begin(self, first_slot: int, ahead_slots: int) -> None:
+        """Forget the schedule: another transmitter begins, so many slots after its hello."""
+        self._zero_ns = None
+        self._rival = None
+        self._first_slot = first_slot
+        self._ahead_ns = round(ahead_slots * self._slot_ns)
+
+    def find(self, symbol: ShortSymbol, expected: int, now_ns: int) -> Place:
+        """Return where a symbol byte that came at `now_ns` belongs; `expected` is not settled yet."""
+        if self._zero_ns is None:
+            return self._first(symbol, now_ns)
+        place = (now_ns - self._zero_ns) / self._slot_ns
+        slot = _nearest(symbol, place)
+        early = slot - place
+        # Deadlines count from the last symbol, itself perhaps late by the allowance. A byte later than
+        # this is one of a heap that waited while this process did not run.
+        in_time = slot >= expected and -early <= max(LATE_SLOTS, 2.0 * self._allowance)
+        if in_time and early <= max(EARLY_SLOTS, self._allowance):
+            self._rival = None
+            self._taken += 1
+            gain = max(GAIN_MIN, 1.0 / (1.0 + self._taken))
+            self._zero_ns -= gain * early * self._slot_ns
+            due_ns = round(self._zero_ns + slot * self._slot_ns)
+            return Place(slot, True, (slot, max(now_ns, due_ns)))
+        if self._is_rival(slot, now_ns):
+            self._start(slot, now_ns)
+            return Place(slot, slot >= expected, (slot, now_ns))
+        return Place(None if early > 0.0 and slot >= expected else slot, False, None)
+
+    def _first(self, symbol: ShortSymbol, now_ns: int) -> Place:
+        since_ns = now_ns - self._greeted_ns - self._delay_ns - self._ahead_ns
+        first = self._first_slot
+        place = (since_ns - START_NS / 2) / self._slot_ns
+        slot = _nearest(symbol, first + max(0.0, place))
+        earliest = first + (since_ns - START_NS) / self._slot_ns - EARLY_SLOTS
+        latest = first + (since_ns + START_SLACK_NS) / self._slot_ns + EARLY_SLOTS
+        if not earliest <= slot <= latest:
+            return Place(None, False, None)
+        self._start(slot, now_ns)
+        return Place(slot, True, (slot, now_ns))
+
+    def _start(self, slot: int, now_ns: int) -> None:
+        self._zero_ns = now_ns - slot * self._slot_ns
+        self._taken = 0
+        self._rival = None
+
+    def _is_rival(self, slot: int, now_ns: int) -> bool:
+        """Return whether this byte is the last of a row that fits itself."""
+        rival = self._rival
+        if rival is not None:
+            slots = (now_ns - rival.time_ns) / self._slot_ns
+            off = abs(slot - rival.slot - slots)
+            if slot > rival.slot and off <= max(RIVAL_SLOTS, self._allowance):
+                self._rival = _Rival(slot, now_ns, rival.count + 1)
+                return self._rival.count >= RIVALS
+        self._rival = _Rival(slot, now_ns)
+        return False
+
+
+def _nearest(symbol: ShortSymbol, place: float) -> int:
+    """Return the slot with the symbol's counter bits that is nearest to a place on the slot axis."""
+    turns = round((place - symbol.slot_low) / symbol.slot_modulus)
+    return symbol.slot_low + symbol.slot_modulus * max(0, turns)

@@ -1,0 +1,85 @@
+"""A link whose two directions are two lines: a slow serial line up, something faster down."""
+
+from __future__ import annotations
+
+from typing import Self
+
+from channel.links.base import Link, LinkCounts, Role
+from channel.protocol.frames import Frame
+from channel.protocol.wire import Wire
+
+DOWNWARD_KINDS = (2, 3, 5, 8, 9)
+"""Frame kinds that only the receiver sends: welcome, refuse, commands, unknown, claim."""
+
+
+class SplitWire:
+    """Looks like the upward line's wire; sizes of downward frames are the downward line's."""
+
+    def __init__(self, up: Wire, down: Wire) -> None:
+        self._up = up
+        self._down = down
+
+    def encode(self, frame: Frame) -> bytes:
+        """Return the message for a frame."""
+        return self._up.encode(frame)
+
+    def decode(self, data: bytes) -> Frame:
+        """Return the frame in a message."""
+        return self._up.decode(data)
+
+    def size(self, data: bytes) -> int:
+        """Return how many bytes a message takes on its line."""
+        downward = len(data) > 1 and data[1] in DOWNWARD_KINDS
+        return (self._down if downward else self._up).size(data)
+
+
+class SplitLink:
+    """Sends on one link and hears on the other, as the role asks; owns and closes both."""
+
+    def __init__(self, role: Role, up: Link, down: Link) -> None:
+        self.name = f"{up.name} up, {down.name} down"
+        self.wire: Wire = SplitWire(up.wire, down.wire)
+        self._out, self._in = (up, down) if role == "transmitter" else (down, up)
+
+    @property
+    def counts(self) -> LinkCounts:
+        """Return what went out on the one, came in on the other, and was dropped on both."""
+        out, come = self._out.counts, self._in.counts
+        return LinkCounts(
+            messages_out=out.messages_out,
+            bytes_out=out.bytes_out,
+            messages_in=come.messages_in,
+            bytes_in=come.bytes_in,
+            dropped=out.dropped + come.dropped,
+            refused=out.refused + come.refused,
+            reconnects=out.reconnects + come.reconnects,
+            line_bytes_out=out.line_bytes_out + come.line_bytes_out,
+            line_bytes_in=out.line_bytes_in + come.line_bytes_in,
+        )
+
+    def send(self, data: bytes, is_symbol: bool = False) -> None:
+        """Put one message on the outward line."""
+        self._out.send(data, is_symbol)
+
+    def receive(self, timeout_s: float) -> bytes | None:
+        """Return the next message of the inward line, or None after `timeout_s` seconds."""
+        return self._in.receive(timeout_s)
+
+    def peer_present(self) -> bool:
+        """Return whether the peer is known to be there on the inward line."""
+        return self._in.peer_present()
+
+    def trouble(self) -> str:
+        """Return what is wrong with either line."""
+        return self._out.trouble() or self._in.trouble()
+
+    def close(self) -> None:
+        """Give both lines back."""
+        self._out.close()
+        self._in.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

@@ -1,0 +1,195 @@
+"""The messages of the two sessions. How they look on a line is `channel.protocol.wire`'s affair.
+
+Uplink: Hello, Symbol, Desync, Bye. Downlink: Welcome, Refuse, Commands, Desync, Unknown, Claim, Bye.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import TypeAlias
+
+
+class Why(IntEnum):
+    """Why a transmitter asks for a session."""
+
+    START = 0
+    """it has none"""
+    DESYNC = 1
+    """the digests of a sample differed"""
+    GAP = 2
+    """echoes were lost, more in a row than command frames repeat"""
+    LAG = 3
+    """no echo came for as long as the history lasts"""
+    UNKNOWN = 4
+    """the receiver does not know the session: it was restarted, or lost track"""
+    GUARD = 5
+    """commands stayed away until the watchdog took the voltage down"""
+    TAKEN_OVER = 6
+    """another receiver takes the flight over, on purpose"""
+
+
+@dataclass(frozen=True, slots=True)
+class Hello:
+    """The transmitter is there and asks for a session, or for a new epoch of the one it has.
+
+    It is repeated until it is answered, so an answer names the request that it belongs to.
+    """
+
+    incarnation: int
+    """drawn anew by every process, 32 bits"""
+    version: str
+    """of the software, for people; the wire format's own version is in every frame"""
+    config_digest: bytes
+    """16 bytes, of the shared part of the configuration"""
+    numerics_probe: bytes
+    """8 bytes, of the codec run over fixed vectors"""
+    request: int = 0
+    """counts the times that this process asked; repetitions of one request are equal"""
+    session: int = 0
+    """that the transmitter flew in; 0: none yet"""
+    epoch: int = 0
+    sample: int = 0
+    """first sample that the transmitter can still send, in its own count"""
+    why: Why = Why.START
+
+
+@dataclass(frozen=True, slots=True)
+class Welcome:
+    """The receiver accepts: symbols may start, with `first_sample`, from a common state."""
+
+    session: int
+    """drawn by the receiver, 32 bits; every later frame of both directions carries it"""
+    epoch: int
+    first_sample: int
+    incarnation: int
+    """of the Hello that is answered"""
+    request: int = 0
+    """of the Hello that is answered"""
+    hold_millivolts: tuple[int, ...] = ()
+    """command of the first `D` ticks from `first_sample` on; empty: the initial command"""
+    state: bytes = b""
+    """codec state before `first_sample`, in canonical bytes; empty: the initial one"""
+
+
+@dataclass(frozen=True, slots=True)
+class Refuse:
+    """The receiver does not fly with this transmitter."""
+
+    incarnation: int
+    reason: str
+    config: str
+    """shared part of the receiver's configuration as JSON, so that the other end can name fields"""
+
+
+@dataclass(frozen=True, slots=True)
+class Symbol:
+    """One paid symbol in its slot."""
+
+    session: int
+    epoch: int
+    slot: int
+    """counted from the first symbol of sample 0"""
+    number: int
+    """place of the symbol in the coder's alphabet"""
+
+
+@dataclass(frozen=True, slots=True)
+class ShortSymbol:
+    """A symbol as a byte of a serial line carries it: the receiver finds its slot by the time.
+
+    Only ever received; the other end sent a Symbol.
+    """
+
+    number: int
+    slot_low: int
+    """the slot modulo `slot_modulus`"""
+    slot_modulus: int
+
+
+@dataclass(frozen=True, slots=True)
+class Echo:
+    """What the receiver consumed for one sample, and what it decided on it."""
+
+    sample: int
+    word_number: int
+    """as `Alphabet.word_number` counts; an erasure has a number of its own"""
+    digest: int
+    """of the codec state after the sample, 64 bits"""
+    millivolts: tuple[int, ...]
+    """commands of ticks `kN + D ... (k+1)N + D - 1`, all motors of a tick together"""
+
+
+@dataclass(frozen=True, slots=True)
+class Commands:
+    """The echoes of consecutive samples, oldest first; the last one is new."""
+
+    session: int
+    epoch: int
+    echoes: tuple[Echo, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Desync:
+    """The transmitter's copy differs from the receiver's after this sample.
+
+    The receiver answers with the same frame and its own state, so that both can write both down.
+    """
+
+    session: int
+    epoch: int
+    sample: int
+    transmitter_digest: int
+    receiver_digest: int
+    state: bytes
+    """the sender's state after the sample, in the codec's canonical bytes; empty: not kept"""
+
+
+@dataclass(frozen=True, slots=True)
+class Unknown:
+    """The receiver got a symbol of a session that it does not know: ask for another."""
+
+    session: int
+    epoch: int
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """Another receiver takes this flight over, on purpose: ask for a new epoch, of its session."""
+
+    session: int
+    """that the transmitter flies in"""
+    epoch: int
+    by: int
+    """session of the receiver that takes over"""
+
+
+@dataclass(frozen=True, slots=True)
+class Bye:
+    """The sender ends the session, and says why."""
+
+    session: int
+    """0 before there is one, and to a second receiver that is refused"""
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class ForeignVersion:
+    """A whole frame of another wire version: not read further, but worth telling about."""
+
+    version: int
+
+
+Frame: TypeAlias = (
+    Hello
+    | Welcome
+    | Refuse
+    | Symbol
+    | ShortSymbol
+    | Commands
+    | Desync
+    | Unknown
+    | Claim
+    | Bye
+    | ForeignVersion
+)

@@ -1,0 +1,86 @@
+"""Who an end is, for the handshake: software, configuration and arithmetic.
+
+The two copies of the codec stay equal only if both ends run the same configuration with the same
+arithmetic. Both are compared before the first symbol. The numerics probe is a digest of our sine,
+cosine and exponential on fixed arguments and of the configured codec run over fixed inputs: a
+library or a processor that computes otherwise is found out here, not in flight.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from hashlib import blake2b
+from struct import pack
+from typing import Any
+
+from channel.codec import numerics
+from channel.codec.codec import Codec
+from channel.codec.words import ERASED, Word
+
+PROBE_SAMPLES = 40
+PROBE_POINTS = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """What an end shows its peer."""
+
+    version: str
+    config: str
+    """shared part of the configuration, as canonical JSON"""
+    numerics_probe: bytes
+
+    @property
+    def config_digest(self) -> bytes:
+        """Return 16 bytes that stand for the shared configuration."""
+        return blake2b(self.config.encode(), digest_size=16).digest()
+
+
+def numerics_probe(codec: Codec) -> bytes:
+    """Return 8 bytes that depend on every bit of this machine's codec arithmetic."""
+    digest = blake2b(digest_size=8)
+    for point in range(-PROBE_POINTS, PROBE_POINTS):
+        x = point * 0.0537109375
+        digest.update(pack("<3d", numerics.sin(x), numerics.cos(x), numerics.exp(x)))
+    symbols = codec.coder.alphabet.symbols
+    state = codec.initial()
+    noise = 1
+    for sample in range(PROBE_SAMPLES):
+        symbols_of_word = []
+        for _ in range(codec.coder.alphabet.symbols_per_word):
+            noise = noise * 1_103_515_245 + 12_345 & 0x7FFFFFFF
+            symbols_of_word.append(symbols[(noise >> 16) % len(symbols)])
+        word: Word = ERASED if sample % 7 == 6 else tuple(symbols_of_word)
+        commands = []
+        for _ in range(codec.ticks_per_sample):
+            noise = noise * 1_103_515_245 + 12_345 & 0x7FFFFFFF
+            volts = ((noise >> 12) % 9_001 - 4_500) / 1000.0
+            signs = (1.0 if motor % 2 == 0 else -1.0 for motor in range(codec.model.input_size))
+            commands.append(tuple(sign * volts for sign in signs))
+        state = codec.step(state, word, commands)
+        digest.update(codec.pack(state))
+    return digest.digest()
+
+
+def differing_fields(ours: str, theirs: str) -> list[str]:
+    """Return one line for each field in which two shared configurations (JSON) differ."""
+    try:
+        left, right = _flatten(json.loads(ours)), _flatten(json.loads(theirs))
+    except (ValueError, RecursionError):
+        return ["the peer's configuration cannot be read"]
+    missing = "(absent)"
+    return [
+        f"{name}: here {left.get(name, missing)}, there {right.get(name, missing)}"
+        for name in sorted(left.keys() | right.keys())
+        if left.get(name, missing) != right.get(name, missing)
+    ]
+
+
+def _flatten(value: Any, prefix: str = "") -> dict[str, Any]:
+    if not isinstance(value, dict):
+        return {prefix.removesuffix("."): value}
+    flat: dict[str, Any] = {}
+    for key, item in value.items():
+        flat |= _flatten(item, f"{prefix}{key}.")
+    return flat

@@ -1,0 +1,107 @@
+"""What is kept for the day on which the two copies differ, and how it is written down.
+
+Each end keeps its last states and inputs. A failure is found at the transmitter up to one lag after
+it happened, so the ring of states is longer than any lag that is allowed.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import NamedTuple
+
+from channel.codec.codec import Codec, CodecState
+from channel.codec.words import Word
+from channel.protocol.frames import Desync
+from channel.protocol.recording import Field, RecordChannel
+
+HISTORY_SAMPLES = 64
+HISTORY_NS = 250_000_000
+"""Bound on history, whichever is longer: echoes may lag, and symbols may jump ahead, by this many
+samples or this time; past it the ends rejoin instead of catching up. In samples alone, the bound of a
+fast flight would be shorter than an ordinary pause of a process."""
+
+STATES_KEPT = 2 * HISTORY_SAMPLES
+INPUTS_KEPT = 64
+
+LOCKSTEP_CHANNEL = RecordChannel(
+    "lockstep_failure",
+    (
+        Field("sample", "integer", "", "first sample after which the two copies differ"),
+        Field("epoch", "integer", "", "epoch of that sample"),
+        Field("digest", "string", "", "digest of this end's state after the sample"),
+        Field("peer_digest", "string", "", "digest of the other end's"),
+        Field("state", "numbers", "", "this end's model state after the sample"),
+        Field("coder", "numbers", "", "this end's coder state after the sample"),
+        Field("peer_state", "numbers", "", "the other end's model state; null: not known here yet"),
+        Field("peer_coder", "numbers", "", "the other end's coder state; null: not known here yet"),
+        Field("input_samples", "integers", "", "samples of the last inputs, oldest first"),
+        Field("input_words", "integers", "", "wire numbers of their words; 65535: erased"),
+    ),
+)
+
+
+class _Kept(NamedTuple):
+    epoch: int
+    word: Word
+    state: CodecState
+
+
+class History:
+    """The last samples of one copy: word consumed and state after it."""
+
+    def __init__(self, codec: Codec, states_kept: int = STATES_KEPT) -> None:
+        self._codec = codec
+        self._kept: deque[_Kept] = deque(maxlen=states_kept)
+
+    def add(self, epoch: int, word: Word, state: CodecState) -> None:
+        """Keep one sample; `state` is the one after it."""
+        self._kept.append(_Kept(epoch, word, state))
+
+    def state_after(self, sample: int) -> CodecState | None:
+        """Return the state after a sample, None when it is not kept (any more)."""
+        for kept in reversed(self._kept):
+            if kept.state.sample == sample + 1:
+                return kept.state
+        return None
+
+    def last_words(self, count: int) -> list[Word]:
+        """Return the words of the last samples, oldest first; may be called from another thread."""
+        # Copied in one go: the flight's thread may add to it meanwhile.
+        return [kept.word for kept in tuple(self._kept)[-count:]]
+
+    def failure_row(
+        self, epoch: int, sample: int, digest: int, peer_digest: int, peer: bytes
+    ) -> tuple[object, ...]:
+        """Return the row of `LOCKSTEP_CHANNEL`; `peer` is the other end's packed state, or empty."""
+        own = self.state_after(sample)
+        theirs = unpacked(self._codec, peer)
+        inputs = [kept for kept in self._kept if kept.state.sample <= sample + 1][-INPUTS_KEPT:]
+        word_number = self._codec.coder.alphabet.word_number
+        return (
+            sample,
+            epoch,
+            f"{digest:016x}",
+            f"{peer_digest:016x}",
+            own and own.model,
+            own and own.coder,
+            theirs and theirs.model,
+            theirs and theirs.coder,
+            [kept.state.sample - 1 for kept in inputs],
+            [word_number(kept.word) for kept in inputs],
+        )
+
+
+def difference_text(report: Desync) -> str:
+    """Return the sentence that tells of a lockstep failure."""
+    return (
+        f"the codecs differ after sample {report.sample}: transmitter "
+        f"{report.transmitter_digest:016x}, receiver {report.receiver_digest:016x}"
+    )
+
+
+def unpacked(codec: Codec, data: bytes) -> CodecState | None:
+    """Return the state in these bytes, None when they hold none of this codec."""
+    try:
+        return codec.unpack(data) if data else None
+    except ValueError:
+        return None

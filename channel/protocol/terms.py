@@ -1,0 +1,130 @@
+"""What both ends agree on about time: ticks, samples, slots, lead.
+
+A *tick* is one step of model and control (`h`). A *sample* is `N` ticks (`T_s = N h`) and has one
+word; each of its symbols takes one *slot* of the uplink. Flight time is in nanoseconds from tick 0,
+as integers, so that the two clocks and the virtual one never disagree by a rounding.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from channel.codec.codec import Vector
+from channel.protocol.limits import CommandLimits
+from channel.protocol.lockstep import HISTORY_NS, HISTORY_SAMPLES
+
+Delivery = Literal["start", "end"]
+Clock = Literal["real", "virtual"]
+
+# What a command frame can hold (channel/protocol/wire.py): 16 KiB, its echoes counted in one byte.
+ECHO_BYTES = 10
+ECHOES_MAX = 255
+ECHOES_BYTES_MAX = 16_000
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """The agreed timing of a flight, checked for sense."""
+
+    tick_ns: int
+    ticks_per_sample: int
+    """N"""
+    symbols_per_word: int
+    """b, the slots of one sample"""
+    lead_ticks: int
+    """D: the command of tick n + D is decided when the codec stands at tick n"""
+    rate_baud: float
+    """R: symbols per second that the uplink may carry"""
+    delivery: Delivery
+    """"start": a symbol is there when its slot begins (the paper); "end": when its slot is over"""
+    deadline_allowance_ns: int
+    """how long after its due time a symbol may come before its slot is taken for erased"""
+    downlink_budget_ns: int
+    """time set aside for a command frame to reach the plant"""
+    repeats: int
+    """W: how many earlier samples each command frame repeats"""
+    initial_command: Vector
+    """motor voltages of ticks 0 ... D - 1"""
+    limits: CommandLimits
+    uplink_line_ns: int = 0
+    """on a line of finite rate: how long a symbol is on its way"""
+    downlink_line_ns: int = 0
+    """on a line of finite rate: how long a command frame is on its way"""
+
+    @property
+    def sample_ns(self) -> int:
+        """Return the symbol period `T_s`."""
+        return self.tick_ns * self.ticks_per_sample
+
+    @property
+    def uplink_delivery_ns(self) -> int:
+        """Return how long after a sample's first tick its word is complete at the receiver."""
+        slots = self.symbols_per_word - 1 + (self.delivery == "end")
+        return slots * self.sample_ns // self.symbols_per_word
+
+    @property
+    def symbol_delay_ns(self) -> int:
+        """Return how long the line takes to deliver one symbol."""
+        return self.slot_ns(1) if self.delivery == "end" else 0
+
+    def slot_ns(self, slot: int) -> int:
+        """Return the flight time at which a slot begins."""
+        return slot * self.tick_ns * self.ticks_per_sample // self.symbols_per_word
+
+    def samples_in(self, time_ns: int, at_least: int) -> int:
+        """Return a time as a number of samples, rounded up, and no fewer than `at_least`."""
+        return max(at_least, -(-time_ns // self.sample_ns))
+
+    @property
+    def history_samples(self) -> int:
+        """Return by how many samples echoes may lag and symbols may jump ahead."""
+        return self.samples_in(HISTORY_NS, HISTORY_SAMPLES)
+
+    @property
+    def lead_needed_ticks(self) -> int:
+        """Return the smallest `D` with which every command can be in time on a real clock."""
+        needed = self.uplink_delivery_ns + self.deadline_allowance_ns + self.downlink_budget_ns
+        needed += self.uplink_line_ns + self.downlink_line_ns
+        return max(1, -(-needed // self.tick_ns))
+
+    def with_shortest_lead(self, clock: Clock) -> Terms:
+        """Return these terms with the smallest lead that `check` allows on this clock."""
+        ideal = clock == "virtual" and self.uplink_delivery_ns == 0
+        return replace(self, lead_ticks=0 if ideal else self.lead_needed_ticks)
+
+    def check(self, clock: Clock) -> None:
+        """Raise ValueError, with the arithmetic, where these terms cannot be flown."""
+        slots_per_s = 1e9 * self.symbols_per_word / self.sample_ns
+        if slots_per_s > self.rate_baud * (1.0 + 1e-9):
+            raise ValueError(
+                f"{self.symbols_per_word} symbol(s) every {self.sample_ns / 1e9:g} s ask for "
+                f"{slots_per_s:g} symbols/s, but the line carries rate_baud = {self.rate_baud:g}; "
+                "lengthen symbol_period_s or raise rate_baud"
+            )
+        echo_bytes = ECHO_BYTES + 2 * len(self.initial_command) * self.ticks_per_sample
+        if (self.repeats + 1) * echo_bytes > ECHOES_BYTES_MAX or self.repeats >= ECHOES_MAX:
+            raise ValueError(
+                f"a command frame of 1 + repeats = {self.repeats + 1} echoes, {echo_bytes} bytes each, "
+                f"would be too long: at most {ECHOES_MAX} echoes and {ECHOES_BYTES_MAX} bytes; lower "
+                "repeats"
+            )
+        ideal = clock == "virtual" and self.lead_ticks == 0 and self.uplink_delivery_ns == 0
+        if ideal or self.lead_ticks >= self.lead_needed_ticks:
+            return
+        if self.lead_ticks == 0 and clock == "real":
+            problem = "lead_ticks = 0 exists on the virtual clock only"
+        else:
+            problem = f"lead_ticks = {self.lead_ticks} is too short"
+        line = ""
+        if self.uplink_line_ns or self.downlink_line_ns:
+            line = (
+                f" + {self.uplink_line_ns / 1e6:.3g} ms for a symbol and "
+                f"{self.downlink_line_ns / 1e6:.3g} ms for a command frame on the serial line"
+            )
+        raise ValueError(
+            f"{problem}: uplink delivery {self.uplink_delivery_ns / 1e6:g} ms + deadline allowance "
+            f"{self.deadline_allowance_ns / 1e6:g} ms + downlink budget "
+            f"{self.downlink_budget_ns / 1e6:g} ms{line} need lead_ticks >= {self.lead_needed_ticks} "
+            f"at {self.tick_ns / 1e6:g} ms a tick"
+        )

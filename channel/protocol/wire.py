@@ -1,0 +1,301 @@
+"""Frames as bytes, for every line that keeps message boundaries.
+
+    version u8 | kind u8 | session u32 | epoch u16 | body | CRC-16/CCITT-FALSE u16
+
+All little-endian; the CRC covers everything before it. Frames that belong to no session have zeros
+there. Bodies, by kind:
+
+    1 hello     incarnation u32, request u32, sample u32, why u8, config digest 16 bytes,
+                probe 8 bytes, version text
+    2 welcome   incarnation u32, request u32, first sample u32, motors u8, millivolts s16 ...,
+                state bytes
+    3 refuse    incarnation u32, reason text, config text
+    4 symbol    slot u32, number u8
+    5 commands  last sample u32, echoes u8, then per echo: word u16, digest u64, millivolts s16 ...
+    6 desync    sample u32, digests u64 u64, state bytes
+    7 bye       reason text
+    8 unknown   nothing
+    9 claim     session that takes over u32
+
+A text is a u16 length and that many bytes of UTF-8.
+"""
+
+from __future__ import annotations
+
+import struct
+from binascii import crc_hqx
+from collections.abc import Callable
+from functools import cache
+from typing import Protocol
+
+from channel.errors import FrameError
+from channel.protocol.frames import (
+    Bye,
+    Claim,
+    Commands,
+    Desync,
+    Echo,
+    ForeignVersion,
+    Frame,
+    Hello,
+    Refuse,
+    ShortSymbol,
+    Symbol,
+    Unknown,
+    Welcome,
+    Why,
+)
+
+WIRE_VERSION = 1
+FRAME_BYTES_MAX = 16_384
+"""No frame of ours comes near it; longer ones are dropped unread."""
+CRC_START = 0xFFFF
+
+_HEAD = struct.Struct("<BBIH")
+_CRC = struct.Struct("<H")
+_HELLO = struct.Struct("<IIIB16s8s")
+_WELCOME = struct.Struct("<IIIB")
+_NUMBER = struct.Struct("<I")
+_SYMBOL = struct.Struct("<IB")
+_COMMANDS = struct.Struct("<IB")
+_ECHO = struct.Struct("<HQ")
+_DESYNC = struct.Struct("<IQQ")
+_TEXT = struct.Struct("<H")
+
+
+class Wire(Protocol):
+    """How frames look on one kind of line. A link says which it needs."""
+
+    def encode(self, frame: Frame) -> bytes:
+        """Return the message for a frame; ValueError for values that no frame can carry."""
+
+    def decode(self, data: bytes) -> Frame:
+        """Return the frame in a message; FrameError, with the reason, for anything else."""
+
+    def size(self, data: bytes) -> int:
+        """Return how many bytes a message takes on the line, framing included."""
+
+
+class DatagramWire:
+    """The frames of this module, one per message: for every line that keeps message boundaries."""
+
+    def encode(self, frame: Frame) -> bytes:
+        """Return the bytes of a frame."""
+        return encode(frame)
+
+    def decode(self, data: bytes) -> Frame:
+        """Return the frame in these bytes."""
+        return decode(data)
+
+    def size(self, data: bytes) -> int:
+        """Return the length: the frame is all that we put on such a line."""
+        return len(data)
+
+
+DATAGRAM = DatagramWire()
+
+
+def foreign_version_text(peer: str, version: int) -> str:
+    """Return what to do about a peer whose frames are of another wire version."""
+    return (
+        f"the {peer} speaks wire version {version}, this end {WIRE_VERSION}: install the same tenbaud "
+        "on both"
+    )
+
+
+def encode(frame: Frame) -> bytes:
+    """Return the bytes of a frame; ValueError for values that no frame can carry."""
+    try:
+        kind, session, epoch, body = _encode_body(frame)
+        message = _HEAD.pack(WIRE_VERSION, kind, session, epoch) + body
+    except struct.error as error:
+        raise ValueError(f"{frame} does not fit a frame: {error}") from error
+    if len(message) + _CRC.size > FRAME_BYTES_MAX:
+        raise ValueError(f"a frame has at most {FRAME_BYTES_MAX} bytes, this one {len(message)}")
+    return message + _CRC.pack(crc_hqx(message, CRC_START))
+
+
+def decode(data: bytes) -> Frame:
+    """Return the frame in these bytes; FrameError, with the reason, for anything else."""
+    if len(data) > FRAME_BYTES_MAX:
+        raise FrameError(f"oversized: {len(data)} bytes, at most {FRAME_BYTES_MAX}")
+    if len(data) < _HEAD.size + _CRC.size:
+        raise FrameError(f"truncated: {len(data)} bytes")
+    message = data[: -_CRC.size]
+    if _CRC.unpack(data[-_CRC.size :])[0] != crc_hqx(message, CRC_START):
+        raise FrameError("checksum")
+    version, kind, session, epoch = _HEAD.unpack_from(message)
+    if version != WIRE_VERSION:
+        return ForeignVersion(version)
+    reader = _READERS.get(kind)
+    if reader is None:
+        raise FrameError(f"unknown kind {kind}")
+    try:
+        return reader(session, epoch, message[_HEAD.size :])
+    except (struct.error, UnicodeDecodeError) as error:
+        raise FrameError(f"malformed frame of kind {kind}: {error}") from error
+
+
+def _encode_body(frame: Frame) -> tuple[int, int, int, bytes]:
+    match frame:
+        case Symbol():
+            body = _SYMBOL.pack(frame.slot, frame.number)
+            return 4, frame.session, frame.epoch, body
+        case Commands():
+            return 5, frame.session, frame.epoch, _encode_commands(frame)
+        case Hello():
+            return 1, frame.session, frame.epoch, _encode_hello(frame)
+        case Welcome():
+            return 2, frame.session, frame.epoch, _encode_welcome(frame)
+        case Refuse():
+            body = _NUMBER.pack(frame.incarnation) + _text(frame.reason) + _text(frame.config)
+            return 3, 0, 0, body
+        case Desync():
+            body = _DESYNC.pack(frame.sample, frame.transmitter_digest, frame.receiver_digest)
+            return 6, frame.session, frame.epoch, body + frame.state
+        case Bye():
+            return 7, frame.session, 0, _text(frame.reason)
+        case Unknown():
+            return 8, frame.session, frame.epoch, b""
+        case Claim():
+            return 9, frame.session, frame.epoch, _NUMBER.pack(frame.by)
+        case ForeignVersion() | ShortSymbol():
+            raise ValueError(f"{frame} is only ever received")
+
+
+def _encode_hello(frame: Hello) -> bytes:
+    if len(frame.config_digest) != 16 or len(frame.numerics_probe) != 8:
+        raise ValueError("a greeting has a digest of 16 bytes and a probe of 8")
+    body = _HELLO.pack(
+        frame.incarnation,
+        frame.request,
+        frame.sample,
+        frame.why,
+        frame.config_digest,
+        frame.numerics_probe,
+    )
+    return body + _text(frame.version)
+
+
+def _encode_welcome(frame: Welcome) -> bytes:
+    hold = frame.hold_millivolts
+    head = _WELCOME.pack(frame.incarnation, frame.request, frame.first_sample, len(hold))
+    return head + struct.pack(f"<{len(hold)}h", *hold) + frame.state
+
+
+def _encode_commands(frame: Commands) -> bytes:
+    if not frame.echoes:
+        raise ValueError("a command frame has at least one echo")
+    newest = frame.echoes[-1]
+    volts = len(newest.millivolts)
+    layout = _echo_layout(volts)
+    parts = [_COMMANDS.pack(newest.sample, len(frame.echoes))]
+    sample = newest.sample + 1 - len(frame.echoes)
+    for echo in frame.echoes:
+        if echo.sample != sample or len(echo.millivolts) != volts:
+            raise ValueError("the echoes of a command frame are consecutive and equally long")
+        parts.append(layout.pack(echo.word_number, echo.digest, *echo.millivolts))
+        sample += 1
+    return b"".join(parts)
+
+
+@cache
+def _echo_layout(volts: int) -> struct.Struct:
+    return struct.Struct(f"<HQ{volts}h")
+
+
+def _decode_commands(session: int, epoch: int, body: bytes) -> Commands:
+    last, count = _COMMANDS.unpack_from(body)
+    size, rest = divmod(len(body) - _COMMANDS.size, count) if count else (0, 1)
+    volts, odd = divmod(size - _ECHO.size, 2)
+    if rest or odd or volts < 0 or last + 1 < count:
+        raise FrameError(f"malformed commands: {count} echoes in {len(body)} bytes")
+    echoes = []
+    layout = _echo_layout(volts)
+    for index in range(count):
+        word_number, digest, *millivolts = layout.unpack_from(body, _COMMANDS.size + index * size)
+        echoes.append(Echo(last + 1 - count + index, word_number, digest, tuple(millivolts)))
+    return Commands(session, epoch, tuple(echoes))
+
+
+def _decode_hello(session: int, epoch: int, body: bytes) -> Hello:
+    incarnation, request, sample, why, config_digest, probe = _HELLO.unpack_from(body)
+    version, rest = _take_text(body[_HELLO.size :])
+    _nothing_left(rest)
+    try:
+        reason = Why(why)
+    except ValueError:
+        raise FrameError(f"hello for the unknown reason {why}") from None
+    return Hello(incarnation, version, config_digest, probe, request, session, epoch, sample, reason)
+
+
+def _decode_welcome(session: int, epoch: int, body: bytes) -> Welcome:
+    incarnation, request, first_sample, motors = _WELCOME.unpack_from(body)
+    hold = struct.unpack_from(f"<{motors}h", body, _WELCOME.size)
+    state = body[_WELCOME.size + 2 * motors :]
+    return Welcome(session, epoch, first_sample, incarnation, request, hold, state)
+
+
+def _decode_refuse(session: int, epoch: int, body: bytes) -> Refuse:
+    (incarnation,) = _NUMBER.unpack_from(body)
+    reason, rest = _take_text(body[_NUMBER.size :])
+    config, rest = _take_text(rest)
+    _nothing_left(rest)
+    return Refuse(incarnation, reason, config)
+
+
+def _decode_symbol(session: int, epoch: int, body: bytes) -> Symbol:
+    slot, number = _SYMBOL.unpack(body)
+    return Symbol(session, epoch, slot, number)
+
+
+def _decode_desync(session: int, epoch: int, body: bytes) -> Desync:
+    sample, ours, theirs = _DESYNC.unpack_from(body)
+    return Desync(session, epoch, sample, ours, theirs, body[_DESYNC.size :])
+
+
+def _decode_bye(session: int, epoch: int, body: bytes) -> Bye:
+    reason, rest = _take_text(body)
+    _nothing_left(rest)
+    return Bye(session, reason)
+
+
+def _decode_unknown(session: int, epoch: int, body: bytes) -> Unknown:
+    _nothing_left(body)
+    return Unknown(session, epoch)
+
+
+def _decode_claim(session: int, epoch: int, body: bytes) -> Claim:
+    (by,) = _NUMBER.unpack(body)
+    return Claim(session, epoch, by)
+
+
+_READERS: dict[int, Callable[[int, int, bytes], Frame]] = {
+    1: _decode_hello,
+    2: _decode_welcome,
+    3: _decode_refuse,
+    4: _decode_symbol,
+    5: _decode_commands,
+    6: _decode_desync,
+    7: _decode_bye,
+    8: _decode_unknown,
+    9: _decode_claim,
+}
+
+
+def _text(text: str) -> bytes:
+    data = text.encode()
+    return _TEXT.pack(len(data)) + data
+
+
+def _take_text(data: bytes) -> tuple[str, bytes]:
+    (length,) = _TEXT.unpack_from(data)
+    end = _TEXT.size + length
+    if len(data) < end:
+        raise FrameError(f"truncated text: {len(data) - _TEXT.size} of {length} bytes")
+    return data[_TEXT.size : end].decode(), data[end:]
+
+
+def _nothing_left(rest: bytes) -> None:
+    if rest:
+        raise FrameError(f"{len(rest)} bytes too many")

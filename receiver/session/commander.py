@@ -1,0 +1,183 @@
+"""From words to commands: the receiver's copy of the codec, its controller, and the echoes.
+
+The session decides what was received; this is what follows from it. Each word advances the codec by
+one sample, the controller is asked for the commands of the sample's ticks `D` ahead, and what was
+consumed and decided becomes an echo. It knows no slot, no frame and no peer.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from collections.abc import Callable
+from typing import NamedTuple
+
+from channel.codec.codec import Codec, CodecState, Vector
+from channel.codec.lead import FlownSample, fly_sample
+from channel.codec.words import Word
+from channel.errors import CodecDiverged
+from channel.protocol.events import EventKind
+from channel.protocol.frames import Echo
+from channel.protocol.limits import are_plausible, from_millivolts, to_millivolts
+from channel.protocol.lockstep import History
+from channel.protocol.recording import Recorder
+from channel.protocol.terms import Terms
+from receiver.controllers.base import Controller
+from receiver.session.records import write_commands, write_sample
+from receiver.session.rejoin import carried_to
+
+Tell = Callable[[EventKind, str], None]
+
+UNWRITTEN_MAX = 32
+"""Samples that may be flown before they are recorded even if nobody finds the time."""
+
+
+class Standing(NamedTuple):
+    """Where a flight stands: all that the next epoch follows from."""
+
+    state: CodecState
+    hold: Vector
+    commands: tuple[Vector, ...]
+
+
+class _Flown(NamedTuple):
+    before: CodecState
+    word: Word
+    flown: FlownSample
+    digest: int
+    now_ns: int
+
+
+class Commander:
+    """Flies samples; see the module's text.
+
+    `counts` gets `bad_commands` and `bad_references`, and `tell` is told of the first of each.
+    """
+
+    def __init__(
+        self,
+        codec: Codec,
+        terms: Terms,
+        controller: Controller,
+        recorder: Recorder,
+        counts: Counter[str],
+        tell: Tell,
+    ) -> None:
+        self.codec = codec
+        self.terms = terms
+        self.state = codec.initial()
+        self.history = History(codec, 2 * terms.history_samples)
+        self.hold = terms.initial_command
+        """last command decided"""
+        self._controller = controller
+        self._recorder = recorder
+        self._counts = counts
+        self._tell = tell
+        self._commands: deque[Vector] = deque([self.hold] * terms.lead_ticks)
+        """of the next `D` ticks"""
+        self._echoes: deque[Echo] = deque(maxlen=terms.repeats + 1)
+        self._millivolts: list[int] = []
+        """decided for the sample that is being flown"""
+        self._unwritten: list[_Flown] = []
+
+    @property
+    def standing(self) -> Standing:
+        """Return where the flight stands, to be gone back to."""
+        return Standing(self.state, self.hold, tuple(self._commands))
+
+    def go_back(self, standing: Standing) -> None:
+        """Stand where the flight stood before."""
+        self.state, self.hold, commands = standing
+        self._commands = deque(commands)
+        self._echoes.clear()
+
+    def restart(self, sample: int) -> None:
+        """Begin afresh at a sample, from the codec's initial state and command."""
+        self.state = self.codec.initial()._replace(sample=sample)
+        self._hold(self.terms.initial_command)
+
+    def carry_on(self, sample: int, silent_samples: int) -> None:
+        """Begin an epoch at a later sample, the state carried there under the last command.
+
+        `silent_samples` had no symbol before.
+        """
+        known = tuple(self._commands)
+        self.state = carried_to(
+            self.codec,
+            self.state,
+            sample,
+            known,
+            self.hold,
+            silent_samples,
+            self.terms.history_samples,
+        )
+        self._hold(self.hold)
+
+    def _hold(self, command: Vector) -> None:
+        self.hold = command
+        self._commands = deque([command] * self.terms.lead_ticks)
+        self._echoes.clear()
+
+    def fly(self, word: Word, epoch: int, now_ns: int) -> tuple[Echo, ...]:
+        """Consume the word of the next sample; return its echo after those that it repeats."""
+        before = self.state
+        self._millivolts = []
+        try:
+            flown = fly_sample(self.codec, before, word, tuple(self._commands), self._decide)
+        except (ArithmeticError, ValueError) as error:
+            raise CodecDiverged(f"the estimate diverged in sample {before.sample}: {error}") from error
+        self._commands.extend(flown.commands)
+        for _ in range(len(self._commands) - self.terms.lead_ticks):
+            self._commands.popleft()
+        self.state = flown.state
+        self.history.add(epoch, word, self.state)
+        digest = self.codec.digest(self.state)
+        number = self.codec.coder.alphabet.word_number(word)
+        self._echoes.append(Echo(before.sample, number, digest, tuple(self._millivolts)))
+        self._unwritten.append(_Flown(before, word, flown, digest, now_ns))
+        if len(self._unwritten) >= UNWRITTEN_MAX:
+            self.write_down()
+        return tuple(self._echoes)
+
+    def write_down(self) -> None:
+        """Record what was flown since the last call. It can wait until the commands have left."""
+        unwritten, self._unwritten = self._unwritten, []
+        for before, word, flown, digest, now_ns in unwritten:
+            ranges = self.codec.coder.ranges(before.coder)
+            write_sample(self._recorder, self.terms, word, ranges, flown.state, digest, now_ns)
+            write_commands(self._recorder, self.terms, before.sample, flown, self._reference_rad)
+
+    def _decide(self, tick: int, state: Vector) -> Vector:
+        """Ask the controller, limit what it wants, and return it as the wire will carry it."""
+        volts = self._ask(tick, state)
+        limited = self.terms.limits.apply(volts, self.hold)
+        millivolts = to_millivolts(limited)
+        self._millivolts += millivolts
+        self.hold = from_millivolts(millivolts)
+        return self.hold
+
+    def _reference_rad(self, tick: int) -> float | None:
+        try:
+            return self._controller.reference_rad(tick)
+        except Exception as error:  # the user's code too, and only a column of the recording
+            self._counts["bad_references"] += 1
+            if self._counts["bad_references"] == 1:
+                problem = f"{type(error).__name__}: {error}"
+                self._tell(EventKind.CONTROLLER, f"the reference of tick {tick} failed: {problem}")
+            return None
+
+    def _ask(self, tick: int, state: Vector) -> Vector:
+        """Return what the controller wants; its last command where it fails or wants nonsense."""
+        try:
+            volts = self._controller.command(tick, state)
+            if len(volts) == len(self.hold) and are_plausible(volts):
+                return volts
+            problem = f"wants {volts}"
+        except Exception as error:  # a controller is the user's code; the flight goes on without it
+            problem = f"failed: {type(error).__name__}: {error}"
+        self._counts["bad_commands"] += 1
+        if self._counts["bad_commands"] == 1:
+            self._tell(
+                EventKind.CONTROLLER,
+                f"at tick {tick} the controller {problem}; its last command is kept",
+            )
+        return self.hold

@@ -1,0 +1,89 @@
+"""What the receiver writes down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from channel.codec.codec import CodecState, Vector
+from channel.codec.lead import FlownSample
+from channel.codec.words import Word
+from channel.protocol.audit_trail import ARRIVED_CHANNEL, EPOCH_CHANNEL, epoch_row
+from channel.protocol.frames import Desync, Symbol
+from channel.protocol.lockstep import LOCKSTEP_CHANNEL, History
+from channel.protocol.recording import Field, RecordChannel, Recorder
+from channel.protocol.terms import Terms
+
+ReferenceOf = Callable[[int], float | None]
+"""Tick -> what the controller steers to, rad."""
+
+TICK_CHANNEL = RecordChannel(
+    "tick",
+    (
+        Field("tick", "integer", "", "tick that the command is for"),
+        Field("reference_rad", "number", "rad", "set-point of the controller at that tick"),
+        Field("live_state", "numbers", "", "model state believed, in advance, of that tick"),
+        Field("command_volts", "numbers", "V", "motor voltages commanded, as on the wire"),
+    ),
+)
+
+SAMPLE_CHANNEL = RecordChannel(
+    "sample",
+    (
+        Field("sample", "integer", "", "index of the sample"),
+        Field("word", "integers", "", "symbols consumed; null: erased"),
+        Field("range", "numbers", "rad", "range M of each axis before the word"),
+        Field("state", "numbers", "", "codec's model state after the sample"),
+        Field("coder", "numbers", "", "coder state after the sample"),
+        Field("digest", "string", "", "64-bit digest of the codec state after the sample"),
+        Field("arrival_s", "number", "s", "when the word was decided, on this clock", timing=True),
+    ),
+)
+
+
+def write_sample(
+    recorder: Recorder,
+    terms: Terms,
+    word: Word,
+    ranges: Vector,
+    after: CodecState,
+    digest: int,
+    now_ns: int,
+) -> None:
+    """Write one sample down: `ranges` before its word, `after` the state after it."""
+    sample = after.sample - 1
+    row = (sample, word, ranges, after.model, after.coder, f"{digest:016x}", now_ns / 1e9)
+    recorder.write(SAMPLE_CHANNEL, sample * terms.sample_ns, row)
+
+
+def write_commands(
+    recorder: Recorder, terms: Terms, sample: int, flown: FlownSample, reference_rad: ReferenceOf
+) -> None:
+    """Write down the commands that were decided with one sample, and what they steered to."""
+    tick = sample * terms.ticks_per_sample + terms.lead_ticks
+    for believed, command in zip(flown.live, flown.commands, strict=True):
+        row = (tick, reference_rad(tick), believed, command)
+        recorder.write(TICK_CHANNEL, tick * terms.tick_ns, row)
+        tick += 1
+
+
+def write_failure(recorder: Recorder, terms: Terms, history: History, theirs: Desync) -> None:
+    """Write a lockstep failure down, as the transmitter reported it and as this end saw it."""
+    row = history.failure_row(
+        theirs.epoch,
+        theirs.sample,
+        theirs.receiver_digest,
+        theirs.transmitter_digest,
+        theirs.state,
+    )
+    recorder.write(LOCKSTEP_CHANNEL, theirs.sample * terms.sample_ns, row)
+
+
+def write_symbol(recorder: Recorder, terms: Terms, symbol: Symbol, now_ns: int, *, taken: bool) -> None:
+    """Write down a symbol that came for a slot, in time or for a slot that was settled already."""
+    row = (symbol.slot, symbol.number, now_ns, taken)
+    recorder.write(ARRIVED_CHANNEL, terms.slot_ns(symbol.slot), row)
+
+
+def write_epoch(recorder: Recorder, terms: Terms, epoch: int, start: CodecState, hold: Vector) -> None:
+    """Write down from what state an epoch starts."""
+    recorder.write(EPOCH_CHANNEL, start.sample * terms.sample_ns, epoch_row(epoch, start, hold))

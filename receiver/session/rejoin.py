@@ -1,0 +1,201 @@
+"""Which request for a session gets which answer, and from which state the ends start again.
+
+* An unanswered request is repeated by the transmitter, so equal requests get equal answers for as
+  long as nothing was flown on them, unless the answer has grown too old to begin with.
+* A second transmitter is refused while the first one is heard. When the first has fallen silent, the
+  second is taken for the same rig started again.
+* A request that contradicts what is known, older than one that was answered or for a sample that the
+  clock cannot have reached, is believed when it persists: one forged or delayed request does nothing.
+* An answer on which no symbol has come is no more than an offer: the next request is answered from
+  where the flight stood before it (`receiver.session.commander.Standing`).
+* The first sample is `max(own next sample, first sample that the transmitter can still send + m)`,
+  `m` being the command lead in whole samples. The request names a sample whose slot lies ahead of it,
+  and no symbol leaves while it is open, so no slot is used twice; symbols of the old epoch that are
+  still on the line are dropped by their epoch. The lead is as long as the round trip, so the answer
+  is there before the start, and the command to hold lasts until the first one decided. A start that
+  has passed all the same costs erasures, never lockstep.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from enum import Enum, auto
+from itertools import chain, repeat
+
+from channel.codec.codec import Codec, CodecState, Vector, is_coder_state
+from channel.codec.words import ERASED
+from channel.errors import CodecDiverged
+from channel.protocol.bounds import shown
+from channel.protocol.frames import Desync, Hello, Welcome
+from channel.protocol.identity import Identity
+from channel.protocol.lockstep import HISTORY_SAMPLES, History
+from channel.protocol.terms import Terms
+
+ANSWER_AGE_SAMPLES_MAX = 4
+ANSWER_AGE_NS = 50_000_000
+"""A start that lies further back than both is not offered again: the motors would have no command for
+so long. In samples alone, every request of a fast flight would begin an epoch of its own before the
+answer to the one before can have arrived."""
+
+PERSISTENT_REQUESTS = 3
+"""Repetitions, each for a later sample, after which a request that contradicts what is known is
+believed, as long as the transmitter is not heard."""
+
+SILENT_SLOTS = 2
+"""Slots missed in a row after which a transmitter may be taken for gone, if another one asks."""
+
+ALIVE_SYMBOLS = 3
+"""Symbols of the present transmitter, after another one asked, that prove it alive."""
+
+KEEP_CODER_SAMPLES = 10
+"""After a pause longer than this the coder starts from its initial range: the plant has moved on."""
+
+VERSION_SHOWN = 40
+"""Characters of a peer's version text that are quoted back."""
+
+
+class Verdict(Enum):
+    """What to do about a request."""
+
+    IGNORE = auto()
+    REPEAT = auto()
+    BUSY = auto()
+    REFUSE = auto()
+    BEGIN = auto()
+
+
+class Greeter:
+    """Judges requests; remembers who is flown with and what was answered."""
+
+    def __init__(self, terms: Terms) -> None:
+        self._answer_age_max = terms.samples_in(ANSWER_AGE_NS, ANSWER_AGE_SAMPLES_MAX)
+        self.welcome: Welcome | None = None
+        """last answer given"""
+        self._stranger: int | None = None
+        self._symbols_since = 0
+        self._doubted: Hello | None = None
+        """last request that contradicted what is known"""
+        self._persisted = 0
+
+    def judge(
+        self, hello: Hello, identity: Identity, advanced: bool, silent_slots: int, in_reach: bool
+    ) -> Verdict:
+        """Return the verdict on a request to an end of this identity.
+
+        `advanced`: a symbol was received on the last answer. `silent_slots`: slots missed in a row.
+        `in_reach`: the clock can have reached the request's sample.
+        """
+        last = self.welcome
+        if last is None:
+            return _admitted(hello, identity)
+        if hello.incarnation != last.incarnation:
+            return self._judge_stranger(hello, identity, advanced, silent_slots)
+        if not in_reach or hello.request < last.request or (hello.request == last.request and advanced):
+            heard = advanced and silent_slots < SILENT_SLOTS
+            believed = self._persists(hello) and not heard
+            return _admitted(hello, identity) if believed else Verdict.IGNORE
+        if hello.request == last.request:
+            age = hello.sample - last.first_sample
+            return Verdict.REPEAT if age <= self._answer_age_max else Verdict.BEGIN
+        return _admitted(hello, identity)
+
+    def _persists(self, hello: Hello) -> bool:
+        """Note a request that contradicts what is known; return whether it has been repeated enough."""
+        before, self._doubted = self._doubted, hello
+        same = before is not None and replace(before, sample=hello.sample) == hello
+        if not same or before is None:
+            self._persisted = 0
+        elif hello.sample <= before.sample:
+            self._doubted = before
+            return False
+        self._persisted += 1
+        return self._persisted >= PERSISTENT_REQUESTS
+
+    def on_symbol(self) -> None:
+        """Note that the present transmitter is heard."""
+        self._symbols_since += 1
+
+    def _judge_stranger(
+        self, hello: Hello, identity: Identity, advanced: bool, silent_slots: int
+    ) -> Verdict:
+        if hello.incarnation != self._stranger:
+            self._stranger, self._symbols_since = hello.incarnation, 0
+        if self._symbols_since >= ALIVE_SYMBOLS:
+            return Verdict.BUSY
+        if advanced and silent_slots < SILENT_SLOTS:
+            return Verdict.IGNORE
+        return _admitted(hello, identity)
+
+
+def _admitted(hello: Hello, identity: Identity) -> Verdict:
+    return Verdict.BEGIN if difference(hello, identity) is None else Verdict.REFUSE
+
+
+def difference(hello: Hello, ours: Identity) -> str | None:
+    """Return in what a transmitter differs so that it cannot be flown with; None: in nothing."""
+    if hello.config_digest != ours.config_digest:
+        return (
+            "the shared configuration differs: transmitter "
+            f"{hello.config_digest.hex()[:12]}, receiver {ours.config_digest.hex()[:12]}"
+        )
+    if hello.version != ours.version:
+        version = shown(hello.version, VERSION_SHOWN)
+        return f"versions differ: transmitter {version}, receiver {ours.version}"
+    if hello.numerics_probe != ours.numerics_probe:
+        return (
+            "the numerics probe differs: transmitter "
+            f"{hello.numerics_probe.hex()}, receiver {ours.numerics_probe.hex()}; the "
+            "two machines do not compute alike, so their codecs would drift apart"
+        )
+    return None
+
+
+def first_sample(hello: Hello, own: int, terms: Terms, begun: bool) -> int:
+    """Return where a session or an epoch begins; `own` is this end's next sample.
+
+    At the very start of both there is no line to wait for: tick 0 has not come yet. A transmitter that
+    has not flown begins where this end stands; one that has knows better than an end far ahead of it.
+    """
+    if not begun and hello.sample == 0:
+        return own
+    margin = -(-terms.lead_ticks // terms.ticks_per_sample)
+    first = hello.sample + margin
+    # By its own clock this end runs on for the history at most: further ahead, its count is wrong.
+    return first if hello.sample and own - first > terms.history_samples else max(own, first)
+
+
+def desync_answer(theirs: Desync, history: History, codec: Codec) -> Desync:
+    """Return the answer to the report of a lockstep failure: the same, with this end's state."""
+    own = history.state_after(theirs.sample)
+    return replace(theirs, state=b"" if own is None else codec.pack(own))
+
+
+def carried_to(
+    codec: Codec,
+    state: CodecState,
+    sample: int,
+    known: Sequence[Vector],
+    hold: Vector,
+    silent_samples: int,
+    carried_samples_max: int = HISTORY_SAMPLES,
+) -> CodecState:
+    """Return a state carried on without corrections to a later sample.
+
+    `known` are the commands of its first ticks, `hold` that of all others; `silent_samples` had no
+    symbol before. At most `carried_samples_max` samples are computed; beyond, as for a state that
+    diverges, only the index moves on, and the initial state is what is left.
+    """
+    paused = sample - state.sample
+    if not 0 <= paused <= carried_samples_max:
+        return codec.initial()._replace(sample=sample)
+    commands = chain(known, repeat(hold))
+    try:
+        for _ in range(paused):
+            ticks = [next(commands) for _ in range(codec.ticks_per_sample)]
+            state = codec.step(state, ERASED, ticks)
+    except (CodecDiverged, ArithmeticError, ValueError):
+        return codec.initial()._replace(sample=sample)
+    if paused + silent_samples > KEEP_CODER_SAMPLES or not is_coder_state(codec.coder, state.coder):
+        return state._replace(coder=codec.coder.initial())
+    return state

@@ -1,0 +1,138 @@
+"""When slots are due by this end's clock: how far ahead of it a slot may be, and who is believed.
+
+The transmitter sends one symbol a slot, so each symbol that is taken says where the schedule lies. A
+symbol long before its time is not the transmitter's, or the clock here was set; one after its deadline
+comes too late, or the schedule has been wrong. Either is dropped, but `RIVALS` of them in a row that
+fit each other as slots do, and none in between that fits the schedule, replace it.
+
+An early symbol does not move the schedule: a single forged one costs the slots before it, at most
+`EARLY_SAMPLES` and the deadline allowance, and later ones are as good as before.
+"""
+
+from __future__ import annotations
+
+from enum import Enum, auto
+from typing import NamedTuple
+
+from channel.protocol.terms import Terms
+from receiver.session.commander import Standing
+
+EARLY_SAMPLES = 4
+"""Symbols may come this much before their time, beside the deadline allowance: the one before may have
+been late, or the first of a heap."""
+
+GAIN = 1.0 / 16.0
+"""How much of its lateness, and of one slot at most, each symbol moves the schedule."""
+
+DRIFT = 1e-3
+"""How much two clocks may drift apart, as a share of the time since the last symbol."""
+
+RIVALS = 3
+RIVAL_SLOTS = 0.9
+"""How far the distance of two symbols may be off the slots between them. Below one, so that symbols of
+different slots that come together are never taken for a schedule."""
+
+
+class Timing(Enum):
+    """How a symbol fits the schedule."""
+
+    DUE = auto()
+    EARLY = auto()
+    NEW = auto()
+    """the last of a row that replaces the schedule"""
+
+
+class _Rival(NamedTuple):
+    slot: int
+    time_ns: int
+    in_a_row: int
+
+
+class Schedule:
+    """Knows the slot that is due; times are of this end's clock."""
+
+    def __init__(self, terms: Terms) -> None:
+        self._terms = terms
+        self._slot_ns = terms.sample_ns / terms.symbols_per_word
+        self._early_ns = EARLY_SAMPLES * terms.sample_ns + terms.deadline_allowance_ns
+        self._zero_ns = 0
+        """when slot 0 was, or would have been, due"""
+        self._heard_ns: int | None = None
+        """when the last symbol came; None: before the first epoch nothing is known"""
+        self._is_guess = True
+        """whether no symbol of the epoch has come, so that `_zero_ns` is the earliest that can be"""
+        self._rival: _Rival | None = None
+        self._anchor: tuple[int, int] | None = None
+        """slot and time that deadlines count from; None: no slot is due by the clock"""
+
+    def deadline_ns(self, slot: int) -> int | None:
+        """Return when a slot is taken for erased; None: not by the clock."""
+        if self._anchor is None:
+            return None
+        anchor_slot, anchor_ns = self._anchor
+        due = self._terms.slot_ns(slot) - self._terms.slot_ns(anchor_slot)
+        return anchor_ns + due + self._terms.deadline_allowance_ns
+
+    def anchor(self, at: tuple[int, int] | None) -> None:
+        """Count deadlines from this (slot, time), or from nothing any more."""
+        self._anchor = at
+
+    def begin(self, slot: int, now_ns: int) -> None:
+        """Begin an epoch at a slot that is not due before now."""
+        self._zero_ns = now_ns - self._terms.slot_ns(slot)
+        self._heard_ns = now_ns
+        self._is_guess = True
+        self._rival = None
+
+    def reaches(self, sample: int, now_ns: int) -> bool:
+        """Return whether the transmitter's clock can say that this sample is the next."""
+        slot = sample * self._terms.symbols_per_word
+        return self._early(slot, now_ns) <= self._early_ns + self._terms.sample_ns
+
+    def timing(self, slot: int, now_ns: int) -> Timing:
+        """Return how a symbol that comes now fits."""
+        if self._early(slot, now_ns) <= self._early_ns:
+            return Timing.DUE
+        return Timing.NEW if self.is_replaced_by(slot, now_ns) else Timing.EARLY
+
+    def is_replaced_by(self, slot: int, now_ns: int) -> bool:
+        """Note a symbol that does not fit; return whether it is the last of a row that is believed."""
+        rival = self._rival
+        count = 1
+        if rival is not None:
+            slots = (now_ns - rival.time_ns) / self._slot_ns
+            if slot > rival.slot and abs(slot - rival.slot - slots) <= RIVAL_SLOTS:
+                count = rival.in_a_row + 1
+        self._rival = _Rival(slot, now_ns, count)
+        return count >= RIVALS
+
+    def take(self, slot: int, now_ns: int, *, anew: bool = False) -> None:
+        """Take a symbol: the next deadlines count from it. `anew`: it replaces the schedule."""
+        zero_ns = now_ns - self._terms.slot_ns(slot)
+        if anew or self._is_guess:
+            self._zero_ns = zero_ns
+        off_ns = zero_ns - self._zero_ns
+        early = -off_ns > self._terms.deadline_allowance_ns
+        largest_ns = round(self._slot_ns)
+        self._zero_ns += round(GAIN * max(-largest_ns, min(largest_ns, off_ns)))
+        self._heard_ns = now_ns
+        self._is_guess = False
+        self._rival = None
+        self._anchor = (slot, now_ns - off_ns if early else now_ns)
+
+    def _early(self, slot: int, now_ns: int) -> float:
+        """Return by how much a slot lies ahead of the clock, ns, doubts about the clock taken off."""
+        if self._heard_ns is None:
+            return 0.0
+        doubt_ns = DRIFT * abs(now_ns - self._heard_ns)
+        return self._zero_ns + self._terms.slot_ns(slot) - now_ns - doubt_ns
+
+
+class Proven(NamedTuple):
+    """The flight as the last symbol left it: nothing that was only offered since is in it."""
+
+    standing: Standing
+    schedule: Schedule
+    silent_slots: int
+    incarnation: int | None
+    """of the transmitter flown with; None: none yet"""

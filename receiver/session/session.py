@@ -1,0 +1,393 @@
+"""The controller node's half of the protocol, without a socket, a clock or a thread.
+
+Three things drive it: a frame that arrived (`on_frame`), a deadline that passed (`on_deadline`) and
+the end of the flight (`bye`). Each returns the frames to send. The receiver decides, once per slot,
+what was received: the symbol, or nothing by the time of a later one or of the deadline. What it
+decided goes back with every command frame, and that echo is what the transmitter's copy consumes.
+
+A transmitter that asks for a session gets one, and one that asks again a new epoch of it: a start
+sample, the state to start from, and the command to hold until the first one decided (`rejoin`).
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from enum import Enum
+
+from channel.codec.codec import Codec, CodecState
+from channel.codec.words import ERASED
+from channel.line.shaper import BaudMeter
+from channel.links.serial.slot_finder import SlotFinder
+from channel.protocol.bounds import Bounds, within_text_bounds
+from channel.protocol.events import EVENT_CHANNEL, Event, EventKind, event_row
+from channel.protocol.frames import (
+    Bye,
+    Commands,
+    Desync,
+    ForeignVersion,
+    Frame,
+    Hello,
+    Refuse,
+    ShortSymbol,
+    Symbol,
+    Unknown,
+    Welcome,
+)
+from channel.protocol.identity import Identity
+from channel.protocol.limits import to_millivolts
+from channel.protocol.lockstep import History, difference_text
+from channel.protocol.recording import NullRecorder, Recorder
+from channel.protocol.terms import Terms
+from channel.protocol.wire import foreign_version_text
+from receiver.controllers.base import Controller
+from receiver.session.commander import Commander
+from receiver.session.records import write_epoch, write_failure, write_symbol
+from receiver.session.rejoin import Greeter, Verdict, desync_answer, difference, first_sample
+from receiver.session.schedule import Proven, Schedule, Timing
+from receiver.session.takeover import Stranger
+
+EPOCH_MAX = 0xFFFF
+
+
+class Phase(Enum):
+    """Where the receiver's session stands."""
+
+    WAITING = "waiting for a transmitter"
+    FLYING = "flying"
+    ENDED = "ended"
+
+
+class ReceiverSession:
+    """Turns symbols into commands; see the module's text.
+
+    `session_number` is drawn by the caller (32 bits, not zero), so that the session itself stays
+    deterministic. `take_over`: claim a flight that another receiver has.
+    """
+
+    def __init__(
+        self,
+        codec: Codec,
+        terms: Terms,
+        controller: Controller,
+        identity: Identity,
+        session_number: int,
+        recorder: Recorder | None = None,
+        *,
+        take_over: bool = False,
+    ) -> None:
+        self.codec = codec
+        self.terms = terms
+        self.identity = identity
+        self.session_number = session_number
+        self.phase = Phase.WAITING
+        self.epoch = 0
+        self.meter = BaudMeter()
+        self.counts: Counter[str] = Counter()
+        """samples (flown), samples_skipped (between epochs), erasures, symbols_late, symbols_misplaced,
+        stale_frames, malformed, refused_hellos, bad_commands, bad_references, desyncs, rejoins,
+        out_of_bounds"""
+        self.end_reason = ""
+        self.refusal: str | None = None
+        self.desync: Desync | None = None
+        self.events: deque[Event] = deque(maxlen=1000)
+        self._greeter = Greeter(terms)
+        self._stranger = Stranger(session_number, take_over)
+        self._recorder = recorder or NullRecorder()
+        self._commander = Commander(codec, terms, controller, self._recorder, self.counts, self._tell)
+        self._slot = 0
+        self._word: list[int | None] = []
+        self._advanced = False
+        """whether a symbol of this epoch has been received"""
+        self._silent_slots = 0
+        self._slots = SlotFinder(terms)
+        self._bounds = Bounds(codec, terms, self.counts, self._tell)
+        self._schedule = Schedule(terms)
+        self._proven = Proven(self._commander.standing, self._schedule, 0, None)
+        self._gap_samples_max = terms.history_samples
+        """A symbol this far ahead is no gap any more; after as many erasures in a row none are due."""
+
+    @property
+    def state(self) -> CodecState:
+        """Return the codec's state before the next sample."""
+        return self._commander.state
+
+    @property
+    def history(self) -> History:
+        """Return the last states, for a failure to be looked into."""
+        return self._commander.history
+
+    # What arrives
+
+    def on_frame(self, frame: Frame, now_ns: int) -> list[Frame]:
+        """Take one frame that arrived at `now_ns` of this end's clock; return the frames to send."""
+        frame = within_text_bounds(frame)
+        match frame:
+            case Symbol():
+                return self._on_symbol(frame, now_ns)
+            case ShortSymbol():
+                return self._on_short_symbol(frame, now_ns)
+            case Hello():
+                answer = self._on_hello(frame, now_ns)
+                self._slots.greeted(now_ns)
+                return answer
+            case Desync() if self._is_current(frame.session):
+                return self._on_desync(frame)
+            case Bye() if self._is_current(frame.session):
+                self._end(f"the transmitter ended the flight: {frame.reason}")
+            case Bye() if frame.session == 0 and self._stranger.asked and self.phase is Phase.WAITING:
+                self._end(frame.reason)
+            case Bye() if self.refusal is not None and frame.session == 0:
+                self.refusal = f"{self.refusal}\n  as the transmitter sees it: {frame.reason}"
+                self._end("refused")
+            case ForeignVersion() if self.phase is Phase.WAITING:
+                self._refuse(foreign_version_text("transmitter", frame.version))
+            case _:
+                self.counts["stale_frames"] += 1
+        return []
+
+    def next_deadline(self) -> int | None:
+        """Return when the slot that is due is taken for erased; None while none is."""
+        return self._schedule.deadline_ns(self._slot) if self.phase is Phase.FLYING else None
+
+    def on_deadline(self, now_ns: int) -> list[Frame]:
+        """Erase the slots whose deadline has passed by `now_ns`; return the frames to send."""
+        frames: list[Frame] = []
+        deadline = self.next_deadline()
+        while deadline is not None and deadline <= now_ns:
+            self._silent_slots += 1
+            frames += self._settle(None, now_ns)
+            if self._silent_slots >= self._gap_samples_max * self.terms.symbols_per_word:
+                self._schedule.anchor(None)
+                text = f"no symbol for {self._gap_samples_max} samples: waiting for one"
+                self._tell(EventKind.PEER, text)
+            deadline = self.next_deadline()
+        return frames
+
+    def bye(self, reason: str) -> list[Frame]:
+        """End the session from this side."""
+        was_flying = self.phase is Phase.FLYING
+        self._end(reason)
+        return [Bye(self.session_number, reason)] if was_flying else []
+
+    def on_malformed(self, why: str) -> None:
+        """Note that bytes came which are no frame."""
+        self.counts["malformed"] += 1
+        self._tell(EventKind.MALFORMED, f"dropped a message: {why}")
+
+    def rest(self) -> None:
+        """Do what can wait until the frames are on their way: the recording."""
+        self._commander.write_down()
+
+    # The handshake
+
+    def _on_hello(self, hello: Hello, now_ns: int) -> list[Frame]:
+        if self.phase is Phase.ENDED:
+            return [Refuse(hello.incarnation, f"this receiver has ended: {self.end_reason}", "")]
+        if self._bounds.drops(self._bounds.of_hello(hello)):
+            return []
+        schedule = self._schedule if self._advanced else self._proven.schedule
+        in_reach = schedule.reaches(hello.sample, now_ns)
+        silent = self._silent_slots
+        verdict = self._greeter.judge(hello, self.identity, self._advanced, silent, in_reach)
+        if verdict is Verdict.REPEAT and self._greeter.welcome is not None:
+            return [self._greeter.welcome]
+        if verdict is Verdict.BEGIN:
+            return self._begin(hello, now_ns)
+        self.counts["refused_hellos"] += 1
+        match verdict:
+            case Verdict.BUSY:
+                return [Refuse(hello.incarnation, "this receiver is flying with another", "")]
+            case Verdict.IGNORE if not in_reach:
+                self._bounds.drops(f"a request for sample {hello.sample}, ahead of the clock")
+            case Verdict.REFUSE:
+                problem = difference(hello, self.identity) or ""
+                self._refuse(problem)
+                return [Refuse(hello.incarnation, problem, self.identity.config)]
+        return []
+
+    def _begin(self, hello: Hello, now_ns: int) -> list[Frame]:
+        """Begin a session, or a new epoch of it; return the answer."""
+        last = self._greeter.welcome
+        state = b""
+        own = self._stand_where_proven(last)
+        proven = self._proven.incarnation
+        first = first_sample(hello, own, self.terms, begun=proven is not None)
+        count = self.terms.symbols_per_word
+        if last is None or hello.incarnation != last.incarnation:
+            ahead = first - hello.sample if hello.sample else 0
+            self._slots.begin(first * count, ahead * count)
+        if last is None:
+            self.phase = Phase.FLYING
+            self.refusal = None
+            self._commander.restart(first)
+        elif self.epoch >= EPOCH_MAX:
+            self._end(f"{EPOCH_MAX} rejoins: something is wrong with this line")
+            return [Bye(self.session_number, self.end_reason)]
+        else:
+            self.epoch += 1
+            self.counts["rejoins"] += 1
+            self.counts["samples_skipped"] += max(0, first - self.state.sample)
+            if hello.incarnation == (last.incarnation if proven is None else proven):
+                self._commander.carry_on(first, self._proven.silent_slots // count)
+                state = self.codec.pack(self.state)
+            else:
+                # A rig that was started again is at rest, and so is what is known of it.
+                self._commander.restart(first)
+        self._slot, self._word = first * count, []
+        self._advanced, self._silent_slots = False, 0
+        self._schedule = Schedule(self.terms)
+        self._schedule.begin(self._slot, now_ns)
+        hold = self._commander.hold
+        told = () if hold == self.terms.initial_command else to_millivolts(hold)
+        asked = (hello.incarnation, hello.request)
+        welcome = Welcome(self.session_number, self.epoch, first, *asked, told, state)
+        self._greeter.welcome = welcome
+        self._commander.write_down()
+        write_epoch(self._recorder, self.terms, self.epoch, self.state, hold)
+        text = f"session {self.session_number:08x}, epoch {self.epoch}, begins at sample {first}"
+        self._tell(EventKind.STARTED if last is None else EventKind.REJOIN, text)
+        return [welcome]
+
+    def _stand_where_proven(self, last: Welcome | None) -> int:
+        """Take back what was offered and never flown; return this end's next sample."""
+        if self._advanced and last is not None:
+            standing, silent = self._commander.standing, self._silent_slots
+            self._proven = Proven(standing, self._schedule, silent, last.incarnation)
+            return self.state.sample + (1 if self._word else 0)
+        self._commander.go_back(self._proven.standing)
+        return self.state.sample
+
+    def _refuse(self, problem: str) -> None:
+        if self.refusal is None:
+            self._tell(EventKind.REFUSED, problem)
+        if self.phase is Phase.WAITING:
+            self.refusal = problem
+
+    # Symbols, slots, words
+
+    def _on_symbol(self, symbol: Symbol, now_ns: int) -> list[Frame]:
+        if not self._is_current(symbol.session) or symbol.epoch != self.epoch:
+            self.counts["stale_frames"] += 1
+            return self._on_foreign_symbol(symbol)
+        if self._bounds.drops(self._bounds.of_symbol(symbol)):
+            return []
+        if symbol.slot < self._slot:
+            return self._on_late_symbol(symbol, now_ns)
+        timing = self._schedule.timing(symbol.slot, now_ns)
+        if timing is Timing.EARLY:
+            self._bounds.drops(f"slot {symbol.slot} is not due yet")
+            return []
+        return self._take_symbol(symbol, now_ns, anew=timing is Timing.NEW)
+
+    def _take_symbol(self, symbol: Symbol, now_ns: int, *, anew: bool) -> list[Frame]:
+        """Consume a symbol of a slot that is due. `anew`: it replaces the schedule."""
+        ahead = symbol.slot - self._slot
+        if ahead > self._gap_samples_max * self.terms.symbols_per_word:
+            self.counts["stale_frames"] += 1
+            self._tell(EventKind.STALE, f"slot {symbol.slot} is {ahead} ahead: dropped")
+            return [Unknown(symbol.session, symbol.epoch)]
+        self._advanced = True
+        self._silent_slots = 0
+        self._greeter.on_symbol()
+        frames: list[Frame] = []
+        while self._slot < symbol.slot:
+            frames += self._settle(None, now_ns)
+        self._schedule.take(symbol.slot, now_ns, anew=anew)
+        self.meter.on_symbol(now_ns)
+        write_symbol(self._recorder, self.terms, symbol, now_ns, taken=True)
+        value = self.codec.coder.alphabet.symbols[symbol.number]
+        return frames + self._settle(value, now_ns)
+
+    def _on_late_symbol(self, symbol: Symbol, now_ns: int) -> list[Frame]:
+        """Drop a symbol of a slot that is settled; a row of them means that the schedule is wrong."""
+        self.counts["symbols_late"] += 1
+        write_symbol(self._recorder, self.terms, symbol, now_ns, taken=False)
+        self._tell(EventKind.LATE_SYMBOL, f"slot {symbol.slot} was settled already: dropped")
+        within = self._slot - symbol.slot <= self._gap_samples_max * self.terms.symbols_per_word
+        if within and self._schedule.is_replaced_by(symbol.slot, now_ns):
+            self._schedule.take(symbol.slot, now_ns, anew=True)
+        return []
+
+    def _on_foreign_symbol(self, symbol: Symbol) -> list[Frame]:
+        """Answer a transmitter that flies in a session or an epoch that is not the present one."""
+        if self.phase is Phase.WAITING and self.refusal is None:
+            return self._stranger.on_symbol(symbol)
+        welcome = self._greeter.welcome
+        current = self._is_current(symbol.session)
+        if current and symbol.epoch > self.epoch:
+            # This end has begun no such epoch: somebody else has answered in its name.
+            return [Unknown(symbol.session, symbol.epoch)]
+        missed = current and symbol.epoch < self.epoch
+        if missed and not self._advanced and welcome is not None:
+            # It flies on without knowing of the new epoch: the answer was lost.
+            return [welcome]
+        return []
+
+    def _on_short_symbol(self, short: ShortSymbol, now_ns: int) -> list[Frame]:
+        """Take a symbol byte of a serial line, as the symbol of this session that it can only be."""
+        if self.phase is not Phase.FLYING:
+            self.counts["stale_frames"] += 1
+            return []
+        place = self._slots.find(short, self._slot, now_ns)
+        frames: list[Frame] = []
+        if place.slot is None:
+            self.counts["symbols_misplaced"] += 1
+            self._tell(EventKind.STALE, f"a symbol of slot ...{short.slot_low} is not due: dropped")
+        elif place.in_time:
+            symbol = Symbol(self.session_number, self.epoch, place.slot, short.number)
+            frames = self._take_symbol(symbol, now_ns, anew=True)
+        else:
+            self.counts["symbols_late"] += 1
+            self._tell(EventKind.LATE_SYMBOL, f"slot {place.slot} came after its deadline: dropped")
+        if place.anchor is not None:
+            self._schedule.anchor(place.anchor)
+        return frames
+
+    def _settle(self, symbol: int | None, now_ns: int) -> list[Frame]:
+        """Decide what this slot's symbol was; at the end of a word, fly its sample."""
+        if symbol is None:
+            self.counts["erasures"] += 1
+            self._tell(EventKind.ERASED, f"slot {self._slot} is erased")
+        self._slot += 1
+        self._word.append(symbol)
+        if len(self._word) < self.terms.symbols_per_word:
+            return []
+        symbols = [value for value in self._word if value is not None]
+        whole = len(symbols) == len(self._word)
+        self._word = []
+        word = tuple(symbols) if whole else ERASED
+        self.counts["samples"] += 1
+        echoes = self._commander.fly(word, self.epoch, now_ns)
+        return [Commands(self.session_number, self.epoch, echoes)]
+
+    # Ends and reports
+
+    def _on_desync(self, theirs: Desync) -> list[Frame]:
+        """Write a failure down and answer with this end's state; the request that follows rejoins."""
+        if self._bounds.drops(self._bounds.of_report(theirs, self.epoch, self.state.sample)):
+            return []
+        answer = desync_answer(theirs, self.history, self.codec)
+        last = self.desync
+        if last is None or (theirs.epoch, theirs.sample) > (last.epoch, last.sample):
+            self.desync = theirs
+            self.counts["desyncs"] += 1
+            self._tell(EventKind.DESYNC, difference_text(theirs), theirs.sample)
+            write_failure(self._recorder, self.terms, self.history, theirs)
+        return [answer]
+
+    def _is_current(self, session: int) -> bool:
+        return self.phase is Phase.FLYING and session == self.session_number
+
+    def _end(self, reason: str) -> None:
+        if self.phase is not Phase.ENDED:
+            self.phase = Phase.ENDED
+            self.end_reason = reason
+            self.rest()
+            self._tell(EventKind.ENDED, reason)
+
+    def _tell(self, kind: EventKind, text: str, sample: int | None = None) -> None:
+        at = self.state.sample if sample is None else sample
+        flight_ns = self.state.sample * self.terms.sample_ns
+        event = Event(kind, flight_ns, at, text)
+        self.events.append(event)
+        self._recorder.write(EVENT_CHANNEL, flight_ns, event_row(event))

@@ -1,0 +1,99 @@
+"""The identification behind Figs. 3 and 4, and how far it holds under noise."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from plant_sim.identification.excitation import parse_excitation
+from plant_sim.identification.experiment import REST_S, excite
+from plant_sim.identification.pitch import PitchSettings
+from plant_sim.identification.record import PitchRecord, identify
+from plant_sim.pitch import PitchPlant
+from tenbaud.build.rig import nominal_plant
+from tenbaud.config.load import load_config
+from tenbaud.identify.run import Identified, run
+from tenbaud.identify.sources import from_rig
+
+EXCITATIONS = ("square:0.2,0,2.5", "square:0.25,0.1,3")
+"""Frequency (Hz), bias (V), magnitude (V) of (a) and (b); the paper gives none of them."""
+
+SEEDS = (1, 2, 3)
+NOISE_DENSITY = 2e-3
+NOISE = f"q={NOISE_DENSITY}"
+NOISY_SETTINGS = PitchSettings(filter_bandwidth_rad_s=3.0, forgetting_per_s=0.002)
+CLEAN_S = 60.0
+NOISY_S = 180.0
+
+
+@dataclass(frozen=True, slots=True)
+class Trials:
+    """Both experiments without noise, and the errors of those with it."""
+
+    clean: list[Identified]
+    clean_errors: list[float]
+    """largest relative error of the three parameters after 60 s, per excitation"""
+    noisy_errors: list[tuple[float, float]]
+    """the same under white torque, after 60 s and after 180 s, per excitation and seed"""
+
+
+def clean_trial(excitation: str) -> Identified:
+    """Run one experiment without noise, on the simulated rig with a ten-bit encoder."""
+    return run(excitation, record_of(excitation, CLEAN_S), "quiet", PitchSettings())
+
+
+def noisy_trial(excitation: str, seed: int) -> tuple[float, float]:
+    """Return the largest relative error after 60 s and after 180 s, under white torque."""
+    record = record_of(excitation, NOISY_S, NOISE, seed)
+    # The body is never at rest here; the mean of its first 5 s has to do for theta_0.
+    rest = float(record.angle_rad[: round(REST_S / record.step_s)].mean())
+    history = identify(record, rest, NOISY_SETTINGS).history
+    early = history[round(CLEAN_S / record.step_s) - 1]
+    return largest_error(tuple(early)), largest_error(tuple(history[-1]))
+
+
+def best_possible_damping_error(excitation: str, duration_s: float = CLEAN_S) -> float:
+    """Return the least standard error of `a_w`, relative, that any unbiased method can have.
+
+    It is the Cramer-Rao bound for angles and rates known without error and the noise torque alone:
+    q times the inverse of the integral of phi phi', phi being the unfiltered regressors.
+    """
+    true = nominal_plant(load_config("paper-10baud"))
+    step_s = 0.01
+    plant = PitchPlant(true, step_s, initial_angle_rad=true.equilibrium_rad)
+    rows = []
+
+    def step(_tick: int, front: float, rear: float) -> float:
+        angle, rate, front_lagged, rear_lagged = plant.state
+        rows.append((rate, math.sin(angle - true.equilibrium_rad), front_lagged - rear_lagged))
+        plant.advance((front, rear))
+        return angle
+
+    excite(step, parse_excitation(excitation, step_s), step_s, duration_s)
+    regressors = np.array(rows)
+    information = regressors.T @ regressors * step_s / NOISE_DENSITY
+    deviation = math.sqrt(float(np.linalg.inv(information)[0, 0]))
+    return deviation / true.rate_damping_per_s
+
+
+def record_of(excitation: str, duration_s: float, disturbance: str = "", seed: int = 1) -> PitchRecord:
+    """Return one experiment on the paper's plant, resting at first."""
+    model = load_config("paper-10baud").model
+    rest = getattr(model, "equilibrium_rad", 0.0)
+    section = {"initial_angle_rad": rest, "disturbance": disturbance}
+    config = load_config(
+        "paper-10baud",
+        None,
+        {"seed": seed, "transmitter": {"encoder_counts_per_turn": 1024, "plant": section}},
+    )
+    return from_rig(config, excitation, duration_s)
+
+
+def largest_error(estimates: tuple[float, ...]) -> float:
+    """Return the largest relative error of a_w, a_th and k_v."""
+    true = nominal_plant(load_config("paper-10baud"))
+    values = (true.rate_damping_per_s, true.stiffness_per_s2, true.torque_gain_rad_per_v_s2)
+    pairs = zip(estimates, values, strict=False)
+    return max(abs(found / wanted - 1.0) for found, wanted in pairs)

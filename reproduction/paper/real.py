@@ -1,0 +1,149 @@
+"""The recorded flights of real helicopters, sent through the same two processes.
+
+Time splits the UIUC recording in half. A model is identified on the first half, the tuned presets
+were fitted on the first half, and errors count on the second half alone, which is flown as the
+continuation of the first.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from plant_sim.identification.crosscheck import CrossCheck, fit
+from plant_sim.identification.pitch import PitchEstimates, PitchSettings
+from plant_sim.identification.record import PitchIdentification, identify
+from reproduction.paper.flights import Job, Overrides
+from tenbaud.config.load import load_config
+from tenbaud.files.whole import write_whole
+from tenbaud.identify.run import model_section
+from tenbaud.identify.sources import LogColumns, from_csv
+
+UIUC_FILE = "uiuc_closed_loop.csv"
+NTNU_FILES = ("ntnu_travel_step.csv", "ntnu_elevation_obstacle.csv")
+TICK_S = 0.02
+HALF_S = 60.0
+RATES = ((10, 0.1), (16, 0.06), (25, 0.04), (50, 0.02))
+"""Name of the rate, bit/s in whole numbers, and the time of one bit."""
+
+BANDWIDTH_RAD_S = 8.0
+SEGMENT_S = 0.6
+"""Between two pushes of a hand: the body is its own only for so long."""
+
+WORD_BITS = 10
+
+
+@dataclass(frozen=True, slots=True)
+class FirstHalf:
+    """What the first half of the recording says about the body."""
+
+    regression: PitchIdentification
+    fitted: CrossCheck
+    model: dict[str, Any]
+
+
+def identify_first_half(data: Path) -> FirstHalf:
+    """Identify the body on the first half.
+
+    People push it, so the regression is disturbed by torques that the log does not hold, and says so.
+    The model is therefore that of the simulation-error fit over stretches of 0.6 s.
+    """
+    config = load_config("uiuc-10baud")
+    record = from_csv(data / UIUC_FILE, LogColumns(), config).part(0.0, HALF_S)
+    settings = PitchSettings(filter_bandwidth_rad_s=BANDWIDTH_RAD_S, settle_s=5.0 / BANDWIDTH_RAD_S)
+    regression = identify(record, None, settings)
+    start = PitchEstimates(1.0, 1.0, regression.estimates.torque_gain_rad_per_v_s2, 0.0)
+    fitted = fit(record, start, estimate_equilibrium=True, settings=settings, segment_s=SEGMENT_S)
+    physical = fitted.estimates._replace(
+        rate_damping_per_s=max(0.0, fitted.estimates.rate_damping_per_s)
+    )
+    return FirstHalf(regression, fitted, model_section(physical, settings))
+
+
+def replayed(file: Path, **sections: Any) -> Overrides:
+    """Return what makes a flight the replay of a recording."""
+    return {
+        **sections,
+        "transmitter": {"rig": "replay", **sections.get("transmitter", {})},
+        "receiver": {"controller": "recorded"},
+        "flight_log": {"file": str(file), **sections.get("flight_log", {})},
+    }
+
+
+def uiuc_jobs(data: Path, model: dict[str, Any]) -> list[Job]:
+    """Return the flights over the UIUC recording."""
+    file = (data / UIUC_FILE).resolve()
+    jobs = []
+    for rate, period_s in RATES:
+        timing = {"tick_s": TICK_S, "symbol_period_s": period_s}
+        channel = {"rate_baud": 1.0 / period_s}
+        paper = replayed(file, timing=timing, channel=channel, model=model, duration_s=2.0 * HALF_S)
+        jobs += [
+            Job(f"uiuc-paper-{rate}", "paper-10baud", paper, window_start_s=HALF_S),
+            Job(
+                f"uiuc-tuned-{rate}",
+                f"uiuc-{rate}baud",
+                replayed(file),
+                processes=rate < 50,
+                window_start_s=HALF_S,
+                keep_series=rate == 10,
+            ),
+            Job(
+                f"uiuc-words-{rate}",
+                "usual-1000baud",
+                _words(file, WORD_BITS * period_s),
+                window_start_s=HALF_S,
+            ),
+        ]
+    every_tick = _words(file, TICK_S)
+    return [*jobs, Job("uiuc-words-500", "usual-1000baud", every_tick, window_start_s=HALF_S)]
+
+
+def _words(file: Path, period_s: float) -> Overrides:
+    return replayed(
+        file,
+        timing={"tick_s": TICK_S, "symbol_period_s": period_s},
+        channel={"rate_baud": WORD_BITS / period_s},
+        transmitter={"encoder_counts_per_turn": 4096},
+        duration_s=2.0 * HALF_S,
+    )
+
+
+def ntnu_jobs(data: Path, folder: Path) -> list[Job]:
+    """Return the flights over the NTNU recordings, brought into the form of a flight log."""
+    jobs = []
+    for name in NTNU_FILES:
+        if not (data / name).is_file():
+            continue
+        log = folder / f"{Path(name).stem}-counts.csv"
+        seconds = convert_ntnu(data / name, log)
+        for preset in ("paper-10baud", "tuned-10baud", "tuned-20baud"):
+            overrides = replayed(log.resolve(), duration_s=seconds)
+            jobs.append(Job(f"{Path(name).stem}-{preset}", preset, overrides, window_start_s=0.0))
+    return jobs
+
+
+def convert_ntnu(source: Path, target: Path) -> float:
+    """Write every fifth row (100 Hz) as encoder counts with zero voltages; return its seconds.
+
+    The recordings hold no voltages, so the commands are unknown and no torque is assumed.
+    """
+    with source.open(newline="", encoding="utf-8") as file:
+        reader = csv.DictReader(file)
+        in_degrees = "pitch_deg" in (reader.fieldnames or ())
+        column = "pitch_deg" if in_degrees else "pitch_rad"
+        angles = np.array([float(row[column]) for row in reader])[::5]
+    turns = angles / (360.0 if in_degrees else math.tau)
+    counts = np.floor(turns * 4096.0 + 0.5).astype(int)
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(("step", "pitch_counts", "right_volts", "left_volts"))
+    writer.writerows((step, count, 0, 0) for step, count in enumerate(counts.tolist()))
+    write_whole(target, text.getvalue())
+    return len(counts) * 0.01

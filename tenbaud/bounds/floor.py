@@ -1,0 +1,256 @@
+"""The floor: the least mean square error that R bit/s allow, for any causal code.
+
+For a linear model under white noise, an estimate that rests on R bit/s without any information in
+*when* the bits come has a steady covariance P with
+
+    tr A + 1/2 tr(Q P^-1) <= R ln 2,     A P + P A' + Q >= 0
+
+(Duncan, SIAM J. Appl. Math. 19, 1970, with the sequential rate-distortion problem of Tanaka et al.).
+The least `c' P c` under these is the floor; `closed.py` has the two cases with a closed form.
+A controller that hears no more than these bits cannot track better either: its error is the sum of the
+estimation error and something that does not correlate with it.
+
+With `b` bits at a time, one word per period T, the error is the mean over the period:
+
+    1/2 log det(F P F' + Q_T) - 1/2 log det P <= b ln 2,     P <= F P F' + Q_T
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy.linalg import solve_continuous_are
+from scipy.optimize import brentq
+
+from tenbaud.bounds.closed import LN2
+from tenbaud.bounds.convex import Value, log_determinant, minimise, traces
+from tenbaud.bounds.linear import LinearModel, Matrix, rate_needed, sampled
+
+QUADRATURE_POINTS = 12
+RATE_LIMITS = (1e-6, 1e7)
+"""bit/s between which a rate is looked for"""
+
+
+class RateTooLow(ValueError):
+    """A rate at which no code can follow the plant; the text says which one can."""
+
+
+def floor(model: LinearModel, rate_bit_s: float, erased: float = 0.0) -> float:
+    """Return the least mean square error of the output at R bit/s, in its unit squared.
+
+    `erased` is the fraction of the bits that are lost, and known by both ends to be lost: the floor is
+    that of `(1 - erased) R`, the capacity of the erasure channel with feedback.
+    """
+    rate = _paid(model, rate_bit_s, erased)
+    speed = _speed(model, rate)
+    one, unit = _in_units_of(speed, model)
+    nats = rate / speed * LN2
+    covariance = minimise(_Flow(one), _start(one, nats), nats)
+    return unit * float(one.output @ covariance @ one.output)
+
+
+def word_floor(model: LinearModel, bits: float, period_s: float, erased: float = 0.0) -> float:
+    """Return the least mean square error, over time, with a word of `bits` bits every `period_s`.
+
+    The word is there at the instant of its sample. A word lost with probability `erased` counts for
+    `1 - erased` of its bits.
+    """
+    rate = _paid(model, bits / period_s, erased)
+    speed = _speed(model, rate)
+    one, unit = _in_units_of(speed, model)
+    problem = _Words(one, speed * period_s)
+    nats = rate * period_s * LN2
+    covariance = minimise(problem, problem.start(nats), nats)
+    return unit * (float(np.trace(problem.cost @ covariance)) + problem.between)
+
+
+def rate_for(model: LinearModel, mean_square: float) -> float:
+    """Return the bit/s that an ideal code needs for this mean square error of the output.
+
+    What even `RATE_LIMITS` cannot do, or needs no bit for, gives the limit itself.
+    """
+    if not mean_square > 0.0:
+        raise ValueError(f"mean_square is {mean_square}; it must be above 0")
+    low = max(RATE_LIMITS[0], rate_needed(model.dynamics) * (1.0 + 1e-6))
+    high = RATE_LIMITS[1]
+
+    def excess(log_rate: float) -> float:
+        return math.log(floor(model, math.exp(log_rate)) / mean_square)
+
+    if excess(math.log(low)) <= 0.0:
+        return low
+    if excess(math.log(high)) >= 0.0:
+        return high
+    return math.exp(brentq(excess, math.log(low), math.log(high), xtol=1e-7))
+
+
+def _paid(model: LinearModel, rate_bit_s: float, erased: float) -> float:
+    """Return the rate that arrives; RateTooLow where it cannot hold the plant."""
+    if not (math.isfinite(rate_bit_s) and rate_bit_s > 0.0):
+        raise ValueError(f"the rate is {rate_bit_s} bit/s; it must be above 0")
+    if not 0.0 <= erased < 1.0:
+        raise ValueError(f"the erased fraction is {erased}; it must be at least 0 and below 1")
+    needed = rate_needed(model.dynamics)
+    rate = rate_bit_s * (1.0 - erased)
+    if rate <= needed:
+        lost = f", of which {100.0 * erased:g} % are lost," if erased else ""
+        raise RateTooLow(
+            f"{rate_bit_s:g} bit/s{lost} are too few: this plant grows by itself, and the data-rate "
+            f"theorem asks for more than {needed / (1.0 - erased):.4g} bit/s"
+        )
+    return rate
+
+
+def _speed(model: LinearModel, rate_bit_s: float) -> float:
+    """Return what sets the pace, bits or plant, in 1/s."""
+    return max(rate_bit_s, float(np.abs(np.linalg.eigvals(model.dynamics)).max()))
+
+
+def _in_units_of(speed: float, model: LinearModel) -> tuple[LinearModel, float]:
+    """Return the model per `1 / speed` instead of per second, with noise of size one, and its unit.
+
+    The unit is that of the squared error. State i is counted in units of speed^i, so that a chain of
+    integrators has the same numbers at any rate and matrices stay well conditioned.
+    """
+    scale = speed ** np.arange(model.states, dtype=float)
+    dynamics = model.dynamics * scale / scale[:, None] / speed
+    noise = model.noise / np.outer(scale, scale) / speed
+    size = float(np.trace(noise))
+    return LinearModel(dynamics, noise / size, model.output * scale), size
+
+
+def _start(model: LinearModel, rate_nats: float) -> Matrix:
+    """Return a covariance strictly within the constraints: that of seeing every state equally well.
+
+    `A P + P A' + Q = k^2 P P` has the rate `k^2 tr P / 2`, which rises with k from the data-rate
+    theorem's to any.
+    """
+    identity = np.eye(model.states)
+    wanted = 0.5 * (rate_nats + rate_needed(model.dynamics) * LN2)
+
+    def covariance(log_gain: float) -> Matrix:
+        seen = identity * math.exp(log_gain)
+        found = solve_continuous_are(model.dynamics.T, seen, model.noise, identity)
+        return np.asarray(0.5 * (found + found.T))
+
+    def excess(log_gain: float) -> float:
+        return 0.5 * math.exp(2.0 * log_gain) * float(np.trace(covariance(log_gain))) - wanted
+
+    low = high = 0.0
+    while excess(low) > 0.0:
+        low -= 1.0
+    while excess(high) < 0.0:
+        high += 1.0
+    return covariance(brentq(excess, low, high, xtol=1e-3))
+
+
+class _Flow:
+    """Bits that flow all the time."""
+
+    def __init__(self, model: LinearModel) -> None:
+        self.model = model
+        self.cost: Matrix = np.outer(model.output, model.output)
+
+    def rate(self, covariance: Matrix, basis: Matrix) -> Value:
+        a, q = self.model.dynamics, self.model.noise
+        inverse = np.linalg.inv(covariance)
+        weighted = inverse @ q @ inverse
+        value = float(np.trace(a)) + 0.5 * float(np.sum(q * inverse))
+        gradient = -0.5 * np.sum(weighted * basis, axis=(1, 2))
+        hessian = traces(weighted @ basis, inverse @ basis)
+        return Value(value, gradient, 0.5 * (hessian + hessian.T))
+
+    def slack(self, covariance: Matrix) -> Matrix:
+        product = self.model.dynamics @ covariance
+        return np.asarray(product + product.T + self.model.noise)
+
+    def slack_basis(self, basis: Matrix) -> Matrix:
+        products = self.model.dynamics @ basis
+        return np.asarray(products + products.transpose(0, 2, 1))
+
+
+class _Words:
+    """A word per period; P is the covariance just after it."""
+
+    def __init__(self, model: LinearModel, period_s: float) -> None:
+        self.model = model
+        self.transition, self.noise = sampled(model, period_s)
+        cost = np.zeros_like(self.noise)
+        between = 0.0
+        nodes, weights = np.polynomial.legendre.leggauss(QUADRATURE_POINTS)
+        for node, weight in zip(nodes, weights, strict=True):
+            transition, noise = sampled(model, 0.5 * (node + 1.0) * period_s)
+            seen = transition.T @ model.output
+            cost += 0.5 * weight * np.outer(seen, seen)
+            between += 0.5 * weight * float(model.output @ noise @ model.output)
+        self.cost: Matrix = cost
+        self.between = between
+        """what grows within a period whatever the words say"""
+
+    def start(self, rate_nats: float) -> Matrix:
+        """Return a covariance strictly within: the limit of a filter that sees every state."""
+        ahead = self.noise
+        for _ in range(2):
+            ahead = self.transition @ ahead @ self.transition.T + self.noise
+
+        def settled(share: float) -> Matrix:
+            # P = share (F P F' + Q) is a fixed point for a share that contracts; its rate is
+            # -n/2 log share, all of the states' directions alike.
+            covariance = ahead
+            for _ in range(2000):
+                following = share * (self.transition @ covariance @ self.transition.T + self.noise)
+                if np.allclose(following, covariance, rtol=1e-12, atol=0.0):
+                    break
+                covariance = np.asarray(following)
+            return covariance
+
+        share = math.exp(-2.0 * 0.9 * rate_nats / self.model.states)
+        radius = float(np.abs(np.linalg.eigvals(self.transition)).max())
+        if share * radius**2 < 1.0 - 1e-6:
+            return settled(share)
+        return self._riccati_start(rate_nats)
+
+    def _riccati_start(self, rate_nats: float) -> Matrix:
+        """For plants that grow unevenly: bisect on how well every state is seen."""
+        size = float(np.trace(self.noise))
+
+        def after(gain: float) -> Matrix:
+            covariance = self.noise
+            for _ in range(5000):
+                ahead = self.transition @ covariance @ self.transition.T + self.noise
+                seen = np.linalg.inv(ahead) + gain / size * np.eye(len(ahead))
+                following = np.asarray(np.linalg.inv(seen), dtype=np.float64)
+                if np.allclose(following, covariance, rtol=1e-12, atol=0.0):
+                    break
+                covariance = following
+            return 0.5 * (covariance + covariance.T)
+
+        wanted = 0.5 * (rate_nats + max(0.0, _growth_nats(self.transition)))
+        basis = np.zeros((0, *self.noise.shape))
+
+        def excess(log_gain: float) -> float:
+            return self.rate(after(math.exp(log_gain)), basis).value - wanted
+
+        return after(math.exp(brentq(excess, -30.0, 30.0, xtol=1e-3)))
+
+    def rate(self, covariance: Matrix, basis: Matrix) -> Value:
+        images = self.transition @ basis @ self.transition.T
+        ahead = log_determinant(self.transition @ covariance @ self.transition.T + self.noise, images)
+        now = log_determinant(covariance, basis)
+        return Value(
+            0.5 * (ahead.value - now.value),
+            0.5 * (ahead.gradient - now.gradient),
+            0.5 * (ahead.hessian - now.hessian),
+        )
+
+    def slack(self, covariance: Matrix) -> Matrix:
+        return np.asarray(self.transition @ covariance @ self.transition.T + self.noise - covariance)
+
+    def slack_basis(self, basis: Matrix) -> Matrix:
+        return np.asarray(self.transition @ basis @ self.transition.T - basis)
+
+
+def _growth_nats(transition: Matrix) -> float:
+    sizes = np.abs(np.linalg.eigvals(transition))
+    return float(np.log(sizes[sizes > 1.0]).sum())

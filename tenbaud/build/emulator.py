@@ -1,0 +1,85 @@
+"""An emulated rig of a configuration: the same plant, talking like a real device."""
+
+from __future__ import annotations
+
+import time
+from typing import Literal
+
+from plant_sim.encoder import Encoder
+from tenbaud.build.flight import read_flight_log
+from tenbaud.build.rig import build_axes, build_plant, quarc_commands, quarc_fields
+from tenbaud.config.load import ConfigError
+from tenbaud.config.schema import FlightConfig
+from transmitter.rigs.emulator.device import Body, EmulatedDevice, RecordedBody, SimulatedBody
+from transmitter.rigs.emulator.faults import Faults
+from transmitter.rigs.emulator.line import parse_line
+from transmitter.rigs.emulator.loop import RigEmulator
+from transmitter.rigs.emulator.speech import (
+    AsciiSpeech,
+    CobsSpeech,
+    DoublesSpeech,
+    QsbSpeech,
+    Speech,
+)
+from transmitter.rigs.quarc import scale_of
+
+EmulatedFormat = Literal["ascii", "cobs", "quarc", "qsb"]
+STEP_S = 0.001
+DEFAULT_RATES = {"ascii": 300.0, "cobs": 480.0, "quarc": 500.0, "qsb": 500.0}
+"""Samples per second: what 115200 baud carries of the first two."""
+
+
+def build_emulator(
+    config: FlightConfig,
+    form: EmulatedFormat,
+    port: str,
+    *,
+    line_form: str = "checked",
+    polled: bool = False,
+    samples_per_s: float | None = None,
+    watchdog_s: float = 0.1,
+    faults: tuple[str, ...] = (),
+) -> RigEmulator:
+    """Return an emulator that is not yet on its line; ConfigError for settings that cannot be."""
+    if form not in DEFAULT_RATES:
+        raise ConfigError(f"format {form!r}: one of {', '.join(DEFAULT_RATES)}")
+    rate = DEFAULT_RATES[form] if samples_per_s is None else samples_per_s
+    if not 1.0 <= rate <= 5000.0:
+        raise ConfigError(f"{rate:g} samples/s: from 1 to 5000")
+    try:
+        device = EmulatedDevice(
+            _body(config), time.monotonic_ns(), watchdog_s, Faults(faults, config.seed)
+        )
+        line = parse_line(port, config.transmitter.serial.line_baud)
+        speech = _speech(config, form, line_form, polled)
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+    return RigEmulator(device, speech, line, rate)
+
+
+def _body(config: FlightConfig) -> Body:
+    section = config.transmitter
+    if section.rig == "replay":
+        return RecordedBody(read_flight_log(config), round(config.timing.tick_s * 1e9))
+    pitch = section.bridge.pitch
+    zero = 0 if pitch.zero_counts == "first" else pitch.zero_counts
+    encoder = Encoder(pitch.counts_per_turn, pitch.sign, zero)
+    return SimulatedBody(build_plant(config, STEP_S), round(STEP_S * 1e9), encoder)
+
+
+def _speech(config: FlightConfig, form: EmulatedFormat, line_form: str, polled: bool) -> Speech:
+    match form:
+        case "cobs":
+            return CobsSpeech()
+        case "ascii":
+            return AsciiSpeech(line_form, polled)
+        case "qsb":
+            return QsbSpeech()
+    section = config.transmitter.quarc
+    pitch = next(axis for axis in build_axes(config) if axis.name == "pitch")
+    return DoublesSpeech(
+        quarc_fields(config),
+        quarc_commands(config),
+        section.byte_order,
+        scale_of(section.unit, pitch.counts_per_turn),
+    )

@@ -1,0 +1,208 @@
+"""The parts of one end: rig and guard of the transmitter, controller and reference of the receiver."""
+
+from __future__ import annotations
+
+import secrets
+from pathlib import Path
+
+from channel.codec.codec import Codec
+from channel.line.impairments import Direction, ImpairedLine
+from channel.line.line import Line
+from channel.line.shaper import SlotShaper, UplinkMeter
+from channel.line.uplink import Uplink
+from channel.protocol.recording import Recorder
+from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
+from channel.protocol.wire import Wire
+from receiver.controllers.base import Controller, ControllerContext
+from receiver.controllers.pid import Pid, PidGains
+from receiver.controllers.recorded import RecordedController
+from receiver.controllers.references import Constant, Csv, Reference, Sine, Square, Step
+from receiver.endpoint import ReceiverEndpoint
+from receiver.session.session import ReceiverSession
+from tenbaud.build.flight import Agreement, read_flight_log, ticks_of, watchdog_wanted_s
+from tenbaud.build.gauge import build_gauge
+from tenbaud.build.liveness import overtaking_ticks, watchdog_ticks
+from tenbaud.build.outside_code import is_plugin
+from tenbaud.build.plugins import CONTROLLER, build_plugin
+from tenbaud.build.rig import build_rig
+from tenbaud.config.load import ConfigError
+from tenbaud.config.schema import FlightConfig, ReferenceSection
+from transmitter.guard import Guard, GuardSettings
+from transmitter.metrics.scores import Scores
+from transmitter.node import TransmitterNode
+from transmitter.session.rate_observer import Sight
+from transmitter.session.session import TransmitterSession
+
+
+def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> TransmitterNode:
+    """Return the sensor node of a configuration."""
+    config, terms = agreement.config, agreement.terms
+    session = TransmitterSession(
+        sabotaged(agreement.codec, config.transmitter.sabotage, agreement.live),
+        terms,
+        agreement.identity,
+        secrets.randbits(32),
+        recorder,
+        stop_on_desync=config.transmitter.on_desync == "stop",
+        sight=build_sight(agreement),
+        overtaking_ticks=overtaking_ticks(terms, agreement.faults),
+    )
+    reference = build_reference(config)
+    gauge = build_gauge(agreement)
+    scores = Scores(
+        agreement.codec.model,
+        agreement.window_start_tick,
+        (terms.history_samples + 2) * terms.ticks_per_sample,
+        (lambda _tick: None) if config.receiver.controller == "recorded" else reference.angle_rad,
+        gauge.on_error if gauge is not None else lambda _error: None,
+    )
+    # Only a rig that hurts nobody is armed again by itself.
+    rearm_s = config.link.peer_timeout_s if config.transmitter.rig == "simulated" else None
+    rearm_ticks = None if rearm_s is None else ticks_of(rearm_s, config)
+    return TransmitterNode(
+        session, build_rig(config), build_guard(agreement), scores, recorder, rearm_ticks, gauge
+    )
+
+
+def build_sight(agreement: Agreement) -> Sight | None:
+    """Return what gives a coder its rates, None for one that does without."""
+    codec = agreement.codec
+    if not codec.uses_rates:
+        return None
+    tick_s = agreement.terms.tick_ns / 1e9
+    try:
+        return Sight(codec.model, tick_s, agreement.config.transmitter.sight_bandwidth_rad_s)
+    except ValueError as error:
+        raise ConfigError(f"coder.kind = {agreement.config.coder.kind!r}: {error}") from error
+
+
+def build_uplink(agreement: Agreement, wire: Wire, recorder: Recorder | None = None) -> Uplink:
+    """Return the transmitter's way out onto a line: grid, delivery delay and meter."""
+    terms = agreement.terms
+    alphabet = agreement.codec.coder.alphabet
+    line = build_line(agreement, "up", wire)
+    return Uplink(SlotShaper(terms), line, UplinkMeter(alphabet), wire, recorder)
+
+
+def build_line(agreement: Agreement, direction: Direction, wire: Wire) -> Line:
+    """Return one direction of the line, with what goes wrong on it."""
+    one = agreement.faults.up if direction == "up" else agreement.faults.down
+    delay_ns = agreement.terms.symbol_delay_ns if direction == "up" else 0
+    if not one.any and not agreement.live:
+        return Line(delay_ns)
+    alphabet = agreement.codec.coder.alphabet
+    return ImpairedLine(one, alphabet, f"{agreement.config.seed} {direction}", wire, delay_ns)
+
+
+def sabotaged(codec: Codec, text: str, live: bool = False) -> Codec:
+    """Return the codec, spoilt as the configuration asks; `live`: ready to be spoilt in flight."""
+    if not text:
+        return SabotagedCodec(codec) if live else codec
+    try:
+        return SabotagedCodec(codec, parse_sabotage(text))
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+
+
+def build_receiver(
+    agreement: Agreement,
+    recorder: Recorder | None,
+    wire: Wire,
+    take_over: bool = False,
+    reference: Reference | None = None,
+) -> ReceiverEndpoint:
+    """Return the controller node of a configuration.
+
+    `take_over` from another one, on purpose; it follows `reference` if one is given.
+    """
+    session = ReceiverSession(
+        sabotaged(agreement.codec, agreement.config.receiver.sabotage, agreement.live),
+        agreement.terms,
+        build_controller(agreement.config, reference),
+        agreement.identity,
+        secrets.randbits(31) + 1,
+        recorder,
+        take_over=take_over,
+    )
+    return ReceiverEndpoint(session, wire)
+
+
+def check_parts(config: FlightConfig) -> None:
+    """Build what can be wrong in files and texts, so that it is told before anything starts."""
+    build_rig(config)
+    build_controller(config)
+
+
+def build_guard(agreement: Agreement) -> Guard:
+    """Return limiter and watchdog beside the motors."""
+    return Guard(agreement.terms.limits, guard_settings(agreement))
+
+
+def guard_settings(agreement: Agreement) -> GuardSettings:
+    """Return when the guard steps in, and how."""
+    section = agreement.config.transmitter
+    terms = agreement.terms
+    soft = () if section.soft_limit_rad is None else (section.soft_limit_rad,)
+    return GuardSettings(
+        timeout_ticks=watchdog_ticks(watchdog_wanted_s(agreement.config), terms, agreement.trip),
+        ramp_ticks=ticks_of(section.ramp_s, agreement.config),
+        safe_volts=section.safe_volts,
+        soft_limits_rad=soft,
+    )
+
+
+def build_controller(config: FlightConfig, reference: Reference | None = None) -> Controller:
+    """Return the controller; it follows `reference` instead of the configured one if it is given."""
+    section = config.receiver
+    if section.controller == "recorded":
+        return RecordedController(read_flight_log(config))
+    if is_plugin(section.controller):
+        context = ControllerContext(
+            config.timing.tick_s,
+            reference or build_reference(config),
+            config.limits.volts_max,
+            config.limits.initial_volts,
+        )
+        plugin: Controller = build_plugin(
+            config,
+            "receiver.controller",
+            section.controller,
+            context,
+            section.controller_options,
+            CONTROLLER,
+        )
+        return plugin
+    pid = section.pid
+    return Pid(
+        PidGains(pid.proportional, pid.integral, pid.derivative, pid.unit),
+        reference or build_reference(config),
+        config.timing.tick_s,
+        volts_max=config.limits.volts_max,
+        normal_force_volts=pid.normal_force_volts,
+        anti_windup=pid.anti_windup,
+    )
+
+
+def build_reference(config: FlightConfig) -> Reference:
+    """Return the set-point over the ticks."""
+    return reference_of(config.receiver.reference, config.timing.tick_s)
+
+
+def reference_of(section: ReferenceSection, tick_s: float) -> Reference:
+    """Return the set-point that a section describes."""
+    match section.kind:
+        case "square":
+            return Square(section.amplitude_rad, section.period_s, tick_s)
+        case "sine":
+            return Sine(section.amplitude_rad, section.period_s, tick_s)
+        case "step":
+            return Step(section.amplitude_rad, section.start_s, tick_s)
+        case "constant":
+            return Constant(section.amplitude_rad, tick_s)
+        case "csv":
+            if not section.file:
+                raise ConfigError("receiver.reference.file names no file for the csv reference")
+            try:
+                return Csv(Path(section.file), tick_s)
+            except ValueError as error:
+                raise ConfigError(f"receiver.reference: {error}") from error

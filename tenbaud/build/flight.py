@@ -1,0 +1,178 @@
+"""From a configuration to the parts that it describes. Nothing is opened or started here."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from channel.codec.codec import Codec
+from channel.errors import TenbaudError
+from channel.flight_log import FlightColumns, FlightLog
+from channel.line.impairments import LineFaults, parse_impairments
+from channel.protocol.identity import Identity, numerics_probe
+from channel.protocol.limits import CommandLimits
+from channel.protocol.terms import Clock, Terms
+from tenbaud.build.codec import build_codec
+from tenbaud.build.liveness import RoundTrip, check_liveness, round_trip
+from tenbaud.build.serial_terms import on_serial_line
+from tenbaud.config.load import ConfigError
+from tenbaud.config.schema import FlightConfig
+
+REAL_RIGS = ("serial", "quarc", "hil")
+
+
+@cache
+def software_version() -> str:
+    """Return the installed version of tenbaud."""
+    try:
+        return version("tenbaud")
+    except PackageNotFoundError:
+        return "0+source"
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """What both ends build alike from their configuration."""
+
+    config: FlightConfig
+    clock: Clock
+    codec: Codec
+    terms: Terms
+    identity: Identity
+    live: bool = False
+    """whether line, codec and set-point may be changed in flight, by hand"""
+
+    @property
+    def flight_ticks(self) -> int:
+        """Return the ticks of the flight: whole samples, at least one."""
+        samples = round(self.config.duration_s * 1e9) // self.terms.sample_ns
+        return max(1, samples) * self.terms.ticks_per_sample
+
+    @property
+    def faults(self) -> LineFaults:
+        """Return what goes wrong on the line, on purpose."""
+        return parse_impairments(self.config.link.impairments)
+
+    @property
+    def trip(self) -> RoundTrip:
+        """Return how long commands take, as far as the configuration knows."""
+        return round_trip(self.terms, self.faults, self.clock)
+
+    @property
+    def desyncs_expected(self) -> float:
+        """Return how many lockstep failures were asked for.
+
+        An inverted bit passes the frame's 16-bit check once in 65,536 times, so raw errors on the
+        downlink explain any number.
+        """
+        if self.faults.down.raw or self.faults.up.raw:
+            return math.inf
+        ends = (self.config.transmitter, self.config.receiver)
+        return len([end for end in ends if end.sabotage])
+
+    @property
+    def window_start_tick(self) -> int:
+        """Return where errors begin to count: after the first period of the reference.
+
+        A flight that is over by then, or that has no periodic reference, counts from its beginning.
+        """
+        reference = self.config.receiver.reference
+        periodic = self.config.receiver.controller != "recorded" and reference.kind in (
+            "square",
+            "sine",
+        )
+        start = round(reference.period_s * 1e9) // self.terms.tick_ns if periodic else 0
+        return start if start < self.flight_ticks else 0
+
+
+def agree(config: FlightConfig, clock: Clock) -> Agreement:
+    """Return codec, terms and identity of a configuration; ConfigError where they make no flight."""
+    if clock == "virtual" and config.transmitter.rig in REAL_RIGS:
+        raise ConfigError(
+            f"the {config.transmitter.rig} rig moves in real time and has no virtual clock: "
+            "add --clock real"
+        )
+    try:
+        codec = build_codec(config)
+        terms = checked_terms(config, codec, clock)
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+    shared = config.shared_json(terms.lead_ticks)
+    identity = Identity(software_version(), shared, numerics_probe(codec))
+    return Agreement(config, clock, codec, terms, identity)
+
+
+def watchdog_wanted_s(config: FlightConfig) -> float | None:
+    """Return the watchdog's time-out as configured, None where it is "auto"."""
+    wanted = config.transmitter.watchdog_s
+    return None if wanted == "auto" else wanted
+
+
+def checked_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:
+    """Return the terms of a flight; ValueError, with the arithmetic, where they cannot be flown."""
+    terms = build_terms(config, codec, clock)
+    terms.check(clock)
+    trip = round_trip(terms, parse_impairments(config.link.impairments), clock)
+    check_liveness(watchdog_wanted_s(config), terms, trip)
+    return terms
+
+
+def build_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:
+    """Return the terms, with the lead chosen where it is "auto"."""
+    lead = config.timing.lead_ticks
+    terms = Terms(
+        tick_ns=round(config.timing.tick_s * 1e9),
+        ticks_per_sample=codec.ticks_per_sample,
+        symbols_per_word=codec.coder.alphabet.symbols_per_word,
+        lead_ticks=0 if lead == "auto" else lead,
+        rate_baud=config.channel.rate_baud,
+        delivery=config.channel.delivery,
+        deadline_allowance_ns=round(config.channel.deadline_allowance_s * 1e9),
+        downlink_budget_ns=round(config.channel.downlink_budget_s * 1e9),
+        repeats=config.channel.repeats,
+        initial_command=config.limits.initial_volts,
+        limits=build_limits(config),
+    )
+    if config.link.kind == "serial":
+        terms = on_serial_line(config.link, codec, terms)
+    if lead != "auto":
+        return terms
+    shortest = terms.with_shortest_lead(clock)
+    delay_ns = parse_impairments(config.link.impairments).longest_delay_ns
+    if not delay_ns:
+        return shortest
+    return replace(terms, lead_ticks=terms.lead_needed_ticks + -(-delay_ns // terms.tick_ns))
+
+
+def build_limits(config: FlightConfig) -> CommandLimits:
+    """Return clamp and slew, the latter per tick."""
+    slew = config.limits.slew_volts_per_s * config.timing.tick_s
+    return CommandLimits(config.limits.volts_max, slew)
+
+
+def read_flight_log(config: FlightConfig) -> FlightLog:
+    """Read the recorded flight that the configuration names."""
+    section = config.flight_log
+    if not section.file:
+        raise ConfigError("flight_log.file names no recording; give --rig replay:FILE")
+    columns = FlightColumns(
+        index_column=section.index_column,
+        counts_columns=(section.counts_column,),
+        volts_columns=section.volts_columns,
+    )
+    try:
+        return FlightLog.read(Path(section.file), columns)
+    except ValueError as error:
+        raise RecordingUnusable(str(error)) from error
+
+
+class RecordingUnusable(TenbaudError):
+    """A recorded flight that cannot be replayed; the text names file, line and column."""
+
+
+def ticks_of(seconds: float, config: FlightConfig) -> int:
+    """Return a time as a whole number of ticks, at least one."""
+    return max(1, math.ceil(seconds / config.timing.tick_s - 1e-9))

@@ -1,0 +1,39 @@
+"""The parts of one transmitter before, during and after its flight."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from channel.line.line import Line
+from channel.line.uplink import Uplink
+from tenbaud.build.flight import Agreement
+from transmitter.node import TransmitterNode
+from transmitter.session.rate_watch import RateWatch
+
+Stop = Callable[[], bool]
+
+
+@dataclass(slots=True)
+class TransmitterRun:
+    """The parts of one transmitter, before, during and after its flight."""
+
+    agreement: Agreement
+    node: TransmitterNode
+    uplink: Uplink
+    downlink: Line
+    """on the virtual clock; on a real one the receiver has its own"""
+    ticks: int = 0
+    """flown by this process"""
+    rejoin_bytes: int = 0
+    """what rejoins cost: control frames of both directions, without greeting and farewell"""
+    flight_s: float = 0.0
+    """wall-clock time of the flight itself"""
+    wire_bytes_down: int = 0
+    desyncs_asked: float = 0.0
+    """lockstep failures that were asked for while the flight went on"""
+    rate: RateWatch | None = None
+    """whether the symbol rate is kept; on a real clock"""
+    extra: dict[str, Any] = field(default_factory=dict)
+    """figures of the clock that was flown on"""

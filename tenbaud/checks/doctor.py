@@ -1,0 +1,198 @@
+"""What this machine can do for a flight: a report to read, and to paste into a question."""
+
+from __future__ import annotations
+
+import platform
+import sys
+import time
+from dataclasses import dataclass
+from typing import Literal
+
+from channel.links.base import Link
+from tenbaud.build.flight import agree, software_version
+from tenbaud.config.schema import FlightConfig
+
+State = Literal["ok", "note", "problem"]
+
+JITTER_SAMPLES = 200
+LATE_MS_P99_MAX = 5.0
+"""Later than this, and ticks of 10 ms run into each other."""
+
+ROUND_TRIPS = 50
+TRIP_TIMEOUT_S = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One line of the report."""
+
+    state: State
+    subject: str
+    text: str
+
+
+def examine(config: FlightConfig, connect: tuple[str, ...] = ()) -> list[Finding]:
+    """Look at everything; `connect` are Zenoh endpoints of a receiver to reach."""
+    return [
+        *_software(),
+        *_numerics(config),
+        *_clock(config),
+        *_ports(),
+        *_vendor(),
+        *_zenoh(),
+        *(_reach(endpoint) for endpoint in connect),
+    ]
+
+
+def report(findings: list[Finding]) -> str:
+    """Return the findings as text of one line each."""
+    width = max(len(finding.subject) for finding in findings)
+    marks = {"ok": "ok     ", "note": "note   ", "problem": "PROBLEM"}
+    return "\n".join(
+        f"{marks[finding.state]}  {finding.subject:{width}}  {finding.text}" for finding in findings
+    )
+
+
+def _software() -> list[Finding]:
+    import importlib.metadata
+
+    versions = []
+    for name in ("eclipse-zenoh", "pyserial", "numpy", "pydantic"):
+        try:
+            versions.append(f"{name} {importlib.metadata.version(name)}")
+        except importlib.metadata.PackageNotFoundError:
+            versions.append(f"{name} missing")
+    return [
+        Finding("ok", "tenbaud", f"{software_version()}, Python {platform.python_version()}"),
+        Finding(
+            "ok", "machine", f"{platform.platform()}, {platform.machine()}, {sys.byteorder}-endian"
+        ),
+        Finding("ok", "libraries", ", ".join(versions)),
+    ]
+
+
+def _numerics(config: FlightConfig) -> list[Finding]:
+    identity = agree(config, "real").identity
+    return [
+        Finding(
+            "ok",
+            "numerics probe",
+            f"{identity.numerics_probe.hex()} with preset {config.preset}; the other machine must "
+            "show the same",
+        )
+    ]
+
+
+def _clock(config: FlightConfig) -> list[Finding]:
+    resolution_ns = time.get_clock_info("monotonic").resolution * 1e9
+    period_s = config.timing.tick_s
+    late_ms = []
+    start = time.monotonic()
+    for index in range(1, JITTER_SAMPLES + 1):
+        due = start + index * period_s
+        time.sleep(max(0.0, due - time.monotonic()))
+        late_ms.append((time.monotonic() - due) * 1e3)
+    late_ms.sort()
+    half, most, largest = (late_ms[round(share * (JITTER_SAMPLES - 1))] for share in (0.5, 0.99, 1.0))
+    text = (
+        f"waking for {JITTER_SAMPLES} ticks of {period_s * 1e3:g} ms: late by {half:.2f} ms (half), "
+        f"{most:.2f} ms (99 %), {largest:.2f} ms (worst)"
+    )
+    bad = most > LATE_MS_P99_MAX
+    if bad:
+        text += "; close other programs, and switch off power saving"
+    return [
+        Finding("ok", "clock", f"monotonic, steps of {resolution_ns:g} ns"),
+        Finding("problem" if bad else "ok", "sleep", text),
+    ]
+
+
+def _ports() -> list[Finding]:
+    from transmitter.rigs.serial_ports import list_ports
+
+    ports = list_ports()
+    if not ports:
+        return [
+            Finding("note", "serial ports", "none; a rig on USB shows here as /dev/ttyACM0 or COM3")
+        ]
+    return [
+        Finding("ok", "serial port", f"{port.device}: {port.description}")
+        if port.usable
+        else Finding("problem", "serial port", f"{port.device}: not permitted; {port.remedy}")
+        for port in ports
+    ]
+
+
+def _vendor() -> list[Finding]:
+    import importlib.util
+
+    try:
+        found = importlib.util.find_spec("quanser.hardware") is not None
+    except ModuleNotFoundError:
+        found = False
+    text = "quanser.hardware is there" if found else "no quanser.hardware; needed for --rig hil only"
+    return [Finding("ok" if found else "note", "Quanser", text)]
+
+
+def _zenoh() -> list[Finding]:
+    """Let two sessions on this machine meet and count how long messages take."""
+    from channel.errors import LinkError
+    from channel.links.endpoints import free_endpoint
+    from channel.links.zenoh.link import ZenohLink
+
+    endpoint = free_endpoint()
+    trips_ms = []
+    try:
+        with (
+            ZenohLink("receiver", "doctor", listen=(endpoint,)) as receiver,
+            ZenohLink("transmitter", "doctor", connect=(endpoint,)) as transmitter,
+        ):
+            if not _present(transmitter, TRIP_TIMEOUT_S):
+                return [Finding("problem", "Zenoh", f"two sessions at {endpoint} did not meet")]
+            for _ in range(ROUND_TRIPS):
+                begun = time.perf_counter()
+                transmitter.send(b"there", is_symbol=True)
+                if receiver.receive(TRIP_TIMEOUT_S) is None:
+                    return [Finding("problem", "Zenoh", f"a message at {endpoint} did not arrive")]
+                receiver.send(b"back")
+                if transmitter.receive(TRIP_TIMEOUT_S) is None:
+                    return [Finding("problem", "Zenoh", f"an answer at {endpoint} did not arrive")]
+                trips_ms.append((time.perf_counter() - begun) * 1e3)
+    except LinkError as error:
+        return [Finding("problem", "Zenoh", str(error))]
+    trips_ms.sort()
+    return [
+        Finding(
+            "ok",
+            "Zenoh",
+            f"loopback round trip {trips_ms[ROUND_TRIPS // 2]:.2f} ms (half), "
+            f"{trips_ms[-1]:.2f} ms (worst of {ROUND_TRIPS})",
+        )
+    ]
+
+
+def _reach(endpoint: str) -> Finding:
+    """Try to open a TCP connection: the first thing that a firewall would refuse."""
+    import socket
+
+    host, _, port = endpoint.partition("/")[2].partition("#")[0].rpartition(":")
+    try:
+        begun = time.perf_counter()
+        with socket.create_connection((host.strip("[]"), int(port)), TRIP_TIMEOUT_S):
+            taken_ms = (time.perf_counter() - begun) * 1e3
+    except (OSError, ValueError) as error:
+        return Finding(
+            "problem",
+            "reach",
+            f"{endpoint}: {error}; is `tenbaud receive` running there, and the port open?",
+        )
+    return Finding("ok", "reach", f"{endpoint} answers in {taken_ms:.1f} ms")
+
+
+def _present(link: Link, timeout_s: float) -> bool:
+    until = time.monotonic() + timeout_s
+    while time.monotonic() < until:
+        if link.peer_present():
+            return True
+        time.sleep(0.01)
+    return False

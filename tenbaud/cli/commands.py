@@ -1,0 +1,70 @@
+"""The commands, gathered. Each lives in a module of its own beside this one."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from tenbaud.cli import (
+    bench,
+    demo,
+    doctor,
+    figures,
+    files,
+    identify,
+    keys,
+    nodes,
+    replays,
+    rig,
+    router,
+    runs,
+    sweep,
+    tune,
+    view,
+)
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    help="""Fly a helicopter over a ten-baud wire.
+
+    Both ends on this machine:   [bold]tenbaud demo[/bold]
+
+    One end per terminal:        [bold]tenbaud receive[/bold]   and   [bold]tenbaud transmit[/bold]
+    """,
+)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from tenbaud.build.flight import software_version
+
+        typer.echo(f"tenbaud {software_version()}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show version.")
+    ] = False,
+) -> None:
+    """Take the options that come before the command."""
+
+
+for panel, commands in (
+    ("Fly", (demo.demo, nodes.transmit, nodes.receive, view.view, runs.presets)),
+    (
+        "What was flown",
+        (runs.inspect, runs.diff, replays.replay, replays.audit, files.convert, files.recover),
+    ),
+    ("Rigs and machines", (doctor.doctor, rig.rig, rig.rig_check, router.router)),
+    ("Models, coders, studies", (identify.identify, figures.figures, sweep.sweep, tune.tune)),
+):
+    for command in commands:
+        app.command(rich_help_panel=panel)(command)
+app.add_typer(keys.app, name="keys", rich_help_panel="Rigs and machines")
+app.add_typer(bench.bench, name="bench", rich_help_panel="Models, coders, studies")

@@ -1,0 +1,204 @@
+"""A serial line between two processes of this machine, made of two pseudo-terminals.
+
+A pseudo-terminal stores a baud rate and does not keep to it. Here a thread stands between two of them
+and passes bytes on no faster than a real line of that rate would, each direction by itself, and it can
+do what real lines do: change bytes, add some, be pulled out and plugged in again. The two ports have
+fixed names in a folder, links to the pseudo-terminals of the moment.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import random
+import select
+import threading
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, Self
+
+from channel.links.serial.budget import LINE_BITS_PER_BYTE
+
+Way = Literal["up", "down"]
+
+QUEUE_BYTES_MAX = 4096
+"""What waits in a direction; more is left in the sender's own buffer, as with a real port."""
+STEP_S = 0.0005
+"""Bytes of a fast line are passed on in steps of this: late by at most so much, never early."""
+BLOCKED_S = 0.2
+IDLE_S = 0.1
+
+
+@dataclass(slots=True)
+class _Direction:
+    rate_baud: float | None
+    damage: float
+    chooser: random.Random
+    carried: int = 0
+    damaged: int = 0
+    overflowed: int = 0
+    _queue: bytearray = field(default_factory=bytearray)
+    _due: float = 0.0
+    """when the first byte of the queue has arrived"""
+    _blocked_since: float | None = None
+
+    @property
+    def room(self) -> int:
+        return QUEUE_BYTES_MAX - len(self._queue)
+
+    def put(self, data: bytes, now: float) -> None:
+        """Put bytes on the line, some of them changed."""
+        if not self._queue:
+            self._due = now + self._byte_s
+        for byte in data:
+            if self.damage and self.chooser.random() < self.damage:
+                byte ^= self.chooser.randrange(1, 256)
+                self.damaged += 1
+            self._queue.append(byte)
+
+    def deliver(self, target: int, now: float) -> None:
+        """Write the bytes that have arrived by now to a pseudo-terminal.
+
+        A reader that takes nothing for `BLOCKED_S`, or is not there, loses them.
+        """
+        if not self._queue or now < self._due:
+            return
+        count = len(self._queue)
+        if self.rate_baud is not None:
+            count = min(count, int((now - self._due) / self._byte_s) + 1)
+        try:
+            written = os.write(target, self._queue[:count])
+            self._blocked_since = None
+        except BlockingIOError:
+            written = 0
+            self._blocked_since = self._blocked_since or now
+            if now - self._blocked_since > BLOCKED_S:
+                self.overflowed += count
+                written = count
+        del self._queue[:written]
+        self._due += written * self._byte_s
+        self.carried += written
+
+    def wait_s(self, now: float) -> float:
+        """Return how long until there is something to take, in steps."""
+        return max(STEP_S, self._due - now) if self._queue else IDLE_S
+
+    @property
+    def _byte_s(self) -> float:
+        return 0.0 if self.rate_baud is None else LINE_BITS_PER_BYTE / self.rate_baud
+
+
+class EmulatedLine:
+    """Within a `with`, a serial line between `transmitter_port` and `receiver_port`.
+
+    `rate_baud` None: as fast as it goes. `damage` is the share of bytes that arrive changed, in either
+    direction, drawn from `seed`. `folder` must exist.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        rate_baud: float | None = 115_200,
+        *,
+        damage: float = 0.0,
+        damage_down: float | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.transmitter_port = folder / "transmitter"
+        self.receiver_port = folder / "receiver"
+        down = damage if damage_down is None else damage_down
+        self._ways: dict[Way, _Direction] = {
+            "up": _Direction(rate_baud, damage, random.Random(2 * seed)),
+            "down": _Direction(rate_baud, down, random.Random(2 * seed + 1)),
+        }
+        self._masters: tuple[int, int] | None = None
+        self._slaves: tuple[int, int] | None = None
+        self._lock = threading.Lock()
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="emulated line", daemon=True)
+
+    def __enter__(self) -> Self:
+        self.plug()
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        self._thread.join()
+        self.unplug()
+
+    def carried(self, way: Way) -> int:
+        """Return how many bytes have gone in this direction."""
+        return self._ways[way].carried
+
+    def damaged(self, way: Way) -> int:
+        """Return how many of them were changed on the way."""
+        return self._ways[way].damaged
+
+    def spoil(self, way: Way, share: float) -> None:
+        """Change this share of the bytes from now on."""
+        self._ways[way].damage = share
+
+    def inject(self, way: Way, data: bytes) -> None:
+        """Put bytes on the line that nobody sent."""
+        with self._lock:
+            self._ways[way].put(data, time.monotonic())
+
+    def plug(self) -> None:
+        """Plug both ends in: two new pseudo-terminals under the same names."""
+        import tty
+
+        pairs = [os.openpty(), os.openpty()]
+        for (master, slave), port in zip(
+            pairs, (self.transmitter_port, self.receiver_port), strict=True
+        ):
+            tty.setraw(slave)
+            os.set_blocking(master, False)
+            port.unlink(missing_ok=True)
+            port.symlink_to(os.ttyname(slave))
+        with self._lock:
+            self._masters = (pairs[0][0], pairs[1][0])
+            # Held open, so that an end which is not there yet or any more is no error here.
+            self._slaves = (pairs[0][1], pairs[1][1])
+
+    def unplug(self) -> None:
+        """Pull both ends out: whoever has them open gets an error, and their names are gone."""
+        with self._lock:
+            if self._masters is None or self._slaves is None:
+                return
+            self.transmitter_port.unlink(missing_ok=True)
+            self.receiver_port.unlink(missing_ok=True)
+            for number in self._slaves + self._masters:
+                os.close(number)
+            self._masters = self._slaves = None
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            with self._lock:
+                wait_s = self._pass_on()
+                readable = [
+                    master
+                    for master, way in zip(self._masters or (), self._ways.values(), strict=False)
+                    if way.room > 0
+                ]
+            try:
+                select.select(readable, [], [], wait_s)
+            except OSError:  # unplugged in between
+                continue
+
+    def _pass_on(self) -> float:
+        """Move what can be moved; return how long to wait."""
+        if self._masters is None:
+            return STEP_S * 10
+        near, far = self._masters
+        now = time.monotonic()
+        for way, source, target in (
+            (self._ways["up"], near, far),
+            (self._ways["down"], far, near),
+        ):
+            if way.room > 0:
+                with contextlib.suppress(BlockingIOError):
+                    way.put(os.read(source, way.room), now)
+            way.deliver(target, now)
+        return min(way.wait_s(now) for way in self._ways.values())

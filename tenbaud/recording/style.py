@@ -1,0 +1,57 @@
+"""How the paper's figures are drawn here: sizes, lines, files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from tenbaud.files.whole import whole_file
+from tenbaud.recording.envelope import Series, thin
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+LINE_A = "#1b1b1b"
+LINE_B = "#0b6fb8"
+LINE_C = "#d9730d"
+FAINT = "#8a8a8a"
+POINTS = 3000
+
+
+def new_figure(
+    rows: int, height: float = 2.0, ratios: Sequence[float] | None = None
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure with `rows` panels under each other that share their time axis."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8.0, 0.5 + height * rows), layout="constrained")
+    grid = figure.subplots(rows, 1, sharex=True, squeeze=False, height_ratios=ratios)
+    panels = [row[0] for row in grid]
+    for panel in panels:
+        panel.grid(visible=True, color="#e6e6e6", linewidth=0.6)
+        panel.set_axisbelow(True)
+        panel.spines[["top", "right"]].set_visible(False)
+    return figure, panels
+
+
+def legend_above(panel: Axes) -> None:
+    """Put the legend above the panel's right end, where no curve is."""
+    panel.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=4, fontsize=8, frameon=False)
+
+
+def decimated(times: Series, values: Series) -> tuple[Series, Series]:
+    """Return a curve of few enough points for a small file, its extremes kept."""
+    return thin(np.asarray(times), np.asarray(values), POINTS)
+
+
+def save(figure: Figure, paths: Sequence[Path]) -> None:
+    """Write the figure to each path; the ending says in which format."""
+    for path in paths:
+        # A fixed salt and no date: the same data give the same file.
+        metadata = {"Date": None} if path.suffix == ".svg" else {"Software": None}
+        with whole_file(path) as stream:
+            figure.savefig(stream, dpi=100, metadata=metadata, format=path.suffix[1:])

@@ -1,0 +1,43 @@
+"""Coders as functions: what the compiled studies call gives what the codec is given."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+
+from channel.codec.codec import Coder
+from channel.codec.coders.base import FunctionCoder
+from channel.codec.coders.static import StaticCoder, StaticParameters
+from channel.codec.coders.timed import TimedCoder, TimedParameters
+from channel.codec.coders.words import WordsCoder, WordsParameters
+from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
+from channel.codec.words import ERASED
+
+CODERS = (
+    ZoomCoder(ZoomParameters(window=4)),
+    TimedCoder(TimedParameters()),
+    StaticCoder(StaticParameters(bits=3)),
+    WordsCoder(WordsParameters(rate_filter_s=0.03)),
+)
+
+
+@pytest.mark.parametrize("coder", CODERS, ids=lambda coder: type(coder).__name__)
+def test_when_the_functions_write_into_old_results_then_nothing_of_them_is_left(
+    coder: FunctionCoder,
+) -> None:
+    """Arrays are used again from sample to sample: every entry must be written every time."""
+    full: Coder = coder  # type: ignore[assignment]
+    chooser = random.Random(8)
+    state = full.initial()
+    for _ in range(100):
+        model = (chooser.uniform(-1.0, 1.0), chooser.uniform(-1.0, 1.0))
+        word = full.encode(state, model[:1], (chooser.uniform(-1.0, 1.0),))
+        erased = chooser.random() < 0.2
+        correction = [chooser.random() for _ in range(coder.correction_size)]
+        after = [chooser.random() for _ in state]
+        symbols = (0,) * len(word) if erased else word
+        coder.functions.decode(coder.constants, state, model, symbols, erased, correction, after)
+        expected = full.decode(state, model, ERASED if erased else word)
+        assert (tuple(correction), tuple(after)) == expected
+        state = expected[1]

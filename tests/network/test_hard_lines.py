@@ -1,0 +1,130 @@
+"""Odd lines: IPv6 alone, small packets, a peer that vanishes, a certificate that expires."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from channel.links.endpoints import free_endpoint
+from channel.links.zenoh.config import LEASE_MS
+from tenbaud.flight.outcome import ExitCode
+from tenbaud.keys.authority import NodeRole
+from tenbaud.keys.store import add_node, create_authority
+from tenbaud.recording.reader import Recording
+from tests.network.flights import (
+    DESK_AT,
+    RIG_AT,
+    Flight,
+    environment,
+    make_keys,
+    tls_links,
+    two_machines,
+)
+from tests.network.namespaces import Lab, Machine
+from tests.tenbaud.ends import End, wait_for
+
+TENBAUD = (sys.executable, "-m", "tenbaud")
+
+
+@pytest.fixture
+def lab(monkeypatch: pytest.MonkeyPatch) -> Iterator[Lab]:
+    monkeypatch.setenv("PYTHONPATH", environment()["PYTHONPATH"])
+    with Lab() as made:
+        yield made
+
+
+def _with_ipv6_alone(lab: Lab) -> Machine:
+    machine = lab.machine("six")
+    machine.ip("addr", "del", "127.0.0.1/8", "dev", "lo")
+    return machine
+
+
+def test_on_a_machine_with_ipv6_alone_both_ends_meet(lab: Lab, tmp_path: Path) -> None:
+    six = _with_ipv6_alone(lab)
+    flight = ("demo", "--mismatch", "0", "--duration", "2", "--json", "--out", str(tmp_path / "demo"))
+    done = six.run(*TENBAUD, *flight, timeout_s=60.0)
+    assert done.returncode == 0, done.stderr
+    seen = (*flight[:-1], str(tmp_path / "seen"), "--view", "--view-port", "0")
+    done = six.run(*TENBAUD, *seen, timeout_s=60.0)
+    assert done.returncode == 0, done.stderr
+    assert "http://[::1]:" in done.stderr
+    desk = End("receive", [], tmp_path / "desk", prefix=six.prefix, draws=False)
+    shown = ["--telemetry", "tcp/[::1]:7448", "--duration", "2"]
+    rig = End("transmit", [], tmp_path / "rig", *shown, prefix=six.prefix, draws=False)
+    (rig_code, upper), (desk_code, _) = rig.ended(), desk.ended()
+    assert (rig_code, desk_code) == (0, 0), rig.said + desk.said
+    assert upper["telemetry"] == "on"
+
+
+@pytest.mark.parametrize("mtu", [1280, 576])
+def test_packets_may_be_small(lab: Lab, tmp_path: Path, mtu: int) -> None:
+    rig, desk = two_machines(lab)
+    for plug in lab.cable(rig, RIG_AT, desk, DESK_AT):
+        plug.machine.ip("link", "set", plug.device, "mtu", str(mtu))
+    with Flight(tmp_path, rig, desk, **tls_links(make_keys(tmp_path)), duration_s=3.0) as flight:
+        upper, lower = flight.ended()
+    assert upper["digest_checks"] == 30
+    assert upper["desyncs"] == lower["desyncs"] == 0
+
+
+def test_a_peer_that_vanishes_without_a_word_is_noticed_within_the_lease(
+    lab: Lab, tmp_path: Path
+) -> None:
+    rig, desk = two_machines(lab)
+    cable = lab.bad_cable(rig, RIG_AT, desk, DESK_AT, delay_s=0.0, loss=0.0)
+    links = tls_links(make_keys(tmp_path))
+    patience = ("--set", "link.peer_timeout_s=3")
+    with Flight(tmp_path, rig, desk, **links, duration_s=12.0, settings=patience) as flight:
+        flight.wait_until_flying()
+        # From here on every packet is dropped, those that would end the connection included.
+        cable.loss = 1.0
+        cut_s = flight.rig.status["time_s"]
+        (rig_code, _), (desk_code, _) = flight.rig.ended(), flight.desk.ended()
+    assert rig_code == desk_code == ExitCode.LINK_LOST, flight.rig.said + flight.desk.said
+    recording = Recording(tmp_path / "rig" / "transmitter.mcap")
+    events = [(time_ns / 1e9, str(row)) for time_ns, row in recording.rows("event")]
+    gone = [at for at, text in events if "the receiver is gone" in text and at >= cut_s]
+    assert gone
+    assert gone[0] - cut_s < LEASE_MS / 1e3 + 1.0
+    ticks = [row for _, row in recording.rows("tick")]
+    # Hold, ramp, safe: watchdog and ramp are 0.5 s and 1 s, and a status is up to 0.2 s old.
+    safe_from = cut_s + 0.5 + 1.0 + 0.5
+    late = [row["applied_volts"] for row in ticks if row["tick"] * 0.01 > safe_from]
+    assert late
+    assert all(volts == [0.0, 0.0] for volts in late)
+
+
+@pytest.mark.parametrize("expiring", ["rig", "desk"])
+def test_a_certificate_that_expires_in_flight_ends_it_and_is_named(
+    expiring: str, tmp_path: Path
+) -> None:
+    keys = tmp_path / "keys"
+    create_authority(keys)
+    days = {"rig": 1.0, "desk": 1.0, expiring: 12.0 / 86_400.0}
+    add_node(keys, "rig", NodeRole.TRANSMITTER, (), days["rig"])
+    add_node(keys, "desk", NodeRole.RECEIVER, ("127.0.0.1",), days["desk"])
+    at = free_endpoint().replace("tcp/", "tls/")
+    common = ("--set", "link.peer_timeout_s=4")
+    desk_link = ["--keys", str(keys / "desk"), "--peer", "rig", "--listen", at]
+    rig_link = ["--keys", str(keys / "rig"), "--peer", "desk", "--connect", at]
+    desk = End("receive", desk_link, tmp_path / "desk", *common, draws=False)
+    rig = End("transmit", rig_link, tmp_path / "rig", *common, "--duration", "25", draws=False)
+    try:
+        wait_for(lambda: rig.flies and desk.flies, lambda: f"{rig.said} {desk.said}")
+        started = time.monotonic()
+        ends: dict[str, tuple[int, dict[str, Any]]] = {"rig": rig.ended(), "desk": desk.ended()}
+    finally:
+        for end in (rig, desk):
+            if end.process.poll() is None:
+                end.kill()
+    assert time.monotonic() - started < 40.0
+    assert {name: code for name, (code, _) in ends.items()} == {"rig": 4, "desk": 4}
+    said = {"rig": rig.said[-1], "desk": desk.said[-1]}
+    assert f"the certificate of {expiring} expired in flight" in said[expiring]
+    ticks = [row for _, row in Recording(tmp_path / "rig" / "transmitter.mcap").rows("tick")]
+    assert ticks[-1]["applied_volts"] == [0.0, 0.0]

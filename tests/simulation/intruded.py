@@ -1,0 +1,154 @@
+"""The world with company: an intruder on the line, and second receivers of the same flight.
+
+Every receiver hears all that goes up, and the transmitter all that comes down, as on one Zenoh key. A
+receiver that has ended (a second one is refused) is a process that has gone; the flight's own is
+started again after a second, by whoever looks after it.
+"""
+
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass
+
+from channel.line.impairments import ImpairedLine
+from receiver.endpoint import ReceiverEndpoint
+from receiver.session.session import Phase
+from tests.simulation.faults import FAULTY_S, Plan
+from tests.simulation.intruder import Intruder
+from tests.simulation.world import World
+
+START_AGAIN_NS = 1_000_000_000
+
+
+@dataclass(frozen=True)
+class Intrusion:
+    """What a seed asks of the company, until the faults stop."""
+
+    rate_hz: float = 0.0
+    """messages injected, evenly distributed in time, into one direction or the other"""
+    replayed_share: float = 0.5
+    """of these; the others are forged"""
+    seconds: tuple[tuple[int, int], ...] = ()
+    """when second receivers are there: (start, end), true time, ns"""
+
+
+def draw_intrusion(seed: int) -> Intrusion:
+    """Return the company of a seed; most of them have some."""
+    chance = random.Random(f"{seed} intrusion")
+    seconds = []
+    for _ in range(chance.choice((0, 1, 1, 2))):
+        start_ns = round(chance.uniform(0.0, FAULTY_S) * 1e9)
+        seconds.append((start_ns, start_ns + round(chance.uniform(0.5, 10.0) * 1e9)))
+    rate_hz = chance.choice((0.0, 0.5, 2.0, 10.0, 50.0))
+    return Intrusion(rate_hz, chance.choice((0.0, 0.5, 0.5, 1.0)), tuple(sorted(seconds)))
+
+
+class IntrudedWorld(World):
+    """One flight with company."""
+
+    def __init__(self, plan: Plan, intrusion: Intrusion) -> None:
+        super().__init__(plan)
+        self.intrusion = intrusion
+        self.intruder = Intruder(
+            random.Random(f"{plan.seed} intruder"), self.codec, self.terms, self.identity
+        )
+        self.rejoins_when_recovered = 0
+        self._second: ReceiverEndpoint | None = None
+        alphabet = self.codec.coder.alphabet
+        self._second_down = ImpairedLine(plan.down, alphabet, f"{plan.seed} second down")
+
+    @property
+    def recovery_ns_max(self) -> int:
+        """Return the bound of a flight that was alone, and what a forged answer costs beside it.
+
+        The transmitter has taken an epoch for begun in which nobody flies. It learns of that when its
+        watchdog has had enough, which counts from when the first command of that epoch was owed; then
+        it asks as ever.
+        """
+        wasted_ticks = 2 * self.terms.lead_ticks + self.plan.watchdog_ticks
+        wasted_ns = wasted_ticks * self.terms.tick_ns + self.plan.round_trip_ns
+        return super().recovery_ns_max + wasted_ns
+
+    def fly(self) -> IntrudedWorld:
+        """Fly as ever, in company until the faults stop."""
+        chance = self.intruder.chance
+        for _ in range(round(self.intrusion.rate_hz * FAULTY_S)):
+            self.at(round(chance.uniform(0.0, FAULTY_S) * 1e9), self._inject)
+        for start_ns, end_ns in self.intrusion.seconds:
+            self.at(start_ns, self._start_second)
+            self.at(end_ns, self._stop_second)
+        super().fly()
+        self.faults.update(self.intruder.counts)
+        return self
+
+    def _inject(self) -> None:
+        chance, intruder = self.intruder.chance, self.intruder
+        replay = chance.random() < self.intrusion.replayed_share
+        data = intruder.replayed() if replay else intruder.forged()
+        if data is None:
+            return
+        if chance.random() < 0.5:
+            super()._receive(data)
+            self._give_second(data)
+        else:
+            super()._take(data)
+
+    # What goes over the line, heard by all
+
+    def _receive(self, data: bytes | None) -> None:
+        if data is not None:
+            self.intruder.hear(data)
+        super()._receive(data)
+        self._give_second(data)
+        if self.endpoint is not None and self.endpoint.session.phase is Phase.ENDED:
+            self.faults["receivers that were refused"] += 1
+            self.endpoint = None
+            self.at(self.now_ns + START_AGAIN_NS, lambda: self._revive("receiver"))
+
+    def _take(self, data: bytes) -> None:
+        self.intruder.hear(data)
+        super()._take(data)
+
+    def _deadline_ns(self) -> int | None:
+        own = super()._deadline_ns()
+        second = None if self._second is None else self._second.session.next_deadline()
+        return own if second is None else second if own is None else min(own, second)
+
+    def _calm(self) -> None:
+        super()._calm()
+        self._stop_second()
+        if self.endpoint is None:
+            self.start_receiver()
+
+    def _plant_tick(self) -> None:
+        before = self.recovered_ns
+        super()._plant_tick()
+        if before is None and self.recovered_ns is not None:
+            self.rejoins_when_recovered = self.watch.rejoins
+
+    # The second receiver
+
+    def _start_second(self) -> None:
+        if self._second is not None or (self.calm_ns and self.now_ns >= self.calm_ns):
+            return
+        own, self.endpoint = self.endpoint, None
+        self.start_receiver()
+        self._second, self.endpoint = self.endpoint, own
+        self.faults["second receivers"] += 1
+
+    def _stop_second(self) -> None:
+        self._second = None
+
+    def _give_second(self, data: bytes | None) -> None:
+        second = self._second
+        if second is None:
+            return
+        messages = second.on_bytes(data, self.now_ns) if data is not None else []
+        messages += second.on_time(self.now_ns)
+        second.session.rest()
+        if second.session.phase is Phase.ENDED:
+            self._second = None
+        for message in messages:
+            for arrival_ns, out in self._second_down.carry(message, False, self.now_ns):
+                if out is not None:
+                    self.at(arrival_ns, lambda out=out: self._take(out))

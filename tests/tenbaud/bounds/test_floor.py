@@ -1,0 +1,143 @@
+"""The floor against its two closed forms, against physics, and against what it must refuse."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tenbaud.bounds.closed import (
+    DOUBLE_INTEGRATOR,
+    WIENER,
+    double_integrator_floor,
+    double_integrator_rate,
+    wiener_floor,
+)
+from tenbaud.bounds.floor import (
+    RateTooLow,
+    floor,
+    rate_for,
+    word_floor,
+)
+from tenbaud.bounds.linear import LinearModel, integrators, linear_model, pitch, sampled
+
+PENDULUM = linear_model([[0.0, 1.0], [7.3198**2, 0.0]], [[0.0, 0.0], [0.0, 1e-3]], [1.0, 0.0])
+
+
+def test_the_constants_are_those_of_the_literature() -> None:
+    assert round(WIENER, 3) == 0.721
+    assert round(DOUBLE_INTEGRATOR, 3) == 0.890
+    assert double_integrator_rate(2e-3, double_integrator_floor(2e-3, 17.0)) == pytest.approx(17.0)
+
+
+@pytest.mark.parametrize("rate", [0.5, 10.0, 400.0])
+def test_when_the_solver_meets_a_closed_form_then_they_agree(rate: float) -> None:
+    assert floor(integrators(1, 2e-3), rate) == pytest.approx(wiener_floor(2e-3, rate), rel=1e-8)
+    assert floor(integrators(2, 2e-3), rate) == pytest.approx(
+        double_integrator_floor(2e-3, rate), rel=1e-8
+    )
+
+
+def test_when_a_chain_is_longer_then_the_floor_falls_with_the_power_that_units_demand() -> None:
+    one, other = (floor(integrators(3, 0.5), rate) * rate**5 for rate in (3.0, 30.0))
+    assert one == pytest.approx(other, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("bits", "constant"), [(0.25, 0.896), (0.5, 0.917), (1.0, 1.010), (2.0, 1.541), (4.0, 6.044)]
+)
+def test_when_bits_come_in_words_then_the_double_integrator_pays_for_waiting(
+    bits: float, constant: float
+) -> None:
+    found = word_floor(integrators(2, 2e-3), bits, bits / 10.0) * 10.0**3 / 2e-3
+    assert found == pytest.approx(constant, abs=6e-4)
+
+
+def test_when_words_get_short_then_their_floor_is_that_of_the_flow() -> None:
+    model = pitch(2e-3)
+    assert word_floor(model, 0.01, 0.001) == pytest.approx(floor(model, 10.0), rel=1e-4)
+
+
+def test_when_one_state_has_words_then_the_scalar_formula_holds() -> None:
+    """P = (a^2 P + q) / 4 per one-bit word: the Gaussian rate-distortion function, step by step."""
+    model = linear_model([[-0.3]], [[2.0]], [1.0])
+    transition, noise = sampled(model, 0.5)
+    a, q = float(transition[0, 0]), float(noise[0, 0])
+    after = q / (4.0 - a * a)
+    times = np.linspace(0.0, 0.5, 2001)
+    grown = np.exp(-0.6 * times) * after + 2.0 * (1.0 - np.exp(-0.6 * times)) / 0.6
+    assert word_floor(model, 1.0, 0.5) == pytest.approx(
+        float(np.trapezoid(grown, times)) / 0.5, rel=1e-6
+    )
+
+
+def test_when_one_state_flows_then_the_scalar_formula_holds() -> None:
+    """R ln 2 = a + q / (2 P)."""
+    for a in (-2.0, 0.0, 3.0):
+        model = linear_model([[a]], [[0.7]], [1.0])
+        expected = 0.7 / (2.0 * (8.0 * math.log(2.0) - a))
+        if a < 0.0:
+            expected = min(expected, 0.7 / (-2.0 * a))
+        assert floor(model, 8.0) == pytest.approx(expected, rel=1e-8)
+
+
+def test_when_nearby_codes_are_tried_then_none_beats_the_floor() -> None:
+    """Any linear observation of the state is a code; its steady filter must stand above the floor."""
+    from scipy.linalg import solve_continuous_are
+
+    model = pitch(2e-3, stiffness_per_s2=4.0)
+    rng = np.random.default_rng(5)
+    gaps = []
+    for _ in range(60):
+        row = rng.normal(size=(1, 2)) * np.array([1.0, 0.2]) * np.exp(rng.uniform(2.0, 8.0))
+        covariance = solve_continuous_are(model.dynamics.T, row.T, model.noise, np.eye(1))
+        rate = 0.5 * float((row @ covariance @ row.T)[0, 0]) / math.log(2.0)
+        gaps.append(float(covariance[0, 0]) / floor(model, rate))
+    assert min(gaps) > 1.0 - 1e-7
+    assert min(gaps) < 1.3, "the trial codes came nowhere near, so this shows nothing"
+
+
+def test_when_bits_are_erased_then_the_floor_is_that_of_what_is_left() -> None:
+    model = integrators(2, 2e-3)
+    half = math.sqrt(floor(model, 10.0, erased=0.5) / floor(model, 10.0))
+    assert half == pytest.approx(0.5**-1.5, rel=1e-8)
+    assert word_floor(model, 1.0, 0.1, erased=0.3) == pytest.approx(
+        word_floor(model, 0.7, 0.1), rel=1e-9
+    )
+
+
+def test_when_a_plant_grows_then_the_floor_rises_without_bound_towards_the_needed_rate() -> None:
+    errors = [floor(PENDULUM, rate) for rate in (100.0, 20.0, 12.0, 10.6, 10.57)]
+    assert errors == sorted(errors)
+    assert errors[-1] > 100.0 * errors[-3]
+    assert word_floor(PENDULUM, 1.0, 1.0 / 12.0) > floor(PENDULUM, 12.0)
+
+
+@pytest.mark.parametrize("solve", [floor, lambda model, rate: word_floor(model, 1.0, 1.0 / rate)])
+def test_when_the_rate_is_too_low_then_the_error_says_what_is_needed(solve) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(RateTooLow, match=r"10 bit/s are too few.*more than 10\.56 bit/s"):
+        solve(PENDULUM, 10.0)
+
+
+def test_when_erasures_take_the_margin_then_the_error_names_them() -> None:
+    with pytest.raises(RateTooLow, match=r"12 bit/s, of which 50 % are lost, .*more than 21\.12"):
+        floor(PENDULUM, 12.0, erased=0.5)
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, math.nan, math.inf])
+def test_when_the_rate_is_no_rate_then_it_is_refused(rate: float) -> None:
+    with pytest.raises(ValueError, match="must be above 0"):
+        floor(integrators(1, 1.0), rate)
+
+
+def test_when_an_error_is_turned_into_a_rate_then_the_floor_there_is_that_error() -> None:
+    for model in (integrators(2, 2e-3), pitch(2e-2), PENDULUM):
+        rate = rate_for(model, 1e-6)
+        assert floor(model, rate) == pytest.approx(1e-6, rel=1e-5)
+
+
+def test_when_the_error_needs_no_bit_then_the_rate_is_the_least_there_is() -> None:
+    assert rate_for(linear_model([[-1.0]], [[1.0]], [1.0]), 10.0) < 1e-5
+    assert isinstance(PENDULUM, LinearModel)
+    assert rate_for(PENDULUM, 1e6) == pytest.approx(10.5602, rel=1e-3)

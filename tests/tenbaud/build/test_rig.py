@@ -1,0 +1,110 @@
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+import typer
+
+from tenbaud.build.flight import agree
+from tenbaud.build.rig import build_axes, build_rig, quarc_commands, quarc_fields
+from tenbaud.cli import options
+from tenbaud.config.load import ConfigError, dump_config, load_config
+from transmitter.rigs.dry import DryRig
+from transmitter.rigs.quarc import QuarcBridge
+from transmitter.rigs.serial_bridge import SerialBridge
+from transmitter.rigs.simulated import SimulatedRig
+
+
+def configured(rig: str, **changes: Any) -> Any:
+    values = options.overrides(rig=rig)
+    values["transmitter"].update(changes)
+    return load_config(None, None, values)
+
+
+@pytest.mark.parametrize("form", ["cobs", "ascii"])
+def test_a_serial_rig_is_named_by_its_format_and_port(form: str) -> None:
+    rig = build_rig(configured(f"{form}:/dev/ttyACM3"))
+    assert isinstance(rig, SerialBridge)
+    assert rig.name == f"{form} at /dev/ttyACM3"
+    assert rig.is_real
+    assert rig.ramps_down
+
+
+def test_a_quarc_rig_is_named_by_its_role_and_address() -> None:
+    client = build_rig(configured("quarc:10.0.0.5:18000"))
+    server = build_rig(configured("quarc-server:9095"))
+    assert isinstance(client, QuarcBridge)
+    assert (client.name, server.name) == (
+        "QUARC client at 10.0.0.5:18000",
+        "QUARC server at 127.0.0.1:9095",
+    )
+
+
+def test_setting_one_field_of_an_axis_keeps_its_others() -> None:
+    config = configured("cobs:X", bridge={"pitch": {"sign": -1}, "travel": {"zero_counts": 3}})
+    travel, pitch, elevation = build_axes(config)
+    assert (travel.channel, travel.counts_per_turn, travel.sign, travel.zero_counts) == (0, 8192, 1, 3)
+    assert (pitch.channel, pitch.counts_per_turn, pitch.sign) == (1, 4096, -1)
+    assert (elevation.channel, elevation.sign) == (2, -1)
+
+
+def test_a_dry_run_wraps_any_rig() -> None:
+    rig = build_rig(load_config(None, None, {"transmitter": {"dry_run": True}}))
+    assert isinstance(rig, DryRig)
+    rig.write(0, (5.0, -5.0))
+    reading = rig.read(100)
+    assert reading is not None
+    assert reading.applied_volts == (0.0, 0.0)
+    driven = SimulatedRig(rig._rig._plant, (), (0.0, 0.0))  # type: ignore[attr-defined]
+    assert driven._plant.state[2:] == (0.0, 0.0), "no voltage reached its motors"  # type: ignore[attr-defined]
+
+
+def test_quarc_vectors_follow_the_wiring() -> None:
+    config = configured(
+        "quarc:h:1",
+        bridge={"motors": {"channels": [1, 0]}, "elevation": {"channel": 4}},
+        quarc={"fields": ["seq", "elevation", "-", "pitch"], "command_fields": ["front", "enable"]},
+    )
+    assert quarc_fields(config) == ("seq", "c4", "-", "c1")
+    assert quarc_commands(config) == ("v1", "enable")
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"bridge": {"axes": ["travel"]}}, "pitch must be among them"),
+        ({"quarc": {"fields": ["travel"]}}, "the pitch is not among them"),
+        ({"quarc": {"fields": ["pitch", "height"]}}, "height"),
+    ],
+)
+def test_a_vector_or_wiring_without_the_pitch_is_refused(changes: dict[str, Any], text: str) -> None:
+    with pytest.raises(ConfigError, match=text):
+        build_rig(configured("quarc:h:1", **changes))
+
+
+def test_columns_that_make_no_sample_name_the_section() -> None:
+    with pytest.raises(ConfigError, match=r"transmitter\.serial: columns"):
+        build_rig(configured("ascii:X", serial={"port": "X", "format": "ascii", "columns": ["t_us"]}))
+
+
+def test_a_real_rig_has_no_virtual_clock() -> None:
+    with pytest.raises(ConfigError, match="--clock real"):
+        agree(configured("cobs:X"), "virtual")
+    assert agree(configured("cobs:X"), "real").clock == "real"
+
+
+def test_every_rig_setting_survives_the_config_file(tmp_path: Any) -> None:
+    config = configured("ascii:X", bridge={"pitch": {"zero_counts": "first"}, "stale_s": 0.2})
+    path = tmp_path / "config.toml"
+    path.write_text(dump_config(config))
+    assert load_config(None, path) == config
+
+
+def test_a_rig_does_not_change_what_both_ends_agree_on() -> None:
+    assert agree(configured("cobs:X"), "real").identity == agree(load_config(), "real").identity
+
+
+@pytest.mark.parametrize("rig", ["cobra:/dev/ttyACM0", "quarc:10.0.0.5", "cobs", "replay"])
+def test_when_a_rig_is_named_that_there_is_not_then_the_forms_are_shown(rig: str) -> None:
+    with pytest.raises(typer.BadParameter, match=r"cobs:PORT|quarc:HOST:PORT|replay:FILE"):
+        options.overrides(rig=rig)

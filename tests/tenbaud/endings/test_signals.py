@@ -1,0 +1,205 @@
+"""Signals at every stage of a command, and children that are killed."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tenbaud.build.flight import agree
+from tenbaud.config.load import load_config
+from tenbaud.flight import demo
+from tenbaud.flight.outcome import ExitCode, outcome_of_status
+from tenbaud.recording.folder import RunFolder
+from tests.tenbaud.endings.commands import nothing_half_is_left, processes_with
+from tests.tenbaud.processes import Ended, finish, start
+
+SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
+PATIENCE_S = 30.0
+FLIGHT = ("demo", "--clock", "real", "--duration", "60", "--mismatch", "0", "--out", "run")
+
+
+def _wait_for(met: Callable[[], bool]) -> None:
+    until = time.monotonic() + PATIENCE_S
+    while not met():
+        assert time.monotonic() < until
+        time.sleep(0.02)
+
+
+def _flies(folder: Path) -> bool:
+    recording = folder / "run" / "transmitter.mcap"
+    return recording.is_file() and recording.stat().st_size > 20_000
+
+
+STAGES: dict[str, Callable[[Path], bool]] = {
+    "at once": lambda _: True,
+    "first moments": lambda folder: (folder / "run").exists(),
+    "in flight": _flies,
+}
+
+
+def _stopped(ended: Ended, number: int) -> None:
+    """Assert that a command ended by a signal, in its own way or in the system's."""
+    assert ended.code in (ExitCode.INTERRUPTED, -number), (ended.code, ended.err)
+    assert "Traceback" not in ended.err, ended.err
+
+
+@pytest.mark.parametrize(
+    ("stage", "number"),
+    [
+        pytest.param(
+            stage,
+            number,
+            id=f"{stage}-{number.name}",
+            marks=() if (stage, number) in zip(STAGES, SIGNALS, strict=True) else pytest.mark.soak,
+        )
+        for stage in STAGES
+        for number in SIGNALS
+    ],
+)
+def test_a_demo_ends_with_all_its_processes(stage: str, number: int, tmp_path: Path) -> None:
+    process = start(*FLIGHT, cwd=tmp_path)
+    time.sleep(0.15)
+    _wait_for(lambda: STAGES[stage](tmp_path))
+    process.send_signal(number)
+    ended = finish(process)
+    _stopped(ended, number)
+    assert processes_with(str(tmp_path)) == []
+    if (tmp_path / "run").exists():
+        nothing_half_is_left(tmp_path)
+    if stage == "in flight":
+        summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+        assert summary["exit_code"] == ExitCode.INTERRUPTED
+        assert (tmp_path / "run" / "flight.png").stat().st_size > 1000
+
+
+LASTING: dict[str, tuple[str, ...]] = {
+    "transmit": ("transmit", "--listen", "tcp/127.0.0.1:0", "--out", "run"),
+    "receive": ("receive", "--listen", "tcp/127.0.0.1:0", "--out", "run"),
+    "receive --sessions": ("receive", "--sessions", "*", "--listen", "tcp/127.0.0.1:0", "--out", "run"),
+    "rig": ("rig", "--port", "pty:port"),
+    "router": ("router", "--listen", "tcp/127.0.0.1:0"),
+    "identify": ("identify", "--duration", "20000", "--out", "run"),
+    "figures": ("figures", "all", "--out", "run"),
+    "tune": ("tune", "--out", "found.toml", "--evaluations", "100000"),
+}
+WHEN_IT_WAITS = ("transmit", "receive", "rig")
+
+
+@pytest.mark.parametrize("number", SIGNALS, ids=lambda one: one.name)
+@pytest.mark.parametrize("after_s", [0.2, pytest.param(2.5, marks=pytest.mark.soak)])
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(one, marks=() if one in WHEN_IT_WAITS else pytest.mark.soak) for one in LASTING],
+)
+def test_a_lasting_command_ends(name: str, after_s: float, number: int, tmp_path: Path) -> None:
+    if name in WHEN_IT_WAITS and number is not signal.SIGTERM and after_s < 1.0:
+        pytest.skip("covered by the demo, which starts them")
+    process = start(*LASTING[name], cwd=tmp_path)
+    time.sleep(after_s)
+    process.send_signal(number)
+    ended = finish(process)
+    # A rig and a router end like this in the ordinary way.
+    assert ended.code in (ExitCode.INTERRUPTED, -number, 0), (ended.code, ended.err)
+    assert "Traceback" not in ended.err, ended.err
+    nothing_half_is_left(tmp_path)
+    assert not (tmp_path / "port").is_symlink(), "its port is left"
+
+
+def test_nohup_is_respected(tmp_path: Path) -> None:
+    code = "import signal; signal.signal(signal.SIGHUP, signal.SIG_IGN)\n"
+    code += "from tenbaud.cli.app import main; main()"
+    process = start(*FLIGHT, cwd=tmp_path, code=code)
+    _wait_for(lambda: _flies(tmp_path))
+    process.send_signal(signal.SIGHUP)
+    time.sleep(0.5)
+    assert process.poll() is None
+    process.send_signal(signal.SIGTERM)
+    assert finish(process).code == ExitCode.INTERRUPTED
+
+
+class _Killer:
+    """Sends a signal to one end of a demo once its transmitter has flown so far."""
+
+    def __init__(self, role: str, at_s: float, *numbers: int) -> None:
+        self.role, self.at_s, self.numbers = role, at_s, list(numbers)
+        self.ends: dict[str, Any] = {}
+        self.at_end: list[int] = []
+
+    def on_status(self, status: dict[str, Any]) -> None:
+        if status["role"] == "transmitter" and (status["time_s"] or 0.0) >= self.at_s and self.numbers:
+            os.kill(self.ends[self.role].process.pid, self.numbers.pop(0))
+
+
+def _fly(
+    folder: Path, killer: _Killer, monkeypatch: pytest.MonkeyPatch, duration_s: float
+) -> demo.DemoResult:
+    made = demo._Child
+
+    def remembered(role: str, *rest: Any) -> Any:
+        killer.ends[role] = made(role, *rest)  # type: ignore[arg-type]
+        return killer.ends[role]
+
+    monkeypatch.setattr(demo, "_Child", remembered)
+    settings = {"duration_s": duration_s, "link": {"peer_timeout_s": 2.0}}
+    agreement = agree(load_config(None, None, settings), "real")
+    folder.mkdir()
+    return demo.fly_demo(agreement, RunFolder(folder), killer.on_status)
+
+
+@pytest.mark.parametrize("role", ["transmitter", "receiver"])
+def test_an_end_that_is_killed_in_flight_is_the_cause_that_is_named(
+    role: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    killer = _Killer(role, 1.0, signal.SIGKILL)
+    result = _fly(tmp_path / "run", killer, monkeypatch, 6.0)
+    assert result.code == ExitCode.LINK_LOST
+    assert result.messages[-1] == f"the {role} was killed by SIGKILL"
+    written = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert written["outcome"] == f"the {role} was killed by SIGKILL"
+    assert written["exit_code"] == ExitCode.LINK_LOST
+    nothing_half_is_left(tmp_path)
+
+
+def test_a_receiver_that_dies_late_does_not_cost_the_summary(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Stopped in the last moments it cannot end; it is killed when the transmitter has ended.
+    killer = _Killer("receiver", 1.75, signal.SIGSTOP)
+    waited = demo._wait
+
+    def wait(ends: Any, stop: Any) -> None:
+        ends[0].process.wait(PATIENCE_S)
+        ends[1].process.kill()
+        waited(ends, stop)
+
+    monkeypatch.setattr(demo, "_wait", wait)
+    result = _fly(tmp_path / "run", killer, monkeypatch, 2.0)
+    assert result.messages[-1] == "the receiver was killed by SIGKILL"
+    assert result.code in (ExitCode.FAILED, ExitCode.LINK_LOST)
+    written = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert written["digest_checks"] >= 15
+    assert written["exit_code"] == result.code
+
+
+@pytest.mark.parametrize(
+    ("status", "code", "text"),
+    [
+        (0, ExitCode.OK, "the flight is over"),
+        (-9, ExitCode.FAILED, "the receiver was killed by SIGKILL"),
+        (-11, ExitCode.FAILED, "the receiver was killed by SIGSEGV"),
+        (-64, ExitCode.FAILED, "the receiver was killed by SIGRTMAX"),
+        (-63, ExitCode.FAILED, "the receiver was killed by signal 63"),
+        (4, ExitCode.LINK_LOST, "the receiver ended with exit code 4"),
+        (120, ExitCode.FAILED, "the receiver ended with exit code 120"),
+    ],
+)
+def test_every_exit_status_is_an_outcome(status: int, code: ExitCode, text: str) -> None:
+    outcome = outcome_of_status("receiver", status)
+    assert (outcome.code, outcome.text) == (code, text)

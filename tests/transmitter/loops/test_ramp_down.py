@@ -1,0 +1,65 @@
+"""The way down after a flight, and the end of everything else."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from channel.codec.codec import Vector
+from channel.protocol.limits import CommandLimits
+from transmitter.guard import Guard, GuardSettings
+from transmitter.loops.ramp_down import Landing
+
+TICK_NS = 10_000_000
+RAMP_TICKS = 50
+
+
+def node(ramps_down: bool, volts: Vector = (4.0, -2.0)) -> Any:
+    guard = Guard(CommandLimits(5.0), GuardSettings(50, RAMP_TICKS, (0.0, 0.0)))
+    guard.apply(0, volts)
+    written: list[Vector] = []
+    rig = SimpleNamespace(ramps_down=ramps_down, write=lambda _tick, value: written.append(value))
+    terms = SimpleNamespace(tick_ns=TICK_NS)
+
+    class Node:
+        latched = property(lambda self: guard.state.value == "latched")
+
+    one: Any = Node()
+    one.guard, one.rig, one.session, one.written = guard, rig, SimpleNamespace(terms=terms), written
+    return one
+
+
+def test_a_real_rig_goes_down_along_the_ramp_one_step_a_tick() -> None:
+    one = node(ramps_down=True)
+    landing = Landing(one, 100)
+    now_ns = 100 * TICK_NS
+    while not landing.over:
+        assert landing.next_ns == now_ns
+        landing.step(now_ns - 1)
+        landing.step(now_ns)
+        now_ns += TICK_NS
+    assert len(one.written) == RAMP_TICKS
+    fronts = [front for front, _ in one.written]
+    assert fronts == sorted(fronts, reverse=True)
+    assert fronts[0] == pytest.approx(4.0 * (1 - 1 / RAMP_TICKS))
+    assert one.written[-1] == (0.0, 0.0)
+
+
+def test_a_simulated_rig_is_left_as_it_is() -> None:
+    one = node(ramps_down=False)
+    landing = Landing(one, 100)
+    landing.step(10**12)
+    assert landing.over
+    assert one.written == []
+    assert not one.guard.stopped
+
+
+def test_ticks_that_were_missed_are_not_made_up_for() -> None:
+    one = node(ramps_down=True)
+    landing = Landing(one, 100)
+    landing.step(150 * TICK_NS)
+    landing.step(150 * TICK_NS)
+    assert len(one.written) == 1
+    assert landing.next_ns == 151 * TICK_NS

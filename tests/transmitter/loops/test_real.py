@@ -1,0 +1,168 @@
+"""Both real drivers over a memory link, in two threads: counts only, never times."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import pytest
+
+from channel.errors import ConfigMismatch, LinkLost
+from channel.line.line import Line
+from channel.line.shaper import SlotShaper, UplinkMeter
+from channel.line.uplink import Uplink
+from channel.line.virtual import Step, encode_step
+from channel.links.memory import MemoryLink, memory_pair
+from channel.protocol.identity import Identity
+from channel.protocol.limits import CommandLimits
+from channel.protocol.terms import Terms
+from plant_sim.encoder import Encoder
+from plant_sim.pitch import PitchParameters, PitchPlant
+from receiver.controllers.pid import PAPER_GAINS, Pid
+from receiver.controllers.references import Constant
+from receiver.endpoint import ReceiverEndpoint
+from receiver.loops.real import serve_real
+from receiver.session.session import Phase as ReceiverPhase
+from receiver.session.session import ReceiverSession
+from tests.channel.codec.parts import THREE_SIGNS, identity_of, pitch_codec, terms
+from transmitter.guard import Guard, GuardSettings
+from transmitter.loops.real import RealFlight
+from transmitter.metrics.scores import Scores
+from transmitter.node import TransmitterNode
+from transmitter.rigs.simulated import SimulatedRig
+from transmitter.session.session import Phase, TransmitterSession
+
+TICK_S = 0.005
+TICKS = 200
+CODEC = pitch_codec(THREE_SIGNS, ticks_per_sample=4, tick_s=TICK_S)
+# A generous allowance: a busy machine may hold up either thread, and counts must not depend on it.
+TERMS = terms(
+    tick_ns=5_000_000,
+    ticks_per_sample=4,
+    rate_baud=50.0,
+    deadline_allowance_ns=500_000_000,
+    downlink_budget_ns=0,
+    lead_ticks=100,
+    repeats=5,
+)
+IDENTITY = identity_of(CODEC)
+
+
+def flight_over(link: MemoryLink, some: Terms = TERMS, identity: Identity = IDENTITY) -> RealFlight:
+    session = TransmitterSession(CODEC, some, identity, 5)
+    plant = PitchPlant(PitchParameters(), TICK_S)
+    node = TransmitterNode(
+        session,
+        SimulatedRig(plant, (Encoder(4096),), (0.0, 0.0)),
+        Guard(CommandLimits(5.0), GuardSettings(400, 10, (0.0, 0.0))),
+        Scores(CODEC.model, 0, 1000, lambda _: None),
+    )
+    uplink = Uplink(SlotShaper(some), Line(some.symbol_delay_ns), UplinkMeter(CODEC.coder.alphabet))
+    return RealFlight(node, uplink, link)
+
+
+def endpoint() -> ReceiverEndpoint:
+    controller = Pid(PAPER_GAINS, Constant(0.5, TICK_S), TICK_S)
+    return ReceiverEndpoint(ReceiverSession(CODEC, TERMS, controller, IDENTITY, 77))
+
+
+class Service:
+    """The receiver's driver in a thread of its own; what it raised is kept."""
+
+    def __init__(self, end: ReceiverEndpoint, link: MemoryLink, **options: Any) -> None:
+        self.error: Exception | None = None
+        self.stop = threading.Event()
+        self._thread = threading.Thread(target=self._serve, args=(end, link), kwargs=options)
+
+    def _serve(self, end: ReceiverEndpoint, link: MemoryLink) -> None:
+        try:
+            serve_real(end, link, peer_timeout_s=20.0, should_stop=self.stop.is_set)
+        except Exception as error:
+            self.error = error
+
+    def __enter__(self) -> Service:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._thread.join(timeout=10.0)
+        self.stop.set()
+        self._thread.join(timeout=10.0)
+        assert not self._thread.is_alive()
+
+
+def test_when_a_flight_is_flown_in_real_time_then_every_sample_is_checked() -> None:
+    near, far = memory_pair()
+    flight, end = flight_over(near), endpoint()
+    node, session = flight._node, flight._node.session
+    with Service(end, far) as service:
+        flight.greet(peer_timeout_s=10.0)
+        assert session.phase is Phase.FLYING
+        ticks = flight.run(TICKS)
+        flight.finish(ticks, lambda: "landed")
+    assert service.error is None
+    assert ticks == TICKS
+    assert end.session.phase is ReceiverPhase.ENDED
+    assert "landed" in end.session.end_reason
+    # Whatever the machine did meanwhile, both ends have seen the same, and say so sample by sample.
+    checked = session.counts["digest_checks"]
+    assert checked == end.session.state.sample == session.copies.confirmed.sample
+    assert session.copies.confirmed == end.session.state
+    assert session.counts["desyncs"] == end.session.counts["desyncs"] == 0
+    assert session.counts["erasures"] == end.session.counts["erasures"]
+    meter = flight._uplink.meter
+    assert meter.symbols == end.session.meter.symbols <= TICKS // 4
+    assert meter.symbols + session.counts["words_missed"] + flight._uplink.shaper.refused >= TICKS // 4
+    assert flight.lateness.count == TICKS - flight.ticks_missed
+    assert flight.inlet.wire_bytes == end.wire_bytes_down
+    assert end.inlet.wire_bytes == meter.wire_bytes, "the farewell is counted too"
+    assert flight.inlet.malformed == end.inlet.malformed == 0
+    assert not node.latched
+
+
+def test_when_nobody_answers_then_greeting_ends_with_link_lost() -> None:
+    near, _ = memory_pair()
+    with pytest.raises(LinkLost, match="no receiver answered"):
+        flight_over(near).greet(peer_timeout_s=0.01)
+
+
+def test_when_the_configuration_differs_then_both_sides_know_and_nothing_flies() -> None:
+    near, far = memory_pair()
+    end = endpoint()
+    flight = flight_over(near, identity=identity_of(CODEC, {"rate_baud": 11.0}))
+    with Service(end, far) as service:
+        flight.greet(peer_timeout_s=10.0)
+    assert service.error is None
+    assert flight._node.session.phase is Phase.GREETING
+    assert "rate_baud: here 11.0, there 10.0" in str(flight._node.session.refusal)
+    assert "rate_baud" in str(end.session.refusal)
+    assert flight._uplink.meter.symbols == 0
+
+
+def test_when_a_real_service_is_stepped_virtually_then_it_says_so() -> None:
+    near, far = memory_pair()
+    near.send(encode_step(Step(1, 0, None)))
+    with pytest.raises(ConfigMismatch, match="virtual clock"):
+        serve_real(endpoint(), far, peer_timeout_s=5.0)
+
+
+def test_when_no_transmitter_comes_then_the_service_ends_with_link_lost() -> None:
+    _, far = memory_pair()
+    with pytest.raises(LinkLost, match="nothing came from a transmitter"):
+        serve_real(endpoint(), far, peer_timeout_s=0.01)
+
+
+def test_when_a_service_is_told_to_stop_then_it_returns() -> None:
+    _, far = memory_pair()
+    serve_real(endpoint(), far, peer_timeout_s=5.0, should_stop=lambda: True)
+
+
+def test_when_garbage_comes_in_greeting_then_it_is_counted_and_the_greeting_goes_on() -> None:
+    near, far = memory_pair()
+    flight, end = flight_over(near), endpoint()
+    far.send(b"garbage")
+    with Service(end, far):
+        flight.greet(peer_timeout_s=10.0)
+        flight.finish(0, lambda: "enough")
+    assert flight.inlet.malformed == 1
+    assert end.session.phase is ReceiverPhase.ENDED

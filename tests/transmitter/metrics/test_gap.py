@@ -1,0 +1,99 @@
+"""The gap gauge: it finds the push that is there, none where there is none, and the known ratios."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from channel.protocol.wire import DATAGRAM
+from tenbaud.build.ends import build_receiver
+from tenbaud.build.flight import agree
+from tenbaud.config.load import load_config
+from tenbaud.flight import transmit
+from tenbaud.flight.summary import transmitter_part
+from tests.channel.codec.parts import ListRecorder
+from transmitter.metrics.gap import GAP_CHANNEL, MEMORY_S, GapGauge, Limit, Running, StrengthMeter
+
+
+def fly(preset: str, seconds: float = 60.0, **changed: Any) -> tuple[dict[str, Any], ListRecorder]:
+    """Fly in memory; return the transmitter's summary and what it recorded."""
+    agreement = agree(load_config(preset, None, {"duration_s": seconds, **changed}), "virtual")
+    recorder = ListRecorder()
+    run = transmit.prepare(agreement, recorder, DATAGRAM)
+    outcome = transmit.fly_virtual(run, build_receiver(agreement, None, DATAGRAM), lambda: False)
+    return transmitter_part(run, outcome), recorder
+
+
+def pushed(density: float, mismatch: float = 0.0, seed: int = 3) -> dict[str, Any]:
+    plant = {"mismatch": mismatch, "disturbance": f"q={density}"}
+    return {"transmitter": {"plant": plant}, "seed": seed}
+
+
+@pytest.mark.parametrize(
+    ("preset", "density"), [("tuned-10baud", 2e-4), ("paper-10baud", 2e-3), ("tuned-10baud", 2e-2)]
+)
+def test_when_the_plant_is_pushed_then_the_density_is_found(preset: str, density: float) -> None:
+    found = [fly(preset, **pushed(density, seed=seed))[0] for seed in (1, 2)]
+    mean = sum(one["disturbance_rad2_per_s3"] for one in found) / len(found)
+    # Two minutes are some 120 spans that do not overlap: 13 % is one deviation.
+    assert mean == pytest.approx(density, rel=0.35)
+
+
+def test_when_nothing_pushes_then_there_is_nothing_to_compare() -> None:
+    summary, recorder = fly("paper-10baud", transmitter={"plant": {"mismatch": 0.0}})
+    assert summary["disturbance_rad2_per_s3"] is None
+    assert summary["rms_over_floor"] is None
+    rows = recorder.column("gap", "rms_over_floor")
+    assert len(rows) == 60
+    assert set(rows) == {None}
+
+
+def test_when_it_is_pushed_then_the_gauge_is_the_error_over_the_floor() -> None:
+    summary, recorder = fly("tuned-10baud", **pushed(2e-2))
+    floor_rad = (0.8897 * summary["disturbance_rad2_per_s3"] / 10.0**3) ** 0.5
+    assert summary["rms_over_floor"] == pytest.approx(
+        summary["error_live_rms_rad"] / floor_rad, rel=1e-3
+    )
+    # R^-1.5: what an ideal code needs for this error, of the 10 bit/s that were paid in the window.
+    paid = 10.0 * (summary["duration_s"] - summary["window_start_s"])
+    assert summary["ideal_bits"] == pytest.approx(
+        paid * summary["rms_over_floor"] ** (-2 / 3), rel=1e-3
+    )
+    assert 1.0 < recorder.column("gap", "rms_over_floor")[-1] < 5.0
+
+
+def test_when_a_flight_rejoins_then_the_estimate_is_not_thrown_off() -> None:
+    changed = pushed(2e-3)
+    changed["transmitter"]["sabotage"] = "sample=300,field=angle"
+    summary, _ = fly("tuned-10baud", **changed)
+    assert summary["rejoins"] == 1
+    assert summary["disturbance_rad2_per_s3"] == pytest.approx(2e-3, rel=0.5)
+
+
+def test_when_the_model_predicts_nothing_then_there_is_no_gauge() -> None:
+    summary, recorder = fly("usual-1000baud", seconds=1.5)
+    assert summary["rms_over_floor"] is None
+    assert not recorder.column(GAP_CHANNEL.topic, "sample")
+
+
+def test_when_nothing_has_pushed_at_all_then_there_is_no_gauge() -> None:
+    limit = Limit(1.0, lambda per_density: per_density)
+    codec = agree(load_config("tuned-10baud", None, {}), "virtual").codec
+    still = StrengthMeter(codec, 0.01, angle_step_rad=0.0)
+    still.squares.add(0.0)
+    assert still.value == 0.0
+    gauge = GapGauge(limit, still, codec.ticks_per_sample, 0.01)
+    gauge.on_error(0.1)
+    assert gauge.now is None
+
+
+def test_a_running_mean_forgets_and_the_whole_does_not() -> None:
+    running = Running(period_s=1.0)
+    assert running.recent is None
+    for _ in range(100):
+        running.add(0.0)
+    for _ in range(int(MEMORY_S)):
+        running.add(1.0)
+    assert running.whole == pytest.approx(20.0 / 120.0)
+    assert running.recent == pytest.approx(1.0 - 0.95**20)

@@ -1,0 +1,135 @@
+"""The transmitter's two copies of the codec.
+
+The *confirmed* copy advances on echoes only: what the receiver consumed, not what was sent. It alone
+is digested. While echoes are on their way the next symbol is formed on the *provisional* copy: the
+confirmed one carried on with the words sent and the commands known, a missing one taken to be like
+the last. A wrong guess there costs one poor bit and never lockstep, because the next echo replaces it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import NamedTuple
+
+from channel.codec.codec import Codec, CodecState, Vector
+from channel.codec.lead import FlownSample, fly_sample
+from channel.codec.words import ERASED, Word
+from channel.errors import CodecDiverged
+from channel.protocol.terms import Terms
+
+CANNOT_FLY = (CodecDiverged, ArithmeticError, LookupError, ValueError)
+"""What a copy raises in a state that it cannot go on from."""
+
+
+class Confirmed(NamedTuple):
+    """One sample that the receiver's echo has confirmed."""
+
+    sample: int
+    before: CodecState
+    word_sent: Word
+    word: Word
+    """as the receiver consumed it"""
+    flown: FlownSample
+    live: list[Vector | None]
+    """what the receiver had believed, in advance, of the sample's ticks; None for ticks below D"""
+    digest: int
+    """of our copy after the sample"""
+    peer_digest: int
+    """of the receiver's"""
+    lag_samples: int
+    """samples that had been sent beyond this one when its echo came"""
+
+
+class Copies:
+    """Confirmed and provisional copy, the words sent, and the commands that prediction needs."""
+
+    def __init__(self, codec: Codec, terms: Terms) -> None:
+        self.codec = codec
+        self.terms = terms
+        self.confirmed = codec.initial()
+        self._commands: deque[Vector] = deque([terms.initial_command] * terms.lead_ticks)
+        """of the ticks from the confirmed sample's first one on"""
+        self._sent: deque[Word] = deque()
+        """of the samples from the confirmed one on"""
+        self._provisional = self.confirmed
+        self._assumed: deque[tuple[Word, list[Vector]]] = deque()
+        """inputs that the provisional copy took for the samples since the confirmed one"""
+        self._last_command = terms.initial_command
+        self._live: deque[Vector | None] = deque([None] * terms.lead_ticks)
+
+    def restart(self, state: CodecState, hold: Vector) -> None:
+        """Take a new common state; the `D` ticks from its first one on have the command `hold`."""
+        self.confirmed = self._provisional = state
+        self._commands = deque([hold] * self.terms.lead_ticks)
+        self._last_command = hold
+        self._live = deque([None] * self.terms.lead_ticks)
+        self._sent.clear()
+        self._assumed.clear()
+
+    @property
+    def next_sample(self) -> int:
+        """Return the sample whose word is to be sent next."""
+        return self.confirmed.sample + len(self._sent)
+
+    @property
+    def lag_samples(self) -> int:
+        """Return how many samples have been sent and not yet confirmed."""
+        return len(self._sent)
+
+    def state_before_next(self) -> CodecState:
+        """Return the best guess at the codec state before `next_sample`."""
+        while self._provisional.sample < self.next_sample:
+            sample = self._provisional.sample
+            word = self._sent[sample - self.confirmed.sample]
+            commands = self._best_commands(sample)
+            self._assumed.append((word, commands))
+            self._provisional = self.codec.step(self._provisional, word, commands)
+        return self._provisional
+
+    def sent(self, word: Word) -> None:
+        """Note the word that was sent for `next_sample`; ERASED where none was."""
+        self._sent.append(word)
+
+    def confirm(self, word: Word, commands: list[Vector], peer_digest: int) -> Confirmed:
+        """Advance the confirmed copy by the echo of its next sample.
+
+        `commands` are those of ticks `kN + D ... (k+1)N + D - 1`.
+        """
+        before = self.confirmed
+        arriving = iter(commands)
+        flown = fly_sample(
+            self.codec, before, word, tuple(self._commands), lambda _tick, _state: next(arriving)
+        )
+        self._commands.extend(commands)
+        self._last_command = commands[-1]
+        self._live.extend(flown.live)
+        ticks = range(self.terms.ticks_per_sample)
+        taken = [self._commands.popleft() for _ in ticks]
+        live = [self._live.popleft() for _ in ticks]
+        lag = len(self._sent)
+        sent = self._sent.popleft() if self._sent else ERASED
+        self.confirmed = flown.state
+        self._keep_provisional(word, taken)
+        digest = self.codec.digest(flown.state)
+        return Confirmed(before.sample, before, sent, word, flown, live, digest, peer_digest, lag)
+
+    def _keep_provisional(self, word: Word, taken: list[Vector]) -> None:
+        """Start the provisional copy anew unless all that it assumed still stands."""
+        if self._assumed and self._assumed.popleft() == (word, taken):
+            first = self.confirmed.sample
+            if all(
+                commands == self._best_commands(first + index)
+                for index, (_, commands) in enumerate(self._assumed)
+            ):
+                return
+        self._assumed.clear()
+        self._provisional = self.confirmed
+
+    def _best_commands(self, sample: int) -> list[Vector]:
+        """Return the commands of a sample's ticks, the last known one where one is missing."""
+        count = self.terms.ticks_per_sample
+        start = (sample - self.confirmed.sample) * count
+        known = [
+            self._commands[index] for index in range(start, min(start + count, len(self._commands)))
+        ]
+        return known + [self._last_command] * (count - len(known))

@@ -1,0 +1,98 @@
+"""What the transmitter writes down."""
+
+from __future__ import annotations
+
+from channel.codec.codec import Codec
+from channel.protocol.frames import Desync
+from channel.protocol.lockstep import LOCKSTEP_CHANNEL, History
+from channel.protocol.recording import Field, RecordChannel, Recorder
+from channel.protocol.terms import Terms
+from transmitter.rigs.base import DeviceNote
+from transmitter.session.copies import Confirmed
+
+TICK_CHANNEL = RecordChannel(
+    "tick",
+    (
+        Field("tick", "integer", "", "index of the tick"),
+        Field("time_s", "number", "s", "flight time"),
+        Field("measured_rad", "numbers", "rad", "angles as the encoders give them"),
+        Field("true_rad", "numbers", "rad", "true angles, where the rig knows them"),
+        Field("commanded_volts", "numbers", "V", "command of this tick; null: it had not come"),
+        Field("applied_volts", "numbers", "V", "voltages put on the motors"),
+        Field("late", "boolean", "", "the command of this tick had not come"),
+        Field("lateness_ms", "number", "ms", "how late the tick began", timing=True),
+        Field("guard", "string", "", "state of the guard beside the motors"),
+    ),
+)
+
+DEVICE_CHANNEL = RecordChannel(
+    "device",
+    (
+        Field("tick", "integer", "", "index of the tick"),
+        Field("counts", "integers", "", "of every encoder channel of a real rig"),
+        Field("device_s", "number", "s", "the rig's own time since its first sample", timing=True),
+        Field("age_ms", "number", "ms", "how long ago the sample had arrived", timing=True),
+        Field("lost", "integer", "", "samples missing in the rig's sequence so far", timing=True),
+    ),
+)
+
+
+def device_row(tick: int, note: DeviceNote) -> tuple[object, ...]:
+    """Return the row of `DEVICE_CHANNEL` for what a rig said."""
+    return (tick, note.counts, note.device_s, note.age_ms, note.lost)
+
+
+ESTIMATE_CHANNEL = RecordChannel(
+    "estimate",
+    (
+        Field("tick", "integer", "", "index of the tick"),
+        Field("coded_state", "numbers", "", "codec's model state at that tick"),
+        Field("live_state", "numbers", "", "model state that the receiver believed of that tick"),
+    ),
+)
+
+SAMPLE_CHANNEL = RecordChannel(
+    "sample",
+    (
+        Field("sample", "integer", "", "index of the sample"),
+        Field("word_sent", "integers", "", "symbols sent; null: none"),
+        Field("word", "integers", "", "symbols as the receiver consumed them; null: erased"),
+        Field("range", "numbers", "rad", "range M of each axis before the word"),
+        Field("state", "numbers", "", "codec's model state after the sample"),
+        Field("coder", "numbers", "", "coder state after the sample"),
+        Field("digest", "string", "", "64-bit digest of the codec state after the sample"),
+        Field("peer_digest", "string", "", "the receiver's digest of the same sample"),
+        Field("lag_samples", "integer", "", "samples sent beyond it when its echo came", timing=True),
+    ),
+)
+
+
+def write_sample(recorder: Recorder, terms: Terms, codec: Codec, done: Confirmed) -> None:
+    """Write down a confirmed sample, and what was estimated at each of its ticks."""
+    first_tick = done.sample * terms.ticks_per_sample
+    state = done.flown.state
+    row = (
+        done.sample,
+        done.word_sent,
+        done.word,
+        codec.coder.ranges(done.before.coder),
+        state.model,
+        state.coder,
+        f"{done.digest:016x}",
+        f"{done.peer_digest:016x}",
+        done.lag_samples,
+    )
+    recorder.write(SAMPLE_CHANNEL, done.sample * terms.sample_ns, row)
+    for offset, (coded, live) in enumerate(zip(done.flown.coded, done.live, strict=True)):
+        tick = first_tick + offset
+        recorder.write(ESTIMATE_CHANNEL, tick * terms.tick_ns, (tick, coded, live))
+
+
+def write_failure(
+    recorder: Recorder, terms: Terms, history: History, own: Desync, peer_state: bytes
+) -> None:
+    """Write a lockstep failure down: when it is found, and once more with the receiver's state."""
+    row = history.failure_row(
+        own.epoch, own.sample, own.transmitter_digest, own.receiver_digest, peer_state
+    )
+    recorder.write(LOCKSTEP_CHANNEL, own.sample * terms.sample_ns, row)

@@ -1,0 +1,85 @@
+"""How the transmitter asks for a session: at the start, and again whenever lockstep is gone.
+
+A request has a number and is repeated every sample period, or every 10 ms if that is longer, until an
+answer with this number comes: both the request and its answer may be lost, late or doubled. Nothing of
+the codec's state travels up the link; the answer brings the state to start from.
+"""
+
+from __future__ import annotations
+
+from channel.codec.codec import Codec, CodecState, Vector
+from channel.protocol.frames import Echo, Hello, Welcome, Why
+from channel.protocol.identity import Identity
+from channel.protocol.limits import from_millivolts
+from channel.protocol.terms import Terms
+
+ASK_AGAIN_NS = 10_000_000
+"""Shortest time between two requests: a sample period may be shorter than the way to the receiver."""
+
+
+class Asking:
+    """The request that is open, and when it is to be repeated."""
+
+    def __init__(self, identity: Identity, incarnation: int, terms: Terms) -> None:
+        self._identity = identity
+        self._incarnation = incarnation
+        self._terms = terms
+        self._period_ticks = terms.ticks_per_sample * terms.samples_in(ASK_AGAIN_NS, 1)
+        self._request = 0
+        self._why = Why.START
+        self._next_tick = 0
+
+    @property
+    def why(self) -> Why:
+        """Return why the last request was made."""
+        return self._why
+
+    def begin(self, why: Why, tick: int) -> None:
+        """Open a new request; it is due at once."""
+        self._request += 1
+        self._why = why
+        self._next_tick = tick
+
+    def due(self, tick: int) -> bool:
+        """Return whether the request is to be sent at this tick, and count it as sent."""
+        if tick < self._next_tick:
+            return False
+        self._next_tick = tick + self._period_ticks
+        return True
+
+    def hello(self, session: int, epoch: int, tick: int) -> Hello:
+        """Return the request as asked at a tick; before tick 0 every sample can still be sent."""
+        return Hello(
+            self._incarnation,
+            self._identity.version,
+            self._identity.config_digest,
+            self._identity.numerics_probe,
+            self._request,
+            session,
+            epoch,
+            tick // self._terms.ticks_per_sample + 1,
+            self._why,
+        )
+
+    def is_answered_by(self, welcome: Welcome) -> bool:
+        """Return whether this is an answer to the last request."""
+        return (welcome.incarnation, welcome.request) == (self._incarnation, self._request)
+
+
+def start_of(welcome: Welcome, codec: Codec, terms: Terms) -> tuple[CodecState, Vector]:
+    """Return the common state of a Welcome within bounds, and the command to hold."""
+    hold = terms.initial_command
+    if welcome.hold_millivolts:
+        hold = from_millivolts(welcome.hold_millivolts)
+    if not welcome.state:
+        return codec.initial()._replace(sample=welcome.first_sample), hold
+    return codec.unpack(welcome.state), hold
+
+
+def commands_of(echo: Echo, ticks_per_sample: int) -> list[Vector]:
+    """Return the commands of an echo within bounds, one for each tick."""
+    inputs = len(echo.millivolts) // ticks_per_sample
+    return [
+        from_millivolts(echo.millivolts[index * inputs : (index + 1) * inputs])
+        for index in range(ticks_per_sample)
+    ]

@@ -1,0 +1,397 @@
+"""The sensor node's half of the protocol, without a socket, a clock or a thread.
+
+Three things drive it: a measurement (`on_measurement`, every tick), a frame that arrived
+(`on_frame`) and the question which command a tick has (`command`). The symbol of a slot depends on
+the measurement at its sample's first tick and on the provisional copy of the codec; the confirmed
+copy moves by echoes alone, and its digest is compared with the receiver's for every sample.
+
+When lockstep is gone (digests that differ, echoes lost or too old, a receiver that was restarted) no
+symbol leaves any more; the session asks for a new epoch, and goes on from the state in the answer.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from dataclasses import replace
+from enum import Enum
+
+from channel.codec.codec import Codec, Vector
+from channel.codec.words import ERASED
+from channel.protocol.audit_trail import EPOCH_CHANNEL, epoch_row
+from channel.protocol.bounds import Bounds, shown, within_text_bounds
+from channel.protocol.events import EVENT_CHANNEL, Event, EventKind, event_row
+from channel.protocol.frames import (
+    Bye,
+    Claim,
+    Commands,
+    Desync,
+    Echo,
+    ForeignVersion,
+    Frame,
+    Hello,
+    Refuse,
+    Symbol,
+    Unknown,
+    Welcome,
+    Why,
+)
+from channel.protocol.identity import Identity, differing_fields
+from channel.protocol.lockstep import History, difference_text
+from channel.protocol.recording import NullRecorder, Recorder
+from channel.protocol.terms import Terms
+from channel.protocol.wire import foreign_version_text
+from transmitter.session.copies import CANNOT_FLY, Confirmed, Copies
+from transmitter.session.echo_order import EchoOrder
+from transmitter.session.owing import Owing
+from transmitter.session.rate_observer import Sight
+from transmitter.session.records import write_failure, write_sample
+from transmitter.session.rejoin import Asking, commands_of, start_of
+from transmitter.session.takeover import Claims
+
+
+class Phase(Enum):
+    """Where the transmitter's session stands."""
+
+    GREETING = "waiting for a receiver"
+    FLYING = "flying"
+    REJOINING = "asking for a common state"
+    ENDED = "ended"
+
+
+class TransmitterSession:
+    """Turns measurements into symbols and echoes into commands; see the module's text.
+
+    `incarnation` is drawn by the caller (32 bits), so that the session itself stays deterministic.
+    `stop_on_desync`: end the flight at the first digest that differs, instead of rejoining.
+    `sight`: gives a coder that uses rates its measurements; None: one with the usual bandwidth.
+    `overtaking_ticks`: how long after a command frame one may come that was sent before it.
+    """
+
+    def __init__(
+        self,
+        codec: Codec,
+        terms: Terms,
+        identity: Identity,
+        incarnation: int,
+        recorder: Recorder | None = None,
+        *,
+        stop_on_desync: bool = False,
+        sight: Sight | None = None,
+        overtaking_ticks: int = 0,
+    ) -> None:
+        self.codec = codec
+        self.terms = terms
+        self.identity = identity
+        self.incarnation = incarnation
+        self.phase = Phase.GREETING
+        self.session_number = 0
+        self.epoch = 0
+        self.copies = Copies(codec, terms)
+        self.counts: Counter[str] = Counter()
+        """digest_checks, desyncs, rejoins, stale_frames, words_missed, erasures, claims_refused,
+        take_overs, out_of_bounds, diverged"""
+        self.rejoins_asked: Counter[Why] = Counter()
+        self.end_reason = ""
+        self.refusal: str | None = None
+        self.desync: Desync | None = None
+        """the last one"""
+        self._report_answered = False
+        self.heard_tick = 0
+        """when the receiver last told something new in the present epoch"""
+        self.epoch_tick = 0
+        """first tick of the present epoch"""
+        self.owing = Owing(terms)
+        self.confirmed: deque[Confirmed] = deque(maxlen=2 * terms.history_samples)
+        """samples confirmed and not yet written down (`take_confirmed`)"""
+        self.events: deque[Event] = deque(maxlen=1000)
+        self.history = History(codec, 2 * terms.history_samples)
+        self._asking = Asking(identity, incarnation, terms)
+        self._claims = Claims(terms)
+        self._bounds = Bounds(codec, terms, self.counts, self._tell)
+        self._stop_on_desync = stop_on_desync
+        self._echoes = EchoOrder(overtaking_ticks, terms.history_samples)
+        self._lag_samples_max = terms.history_samples
+        """Echoes may be this many samples behind before a rejoin is asked for."""
+        self._sight = (sight or Sight(codec.model, terms.tick_ns / 1e9)) if codec.uses_rates else None
+        self._recorder = recorder or NullRecorder()
+        self._due: deque[tuple[int, Vector]] = deque(
+            enumerate([terms.initial_command] * terms.lead_ticks)
+        )
+        """commands of coming ticks"""
+        self._tick = -1
+        self._command: Vector = terms.initial_command
+        """the last one given out"""
+
+    # What happens at a tick
+
+    def hello(self) -> Hello:
+        """Return the frame that asks for a session; to be repeated until there is one."""
+        return self._asking.hello(self.session_number, self.epoch, self._tick)
+
+    def on_measurement(self, tick: int, measurement: Vector) -> list[Frame]:
+        """Take the measurement of a tick; return the frames that leave with it.
+
+        These are the symbols of the sample that begins with it, or the request for a new epoch. A word
+        has a slot for each of its symbols; whoever sends them holds each until its slot. A tick that
+        was never seen, because the process was held up, sent no symbol: its sample's word counts as
+        not sent, and the next sample starts afresh.
+        """
+        self._tick = tick
+        if self._sight is not None:
+            measurement = self._sight.look(tick, measurement, self._command)
+        if self.phase is Phase.REJOINING:
+            return self._ask()
+        if self.phase is not Phase.FLYING:
+            return []
+        sample, offset = divmod(tick, self.terms.ticks_per_sample)
+        if sample - self.copies.confirmed.sample > self._lag_samples_max:
+            return self.rejoin(Why.LAG, f"no echo for {self._lag_samples_max} samples")
+        if frames := self._check_gap():
+            return frames
+        while self.copies.next_sample < sample:
+            self.counts["words_missed"] += 1
+            self.copies.sent(ERASED)
+        if offset != 0 or self.copies.next_sample != sample:
+            return []
+        try:
+            word = self.codec.encode(self.copies.state_before_next(), measurement)
+        except CANNOT_FLY as error:
+            return self._on_diverged(error)
+        self.copies.sent(word)
+        first = sample * self.terms.symbols_per_word
+        number = self.codec.coder.alphabet.symbol_number
+        here = (self.session_number, self.epoch)
+        return [Symbol(*here, slot, number(symbol)) for slot, symbol in enumerate(word, first)]
+
+    def rejoin(self, why: Why, text: str) -> list[Frame]:
+        """Stop sending symbols and ask for a new epoch; return the frames that do."""
+        if self.phase is not Phase.FLYING:
+            return []
+        self.phase = Phase.REJOINING
+        self.rejoins_asked[why] += 1
+        self._asking.begin(why, self._tick)
+        self._tell(EventKind.REJOIN, f"{text}: asking for a new epoch after {self.epoch}")
+        return self._ask()
+
+    def _ask(self) -> list[Frame]:
+        if not self._asking.due(self._tick):
+            return []
+        report = self.desync if self._asking.why is Why.DESYNC else None
+        return [self.hello()] if report is None else [report, self.hello()]
+
+    def command(self, tick: int) -> Vector | None:
+        """Return the command of this tick, None when it has not come; earlier ones are forgotten."""
+        while self._due and self._due[0][0] < tick:
+            self._due.popleft()
+        if not self._due or self._due[0][0] != tick:
+            return None
+        self._command = self._due[0][1]
+        return self._command
+
+    def take_confirmed(self) -> list[Confirmed]:
+        """Write the samples down that were confirmed since the last call, and return them.
+
+        It can wait until the next symbol has left.
+        """
+        taken = list(self.confirmed)
+        self.confirmed.clear()
+        for done in taken:
+            write_sample(self._recorder, self.terms, self.codec, done)
+        return taken
+
+    # What arrives
+
+    def on_frame(self, frame: Frame) -> list[Frame]:
+        """Take one frame; return the frames to send."""
+        frame = within_text_bounds(frame)
+        match frame:
+            case Commands() if self._is_current(frame.session) and frame.epoch == self.epoch:
+                return self._on_commands(frame)
+            case Welcome() if self._asking.is_answered_by(frame):
+                return self._on_welcome(frame)
+            case Unknown() if self._is_current(frame.session) and frame.epoch == self.epoch:
+                return self._on_unknown()
+            case Claim() if self._is_current(frame.session) and frame.epoch == self.epoch:
+                return self._on_claim(frame)
+            case Desync() if self._is_answer(frame):
+                self._report_answered = True
+                write_failure(self._recorder, self.terms, self.history, frame, frame.state)
+            case Refuse() if frame.incarnation == self.incarnation:
+                return self._on_refuse(frame)
+            case Bye() if self._has_session and frame.session == self.session_number:
+                self._end(f"the receiver ended the flight: {frame.reason}")
+            case ForeignVersion() if self.phase is Phase.GREETING:
+                self.refusal = foreign_version_text("receiver", frame.version)
+            case _:
+                self.counts["stale_frames"] += 1
+        return []
+
+    def bye(self, reason: str) -> list[Frame]:
+        """End the session from this side."""
+        had_session = self._has_session
+        self._end(reason)
+        return [Bye(self.session_number, reason)] if had_session else []
+
+    def _on_unknown(self) -> list[Frame]:
+        """Believe it of a receiver that has stopped commanding; refuse it of a second one."""
+        if self._claims.is_lost(self._tick, self.heard_tick):
+            return self.rejoin(Why.UNKNOWN, "the receiver does not know this session (any more)")
+        if not self._claims.is_second():
+            return []
+        self.counts["claims_refused"] += 1
+        reason = (
+            "the transmitter flies with another receiver and stays with it; to take the flight over on "
+            "purpose: tenbaud receive --take-over"
+        )
+        self._tell(EventKind.REFUSED, "a second receiver asked for this flight: refused")
+        return [Bye(0, reason)]
+
+    def _on_claim(self, claim: Claim) -> list[Frame]:
+        self._claims.name_successor(claim.by, self._tick)
+        return self.rejoin(Why.TAKEN_OVER, f"receiver session {claim.by:08x} takes over on purpose")
+
+    def _on_welcome(self, welcome: Welcome) -> list[Frame]:
+        newer = welcome.session == self.session_number and welcome.epoch > self.epoch
+        successor = self._claims.successor(self._tick)
+        foreign = successor is not None and welcome.session != successor
+        if foreign or self.phase is Phase.ENDED or (self.phase is Phase.FLYING and not newer):
+            self.counts["stale_frames"] += 1
+            return []
+        again = self.phase is not Phase.GREETING
+        if self._bounds.drops(self._bounds.of_welcome(welcome, self._sample if again else None)):
+            return []
+        state, hold = start_of(welcome, self.codec, self.terms)
+        farewell: list[Frame] = []
+        if successor is not None and welcome.session != self.session_number:
+            self.counts["take_overs"] += 1
+            farewell = [Bye(self.session_number, "another receiver has taken the flight over")]
+        self._claims.settle()
+        self.session_number = welcome.session
+        self.epoch = welcome.epoch
+        self.heard_tick = self._tick
+        self.copies.restart(state, hold)
+        self._echoes.clear()
+        self.epoch_tick = state.sample * self.terms.ticks_per_sample
+        held = self.owing.begin(self.epoch_tick, self._tick, self._asking.why)
+        self._due = deque(enumerate([hold] * held, self.epoch_tick))
+        self.phase = Phase.FLYING
+        begins_ns = state.sample * self.terms.sample_ns
+        self._recorder.write(EPOCH_CHANNEL, begins_ns, epoch_row(self.epoch, state, hold))
+        self.counts["rejoins"] += again
+        text = f"session {welcome.session:08x}, epoch {welcome.epoch}, begins at sample {state.sample}"
+        self._tell(EventKind.REJOIN if again else EventKind.STARTED, text)
+        return farewell
+
+    def _on_refuse(self, refuse: Refuse) -> list[Frame]:
+        if self.phase not in (Phase.GREETING, Phase.REJOINING):
+            return []
+        if self._claims.successor(self._tick) is not None:
+            # The present receiver has been asked too, and goes on instead.
+            self._claims.settle()
+            self._tell(EventKind.REFUSED, f"the receiver that takes over refused: {refuse.reason}")
+            return []
+        lines = [refuse.reason]
+        if refuse.config and refuse.config != self.identity.config:
+            lines += differing_fields(self.identity.config, refuse.config)
+        self.refusal = shown("\n  ".join(lines))
+        self._tell(EventKind.REFUSED, self.refusal)
+        if self.phase is Phase.REJOINING:
+            self._end(f"the receiver refused to go on: {refuse.reason}")
+        return [Bye(0, self.refusal)]
+
+    def _on_commands(self, frame: Commands) -> list[Frame]:
+        if frame.echoes[-1].sample < self.copies.confirmed.sample:
+            # A copy, or a recording: it brings nothing, and proves nobody alive.
+            self.counts["stale_frames"] += 1
+            return []
+        problem = self._bounds.of_commands(frame, self._sample, self.copies.next_sample)
+        if self._bounds.drops(problem):
+            return []
+        self.heard_tick = self._tick
+        self._claims.on_command()
+        self._echoes.add(frame.echoes, self.copies.confirmed.sample, self._tick, self._sample)
+        while (echo := self._echoes.take(self.copies.confirmed.sample)) is not None:
+            if frames := self._confirm(echo):
+                return frames
+        return self._check_gap()
+
+    def _check_gap(self) -> list[Frame]:
+        if not self._echoes.is_lost(expected := self.copies.confirmed.sample, self._tick):
+            return []
+        return self.rejoin(Why.GAP, f"the echo of sample {expected} never came, nor a repetition of it")
+
+    def _confirm(self, echo: Echo) -> list[Frame]:
+        """Advance the confirmed copy by one echo; return the report of a desync, if it is one."""
+        word = self.codec.coder.alphabet.word(echo.word_number)
+        commands = commands_of(echo, self.terms.ticks_per_sample)
+        try:
+            done = self.copies.confirm(word, commands, echo.digest)
+        except CANNOT_FLY as error:
+            return self._on_diverged(error)
+        self.confirmed.append(done)
+        self.history.add(self.epoch, word, done.flown.state)
+        self.counts["digest_checks"] += 1
+        self.counts["erasures"] += word is ERASED
+        if done.digest != echo.digest:
+            return self._on_desync(done)
+        # Only now: whoever does not hold the same state moves no motor.
+        self.owing.on_confirmed()
+        first_tick = echo.sample * self.terms.ticks_per_sample + self.terms.lead_ticks
+        self._due.extend(enumerate(commands, first_tick))
+        return []
+
+    def _on_desync(self, done: Confirmed) -> list[Frame]:
+        self.counts["desyncs"] += 1
+        self._report_answered = False
+        state = self.codec.pack(done.flown.state)
+        digests = (done.digest, done.peer_digest)
+        self.desync = Desync(self.session_number, self.epoch, done.sample, *digests, state)
+        self._tell(EventKind.DESYNC, difference_text(self.desync), done.sample)
+        write_failure(self._recorder, self.terms, self.history, self.desync, b"")
+        text = "the two copies of the codec disagree"
+        if self._stop_on_desync:
+            return [self.desync, *self.bye(text)]
+        return self.rejoin(Why.DESYNC, text)
+
+    def _on_diverged(self, error: Exception) -> list[Frame]:
+        """Ask for another state: the receiver flies on from its own, so this one is not the same."""
+        self.counts["diverged"] += 1
+        return self.rejoin(Why.LAG, f"this end's copy of the codec cannot go on ({error!r})")
+
+    # Reports
+
+    @property
+    def _sample(self) -> int:
+        """Return the sample that this end's clock stands in."""
+        return max(0, self._tick) // self.terms.ticks_per_sample
+
+    def _is_answer(self, frame: Desync) -> bool:
+        """Return whether this is the first answer to our last report: the same, with another state."""
+        own = self.desync
+        return own is not None and not self._report_answered and own == replace(frame, state=own.state)
+
+    def _is_current(self, session: int) -> bool:
+        return self.phase is Phase.FLYING and session == self.session_number
+
+    @property
+    def is_proven(self) -> bool:
+        """Return whether the confirmed state has been compared with the receiver's, and is equal."""
+        flown = self.copies.confirmed.sample * self.terms.ticks_per_sample > self.epoch_tick
+        return self.phase is Phase.FLYING and flown
+
+    @property
+    def _has_session(self) -> bool:
+        return self.phase in (Phase.FLYING, Phase.REJOINING)
+
+    def _end(self, reason: str) -> None:
+        if self.phase is not Phase.ENDED:
+            self.phase = Phase.ENDED
+            self.end_reason = reason
+            self._tell(EventKind.ENDED, reason)
+
+    def _tell(self, kind: EventKind, text: str, sample: int | None = None) -> None:
+        now_ns = self._tick * self.terms.tick_ns
+        at = self.copies.confirmed.sample if sample is None else sample
+        event = Event(kind, now_ns, at, text)
+        self.events.append(event)
+        self._recorder.write(EVENT_CHANNEL, now_ns, event_row(event))

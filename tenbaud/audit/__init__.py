@@ -1,1 +1,1 @@
-"""Whether a flight rested on its paid symbols alone: a table of claims over what both ends recorded."""
+"""What an audit checks: a table of claims, each of which owns the recorded fields that it verifies."""

@@ -1,4 +1,4 @@
-"""What an audit says to a person."""
+"""The outcome of an audit as text."""
 
 from __future__ import annotations
 

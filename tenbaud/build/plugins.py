@@ -16,8 +16,8 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
 
-from tenbaud.build.outside_code import require_allowed
 from tenbaud.config.load import ConfigError
+from tenbaud.config.outside_code import require_allowed
 from tenbaud.config.schema import FlightConfig
 
 Interface = Mapping[str, int | None]

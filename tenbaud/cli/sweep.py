@@ -24,10 +24,7 @@ def sweep(
     workers: Annotated[
         int | None,
         typer.Option(
-            min=1,
-            max=1024,
-            help="Processes on this machine; all cores if not given.",
-            show_default=False,
+            min=1, max=1024, help="Processes on this machine; default: all cores.", show_default=False
         ),
     ] = None,
     scheduler: Annotated[
@@ -40,7 +37,9 @@ def sweep(
     ] = None,
     allow_code: options.AllowCode = False,
     plots: Annotated[bool, typer.Option(help="Draw the plots.")] = True,
-    as_json: options.AsJson = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Summary on standard output as JSON, nothing else there.")
+    ] = False,
 ) -> None:
     """Fly a study: settings swept on a grid or sampled, many seeds, results as Parquet and plots.
 

@@ -46,8 +46,6 @@ def convert(run: Run, form: str, output: Path | None = None, overwrite: bool = F
     make_folder(target.parent)
     with whole_path(target) as part:
         write(run, part)
-    for layout in layouts:
-        layout.unlink(missing_ok=True)
     if layouts:
         flight_layouts(run, target)
     return sorted(target.iterdir()) if target.is_dir() else [target, *layouts]

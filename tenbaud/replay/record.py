@@ -9,7 +9,7 @@ from typing import Any
 from channel.codec.codec import CodecState, Vector
 from channel.codec.words import Word
 from tenbaud.build.flight import Agreement, agree
-from tenbaud.build.outside_code import require_allowed, require_regular_files
+from tenbaud.config.outside_code import require_allowed, require_regular_files
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.run import Run
 from tenbaud.recording.table import Tables

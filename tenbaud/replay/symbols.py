@@ -22,7 +22,7 @@ from typing import Any, Literal
 from channel.codec.codec import Codec, CodecState
 from channel.codec.words import ERASED, Alphabet, Word
 from tenbaud.build.flight import Agreement, agree
-from tenbaud.build.outside_code import require_allowed, require_regular_files
+from tenbaud.config.outside_code import require_allowed, require_regular_files
 from tenbaud.config.schema import FlightConfig
 from tenbaud.recording.errors import RecordingError
 from tenbaud.replay.record import Epoch, check_epoch

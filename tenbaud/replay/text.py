@@ -1,4 +1,4 @@
-"""What a replay says to a person."""
+"""The outcome of a replay as text."""
 
 from __future__ import annotations
 

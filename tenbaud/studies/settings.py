@@ -19,8 +19,8 @@ from pydantic import BaseModel
 
 from channel.errors import TenbaudError
 from tenbaud.build.codec import build_codec
-from tenbaud.build.outside_code import require_allowed
 from tenbaud.config.load import load_config
+from tenbaud.config.outside_code import require_allowed
 from tenbaud.config.schema import KINDS, FlightConfig
 
 

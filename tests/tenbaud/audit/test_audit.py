@@ -9,9 +9,9 @@ import pytest
 from tenbaud import Run
 from tenbaud.audit.audit import Audit, audit
 from tenbaud.recording.errors import RecordingError
+from tests.tenbaud.audit.doctor import Edit, Row, at, doctored
 from tests.tenbaud.flown import flown
 from tests.tenbaud.processes import run as run_command
-from tests.tenbaud.replay.doctor import Edit, Row, at, doctored
 
 MS = 1_000_000
 

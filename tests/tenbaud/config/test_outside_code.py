@@ -17,8 +17,8 @@ from tenbaud import Run
 from tenbaud.audit.audit import audit
 from tenbaud.build.ends import check_parts
 from tenbaud.build.flight import agree
-from tenbaud.build.outside_code import CodeNotAllowed, find_origin
 from tenbaud.config.load import ConfigError, load_config, nested
+from tenbaud.config.outside_code import CodeNotAllowed, find_origin
 from tenbaud.recording.convert import convert
 from tenbaud.recording.diff import compare_runs
 from tenbaud.recording.errors import RecordingError

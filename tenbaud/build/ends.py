@@ -23,6 +23,7 @@ from receiver.session.session import ReceiverSession
 from tenbaud.build.flight import Agreement, read_flight_log, ticks_of, watchdog_wanted_s
 from tenbaud.build.gauge import build_gauge
 from tenbaud.build.liveness import overtaking_ticks, watchdog_ticks
+from tenbaud.build.parts import Parts
 from tenbaud.build.plugins import build_plugin, is_plugin
 from tenbaud.build.rig import build_rig
 from tenbaud.config.load import ConfigError
@@ -141,10 +142,15 @@ def build_receiver(
     return ReceiverEndpoint(session, wire)
 
 
-def check_parts(config: FlightConfig) -> None:
-    """Build what can be wrong in files and texts, so that it is told before anything starts."""
-    build_rig(config)
-    build_controller(config)
+def check_parts(config: FlightConfig, parts: Parts | None = None) -> None:
+    """Build what can be wrong in files and texts, so that it is reported before anything starts.
+
+    `parts` are objects in place of what is configured; they are checked already.
+    """
+    parts = parts or Parts()
+    build_rig(config, parts.plant)
+    if parts.controller is None:
+        build_controller(config)
 
 
 def build_guard(agreement: Agreement) -> Guard:

@@ -19,7 +19,7 @@ from typing import Any
 from tenbaud.build.parts import PartError, check_part
 
 OBJECT = "object"
-"""The module in a kind that stands for an object, in the configuration of the flight it was given to."""
+"""The module in a kind that stands for an object, in the configuration of its flight."""
 
 
 def is_plugin(name: str) -> bool:

@@ -163,7 +163,8 @@ def _check(codec: Codec, terms: Terms, plant: Plant, controller: Controller) -> 
     """Raise PartError or ValueError for parts that do not make a flight."""
     if not isinstance(codec, Codec):
         raise PartError(
-            f"the codec ({type(codec).__name__}) is no Codec; give Codec(model, coder, ticks_per_sample)"
+            f"the codec ({type(codec).__name__}) is no Codec: give Codec(model, coder, "
+            "ticks_per_sample)"
         )
     Parts(codec.model, codec.coder, plant, controller).check()
     for name, ours, theirs in (

@@ -93,7 +93,7 @@ def result_of(
     events = sorted([*transmitter.events, *receiver.events], key=lambda event: event.time_ns)
     return FlightResult(
         ticks=ticks,
-        time_s=np.arange(ticks) * (terms.tick_ns / 1e9),
+        time_s=np.asarray(np.arange(ticks) * (terms.tick_ns / 1e9), dtype=np.float64),
         angles_rad=angles,
         measured_rad=_per_tick(up, "tick", "measured_rad", ticks, axes),
         reference_rad=_per_tick(down, "tick", "reference_rad", ticks, 1)[:, 0],

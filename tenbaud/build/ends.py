@@ -24,9 +24,10 @@ from tenbaud.build.flight import Agreement, read_flight_log, ticks_of, watchdog_
 from tenbaud.build.gauge import build_gauge
 from tenbaud.build.liveness import overtaking_ticks, watchdog_ticks
 from tenbaud.build.parts import Parts
-from tenbaud.build.plugins import build_plugin, is_plugin
+from tenbaud.build.plugins import build_plugin
 from tenbaud.build.rig import build_rig
 from tenbaud.config.load import ConfigError
+from tenbaud.config.outside_code import is_plugin
 from tenbaud.config.schema import FlightConfig, ReferenceSection
 from transmitter.guard import Guard, GuardSettings
 from transmitter.metrics.scores import Scores
@@ -184,6 +185,7 @@ def build_controller(config: FlightConfig, reference: Reference | None = None) -
             config.limits.initial_volts,
         )
         plugin: Controller = build_plugin(
+            config,
             "receiver.controller",
             section.controller,
             context,

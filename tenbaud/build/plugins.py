@@ -17,26 +17,29 @@ from importlib import import_module
 from typing import Any
 
 from tenbaud.build.parts import PartError, check_part
-
-OBJECT = "object"
-"""The module in a kind that stands for an object, in the configuration of its flight."""
-
-
-def is_plugin(name: str) -> bool:
-    """Return whether a kind names a class from outside."""
-    return ":" in name
-
-
-def object_kind(part: object) -> str:
-    """Return the kind that stands for an object in the configuration of its flight."""
-    return f"{OBJECT}:{type(part).__name__}"
+from tenbaud.config.outside_code import is_object, require_allowed
+from tenbaud.config.schema import FlightConfig
 
 
 def build_plugin(
-    field: str, name: str, context: object, options: Mapping[str, Any], protocol: type
+    config: FlightConfig,
+    field: str,
+    name: str,
+    context: object,
+    options: Mapping[str, Any],
+    protocol: type,
 ) -> Any:
-    """Return the object that `module:Class` builds; PartError if it is not what `field` needs."""
-    found = load_class(field, name)
+    """Return the object that `module:Class` builds; PartError if it is not what `field` needs.
+
+    CodeNotAllowed if nobody allowed the configuration's code to run.
+    """
+    require_allowed(config)
+    if is_object(name):
+        raise PartError(
+            f"{field} = {name!r} was an object in a program, and a recording does not keep objects: "
+            "run that program again, or name its class as module:Class"
+        )
+    found = _load_class(field, name)
     try:
         part = found(context, **options)
     except Exception as error:  # it is the user's code, and anything may be wrong in it
@@ -49,14 +52,9 @@ def build_plugin(
     return part
 
 
-def load_class(field: str, name: str) -> Any:
+def _load_class(field: str, name: str) -> Any:
     """Return what `module:Class` names; PartError, with a hint, if there is no such thing."""
     module_name, _, class_name = name.partition(":")
-    if module_name == OBJECT:
-        raise PartError(
-            f"{field} was an object of the class {class_name} in a program, and a recording does not "
-            "keep objects: run that program again, or name the class as module:Class."
-        )
     here = os.getcwd()
     if here not in sys.path:
         sys.path.insert(0, here)

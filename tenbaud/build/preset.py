@@ -35,7 +35,7 @@ def load_preset(name: str, settings: Mapping[str, Any] | None = None) -> Preset:
     `settings` are fields by their full names that are to differ, `{"transmitter.plant.mismatch": 0.1}`.
     Raises ConfigError for an unknown name, field or value.
     """
-    config = load_config(name, overrides=nested(settings or {}))
+    config = load_config(name, overrides=nested(settings or {}), allow_code=True)
     agreement = agree(config, "virtual")
     plant = build_plant(config, config.timing.tick_s)
     return Preset(config, agreement.codec, agreement.terms, plant, build_controller(config))

@@ -64,7 +64,7 @@ def fly(
     given = {"model": model, "coder": coder, "plant": plant, "controller": controller}
     names, parts = _names_and_objects(given, link)
     changes = nested({**(settings or {}), **names, "link.kind": link})
-    loaded = load_config(preset, None if config is None else Path(config), changes)
+    loaded = load_config(preset, None if config is None else Path(config), changes, allow_code=True)
     agreement = agree(loaded, clock, parts)
     check_parts(agreement.config, parts)
     folder = RunFolder(create_run_folder(None, loaded.preset, None if out is None else Path(out)))
@@ -78,7 +78,7 @@ def fly(
 def _names_and_objects(given: dict[str, Any], link: str) -> tuple[dict[str, str], Parts]:
     """Return the settings that name each part, and the parts that are objects, checked."""
     from tenbaud.build.parts import PartError, Parts
-    from tenbaud.build.plugins import object_kind
+    from tenbaud.config.outside_code import object_kind
 
     given = {name: part for name, part in given.items() if part is not None}
     objects = {name: part for name, part in given.items() if not isinstance(part, str)}

@@ -31,7 +31,7 @@ def is_plugin(kind: str) -> bool:
 
 
 def is_object(kind: str) -> bool:
-    """Return whether a kind stands for an object that a program gave to its flight: it names no code."""
+    """Return whether a kind stands for an object that a program gave to its flight: no code."""
     return kind.startswith(f"{OBJECT}:")
 
 

@@ -121,5 +121,12 @@ def _method_fault(part: object, name: str, takes: Sequence[str]) -> str:
     try:
         signature.bind(*takes)
     except TypeError:
-        return f"its method {name} must take {call}, not {signature}"
+        return f"its method {name} must take {call}, not {_plain(signature)}"
     return ""
+
+
+def _plain(signature: inspect.Signature) -> inspect.Signature:
+    """Return a signature without its annotations."""
+    empty = inspect.Signature.empty
+    parameters = [one.replace(annotation=empty) for one in signature.parameters.values()]
+    return inspect.Signature(parameters)

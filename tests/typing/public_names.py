@@ -39,7 +39,7 @@ def signals_of(run: Run) -> None:
     assert_type(run.symbol, Series)
     assert_type(run.gap_to_floor, Series)
     assert_type(run.time_s, Series)
-    run.pich  # type: ignore[attr-defined]
+    _ = run.pich  # type: ignore[attr-defined]
 
 
 def parts() -> MemoryFlight:

@@ -146,7 +146,7 @@ NOT_ONE = Codec(CartModel(), coders.ZoomCoder(coders.ZoomParameters()), 5)
         ({"controller": Mute()}, r"the controller \(Mute\) .* it has no method command\(tick, state\)"),
         ({"controller": Hasty()}, r"its method command must take \(tick, state\), not \(tick\)"),
         ({"controller": Damper}, r"is the class Damper; give an object of it, Damper\(\.\.\.\)"),
-        ({"plant": object()}, r"no attribute measured_rad \(tuple.*\); it has no method advance\(volts\)"),
+        ({"plant": object()}, r"no attribute measured_rad \(tuple.*\); it has no method adv"),
         ({"plant": TwoAngles()}, r"measures 2 angle\(s\) and the model \(CartModel\) predicts 1"),
         ({"codec": CartModel()}, r"\(CartModel\) is no Codec: give Codec\(model, coder, ticks"),
         ({"codec": GROWING}, "the number of states changed within a sample"),

@@ -9,7 +9,8 @@ import pytest
 from channel.codec.codec import Vector
 from channel.protocol.events import EventKind
 from channel.protocol.frames import Commands, Echo, Welcome
-from tests.channel.codec.parts import ListRecorder, identity_of, pitch_codec, terms
+from tenbaud import MemoryRecorder
+from tests.channel.codec.parts import identity_of, pitch_codec, terms
 from transmitter.guard import Guard, GuardSettings, GuardState
 from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode
@@ -41,7 +42,7 @@ class ScriptedRig(RigBase):
         self.written.append((tick, volts))
 
 
-def node_with(rig: ScriptedRig, recorder: ListRecorder | None = None) -> TransmitterNode:
+def node_with(rig: ScriptedRig, recorder: MemoryRecorder | None = None) -> TransmitterNode:
     session = TransmitterSession(CODEC, terms(), identity_of(CODEC), 5, recorder)
     guard = Guard(session.terms.limits, GuardSettings(20, 10, (0.0, 0.0), (1.0,)))
     scores = Scores(CODEC.model, 0, 640, lambda _: None)
@@ -127,7 +128,7 @@ def test_when_the_session_ends_then_the_voltage_is_taken_down_with_its_reason() 
 def test_when_the_sensor_or_the_angle_is_wrong_then_the_guard_trips_and_it_is_told(
     rig: ScriptedRig, text: str
 ) -> None:
-    recorder = ListRecorder()
+    recorder = MemoryRecorder()
     node = node_with(rig, recorder)
     for sample in range(5):
         fly_sample(node, sample)
@@ -154,12 +155,12 @@ def test_when_a_tick_is_actuated_before_it_was_measured_then_it_is_an_error() ->
 
 
 def test_when_a_row_is_recorded_then_commanded_and_applied_voltages_stand_side_by_side() -> None:
-    recorder = ListRecorder()
+    recorder = MemoryRecorder()
     node = node_with(ScriptedRig(), recorder)
     fly_sample(node, 0)
     node.measure(10)
     node.actuate(10)
-    rows = recorder.rows["tick"]
+    rows = recorder.topic("tick")
     assert [row["tick"] for row in rows] == list(range(11))
     assert rows[3]["commanded_volts"] == rows[3]["applied_volts"] == (2.0, -2.0)
     assert rows[10]["commanded_volts"] is None

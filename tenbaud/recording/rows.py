@@ -18,6 +18,7 @@ from channel.protocol.lockstep import LOCKSTEP_CHANNEL
 from channel.protocol.recording import Field, RecordChannel
 from receiver.session import records as receiver
 from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.old_events import OLD_EVENT_CHANNEL, filled, is_old
 from transmitter.metrics.gap import GAP_CHANNEL
 from transmitter.session import records as transmitter
 
@@ -33,8 +34,9 @@ KNOWN = (
     *(transmitter.TICK_CHANNEL, transmitter.SAMPLE_CHANNEL, transmitter.ESTIMATE_CHANNEL),
     *(transmitter.DEVICE_CHANNEL, receiver.TICK_CHANNEL, receiver.SAMPLE_CHANNEL, SENT_CHANNEL),
     *(ARRIVED_CHANNEL, EPOCH_CHANNEL, EVENT_CHANNEL, LOCKSTEP_CHANNEL, GAP_CHANNEL),
+    OLD_EVENT_CHANNEL,
 )
-"""What the two ends of this version write."""
+"""What the two ends of this version write, and of those before it what has changed."""
 
 NEVER_NULL = {
     ("epoch", "epoch"),
@@ -110,13 +112,15 @@ class RowDecoder:
         fields = channel.fields
         self._fields = [one for one in fields if names is None or one.name in names]
         self._count = 0
+        self._is_old = is_old(channel)
 
     def decode(self, texts: Sequence[bytes]) -> list[Row]:
         """Return the next rows; RecordingError for one that is not what the channel declares."""
         rows: list[Row] = []
         for start in range(0, len(texts), ROWS_AT_ONCE):
             some = texts[start : start + ROWS_AT_ONCE]
-            rows += self._checked(some)
+            checked = self._checked(some)
+            rows += map(filled, checked) if self._is_old else checked
             self._count += len(some)
         return rows
 

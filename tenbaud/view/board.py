@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import orjson
 
+from tenbaud.sentences import events
 from tenbaud.telemetry.schema import SCHEMA_VERSION
 
 POINTS_KEPT = 1200
@@ -97,7 +98,7 @@ class Board:
         else:
             self._on_receiver(message)
         for event in message["events"]:
-            row = [role, event["time_s"], event["kind"], event["text"]]
+            row = {"role": role, **event, "text": events.event_text(event)}
             self._events.append(row)
             self._fresh["events"].append(row)
 

@@ -97,9 +97,7 @@ class _EndMessage(_Message):
     phase: Literal["greeting", "waiting", "flying", "rejoining", "ended"] = Field(
         description="where the session stands"
     )
-    ending: str | None = Field(
-        None, description="how the session ended, by name; null: not yet"
-    )
+    ending: str | None = Field(None, description="how the session ended, by name; null: not yet")
     clock: Literal["real", "virtual"]
     takes_commands: bool = Field(description="whether the flight was started with control allowed")
     time_s: float = Field(description="flight time reached")

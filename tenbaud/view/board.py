@@ -44,7 +44,7 @@ class Board:
         self._points: deque[list[Any]] = deque(maxlen=POINTS_KEPT)
         self._decisions: deque[list[Any]] = deque(maxlen=POINTS_KEPT)
         self._samples: dict[int, list[Any]] = {}
-        self._events: deque[list[Any]] = deque(maxlen=EVENTS_KEPT)
+        self._events: deque[dict[str, Any]] = deque(maxlen=EVENTS_KEPT)
         self._news: deque[News] = deque(maxlen=NEWS_KEPT)
         self._index = 0
         self._fresh = self._nothing()

@@ -62,9 +62,7 @@ def example_frames() -> list[frames.Frame]:
         frames.Hello(9, "1", bytes(16), bytes(8), 3, 0x01020304, 5, 77, frames.Why.GAP),
         frames.Welcome(0x01020304, 5, 6, 0xDEADBEEF),
         frames.Welcome(0x01020304, 5, 6, 0xDEADBEEF, 3, (1500, -1500), bytes(range(40))),
-        frames.Refuse(
-            0xDEADBEEF, Ending.MISMATCH, "versions differ: 1 and \u00b5", '{"rate_baud": 10.0}'
-        ),
+        frames.Refuse(0xDEADBEEF, Ending.MISMATCH, "versions: 1 and \u00b5", '{"rate_baud": 10.0}'),
         frames.Symbol(0x01020304, 5, 0x0A0B0C0D, 1),
         frames.Symbol(0xFFFFFFFF, 0xFFFF, 0xFFFFFFFF, 0xFF),
         frames.Commands(0x01020304, 5, (echo,)),

@@ -10,6 +10,7 @@ import pytest
 from channel.errors import TenbaudError
 from channel.line.virtual import Step, encode_step
 from channel.links.endpoints import free_endpoint
+from channel.protocol.endings import Ending
 from channel.protocol.frames import Bye, Symbol, Unknown
 from channel.protocol.wire import decode, encode
 from receiver.loops.many import BURST_MESSAGES
@@ -82,7 +83,7 @@ def test_when_a_handshake_does_not_fit_then_it_is_refused_told_once_and_leaves_n
         other.put(encode(other.session.hello()))
         other.hear()
         for _ in range(5):
-            other.put(encode(Bye(0, "as I see it")))
+            other.put(encode(Bye(0, Ending.OVER, "as I see it")))
         good.fly(2)
     # The first is what it said of itself when it was refused.
     assert len([text for text in room.told if "as its transmitter sees it" in text]) == 1

@@ -7,6 +7,7 @@ import itertools
 import pytest
 
 from channel.codec.codec import Vector
+from channel.protocol.endings import End, Ending
 from channel.protocol.events import EventKind
 from channel.protocol.frames import Commands, Echo, Welcome
 from tests.channel.codec.parts import ListRecorder, identity_of, pitch_codec, terms
@@ -104,7 +105,7 @@ def test_when_the_session_ends_then_the_voltage_is_taken_down_with_its_reason() 
     rig = ScriptedRig()
     node = node_with(rig)
     fly_sample(node, 0)
-    node.session.bye("enough")
+    node.session.bye(End(Ending.OVER, "enough"))
     for tick in range(10, 20):
         node.measure(tick)
         node.actuate(tick)

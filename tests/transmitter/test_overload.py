@@ -12,6 +12,7 @@ from channel.line.line import Line
 from channel.line.shaper import SlotShaper, UplinkMeter
 from channel.line.uplink import Uplink
 from channel.links.memory import MemoryLink, memory_pair
+from channel.protocol.endings import End, Ending
 from channel.protocol.events import EventKind
 from channel.protocol.limits import CommandLimits
 from plant_sim.encoder import Encoder
@@ -80,7 +81,7 @@ def flown(rig: type[SimulatedRig], controller: ConstantController) -> RealFlight
         flight.greet(peer_timeout_s=10.0)
         flight.run(TICKS)
     finally:
-        flight.leave("the flight is over")
+        flight.leave(End(Ending.OVER, "the flight is over"))
         thread.join(timeout=20.0)
     assert not thread.is_alive()
     return flight

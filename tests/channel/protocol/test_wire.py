@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from channel.errors import FrameError
 from channel.protocol import wire
+from channel.protocol.endings import Ending
 from channel.protocol.frames import (
     Bye,
     Commands,
@@ -113,9 +114,9 @@ def test_when_a_whole_frame_is_of_another_version_then_it_is_told_and_not_read(v
         Symbol(0, 0, 0, 256),
         Symbol(0, 0, -1, 0),
         Welcome(0, 0, 2**32, 0),
-        Bye(0, "x" * 70_000),
-        Bye(0, "x" * 16_383),
-        Bye(0, "\ud800"),
+        Bye(0, Ending.OVER, "x" * 70_000),
+        Bye(0, Ending.OVER, "x" * 16_383),
+        Bye(0, Ending.OVER, "\ud800"),
         Commands(0, 0, (Echo(0, 0, 0, (32768,)),)),
         Commands(0, 0, (Echo(0, 0, 2**64, ()),)),
         Commands(0, 0, tuple(Echo(sample, 0, 0, ()) for sample in range(256))),
@@ -149,8 +150,8 @@ def test_when_a_frame_would_not_come_back_as_it_is_then_encoding_refuses(frame: 
 
 
 def test_when_the_longest_frame_is_encoded_then_it_is_decoded_and_one_byte_more_is_not() -> None:
-    room = wire.FRAME_BYTES_MAX - len(wire.encode(Bye(0, "")))
-    longest = Bye(0, "x" * room)
+    room = wire.FRAME_BYTES_MAX - len(wire.encode(Bye(0, Ending.OVER, "")))
+    longest = Bye(0, Ending.OVER, "x" * room)
     assert wire.decode(wire.encode(longest)) == longest
     with pytest.raises(ValueError, match="at most 16384 bytes"):
-        wire.encode(Bye(0, "x" * (room + 1)))
+        wire.encode(Bye(0, Ending.OVER, "x" * (room + 1)))

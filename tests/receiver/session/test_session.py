@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from channel.protocol import wire
+from channel.protocol.endings import End, Ending
 from channel.protocol.events import EventKind
 from channel.protocol.frames import (
     Bye,
@@ -82,7 +83,7 @@ def test_when_the_ends_differ_then_it_is_refused_and_said_in_what(
 def test_when_a_refused_transmitter_explains_itself_then_the_session_ends_with_both_views() -> None:
     session = receiver()
     session.on_frame(hello(version="2.0"), 0)
-    session.on_frame(Bye(0, "rate_baud: here 20, there 10"), 0)
+    session.on_frame(Bye(0, Ending.OVER, "rate_baud: here 20, there 10"), 0)
     assert session.phase is Phase.ENDED
     assert "versions differ" in str(session.refusal)
     assert "rate_baud: here 20, there 10" in str(session.refusal)
@@ -102,7 +103,7 @@ def test_when_a_second_transmitter_greets_then_it_is_refused_once_the_first_is_h
     for slot in (1, 2, 3):
         assert word_numbers(session.on_frame(symbol(slot), 100 * slot * MS)) == [1]
     (answer,) = session.on_frame(hello(PEER + 1), 310 * MS)
-    assert answer == Refuse(PEER + 1, "this receiver is flying with another", "")
+    assert answer == Refuse(PEER + 1, Ending.MISMATCH, "this receiver is flying with another", "")
     assert session.phase is Phase.FLYING
     assert session.refusal is None
     assert session.epoch == 0
@@ -112,7 +113,7 @@ def test_when_a_second_transmitter_greets_then_it_is_refused_once_the_first_is_h
 def test_when_a_second_transmitter_leaves_then_the_flight_goes_on() -> None:
     session = flying()
     session.on_frame(hello(PEER + 1), 0)
-    session.on_frame(Bye(0, "this receiver is flying with another"), 0)
+    session.on_frame(Bye(0, Ending.OVER, "this receiver is flying with another"), 0)
     assert session.phase is Phase.FLYING
 
 
@@ -136,7 +137,7 @@ def test_when_a_foreign_version_text_is_long_then_the_refusal_can_still_be_sent(
 
 def test_when_the_session_has_ended_then_a_greeting_is_refused_with_the_reason() -> None:
     session = flying()
-    session.bye("landed")
+    session.bye(End(Ending.OVER, "landed"))
     (answer,) = session.on_frame(hello(PEER + 1), 0)
     assert isinstance(answer, Refuse)
     assert "landed" in answer.reason
@@ -161,9 +162,9 @@ def test_when_the_transmitter_reports_a_desync_then_both_digests_are_told_and_it
 
 def test_when_the_transmitter_says_bye_then_the_flight_ends_with_its_reason() -> None:
     session = flying()
-    session.on_frame(Bye(SESSION + 1, "not me"), 0)
+    session.on_frame(Bye(SESSION + 1, Ending.OVER, "not me"), 0)
     assert session.phase is Phase.FLYING
-    session.on_frame(Bye(SESSION, "landed"), 0)
+    session.on_frame(Bye(SESSION, Ending.OVER, "landed"), 0)
     assert session.phase is Phase.ENDED
     assert "landed" in session.end_reason
 

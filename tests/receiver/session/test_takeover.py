@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from channel.protocol.endings import Ending
 from channel.protocol.frames import Bye, Claim, Symbol, Unknown
 from receiver.session.session import Phase
 from tests.receiver.session.sessions import SESSION, receiver
 
 FOREIGN = Symbol(99, 4, 1000, 1)
-REFUSAL = Bye(0, "the transmitter flies with another receiver")
+REFUSAL = Bye(0, Ending.OVER, "the transmitter flies with another receiver")
 
 
 def test_when_it_is_refused_then_it_ends_and_says_what_the_transmitter_said() -> None:

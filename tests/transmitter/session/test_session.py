@@ -10,6 +10,7 @@ import pytest
 from channel.codec.codec import Codec, CodecState, Vector
 from channel.codec.coders.zoom import ZoomCoder
 from channel.codec.words import ERASED, WIRE_ERASED, Word
+from channel.protocol.endings import End, Ending
 from channel.protocol.events import EventKind
 from channel.protocol.frames import (
     Bye,
@@ -93,7 +94,7 @@ def test_when_it_is_welcome_then_it_flies_in_that_session_and_epoch() -> None:
 def test_when_somebody_else_is_welcome_then_it_goes_on_waiting() -> None:
     session = transmitter()
     session.on_frame(Welcome(SESSION, 0, 0, INCARNATION + 1))
-    session.on_frame(Refuse(INCARNATION + 1, "no", ""))
+    session.on_frame(Refuse(INCARNATION + 1, Ending.MISMATCH, "no", ""))
     assert session.phase is Phase.GREETING
     assert session.refusal is None
     assert session.counts["stale_frames"] == 2
@@ -114,7 +115,7 @@ def test_when_it_has_not_been_welcomed_then_no_symbol_leaves() -> None:
 def test_when_it_is_refused_for_its_configuration_then_the_fields_are_named_to_both() -> None:
     session = transmitter()
     theirs = json.dumps({"rate_baud": 20.0})
-    (answer,) = session.on_frame(Refuse(INCARNATION, "the configuration differs", theirs))
+    (answer,) = session.on_frame(Refuse(INCARNATION, Ending.MISMATCH, "differs", theirs))
     assert isinstance(answer, Bye)
     assert answer.session == 0
     assert "rate_baud: here 10.0, there 20.0" in answer.reason
@@ -356,18 +357,18 @@ def test_when_several_digests_differ_in_one_frame_then_the_first_is_reported() -
 
 def test_when_either_side_says_bye_then_the_session_ends_once() -> None:
     session = flying()
-    assert session.on_frame(Bye(SESSION + 1, "not mine")) == []
+    assert session.on_frame(Bye(SESSION + 1, Ending.OVER, "not mine")) == []
     assert session.phase is Phase.FLYING
-    session.on_frame(Bye(SESSION, "tired"))
+    session.on_frame(Bye(SESSION, Ending.OVER, "tired"))
     assert session.phase is Phase.ENDED
     assert "tired" in session.end_reason
-    assert session.bye("me too") == []
+    assert session.bye(End(Ending.OVER, "me too")) == []
     assert "tired" in session.end_reason
 
 
 def test_when_it_says_bye_in_flight_then_the_receiver_is_told() -> None:
-    assert flying().bye("landed") == [Bye(SESSION, "landed")]
-    assert transmitter().bye("never flew") == []
+    assert flying().bye(End(Ending.OVER, "landed")) == [Bye(SESSION, Ending.OVER, "landed")]
+    assert transmitter().bye(End(Ending.OVER, "never flew")) == []
 
 
 def test_when_erasures_are_echoed_then_their_number_is_the_erased_one() -> None:

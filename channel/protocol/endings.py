@@ -52,11 +52,6 @@ class Ending(IntEnum):
         unknown._value_ = value
         return unknown
 
-    @property
-    def is_known(self) -> bool:
-        """Return whether this version knows what the number means."""
-        return self.value in Ending._value2member_map_
-
 
 @dataclass(frozen=True, slots=True)
 class End:

@@ -186,7 +186,9 @@ class ReceiverSession:
 
     def _on_hello(self, hello: Hello, now_ns: int) -> list[Frame]:
         if self.phase is Phase.ENDED:
-            return [Refuse(hello.incarnation, Ending.ALREADY_ENDED, "", "")]
+            return [
+                Refuse(hello.incarnation, Ending.ALREADY_ENDED, self.end.text if self.end else "", "")
+            ]
         if self._bounds.drops(self._bounds.of_hello(hello)):
             return []
         schedule = self._schedule if self._advanced else self._proven.schedule

@@ -1,6 +1,6 @@
 """One sentence for each event, from its fields as recordings and telemetry hold them.
 
-Only what shows something to a person calls this module and `endings`, and nothing reads what they return.
+Only what shows something to a person calls this module and `endings`; nothing reads what they return.
 Call them through the module (`events.event_text`), so that a test can replace every sentence.
 """
 

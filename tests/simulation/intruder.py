@@ -68,9 +68,7 @@ class Intruder:
             "symbol": self._symbol,
             "commands": self._commands,
             "desync": self._desync,
-            "bye": lambda: Bye(
-                self._number(self._session, U32), self._ending(), self._text()
-            ),
+            "bye": lambda: Bye(self._number(self._session, U32), self._ending(), self._text()),
             "unknown": lambda: Unknown(*self._flight()),
             "claim": lambda: Claim(*self._flight(), self._number(self._session, U32)),
         }

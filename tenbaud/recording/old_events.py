@@ -1,6 +1,6 @@
 """Events as recordings held them up to wire version 1: kind, sample and a sentence.
 
-The fields of today are taken from there, so that whoever reads an event need not know how old it is.
+The fields of today are filled from there, so that whoever reads an event need not know how old it is.
 The sentence stays, as `text`, for people.
 """
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
+from channel.protocol.events import EVENT_CHANNEL
 from channel.protocol.recording import Field, RecordChannel
 
 OLD_EVENT_CHANNEL = RecordChannel(
@@ -20,30 +21,34 @@ OLD_EVENT_CHANNEL = RecordChannel(
         Field("text", "string", "", "what happened"),
     ),
 )
+_FILLED = RecordChannel("event", (*EVENT_CHANNEL.fields, OLD_EVENT_CHANNEL.fields[-1]))
+_NOTHING = {field.name: None for field in _FILLED.fields}
 
-_BEGINS = re.compile(r"session ([0-9a-f]{8}), epoch (\d{1,5}), begins at sample (\d{1,10})")
-_DIFFERS = re.compile(r"sample (\d{1,10}): transmitter ([0-9a-f]{16}), receiver ([0-9a-f]{16})")
 _ASKED = "asking for a new epoch after"
+_BEGINS = re.compile(r"session ([0-9a-f]{8}), epoch (\d{1,5}), begins at sample \d")
+_DIFFERS = re.compile(r"transmitter ([0-9a-f]{16}), receiver ([0-9a-f]{16})")
 _GUARD = re.compile(r"guard (holding|ramping|latched|ready)")
 
 
-def is_old(channel: RecordChannel) -> bool:
-    """Return whether rows of this channel are events with a sentence instead of fields."""
-    names = {field.name for field in channel.fields}
-    return channel.topic == OLD_EVENT_CHANNEL.topic and "text" in names and "cause" not in names
+def of_today(channel: RecordChannel) -> RecordChannel:
+    """Return the channel as its rows will be read."""
+    return _FILLED if channel.fields == OLD_EVENT_CHANNEL.fields else channel
 
 
 def filled(row: dict[str, Any]) -> dict[str, Any]:
-    """Return an old event with the fields that its sentence gives."""
-    kind, text = row.get("kind"), row.get("text") or ""
+    """Return an event with the fields of today; one that has them as it is."""
+    if "text" not in row or "cause" in row:
+        return row
+    row = {**_NOTHING, **row}
+    kind, text = row["kind"], row["text"]
+    if not isinstance(text, str):
+        return row
     if kind == "rejoin" and _ASKED in text:
-        return {**row, "kind": "rejoin_asked"}
-    if kind in ("started", "rejoin") and (begins := _BEGINS.search(text)):
-        session, epoch, sample = begins.groups()
-        return {**row, "session": int(session, 16), "epoch": int(epoch), "sample": int(sample)}
-    if kind == "desync" and (differs := _DIFFERS.search(text)):
-        _, transmitter, receiver = differs.groups()
-        return {**row, "transmitter_digest": transmitter, "receiver_digest": receiver}
-    if kind == "guard" and (guard := _GUARD.match(text)):
-        return {**row, "state": guard.group(1)}
+        row["kind"] = "rejoin_asked"
+    elif kind in ("started", "rejoin") and (begins := _BEGINS.match(text)):
+        row["session"], row["epoch"] = int(begins[1], 16), int(begins[2])
+    elif kind == "desync" and (differs := _DIFFERS.search(text)):
+        row["transmitter_digest"], row["receiver_digest"] = differs[1], differs[2]
+    elif kind == "guard" and (guard := _GUARD.match(text)):
+        row["state"] = guard[1]
     return row

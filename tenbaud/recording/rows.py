@@ -18,7 +18,7 @@ from channel.protocol.lockstep import LOCKSTEP_CHANNEL
 from channel.protocol.recording import Field, RecordChannel
 from receiver.session import records as receiver
 from tenbaud.recording.errors import RecordingError
-from tenbaud.recording.old_events import OLD_EVENT_CHANNEL, filled, is_old
+from tenbaud.recording.old_events import OLD_EVENT_CHANNEL, filled
 from transmitter.metrics.gap import GAP_CHANNEL
 from transmitter.session import records as transmitter
 
@@ -112,15 +112,13 @@ class RowDecoder:
         fields = channel.fields
         self._fields = [one for one in fields if names is None or one.name in names]
         self._count = 0
-        self._is_old = is_old(channel)
 
     def decode(self, texts: Sequence[bytes]) -> list[Row]:
         """Return the next rows; RecordingError for one that is not what the channel declares."""
         rows: list[Row] = []
         for start in range(0, len(texts), ROWS_AT_ONCE):
             some = texts[start : start + ROWS_AT_ONCE]
-            checked = self._checked(some)
-            rows += map(filled, checked) if self._is_old else checked
+            rows += self._checked(some)
             self._count += len(some)
         return rows
 
@@ -135,6 +133,8 @@ class RowDecoder:
         if set(map(type, rows)) - {dict}:
             bad = next(index for index, row in enumerate(rows) if type(row) is not dict)
             raise self._error(bad, "is no JSON object")
+        if self._channel.topic == OLD_EVENT_CHANNEL.topic:
+            rows = [filled(row) for row in rows]
         for one in self._fields:
             self._check(one, rows)
         return rows  # type: ignore[no-any-return]

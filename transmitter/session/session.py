@@ -307,25 +307,21 @@ class TransmitterSession:
     def _on_refuse(self, refuse: Refuse) -> list[Frame]:
         if self.phase not in (Phase.GREETING, Phase.REJOINING):
             return []
+        refused = Event(EventKind.REFUSED, cause=refuse.ending, by_peer=True)
         successor = self._claims.successor(self._tick)
-        lines = [refuse.text]
-        if successor is None and refuse.config and refuse.config != self.identity.config:
-            lines += differing_fields(self.identity.config, refuse.config)
-        refusal = End(refuse.ending, shown("\n  ".join(lines)), by_peer=True)
-        self._tell(
-            Event(
-                EventKind.REFUSED,
-                session=successor,
-                cause=refusal.ending,
-                by_peer=True,
-                detail=refusal.text,
-            )
-        )
         if successor is not None:
             # The present receiver has been asked too, and goes on instead.
             self._claims.settle()
+            self._tell(replace(refused, session=successor, detail=refuse.text))
             return []
+        if self.phase is Phase.REJOINING and not self._asking.is_refused():
+            return []
+        lines = [refuse.text] if refuse.text else []
+        if refuse.config and refuse.config != self.identity.config:
+            lines += differing_fields(self.identity.config, refuse.config)
+        refusal = End(refuse.ending, shown("\n  ".join(lines)), by_peer=True)
         self.refusal = refusal
+        self._tell(replace(refused, detail=refusal.text))
         if self.phase is Phase.REJOINING:
             self._end(refusal)
         return [Bye(0, refusal.ending, refusal.text)]
@@ -335,7 +331,8 @@ class TransmitterSession:
             # A copy, or a recording: it brings nothing, and proves nobody alive.
             self.counts["stale_frames"] += 1
             return []
-        problem = self._bounds.of_commands(frame, self._sample, self.copies.next_sample)
+        sent = (self.copies.confirmed.sample, self.copies.next_sample)
+        problem = self._bounds.of_commands(frame, self._sample, *sent)
         if self._bounds.drops(problem):
             return []
         self.heard_tick = self._tick

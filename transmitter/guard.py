@@ -56,7 +56,7 @@ class GuardReason:
     axis: int | None = None
     value: float | None = None
     limit: float | None = None
-    count: int | None = None
+    number: int | None = None
     """ticks that were owed a command and had none"""
     detail: str | None = None
     """for people: what the sensor's device says"""
@@ -159,7 +159,7 @@ class Guard:
         if self.state is GuardState.RUNNING:
             self.state = GuardState.HOLDING
         if self._age_ticks > self._settings.timeout_ticks:
-            self.trip(GuardReason(GuardCause.TIMED_OUT, tick, count=self._age_ticks))
+            self.trip(GuardReason(GuardCause.TIMED_OUT, tick, number=self._age_ticks))
 
     def _ramp(self) -> None:
         self._ramp_tick += 1

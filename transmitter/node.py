@@ -214,7 +214,7 @@ class TransmitterNode:
                     axis=reason.axis,
                     value=reason.value,
                     limit=reason.limit,
-                    count=reason.count,
+                    number=reason.number,
                     detail=reason.detail,
                 )
             self.tell(event)

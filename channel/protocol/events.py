@@ -98,7 +98,7 @@ class Event:
     state: Enum | None = None
     by_peer: bool | None = None
     axis: int | None = None
-    count: int | None = None
+    number: int | None = None
     value: float | None = None
     limit: float | None = None
     missed_share: float | None = None
@@ -125,7 +125,7 @@ EVENT_CHANNEL = RecordChannel(
         Field("state", "string", "", "state of the guard"),
         Field("by_peer", "boolean", "", "whether the other end said so"),
         Field("axis", "integer", "", "measured axis"),
-        Field("count", "integer", "", "how many: samples without a symbol or echo, slots ahead, ticks"),
+        Field("number", "integer", "", "how many samples or ticks nothing came, or slots ahead"),
         Field("value", "number", "", "angle (rad), symbols per second, pace: what the cause is about"),
         Field("limit", "number", "", "what the value should keep to"),
         Field("missed_share", "number", "", "share of this process' ticks that it missed"),

@@ -162,8 +162,8 @@ class ReceiverSession:
             frames += self._settle(None, now_ns)
             if self._silent_slots >= self._gap_samples_max * self.terms.symbols_per_word:
                 self._schedule.anchor(None)
-                count = self._gap_samples_max
-                self._tell(Event(EventKind.PEER, cause=Presence.SILENT, count=count))
+                number = self._gap_samples_max
+                self._tell(Event(EventKind.PEER, cause=Presence.SILENT, number=number))
             deadline = self.next_deadline()
         return frames
 
@@ -290,7 +290,7 @@ class ReceiverSession:
         ahead = symbol.slot - self._slot
         if ahead > self._gap_samples_max * self.terms.symbols_per_word:
             self.counts["stale_frames"] += 1
-            self._tell(Event(EventKind.STALE, slot=symbol.slot, cause=Dropped.FAR_AHEAD, count=ahead))
+            self._tell(Event(EventKind.STALE, slot=symbol.slot, cause=Dropped.FAR_AHEAD, number=ahead))
             return [Unknown(symbol.session, symbol.epoch)]
         self._advanced = True
         self._silent_slots = 0

@@ -136,7 +136,7 @@ UNCLAIMED: tuple[Unclaimed, ...] = (
         "transmitter",
         "event",
         _all_fields("transmitter", "event")[2:],
-        "what an event says beyond its kind rests on nothing else; where the copy stood is in the samples",
+        "what an event says beyond its kind; where the confirmed copy stood is in the samples",
     ),
     Unclaimed(
         "transmitter",
@@ -148,7 +148,7 @@ UNCLAIMED: tuple[Unclaimed, ...] = (
         "receiver",
         "event",
         _all_fields("receiver", "event")[3:],
-        "what an event says beyond kind and sample rests on nothing else",
+        "what an event says beyond its kind and sample",
     ),
     Unclaimed(
         "transmitter",

@@ -71,7 +71,7 @@ class EventRow(NamedTuple):
     state: str | None
     by_peer: bool | None
     axis: int | None
-    count: int | None
+    number: int | None
     value: float | None
     limit: float | None
     missed_share: float | None

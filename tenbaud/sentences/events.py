@@ -91,14 +91,14 @@ def _rejoin_asked(one: Fields) -> str:
 def _lag(one: Fields) -> str:
     if one["detail"]:
         return f"this end's copy of the codec cannot go on ({one['detail']})"
-    return f"no echo for {one['count']} samples"
+    return f"no echo for {one['number']} samples"
 
 
 def _dropped(one: Fields) -> str:
     texts = {
         "settled": f"slot {one['slot']} was settled already: dropped",
         "past_deadline": f"slot {one['slot']} came after its deadline: dropped",
-        "far_ahead": f"slot {one['slot']} is {one['count']} ahead: dropped",
+        "far_ahead": f"slot {one['slot']} is {one['number']} ahead: dropped",
         "not_due": f"a symbol of slot ...{one['slot']} is not due: dropped",
         "out_of_bounds": f"dropped a frame that is out of bounds: {one['detail']}",
     }
@@ -113,7 +113,7 @@ def _guard_cause(one: Fields) -> str:
     axis, tick, value, limit = one["axis"], one["tick"], one["value"], one["limit"]
     match str(one["cause"]):
         case "timed_out":
-            return f"no command for {one['count']} ticks up to tick {tick}"
+            return f"no command for {one['number']} ticks up to tick {tick}"
         case "stopped":
             return endings.ending_text(Ending.STOPPED)
         case "session_ended":
@@ -144,7 +144,7 @@ def _peer(one: Fields) -> str:
     texts = {
         "gone": "the receiver is gone",
         "back": "the receiver is there again",
-        "silent": f"no symbol for {one['count']} samples: waiting for one",
+        "silent": f"no symbol for {one['number']} samples: waiting for one",
     }
     return texts[one["cause"]]
 
@@ -167,7 +167,7 @@ def _control(one: Fields) -> str:
     texts: dict[str, Callable[[], str]] = {
         "set_point": lambda: f"set-point {one['value']!r} rad",
         "follow": lambda: "follow the reference",
-        "pause": lambda: f"pause before tick {one['count']}",
+        "pause": lambda: f"pause before tick {one['number']}",
         "go_on": lambda: "go on",
         "pace": lambda: f"{one['value']!r} times real time",
         "impair": lambda: line_text(one["detail"] or ""),

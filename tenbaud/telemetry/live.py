@@ -83,14 +83,14 @@ class LiveTransmitter:
                 return _ignored("a real clock can be neither stopped nor paced")
             case Pause(paused=True):
                 self._pause_tick = self._next_sample_tick(tick)
-                return _by_hand(ByHand.PAUSE, count=self._pause_tick)
+                return _by_hand(ByHand.PAUSE, number=self._pause_tick)
             case Pause():
                 self._pause_tick = None
                 return _by_hand(ByHand.GO_ON)
             case Step(samples=samples):
                 per_sample = self._run.agreement.terms.ticks_per_sample
                 self._pause_tick = self._next_sample_tick(tick) + samples * per_sample
-                return _by_hand(ByHand.PAUSE, count=self._pause_tick)
+                return _by_hand(ByHand.PAUSE, number=self._pause_tick)
             case Pace(factor=factor):
                 self.pace, self._anchor = factor, None
                 return _by_hand(ByHand.PACE, value=factor)
@@ -221,9 +221,9 @@ def spoil(session: object, field: str, sample: int, arm: bool = True) -> Event:
 
 
 def _by_hand(
-    cause: ByHand, *, value: float | None = None, count: int | None = None, detail: str | None = None
+    cause: ByHand, *, value: float | None = None, number: int | None = None, detail: str | None = None
 ) -> Event:
-    return Event(EventKind.CONTROL, cause=cause, value=value, count=count, detail=detail)
+    return Event(EventKind.CONTROL, cause=cause, value=value, number=number, detail=detail)
 
 
 def _ignored(why: str) -> Event:

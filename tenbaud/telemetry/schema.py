@@ -71,7 +71,7 @@ class Happening(_Message):
     state: str | None = Field(None, description="of the guard")
     by_peer: bool | None = None
     axis: int | None = None
-    count: int | None = None
+    number: int | None = None
     value: float | None = None
     limit: float | None = None
     missed_share: float | None = None

@@ -36,7 +36,7 @@ def test_when_commands_stay_away_then_it_holds_then_ramps_then_latches() -> None
     latched = (SAFE, GuardState.LATCHED)
     assert walk == [held] * 3 + [(volts, GuardState.RAMPING) for volts in down] + [latched] * 3
     assert one.stopped
-    assert one.reason == GuardReason(GuardCause.TIMED_OUT, 4, count=4)
+    assert one.reason == GuardReason(GuardCause.TIMED_OUT, 4, number=4)
 
 
 def test_when_commands_come_back_in_time_then_it_runs_on_and_the_age_starts_anew() -> None:
@@ -67,7 +67,7 @@ def test_when_no_command_is_owed_then_the_last_one_is_held_and_does_not_age() ->
         assert one.apply(tick, None) == (1.0, 1.0)
     one.apply(53, None)
     assert one.state is GuardState.RAMPING
-    assert one.reason == GuardReason(GuardCause.TIMED_OUT, 53, count=4)
+    assert one.reason == GuardReason(GuardCause.TIMED_OUT, 53, number=4)
 
 
 def test_when_it_ramps_or_is_latched_then_no_command_passes_any_more() -> None:

@@ -148,7 +148,7 @@ class TransmitterSession:
             return []
         sample, offset = divmod(tick, self.terms.ticks_per_sample)
         if sample - self.copies.confirmed.sample > self._lag_samples_max:
-            return self.rejoin(Why.LAG, count=self._lag_samples_max)
+            return self.rejoin(Why.LAG, number=self._lag_samples_max)
         if frames := self._check_gap():
             return frames
         while self.copies.next_sample < sample:
@@ -171,7 +171,7 @@ class TransmitterSession:
         why: Why,
         sample: int | None = None,
         *,
-        count: int | None = None,
+        number: int | None = None,
         successor: int | None = None,
         detail: str | None = None,
     ) -> list[Frame]:
@@ -192,7 +192,7 @@ class TransmitterSession:
                 session=successor,
                 epoch=self.epoch,
                 cause=why,
-                count=count,
+                number=number,
                 detail=detail,
             )
         )

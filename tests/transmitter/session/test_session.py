@@ -209,7 +209,7 @@ def test_when_echoes_stay_away_then_slots_do_not_wait_until_a_rejoin_is_asked_fo
         sent += session.on_measurement(tick, (1.0,))
     assert session.phase is Phase.REJOINING
     asked = session.events[-1]
-    assert (asked.kind, asked.cause, asked.count) == (EventKind.REJOIN_ASKED, Why.LAG, HISTORY_SAMPLES)
+    assert (asked.kind, asked.cause, asked.number) == (EventKind.REJOIN_ASKED, Why.LAG, HISTORY_SAMPLES)
     symbols = [one for one in sent if isinstance(one, Symbol)]
     assert len(symbols) <= HISTORY_SAMPLES + 1
     requests = [one for one in sent if isinstance(one, Hello)]

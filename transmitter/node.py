@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from channel.codec.codec import Vector
-from channel.protocol.events import EVENT_CHANNEL, Event, EventKind, event_row
+from channel.protocol.events import Event, EventKind, write_event
 from channel.protocol.frames import Frame, Why
 from channel.protocol.recording import NullRecorder, Recorder
 from transmitter.encoder_watch import EncoderWatch
@@ -185,7 +185,7 @@ class TransmitterNode:
         time_ns = self.tick * self.session.terms.tick_ns
         event = replace(event, time_ns=time_ns, sample=self.session.copies.confirmed.sample)
         self.session.events.append(event)
-        self._recorder.write(EVENT_CHANNEL, time_ns, event_row(event))
+        write_event(self._recorder, event)
 
     def on_malformed(self, why: str) -> None:
         """Report a message that came and was no frame."""

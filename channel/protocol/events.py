@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from enum import Enum, StrEnum
 from typing import Any
 
-from channel.protocol.recording import Field, RecordChannel
+from channel.protocol.endings import End
+from channel.protocol.recording import Field, RecordChannel, Recorder
 
 
 class EventKind(StrEnum):
@@ -109,6 +110,14 @@ class Event:
     """for people: what a peer, a device, a plugin or an exception said"""
 
 
+ASKED = Event(EventKind.REJOIN_ASKED)
+
+
+def ended_event(end: End) -> Event:
+    """Return the event that reports the end of a session."""
+    return Event(EventKind.ENDED, cause=end.ending, by_peer=end.by_peer, detail=end.text or None)
+
+
 Tell = Callable[[Event], None]
 
 EVENT_CHANNEL = RecordChannel(
@@ -147,6 +156,11 @@ def event_row(event: Event) -> tuple[object, ...]:
         _hex(event.receiver_digest),
         event.detail,
     )
+
+
+def write_event(recorder: Recorder, event: Event) -> None:
+    """Record an event under its flight time."""
+    recorder.write(EVENT_CHANNEL, event.time_ns, event_row(event))
 
 
 def event_fields(event: Event) -> dict[str, Any]:

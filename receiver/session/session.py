@@ -21,7 +21,7 @@ from channel.line.shaper import BaudMeter
 from channel.links.serial.slot_finder import SlotFinder
 from channel.protocol.bounds import Bounds, within_text_bounds
 from channel.protocol.endings import End, Ending
-from channel.protocol.events import EVENT_CHANNEL, Dropped, Event, EventKind, Presence, event_row
+from channel.protocol.events import Dropped, Event, EventKind, Presence, ended_event, write_event
 from channel.protocol.frames import (
     Bye,
     Commands,
@@ -54,8 +54,7 @@ EPOCH_MAX = 0xFFFF
 class Phase(Enum):
     """Where the receiver's session stands."""
 
-    WAITING = "waiting"
-    """for a transmitter"""
+    WAITING = "waiting"  # for a transmitter
     FLYING = "flying"
     ENDED = "ended"
 
@@ -389,12 +388,11 @@ class ReceiverSession:
             self.phase = Phase.ENDED
             self.end = end
             self.rest()
-            detail = end.text or None
-            self._tell(Event(EventKind.ENDED, cause=end.ending, by_peer=end.by_peer, detail=detail))
+            self._tell(ended_event(end))
 
     def _tell(self, event: Event) -> None:
         at = self.state.sample if event.sample is None else event.sample
         flight_ns = self.state.sample * self.terms.sample_ns
         event = replace(event, time_ns=flight_ns, sample=at)
         self.events.append(event)
-        self._recorder.write(EVENT_CHANNEL, flight_ns, event_row(event))
+        write_event(self._recorder, event)

@@ -19,7 +19,7 @@ from dataclasses import replace
 
 from channel.line.impairments import ImpairedLine, parse_impairments
 from channel.links.base import Role
-from channel.protocol.events import EVENT_CHANNEL, ByHand, Event, EventKind, event_row
+from channel.protocol.events import ByHand, Event, EventKind, write_event
 from channel.protocol.recording import Recorder
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
 from receiver.controllers.steered import SteeredReference
@@ -199,7 +199,7 @@ class LiveReceiver:
         time_ns = sample * session.terms.sample_ns
         event = replace(event, time_ns=time_ns, sample=sample)
         session.events.append(event)
-        self._recorder.write(EVENT_CHANNEL, time_ns, event_row(event))
+        write_event(self._recorder, event)
 
 
 def spoil(session: object, field: str, sample: int, arm: bool = True) -> Event:

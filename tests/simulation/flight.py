@@ -11,6 +11,7 @@ from channel.codec.coders.zoom import ZoomParameters
 from channel.line.line import Line
 from channel.line.shaper import SlotShaper, UplinkMeter
 from channel.line.uplink import Uplink
+from channel.protocol.endings import End, Ending
 from channel.protocol.terms import Terms
 from channel.protocol.wire import DATAGRAM, Wire
 from plant_sim.encoder import Encoder
@@ -52,7 +53,7 @@ class Flight:
         """Greet, fly and finish; return the flight itself."""
         self.virtual.greet()
         self.ticks = self.virtual.run(round(seconds * 1e9 / self.transmitter.terms.tick_ns))
-        self.virtual.finish(self.ticks, lambda: "done")
+        self.virtual.finish(self.ticks, lambda: End(Ending.OVER))
         return self
 
     @property

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from channel.links.serial.wire import SerialWire
+from channel.protocol.endings import End, Ending
 from tests.channel.codec.parts import THREE_SIGNS
 from tests.simulation.flight import Flight, pitch_flight
 from tests.simulation.serial_lines import StreamLine
@@ -28,7 +29,7 @@ def fly_on(flight: Flight, samples: int) -> int:
     """Fly so many samples or to the end of the session; return how many were confirmed."""
     flight.virtual.greet()
     flight.ticks = flight.virtual.run(samples * flight.transmitter.terms.ticks_per_sample)
-    flight.virtual.finish(flight.ticks, lambda: "done")
+    flight.virtual.finish(flight.ticks, lambda: End(Ending.OVER))
     return flight.transmitter.copies.confirmed.sample
 
 

@@ -20,7 +20,7 @@ from channel.codec.words import ERASED
 from channel.protocol.audit_trail import EPOCH_CHANNEL, epoch_row
 from channel.protocol.bounds import Bounds, shown, within_text_bounds
 from channel.protocol.endings import End, Ending
-from channel.protocol.events import EVENT_CHANNEL, Event, EventKind, event_row
+from channel.protocol.events import ASKED, Event, EventKind, ended_event, write_event
 from channel.protocol.frames import (
     Bye,
     Claim,
@@ -53,11 +53,9 @@ from transmitter.session.takeover import Claims
 class Phase(Enum):
     """Where the transmitter's session stands."""
 
-    GREETING = "greeting"
-    """waiting for a receiver"""
+    GREETING = "greeting"  # waiting for a receiver
     FLYING = "flying"
-    REJOINING = "rejoining"
-    """asking for a common state"""
+    REJOINING = "rejoining"  # asking for a common state
     ENDED = "ended"
 
 
@@ -148,7 +146,7 @@ class TransmitterSession:
             return []
         sample, offset = divmod(tick, self.terms.ticks_per_sample)
         if sample - self.copies.confirmed.sample > self._lag_samples_max:
-            return self.rejoin(Why.LAG, number=self._lag_samples_max)
+            return self.rejoin(Why.LAG, replace(ASKED, number=self._lag_samples_max))
         if frames := self._check_gap():
             return frames
         while self.copies.next_sample < sample:
@@ -166,36 +164,14 @@ class TransmitterSession:
         here = (self.session_number, self.epoch)
         return [Symbol(*here, slot, number(symbol)) for slot, symbol in enumerate(word, first)]
 
-    def rejoin(
-        self,
-        why: Why,
-        sample: int | None = None,
-        *,
-        number: int | None = None,
-        successor: int | None = None,
-        detail: str | None = None,
-    ) -> list[Frame]:
-        """Stop sending symbols and ask for a new epoch; return the frames that do.
-
-        The rest is what the event says: the sample without an echo, how many samples had none, the
-        session that takes over, what an exception said.
-        """
+    def rejoin(self, why: Why, details: Event = ASKED) -> list[Frame]:
+        """Stop sending symbols and ask for a new epoch; return the frames that do."""
         if self.phase is not Phase.FLYING:
             return []
         self.phase = Phase.REJOINING
         self.rejoins_asked[why] += 1
         self._asking.begin(why, self._tick)
-        self._tell(
-            Event(
-                EventKind.REJOIN_ASKED,
-                sample,
-                session=successor,
-                epoch=self.epoch,
-                cause=why,
-                number=number,
-                detail=detail,
-            )
-        )
+        self._tell(replace(details, epoch=self.epoch, cause=why))
         return self._ask()
 
     def _ask(self) -> list[Frame]:
@@ -270,7 +246,7 @@ class TransmitterSession:
 
     def _on_claim(self, claim: Claim) -> list[Frame]:
         self._claims.name_successor(claim.by, self._tick)
-        return self.rejoin(Why.TAKEN_OVER, successor=claim.by)
+        return self.rejoin(Why.TAKEN_OVER, replace(ASKED, session=claim.by))
 
     def _on_welcome(self, welcome: Welcome) -> list[Frame]:
         newer = welcome.session == self.session_number and welcome.epoch > self.epoch
@@ -346,7 +322,7 @@ class TransmitterSession:
     def _check_gap(self) -> list[Frame]:
         if not self._echoes.is_lost(expected := self.copies.confirmed.sample, self._tick):
             return []
-        return self.rejoin(Why.GAP, expected)
+        return self.rejoin(Why.GAP, replace(ASKED, sample=expected))
 
     def _confirm(self, echo: Echo) -> list[Frame]:
         """Advance the confirmed copy by one echo; return the report of a desync, if it is one."""
@@ -378,12 +354,12 @@ class TransmitterSession:
         write_failure(self._recorder, self.terms, self.history, self.desync, b"")
         if self._stop_on_desync:
             return [self.desync, *self.bye(End(Ending.DESYNC))]
-        return self.rejoin(Why.DESYNC, done.sample)
+        return self.rejoin(Why.DESYNC, replace(ASKED, sample=done.sample))
 
     def _on_diverged(self, error: Exception) -> list[Frame]:
         """Ask for another state: the receiver flies on from its own, so this one is not the same."""
         self.counts["diverged"] += 1
-        return self.rejoin(Why.LAG, detail=repr(error))
+        return self.rejoin(Why.LAG, replace(ASKED, detail=repr(error)))
 
     # Reports
 
@@ -414,12 +390,11 @@ class TransmitterSession:
         if self.phase is not Phase.ENDED:
             self.phase = Phase.ENDED
             self.end = end
-            detail = end.text or None
-            self._tell(Event(EventKind.ENDED, cause=end.ending, by_peer=end.by_peer, detail=detail))
+            self._tell(ended_event(end))
 
     def _tell(self, event: Event) -> None:
         now_ns = self._tick * self.terms.tick_ns
         at = self.copies.confirmed.sample if event.sample is None else event.sample
         event = replace(event, time_ns=now_ns, sample=at)
         self.events.append(event)
-        self._recorder.write(EVENT_CHANNEL, now_ns, event_row(event))
+        write_event(self._recorder, event)

@@ -164,6 +164,6 @@ def test_when_garbage_comes_in_greeting_then_it_is_counted_and_the_greeting_goes
     far.send(b"garbage")
     with Service(end, far):
         flight.greet(peer_timeout_s=10.0)
-        flight.finish(0, lambda: "enough")
+        flight.finish(0, lambda: End(Ending.OVER))
     assert flight.inlet.malformed == 1
     assert end.session.phase is ReceiverPhase.ENDED

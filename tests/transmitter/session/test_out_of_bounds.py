@@ -82,7 +82,5 @@ def test_when_a_flight_is_refused_then_it_ends_at_the_third_refusal_of_a_request
 def test_when_a_refusal_is_longer_than_a_frame_then_the_answer_still_fits_one() -> None:
     session = transmitter()
     theirs = json.dumps({f"field {number}": number for number in range(600)})
-    (answer,) = session.on_frame(
-        Refuse(INCARNATION, Ending.MISMATCH, "the configuration differs", theirs)
-    )
+    (answer,) = session.on_frame(Refuse(INCARNATION, Ending.MISMATCH, "differs", theirs))
     encode(answer)

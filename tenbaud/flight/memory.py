@@ -11,6 +11,7 @@ from channel.line.impairments import LineFaults
 from channel.line.line import Line
 from channel.line.shaper import SlotShaper, UplinkMeter
 from channel.line.uplink import Uplink
+from channel.protocol.endings import End, Ending
 from channel.protocol.identity import Identity, numerics_probe
 from channel.protocol.recording import Recorder
 from channel.protocol.terms import Terms
@@ -25,6 +26,8 @@ from tenbaud.build.liveness import round_trip, watchdog_ticks
 from tenbaud.build.parts import PartError, Parts, check_codec
 from tenbaud.flight.memory_result import FlightResult, result_of
 from tenbaud.recording.memory import MemoryRecorder
+from tenbaud.sentences.endings import end_text, refusal_text
+from tenbaud.sentences.events import guard_text
 from transmitter.guard import Guard, GuardSettings
 from transmitter.loops.virtual import VirtualFlight
 from transmitter.metrics.scores import Scores
@@ -146,17 +149,23 @@ class MemoryFlight:
         self._flown = True
         self.loop.greet()
         if self.transmitter.refusal is not None:
-            raise ConfigMismatch(f"the receiver refused: {self.transmitter.refusal}")
+            raise ConfigMismatch(f"the receiver refused: {refusal_text(self.transmitter.refusal)}")
         if self.transmitter.phase is Phase.GREETING:
             raise LinkLost("no request for a session came through the line")
         flown = self.loop.run(ticks)
-        ended_by = "" if flown == ticks else self.transmitter.end_reason or self.node.guard.reason
-        self.loop.finish(flown, lambda: ended_by or "the flight is over")
+        ended_by = "" if flown == ticks else self._ended_by()
+        end = End(Ending.OVER) if flown == ticks else self.transmitter.end or End(Ending.SAFETY_STOP)
+        self.loop.finish(flown, lambda: end)
         self.receiver.rest()
         rows = (self.transmitter_rows, self.receiver_rows)
         return result_of(
             self.codec.model, self.terms, self.transmitter, self.receiver, rows, flown, ended_by
         )
+
+    def _ended_by(self) -> str:
+        """Return what ended a flight before its time, for people."""
+        end = self.transmitter.end
+        return guard_text(self.node.guard.reason) if end is None else end_text(end, "receiver")
 
 
 def _check(codec: Codec, terms: Terms, plant: Plant, controller: Controller) -> None:

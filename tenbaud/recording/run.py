@@ -32,6 +32,7 @@ from tenbaud.recording.folder import (
 )
 from tenbaud.recording.signals import SIGNALS, Signal, Source, TimeBase
 from tenbaud.recording.table import Series, Table, Tables, read_tables
+from tenbaud.sentences import events
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -192,9 +193,12 @@ class Run:
 
     @property
     def events(self) -> list[dict[str, Any]]:
-        """What both ends reported, in order of flight time; each with its `end`."""
+        """What both ends reported, in order of flight time: the fields recorded, `end` and `text`.
+
+        The text is a sentence made from the fields, for people.
+        """
         told = [
-            {"end": end, **row}
+            {"end": end, **row, "text": events.event_text(row)}
             for end in self.ends
             for row in (self.table(end, "event").rows if "event" in self.topics(end) else [])
         ]

@@ -14,9 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from channel.errors import FrameError
 from channel.line.line import Delivery
-from channel.protocol.frames import Frame, Symbol
 from tenbaud.build.ends import build_line
 from tenbaud.build.flight import Agreement
 from transmitter.loops.virtual import GREETINGS_MAX
@@ -81,31 +79,21 @@ def _arrays(
 
 
 def _linger_ns(agreement: Agreement) -> int:
-    """Return how long echoes are waited for after the last tick, as `VirtualFlight.finish` does."""
-    terms = agreement.terms
-    linger_ns = terms.uplink_delivery_ns + terms.symbol_delay_ns + terms.downlink_budget_ns
+    """Return how long echoes are waited for after the last tick, as a virtual flight does."""
     lines = (build_line(agreement, "up", _WIRE), build_line(agreement, "down", _WIRE))
-    return linger_ns + sum(line.longest_delay_ns for line in lines)
+    return agreement.terms.linger_ns(sum(line.longest_delay_ns for line in lines))
 
 
 class _NumberWire:
-    """A wire whose symbols are their numbers: enough for a line to flip one."""
+    """Symbols are their numbers: enough for a line to flip one."""
 
-    def encode(self, frame: Frame) -> bytes:
-        """Return a symbol's number."""
-        if not isinstance(frame, Symbol):
-            raise ValueError(f"{frame} is no symbol")
-        return bytes((frame.number,))
+    def is_symbol(self, data: bytes) -> bool:
+        """Return whether there is a number."""
+        return len(data) == 1
 
-    def decode(self, data: bytes) -> Frame:
-        """Return the symbol of a number."""
-        if len(data) != 1:
-            raise FrameError("no symbol")
-        return Symbol(0, 0, 0, data[0])
-
-    def size(self, data: bytes) -> int:
-        """Return the length."""
-        return len(data)
+    def renumbered(self, data: bytes, shift: int, kinds: int) -> bytes:
+        """Return another number."""
+        return bytes(((data[0] + shift) % kinds,))
 
 
 _WIRE = _NumberWire()
@@ -159,7 +147,7 @@ class _LineFlight:
             first = sample * terms.symbols_per_word
             for slot in range(first, first + terms.symbols_per_word):
                 leaves_ns = max(terms.slot_ns(slot), now_ns)
-                self._push_all(self._up.carry(b"\0", True, leaves_ns), slot, 0)
+                self._push_all(self._symbols(leaves_ns), slot, 0)
             self._pass_to(now_ns)
         self._pass_to((self._ticks - 1) * terms.tick_ns)
         last_ns = self._ticks * terms.tick_ns + _linger_ns(self._agreement)
@@ -168,21 +156,24 @@ class _LineFlight:
     def _greet(self) -> None:
         """Draw the chances of the handshake, which goes over the same lines."""
         for _ in range(GREETINGS_MAX):
-            pending = [
-                (one.arrival_ns, True) for one in self._up.carry(b"", False, 0) if one.data is not None
-            ]
+            pending = [(one.arrival_ns, True) for one in self._up.carry(b"", 0) if one.data is not None]
             met = False
             while pending:
                 pending.sort()
                 time_ns, upward = pending.pop(0)
                 if upward:
-                    answers = self._down.carry(b"", False, time_ns)
+                    answers = self._down.carry(b"", time_ns)
                     pending += [(one.arrival_ns, False) for one in answers if one.data is not None]
                 else:
                     met = True
             if met:
                 return
         raise Uncommon("no handshake gets through this line")
+
+    def _symbols(self, leaves_ns: int) -> list[Delivery]:
+        delay_ns = self._terms.symbol_delay_ns
+        carried = self._up.carry(b"\0", leaves_ns)
+        return [Delivery(arrival_ns + delay_ns, data) for arrival_ns, data in carried]
 
     def _push_all(self, deliveries: list[Delivery], slot: int, sample: int) -> None:
         for one in deliveries:
@@ -236,7 +227,7 @@ class _LineFlight:
             self._deadline_ns = self._terms.slot_ns(self._slot) + self._shift_ns
         sample, left = divmod(self._slot, self._terms.symbols_per_word)
         if left == 0:
-            self._push_all(self._down.carry(b"", False, now_ns), -1, sample - 1)
+            self._push_all(self._down.carry(b"", now_ns), -1, sample - 1)
 
     def _on_echo(self, arrival: _Arrival) -> None:
         """Take a frame of echoes up to `arrival.sample`; the older ones in it are repeats."""

@@ -16,7 +16,7 @@ import math
 import time
 from collections.abc import Callable
 
-from channel.line.impairments import ImpairedLine, parse_impairments
+from channel.line.impairments import impair, parse_impairments
 from channel.links.base import Role
 from channel.protocol.events import EVENT_CHANNEL, Event, EventKind, event_row
 from channel.protocol.recording import Recorder
@@ -104,9 +104,8 @@ class LiveTransmitter:
     def _impair(self, text: str) -> str:
         faults = parse_impairments(text)
         self.impairments = text
-        _set_faults(self._run.uplink.line, faults.up)
-        if self._virtual:
-            _set_faults(self._run.downlink, faults.down)
+        impair(self._run.uplink.line, faults.up)
+        impair(self._run.downlink, faults.down)
         if faults.up.raw or faults.down.raw:
             self._run.desyncs_asked = math.inf
         return line_text(text)
@@ -184,8 +183,7 @@ class LiveReceiver:
                 return "follow the reference" if angle_rad is None else f"set-point {angle_rad!r} rad"
             case Impair(text=text):
                 self.impairments = text
-                if isinstance(self._endpoint.downlink, ImpairedLine):
-                    _set_faults(self._endpoint.downlink, parse_impairments(text).down)
+                if impair(self._endpoint.downlink.line, parse_impairments(text).down):
                     return line_text(text)
             case Spoil(end="receiver", field=field):
                 return spoil(session, field, session.state.sample)[0]
@@ -221,8 +219,3 @@ def spoil(session: object, field: str, sample: int, arm: bool = True) -> tuple[s
 def line_text(text: str) -> str:
     """Return the words for what the line suffers from now on."""
     return f"the line suffers {text}" if text else "the line is clean"
-
-
-def _set_faults(line: object, impairments: object) -> None:
-    if isinstance(line, ImpairedLine):
-        line.impairments = impairments  # type: ignore[assignment]

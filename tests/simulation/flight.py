@@ -8,8 +8,8 @@ from typing import Any
 
 from channel.codec.codec import Codec, Vector
 from channel.codec.coders.zoom import ZoomParameters
-from channel.line.line import Line
-from channel.line.shaper import SlotShaper, UplinkMeter
+from channel.line.downlink import Downlink
+from channel.line.line import CleanLine, Line
 from channel.line.uplink import Uplink
 from channel.protocol.terms import Terms
 from channel.protocol.wire import DATAGRAM, Wire
@@ -22,6 +22,7 @@ from receiver.controllers.references import Square
 from receiver.endpoint import ReceiverEndpoint
 from receiver.session.session import ReceiverSession
 from tests.channel.codec.parts import PAPER, TICK_S, ListRecorder, identity_of, pitch_codec, terms
+from transmitter.endpoint import TransmitterEndpoint
 from transmitter.guard import Guard, GuardSettings
 from transmitter.loops.virtual import VirtualFlight
 from transmitter.metrics.scores import Scores
@@ -52,7 +53,7 @@ class Flight:
         """Greet, fly and finish; return the flight itself."""
         self.virtual.greet()
         self.ticks = self.virtual.run(round(seconds * 1e9 / self.transmitter.terms.tick_ns))
-        self.virtual.finish(self.ticks, lambda: "done")
+        self.virtual.finish(lambda: "done")
         return self
 
     @property
@@ -101,14 +102,9 @@ def assemble(
         scores,
         sent,
     )
-    uplink = Uplink(
-        SlotShaper(flight_terms),
-        uplink_line or Line(flight_terms.symbol_delay_ns),
-        UplinkMeter(codec.coder.alphabet),
-        wire,
-    )
-    endpoint = ReceiverEndpoint(receiver, wire)
-    virtual = VirtualFlight(node, uplink, downlink_line or Line(), endpoint)
+    uplink = Uplink(flight_terms, codec.coder.alphabet, uplink_line, wire)
+    endpoint = ReceiverEndpoint(receiver, Downlink(wire))
+    virtual = VirtualFlight(TransmitterEndpoint(node, uplink), downlink_line or CleanLine(), endpoint)
     return Flight(transmitter, receiver, node, virtual, endpoint, sent, received)
 
 

@@ -28,7 +28,7 @@ def fly_on(flight: Flight, samples: int) -> int:
     """Fly so many samples or to the end of the session; return how many were confirmed."""
     flight.virtual.greet()
     flight.ticks = flight.virtual.run(samples * flight.transmitter.terms.ticks_per_sample)
-    flight.virtual.finish(flight.ticks, lambda: "done")
+    flight.virtual.finish(lambda: "done")
     return flight.transmitter.copies.confirmed.sample
 
 

@@ -25,7 +25,7 @@ def line(seed: str = "a", **changes: Any) -> ImpairedLine:
 
 
 def carried(one: ImpairedLine, count: int = MESSAGES) -> list[list[Delivery]]:
-    return [one.carry(SYMBOL, True, index * MS) for index in range(count)]
+    return [one.carry(SYMBOL, index * MS) for index in range(count)]
 
 
 def test_when_a_text_names_everything_then_both_directions_have_it() -> None:
@@ -104,7 +104,7 @@ def test_when_a_symbol_is_flipped_then_it_is_a_valid_frame_with_another_symbol()
     assert delivery.data is not None
     assert wire.decode(delivery.data) == Symbol(1, 0, 5, 0)
     goodbye = wire.encode(Bye(1, "done"))
-    assert one.carry(goodbye, False, 0) == [Delivery(0, goodbye)]
+    assert one.carry(goodbye, 0) == [Delivery(0, goodbye)]
 
 
 def test_when_raw_bits_are_inverted_then_the_check_finds_it() -> None:

@@ -48,12 +48,12 @@ def test_when_the_paper_is_flown_then_the_error_is_within_its_bound(
 
 def test_when_ten_baud_are_flown_then_one_bit_per_sample_is_paid_and_measured() -> None:
     flight = pitch_flight().fly(30.0)
-    meter = flight.virtual._uplink.meter
+    meter = flight.virtual.endpoint.uplink.meter
     assert meter.coder_bits == 300
     assert flight.receiver.meter.baud == pytest.approx(10.0)
     assert flight.endpoint.inlet.wire_bytes == meter.wire_bytes
-    assert flight.endpoint.wire_bytes_down == flight.virtual.inlet.wire_bytes
-    assert flight.virtual._uplink.shaper.refused == 0
+    assert flight.endpoint.wire_bytes_down == flight.virtual.endpoint.inlet.wire_bytes
+    assert flight.virtual.endpoint.uplink.shaper.refused == 0
 
 
 def test_when_bits_arrive_at_the_end_of_their_slot_then_the_live_error_stays_bounded() -> None:
@@ -256,4 +256,4 @@ def test_when_the_receivers_configuration_differs_then_no_symbol_leaves() -> Non
     assert flight.transmitter.phase is Phase.GREETING
     assert "rate_baud: here 10.0, there 20.0" in str(flight.transmitter.refusal)
     assert "rate_baud" in str(flight.receiver.refusal)
-    assert flight.virtual._uplink.meter.symbols == 0
+    assert flight.virtual.endpoint.uplink.meter.symbols == 0

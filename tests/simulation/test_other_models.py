@@ -62,7 +62,7 @@ def test_when_two_axes_are_flown_then_a_word_takes_two_slots(ticks: int) -> None
     samples = 2000 // ticks
     assert_lockstep(flight, samples)
     assert flight.receiver.counts["erasures"] == 0
-    assert flight.virtual._uplink.meter.symbols == 2 * samples
+    assert flight.virtual.endpoint.uplink.meter.symbols == 2 * samples
     assert flight.node.scores.coded.largest < 0.05
     assert flight.node.scores.angle_max_rad < 0.2
 

@@ -56,7 +56,7 @@ def _build_model(config: FlightConfig) -> Model:
     if not isinstance(section, PluginModelSection):
         return MODELS[section.kind](section, config)
     context = ModelContext(config.timing.tick_s, config.timing.symbol_period_s)
-    model: Model = build_plugin("model.kind", section.kind, context, section.options, MODEL)
+    model: Model = build_plugin(config, "model.kind", section.kind, context, section.options, MODEL)
     return model
 
 
@@ -65,7 +65,7 @@ def _build_coder(config: FlightConfig, model: Model) -> Coder:
     if not isinstance(section, PluginCoderSection):
         return CODERS[section.kind](section, config)
     context = CoderContext(config.timing.tick_s, config.timing.symbol_period_s, model)
-    coder: Coder = build_plugin("coder.kind", section.kind, context, section.options, CODER)
+    coder: Coder = build_plugin(config, "coder.kind", section.kind, context, section.options, CODER)
     return coder
 
 

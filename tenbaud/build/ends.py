@@ -24,9 +24,10 @@ from receiver.session.session import ReceiverSession
 from tenbaud.build.flight import Agreement, read_flight_log, ticks_of, watchdog_wanted_s
 from tenbaud.build.gauge import build_gauge
 from tenbaud.build.liveness import overtaking_ticks, watchdog_ticks
-from tenbaud.build.plugins import CONTROLLER, build_plugin, is_plugin
+from tenbaud.build.plugins import CONTROLLER, build_plugin
 from tenbaud.build.rig import build_rig
 from tenbaud.config.load import ConfigError
+from tenbaud.config.outside_code import is_plugin
 from tenbaud.config.schema import FlightConfig, ReferenceSection
 from transmitter.guard import Guard, GuardSettings
 from transmitter.metrics.scores import Scores
@@ -167,6 +168,7 @@ def build_controller(config: FlightConfig, reference: Reference | None = None) -
             config.limits.initial_volts,
         )
         plugin: Controller = build_plugin(
+            config,
             "receiver.controller",
             section.controller,
             context,

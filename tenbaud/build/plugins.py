@@ -17,6 +17,8 @@ from importlib import import_module
 from typing import Any
 
 from tenbaud.config.load import ConfigError
+from tenbaud.config.outside_code import require_allowed
+from tenbaud.config.schema import FlightConfig
 
 Interface = Mapping[str, int | None]
 """What an object must have: methods with their number of arguments, attributes with None."""
@@ -45,16 +47,20 @@ class PluginError(ConfigError):
     """A part from outside that cannot be used; the text names field, module, class and fault."""
 
 
-def is_plugin(name: str) -> bool:
-    """Return whether a kind names a class from outside."""
-    return ":" in name
-
-
 def build_plugin(
-    field: str, name: str, context: object, options: Mapping[str, Any], interface: Interface
+    config: FlightConfig,
+    field: str,
+    name: str,
+    context: object,
+    options: Mapping[str, Any],
+    interface: Interface,
 ) -> Any:
-    """Return the object that `module:Class` builds; PluginError if it is not what `field` needs."""
-    found = load_class(field, name)
+    """Return the object that `module:Class` builds; PluginError if it is not what `field` needs.
+
+    CodeNotAllowed if nobody allowed the configuration's code to run.
+    """
+    require_allowed(config)
+    found = _load_class(field, name)
     try:
         part = found(context, **options)
     except Exception as error:  # it is the user's code, and anything may be wrong in it
@@ -72,7 +78,7 @@ def build_plugin(
     return part
 
 
-def load_class(field: str, name: str) -> Any:
+def _load_class(field: str, name: str) -> Any:
     """Return what `module:Class` names; PluginError, with a hint, if there is no such thing."""
     module_name, _, class_name = name.partition(":")
     here = os.getcwd()

@@ -8,8 +8,9 @@ from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters, PitchPlant
 from plant_sim.plant import Plant, PlantContext
 from tenbaud.build.flight import REAL_RIGS, read_flight_log
-from tenbaud.build.plugins import PLANT, build_plugin, is_plugin
+from tenbaud.build.plugins import PLANT, build_plugin
 from tenbaud.config.load import ConfigError
+from tenbaud.config.outside_code import is_plugin
 from tenbaud.config.rig_schema import AxisSection
 from tenbaud.config.schema import FlightConfig, PitchModelSection
 from transmitter.rigs.axes import Axis, Motors
@@ -77,7 +78,7 @@ def build_plant(config: FlightConfig, step_s: float) -> Plant:
             section.initial_angle_rad,
         )
         plugin: Plant = build_plugin(
-            "transmitter.plant.kind", section.kind, context, section.options, PLANT
+            config, "transmitter.plant.kind", section.kind, context, section.options, PLANT
         )
         return plugin
     return PitchPlant(

@@ -131,7 +131,8 @@ def _agree_all(
     from tenbaud.build.flight import agree
     from tenbaud.config.load import load_config
 
-    agreements = [agree(load_config(preset, config, change), clock.value) for change in changes]
+    configs = [load_config(preset, config, change, allow_code=True) for change in changes]
+    agreements = [agree(one, clock.value) for one in configs]
     for agreement in agreements:
         check_parts(agreement.config)
     return agreements

@@ -122,7 +122,7 @@ def agreements(
             own = None
         changed_s = 0.0 if own is None else own.stat().st_mtime
         if own not in known or known[own][0] != changed_s:
-            config = load_config(preset if own is None else None, own or path, changed)
+            config = load_config(preset if own is None else None, own or path, changed, allow_code=True)
             if own is not None:
                 check_parts(config)
             known[own] = (changed_s, agree(config, clock))

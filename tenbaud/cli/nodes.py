@@ -123,7 +123,7 @@ def _run(
     from tenbaud.recording.folder import RunFolder, create_run_folder
     from tenbaud.telemetry.station import Wish
 
-    config = load_config(node.preset, node.config, changed)
+    config = load_config(node.preset, node.config, changed, allow_code=True)
     _check_link(config, addresses.insecure)
     wish = Wish(node.telemetry, node.allow_control, pace)
     agreement = replace(agree(config, node.clock.value), live=wish.control)

@@ -33,10 +33,13 @@ def load_config(
     preset: str | None = None,
     path: Path | None = None,
     overrides: dict[str, Any] | None = None,
+    *,
+    allow_code: bool = False,
 ) -> FlightConfig:
     """Return the checked configuration.
 
     A file may name the preset that it builds on (`preset = "..."`); an explicit `preset` wins.
+    `allow_code`: classes from outside that it names may be imported, as for a flight of one's own.
     Raises ConfigError.
     """
     from_file = _read_toml(path) if path is not None else {}
@@ -47,10 +50,11 @@ def load_config(
     values = _merge(values, overrides or {})
     values["preset"] = base
     try:
-        return FlightConfig.model_validate(values)
+        config = FlightConfig.model_validate(values)
     except ValidationError as error:
         source = str(path) if path is not None else f"preset {base}"
         raise ConfigError(_describe_all(source, error)) from error
+    return config.allowing_code() if allow_code else config
 
 
 def nested(settings: Mapping[str, Any]) -> dict[str, Any]:

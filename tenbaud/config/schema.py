@@ -14,6 +14,7 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator,
 
 from channel.line.impairments import parse_impairments
 from channel.protocol.sabotage import parse_sabotage
+from tenbaud.config.permission import CodePermission
 from tenbaud.config.rig_schema import BridgeSection, HilSection, QuarcSection, SerialSection
 from tenbaud.config.section import (
     AngleRange,
@@ -372,7 +373,7 @@ class TelemetrySection(Section):
     """messages per second of each end"""
 
 
-class FlightConfig(Section):
+class FlightConfig(CodePermission):
     """Everything about a flight."""
 
     preset: str = "paper-10baud"

@@ -52,7 +52,7 @@ def test_when_ten_baud_are_flown_then_one_bit_per_sample_is_paid_and_measured() 
     assert meter.coder_bits == 300
     assert flight.receiver.meter.baud == pytest.approx(10.0)
     assert flight.endpoint.inlet.wire_bytes == meter.wire_bytes
-    assert flight.endpoint.wire_bytes_down == flight.virtual.endpoint.inlet.wire_bytes
+    assert flight.endpoint.downlink.wire_bytes == flight.virtual.endpoint.inlet.wire_bytes
     assert flight.virtual.endpoint.uplink.shaper.refused == 0
 
 

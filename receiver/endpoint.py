@@ -12,6 +12,8 @@ from channel.line.clocks import SkewedClock
 from channel.line.downlink import Downlink
 from channel.line.line import Inlet
 from channel.line.virtual import Reply, decode_step, encode_reply, is_envelope
+from channel.links.serial.slot_finder import SlotFinder
+from channel.protocol.frames import Frame, Hello, ShortSymbol
 from receiver.session.session import Phase, ReceiverSession
 
 REFUSAL_LINGER_S = 1.0
@@ -33,6 +35,8 @@ class ReceiverEndpoint:
         self.session = session
         self.downlink = downlink or Downlink()
         self.inlet = Inlet(self.downlink.wire, session.on_malformed)
+        self._slots = SlotFinder(session.terms)
+        """of the symbol bytes of a serial line"""
         self._clock = clock
         self._heard_ns: int | None = None
 
@@ -52,7 +56,7 @@ class ReceiverEndpoint:
         Raises ConfigMismatch when the peer flies on the virtual clock.
         """
         shown_ns = now_ns if self._clock is None else self._clock.shown(now_ns)
-        frames = []
+        frames: list[Frame] = []
         if data is not None:
             self._heard_ns = now_ns
             if is_envelope(data):
@@ -60,9 +64,7 @@ class ReceiverEndpoint:
                     "the transmitter flies on the virtual clock, this end on the real one; give "
                     "both the same --clock"
                 )
-            frame = self.inlet.take(data)
-            if frame is not None:
-                frames += self.session.on_frame(frame, shown_ns)
+            frames += self._on_message(data, shown_ns)
         frames += self.session.on_deadline(shown_ns)
         return self.downlink.offer(frames, now_ns)
 
@@ -91,12 +93,21 @@ class ReceiverEndpoint:
 
         A symbol that arrives exactly at its deadline is in time, so it is taken first.
         """
-        frames = []
-        frame = self.inlet.take(data) if data is not None else None
-        if frame is not None:
-            frames += self.session.on_frame(frame, time_ns)
+        frames = [] if data is None else self._on_message(data, time_ns)
         frames += self.session.on_deadline(time_ns)
         return Reply(0, self.session.next_deadline(), tuple(self.downlink.encoded(frames)))
+
+    def _on_message(self, data: bytes, now_ns: int) -> list[Frame]:
+        session = self.session
+        frame = self.inlet.take(data)
+        if frame is None:
+            return []
+        if isinstance(frame, ShortSymbol) and session.due_slot is not None:
+            frame = self._slots.located(frame, session.due_slot, now_ns)
+        answers = session.on_frame(frame, now_ns)
+        if isinstance(frame, Hello):
+            self._slots.answered(frame, answers, now_ns)
+        return answers
 
 
 class SteppedEndpoint(ReceiverEndpoint):

@@ -39,6 +39,7 @@ from channel.protocol.frames import (
     ForeignVersion,
     Frame,
     Hello,
+    LocatedSymbol,
     Refuse,
     ShortSymbol,
     Symbol,
@@ -178,7 +179,7 @@ def _encode_body(frame: Frame) -> tuple[int, int, int, bytes]:
             return 8, frame.session, frame.epoch, b""
         case Claim():
             return 9, frame.session, frame.epoch, _NUMBER.pack(frame.by)
-        case ForeignVersion() | ShortSymbol():
+        case ForeignVersion() | ShortSymbol() | LocatedSymbol():
             raise ValueError(f"{frame} is only ever received")
 
 

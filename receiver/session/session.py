@@ -17,7 +17,6 @@ from enum import Enum
 from channel.codec.codec import Codec, CodecState
 from channel.codec.words import ERASED
 from channel.line.shaper import BaudMeter
-from channel.links.serial.slot_finder import SlotFinder
 from channel.protocol.bounds import Bounds, within_text_bounds
 from channel.protocol.events import EVENT_CHANNEL, Event, EventKind, event_row
 from channel.protocol.frames import (
@@ -27,8 +26,8 @@ from channel.protocol.frames import (
     ForeignVersion,
     Frame,
     Hello,
+    LocatedSymbol,
     Refuse,
-    ShortSymbol,
     Symbol,
     Unknown,
     Welcome,
@@ -99,7 +98,6 @@ class ReceiverSession:
         self._advanced = False
         """whether a symbol of this epoch has been received"""
         self._silent_slots = 0
-        self._slots = SlotFinder(terms)
         self._bounds = Bounds(codec, terms, self.counts, self._tell)
         self._schedule = Schedule(terms)
         self._proven = Proven(self._commander.standing, self._schedule, 0, None)
@@ -110,6 +108,11 @@ class ReceiverSession:
     def state(self) -> CodecState:
         """Return the codec's state before the next sample."""
         return self._commander.state
+
+    @property
+    def due_slot(self) -> int | None:
+        """Return the slot that is not settled yet; None while no flight is on."""
+        return self._slot if self.phase is Phase.FLYING else None
 
     @property
     def history(self) -> History:
@@ -124,12 +127,10 @@ class ReceiverSession:
         match frame:
             case Symbol():
                 return self._on_symbol(frame, now_ns)
-            case ShortSymbol():
-                return self._on_short_symbol(frame, now_ns)
+            case LocatedSymbol() if self.phase is Phase.FLYING:
+                return self._on_located_symbol(frame, now_ns)
             case Hello():
-                answer = self._on_hello(frame, now_ns)
-                self._slots.greeted(now_ns)
-                return answer
+                return self._on_hello(frame, now_ns)
             case Desync() if self._is_current(frame.session):
                 return self._on_desync(frame)
             case Bye() if self._is_current(frame.session):
@@ -213,9 +214,6 @@ class ReceiverSession:
         proven = self._proven.incarnation
         first = first_sample(hello, own, self.terms, begun=proven is not None)
         count = self.terms.symbols_per_word
-        if last is None or hello.incarnation != last.incarnation:
-            ahead = first - hello.sample if hello.sample else 0
-            self._slots.begin(first * count, ahead * count)
         if last is None:
             self.phase = Phase.FLYING
             self.refusal = None
@@ -323,18 +321,14 @@ class ReceiverSession:
             return [welcome]
         return []
 
-    def _on_short_symbol(self, short: ShortSymbol, now_ns: int) -> list[Frame]:
-        """Take a symbol byte of a serial line, as the symbol of this session that it can only be."""
-        if self.phase is not Phase.FLYING:
-            self.counts["stale_frames"] += 1
-            return []
-        place = self._slots.find(short, self._slot, now_ns)
+    def _on_located_symbol(self, place: LocatedSymbol, now_ns: int) -> list[Frame]:
+        """Take a symbol that says no session, as one of this session, which it can only be."""
         frames: list[Frame] = []
         if place.slot is None:
             self.counts["symbols_misplaced"] += 1
-            self._tell(EventKind.STALE, f"a symbol of slot ...{short.slot_low} is not due: dropped")
+            self._tell(EventKind.STALE, f"a symbol of slot ...{place.slot_low} is not due: dropped")
         elif place.in_time:
-            symbol = Symbol(self.session_number, self.epoch, place.slot, short.number)
+            symbol = Symbol(self.session_number, self.epoch, place.slot, place.number)
             frames = self._take_symbol(symbol, now_ns, anew=True)
         else:
             self.counts["symbols_late"] += 1

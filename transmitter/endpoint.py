@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from channel.line.lateness import LatenessMeter
 from channel.line.line import Delivery, Inlet
+from channel.line.meters import LatenessMeter
 from channel.line.uplink import Uplink
 from channel.protocol.frames import Frame
 from transmitter.node import TransmitterNode
+from transmitter.session.rate_watch import RateWatch
 from transmitter.session.session import Phase
 
 
@@ -26,6 +27,8 @@ class TransmitterEndpoint:
         self.lateness = LatenessMeter()
         """of the ticks; on the virtual clock none is late"""
         self.ticks_missed = 0
+        self.rate = RateWatch(node.session.terms)
+        """whether the symbol rate is kept; a real loop looks at it"""
         self.tick = 0
         """the next one, or the one in hand"""
         self._end_tick = 0

@@ -1,18 +1,65 @@
-"""The transmitter's way out onto a line: slot grid, delivery time, meter and line, in one place.
+"""The transmitter's way out onto a line, and what R baud means there, enforced and measured.
 
-Both loops of the transmitter send through it, so that nobody can go around the baud rate.
+Symbols leave on a fixed grid of slots, one per slot and none in advance or afterwards: whoever asks
+for more gets an erasure, not a burst. Both loops of the transmitter send through it, so that nobody can
+go around the baud rate.
 """
 
 from __future__ import annotations
 
+from math import log2
+
 from channel.codec.words import Alphabet
 from channel.line.line import CleanLine, Delivery, Line
-from channel.line.shaper import SlotShaper, UplinkMeter
 from channel.protocol.audit_trail import SENT_CHANNEL
 from channel.protocol.frames import Frame, Symbol
 from channel.protocol.recording import NullRecorder, Recorder
 from channel.protocol.terms import Terms
 from channel.protocol.wire import DATAGRAM, Wire
+
+
+class SlotShaper:
+    """Lets each slot's symbol leave once, when the slot begins or while it lasts."""
+
+    def __init__(self, terms: Terms) -> None:
+        self._terms = terms
+        self._next_slot = 0
+        self.refused = 0
+        """symbols that asked for a slot already used, over, or more than a sample away"""
+
+    def departure_ns(self, slot: int, now_ns: int) -> int | None:
+        """Return when the symbol of this slot, offered now, leaves; None: it does not."""
+        begins = self._terms.slot_ns(slot)
+        ends = self._terms.slot_ns(slot + 1)
+        if slot < self._next_slot or not begins - self._terms.sample_ns <= now_ns < ends:
+            self.refused += 1
+            return None
+        self._next_slot = slot + 1
+        return max(begins, now_ns)
+
+
+class UplinkMeter:
+    """Counts what the transmitter put on the line."""
+
+    def __init__(self, alphabet: Alphabet) -> None:
+        self._bits_per_symbol = log2(len(alphabet.symbols))
+        self.symbols = 0
+        self.wire_bytes = 0
+        self.control_bytes = 0
+        """of `wire_bytes`, those that carried no symbol"""
+
+    def count(self, frame: Frame, size: int) -> None:
+        """Count one frame of `size` bytes."""
+        self.wire_bytes += size
+        if isinstance(frame, Symbol):
+            self.symbols += 1
+        else:
+            self.control_bytes += size
+
+    @property
+    def coder_bits(self) -> float:
+        """Return the bits that the coder was paid for."""
+        return self.symbols * self._bits_per_symbol
 
 
 class Uplink:

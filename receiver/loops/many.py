@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from channel.line.lateness import LatenessMeter
+from channel.line.meters import LatenessMeter
 from receiver.endpoint import ReceiverEndpoint
 
 POLL_NS = 200_000_000

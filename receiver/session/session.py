@@ -16,7 +16,7 @@ from enum import Enum
 
 from channel.codec.codec import Codec, CodecState
 from channel.codec.words import ERASED
-from channel.line.shaper import BaudMeter
+from channel.line.meters import BaudMeter
 from channel.protocol.bounds import Bounds, within_text_bounds
 from channel.protocol.events import EVENT_CHANNEL, Event, EventKind, event_row
 from channel.protocol.frames import (
@@ -36,6 +36,7 @@ from channel.protocol.identity import Identity
 from channel.protocol.limits import to_millivolts
 from channel.protocol.lockstep import History, difference_text
 from channel.protocol.recording import NullRecorder, Recorder
+from channel.protocol.slot_clock import SlotClock
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
 from receiver.controllers.base import Controller
@@ -93,16 +94,13 @@ class ReceiverSession:
         self._stranger = Stranger(session_number, take_over)
         self._recorder = recorder or NullRecorder()
         self._commander = Commander(codec, terms, controller, self._recorder, self.counts, self._tell)
-        self._slot = 0
+        self._clock = SlotClock(terms)
         self._word: list[int | None] = []
         self._advanced = False
         """whether a symbol of this epoch has been received"""
-        self._silent_slots = 0
         self._bounds = Bounds(codec, terms, self.counts, self._tell)
         self._schedule = Schedule(terms)
         self._proven = Proven(self._commander.standing, self._schedule, 0, None)
-        self._gap_samples_max = terms.history_samples
-        """A symbol this far ahead is no gap any more; after as many erasures in a row none are due."""
 
     @property
     def state(self) -> CodecState:
@@ -112,7 +110,7 @@ class ReceiverSession:
     @property
     def due_slot(self) -> int | None:
         """Return the slot that is not settled yet; None while no flight is on."""
-        return self._slot if self.phase is Phase.FLYING else None
+        return self._clock.slot if self.phase is Phase.FLYING else None
 
     @property
     def history(self) -> History:
@@ -148,20 +146,19 @@ class ReceiverSession:
 
     def next_deadline(self) -> int | None:
         """Return when the slot that is due is taken for erased; None while none is."""
-        return self._schedule.deadline_ns(self._slot) if self.phase is Phase.FLYING else None
+        return self._clock.deadline_ns if self.phase is Phase.FLYING else None
 
     def on_deadline(self, now_ns: int) -> list[Frame]:
         """Erase the slots whose deadline has passed by `now_ns`; return the frames to send."""
         frames: list[Frame] = []
-        deadline = self.next_deadline()
-        while deadline is not None and deadline <= now_ns:
-            self._silent_slots += 1
-            frames += self._settle(None, now_ns)
-            if self._silent_slots >= self._gap_samples_max * self.terms.symbols_per_word:
-                self._schedule.anchor(None)
-                text = f"no symbol for {self._gap_samples_max} samples: waiting for one"
+        if self.phase is not Phase.FLYING:
+            return frames
+        for slot in self._clock.expired(now_ns):
+            frames += self._settle(slot, None, now_ns)
+            if self._clock.is_silent:
+                self._clock.anchor(None)
+                text = f"no symbol for {self.terms.history_samples} samples: waiting for one"
                 self._tell(EventKind.PEER, text)
-            deadline = self.next_deadline()
         return frames
 
     def bye(self, reason: str) -> list[Frame]:
@@ -188,7 +185,7 @@ class ReceiverSession:
             return []
         schedule = self._schedule if self._advanced else self._proven.schedule
         in_reach = schedule.reaches(hello.sample, now_ns)
-        silent = self._silent_slots
+        silent = self._clock.silent_slots
         verdict = self._greeter.judge(hello, self.identity, self._advanced, silent, in_reach)
         if verdict is Verdict.REPEAT and self._greeter.welcome is not None:
             return [self._greeter.welcome]
@@ -231,10 +228,9 @@ class ReceiverSession:
             else:
                 # A rig that was started again is at rest, and so is what is known of it.
                 self._commander.restart(first)
-        self._slot, self._word = first * count, []
-        self._advanced, self._silent_slots = False, 0
+        self._clock, self._word, self._advanced = SlotClock(self.terms, first * count), [], False
         self._schedule = Schedule(self.terms)
-        self._schedule.begin(self._slot, now_ns)
+        self._schedule.begin(first * count, now_ns)
         hold = self._commander.hold
         told = () if hold == self.terms.initial_command else to_millivolts(hold)
         asked = (hello.incarnation, hello.request)
@@ -249,7 +245,7 @@ class ReceiverSession:
     def _stand_where_proven(self, last: Welcome | None) -> int:
         """Take back what was offered and never flown; return this end's next sample."""
         if self._advanced and last is not None:
-            standing, silent = self._commander.standing, self._silent_slots
+            standing, silent = self._commander.standing, self._clock.silent_slots
             self._proven = Proven(standing, self._schedule, silent, last.incarnation)
             return self.state.sample + (1 if self._word else 0)
         self._commander.go_back(self._proven.standing)
@@ -269,7 +265,7 @@ class ReceiverSession:
             return self._on_foreign_symbol(symbol)
         if self._bounds.drops(self._bounds.of_symbol(symbol)):
             return []
-        if symbol.slot < self._slot:
+        if symbol.slot < self._clock.slot:
             return self._on_late_symbol(symbol, now_ns)
         timing = self._schedule.timing(symbol.slot, now_ns)
         if timing is Timing.EARLY:
@@ -279,31 +275,30 @@ class ReceiverSession:
 
     def _take_symbol(self, symbol: Symbol, now_ns: int, *, anew: bool) -> list[Frame]:
         """Consume a symbol of a slot that is due. `anew`: it replaces the schedule."""
-        ahead = symbol.slot - self._slot
-        if ahead > self._gap_samples_max * self.terms.symbols_per_word:
+        if not self._clock.bridges(symbol.slot):
+            ahead = symbol.slot - self._clock.slot
             self.counts["stale_frames"] += 1
             self._tell(EventKind.STALE, f"slot {symbol.slot} is {ahead} ahead: dropped")
             return [Unknown(symbol.session, symbol.epoch)]
         self._advanced = True
-        self._silent_slots = 0
         self._greeter.on_symbol()
         frames: list[Frame] = []
-        while self._slot < symbol.slot:
-            frames += self._settle(None, now_ns)
-        self._schedule.take(symbol.slot, now_ns, anew=anew)
+        for slot in self._clock.take(symbol.slot):
+            frames += self._settle(slot, None, now_ns)
+        self._clock.anchor(self._schedule.take(symbol.slot, now_ns, anew=anew))
         self.meter.on_symbol(now_ns)
         write_symbol(self._recorder, self.terms, symbol, now_ns, taken=True)
         value = self.codec.coder.alphabet.symbols[symbol.number]
-        return frames + self._settle(value, now_ns)
+        return frames + self._settle(symbol.slot, value, now_ns)
 
     def _on_late_symbol(self, symbol: Symbol, now_ns: int) -> list[Frame]:
         """Drop a symbol of a slot that is settled; a row of them means that the schedule is wrong."""
         self.counts["symbols_late"] += 1
         write_symbol(self._recorder, self.terms, symbol, now_ns, taken=False)
         self._tell(EventKind.LATE_SYMBOL, f"slot {symbol.slot} was settled already: dropped")
-        within = self._slot - symbol.slot <= self._gap_samples_max * self.terms.symbols_per_word
-        if within and self._schedule.is_replaced_by(symbol.slot, now_ns):
-            self._schedule.take(symbol.slot, now_ns, anew=True)
+        near = self._clock.bridges(symbol.slot)
+        if near and self._schedule.is_replaced_by(symbol.slot, now_ns):
+            self._clock.anchor(self._schedule.take(symbol.slot, now_ns, anew=True))
         return []
 
     def _on_foreign_symbol(self, symbol: Symbol) -> list[Frame]:
@@ -334,15 +329,14 @@ class ReceiverSession:
             self.counts["symbols_late"] += 1
             self._tell(EventKind.LATE_SYMBOL, f"slot {place.slot} came after its deadline: dropped")
         if place.anchor is not None:
-            self._schedule.anchor(place.anchor)
+            self._clock.anchor(place.anchor)
         return frames
 
-    def _settle(self, symbol: int | None, now_ns: int) -> list[Frame]:
+    def _settle(self, slot: int, symbol: int | None, now_ns: int) -> list[Frame]:
         """Decide what this slot's symbol was; at the end of a word, fly its sample."""
         if symbol is None:
             self.counts["erasures"] += 1
-            self._tell(EventKind.ERASED, f"slot {self._slot} is erased")
-        self._slot += 1
+            self._tell(EventKind.ERASED, f"slot {slot} is erased")
         self._word.append(symbol)
         if len(self._word) < self.terms.symbols_per_word:
             return []

@@ -11,7 +11,6 @@ from channel.line.uplink import Uplink
 from tenbaud.build.flight import Agreement
 from transmitter.endpoint import TransmitterEndpoint
 from transmitter.node import TransmitterNode
-from transmitter.session.rate_watch import RateWatch
 
 Stop = Callable[[], bool]
 
@@ -33,8 +32,6 @@ class TransmitterRun:
     wire_bytes_down: int = 0
     desyncs_asked: float = 0.0
     """lockstep failures that were asked for while the flight went on"""
-    rate: RateWatch | None = None
-    """whether the symbol rate is kept; on a real clock"""
     extra: dict[str, Any] = field(default_factory=dict)
     """figures of the clock that was flown on"""
 

@@ -48,7 +48,6 @@ def fly_real(run: TransmitterRun, link: Link, should_stop: Stop) -> Outcome:
     """Fly on the real clock over a link."""
     timeout_s = run.agreement.config.link.peer_timeout_s
     flight = RealFlight(run.endpoint, link, timeout_s, should_stop)
-    run.rate = flight.rate
     try:
         return _fly(run, flight, should_stop, link.peer_present)
     finally:

@@ -19,7 +19,6 @@ from channel.protocol.events import EventKind
 from transmitter.endpoint import TransmitterEndpoint
 from transmitter.loops.flight import Flight
 from transmitter.loops.ramp_down import Landing
-from transmitter.session.rate_watch import RateWatch
 from transmitter.session.rejoin import ASK_AGAIN_NS
 from transmitter.session.session import Phase
 
@@ -51,7 +50,6 @@ class RealFlight(Flight):
         self._peer_told = True
         """what was last told about the receiver: it is there"""
         terms = endpoint.node.session.terms
-        self.rate = RateWatch(terms)
         self._tick_ns = terms.tick_ns
         self._landing: Landing | None = None
         self._ask_again_ns = min(max(terms.sample_ns, ASK_AGAIN_NS), HELLO_PERIOD_NS)
@@ -165,7 +163,7 @@ class RealFlight(Flight):
         self._link.send(message)
 
     def _watch_rate(self, tick: int) -> None:
-        text = self.rate.look(tick, self.endpoint.node.session)
+        text = self.endpoint.rate.look(tick, self.endpoint.node.session)
         if text is not None:
             self.endpoint.node.tell(EventKind.RATE, text)
 

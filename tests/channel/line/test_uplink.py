@@ -8,8 +8,8 @@ import pytest
 
 from channel.codec.words import Alphabet
 from channel.line.line import CleanLine
-from channel.line.shaper import BaudMeter, SlotShaper, UplinkMeter
-from channel.line.uplink import Uplink
+from channel.line.meters import BaudMeter
+from channel.line.uplink import SlotShaper, Uplink, UplinkMeter
 from channel.protocol import wire
 from channel.protocol.frames import Bye, Hello, Symbol
 from tests.channel.codec.parts import terms

@@ -13,6 +13,7 @@ from channel.line.downlink import Downlink
 from channel.line.line import Inlet
 from channel.line.virtual import Reply, decode_step, encode_reply, is_envelope
 from channel.links.serial.slot_finder import SlotFinder
+from channel.protocol.endings import End
 from channel.protocol.frames import Frame, Hello, ShortSymbol
 from receiver.session.session import Phase, ReceiverSession
 
@@ -84,9 +85,9 @@ class ReceiverEndpoint:
             )
         return False
 
-    def bye(self, reason: str) -> list[bytes]:
+    def bye(self, end: End) -> list[bytes]:
         """End the session; return the messages that tell the peer."""
-        return self.downlink.encoded(self.session.bye(reason))
+        return self.downlink.encoded(self.session.bye(end))
 
     def step(self, time_ns: int, data: bytes | None) -> Reply:
         """Do one step of the virtual clock within this process (`channel.line.virtual.Peer`).
@@ -144,7 +145,7 @@ class SteppedEndpoint(ReceiverEndpoint):
             self._last_reply = encode_reply(reply._replace(number=step.number))
         return [self._last_reply]
 
-    def bye(self, reason: str) -> list[bytes]:
+    def bye(self, end: End) -> list[bytes]:
         """End the session; there is nothing to send, since the peer waits for replies alone."""
-        super().bye(reason)
+        super().bye(end)
         return []

@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from channel.line.line import Delivery, Inlet
 from channel.line.meters import LatenessMeter
 from channel.line.uplink import Uplink
+from channel.protocol.endings import End
 from channel.protocol.frames import Frame
 from transmitter.node import TransmitterNode
 from transmitter.session.rate_watch import RateWatch
@@ -83,12 +84,12 @@ class TransmitterEndpoint:
         frame = self.inlet.take(data)
         return [] if frame is None else self._offer(self.node.deliver(frame), now_ns)
 
-    def farewell(self, reason: str) -> list[bytes]:
+    def farewell(self, end: End) -> list[bytes]:
         """End the session; return the messages that tell the receiver.
 
         They are spared the line's delay and what goes wrong on it: this process is about to end.
         """
-        return [self.uplink.counted(frame)[0] for frame in self.node.session.bye(reason)]
+        return [self.uplink.counted(frame)[0] for frame in self.node.session.bye(end)]
 
     def _offer(self, frames: Iterable[Frame], now_ns: int) -> list[Delivery]:
         return [one for frame in frames for one in self.uplink.offer(frame, now_ns)]

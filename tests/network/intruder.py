@@ -18,6 +18,8 @@ import sys
 import time
 from pathlib import Path
 
+from channel.protocol.endings import Ending
+
 PORT = 7447
 GREETINGS = (
     b"GET / HTTP/1.0\r\n\r\n",
@@ -82,7 +84,7 @@ def insider(host: str, keys: str, transmitter: str, receiver: str) -> dict[str, 
         Unknown(1, 0),
         Claim(1, 0, 2),
         Commands(1, 0, (echo,)),
-        Bye(1, "intruder"),
+        Bye(1, Ending.OVER, "intruder"),
     )
     roles: tuple[tuple[Role, Part, str], ...] = (
         ("transmitter", "receiver", receiver),

@@ -9,8 +9,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 
 from channel.line.line import Delivery
+from channel.protocol.endings import End
 from transmitter.endpoint import TransmitterEndpoint
-from transmitter.node import STOPPED
 
 
 class Flight(ABC):
@@ -34,7 +34,7 @@ class Flight(ABC):
         while (due_ns := endpoint.next_due_ns) is not None:
             self._wait_until(due_ns)
             if self._should_stop():
-                endpoint.node.guard.trip(STOPPED)
+                endpoint.node.stop()
             messages = endpoint.begin_tick(self._now_ns())
             if messages is None:
                 break
@@ -43,19 +43,19 @@ class Flight(ABC):
             self._rest()
         return endpoint.tick
 
-    def finish(self, reason: Callable[[], str]) -> None:
+    def finish(self, farewell: Callable[[], End]) -> None:
         """Let the last echoes come in, end the session on both sides, take a real rig's motors down.
 
-        `reason` is asked for what the receiver is told once the echoes are in.
+        `farewell` is asked for what the receiver is told once the echoes are in.
         """
         self._linger()
         self.endpoint.node.rest()
-        self.leave(reason())
+        self.leave(farewell())
         self._land()
 
-    def leave(self, reason: str) -> None:
+    def leave(self, end: End) -> None:
         """End the session on both sides at once; before the first tick nothing else is to be done."""
-        for message in self.endpoint.farewell(reason):
+        for message in self.endpoint.farewell(end):
             self._send_past_line(message)
 
     @abstractmethod

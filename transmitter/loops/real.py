@@ -15,7 +15,7 @@ from channel.errors import ConfigMismatch, LinkLost
 from channel.line.line import Delivery, Outbox
 from channel.line.virtual import is_envelope
 from channel.links.base import Link
-from channel.protocol.events import EventKind
+from channel.protocol.events import Event, EventKind, Presence
 from transmitter.endpoint import TransmitterEndpoint
 from transmitter.loops.flight import Flight
 from transmitter.loops.ramp_down import Landing
@@ -163,14 +163,13 @@ class RealFlight(Flight):
         self._link.send(message)
 
     def _watch_rate(self, tick: int) -> None:
-        text = self.endpoint.rate.look(tick, self.endpoint.node.session)
-        if text is not None:
-            self.endpoint.node.tell(EventKind.RATE, text)
+        event = self.endpoint.rate.look(tick, self.endpoint.node.session)
+        if event is not None:
+            self.endpoint.node.tell(event)
 
     def _watch_peer(self) -> None:
         present = self._link.peer_present()
         if present is not self._peer_told:
             self._peer_told = present
-            self.endpoint.node.tell(
-                EventKind.PEER, f"the receiver is {'there again' if present else 'gone'}"
-            )
+            cause = Presence.BACK if present else Presence.GONE
+            self.endpoint.node.tell(Event(EventKind.PEER, cause=cause))

@@ -11,6 +11,7 @@ from channel.line.line import CleanLine
 from channel.line.meters import BaudMeter
 from channel.line.uplink import SlotShaper, Uplink, UplinkMeter
 from channel.protocol import wire
+from channel.protocol.endings import Ending
 from channel.protocol.frames import Bye, Hello, Symbol
 from tests.channel.codec.parts import terms
 
@@ -103,7 +104,7 @@ def test_when_a_symbol_is_offered_out_of_its_slot_then_nothing_leaves_and_nothin
 
 def test_when_frames_are_offered_then_they_are_encoded_delayed_and_counted() -> None:
     uplink = Uplink(terms(delivery="end"), Alphabet((-1, 1), 1), CleanLine(3))
-    symbol, bye = Symbol(1, 0, 0, 1), Bye(1, "done")
+    symbol, bye = Symbol(1, 0, 0, 1), Bye(1, Ending.OVER, "done")
     assert uplink.offer(symbol, 100) == [(100 * MS + 103, wire.encode(symbol))]
     assert uplink.offer(bye, 100) == [(103, wire.encode(bye))]
     assert uplink.meter.symbols == 1

@@ -18,6 +18,8 @@ from tenbaud.config.schema import FlightConfig
 
 ALLOW_OPTION = "--allow-code"
 
+OBJECT = "object"
+
 
 class CodeNotAllowed(ConfigError):
     """A configuration names code that nobody has allowed; the text says which, and from where."""
@@ -26,6 +28,16 @@ class CodeNotAllowed(ConfigError):
 def is_plugin(kind: str) -> bool:
     """Return whether a kind names a class from outside."""
     return ":" in kind
+
+
+def is_object(kind: str) -> bool:
+    """Return whether a kind stands for an object that a program gave to its flight: no code."""
+    return kind.startswith(f"{OBJECT}:")
+
+
+def object_kind(part: object) -> str:
+    """Return the kind that stands for an object in the configuration of its flight."""
+    return f"{OBJECT}:{type(part).__name__}"
 
 
 class OutsidePart(NamedTuple):
@@ -43,7 +55,7 @@ def outside_parts(config: FlightConfig) -> list[OutsidePart]:
         OutsidePart("receiver.controller", config.receiver.controller),
         OutsidePart("transmitter.plant.kind", config.transmitter.plant.kind),
     )
-    return [part for part in named if is_plugin(part.name)]
+    return [part for part in named if is_plugin(part.name) and not is_object(part.name)]
 
 
 def require_allowed(config: FlightConfig) -> None:

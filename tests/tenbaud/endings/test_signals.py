@@ -105,7 +105,7 @@ def test_a_lasting_command_ends(name: str, after_s: float, number: int, tmp_path
     time.sleep(after_s)
     process.send_signal(number)
     ended = finish(process)
-    # A rig and a router end with 0 in the ordinary way. Interrupted within an `exec` of a text, as when a
+    # A rig and a router end with 0 in the ordinary way. Interrupted in an `exec` of a text, as when a
     # dataclass is made, Python 3.11 dies of SIGINT after all, which a shell calls 130 too.
     codes = (ExitCode.INTERRUPTED, -number, -signal.SIGINT, 0)
     assert ended.code in codes, (ended.code, ended.err)

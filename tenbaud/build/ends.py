@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import secrets
-from pathlib import Path
 
 from channel.codec.codec import Codec
 from channel.line.impairments import Direction, ImpairedLine
@@ -13,19 +12,16 @@ from channel.line.uplink import Uplink
 from channel.protocol.recording import Recorder
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
 from channel.protocol.wire import Wire
-from receiver.controllers.base import Controller, ControllerContext
-from receiver.controllers.pid import Pid, PidGains
-from receiver.controllers.recorded import RecordedController
-from receiver.controllers.references import Constant, Csv, Reference, Sine, Square, Step
+from receiver.controllers.references import Reference
 from receiver.endpoint import ReceiverEndpoint
 from receiver.session.session import ReceiverSession
-from tenbaud.build.flight import Agreement, read_flight_log, ticks_of, watchdog_wanted_s
+from tenbaud.build.controllers import build_controller, build_reference
+from tenbaud.build.flight import Agreement, ticks_of, watchdog_wanted_s
 from tenbaud.build.gauge import build_gauge
 from tenbaud.build.liveness import overtaking_ticks, watchdog_ticks
-from tenbaud.build.plugins import CONTROLLER, build_plugin, is_plugin
 from tenbaud.build.rig import build_rig
 from tenbaud.config.load import ConfigError
-from tenbaud.config.schema import FlightConfig, ReferenceSection
+from tenbaud.config.schema import FlightConfig
 from transmitter.guard import Guard, GuardSettings
 from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode
@@ -148,59 +144,3 @@ def guard_settings(agreement: Agreement) -> GuardSettings:
         safe_volts=section.safe_volts,
         soft_limits_rad=soft,
     )
-
-
-def build_controller(config: FlightConfig, reference: Reference | None = None) -> Controller:
-    """Return the controller; it follows `reference` instead of the configured one if it is given."""
-    section = config.receiver
-    if section.controller == "recorded":
-        return RecordedController(read_flight_log(config))
-    if is_plugin(section.controller):
-        context = ControllerContext(
-            config.timing.tick_s,
-            reference or build_reference(config),
-            config.limits.volts_max,
-            config.limits.initial_volts,
-        )
-        plugin: Controller = build_plugin(
-            "receiver.controller",
-            section.controller,
-            context,
-            section.controller_options,
-            CONTROLLER,
-        )
-        return plugin
-    pid = section.pid
-    return Pid(
-        PidGains(pid.proportional, pid.integral, pid.derivative, pid.unit),
-        reference or build_reference(config),
-        config.timing.tick_s,
-        volts_max=config.limits.volts_max,
-        normal_force_volts=pid.normal_force_volts,
-        anti_windup=pid.anti_windup,
-    )
-
-
-def build_reference(config: FlightConfig) -> Reference:
-    """Return the set-point over the ticks."""
-    return reference_of(config.receiver.reference, config.timing.tick_s)
-
-
-def reference_of(section: ReferenceSection, tick_s: float) -> Reference:
-    """Return the set-point that a section describes."""
-    match section.kind:
-        case "square":
-            return Square(section.amplitude_rad, section.period_s, tick_s)
-        case "sine":
-            return Sine(section.amplitude_rad, section.period_s, tick_s)
-        case "step":
-            return Step(section.amplitude_rad, section.start_s, tick_s)
-        case "constant":
-            return Constant(section.amplitude_rad, tick_s)
-        case "csv":
-            if not section.file:
-                raise ConfigError("receiver.reference.file names no file for the csv reference")
-            try:
-                return Csv(Path(section.file), tick_s)
-            except ValueError as error:
-                raise ConfigError(f"receiver.reference: {error}") from error

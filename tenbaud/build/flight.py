@@ -12,12 +12,12 @@ from channel.codec.codec import Codec
 from channel.errors import TenbaudError
 from channel.flight_log import FlightColumns, FlightLog
 from channel.line.impairments import LineFaults, parse_impairments
+from channel.links.registry import link_kind
 from channel.protocol.identity import Identity, numerics_probe
 from channel.protocol.limits import CommandLimits
 from channel.protocol.terms import Clock, Terms
 from tenbaud.build.codec import build_codec
 from tenbaud.build.liveness import RoundTrip, check_liveness, round_trip
-from tenbaud.build.serial_terms import on_serial_line
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
 
@@ -136,8 +136,7 @@ def build_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:
         initial_command=config.limits.initial_volts,
         limits=build_limits(config),
     )
-    if config.link.kind == "serial":
-        terms = on_serial_line(config.link, codec, terms)
+    terms = link_kind(config.link.kind).terms(config.link, codec, terms)
     if lead != "auto":
         return terms
     shortest = terms.with_shortest_lead(clock)

@@ -16,6 +16,7 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
 
+from channel.registry import Registry, RegistryError
 from tenbaud.config.load import ConfigError
 
 Interface = Mapping[str, int | None]
@@ -51,10 +52,14 @@ def is_plugin(name: str) -> bool:
 
 
 def build_plugin(
-    field: str, name: str, context: object, options: Mapping[str, Any], interface: Interface
+    registry: Registry, name: str, context: object, options: Mapping[str, Any], interface: Interface
 ) -> Any:
-    """Return the object that `module:Class` builds; PluginError if it is not what `field` needs."""
-    found = load_class(field, name)
+    """Return the object that a class from outside builds; PluginError if it is not what is needed.
+
+    `name` is `module:Class` or what an installed package offers.
+    """
+    field = registry.field
+    found = load_class(field, name) if is_plugin(name) else _offered(registry, name)
     try:
         part = found(context, **options)
     except Exception as error:  # it is the user's code, and anything may be wrong in it
@@ -102,6 +107,27 @@ def load_class(field: str, name: str) -> Any:
         hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(classes) or 'no class'}."
         raise PluginError(f"{field} = {name!r}: {module_name} has no class {class_name!r}; {hint}")
     return found
+
+
+def build_part(
+    registry: Registry,
+    name: str,
+    config: object,
+    context: object,
+    options: Mapping[str, Any],
+    interface: Interface,
+) -> Any:
+    """Return a plant or controller: built in as a function of the configuration, or as a class."""
+    if name in registry.built_in and not inspect.isclass(part := registry.load(name)):
+        return part(config, context)
+    return build_plugin(registry, name, context, options, interface)
+
+
+def _offered(registry: Registry, name: str) -> Any:
+    try:
+        return registry.load(name)
+    except RegistryError as error:
+        raise PluginError(str(error)) from error
 
 
 def _faults(part: object, interface: Interface) -> list[str]:

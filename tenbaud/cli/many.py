@@ -51,8 +51,7 @@ def serve(
 
     agreement_of = agreements(node.preset, node.config, many.configs, changed, node.clock.value)
     common = agreement_of("")
-    if common.config.link.kind != "zenoh":
-        raise typer.BadParameter("--sessions needs Zenoh; a serial line has one rig at its other end")
+    _check_link(common.config.link.kind)
     check_parts(common.config)
     where = endpoints_of("receiver", addresses, common.config, sessions=many.sessions)
     places = ", ".join(where.listen + where.connect + where.router)
@@ -101,6 +100,13 @@ def serve(
     if host.counts["not_written"]:
         typer.echo(f"tenbaud: {host.counts['not_written']} files below {root} are not whole", err=True)
         raise typer.Exit(int(ExitCode.NOT_WRITTEN))
+
+
+def _check_link(name: str) -> None:
+    from channel.links.registry import link_kind
+
+    if not link_kind(name).serves_many:
+        raise typer.BadParameter("--sessions needs Zenoh; other links have one rig at their other end")
 
 
 def agreements(

@@ -9,6 +9,7 @@ from math import log2
 from typing import Any
 
 from channel.codec.words import Word
+from channel.links.registry import link_kind
 from tenbaud.build.flight import Agreement
 from tenbaud.recording.table import Tables
 from tenbaud.replay.record import FlightRecord
@@ -52,7 +53,7 @@ def check_slots(record: FlightRecord) -> tuple[list[str], list[str]]:
         leaks += _check_words(record.receiver, taken, record.agreement)
     if record.transmitter is not None and sent is not None:
         leaks += _check_words_sent(record.transmitter, sent, record.agreement)
-    if sent is not None and taken and record.agreement.config.link.kind != "serial":
+    if sent is not None and taken and link_kind(record.agreement.config.link.kind).carries_slots:
         leaks += _check_origin(sent, taken)
     return leaks, gaps
 

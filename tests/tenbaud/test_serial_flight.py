@@ -12,22 +12,18 @@ from typing import Any
 import pytest
 
 from channel.errors import LinkLost
+from channel.links.serial.emulated import EmulatedLine
 from tenbaud.build.ends import build_receiver
 from tenbaud.build.flight import agree
 from tenbaud.build.transmitter_run import TransmitterRun
 from tenbaud.config.load import ConfigError, load_config
 from tenbaud.flight import receive, transmit
+from tenbaud.flight.ends import Endpoints, open_link
 from tenbaud.flight.outcome import ExitCode, Outcome
-from tenbaud.flight.serial_ends import open_serial
-from tenbaud.flight.serial_line import EmulatedLine
 from tenbaud.recording.diff import first_difference
 from tenbaud.recording.folder import RunFolder
 from tests.channel.codec.parts import ListRecorder
 from tests.tenbaud.processes import run
-
-
-def no_zenoh() -> Any:
-    raise AssertionError("a serial flight opens no Zenoh link")
 
 
 @dataclass
@@ -73,7 +69,7 @@ def fly(
         ):
             section = config.link.model_copy(update={"port": str(port)})
             changed = agree(config.model_copy(update={"link": section}), "real")
-            ends.append(stack.enter_context(open_serial(changed, role, False, no_zenoh)))  # type: ignore[arg-type]
+            ends.append(stack.enter_context(open_link(changed, role, Endpoints())))  # type: ignore[arg-type]
         lower, upper = ends
         endpoint = build_receiver(agreement, received, lower.wire)
         service = threading.Thread(

@@ -11,7 +11,6 @@ from channel.codec.codec import Vector
 from channel.line.line import Line
 from channel.line.shaper import SlotShaper, UplinkMeter
 from channel.line.uplink import Uplink
-from channel.links.memory import MemoryLink, memory_pair
 from channel.protocol.events import EventKind
 from channel.protocol.limits import CommandLimits
 from plant_sim.encoder import Encoder
@@ -20,6 +19,7 @@ from receiver.endpoint import ReceiverEndpoint
 from receiver.loops.real import serve_real
 from receiver.session.session import ReceiverSession
 from tests.channel.codec.parts import THREE_SIGNS, ConstantController, identity_of, pitch_codec, terms
+from tests.channel.links.memory_pair import MemoryLink, memory_pair
 from transmitter.guard import Guard, GuardSettings
 from transmitter.loops.real import RealFlight
 from transmitter.metrics.scores import Scores

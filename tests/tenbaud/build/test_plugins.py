@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from tenbaud import Run
-from tenbaud.build.ends import build_controller, check_parts
+from tenbaud.build.controllers import build_controller
+from tenbaud.build.ends import check_parts
 from tenbaud.build.flight import agree
 from tenbaud.config.load import ConfigError, load_config, nested
 from tenbaud.flight.fly import fly

@@ -10,15 +10,8 @@ import pytest
 from channel.codec.coders.timed import TimedCoder
 from channel.codec.coders.words import WordsCoder
 from channel.codec.coders.zoom import ZoomCoder
-from tenbaud.build.codec import CODERS, MODELS
 from tenbaud.build.flight import agree
 from tenbaud.config.load import ConfigError, dump_config, load_config, preset_names
-from tenbaud.config.schema import KINDS
-
-
-def test_when_the_registry_is_compared_with_the_schema_then_both_know_the_same_kinds() -> None:
-    assert set(CODERS) == set(KINDS["coder"])
-    assert set(MODELS) == set(KINDS["model"])
 
 
 @pytest.mark.parametrize("preset", preset_names())

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from channel.links.serial.emulated import EmulatedLine
 from tenbaud.flight.outcome import SAFE, ExitCode, Outcome, first_cause
-from tenbaud.flight.serial_line import EmulatedLine
 from tests.tenbaud.ends import Pair, over_serial
 
 

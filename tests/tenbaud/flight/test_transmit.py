@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 
-from channel.links.memory import memory_pair
 from channel.protocol.wire import DATAGRAM
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build.ends import build_receiver
@@ -17,6 +16,7 @@ from tenbaud.build.transmitter_run import TransmitterRun
 from tenbaud.config.load import load_config
 from tenbaud.flight import receive, transmit
 from tenbaud.flight.outcome import ExitCode, Outcome
+from tests.channel.links.memory_pair import memory_pair
 from transmitter.node import STOPPED
 from transmitter.session.session import Phase
 

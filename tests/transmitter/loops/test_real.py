@@ -12,7 +12,6 @@ from channel.line.line import Line
 from channel.line.shaper import SlotShaper, UplinkMeter
 from channel.line.uplink import Uplink
 from channel.line.virtual import Step, encode_step
-from channel.links.memory import MemoryLink, memory_pair
 from channel.protocol.identity import Identity
 from channel.protocol.limits import CommandLimits
 from channel.protocol.terms import Terms
@@ -25,6 +24,7 @@ from receiver.loops.real import serve_real
 from receiver.session.session import Phase as ReceiverPhase
 from receiver.session.session import ReceiverSession
 from tests.channel.codec.parts import THREE_SIGNS, identity_of, pitch_codec, terms
+from tests.channel.links.memory_pair import MemoryLink, memory_pair
 from transmitter.guard import Guard, GuardSettings
 from transmitter.loops.real import RealFlight
 from transmitter.metrics.scores import Scores

@@ -26,11 +26,15 @@ class Registry:
     """The kinds of one sort of part.
 
     `field` is the setting that names a kind, for error messages; `group` the group of entry points. A
-    name that is built in cannot be replaced from outside.
+    name that is built in cannot be replaced from outside. `classes`: the setting takes
+    `module:Class` too.
     """
 
-    def __init__(self, field: str, group: str, built_in: Mapping[str, str]) -> None:
+    def __init__(
+        self, field: str, group: str, built_in: Mapping[str, str], *, classes: bool = True
+    ) -> None:
         self.field = field
+        self.classes = classes
         self.group = group
         self.built_in = built_in
 
@@ -52,7 +56,7 @@ class Registry:
         """Return what else a name that nobody offers might be."""
         names = self.names()
         near = difflib.get_close_matches(name, names, 1)
-        known = f"known are {', '.join(names)}"
+        known = f"known are {', '.join(names)}" + (" and module:Class" if self.classes else "")
         return f"{known}; did you mean {near[0]}?" if near else known
 
     def load(self, name: str) -> Any:
@@ -75,6 +79,11 @@ class Registry:
                 f"{self.field} = {name!r}: {_owner(offers[0])} offers it as {offers[0].value}, which "
                 f"cannot be loaded: {type(error).__name__}: {error}. Repair or uninstall that package."
             ) from error
+
+    def offered_by(self, name: str) -> str:
+        """Return who offers a name, as what. Imports nothing."""
+        offers = self._offered().get(name, [])
+        return " and ".join(f"{_owner(offer)} offers as {offer.value}" for offer in offers)
 
     def _offered(self) -> dict[str, list[EntryPoint]]:
         offered: dict[str, list[EntryPoint]] = {}

@@ -7,6 +7,7 @@ not load it.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -90,7 +91,7 @@ class Meeting:
     connect: str = ""
 
 
-class LinkKind:
+class LinkKind(ABC):
     """A kind of link; what stands here is what an ordinary one has."""
 
     in_process = False
@@ -100,7 +101,8 @@ class LinkKind:
     changes_terms = False
     """bytes take time on the line, so `terms` changes what a flight is"""
     carries_slots = True
-    """a symbol arrives with the number of the slot that it left in, whole and checked"""
+    """a symbol arrives with the number of its slot, whole and checked; without it, a symbol that comes
+    after its deadline cannot be told from a later one's"""
 
     def uses_addresses(self, settings: LinkSettings) -> bool:
         """Return whether ends meet at Zenoh endpoints, with its keys: `--listen`, `--connect` ..."""
@@ -117,9 +119,9 @@ class LinkKind:
         """Return the terms with what the line does to them; ValueError for what it cannot carry."""
         return terms
 
+    @abstractmethod
     def open(self, end: LinkEnd) -> Link:
         """Return one open end; LinkError where that fails."""
-        raise NotImplementedError
 
     @contextmanager
     def meeting(self, settings: LinkSettings) -> Iterator[tuple[Meeting, Meeting]]:

@@ -13,6 +13,7 @@ LINKS = Registry(
         "serial": "channel.links.serial.kind:SerialKind",
         "memory": "channel.links.memory:MemoryKind",
     },
+    classes=False,
 )
 
 

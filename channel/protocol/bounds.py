@@ -32,9 +32,11 @@ Tell = Callable[[EventKind, str], None]
 COUNTER = "out_of_bounds"
 """Name under which sessions count, and summaries show, the frames dropped for what they hold."""
 
-COUNTER_MAX = 2**31
-"""Half of what 32 bits count."""
-TIME_NS_MAX = 2**62
+COUNTER_MAX = 3 * 2**30
+"""Three quarters of what 32 bits count: slots beyond are left to the flight that goes on."""
+TIME_NS_MAX = 3 * 2**61
+FIRST_SHARE = 2.0 / 3.0
+"""How far into these a first flight may begin, so that what is asked for later is within them."""
 
 TEXT_CHARACTERS_MAX = 2000
 """Four bytes each at most, so that a text that is quoted in an answer still fits a frame."""
@@ -89,13 +91,20 @@ class Bounds:
             return f"a state of {len(report.state)} bytes"
         return None
 
-    def of_commands(self, commands: Commands, sample: int, next_sample: int) -> str | None:
-        """Check a command frame; the clock stands in `sample`, and `next_sample` is sent next."""
+    def of_commands(
+        self, commands: Commands, sample: int, confirmed: int, next_sample: int
+    ) -> str | None:
+        """Check a command frame, but for the echoes that were had before.
+
+        The clock stands in `sample`; `confirmed` is to be confirmed next, `next_sample` to be sent.
+        """
         if len(commands.echoes) > self._echoes_max:
             return f"{len(commands.echoes)} echoes, where at most {self._echoes_max} are agreed"
         if commands.echoes[-1].sample > sample + self._reach:
             return f"an echo of sample {commands.echoes[-1].sample} during sample {sample}"
         for echo in commands.echoes:
+            if echo.sample < confirmed:
+                continue
             problem = self._of_echo(echo)
             if problem is not None:
                 return problem
@@ -116,6 +125,8 @@ class Bounds:
             return f"a command of {hold} mV to hold, beyond +-{self._millivolts_max}"
         if sample is not None and welcome.first_sample > sample + self._reach + self._lead_samples:
             return f"a start at sample {welcome.first_sample} during sample {sample}"
+        if sample is None and welcome.first_sample > FIRST_SHARE * self.sample_max:
+            return f"a first start at sample {welcome.first_sample}"
         return self._of_sample(welcome.first_sample) or self._of_state(welcome)
 
     @property

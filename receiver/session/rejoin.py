@@ -91,14 +91,16 @@ class Greeter:
             return _admitted(hello, identity)
         if hello.incarnation != last.incarnation:
             return self._judge_stranger(hello, identity, advanced, silent_slots)
+        if difference(hello, identity) is not None:
+            # It was admitted, and a process does not change what it is: somebody else asks in its name.
+            return Verdict.IGNORE
         if not in_reach or hello.request < last.request or (hello.request == last.request and advanced):
             heard = advanced and silent_slots < SILENT_SLOTS
-            believed = self._persists(hello) and not heard
-            return _admitted(hello, identity) if believed else Verdict.IGNORE
+            return Verdict.BEGIN if self._persists(hello) and not heard else Verdict.IGNORE
         if hello.request == last.request:
             age = hello.sample - last.first_sample
             return Verdict.REPEAT if age <= self._answer_age_max else Verdict.BEGIN
-        return _admitted(hello, identity)
+        return Verdict.BEGIN
 
     def _persists(self, hello: Hello) -> bool:
         """Note a request that contradicts what is known; return whether it has been repeated enough."""
@@ -106,7 +108,8 @@ class Greeter:
         same = before is not None and replace(before, sample=hello.sample) == hello
         if not same or before is None:
             self._persisted = 0
-        elif hello.sample <= before.sample:
+        elif hello.sample and hello.sample <= before.sample:
+            # A copy. One that has not flown yet asks for sample 0 every time.
             self._doubted = before
             return False
         self._persisted += 1

@@ -35,7 +35,7 @@ def _build_model(config: FlightConfig) -> Model:
     context = ModelContext(config.timing.tick_s, config.timing.symbol_period_s)
     model: Model
     if isinstance(section, OutsideSection):
-        model = build_plugin(MODELS, section.kind, context, section.options, MODEL)
+        model = build_plugin(config, MODELS, section.kind, context, section.options, MODEL)
     else:
         model = kind_of(MODELS, section.kind).build(section, context)
     return model
@@ -46,7 +46,7 @@ def _build_coder(config: FlightConfig, model: Model) -> Coder:
     context = CoderContext(config.timing.tick_s, config.timing.symbol_period_s, model)
     coder: Coder
     if isinstance(section, OutsideSection):
-        coder = build_plugin(CODERS, section.kind, context, section.options, CODER)
+        coder = build_plugin(config, CODERS, section.kind, context, section.options, CODER)
     else:
         coder = kind_of(CODERS, section.kind).build(section, context)
     return coder

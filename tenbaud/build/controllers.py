@@ -25,7 +25,7 @@ def build_controller(config: FlightConfig, reference: Reference | None = None) -
     )
     section = config.receiver
     controller: Controller = build_part(
-        CONTROLLERS, section.controller, config, context, section.controller_options, CONTROLLER
+        config, CONTROLLERS, section.controller, context, section.controller_options, CONTROLLER
     )
     return controller
 

@@ -18,6 +18,8 @@ from typing import Any
 
 from channel.registry import Registry, RegistryError
 from tenbaud.config.load import ConfigError
+from tenbaud.config.outside_code import require_allowed
+from tenbaud.config.schema import FlightConfig
 
 Interface = Mapping[str, int | None]
 """What an object must have: methods with their number of arguments, attributes with None."""
@@ -46,20 +48,22 @@ class PluginError(ConfigError):
     """A part from outside that cannot be used; the text names field, module, class and fault."""
 
 
-def is_plugin(name: str) -> bool:
-    """Return whether a kind names a class from outside."""
-    return ":" in name
-
-
 def build_plugin(
-    registry: Registry, name: str, context: object, options: Mapping[str, Any], interface: Interface
+    config: FlightConfig,
+    registry: Registry,
+    name: str,
+    context: object,
+    options: Mapping[str, Any],
+    interface: Interface,
 ) -> Any:
     """Return the object that a class from outside builds; PluginError if it is not what is needed.
 
-    `name` is `module:Class` or what an installed package offers.
+    `name` is `module:Class` or what an installed package offers. CodeNotAllowed if nobody allowed the
+    configuration's code to run.
     """
+    require_allowed(config)
     field = registry.field
-    found = load_class(field, name) if is_plugin(name) else _offered(registry, name)
+    found = _load_class(field, name) if ":" in name else _offered(registry, name)
     try:
         part = found(context, **options)
     except Exception as error:  # it is the user's code, and anything may be wrong in it
@@ -77,7 +81,7 @@ def build_plugin(
     return part
 
 
-def load_class(field: str, name: str) -> Any:
+def _load_class(field: str, name: str) -> Any:
     """Return what `module:Class` names; PluginError, with a hint, if there is no such thing."""
     module_name, _, class_name = name.partition(":")
     here = os.getcwd()
@@ -110,9 +114,9 @@ def load_class(field: str, name: str) -> Any:
 
 
 def build_part(
+    config: FlightConfig,
     registry: Registry,
     name: str,
-    config: object,
     context: object,
     options: Mapping[str, Any],
     interface: Interface,
@@ -120,7 +124,7 @@ def build_part(
     """Return a plant or controller: built in as a function of the configuration, or as a class."""
     if name in registry.built_in and not inspect.isclass(part := registry.load(name)):
         return part(config, context)
-    return build_plugin(registry, name, context, options, interface)
+    return build_plugin(config, registry, name, context, options, interface)
 
 
 def _offered(registry: Registry, name: str) -> Any:

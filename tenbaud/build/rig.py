@@ -77,7 +77,7 @@ def build_plant(config: FlightConfig, step_s: float) -> Plant:
         disturbance,
         section.initial_angle_rad,
     )
-    plant: Plant = build_part(PLANTS, section.kind, config, context, section.options, PLANT)
+    plant: Plant = build_part(config, PLANTS, section.kind, context, section.options, PLANT)
     return plant
 
 

@@ -32,13 +32,13 @@ def endpoints_of(
     `sessions` is the pattern of session names of an end that serves many.
     """
     from channel.links.endpoints import check_endpoints, default_endpoint, with_protocol
-    from channel.links.registry import link_kind
+    from tenbaud.build.flight import kind_of_link
     from tenbaud.flight.ends import Endpoints
 
     listen, connect = tuple(addresses.listen or ()), tuple(addresses.connect or ())
     router = tuple(addresses.router or ())
     security = security_of(role, addresses, sessions or config.link.session)
-    if not link_kind(config.link.kind).uses_addresses(config.link):
+    if not kind_of_link(config).uses_addresses(config.link):
         if listen or connect or router or addresses.scout:
             raise typer.BadParameter(
                 "--listen, --connect, --router and --scout are Zenoh's; a serial line has --port, and "

@@ -93,9 +93,7 @@ def demo(
 
 def _checked_pace(agreement: Agreement, pace: float | None, view: bool) -> float | None:
     """Return how many times real time to fly at most; a flight that is looked at keeps to 1."""
-    from channel.links.registry import link_kind
-
-    virtual = agreement.clock == "virtual" and not link_kind(agreement.config.link.kind).in_process
+    virtual = agreement.clock == "virtual" and not agreement.link.in_process
     if pace is not None and not virtual:
         raise typer.BadParameter("--pace slows the virtual clock of two processes down, and no other")
     return pace or (1.0 if view and virtual else None)
@@ -110,11 +108,10 @@ def _view_wish(
             raise typer.BadParameter("--open opens the live page; it goes with --view")
         return None
     from channel.links.endpoints import loopback_host
-    from channel.links.registry import link_kind
     from tenbaud.flight.viewing import ViewWish
     from tenbaud.view.server import Address, free_port, require_nicegui
 
-    if len(agreements) > 1 or link_kind(agreements[0].config.link.kind).in_process:
+    if len(agreements) > 1 or agreements[0].link.in_process:
         raise typer.BadParameter("--view shows one flight of two processes: one --mismatch, no memory")
     require_nicegui()
     host = loopback_host()
@@ -134,7 +131,8 @@ def _agree_all(
     from tenbaud.build.flight import agree
     from tenbaud.config.load import load_config
 
-    agreements = [agree(load_config(preset, config, change), clock.value) for change in changes]
+    configs = [load_config(preset, config, change, allow_code=True) for change in changes]
+    agreements = [agree(one, clock.value) for one in configs]
     for agreement in agreements:
         check_parts(agreement.config)
     return agreements

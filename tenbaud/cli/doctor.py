@@ -15,6 +15,7 @@ def doctor(
     preset: options.Preset = None,
     config: options.ConfigFile = None,
     connect: options.Connect = None,
+    allow_code: options.AllowCode = False,
     json: options.AsJson = False,
 ) -> None:
     """Look at ports, permissions, clock, arithmetic and Zenoh; print a report to paste.
@@ -28,7 +29,7 @@ def doctor(
     from tenbaud.checks.doctor import examine, report
     from tenbaud.config.load import load_config
 
-    findings = examine(load_config(preset, config), tuple(connect or ()))
+    findings = examine(load_config(preset, config, allow_code=allow_code), tuple(connect or ()))
     if json:
         typer.echo(json_module.dumps([asdict(finding) for finding in findings], indent=2))
     else:

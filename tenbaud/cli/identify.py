@@ -81,6 +81,7 @@ def identify(
     damping: Damping = 0.7,
     forgetting: Forgetting = 0.01,
     settings: options.Settings = None,
+    allow_code: options.AllowCode = False,
     out: options.Out = None,
     json: options.AsJson = False,
 ) -> None:
@@ -98,7 +99,7 @@ def identify(
     changed = options.overrides(
         seed=seed, mismatch=mismatch, disturbance=disturbance, settings=settings
     )
-    loaded = load_config(preset, config, changed)
+    loaded = load_config(preset, config, changed, allow_code=allow_code)
     records = _records(loaded, source, excitation, duration, columns, unit.value)
     if start > 0.0 or end is not None:
         records = [(name, record.part(start, end or 1e9)) for name, record in records]

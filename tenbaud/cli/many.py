@@ -51,7 +51,8 @@ def serve(
 
     agreement_of = agreements(node.preset, node.config, many.configs, changed, node.clock.value)
     common = agreement_of("")
-    _check_link(common.config.link.kind)
+    if not common.link.serves_many:
+        raise typer.BadParameter("--sessions needs Zenoh; other links have one rig at their other end")
     check_parts(common.config)
     where = endpoints_of("receiver", addresses, common.config, sessions=many.sessions)
     places = ", ".join(where.listen + where.connect + where.router)
@@ -102,13 +103,6 @@ def serve(
         raise typer.Exit(int(ExitCode.NOT_WRITTEN))
 
 
-def _check_link(name: str) -> None:
-    from channel.links.registry import link_kind
-
-    if not link_kind(name).serves_many:
-        raise typer.BadParameter("--sessions needs Zenoh; other links have one rig at their other end")
-
-
 def agreements(
     preset: str | None, path: Path | None, configs: Path | None, changed: dict[str, Any], clock: Clock
 ) -> Callable[[str], Agreement]:
@@ -128,7 +122,7 @@ def agreements(
             own = None
         changed_s = 0.0 if own is None else own.stat().st_mtime
         if own not in known or known[own][0] != changed_s:
-            config = load_config(preset if own is None else None, own or path, changed)
+            config = load_config(preset if own is None else None, own or path, changed, allow_code=True)
             if own is not None:
                 check_parts(config)
             known[own] = (changed_s, agree(config, clock))

@@ -123,7 +123,7 @@ def _run(
     from tenbaud.recording.folder import RunFolder, create_run_folder
     from tenbaud.telemetry.station import Wish
 
-    config = load_config(node.preset, node.config, changed)
+    config = load_config(node.preset, node.config, changed, allow_code=True)
     _check_link(config, addresses.insecure)
     wish = Wish(node.telemetry, node.allow_control, pace)
     agreement = replace(agree(config, node.clock.value), live=wish.control)
@@ -156,9 +156,9 @@ def _run(
 
 def _check_link(config: FlightConfig, insecure: bool) -> None:
     """Refuse, before there is a run folder, a link that one end by itself cannot open."""
-    from channel.links.registry import link_kind
+    from tenbaud.build.flight import kind_of_link
 
-    kind = link_kind(config.link.kind)
+    kind = kind_of_link(config)
     if kind.in_process:
         raise typer.BadParameter(
             f"link.kind = {config.link.kind} joins two ends in one process: "
@@ -170,9 +170,9 @@ def _check_link(config: FlightConfig, insecure: bool) -> None:
 def _introduce(
     role: Role, identity: Any, config: FlightConfig, endpoints: Endpoints, folder: RunFolder
 ) -> None:
-    from channel.links.registry import link_kind
+    from tenbaud.build.flight import kind_of_link
 
-    own = link_kind(config.link.kind).where(config.link)
+    own = kind_of_link(config).where(config.link)
     places = [*own, *endpoints.listen, *endpoints.connect, *endpoints.router]
     if endpoints.scouting:
         places.append("whatever answers in this network")

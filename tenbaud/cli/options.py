@@ -26,6 +26,13 @@ ConfigFile = Annotated[
     Path | None,
     typer.Option("--config", help="TOML file over the preset; the same at both ends."),
 ]
+AllowCode = Annotated[
+    bool,
+    typer.Option(
+        "--allow-code",
+        help="Import and run the classes from outside (module:Class) that the configuration names.",
+    ),
+]
 Duration = Annotated[
     float | None,
     typer.Option(help="Flight time in seconds.", min=1e-5, max=1e7, show_default=False),

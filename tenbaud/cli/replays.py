@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from tenbaud.cli import options
 from tenbaud.flight.outcome import ExitCode
 
 OtherRun = Annotated[
@@ -23,6 +24,7 @@ def replay(
     save: Annotated[
         Path | None, typer.Option(help="Write the symbols into this new file: the whole flight.")
     ] = None,
+    allow_code: options.AllowCode = False,
 ) -> None:
     """Fly a recorded flight again from its symbols alone, and compare every state to the last bit.
 
@@ -35,13 +37,13 @@ def replay(
     from tenbaud.replay.text import replay_text
 
     if run.is_file() and run.suffix != ".mcap":
-        _replay_file(run)
+        _replay_file(run, allow_code)
         return
     from tenbaud.replay.record import load_record
     from tenbaud.replay.replay import replay as fly_again
     from tenbaud.replay.replay import save_symbols
 
-    record = load_record(run, other)
+    record = load_record(run, other, allow_code=allow_code)
     for _, tables in record.ends():
         for note in tables.notes:
             typer.echo(f"note: {note}", err=True)
@@ -54,11 +56,11 @@ def replay(
         raise typer.Exit(int(ExitCode.FAILED))
 
 
-def _replay_file(path: Path) -> None:
+def _replay_file(path: Path, allow_code: bool) -> None:
     from tenbaud.replay.replay import replay_symbols
     from tenbaud.replay.symbols import unpack
 
-    unpacked = unpack(path)
+    unpacked = unpack(path, allow_code=allow_code)
     samples, digest = replay_symbols(unpacked)
     typer.echo(f"{samples} samples flown from {path}; last state {digest}")
     if digest != unpacked.last_digest:
@@ -70,6 +72,7 @@ def _replay_file(path: Path) -> None:
 def audit(
     run: Annotated[Path, typer.Argument(help="Folder of a run.")],
     other: OtherRun = None,
+    allow_code: options.AllowCode = False,
 ) -> None:
     """Show that a flight rested on its paid symbols alone, and what was counted.
 
@@ -77,10 +80,10 @@ def audit(
 
     [dim]tenbaud audit runs/2026-11-23T10-00-00_paper-10baud[/dim]
     """
-    from tenbaud.replay.audit import audit as audit_run
-    from tenbaud.replay.text import audit_text
+    from tenbaud.audit.audit import audit as audit_run
+    from tenbaud.audit.text import audit_text
 
-    result = audit_run(run, other)
+    result = audit_run(run, other, allow_code=allow_code)
     typer.echo(audit_text(result))
     if not result.passed:
         raise typer.Exit(int(ExitCode.FAILED))

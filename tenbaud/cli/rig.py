@@ -61,6 +61,7 @@ def rig(
         float | None, typer.Option(help="Seconds to run; for ever if not given.", min=0.0, max=1e7)
     ] = None,
     settings: options.Settings = None,
+    allow_code: options.AllowCode = False,
     json: options.AsJson = False,
 ) -> None:
     """Behave like a real rig in real time: encoders, motors, a watchdog, and faults on request.
@@ -82,7 +83,7 @@ def rig(
     if preset is None and config is None and replay is not None:
         preset = "uiuc-10baud"
     emulator = build_emulator(
-        load_config(preset, config, changed),
+        load_config(preset, config, changed, allow_code=allow_code),
         form,  # type: ignore[arg-type]
         port,
         line_form=lines,

@@ -35,18 +35,26 @@ def diff(
         typer.Argument(help="Another; not given: the two ends of the first are compared."),
     ] = None,
 ) -> None:
-    """Name the first sample at which two recordings differ, and the field. Exit code 1 if they do.
+    """Name the first sample at which two recordings differ, and the field.
+
+    Exit code 0: equal. 1: a value differs. 2: not comparable, because rows are missing that both should
+    hold, or because there is nothing to compare; what is missing is named.
 
     [dim]tenbaud diff runs/monday runs/tuesday[/dim]
     """
-    from tenbaud.recording.diff import files_to_compare, first_difference
+    from tenbaud.recording.comparison import Verdict
+    from tenbaud.recording.diff import compare_runs, files_to_compare
 
-    difference = first_difference(run_a, run_b)
-    if difference is not None:
-        typer.echo(str(difference))
+    compared = compare_runs(run_a, run_b)
+    if compared.verdict is Verdict.EQUAL:
+        pairs = (f"{pair.first} and {pair.second}" for pair in files_to_compare(run_a, run_b))
+        typer.echo(f"no difference between {', '.join(pairs)}")
+    if text := str(compared):
+        typer.echo(text)
+    if compared.verdict is Verdict.DIFFERENT:
         raise typer.Exit(int(ExitCode.FAILED))
-    compared = ", ".join(f"{pair.first} and {pair.second}" for pair in files_to_compare(run_a, run_b))
-    typer.echo(f"no difference between {compared}")
+    if compared.verdict is Verdict.NOT_COMPARABLE:
+        raise typer.Exit(int(ExitCode.USAGE))
 
 
 def presets() -> None:

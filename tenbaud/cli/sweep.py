@@ -10,6 +10,8 @@ from typing import Annotated, Any
 
 import typer
 
+from tenbaud.cli import options
+
 
 def sweep(
     study: Annotated[
@@ -22,10 +24,7 @@ def sweep(
     workers: Annotated[
         int | None,
         typer.Option(
-            min=1,
-            max=1024,
-            help="Processes on this machine; all cores if not given.",
-            show_default=False,
+            min=1, max=1024, help="Processes on this machine; default: all cores.", show_default=False
         ),
     ] = None,
     scheduler: Annotated[
@@ -36,6 +35,7 @@ def sweep(
         int | None,
         typer.Option(min=1, max=1_000_000, help="Seeds of each point, instead of the study's."),
     ] = None,
+    allow_code: options.AllowCode = False,
     plots: Annotated[bool, typer.Option(help="Draw the plots.")] = True,
     as_json: Annotated[
         bool, typer.Option("--json", help="Summary on standard output as JSON, nothing else there.")
@@ -52,7 +52,7 @@ def sweep(
 
     if scheduler is not None and workers is not None:
         raise StudyError("--workers is of this machine and --scheduler of a cluster: give one of them")
-    what = read_study(study, seeds)
+    what = read_study(study, seeds, allow_code=allow_code)
     folder = out or Path("studies") / what.file.name
     results = Results(what, folder)
     try:

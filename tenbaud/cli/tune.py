@@ -89,6 +89,7 @@ def tune(
     method: Method = MethodOption.EVOLUTION,
     evaluations: Evaluations = 600,
     seed: Seed = 1,
+    allow_code: options.AllowCode = False,
     as_json: options.AsJson = False,
 ) -> None:
     """Fit a coder's constants, and with --model the model's, on flights; judge them on others.
@@ -122,7 +123,7 @@ def tune(
     )
     first = seeds + 1
     split = Split(tuple(range(1, first)), tuple(range(first, first + test_seeds)), train_share)
-    tuning = Tuning(preset, config, overrides, {}, split, method.value, evaluations, seed)
+    tuning = Tuning(preset, config, overrides, {}, split, method.value, evaluations, seed, allow_code)
     ranges = free_ranges(tuning.config({}), _named(free or []), model=model)
     tuning = replace(tuning, free=ranges)
     with StopFlag() as stop, _bar(evaluations) as (progress, task):

@@ -68,14 +68,13 @@ class Kind:
 
 @dataclass(frozen=True, slots=True)
 class PartName:
-    """Checks the name of a kind; `classes`: module:Class will do as well."""
+    """Checks the name of a kind."""
 
     registry: Registry
-    classes: bool = True
 
     def __call__(self, name: str) -> str:
         """Return the name; ValueError where nobody offers it."""
-        if not self.classes or ":" not in name:
+        if not self.registry.classes or ":" not in name:
             return self.registry.check(name)
         if not re.fullmatch(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*", name):
             raise ValueError("a class from outside is written module:Class")

@@ -34,10 +34,13 @@ def load_config(
     preset: str | None = None,
     path: Path | None = None,
     overrides: dict[str, Any] | None = None,
+    *,
+    allow_code: bool = False,
 ) -> FlightConfig:
     """Return the checked configuration.
 
     A file may name the preset that it builds on (`preset = "..."`); an explicit `preset` wins.
+    `allow_code`: classes from outside that it names may be imported, as for a flight of one's own.
     Raises ConfigError.
     """
     from_file = _read_toml(path) if path is not None else {}
@@ -48,10 +51,11 @@ def load_config(
     values = _merge(values, overrides or {})
     values["preset"] = base
     try:
-        return FlightConfig.model_validate(values)
+        config = FlightConfig.model_validate(values)
     except ValidationError as error:
         source = str(path) if path is not None else f"preset {base}"
         raise ConfigError(_describe_all(source, error)) from error
+    return config.allowing_code() if allow_code else config
 
 
 def nested(settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -153,7 +157,7 @@ def _describe(detail: ErrorDetails) -> tuple[str, str]:
     if detail["type"] == "union_tag_invalid":
         tag = detail["ctx"]["tag"]
         hint = (MODELS if name == "model" else CODERS).hint(str(tag))
-        return f"{name}.kind", f"{hint}; or module:Class, got {tag!r}"
+        return f"{name}.kind = {tag!r}", hint
     if detail["type"] == "string_pattern_mismatch" and place[-1] in ("controller", "kind"):
         return f"{name} = {detail['input']!r}", "a class from outside is written module:Class"
     message = detail["msg"].removeprefix("Value error, ")

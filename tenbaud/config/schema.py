@@ -25,6 +25,7 @@ from tenbaud.config.kinds import (
     union_of,
 )
 from tenbaud.config.models import PitchModelSection
+from tenbaud.config.permission import CodePermission
 from tenbaud.config.rig_schema import BridgeSection, HilSection, QuarcSection, SerialSection
 from tenbaud.config.section import (
     Counts,
@@ -113,7 +114,7 @@ class PlantSection(Section):
     """The simulated plant, relative to the codec's model."""
 
     kind: Annotated[str, AfterValidator(PartName(PLANTS))] = "pitch"
-    """the pitch axis, what an installed package offers, or module:Class"""
+    """the pitch axis, or a plant from outside"""
     options: Options = Field(default_factory=dict)
     """what a class from outside is built with"""
     relative_to: Literal["model", "pitch"] = "model"
@@ -186,8 +187,7 @@ class ReceiverSection(Section):
     """The controller node."""
 
     controller: Annotated[str, AfterValidator(PartName(CONTROLLERS))] = "pid"
-    """the PID law, the voltages of a recorded flight, what an installed package offers, or
-    module:Class"""
+    """the PID law, the voltages of a recorded flight, or a law from outside"""
     controller_options: Options = Field(default_factory=dict)
     """what a class from outside is built with"""
     pid: PidSection = PidSection()
@@ -209,8 +209,7 @@ class FlightLogSection(Section):
 class LinkSection(Section):
     """Where the other end is."""
 
-    kind: Annotated[str, AfterValidator(PartName(LINKS, classes=False))] = "zenoh"
-    """or what an installed package offers"""
+    kind: Annotated[str, AfterValidator(PartName(LINKS))] = "zenoh"
     session: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+(/[A-Za-z0-9_.-]+)*$")] = "helicopter"
     peer_timeout_s: Annotated[float, Field(ge=0.01, le=3600.0)] = 10.0
     """silence after which an end gives the other one up"""
@@ -243,7 +242,7 @@ class TelemetrySection(Section):
     """messages per second of each end"""
 
 
-class FlightConfig(Section):
+class FlightConfig(CodePermission):
     """Everything about a flight."""
 
     preset: str = "paper-10baud"

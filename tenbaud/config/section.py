@@ -10,7 +10,7 @@ Positive = Annotated[float, Field(ge=1e-9, le=1e9)]
 AngleRange = Annotated[float, Field(ge=1e-9, le=1000.0)]
 NotNegative = Annotated[float, Field(ge=0.0, le=1e9)]
 Gain = Annotated[float, Field(ge=0.0, le=1e6)]
-Factor = Annotated[float, Field(ge=-1e6, le=1e6)]
+Factor = Annotated[float, Field(ge=-1e9, le=1e9)]
 Mismatch = Annotated[float, Field(ge=-0.999, le=10.0)]
 """A fraction: -1 would leave nothing of the constant."""
 Volts = Annotated[float, Field(ge=-32.0, le=32.0)]

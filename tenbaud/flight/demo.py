@@ -16,7 +16,6 @@ from typing import IO
 
 from channel.links.base import Role
 from channel.links.kind import Meeting
-from channel.links.registry import link_kind
 from tenbaud.build.flight import Agreement
 from tenbaud.config.load import dump_config
 from tenbaud.files.whole import write_whole
@@ -59,7 +58,7 @@ def fly_demo(
     virtual clock, at most so many times real time; not for a link within one process.
     """
     write_whole(folder.config, dump_config(agreement.config))
-    if link_kind(agreement.config.link.kind).in_process:
+    if agreement.link.in_process:
         outcome, upper, lower = run_in_memory(agreement, folder, "auto")
         messages = [] if outcome.code is ExitCode.OK else [outcome.text]
         result = DemoResult(joined(upper, lower), outcome.code, messages)
@@ -78,8 +77,7 @@ def fly_demo(
 def _fly_processes(
     agreement: Agreement, folder: RunFolder, on_status: OnStatus, viewing: Viewing, stop: StopFlag
 ) -> DemoResult:
-    section = agreement.config.link
-    with link_kind(section.kind).meeting(section) as meetings:
+    with agreement.link.meeting(agreement.config.link) as meetings:
         up, down = _words(meetings[0]) + viewing.transmitter, _words(meetings[1]) + viewing.receiver
         receiver = _Child("receiver", agreement, folder, down, on_status)
         transmitter = _Child("transmitter", agreement, folder, up, on_status)

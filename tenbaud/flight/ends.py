@@ -13,7 +13,6 @@ from pathlib import Path
 
 from channel.links.base import Link, Role
 from channel.links.kind import LinkEnd, NodePlace
-from channel.links.registry import link_kind
 from channel.links.security import Security
 from channel.protocol.wire import DATAGRAM
 from receiver.endpoint import ReceiverEndpoint
@@ -73,9 +72,9 @@ def open_link(
     agreement: Agreement, role: Role, endpoints: Endpoints, stop: Stop = lambda: False
 ) -> Link:
     """Return an open link of the configured kind for one end."""
-    section = agreement.config.link
-    end = LinkEnd(role, section, agreement.terms, agreement.codec, endpoints.node(), stop)
-    return link_kind(section.kind).open(end)
+    settings, terms = agreement.config.link, agreement.terms
+    end = LinkEnd(role, settings, terms, agreement.codec, endpoints.node(), stop)
+    return agreement.link.open(end)
 
 
 def run_transmitter(

@@ -42,7 +42,7 @@ def fly(
     from tenbaud.recording.run import Run
 
     changes = nested({**(settings or {}), "link.kind": link})
-    loaded = load_config(preset, None if config is None else Path(config), changes)
+    loaded = load_config(preset, None if config is None else Path(config), changes, allow_code=True)
     agreement = agree(loaded, clock)
     check_parts(agreement.config)
     folder = RunFolder(create_run_folder(None, loaded.preset, None if out is None else Path(out)))

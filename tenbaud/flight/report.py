@@ -63,7 +63,7 @@ def write_up(folder: RunFolder, config: FlightConfig, summary: Summary, draw: bo
         problems.append(outcome_of(error))
     if draw:
         try:
-            _draw(folder, figure_title(config, summary))
+            draw_figure(folder, figure_title(config, summary))
         except (RecordingError, WriteError) as error:
             code = ExitCode.NOT_WRITTEN if isinstance(error, WriteError) else ExitCode.OK
             problems.append(Outcome(code, f"no figure was drawn: {error}"))
@@ -75,8 +75,8 @@ def write_summary(folder: RunFolder, summary: Summary) -> None:
     write_whole(folder.summary, json.dumps(summary, indent=2) + "\n")
 
 
-def _draw(folder: RunFolder, title: str) -> None:
-    """Draw the figure of a run from the recordings that are there."""
+def draw_figure(folder: RunFolder, title: str) -> None:
+    """Draw the figure of a run from its recordings. Raises RecordingError and WriteError."""
     from tenbaud.recording.figure import draw_flight
 
     receiver = folder.receiver if folder.receiver.is_file() else None

@@ -34,7 +34,8 @@ def convert(run: Run, form: str, output: Path | None = None, overwrite: bool = F
     default, write = FORMS[form]
     target = output or run.folder.path / default
     layouts = layout_paths(target) if form == "mcap" else []
-    there = [path for path in (target, *layouts) if path.exists()]
+    # A symbolic link counts as something, wherever it leads.
+    there = [path for path in (target, *layouts) if path.exists() or path.is_symlink()]
     if there and not overwrite:
         raise RecordingError(
             f"{there[0]} exists already and is not overwritten. Add --force, or choose another place "

@@ -1,8 +1,8 @@
-"""Where two recordings first disagree, to the last bit.
+"""Two recordings side by side, to the last bit.
 
-Rows of a topic are joined on its first field (tick or sample) while both files stream by, so that
-two long flights need no memory. Wall-clock fields and the topic `event` are left out: two runs of
-one flight need not share them.
+Rows of a topic are joined on its first field (tick or sample) while both files stream by, so that two
+long flights need no memory. Wall-clock fields and the topic `event` are left out: two runs of one
+flight need not share them. The two ends of one flight are compared sample by sample (`both_ends`).
 """
 
 from __future__ import annotations
@@ -10,20 +10,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 from channel.protocol.recording import RecordChannel
+from tenbaud.recording.both_ends import compare_ends
+from tenbaud.recording.comparison import Compared, Difference, unlike_field
+from tenbaud.recording.encoding import END_METADATA
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RECEIVER_NAME, TRANSMITTER_NAME, RunFolder
 from tenbaud.recording.reader import Recording
 from tenbaud.recording.rows import Row
 
 IGNORED_TOPIC = "event"
-LOCKSTEP_TOPIC = "sample"
-NO_FIELD = "(no such field)"
-NO_ROW = "(no row)"
 
-DifferenceKind = Literal["value", "missing row", "length"]
 _KeyedRow = tuple[object, int, Row]
 
 
@@ -36,58 +34,30 @@ class Comparison:
     lockstep: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Difference:
-    """The first difference. `key` is the value of the field `key_name`: the tick or sample."""
-
-    kind: DifferenceKind
-    topic: str
-    key_name: str
-    key: object
-    time_ns: int
-    field: str
-    first_value: object
-    second_value: object
-    first: Path
-    second: Path
-
-    def __str__(self) -> str:
-        where = f"{self.key_name} {self.key} ({self.time_ns / 1e9:.3f} s), topic {self.topic!r}"
-        if self.kind == "length":
-            longer, shorter = self.first, self.second
-            if self.first_value == NO_ROW:
-                longer, shorter = shorter, longer
-            return f"No value differs, but {shorter} ends before {where}, where {longer} goes on."
-        if self.kind == "missing row":
-            lacking = self.first if self.first_value == NO_ROW else self.second
-            return f"First difference at {where}: the row is missing in {lacking}."
-        return (
-            f"First difference at {where}, field {self.field!r}:\n"
-            f"  {self.first_value!r}  in {self.first}\n"
-            f"  {self.second_value!r}  in {self.second}"
-        )
-
-
-def first_difference(first: Path, second: Path | None = None) -> Difference | None:
-    """The earliest difference in flight time, or None if there is none.
+def compare_runs(first: Path, second: Path | None = None) -> Compared:
+    """Compare two runs, or the two ends of one.
 
     Two run folders: each end is compared with the same end. One run folder alone: its transmitter
     is compared with its receiver, on the fields of `sample` that both have. Two files are compared
-    as they are. That one side ends earlier is reported only if nothing else differs.
-    Raises RecordingError if there is nothing to compare.
+    as they are. Raises RecordingError if there is nothing to compare.
     """
-    found = [
-        difference
-        for comparison in files_to_compare(first, second)
-        for difference in _compare_files(comparison)
-    ]
-    return min(found, key=lambda entry: (entry.kind == "length", entry.time_ns), default=None)
+    compared = Compared()
+    for pair in files_to_compare(first, second):
+        here, there = Recording(pair.first), Recording(pair.second)
+        for recording in (here, there):
+            _check_whole(recording, compared)
+        if pair.lockstep:
+            compare_ends(here, there, compared)
+        else:
+            _compare_files(here, there, compared)
+    return compared
 
 
 def files_to_compare(first: Path, second: Path | None = None) -> list[Comparison]:
-    """Which files `first_difference` would open. Ends recorded in one folder only are left out."""
+    """Which files `compare_runs` would open. Ends recorded in one folder only are left out."""
     if second is None:
         run = RunFolder(first)
+        run.recordings()  # refuses links
         return [Comparison(run.transmitter, run.receiver, lockstep=True)]
     if first.is_dir() != second.is_dir():
         raise RecordingError(
@@ -112,39 +82,32 @@ def files_to_compare(first: Path, second: Path | None = None) -> list[Comparison
     )
 
 
-def _compare_files(comparison: Comparison) -> Iterator[Difference]:
-    first, second = Recording(comparison.first), Recording(comparison.second)
-    if comparison.lockstep:
-        topics = [LOCKSTEP_TOPIC]
-    else:
-        topics = sorted((first.topics.keys() | second.topics.keys()) - {IGNORED_TOPIC})
-    for topic in topics:
-        # An end that recorded no sample at all cannot be checked, and `schema` says so.
-        sides = [side for side in (first, second) if comparison.lockstep or topic in side.topics]
-        channels = [side.schema(topic) for side in sides]
-        fields = _fields(channels, comparison.lockstep)
-        rejoined = comparison.lockstep and (_rejoined(first) or _rejoined(second))
-        difference = _compare_topic(first, second, channels[0], fields, rejoined)
-        if difference is not None:
-            yield difference
+def _check_whole(recording: Recording, compared: Compared) -> None:
+    """Note what a file says itself that it lacks."""
+    end = recording.metadata_record(END_METADATA)
+    if not recording.complete:
+        compared.faults.append(f"{recording.path} was cut or damaged: rows after that are missing")
+    held = sum(topic.rows for topic in recording.topics.values())
+    written = end.get("rows_written", "")
+    if written.isdecimal() and int(written) != held:
+        compared.faults.append(f"{recording.path} holds {held} rows of {written} that were written")
+    if end.get("rows_dropped", "0") != "0":
+        compared.faults.append(
+            f"{recording.path} lacks {end['rows_dropped']} rows: the recorder lost them"
+        )
 
 
-def _fields(channels: list[RecordChannel], only_common: bool) -> list[str]:
+def _compare_files(first: Recording, second: Recording, compared: Compared) -> None:
+    for topic in sorted((first.topics.keys() | second.topics.keys()) - {IGNORED_TOPIC}):
+        channels = [side.schema(topic) for side in (first, second) if topic in side.topics]
+        _compare_topic(first, second, channels[0], _fields(channels), compared)
+
+
+def _fields(channels: list[RecordChannel]) -> list[str]:
     """The fields to compare, in the first channel's order."""
     timing = {field.name for channel in channels for field in channel.fields if field.timing}
-    names = [[field.name for field in channel.fields] for channel in channels]
-    if only_common:
-        kept = [name for name in names[0] if name in names[-1]]
-    else:
-        kept = list(dict.fromkeys(name for listed in names for name in listed))
-    return [name for name in kept if name not in timing]
-
-
-def _rejoined(recording: Recording) -> bool:
-    """Whether the ends began anew: samples flown by one end only belong to the pause before."""
-    if IGNORED_TOPIC not in recording.topics:
-        return False
-    return any(row.get("kind") == "rejoin" for _, row in recording.rows(IGNORED_TOPIC))
+    names = dict.fromkeys(field.name for channel in channels for field in channel.fields)
+    return [name for name in names if name not in timing]
 
 
 def _compare_topic(
@@ -152,42 +115,39 @@ def _compare_topic(
     second: Recording,
     channel: RecordChannel,
     fields: list[str],
-    skip_missing: bool,
-) -> Difference | None:
-    key_name = channel.fields[0].name
-    left, right = _keyed(first, channel, key_name), _keyed(second, channel, key_name)
-
-    def difference(
-        kind: DifferenceKind, at: _KeyedRow, field: str, values: tuple[object, object]
-    ) -> Difference:
-        where = (at[0], at[1], field, *values, first.path, second.path)
-        return Difference(kind, channel.topic, key_name, *where)
-
+    compared: Compared,
+) -> None:
+    topic, key_name = channel.topic, channel.fields[0].name
+    left, right = _keyed(first, topic, key_name), _keyed(second, topic, key_name)
     here, there = next(left, None), next(right, None)
+    found = False
     while here is not None and there is not None:
         if here[0] != there[0]:
-            if skip_missing:
-                if _before(there[0], here[0]):
-                    there = next(right, None)
-                else:
-                    here = next(left, None)
-                continue
-            missing = (NO_ROW, "(a row)") if _before(there[0], here[0]) else ("(a row)", NO_ROW)
-            at = there if missing[0] == NO_ROW else here
-            return difference("missing row", at, key_name, missing)
-        unlike = _unlike_field(here[2], there[2], fields)
+            if _before(there[0], here[0]):
+                compared.lacks(first.path, topic, key_name, there[0])
+                there = next(right, None)
+            else:
+                compared.lacks(second.path, topic, key_name, here[0])
+                here = next(left, None)
+            continue
+        compared.rows += 1
+        unlike = None if found else unlike_field(here[2], there[2], fields)
         if unlike is not None:
-            return difference("value", here, unlike[0], unlike[1:])
+            found = True
+            where = (topic, key_name, here[0], here[1])
+            compared.differences.append(Difference(*where, *unlike, first.path, second.path))
         here, there = next(left, None), next(right, None)
-    if here is not None:
-        return difference("length", here, key_name, ("(a row)", NO_ROW))
-    if there is not None:
-        return difference("length", there, key_name, (NO_ROW, "(a row)"))
-    return None
+    for recording, row, rest in ((second, here, left), (first, there, right)):
+        before = len(compared.missing)
+        while row is not None:
+            compared.lacks(recording.path, topic, key_name, row[0])
+            row = next(rest, None)
+        for entry in compared.missing[before:]:
+            entry.ends = True
 
 
-def _keyed(recording: Recording, channel: RecordChannel, key_name: str) -> Iterator[_KeyedRow]:
-    for time_ns, row in recording.rows(channel.topic):
+def _keyed(recording: Recording, topic: str, key_name: str) -> Iterator[_KeyedRow]:
+    for time_ns, row in recording.rows(topic):
         yield row.get(key_name), time_ns, row
 
 
@@ -196,21 +156,3 @@ def _before(one: object, other: object) -> bool:
     if isinstance(one, int | float) and isinstance(other, int | float):
         return one < other
     return isinstance(one, int | float)
-
-
-def _unlike_field(here: Row, there: Row, fields: list[str]) -> tuple[str, object, object] | None:
-    for name in fields:
-        one, other = here.get(name, NO_FIELD), there.get(name, NO_FIELD)
-        if _same(one, other):
-            continue
-        if isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
-            for index, (value, counterpart) in enumerate(zip(one, other, strict=True)):
-                if not _same(value, counterpart):
-                    return f"{name}[{index}]", value, counterpart
-        return name, one, other
-    return None
-
-
-def _same(one: object, other: object) -> bool:
-    # The text tells 0.0 from -0.0 and 1 from 1.0, which are equal as numbers but not as bits.
-    return one == other and repr(one) == repr(other)

@@ -60,8 +60,21 @@ class RunFolder:
         return self.path / FIGURE_NAME
 
     def recordings(self) -> list[Path]:
-        """The recordings that exist, the transmitter's first."""
-        return [path for path in (self.transmitter, self.receiver) if path.is_file()]
+        """The recordings that exist, the transmitter's first; RecordingError for a symbolic link."""
+        return [path for path in (self.transmitter, self.receiver) if is_own_file(path)]
+
+
+def is_own_file(path: Path) -> bool:
+    """Whether there is such a file in a run folder; RecordingError if it is a symbolic link.
+
+    A run folder may come from anybody, and a link in it would have this machine's files read.
+    """
+    if path.is_symlink():
+        raise RecordingError(
+            f"{path} is a symbolic link, and links within a run folder are not followed. "
+            "If you know where it leads, put a copy of that file in its place."
+        )
+    return path.is_file()
 
 
 def create_run_folder(
@@ -126,8 +139,10 @@ def find_recordings(path: Path) -> list[Path]:
 def read_small(path: Path) -> str:
     """Return the text of a small file of a run folder.
 
-    Raises OSError for what is missing, no plain file or too large, ValueError for what is no text.
+    Raises OSError for what is missing, no plain file or too large, ValueError for what is no text, and
+    RecordingError for a symbolic link.
     """
+    is_own_file(path)
     handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC | getattr(os, "O_NONBLOCK", 0))
     with open(handle, "rb") as stream:
         if not stat.S_ISREG(os.fstat(handle).st_mode):
@@ -156,6 +171,8 @@ def open_new_recording(path: Path) -> BinaryIO:
     try:
         stream = os.fdopen(os.open(path, flags, 0o666), "wb")
     except OSError as error:
+        if error.errno == errno.ELOOP:
+            raise RecordingError(f"{path} is a link, and nothing is recorded through one.") from error
         raise write_error(path, error) from error
     if not hold(stream.fileno()) or os.fstat(stream.fileno()).st_size > 0:
         stream.close()

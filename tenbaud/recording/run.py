@@ -26,6 +26,7 @@ from tenbaud.recording.folder import (
     TRANSMITTER_NAME,
     RunFolder,
     find_recordings,
+    is_own_file,
     read_small,
     read_summary,
 )
@@ -181,10 +182,13 @@ class Run:
 
     @cached_property
     def config(self) -> FlightConfig:
-        """The configuration that was flown, checked anew."""
+        """The configuration that was flown, checked anew.
+
+        Classes from outside that it names are not imported: `config.allowing_code()` permits that.
+        """
         from tenbaud.config.load import load_config
 
-        if not self.folder.config.is_file():
+        if not is_own_file(self.folder.config):
             raise RecordingError(f"{self.folder.path} holds no {self.folder.config.name}.")
         return load_config(path=self.folder.config)
 

@@ -9,8 +9,7 @@ from receiver.controllers.base import Controller
 from receiver.controllers.references import Reference
 from tenbaud.build.controllers import build_controller, build_reference
 from tenbaud.config.schema import FlightConfig
-from tenbaud.recording.table import Tables
-from tenbaud.replay.record import FlightRecord, by_key
+from tenbaud.replay.record import FlightRecord
 
 
 class RecordedCommands:
@@ -52,12 +51,11 @@ def steps_by_hand(record: FlightRecord) -> tuple[tuple[int, float], ...]:
 
     () where the flight followed its configuration, as it does unless somebody moved the set-point.
     """
-    receiver = record.receiver
-    if receiver is None or "tick" not in receiver.topics:
+    if "receiver" not in record.rows:
         return ()
     reference = build_reference(record.agreement.config)
-    rows = receiver.topics["tick"].rows
-    told = [(row["tick"], row["reference_rad"]) for row in rows if row["reference_rad"] is not None]
+    rows = record.rows["receiver"].topic("tick")
+    told = [(row.tick, row.reference_rad) for row in rows if row.reference_rad is not None]
     first = next(
         (index for index, (tick, angle) in enumerate(told) if angle != reference.angle_rad(tick)), None
     )
@@ -80,21 +78,13 @@ def controller_of(config: FlightConfig, steps: tuple[tuple[int, float], ...] = (
 def recorded_commands(record: FlightRecord) -> RecordedCommands | None:
     """Return the commands as they were recorded; None if not all of them were."""
     initial = record.agreement.terms.initial_command
-    if record.receiver is not None and "tick" in record.receiver.topics:
-        rows = by_key(record.receiver.topics["tick"])
-        return RecordedCommands(
-            {tick: tuple(row["command_volts"]) for tick, row in rows.items()}, initial
-        )
-    return _commands_at_plant(record.transmitter, initial)
-
-
-def _commands_at_plant(tables: Tables | None, initial: tuple[float, ...]) -> RecordedCommands | None:
-    if tables is None or "tick" not in tables.topics:
+    rows = record.rows.get("receiver")
+    if rows is not None and rows.topic("tick").recorded:
+        commands = {row.tick: row.command_volts for row in rows.topic("tick")}
+        return RecordedCommands(commands, initial)
+    beside = record.rows.get("transmitter")
+    if beside is None or not beside.topic("tick").recorded:
         return None
-    rows = by_key(tables.topics["tick"])
-    commands = {
-        tick: tuple(row["commanded_volts"])
-        for tick, row in rows.items()
-        if row["commanded_volts"] is not None
-    }
-    return RecordedCommands(commands, initial) if len(commands) == len(rows) else None
+    ticks = beside.topic("tick").rows
+    commands = {row.tick: row.commanded_volts for row in ticks if row.commanded_volts is not None}
+    return RecordedCommands(commands, initial) if len(commands) == len(ticks) else None

@@ -9,9 +9,11 @@ from typing import Any
 from channel.codec.codec import CodecState, Vector
 from channel.codec.words import Word
 from tenbaud.build.flight import Agreement, agree
+from tenbaud.config.outside_code import require_allowed, require_regular_files
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.run import Run
-from tenbaud.recording.table import Table, Tables
+from tenbaud.recording.table import Tables
+from tenbaud.replay.rows import EndRows, EpochStart, read_rows
 
 NUMBER_MAX = 1e9
 """Of a state or a command, in rad, rad/s or V."""
@@ -36,6 +38,13 @@ class FlightRecord:
     receiver: Tables | None
     summaries: dict[str, dict[str, Any]]
     """of each end that left one"""
+    rows: dict[str, EndRows]
+    """of each end that is here"""
+
+    @property
+    def consumer_rows(self) -> EndRows:
+        """The same recording's rows."""
+        return self.rows["receiver" if self.receiver is not None else "transmitter"]
 
     @property
     def consumer(self) -> Tables:
@@ -51,9 +60,10 @@ class FlightRecord:
         return [(name, tables) for name, tables in both if tables is not None]
 
 
-def load_record(path: Path, other: Path | None = None) -> FlightRecord:
+def load_record(path: Path, other: Path | None = None, *, allow_code: bool = False) -> FlightRecord:
     """Read the recordings of a flight; `other` is the folder of the other machine, if there is one.
 
+    CodeNotAllowed if the configuration names classes from outside, unless `allow_code` permits them.
     Raises RecordingError for what cannot be read, and where this machine or this version of the
     configuration is not the one that was flown.
     """
@@ -66,18 +76,22 @@ def load_record(path: Path, other: Path | None = None) -> FlightRecord:
                 raise RecordingError(f"{path} and {other} both hold a {end}'s recording. Give one.")
             tables[end], summaries[end], homes[end] = run.tables(end), run.summary, run
     home = homes.get("receiver") or homes["transmitter"]
-    agreement = _agreement(home, next(iter(tables.values())))
+    agreement = _agreement(home, next(iter(tables.values())), allow_code)
     for end, one in tables.items():
         _check_same(one, agreement, end)
-    return FlightRecord(agreement, tables.get("transmitter"), tables.get("receiver"), summaries)
+    rows = {end: read_rows(end, one) for end, one in tables.items()}
+    return FlightRecord(agreement, tables.get("transmitter"), tables.get("receiver"), summaries, rows)
 
 
-def _agreement(run: Run, tables: Tables) -> Agreement:
+def _agreement(run: Run, tables: Tables, allow_code: bool) -> Agreement:
+    config = run.config.allowing_code() if allow_code else run.config
+    require_allowed(config)
+    require_regular_files(config)
     clock = tables.metadata.get("clock", "")
     if clock == "real":
-        return agree(run.config, "real")
+        return agree(config, "real")
     if clock == "virtual":
-        return agree(run.config, "virtual")
+        return agree(config, "virtual")
     raise RecordingError(f"{tables.path} does not say on which clock it was flown.")
 
 
@@ -101,46 +115,50 @@ def _check_same(tables: Tables, agreement: Agreement, end: str) -> None:
         )
 
 
-def epochs_of(tables: Tables, agreement: Agreement) -> list[Epoch]:
-    """Return the epochs of one end's recording with the words consumed in each.
+def epochs_of(record: FlightRecord) -> list[Epoch]:
+    """Return the epochs of a flight with the words consumed in each.
 
-    Raises RecordingError where samples are missing within an epoch: what came after cannot be
-    computed.
+    They are the receiver's, if its recording is here. Raises RecordingError where samples are missing
+    within an epoch: what came after cannot be computed.
     """
-    codec, terms = agreement.codec, agreement.terms
-    samples = tables.topic("sample").rows
-    epochs = [_epoch(row) for row in tables.topics["epoch"].rows] if "epoch" in tables.topics else []
-    before = bool(epochs and samples) and samples[0]["sample"] < epochs[0].start.sample
-    if tables.holes and (not epochs or before):
+    agreement, codec = record.agreement, record.agreement.codec
+    tables, samples = record.consumer, record.consumer_rows.topic("sample").rows
+    epochs = [_epoch(row) for row in record.consumer_rows.topic("epoch")]
+    before = bool(epochs and samples) and samples[0].sample < epochs[0].start.sample
+    if before or (tables.holes and not epochs):
         raise RecordingError(
-            f"{tables.path} lacks the state that its first epoch starts from: it is in a hole, "
-            "so nothing can be computed from its symbols."
+            f"{tables.path} lacks the epoch of its first samples, and with it the state that "
+            "they start from: nothing can be computed from its symbols."
         )
     if not epochs:
         # From before epochs were recorded: one of them, from the common initial state.
-        first = samples[0]["sample"] if samples else 0
-        epochs = [Epoch(0, codec.initial()._replace(sample=first), terms.initial_command)]
+        first = samples[0].sample if samples else 0
+        initial = codec.initial()._replace(sample=first)
+        epochs = [Epoch(0, initial, agreement.terms.initial_command)]
     for epoch in epochs:
         check_epoch(epoch, agreement, str(tables.path))
     index = 0
     for row in samples:
-        sample = row["sample"]
-        while index + 1 < len(epochs) and epochs[index + 1].start.sample <= sample:
+        while index + 1 < len(epochs) and epochs[index + 1].start.sample <= row.sample:
             index += 1
         epoch = epochs[index]
         expected = epoch.start.sample + len(epoch.words)
-        if sample != expected:
+        if row.sample > expected:
             raise RecordingError(
-                f"{tables.path} lacks sample {expected}: the next one recorded is {sample}. "
+                f"{tables.path} lacks sample {expected}: the next one recorded is {row.sample}. "
                 "Rows were lost, so what follows cannot be computed from the symbols."
             )
-        word = None if row["word"] is None else tuple(row["word"])
-        if word is not None and not _is_word(word, agreement):
+        if row.sample < expected:
             raise RecordingError(
-                f"{tables.path}: sample {sample} consumed {list(word)!r:.60}, which is no word of the "
-                "flight's coder. The file was changed, or its configuration is another one."
+                f"{tables.path} holds sample {row.sample} where sample {expected} is due: a row is "
+                "doubled or out of order, so what follows cannot be computed from the symbols."
             )
-        epoch.words.append(word)
+        if row.word is not None and not _is_word(row.word, agreement):
+            raise RecordingError(
+                f"{tables.path}: sample {row.sample} consumed {list(row.word)!r:.60}, which is no word "
+                "of the flight's coder. The file was changed, or its configuration is another one."
+            )
+        epoch.words.append(row.word)
     return epochs
 
 
@@ -165,12 +183,5 @@ def _is_word(word: tuple[int, ...], agreement: Agreement) -> bool:
     return len(word) == alphabet.symbols_per_word and all(one in alphabet.symbols for one in word)
 
 
-def _epoch(row: dict[str, Any]) -> Epoch:
-    start = CodecState(row["sample"], tuple(row["state"]), tuple(row["coder"]))
-    return Epoch(row["epoch"], start, tuple(row["hold_volts"]))
-
-
-def by_key(table: Table) -> dict[int, dict[str, Any]]:
-    """Return the rows of a topic by their first field."""
-    key = table.names[0]
-    return {row[key]: row for row in table.rows}
+def _epoch(row: EpochStart) -> Epoch:
+    return Epoch(row.epoch, CodecState(row.sample, row.state, row.coder), row.hold_volts)

@@ -28,7 +28,8 @@ Delay = Callable[[int], int]
 class Reflown(NamedTuple):
     """One sample, flown again."""
 
-    epoch: int
+    place: int
+    """of its epoch among those flown, from 0"""
     sample: int
     word: Word
     model: Vector
@@ -45,8 +46,8 @@ def refly(
     delay: Delay = lambda _slot: 0,
 ) -> Iterator[Reflown]:
     """Yield the samples of a flight, flown again from the words of its epochs."""
-    for epoch in epochs:
-        yield from _refly_epoch(agreement, controller, epoch, delay)
+    for place, epoch in enumerate(epochs):
+        yield from _refly_epoch(agreement, controller, place, epoch, delay)
 
 
 class _Starting(Codec):
@@ -77,7 +78,7 @@ class _Rows:
 
 
 def _refly_epoch(
-    agreement: Agreement, controller: Controller, epoch: Epoch, delay: Delay
+    agreement: Agreement, controller: Controller, place: int, epoch: Epoch, delay: Delay
 ) -> Iterator[Reflown]:
     terms = replace(agreement.terms, initial_command=epoch.hold)
     codec = _Starting(agreement.codec, epoch.start)
@@ -90,24 +91,27 @@ def _refly_epoch(
         raise AssertionError(f"a session refused its own identity: {welcome}")
     alphabet = codec.coder.alphabet
     count = terms.symbols_per_word
+    # A word of many symbols is erased though some of them came. Without any, nothing would ever be due
+    # in an epoch whose words were all erased.
+    some = alphabet.symbols[: 1 if count > 1 else 0]
     last = epoch.start.sample + len(epoch.words)
     now_ns = 0
     for sample, word in enumerate(epoch.words, epoch.start.sample):
-        for place, symbol in enumerate(word or ()):
-            slot = sample * count + place
+        for index, symbol in enumerate(some if word is None else word):
+            slot = sample * count + index
             due_ns = terms.slot_ns(slot) + terms.symbol_delay_ns + terms.uplink_line_ns
             now_ns = max(now_ns, due_ns + delay(slot))
             _let_deadlines_pass(session, now_ns)
             frame = Symbol(welcome.session, welcome.epoch, slot, alphabet.symbol_number(symbol))
             session.on_frame(frame, now_ns)
             session.rest()
-            yield from _taken(rows, epoch.number)
+            yield from _taken(rows, place)
     # Erasures after the last symbol: their deadlines pass one by one.
     deadline = session.next_deadline()
     while session.state.sample < last and deadline is not None:
         session.on_deadline(deadline)
         session.rest()
-        yield from _taken(rows, epoch.number)
+        yield from _taken(rows, place)
         deadline = session.next_deadline()
 
 
@@ -117,11 +121,11 @@ def _let_deadlines_pass(session: ReceiverSession, now_ns: int) -> None:
         session.on_deadline(now_ns - 1)
 
 
-def _taken(rows: _Rows, epoch: int) -> Iterator[Reflown]:
+def _taken(rows: _Rows, place: int) -> Iterator[Reflown]:
     per_sample = len(rows.ticks) // len(rows.samples) if rows.samples else 0
     for index, row in enumerate(rows.samples):
         sample, word, _, model, coder, digest, _ = row
         ticks = rows.ticks[index * per_sample : (index + 1) * per_sample]
-        yield Reflown(epoch, sample, word, model, coder, digest, ticks)  # type: ignore[arg-type]
+        yield Reflown(place, sample, word, model, coder, digest, ticks)  # type: ignore[arg-type]
     rows.samples.clear()
     rows.ticks.clear()

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from receiver.controllers.base import Controller
 from tenbaud.files.whole import make_folder, write_whole
 from tenbaud.recording.errors import RecordingError
-from tenbaud.recording.table import Tables
 from tenbaud.replay.control import controller_of, steps_by_hand
-from tenbaud.replay.record import Epoch, FlightRecord, by_key, epochs_of
-from tenbaud.replay.refly import Delay, Reflown, refly
+from tenbaud.replay.record import FlightRecord, epochs_of
+from tenbaud.replay.refly import Reflown, refly
+from tenbaud.replay.rows import EndRows
 from tenbaud.replay.symbols import Packed, Unpacked, pack
 
 
@@ -44,7 +43,8 @@ def replay(record: FlightRecord) -> Replayed:
     from math import log2
 
     agreement = record.agreement
-    epochs = epochs_of(record.consumer, agreement)
+    _check_shape(record)
+    epochs = epochs_of(record)
     steps = steps_by_hand(record)
     flown = list(refly(agreement, controller_of(agreement.config, steps), epochs))
     differences, compared = compare(record, flown)
@@ -77,33 +77,37 @@ def replay_symbols(unpacked: Unpacked) -> tuple[int, str]:
     return samples, digest
 
 
-def fly_again(
-    record: FlightRecord, controller: Controller, epochs: Sequence[Epoch], delay: Delay
-) -> list[Reflown]:
-    """Fly again with a given controller and given arrival times."""
-    return list(refly(record.agreement, controller, epochs, delay))
-
-
 def compare(record: FlightRecord, flown: Sequence[Reflown]) -> tuple[list[str], int]:
     """Return what differs from the recordings, and how many digests were compared."""
     differences: list[str] = []
     compared = 0
-    for end, tables in record.ends():
-        found, count = _compare_samples(end, tables, flown)
+    for end, rows in record.rows.items():
+        found, count = _compare_samples(end, rows, flown)
         compared += count
         differences += found
-    if record.receiver is not None and "tick" in record.receiver.topics:
-        differences += _compare_commands(record.receiver, flown)
+    if "receiver" in record.rows:
+        differences += _compare_commands(record.rows["receiver"], flown)
     return differences, compared
 
 
-def _compare_samples(end: str, tables: Tables, flown: Sequence[Reflown]) -> tuple[list[str], int]:
-    rows = by_key(tables.topic("sample"))
+def _check_shape(record: FlightRecord) -> None:
+    """Raise RecordingError for rows that no node writes."""
+    for end, rows in record.rows.items():
+        if rows.misfits:
+            first = rows.misfits[0]
+            raise RecordingError(
+                f"The {end}'s recording holds what no node writes: topic {first.topic}, {first.row}, "
+                f"field {first.field}: {first.text}."
+            )
+
+
+def _compare_samples(end: str, rows: EndRows, flown: Sequence[Reflown]) -> tuple[list[str], int]:
+    by_sample = rows.topic("sample").by_key()
     unlike = 0
     first = ""
     compared = 0
     for one in flown:
-        row = rows.get(one.sample)
+        row = by_sample.get(one.sample)
         if row is None:
             continue
         compared += 1
@@ -117,14 +121,13 @@ def _compare_samples(end: str, tables: Tables, flown: Sequence[Reflown]) -> tupl
     return [f"{end}: {unlike} {noun} from what the symbols give, first at {first}"], compared
 
 
-def _unlike_field(row: dict[str, Any], one: Reflown) -> str | None:
+def _unlike_field(row: Any, one: Reflown) -> str | None:
     """Return the first field in which a recorded sample differs, with both values."""
-    word = None if one.word is None else list(one.word)
     pairs = (
-        ("word", row.get("word"), word),
-        ("state", row.get("state"), list(one.model)),
-        ("coder", row.get("coder"), list(one.coder)),
-        ("digest", row.get("digest"), one.digest),
+        ("word", row.word, one.word),
+        ("state", row.state, one.model),
+        ("coder", row.coder, one.coder),
+        ("digest", row.digest, one.digest),
     )
     for name, recorded, computed in pairs:
         if recorded != computed:
@@ -132,20 +135,17 @@ def _unlike_field(row: dict[str, Any], one: Reflown) -> str | None:
     return None
 
 
-def _compare_commands(tables: Tables, flown: Sequence[Reflown]) -> list[str]:
-    rows = by_key(tables.topic("tick"))
+def _compare_commands(rows: EndRows, flown: Sequence[Reflown]) -> list[str]:
+    by_tick = rows.topic("tick").by_key()
     unlike, first = 0, ""
     for one in flown:
         for tick, _, live, command in one.ticks:
-            row = rows.get(tick)
+            row = by_tick.get(tick)
             if row is None:
                 continue
-            same = row["command_volts"] == list(command) and row["live_state"] == list(live)
-            if not same:
+            if row.command_volts != command or row.live_state != live:
                 unlike += 1
-                first = first or (
-                    f"tick {tick}: recorded {row['command_volts']} V, computed {list(command)} V"
-                )
+                first = first or f"tick {tick}: recorded {row.command_volts} V, computed {command} V"
     if not unlike:
         return []
     return [f"receiver: {unlike} commands differ from what the states give, first at {first}"]

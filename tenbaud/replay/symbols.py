@@ -22,6 +22,7 @@ from typing import Any, Literal
 from channel.codec.codec import Codec, CodecState
 from channel.codec.words import ERASED, Alphabet, Word
 from tenbaud.build.flight import Agreement, agree
+from tenbaud.config.outside_code import require_allowed, require_regular_files
 from tenbaud.config.schema import FlightConfig
 from tenbaud.recording.errors import RecordingError
 from tenbaud.replay.record import Epoch, check_epoch
@@ -96,8 +97,11 @@ HEAD_BYTES_MAX = 16 << 20
 NUMBER_MAX = 1 << 53
 
 
-def unpack(path: Path) -> Unpacked:
-    """Read a symbols file; RecordingError for a file that is none, or not a whole one."""
+def unpack(path: Path, *, allow_code: bool = False) -> Unpacked:
+    """Read a symbols file; RecordingError for a file that is none, or not a whole one.
+
+    CodeNotAllowed if its configuration names classes from outside, unless `allow_code` permits them.
+    """
     try:
         data = path.read_bytes()
         head_at = len(MAGIC) + _LENGTH.size
@@ -106,6 +110,10 @@ def unpack(path: Path) -> Unpacked:
         (length,) = _LENGTH.unpack_from(data, len(MAGIC))
         head: dict[str, Any] = json.loads(_unpacked_head(data[head_at : head_at + length]))
         config = FlightConfig.model_validate(head["config"])
+        if allow_code:
+            config = config.allowing_code()
+        require_allowed(config)
+        require_regular_files(config)
         clock: Literal["real", "virtual"] = "real" if head["clock"] == "real" else "virtual"
         agreement = agree(config, clock)
         epochs = _epochs(head["epochs"], data[head_at + length :], agreement.codec)

@@ -50,6 +50,8 @@ class Tuning:
     evaluations: int = 600
     """sets of constants to fly at most, those that are configured included"""
     seed: int = 1
+    allow_code: bool = False
+    """whether classes from outside that the configuration names may be imported"""
 
     def config(self, values: dict[str, float]) -> FlightConfig:
         """Return the configuration with these constants; ConfigError where there is none.
@@ -58,7 +60,8 @@ class Tuning:
         """
         fitted = any(name.startswith("model.") for name in values)
         plant = self._plant() if fitted else {}
-        return configured(self.preset, self.file, self.overrides, {**plant, **values})
+        settings = {**plant, **values}
+        return configured(self.preset, self.file, self.overrides, settings, allow_code=self.allow_code)
 
     def _plant(self) -> dict[str, Any]:
         config = self.config({})

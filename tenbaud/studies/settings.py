@@ -20,6 +20,7 @@ from pydantic import BaseModel
 from channel.errors import TenbaudError
 from tenbaud.build.codec import build_codec
 from tenbaud.config.load import load_config
+from tenbaud.config.outside_code import require_allowed
 from tenbaud.config.schema import KINDS, FlightConfig
 
 
@@ -88,16 +89,25 @@ def put(values: dict[str, Any], name: str, value: object) -> None:
 
 
 def configured(
-    preset: str | None, file: Path | None, fixed: dict[str, Any], swept: dict[str, Any]
+    preset: str | None,
+    file: Path | None,
+    fixed: dict[str, Any],
+    swept: dict[str, Any],
+    *,
+    allow_code: bool = False,
 ) -> FlightConfig:
-    """Return the configuration of one point; ConfigError or StudyError where there is none."""
+    """Return the configuration of one point; ConfigError or StudyError where there is none.
+
+    `allow_code`: classes from outside that it names may be imported.
+    """
     entries = {name: value for name, value in swept.items() if name.rpartition(".")[2].isdigit()}
     texts = {name: value for name, value in swept.items() if name in TEXTS}
     values = copy.deepcopy(fixed)
     for name, value in swept.items():
         if name not in entries and name not in texts:
             put(values, FIELDS.get(name, name), value)
-    config = load_config(preset, file, values)
+    config = load_config(preset, file, values, allow_code=allow_code)
+    require_allowed(config)
     if not (entries or texts or "rate" in swept):
         return config
     _put_texts(config, values, texts)
@@ -107,7 +117,9 @@ def configured(
     for name, value in entries.items():
         field, _, index = name.rpartition(".")
         put(values, field, _with_entry(config, values, field, int(index), value))
-    return load_config(preset, file, values)
+    config = load_config(preset, file, values, allow_code=allow_code)
+    require_allowed(config)
+    return config
 
 
 def _put_texts(config: FlightConfig, values: dict[str, Any], texts: dict[str, Any]) -> None:

@@ -46,9 +46,15 @@ PARTS = {"timing", "limits", "model", "transmitter", "receiver", "flight_log", "
 
 
 class Study:
-    """A study, checked; it says what flight number `n` is."""
+    """A study, checked; it says what flight number `n` is.
 
-    def __init__(self, file: StudyFile, folder: Path | None = None) -> None:
+    `allow_code`: classes from outside that its configurations name may be imported.
+    """
+
+    def __init__(
+        self, file: StudyFile, folder: Path | None = None, *, allow_code: bool = False
+    ) -> None:
+        self._allow_code = allow_code
         self.file = file
         self.folder = folder or Path()
         self.seeds = file.seeds if isinstance(file.seeds, list) else list(range(1, file.seeds + 1))
@@ -87,7 +93,9 @@ class Study:
     def _config(self, point: dict[str, Value]) -> FlightConfig:
         path = None if self.file.config is None else self.folder / self.file.config
         try:
-            config = configured(self.file.preset, path, self.file.set, point)
+            config = configured(
+                self.file.preset, path, self.file.set, point, allow_code=self._allow_code
+            )
             shared_parts(config)
             _check_parts(config.model_dump_json(include=PARTS))
         except (TenbaudError, ValueError) as error:
@@ -103,19 +111,20 @@ class Study:
 @lru_cache(maxsize=1024)
 def _check_parts(parts: str) -> None:
     """Build what a flight needs beside the codec, given its sections as JSON; ConfigError."""
-    check_parts(FlightConfig.model_validate_json(parts))
+    # What the study names was allowed, or refused, where its configurations were made.
+    check_parts(FlightConfig.model_validate_json(parts).allowing_code())
 
 
-def read_study(path: Path, seeds: int | None = None) -> Study:
+def read_study(path: Path, seeds: int | None = None, *, allow_code: bool = False) -> Study:
     """Return the study in a file; StudyError, naming the field, where it is none.
 
-    `seeds`: so many of each point, instead of what the file says.
+    `seeds`: so many of each point, instead of what the file says. `allow_code`: as for `Study`.
     """
     try:
         values = tomllib.loads(path.read_text(encoding="utf-8"))
         if seeds is not None:
             values["seeds"] = seeds
-        return Study(StudyFile.model_validate(values), path.parent)
+        return Study(StudyFile.model_validate(values), path.parent, allow_code=allow_code)
     except OSError as error:
         raise StudyError(f"cannot read the study {path}: {error.strerror}") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

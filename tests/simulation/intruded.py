@@ -7,10 +7,13 @@ started again after a second, by whoever looks after it.
 
 from __future__ import annotations
 
+import math
 import random
 from dataclasses import dataclass
 
 from channel.line.impairments import ImpairedLine
+from channel.protocol.bounds import COUNTER
+from channel.protocol.sabotage import Sabotage, SabotagedCodec
 from receiver.endpoint import ReceiverEndpoint
 from receiver.session.session import Phase
 from tests.simulation.faults import FAULTY_S, Plan
@@ -52,7 +55,6 @@ class IntrudedWorld(World):
         self.intruder = Intruder(
             random.Random(f"{plan.seed} intruder"), self.codec, self.terms, self.identity
         )
-        self.rejoins_when_recovered = 0
         self._second: ReceiverEndpoint | None = None
         alphabet = self.codec.coder.alphabet
         self._second_down = ImpairedLine(plan.down, alphabet, f"{plan.seed} second down")
@@ -69,6 +71,15 @@ class IntrudedWorld(World):
         wasted_ns = wasted_ticks * self.terms.tick_ns + self.plan.round_trip_ns
         return super().recovery_ns_max + wasted_ns
 
+    @property
+    def calm_rejoins_max(self) -> int:
+        """Return how often the ends may rejoin after the last fault.
+
+        Every forged request that is still on the line may begin an epoch, whose answer is taken.
+        """
+        on_line = self.intrusion.rate_hz * self.plan.round_trip_ns / 1e9
+        return super().calm_rejoins_max + math.ceil(on_line)
+
     def fly(self) -> IntrudedWorld:
         """Fly as ever, in company until the faults stop."""
         chance = self.intruder.chance
@@ -80,6 +91,13 @@ class IntrudedWorld(World):
         super().fly()
         self.faults.update(self.intruder.counts)
         return self
+
+    @property
+    def out_of_bounds(self) -> int:
+        """Return how many frames both ends have dropped for what they hold."""
+        node, endpoint = self.node, self.endpoint
+        counts = [end.session.counts for end in (node, endpoint) if end is not None]
+        return sum(count[COUNTER] for count in counts)
 
     def _inject(self) -> None:
         chance, intruder = self.intruder.chance, self.intruder
@@ -117,14 +135,13 @@ class IntrudedWorld(World):
     def _calm(self) -> None:
         super()._calm()
         self._stop_second()
+        for end in (self.node, self.endpoint):
+            codec = None if end is None else end.session.codec
+            if isinstance(codec, SabotagedCodec):
+                # Company puts samples off; what was to go wrong by now does so no more.
+                codec.arm(Sabotage(-1, "model", 0))
         if self.endpoint is None:
             self.start_receiver()
-
-    def _plant_tick(self) -> None:
-        before = self.recovered_ns
-        super()._plant_tick()
-        if before is None and self.recovered_ns is not None:
-            self.rejoins_when_recovered = self.watch.rejoins
 
     # The second receiver
 

@@ -39,7 +39,7 @@ U16, U32, U64 = 0xFFFF, 0xFFFF_FFFF, 0xFFFF_FFFF_FFFF_FFFF
 STEPS = (0, 0, 0, 1, 1, 2, 3, 5, 8, 20, 63, 64, 65, 127, 128, 129, 200, 1000)
 FLOATS = (0.0, -0.0, 1.0, -1.0, 0.5, 3.0, 1e3, STATE_MAX * 0.999, -STATE_MAX, 1e36, -1e300, 5e-324)
 NOT_NUMBERS = (float("nan"), float("inf"), float("-inf"))
-TEXTS = ("", "done", "x" * 3000, "\x1b]0;title\x07", "\u2028\u202e", "{" * 500, "[" * 4000)
+TEXTS = ("", "done", "x" * 2500, "\x1b]0;title\x07", "\u2028\u202e", "{" * 500, "[" * 4000)
 
 
 class Intruder:
@@ -59,6 +59,8 @@ class Intruder:
         self._incarnation = 1
         self._request = 0
         self._sample = 0
+        self._echoed = 0
+        """sample whose echo comes next"""
         self._state = codec.initial()
         self._makers: dict[str, Callable[[], Frame]] = {
             "hello": self._hello,
@@ -86,9 +88,11 @@ class Intruder:
                 self._incarnation, self._request = frame.incarnation, frame.request
             case Welcome():
                 self._session, self._epoch = frame.session, frame.epoch
-                self._sample = frame.first_sample
+                self._sample = self._echoed = frame.first_sample
                 if frame.state:
                     self._state = self._codec.unpack(frame.state)
+            case Commands():
+                self._echoed = frame.echoes[-1].sample + 1
             case Symbol():
                 self._session, self._epoch = frame.session, frame.epoch
                 self._sample = frame.slot // self._terms.symbols_per_word
@@ -186,6 +190,8 @@ class Intruder:
 
     def _welcome(self) -> Welcome:
         session, epoch = self._flight()
+        # One that is believed makes a session of this number.
+        self._sessions.add(session)
         sample = self._number(self._sample, U32)
         inputs = self._codec.model.input_size
         return Welcome(
@@ -209,7 +215,7 @@ class Intruder:
     def _commands(self) -> Commands:
         count = self._count(self.chance.randrange(1, self._terms.repeats + 2)) or 1
         volts = self._count(self._terms.ticks_per_sample * self._codec.model.input_size)
-        last = max(count - 1, self._number(self._sample, U32))
+        last = max(count - 1, self._number(self.chance.choice((self._sample, self._echoed)), U32))
         echoes = tuple(
             Echo(
                 last + 1 - count + index,

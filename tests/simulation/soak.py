@@ -22,6 +22,7 @@ from channel.protocol.sabotage import Sabotage
 from tests.channel.protocol.fuzz import fuzz_all
 from tests.simulation.clean import fly_clean
 from tests.simulation.faults import draw
+from tests.simulation.intruded import IntrudedWorld, draw_intrusion
 from tests.simulation.watch import LivenessViolation, SafetyViolation
 from tests.simulation.world import World
 
@@ -48,17 +49,34 @@ class SeedResult:
     rejoins: int = 0
     faults: Counter[str] = field(default_factory=Counter)
     problem: str | None = None
+    in_company: bool = False
 
 
 def fly_seed(seed: int) -> SeedResult:
     """Fly one seed; a violation is in the result, with the command that repeats it."""
-    plan = draw(seed)
-    world = World(plan)
+    return _fly(World(draw(seed)), "--seed")
+
+
+def fly_intruded_seed(seed: int) -> SeedResult:
+    """Fly one seed in company: an intruder on the line, second receivers."""
+    result = _fly(IntrudedWorld(draw(seed), draw_intrusion(seed)), "--intruded-seed")
+    result.in_company = True
+    return result
+
+
+def fly_any(seed: int) -> SeedResult:
+    """Fly a seed of a soak: one in three is in company."""
+    return fly_intruded_seed(seed) if seed % 3 == 2 else fly_seed(seed)
+
+
+def _fly(world: World, option: str) -> SeedResult:
+    plan = world.plan
+    seed = plan.seed
     problem = None
     try:
         world.fly()
     except (SafetyViolation, LivenessViolation) as error:
-        again = f"python -m tests.simulation.soak --seed {seed}"
+        again = f"python -m tests.simulation.soak {option} {seed}"
         problem = f"{type(error).__name__} in seed {seed}: {error}\n  again: {again}"
     watch = world.watch
     recovered = world.recovered_ns
@@ -92,7 +110,8 @@ def soak(minutes: float, first_seed: int, workers: int) -> dict[str, object]:
     faults: Counter[str] = Counter()
     results = 0
     totals: Counter[str] = Counter()
-    worst, beyond, hours = 0.0, 0.0, 0.0
+    worst, beyond = Counter[str](), Counter[str]()
+    hours = 0.0
     problems: list[str] = []
     started = time.monotonic()
     context = multiprocessing.get_context("spawn")
@@ -102,7 +121,7 @@ def soak(minutes: float, first_seed: int, workers: int) -> dict[str, object]:
         seeds = iter(range(first_seed, 2**62))
         while time.monotonic() < until:
             batch = [next(seeds) for _ in range(4 * workers)]
-            for result in pool.imap_unordered(fly_seed, batch):
+            for result in pool.imap_unordered(fly_any, batch):
                 results += 1
                 hours += result.simulated_s / 3600.0
                 faults.update(result.faults)
@@ -110,8 +129,10 @@ def soak(minutes: float, first_seed: int, workers: int) -> dict[str, object]:
                 totals["rejoins"] += result.rejoins
                 totals["desyncs_raised"] += result.desyncs_raised
                 totals["desyncs_missed"] += result.desyncs_missed
-                worst = max(worst, result.recovery_samples or 0.0)
-                beyond = max(beyond, result.beyond_samples or 0.0)
+                whose = "in company" if result.in_company else "alone"
+                totals[f"seeds {whose}"] += 1
+                worst[whose] = max(worst[whose], result.recovery_samples or 0.0)
+                beyond[whose] = max(beyond[whose], result.beyond_samples or 0.0)
                 if result.problem is not None:
                     problems.append(result.problem)
                     print(result.problem, flush=True)
@@ -125,8 +146,9 @@ def soak(minutes: float, first_seed: int, workers: int) -> dict[str, object]:
             "workers": workers,
             **{name: totals[name] for name in ("samples", "rejoins", "desyncs_raised")},
             "desyncs_missed": totals["desyncs_missed"],
-            "worst_recovery_samples": round(worst, 2),
-            "worst_recovery_beyond_round_trip_and_lead_samples": round(beyond, 2),
+            "seeds_in_company": totals["seeds in company"],
+            "worst_recovery_samples": _rounded(worst),
+            "worst_recovery_beyond_round_trip_and_lead_samples": _rounded(beyond),
             "faults_injected": dict(sorted(faults.items())),
             "frames_fuzzed": fuzzed.get(),
             "clean_run": clean.get(),
@@ -135,11 +157,16 @@ def soak(minutes: float, first_seed: int, workers: int) -> dict[str, object]:
     return report
 
 
+def _rounded(figures: Counter[str]) -> dict[str, float]:
+    return {name: round(figure, 2) for name, figure in sorted(figures.items())}
+
+
 def main() -> int:
     """Run as a command."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--seed", type=int, help="fly this one seed and stop")
+    parser.add_argument("--intruded-seed", type=int, help="fly this one seed in company and stop")
     parser.add_argument("--first-seed", type=int, default=1_000)
     parser.add_argument("--workers", type=int, default=max(1, multiprocessing.cpu_count()))
     parser.add_argument("--canary", action="store_true", help="must fail")
@@ -148,9 +175,10 @@ def main() -> int:
     if options.canary:
         fly_canary(CANARY_SEED)
         return 0
-    if options.seed is not None:
-        result = fly_seed(options.seed)
-        print(result.problem or f"seed {options.seed} is well: {result}")
+    if options.seed is not None or options.intruded_seed is not None:
+        alone = options.intruded_seed is None
+        result = fly_seed(options.seed) if alone else fly_intruded_seed(options.intruded_seed)
+        print(result.problem or f"seed {result.seed} is well: {result}")
         return 1 if result.problem else 0
     try:
         fly_canary(CANARY_SEED)

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from tenbaud.config.load import load_config
-from tenbaud.recording.diff import first_difference
+from tenbaud.recording.comparison import Verdict
+from tenbaud.recording.diff import compare_runs
 from tenbaud.recording.folder import RunFolder
 from tests.tenbaud.processes import run
 
@@ -61,7 +62,7 @@ def test_when_the_demo_flies_the_paper_then_every_sample_is_checked(tmp_path: Pa
     folder = RunFolder(tmp_path / "run")
     assert folder.figure.read_bytes().startswith(b"\x89PNG")
     assert load_config(path=folder.config).transmitter.plant.mismatch == 0.1
-    assert first_difference(folder.path) is None, "the two ends' recordings"
+    assert compare_runs(folder.path).verdict is Verdict.EQUAL, "the two ends' recordings"
 
 
 def test_when_the_tuned_preset_flies_off_its_model_then_it_errs_less_than_two_percent(
@@ -116,8 +117,8 @@ def test_when_flown_on_every_clock_and_link_then_the_states_are_identical(tmp_pa
         assert ended.code == 0, ended.err
         assert ended.summary["commands_late"] == ended.summary["erasures"] == 0, name
     for other in ("virtual", "memory"):
-        difference = first_difference(tmp_path / "real", tmp_path / other)
-        assert difference is None, f"real and {other}: {difference}"
+        compared = compare_runs(tmp_path / "real", tmp_path / other)
+        assert compared.verdict is Verdict.EQUAL, f"real and {other}: {compared}"
 
 
 def test_when_the_real_clock_flies_then_the_receiver_measures_the_baud_rate(tmp_path: Path) -> None:
@@ -134,9 +135,7 @@ def test_when_the_seed_changes_then_the_disturbed_flight_changes(tmp_path: Path)
     flown = ["--disturbance", "q=2e-2", "--duration", "3", "--link", "memory", "--json"]
     for name, seed in (("a", "1"), ("b", "2"), ("c", "1")):
         assert run("demo", *flown, "--seed", seed, "--out", name, cwd=tmp_path).code == 0
-    assert first_difference(tmp_path / "a", tmp_path / "c") is None
-    difference = first_difference(tmp_path / "a", tmp_path / "b")
-    assert difference is not None
-    assert difference.kind == "value"
+    assert compare_runs(tmp_path / "a", tmp_path / "c").verdict is Verdict.EQUAL
+    assert compare_runs(tmp_path / "a", tmp_path / "b").verdict is Verdict.DIFFERENT
     assert run("diff", "a", "b", cwd=tmp_path).code == 1
     assert run("diff", "a", "c", cwd=tmp_path).code == 0

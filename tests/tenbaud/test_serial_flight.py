@@ -20,7 +20,8 @@ from tenbaud.config.load import ConfigError, load_config
 from tenbaud.flight import receive, transmit
 from tenbaud.flight.ends import Endpoints, open_link
 from tenbaud.flight.outcome import ExitCode, Outcome
-from tenbaud.recording.diff import first_difference
+from tenbaud.recording.comparison import Verdict
+from tenbaud.recording.diff import compare_runs
 from tenbaud.recording.folder import RunFolder
 from tests.channel.codec.parts import ListRecorder
 from tests.tenbaud.processes import run
@@ -245,8 +246,12 @@ def test_when_the_demo_flies_over_a_serial_line_then_it_is_the_flight_of_any_lin
     memory = run("demo", "--link", "memory", "--out", "memory", *common, cwd=tmp_path)
     assert memory.code == 0, memory.err
     serial_run, memory_run = RunFolder(tmp_path / "serial"), RunFolder(tmp_path / "memory")
-    assert first_difference(serial_run.transmitter, memory_run.transmitter) is None
-    assert first_difference(serial_run.receiver, memory_run.receiver) is None
+    for one, other in (
+        (serial_run.transmitter, memory_run.transmitter),
+        (serial_run.receiver, memory_run.receiver),
+    ):
+        compared = compare_runs(one, other)
+        assert compared.verdict is Verdict.EQUAL, str(compared)
     assert memory.summary["coder_bits_up"] == summary["coder_bits_up"]
     # One byte where a datagram has fifteen.
     assert memory.summary["wire_bytes_up"] - summary["wire_bytes_up"] == 80 * 14 - 2 * 3

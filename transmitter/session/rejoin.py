@@ -17,6 +17,11 @@ ASK_AGAIN_NS = 10_000_000
 """Shortest time between two requests: a sample period may be shorter than the way to the receiver."""
 
 
+REFUSALS_BELIEVED = 3
+"""Refusals of one request that end a flight. A receiver that means it refuses every repetition; one
+forged request in this flight's name gets one refusal."""
+
+
 class Asking:
     """The request that is open, and when it is to be repeated."""
 
@@ -26,6 +31,7 @@ class Asking:
         self._terms = terms
         self._period_ticks = terms.ticks_per_sample * terms.samples_in(ASK_AGAIN_NS, 1)
         self._request = 0
+        self._refusals = 0
         self._why = Why.START
         self._next_tick = 0
 
@@ -37,8 +43,14 @@ class Asking:
     def begin(self, why: Why, tick: int) -> None:
         """Open a new request; it is due at once."""
         self._request += 1
+        self._refusals = 0
         self._why = why
         self._next_tick = tick
+
+    def is_refused(self) -> bool:
+        """Note a refusal of a flight that was admitted before; return whether it is to be believed."""
+        self._refusals += 1
+        return self._refusals >= REFUSALS_BELIEVED
 
     def due(self, tick: int) -> bool:
         """Return whether the request is to be sent at this tick, and count it as sent."""

@@ -290,6 +290,8 @@ class TransmitterSession:
             self._claims.settle()
             self._tell(EventKind.REFUSED, f"the receiver that takes over refused: {refuse.reason}")
             return []
+        if self.phase is Phase.REJOINING and not self._asking.is_refused():
+            return []
         lines = [refuse.reason]
         if refuse.config and refuse.config != self.identity.config:
             lines += differing_fields(self.identity.config, refuse.config)
@@ -304,7 +306,8 @@ class TransmitterSession:
             # A copy, or a recording: it brings nothing, and proves nobody alive.
             self.counts["stale_frames"] += 1
             return []
-        problem = self._bounds.of_commands(frame, self._sample, self.copies.next_sample)
+        sent = (self.copies.confirmed.sample, self.copies.next_sample)
+        problem = self._bounds.of_commands(frame, self._sample, *sent)
         if self._bounds.drops(problem):
             return []
         self.heard_tick = self._tick

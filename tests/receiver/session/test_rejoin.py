@@ -5,9 +5,25 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from channel.protocol.frames import Bye, Commands, Frame, Hello, Refuse, Symbol, Unknown, Welcome, Why
+from channel.protocol.frames import (
+    Bye,
+    Commands,
+    Desync,
+    Frame,
+    Hello,
+    Refuse,
+    Symbol,
+    Unknown,
+    Welcome,
+    Why,
+)
 from channel.protocol.lockstep import HISTORY_SAMPLES
-from receiver.session.rejoin import ANSWER_AGE_SAMPLES_MAX, KEEP_CODER_SAMPLES, carried_to
+from receiver.session.rejoin import (
+    ANSWER_AGE_SAMPLES_MAX,
+    KEEP_CODER_SAMPLES,
+    PERSISTENT_REQUESTS,
+    carried_to,
+)
 from receiver.session.session import ReceiverSession
 from tests.receiver.session.sessions import CODEC, MS, PEER, SESSION, flying, hello, receiver, symbol
 
@@ -146,3 +162,87 @@ def test_when_the_request_comes_in_the_middle_of_a_word_then_the_word_is_given_u
     session = two_axes()
     session.on_frame(symbol(0), 0)
     assert only_welcome(session.on_frame(request(1, 0), 0 * 100 * MS)).first_sample == 1
+
+
+# Requests that make no sense
+
+
+def test_when_one_request_is_for_a_sample_far_ahead_then_it_is_dropped_and_the_flight_goes_on() -> None:
+    session = flown(10)
+    assert session.on_frame(request(1, 2**31), 950 * MS) == []
+    assert session.counts["out_of_bounds"] == 1
+    assert session.epoch == 0
+    assert Commands in {type(frame) for frame in session.on_frame(symbol(10), 1_000 * MS)}
+    assert only_welcome(session.on_frame(request(1, 12), 1_150 * MS)).first_sample == 12
+
+
+def test_when_a_fresh_receiver_is_asked_for_a_sample_beyond_all_counters_then_it_waits() -> None:
+    session = receiver()
+    assert session.on_frame(request(0, 2**32 - 1, session=0), 0) == []
+    assert session.counts["out_of_bounds"] == 1
+    assert only_welcome(session.on_frame(hello(), 0)).first_sample == 0
+
+
+def test_when_a_fresh_receiver_was_sent_far_ahead_then_the_next_request_brings_it_back() -> None:
+    session = receiver()
+    assert only_welcome(session.on_frame(request(3, 2**30, PEER + 1), 0)).first_sample == 2**30
+    assert only_welcome(session.on_frame(request(1, 50), 10 * MS)).first_sample == 50
+
+
+def test_when_an_answer_is_never_used_then_the_next_one_follows_from_the_flight_before_it() -> None:
+    session = flown(10)
+    flown_state = session.state
+    for number in range(1, 6):
+        only_welcome(session.on_frame(request(number, 13), 1_000 * MS + number * MS))
+    welcome = only_welcome(session.on_frame(request(9, 12), 1_100 * MS))
+    assert welcome.first_sample == 12
+    expected = carried_to(CODEC, flown_state, 12, (), VOLTS, 0)
+    assert CODEC.unpack(welcome.state) == expected
+
+
+def test_when_requests_go_on_against_what_is_known_then_they_are_believed_if_nobody_is_heard() -> None:
+    session = flown(10)
+    only_welcome(session.on_frame(request(2**32 - 1, 12), 950 * MS))
+    # The transmitter's own requests have lower numbers.
+    for later in range(PERSISTENT_REQUESTS - 1):
+        assert session.on_frame(request(1, 13 + later), (1_000 + 100 * later) * MS) == []
+        assert session.on_frame(request(1, 13 + later), (1_001 + 100 * later) * MS) == [], "a copy"
+    welcome = only_welcome(session.on_frame(request(1, 20), 1_700 * MS))
+    assert (welcome.request, welcome.first_sample) == (1, 20)
+    assert only_welcome(session.on_frame(request(2, 30), 2_700 * MS)).request == 2
+
+
+def test_when_old_requests_are_played_back_while_symbols_come_then_the_flight_goes_on() -> None:
+    session = flown(10)
+    only_welcome(session.on_frame(request(5, 10), 950 * MS))
+    for slot in range(10, 40):
+        (commands,) = session.on_frame(symbol(slot, epoch=1), slot * 100 * MS)
+        assert isinstance(commands, Commands)
+        assert session.on_frame(request(3, slot - 5), (slot * 100 + 10) * MS) == []
+    assert session.epoch == 1
+
+
+def test_when_the_transmitters_name_comes_with_another_configuration_then_it_is_ignored() -> None:
+    session = flown(10)
+    assert session.on_frame(request(1, 12, config_digest=bytes(16)), 950 * MS) == []
+    assert session.counts["refused_hellos"] == 1
+    assert only_welcome(session.on_frame(request(1, 12), 960 * MS)).epoch == 1
+
+
+def test_when_this_end_is_too_far_ahead_of_the_transmitter_then_its_own_count_is_wrong() -> None:
+    session = flying(*VOLTS)
+    for slot in range(300):
+        session.on_frame(symbol(slot, slot % 2), slot * 100 * MS)
+    assert only_welcome(session.on_frame(request(1, 20), 30_000 * MS)).first_sample == 20
+    assert session.state == CODEC.initial()._replace(sample=20)
+
+
+def test_when_a_report_is_of_a_sample_that_this_end_has_not_flown_then_it_is_dropped() -> None:
+    session = flown(10)
+    assert session.on_frame(Desync(SESSION, 0, 10, 1, 2, b""), 950 * MS) == []
+    assert session.counts["out_of_bounds"] == 1
+    (answer,) = session.on_frame(Desync(SESSION, 0, 8, 1, 2, b""), 950 * MS)
+    assert isinstance(answer, Desync)
+    for _ in range(3):
+        session.on_frame(Desync(SESSION, 0, 7, 1, 2, b""), 950 * MS)
+    assert session.counts["desyncs"] == 1

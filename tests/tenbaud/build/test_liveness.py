@@ -15,7 +15,6 @@ from tenbaud.build.transmitter_run import TransmitterRun
 from tenbaud.config.load import ConfigError, load_config
 from tenbaud.flight import transmit
 from tenbaud.flight.outcome import ExitCode, Outcome
-from tenbaud.flight.verdict import NotFlown
 
 SECONDS = 30.0
 DESYNC = "sample=100,field=range"
@@ -91,14 +90,7 @@ def test_when_lockstep_is_lost_once_under_a_long_lead_then_one_rejoin_brings_it_
 
 def test_when_command_frames_overtake_each_other_then_that_is_no_lost_lockstep() -> None:
     flown = fly(**line("delay=400ms±300ms"))
-    assert flown.rejoins == 0
-    assert flown.outcome.code is ExitCode.NOT_FLOWN, "nearly every symbol misses its deadline"
-    assert flown.outcome.not_flown == (NotFlown.NO_WORDS,)
-    assert "channel.deadline_allowance_s = 0.02 late is erased: set it to at least 0.6" in (
-        flown.outcome.text
-    )
-    wider = fly(**line("delay=400ms±300ms"), channel={"deadline_allowance_s": 0.6})
-    assert (wider.rejoins, wider.outcome.code) == (0, ExitCode.OK)
+    assert (flown.rejoins, flown.outcome.code) == (0, ExitCode.OK)
 
 
 def drawn(seed: int) -> dict[str, Any]:
@@ -110,9 +102,9 @@ def drawn(seed: int) -> dict[str, Any]:
     items = [f"{way}:delay={delay}ms±{spread}ms" for way, delay, spread in ways]
     cut = chance.choice((True, False))
     if cut:
-        items.append(f"cut=3s+{chance.choice((500, 1000, 8000))}ms")
+        items.append(f"cut=8s+{chance.choice((500, 1000, 8000))}ms")
     return {
-        "duration_s": 45.0,
+        "duration_s": 55.0,
         "timing": {"lead_ticks": chance.choice(("auto", chance.randrange(30), chance.randrange(1000)))},
         "channel": {
             "delivery": chance.choice(("start", "end")),
@@ -137,7 +129,7 @@ def assert_comes_back(seed: int) -> bool:
     node = flown.run.node
     assert flown.outcome.code in (ExitCode.OK, ExitCode.NOT_FLOWN), (seed, flown.outcome.text)
     assert not node.guard.stopped, seed
-    assert flown.last_rejoin_s < 33.0, (seed, flown.rejoins, flown.last_rejoin_s)
+    assert flown.last_rejoin_s < 40.0, (seed, flown.rejoins, flown.last_rejoin_s)
     return True
 
 

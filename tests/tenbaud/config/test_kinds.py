@@ -54,8 +54,8 @@ def test_when_the_kind_is_repeated_then_the_preset_s_fields_stay() -> None:
 @pytest.mark.parametrize(
     ("overrides", "text"),
     [
-        ({"coder": {"kind": "zom"}}, "coder.kind: known are zoom, fixed"),
-        ({"model": {"kind": "pich"}}, "model.kind: known are pitch, hold"),
+        ({"coder": {"kind": "zom"}}, "coder.kind = 'zom': known are zoom, fixed"),
+        ({"model": {"kind": "pich"}}, "model.kind = 'pich': known are pitch, hold"),
         ({"coder": {"windw_signs": 3}}, "coder.windw_signs: unknown field; did you mean window_signs"),
         ({"coder": {"kind": "fixed", "window_signs": 3}}, "coder.window_signs: unknown field"),
         ({"coder": {"decay": 2.0}}, "coder.decay = 2.0"),

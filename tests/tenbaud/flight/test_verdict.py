@@ -67,3 +67,13 @@ def test_when_it_is_said_then_with_its_numbers_and_what_to_change() -> None:
         "of a round trip of 0.03 s; if the line takes longer, raise timing.lead_ticks (--lead) at both "
         'ends to what it takes, and leave transmitter.watchdog_s at "auto"',
     ]
+
+
+@pytest.mark.parametrize(
+    ("spread_s", "advice"),
+    [(0.0, "nearly all symbols are lost"), (0.6, "set it to at least 0.6 at both ends")],
+)
+def test_when_no_words_come_then_the_advice_follows_from_the_line(spread_s: float, advice: str) -> None:
+    deaf = replace(GOOD, erased=600)
+    text = verdict_text(faults_of(deaf), deaf, replace(SETTINGS, uplink_spread_s=spread_s), {})
+    assert advice in text

@@ -133,7 +133,6 @@ def test_when_a_log_is_no_good_then_the_error_names_the_cause(
         (("--columns", "time=t,angle=yaw,front=uf,rear=ur"), "column yaw is missing"),
         (("--columns", "when=t"), "is not NAME=COLUMN"),
         ((*COLUMNS, "--equilibrium", "later"), "--equilibrium later"),
-        ((*COLUMNS, "--bandwidth", "-1"), "must both be above 0"),
         ((*COLUMNS, "--from", "29.9"), "too few"),
     ],
 )

@@ -23,14 +23,14 @@ from typing import Any
 
 from channel.errors import TenbaudError
 from tenbaud import Run
+from tenbaud.audit.audit import audit
 from tenbaud.recording.convert import convert
-from tenbaud.recording.diff import first_difference
+from tenbaud.recording.diff import compare_runs
 from tenbaud.recording.encoding import channel_schema
 from tenbaud.recording.figure import draw_run
 from tenbaud.recording.inspect import describe_json, describe_text
 from tenbaud.recording.reader import MessageStream
 from tenbaud.recording.recover import recover
-from tenbaud.replay.audit import audit
 from tenbaud.replay.record import load_record
 from tenbaud.replay.replay import replay, replay_symbols
 from tenbaud.replay.symbols import MAGIC, unpack
@@ -227,7 +227,7 @@ QUICK: tuple[Callable[[Path], object], ...] = (_stream, _signals, _inspect)
 SLOW: tuple[Callable[[Path], object], ...] = (
     _convert,
     _figure,
-    first_difference,
+    compare_runs,
     audit,
     lambda folder: replay(load_record(folder)),
     _recover,

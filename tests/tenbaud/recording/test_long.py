@@ -20,7 +20,7 @@ MEMORY_MAX_MIB = 150
 PROGRAM = """
 import json, resource, sys
 from pathlib import Path
-from tenbaud.flight.report import draw_run
+from tenbaud.flight.report import draw_figure
 from tenbaud.recording.folder import RunFolder
 from tenbaud.recording.inspect import describe_text
 
@@ -30,7 +30,7 @@ def peak():
 before = peak()
 describe_text(Path(sys.argv[1]))
 inspected = peak()
-problem = draw_run(RunFolder(Path(sys.argv[1])), "a flight")
+problem = draw_figure(RunFolder(Path(sys.argv[1])), "a flight")
 print(json.dumps({"inspect": inspected - before, "figure": peak() - before, "problem": problem}))
 """
 

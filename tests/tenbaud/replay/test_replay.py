@@ -12,9 +12,9 @@ from tenbaud.recording.errors import RecordingError
 from tenbaud.replay.record import load_record
 from tenbaud.replay.replay import replay, replay_symbols, save_symbols
 from tenbaud.replay.symbols import unpack
+from tests.tenbaud.audit.doctor import Row, at, doctored
 from tests.tenbaud.flown import flown
 from tests.tenbaud.processes import run as run_command
-from tests.tenbaud.replay.doctor import Row, at, doctored
 
 
 @pytest.mark.parametrize(

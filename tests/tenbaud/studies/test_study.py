@@ -140,7 +140,7 @@ def test_when_an_example_is_read_then_it_is_a_study(name: str) -> None:
         ({"grid": {"transmitter.rig": ["hil"]}}, "moves in real time"),
         ({"grid": {"transmitter.rig": ["replay"]}}, "names no recording"),
         ({"grid": {"receiver.reference.kind": ["csv"]}}, "names no file"),
-        ({"grid": {"receiver.controller": ["nowhere:Law"]}}, "no module nowhere"),
+        ({"grid": {"receiver.controller": ["nowhere:Law"]}}, "would import nowhere"),
         ({"grid": {"duration_s": [1e7]}, "set": {}}, "ticks"),
         (
             {"sample": {"points": 4, "settings": {"mismatch": {"from": 0.0, "to": 0.2}}}},

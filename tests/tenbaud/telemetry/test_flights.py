@@ -13,7 +13,8 @@ from typing import Any
 import pytest
 
 from channel.links.endpoints import free_endpoint
-from tenbaud.recording.diff import first_difference
+from tenbaud.recording.comparison import Verdict
+from tenbaud.recording.diff import compare_runs
 from tenbaud.recording.reader import Recording
 from tenbaud.telemetry.schema import TELEMETRY, ReceiverTelemetry, TransmitterTelemetry
 from tests.tenbaud.processes import Ended, finish, run, start
@@ -137,10 +138,8 @@ def test_when_a_flight_is_watched_and_could_be_steered_then_it_is_the_same_fligh
     assert unwatched.code == 0, unwatched.err
     for end in ("transmitter", "receiver"):
         folder = "upper" if end == "transmitter" else "lower"
-        difference = first_difference(
-            tmp_path / folder / f"{end}.mcap", tmp_path / "alone" / f"{end}.mcap"
-        )
-        assert difference is None, str(difference)
+        compared = compare_runs(tmp_path / folder / f"{end}.mcap", tmp_path / "alone" / f"{end}.mcap")
+        assert compared.verdict is Verdict.EQUAL, str(compared)
 
 
 def test_when_a_flight_is_steered_then_every_command_takes_hold_and_is_written_down(

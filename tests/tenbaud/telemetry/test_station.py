@@ -30,6 +30,7 @@ def test_when_the_usual_place_is_taken_then_the_flight_goes_on_without(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    monkeypatch.setattr("secrets.token_hex", lambda _: "same")
     usual = endpoint_for("", "receiver")
     assert usual is not None
     taken = TelemetryPort("receiver", "another", usual)

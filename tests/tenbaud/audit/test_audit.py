@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from tenbaud import Run
+from tenbaud.audit.audit import Audit, audit
 from tenbaud.recording.errors import RecordingError
-from tenbaud.replay.audit import Audit, audit
+from tests.tenbaud.audit.doctor import Edit, Row, at, doctored
 from tests.tenbaud.flown import flown
 from tests.tenbaud.processes import run as run_command
-from tests.tenbaud.replay.doctor import Edit, Row, at, doctored
 
 MS = 1_000_000
 
@@ -92,8 +92,8 @@ def test_an_extra_symbol_in_a_slot_is_found(clean: Run, tmp_path: Path) -> None:
         return [row, row] if row["slot"] == 50 else [row]
 
     result = leaks_of(clean, tmp_path, "transmitter", "symbol", twice)
-    assert "slot 50: 2 symbols sent" in told(result)
-    assert "the summary says 120 coder bits, the recording holds 121" in told(result)
+    assert "slot 50, field slot: two symbols left in this slot" in told(result)
+    assert "the summary's coder_bits_up is another: 120 said, 121 recorded" in told(result)
 
 
 def test_a_second_symbol_taken_in_a_slot_is_found(clean: Run, tmp_path: Path) -> None:
@@ -101,7 +101,7 @@ def test_a_second_symbol_taken_in_a_slot_is_found(clean: Run, tmp_path: Path) ->
         return [row, row] if row["slot"] == 50 else [row]
 
     result = leaks_of(clean, tmp_path, "receiver", "symbol", twice)
-    assert "slot 50: 2 symbols taken by the receiver" in told(result)
+    assert "slot 50, field slot: two symbols were taken in this slot" in told(result)
 
 
 def test_a_symbol_that_left_too_early_is_found(clean: Run, tmp_path: Path) -> None:
@@ -109,7 +109,7 @@ def test_a_symbol_that_left_too_early_is_found(clean: Run, tmp_path: Path) -> No
         return {**row, "left_ns": row["left_ns"] - 3 * MS}
 
     result = leaks_of(clean, tmp_path, "transmitter", "symbol", at("slot", 31, early))
-    assert "slot 31 left before its slot began, 3.000 ms too early" in told(result)
+    assert "slot 31, field left_ns: it left before its slot began: 3.000 ms too early" in told(result)
 
 
 def test_a_symbol_that_left_when_its_slot_was_over_is_found(clean: Run, tmp_path: Path) -> None:
@@ -117,7 +117,7 @@ def test_a_symbol_that_left_when_its_slot_was_over_is_found(clean: Run, tmp_path
         return {**row, "left_ns": row["left_ns"] + 100 * MS}
 
     result = leaks_of(clean, tmp_path, "transmitter", "symbol", at("slot", 31, late))
-    assert "slot 31 left when its slot was over" in told(result)
+    assert "slot 31, field left_ns: it left when its slot was over" in told(result)
 
 
 def test_a_symbol_that_was_there_before_its_slot_is_found(clean: Run, tmp_path: Path) -> None:
@@ -125,27 +125,27 @@ def test_a_symbol_that_was_there_before_its_slot_is_found(clean: Run, tmp_path: 
         return {**row, "arrived_ns": row["arrived_ns"] - 1}
 
     result = leaks_of(clean, tmp_path, "receiver", "symbol", at("slot", 31, early))
-    assert "slot 31 came before the line could have delivered it" in told(result)
+    assert "slot 31, field arrived_ns: it came before the line could have delivered it" in told(result)
 
 
 def test_a_symbol_from_nowhere_is_found(clean: Run, tmp_path: Path) -> None:
     result = leaks_of(
         clean, tmp_path, "transmitter", "symbol", lambda row: [] if row["slot"] == 7 else [row]
     )
-    assert "slot 7 was taken by the receiver and never left the transmitter" in told(result)
+    assert "slot 7, field slot: it came and never left the transmitter" in told(result)
 
 
 def test_a_symbol_outside_the_alphabet_is_found(clean: Run, tmp_path: Path) -> None:
     result = leaks_of(
         clean, tmp_path, "receiver", "symbol", at("slot", 9, lambda row: {**row, "symbol": 2})
     )
-    assert "slot 9 is not in the coder's alphabet, number 2" in told(result)
+    assert "slot 9, field symbol: it is not in the coder's alphabet: 2" in told(result)
 
 
 def test_a_word_that_is_not_the_symbol_of_its_slot_is_found(clean: Run, tmp_path: Path) -> None:
     other = at("sample", 40, lambda row: {**row, "word": [-row["word"][0]]})
     result = leaks_of(clean, tmp_path, "receiver", "sample", other)
-    assert "sample 40 consumed" in told(result)
+    assert "sample 40, field word: it is not what its slots brought" in told(result)
 
 
 def test_a_word_with_a_second_symbol_is_found(clean: Run, tmp_path: Path) -> None:
@@ -166,14 +166,15 @@ def test_a_state_that_depends_on_something_else_is_found(
         return {**row, field: [row[field][0] * (1.0 + 2.0**-52), *row[field][1:]]}
 
     result = leaks_of(clean, tmp_path, end, "sample", at("sample", 77, knows_more))
-    assert f"{end}: 1 state differs from what the symbols give, first at sample 77" in told(result)
-    assert f"field {field}" in told(result)
+    assert f"{end}: sample, sample 77, field {field}: it is not what the symbols give" in told(result)
 
 
 def test_a_command_that_does_not_follow_from_the_state_is_found(clean: Run, tmp_path: Path) -> None:
     nudged = at("tick", 500, lambda row: {**row, "command_volts": [0.001, 0.0]})
     result = leaks_of(clean, tmp_path, "receiver", "tick", nudged)
-    assert "commands differ from what the states give, first at tick 500" in told(result)
+    assert "receiver: tick, tick 500, field command_volts: it is not what the symbols give" in told(
+        result
+    )
 
 
 def test_an_epoch_that_starts_from_an_unearned_state_is_found(rough: Run, tmp_path: Path) -> None:
@@ -188,7 +189,7 @@ def test_an_epoch_that_starts_from_an_unearned_state_is_found(rough: Run, tmp_pa
 def test_a_sabotaged_flight_fails_its_audit(tmp_path: Path) -> None:
     run = flown(tmp_path / "run", receiver__sabotage="sample=60,field=range")
     result = audit(run.path)
-    assert "receiver: 1 state differs" in told(result)
+    assert "receiver: sample, sample 60, field digest: it is not what the symbols give" in told(result)
     assert any("sabotaged on purpose" in note for note in result.notes)
 
 
@@ -201,7 +202,7 @@ def test_missing_rows_are_not_taken_for_a_clean_flight(clean: Run, tmp_path: Pat
 
 def test_a_recording_without_slots_shows_nothing(clean: Run, tmp_path: Path) -> None:
     result = leaks_of(clean, tmp_path, "transmitter", "symbol", lambda _row: [])
-    assert any("does not say which symbol was in which slot" in gap for gap in result.gaps)
+    assert any("no symbols were recorded" in gap for gap in result.gaps)
 
 
 def test_each_machine_may_have_kept_its_own_end(clean: Run, tmp_path: Path) -> None:
@@ -267,4 +268,5 @@ def test_the_command_says_what_it_counted_and_exits_with_the_verdict(
     )
     done = run_command("audit", str(bad), cwd=tmp_path)
     assert done.code == 1
-    assert "failed: 1 finding" in done.out
+    assert "slot 119, field slot: two symbols were taken in this slot" in done.out
+    assert "failed: " in done.out

@@ -1,0 +1,150 @@
+"""Whether a flight was flown on what it paid for, shown from its recordings.
+
+Did each slot carry at most one symbol, on the grid? Do the states of both ends follow from symbols and
+slots alone? Do the commands, the codec's other input, follow from the states, so that nothing came down
+by them that had not gone up? Did both ends record the same flight, all of it? What is checked, field by
+field, is in the table in `claims/table.py`. What cannot be shown counts as not shown, and fails too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from channel.errors import CodecDiverged, TenbaudError
+from receiver.controllers.base import Controller
+from tenbaud.audit.base import Evidence, Findings, Place
+from tenbaud.audit.counted import Counted, count
+from tenbaud.audit.table import CLAIMS
+from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.notes import version_notes
+from tenbaud.recording.recover import RECOVERED_NOTE
+from tenbaud.replay.control import controller_of, recorded_commands, steps_by_hand
+from tenbaud.replay.expected import expect
+from tenbaud.replay.record import FlightRecord, epochs_of, load_record
+from tenbaud.replay.refly import Reflown, refly
+from tenbaud.replay.replay import compare
+
+WHOLE = Place("flight", "all topics", "all samples")
+
+
+@dataclass(slots=True)
+class Audit:
+    """What an audit found. `passed` needs no leak and nothing that could not be shown."""
+
+    record: FlightRecord
+    counted: Counted
+    leaks: list[str] = field(default_factory=list)
+    gaps: list[str] = field(default_factory=list)
+    """what the recordings do not show"""
+    notes: list[str] = field(default_factory=list)
+    digests_compared: int = 0
+    jittered_states: int = 0
+    """states that were computed again with other arrival times"""
+    rejoin_bytes: int = 0
+    """of start states, which went down the link"""
+
+    @property
+    def passed(self) -> bool:
+        """Whether the flight was shown to rest on its paid symbols alone."""
+        return not self.leaks and not self.gaps
+
+
+def audit(path: Path, other: Path | None = None, *, allow_code: bool = False) -> Audit:
+    """Audit the run at `path`; `other` is the folder of the other machine, where each kept its end.
+
+    `allow_code`: classes from outside that its configuration names may run.
+    """
+    return audit_record(load_record(path, other, allow_code=allow_code))
+
+
+def audit_record(record: FlightRecord) -> Audit:
+    """Audit what was recorded of a flight."""
+    evidence, findings = Evidence(record), Findings()
+    _fly(evidence, findings)
+    for claim in CLAIMS:
+        claim.check(evidence, findings)
+    compared = compare(record, evidence.flown)[1]
+    if not compared:
+        findings.gap(WHOLE, "no state could be compared with a recorded one")
+    codec = record.agreement.codec
+    starts = [epoch.start for epoch in evidence.epochs]
+    carried = [one for one in starts if one != codec.initial()._replace(sample=one.sample)]
+    return Audit(
+        record,
+        count(evidence),
+        findings.leaks,
+        findings.gaps,
+        _notes(record),
+        compared,
+        evidence.jittered_states,
+        sum(len(codec.pack(start)) for start in carried),
+    )
+
+
+def _fly(evidence: Evidence, findings: Findings) -> None:
+    """Fly the flight again from its words, if these are all here, as well as that can be done."""
+    record = evidence.record
+    record.consumer.topic("sample")  # or there is nothing to audit
+    try:
+        evidence.epochs = epochs_of(record)
+    except RecordingError as error:
+        findings.gap(WHOLE, str(error))
+        return
+    try:
+        evidence.steps = steps_by_hand(record)
+        rebuilt: Controller | None = controller_of(record.agreement.config, evidence.steps)
+    except (TenbaudError, ValueError) as error:
+        rebuilt = None
+        findings.gap(WHOLE, "whether the commands follow from the states", str(error))
+    flown = None if rebuilt is None else _flown(evidence, rebuilt)
+    commands = recorded_commands(record)
+    if commands is not None and (flown is None or compare(record, flown)[0]):
+        # Which of the two is it? With the recorded commands only the codec is left.
+        alone = _flown(evidence, commands)
+        if flown is None:
+            flown = alone
+        elif alone is not None and not _states_differ(record, alone):
+            findings.leak(
+                WHOLE,
+                "given the recorded commands the states do follow from the symbols",
+                "it is the controller that used something else than the states and the set-point",
+            )
+    if flown is None:
+        findings.gap(WHOLE, "the flight cannot be flown again from its symbols")
+        return
+    evidence.flown = flown
+    evidence.expected = expect(record.agreement, evidence.epochs, flown)
+
+
+def _flown(evidence: Evidence, controller: Controller) -> list[Reflown] | None:
+    """Return the flight flown again, None where it leads to states that no codec has."""
+    try:
+        return list(refly(evidence.agreement, controller, evidence.epochs))
+    except (CodecDiverged, OverflowError):
+        return None
+
+
+def _states_differ(record: FlightRecord, flown: list[Reflown]) -> bool:
+    return any("state" in found for found in compare(record, flown)[0])
+
+
+def _notes(record: FlightRecord) -> list[str]:
+    notes = []
+    if record.transmitter is None:
+        notes.append("only the receiver's recording is here: when each symbol left is not shown")
+    if record.receiver is None:
+        notes.append("only the transmitter's recording is here: what arrived, and when, is not shown")
+    if "transmitter" in record.rows and not record.summaries.get("transmitter"):
+        notes.append("there is no summary: how many symbols left in all is not shown")
+    for end, tables in record.ends():
+        notes += version_notes(tables.path, tables.metadata)
+        if not tables.end:
+            notes.append(f"the {end}'s recording was cut: audited up to the cut")
+        if RECOVERED_NOTE in tables.end:
+            notes.append(f"the {end}'s recording was recovered: audited up to the cut")
+    config = record.agreement.config
+    for end, section in (("transmitter", config.transmitter), ("receiver", config.receiver)):
+        if section.sabotage:
+            notes.append(f"the {end} was sabotaged on purpose: {section.sabotage}")
+    return notes

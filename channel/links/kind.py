@@ -112,7 +112,7 @@ class LinkKind(ABC):
         """Return the places of this end that are not endpoints, such as ports, to be shown."""
         return ()
 
-    def check(self, settings: LinkSettings, insecure: bool) -> None:
+    def check(self, settings: LinkSettings, insecure: bool) -> None:  # noqa: B027, most need none
         """Raise LinkError for settings that cannot be opened or are not safe."""
 
     def terms(self, settings: LinkSettings, codec: Codec, terms: Terms) -> Terms:

@@ -17,7 +17,7 @@ from typing import IO
 from channel.links.base import Role
 from channel.links.kind import Meeting
 from tenbaud.build.flight import Agreement
-from tenbaud.config.load import dump_config
+from tenbaud.config.load import dump_config, flattened
 from tenbaud.files.whole import write_whole
 from tenbaud.flight.ends import run_in_memory
 from tenbaud.flight.lifeline import start_child
@@ -115,8 +115,8 @@ def _result(agreement: Agreement, transmitter: _Child, receiver: _Child) -> Demo
 def _words(meeting: Meeting) -> list[str]:
     """Return the options of one end that say where it meets the other."""
     words = []
-    for name, value in meeting.settings.items():
-        words += ["--set", f"link.{name}={json.dumps(value)}"]
+    for name, value in flattened(meeting.settings, "link."):
+        words += ["--set", f"{name}={json.dumps(value)}"]
     for option, endpoint in (("--listen", meeting.listen), ("--connect", meeting.connect)):
         words += [option, endpoint] if endpoint else []
     return words

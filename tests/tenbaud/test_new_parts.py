@@ -105,12 +105,14 @@ def test_when_an_offered_link_cannot_be_loaded_then_its_package_is_named(
     install(tmp_path, "carrier-pigeons", {LINKS.group: offers})
     install(tmp_path, "other-pigeons", {LINKS.group: {"odd": "elsewhere:Odd"}})
     monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(RegistryError, match="package carrier-pigeons .*a_library_that_nobody_has"):
+    with pytest.raises(RegistryError, match=r"package carrier-pigeons .*a_library_that_nobody_has"):
         link_kind("carrier")
-    with pytest.raises(RegistryError, match="carrier-pigeons and the package other-pigeons both offer"):
+    with pytest.raises(
+        RegistryError, match=r"carrier-pigeons and the package other-pigeons both offer"
+    ):
         link_kind("odd")
     shutil.rmtree(tmp_path / "other-pigeons-1.0.dist-info")
-    with pytest.raises(RegistryError, match=r"link\.kind = 'odd': .*Odd.* LinkKind"):
+    with pytest.raises(RegistryError, match=r"link\.kind = 'odd': .*Odd.*LinkKind"):
         link_kind("odd")
     # What is built in cannot be replaced.
     assert type(link_kind("zenoh")).__name__ == "ZenohKind"

@@ -93,6 +93,6 @@ def test_an_undeclared_import_is_caught(source: str) -> None:
     assert findings_in(source, "tenbaud/some.py")
 
 
-@pytest.mark.parametrize("source", ["import zenoh, serial", "def f():\n    from distributed import Client"])
+@pytest.mark.parametrize("source", ["import zenoh, serial", "def f():\n    import distributed"])
 def test_a_declared_import_passes(source: str) -> None:
     assert not findings_in(source, "tenbaud/some.py")

@@ -16,10 +16,9 @@ from tenbaud.bounds.closed import (
 from tenbaud.bounds.floor import (
     RateTooLow,
     floor,
-    rate_for,
     word_floor,
 )
-from tenbaud.bounds.linear import LinearModel, integrators, linear_model, pitch, sampled
+from tenbaud.bounds.linear import integrators, linear_model, pitch, sampled
 
 PENDULUM = linear_model([[0.0, 1.0], [7.3198**2, 0.0]], [[0.0, 0.0], [0.0, 1e-3]], [1.0, 0.0])
 
@@ -128,15 +127,3 @@ def test_when_erasures_take_the_margin_then_the_error_names_them() -> None:
 def test_when_the_rate_is_no_rate_then_it_is_refused(rate: float) -> None:
     with pytest.raises(ValueError, match="must be above 0"):
         floor(integrators(1, 1.0), rate)
-
-
-def test_when_an_error_is_turned_into_a_rate_then_the_floor_there_is_that_error() -> None:
-    for model in (integrators(2, 2e-3), pitch(2e-2), PENDULUM):
-        rate = rate_for(model, 1e-6)
-        assert floor(model, rate) == pytest.approx(1e-6, rel=1e-5)
-
-
-def test_when_the_error_needs_no_bit_then_the_rate_is_the_least_there_is() -> None:
-    assert rate_for(linear_model([[-1.0]], [[1.0]], [1.0]), 10.0) < 1e-5
-    assert isinstance(PENDULUM, LinearModel)
-    assert rate_for(PENDULUM, 1e6) == pytest.approx(10.5602, rel=1e-3)

@@ -11,7 +11,7 @@ from tenbaud.bounds.encoder import (
     double_integrator_rate_at_encoder_floor,
     encoder_floor,
 )
-from tenbaud.bounds.floor import rate_for
+from tenbaud.bounds.floor import floor
 from tenbaud.bounds.linear import (
     integrators,
     linear_model,
@@ -76,5 +76,5 @@ def test_when_bits_stop_mattering_then_the_closed_form_and_the_solver_agree(
 ) -> None:
     closed = double_integrator_rate_at_encoder_floor(density, 4096)
     assert closed == pytest.approx(rate, abs=0.06)
-    solved = rate_for(integrators(2, density), encoder_floor(4096) ** 2)
-    assert solved == pytest.approx(closed, rel=1e-6)
+    solved = floor(integrators(2, density), closed)
+    assert math.sqrt(solved) == pytest.approx(encoder_floor(4096), rel=1e-6)

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 from channel.line.inlet import Inlet
 from channel.links.zenoh.link import ZenohLink
+from channel.protocol.endings import End, Ending
 from channel.protocol.wire import encode
 from tenbaud.build.flight import Agreement, agree
 from tenbaud.config.load import load_config
@@ -57,7 +58,7 @@ class LightRig:
     def end(self) -> None:
         """Take the last echo in and end the flight."""
         self.take_in()
-        for frame in self.session.bye("the flight is over"):
+        for frame in self.session.bye(End(Ending.OVER, "the flight is over")):
             self.link.send(encode(frame))
 
 

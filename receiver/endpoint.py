@@ -8,6 +8,7 @@ from __future__ import annotations
 from channel.line.inlet import Inlet
 from channel.line.line import Line
 from channel.line.virtual import Reply
+from channel.protocol.endings import End
 from channel.protocol.frames import Frame
 from channel.protocol.wire import DATAGRAM, Wire
 from receiver.session.session import ReceiverSession
@@ -35,9 +36,9 @@ class ReceiverEndpoint:
         """Let the deadlines up to `now_ns` pass; return the messages to send."""
         return self._encode(self.session.on_deadline(now_ns))
 
-    def bye(self, reason: str) -> list[bytes]:
+    def bye(self, end: End) -> list[bytes]:
         """End the session; return the messages that tell the peer."""
-        return self._encode(self.session.bye(reason))
+        return self._encode(self.session.bye(end))
 
     def step(self, time_ns: int, data: bytes | None) -> Reply:
         """Do one step of the virtual clock within this process (`channel.line.virtual.Peer`).

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import TypeAlias
 
+from channel.protocol.endings import Ending
+
 
 class Why(IntEnum):
     """Why a transmitter asks for a session."""
@@ -77,7 +79,9 @@ class Refuse:
     """The receiver does not fly with this transmitter."""
 
     incarnation: int
-    reason: str
+    ending: Ending
+    text: str
+    """for people; may be empty"""
     config: str
     """shared part of the receiver's configuration as JSON, so that the other end can name fields"""
 
@@ -170,7 +174,9 @@ class Bye:
 
     session: int
     """0 before there is one, and to a second receiver that is refused"""
-    reason: str
+    ending: Ending
+    text: str = ""
+    """for people; may be empty"""
 
 
 @dataclass(frozen=True, slots=True)

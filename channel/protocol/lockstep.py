@@ -7,10 +7,12 @@ it happened, so the ring of states is longer than any lag that is allowed.
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 from typing import NamedTuple
 
 from channel.codec.codec import Codec, CodecState
 from channel.codec.words import Word
+from channel.protocol.events import Event, EventKind
 from channel.protocol.frames import Desync
 from channel.protocol.recording import Field, RecordChannel
 
@@ -91,12 +93,20 @@ class History:
         )
 
 
-def difference_text(report: Desync) -> str:
-    """Return the sentence that tells of a lockstep failure."""
-    return (
-        f"the codecs differ after sample {report.sample}: transmitter "
-        f"{report.transmitter_digest:016x}, receiver {report.receiver_digest:016x}"
+def difference_event(report: Desync) -> Event:
+    """Return the event that reports a lockstep failure."""
+    return Event(
+        EventKind.DESYNC,
+        report.sample,
+        epoch=report.epoch,
+        transmitter_digest=report.transmitter_digest,
+        receiver_digest=report.receiver_digest,
     )
+
+
+def is_answer(report: Desync, own: Desync | None) -> bool:
+    """Return whether a report is the answer to this end's own: the same, with another state."""
+    return own is not None and own == replace(report, state=own.state)
 
 
 def unpacked(codec: Codec, data: bytes) -> CodecState | None:

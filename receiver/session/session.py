@@ -12,6 +12,7 @@ sample, the state to start from, and the command to hold until the first one dec
 from __future__ import annotations
 
 from collections import Counter, deque
+from dataclasses import replace
 from enum import Enum
 
 from channel.codec.codec import Codec, CodecState
@@ -19,7 +20,8 @@ from channel.codec.words import ERASED
 from channel.line.shaper import BaudMeter
 from channel.links.serial.slot_finder import SlotFinder
 from channel.protocol.bounds import Bounds, within_text_bounds
-from channel.protocol.events import EVENT_CHANNEL, Event, EventKind, event_row
+from channel.protocol.endings import End, Ending
+from channel.protocol.events import Dropped, Event, EventKind, Presence, ended_event, write_event
 from channel.protocol.frames import (
     Bye,
     Commands,
@@ -35,7 +37,7 @@ from channel.protocol.frames import (
 )
 from channel.protocol.identity import Identity
 from channel.protocol.limits import to_millivolts
-from channel.protocol.lockstep import History, difference_text
+from channel.protocol.lockstep import History, difference_event
 from channel.protocol.recording import NullRecorder, Recorder
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
@@ -52,7 +54,7 @@ EPOCH_MAX = 0xFFFF
 class Phase(Enum):
     """Where the receiver's session stands."""
 
-    WAITING = "waiting for a transmitter"
+    WAITING = "waiting"  # for a transmitter
     FLYING = "flying"
     ENDED = "ended"
 
@@ -86,8 +88,8 @@ class ReceiverSession:
         """samples (flown), samples_skipped (between epochs), erasures, symbols_late, symbols_misplaced,
         stale_frames, malformed, refused_hellos, bad_commands, bad_references, desyncs, rejoins,
         out_of_bounds"""
-        self.end_reason = ""
-        self.refusal: str | None = None
+        self.end: End | None = None
+        self.refusal: End | None = None
         self.desync: Desync | None = None
         self.events: deque[Event] = deque(maxlen=1000)
         self._greeter = Greeter(terms)
@@ -133,14 +135,15 @@ class ReceiverSession:
             case Desync() if self._is_current(frame.session):
                 return self._on_desync(frame)
             case Bye() if self._is_current(frame.session):
-                self._end(f"the transmitter ended the flight: {frame.reason}")
+                self._end(End(frame.ending, frame.text, by_peer=True))
             case Bye() if frame.session == 0 and self._stranger.asked and self.phase is Phase.WAITING:
-                self._end(frame.reason)
+                self._end(End(frame.ending, frame.text, by_peer=True))
             case Bye() if self.refusal is not None and frame.session == 0:
-                self.refusal = f"{self.refusal}\n  as the transmitter sees it: {frame.reason}"
-                self._end("refused")
+                self.refusal = replace(self.refusal, answer=frame.text)
+                self._end(self.refusal)
             case ForeignVersion() if self.phase is Phase.WAITING:
-                self._refuse(foreign_version_text("transmitter", frame.version))
+                text = foreign_version_text("transmitter", frame.version)
+                self._refuse(End(Ending.WIRE_VERSION, text))
             case _:
                 self.counts["stale_frames"] += 1
         return []
@@ -158,21 +161,21 @@ class ReceiverSession:
             frames += self._settle(None, now_ns)
             if self._silent_slots >= self._gap_samples_max * self.terms.symbols_per_word:
                 self._schedule.anchor(None)
-                text = f"no symbol for {self._gap_samples_max} samples: waiting for one"
-                self._tell(EventKind.PEER, text)
+                number = self._gap_samples_max
+                self._tell(Event(EventKind.PEER, cause=Presence.SILENT, number=number))
             deadline = self.next_deadline()
         return frames
 
-    def bye(self, reason: str) -> list[Frame]:
+    def bye(self, end: End) -> list[Frame]:
         """End the session from this side."""
         was_flying = self.phase is Phase.FLYING
-        self._end(reason)
-        return [Bye(self.session_number, reason)] if was_flying else []
+        self._end(end)
+        return [Bye(self.session_number, end.ending, end.text)] if was_flying else []
 
     def on_malformed(self, why: str) -> None:
         """Note that bytes came which are no frame."""
         self.counts["malformed"] += 1
-        self._tell(EventKind.MALFORMED, f"dropped a message: {why}")
+        self._tell(Event(EventKind.MALFORMED, detail=why))
 
     def rest(self) -> None:
         """Do what can wait until the frames are on their way: the recording."""
@@ -182,7 +185,9 @@ class ReceiverSession:
 
     def _on_hello(self, hello: Hello, now_ns: int) -> list[Frame]:
         if self.phase is Phase.ENDED:
-            return [Refuse(hello.incarnation, f"this receiver has ended: {self.end_reason}", "")]
+            return [
+                Refuse(hello.incarnation, Ending.ALREADY_ENDED, self.end.text if self.end else "", "")
+            ]
         if self._bounds.drops(self._bounds.of_hello(hello)):
             return []
         schedule = self._schedule if self._advanced else self._proven.schedule
@@ -196,13 +201,13 @@ class ReceiverSession:
         self.counts["refused_hellos"] += 1
         match verdict:
             case Verdict.BUSY:
-                return [Refuse(hello.incarnation, "this receiver is flying with another", "")]
+                return [Refuse(hello.incarnation, Ending.BUSY, "", "")]
             case Verdict.IGNORE if not in_reach:
                 self._bounds.drops(f"a request for sample {hello.sample}, ahead of the clock")
             case Verdict.REFUSE:
                 problem = difference(hello, self.identity) or ""
-                self._refuse(problem)
-                return [Refuse(hello.incarnation, problem, self.identity.config)]
+                self._refuse(End(Ending.MISMATCH, problem))
+                return [Refuse(hello.incarnation, Ending.MISMATCH, problem, self.identity.config)]
         return []
 
     def _begin(self, hello: Hello, now_ns: int) -> list[Frame]:
@@ -221,8 +226,8 @@ class ReceiverSession:
             self.refusal = None
             self._commander.restart(first)
         elif self.epoch >= EPOCH_MAX:
-            self._end(f"{EPOCH_MAX} rejoins: something is wrong with this line")
-            return [Bye(self.session_number, self.end_reason)]
+            self._end(End(Ending.REJOINS))
+            return [Bye(self.session_number, Ending.REJOINS)]
         else:
             self.epoch += 1
             self.counts["rejoins"] += 1
@@ -244,8 +249,8 @@ class ReceiverSession:
         self._greeter.welcome = welcome
         self._commander.write_down()
         write_epoch(self._recorder, self.terms, self.epoch, self.state, hold)
-        text = f"session {self.session_number:08x}, epoch {self.epoch}, begins at sample {first}"
-        self._tell(EventKind.STARTED if last is None else EventKind.REJOIN, text)
+        kind = EventKind.STARTED if last is None else EventKind.REJOIN
+        self._tell(Event(kind, first, session=self.session_number, epoch=self.epoch))
         return [welcome]
 
     def _stand_where_proven(self, last: Welcome | None) -> int:
@@ -257,11 +262,11 @@ class ReceiverSession:
         self._commander.go_back(self._proven.standing)
         return self.state.sample
 
-    def _refuse(self, problem: str) -> None:
+    def _refuse(self, refusal: End) -> None:
         if self.refusal is None:
-            self._tell(EventKind.REFUSED, problem)
+            self._tell(Event(EventKind.REFUSED, cause=refusal.ending, detail=refusal.text))
         if self.phase is Phase.WAITING:
-            self.refusal = problem
+            self.refusal = refusal
 
     # Symbols, slots, words
 
@@ -284,7 +289,7 @@ class ReceiverSession:
         ahead = symbol.slot - self._slot
         if ahead > self._gap_samples_max * self.terms.symbols_per_word:
             self.counts["stale_frames"] += 1
-            self._tell(EventKind.STALE, f"slot {symbol.slot} is {ahead} ahead: dropped")
+            self._tell(Event(EventKind.STALE, slot=symbol.slot, cause=Dropped.FAR_AHEAD, number=ahead))
             return [Unknown(symbol.session, symbol.epoch)]
         self._advanced = True
         self._silent_slots = 0
@@ -302,7 +307,7 @@ class ReceiverSession:
         """Drop a symbol of a slot that is settled; a row of them means that the schedule is wrong."""
         self.counts["symbols_late"] += 1
         write_symbol(self._recorder, self.terms, symbol, now_ns, taken=False)
-        self._tell(EventKind.LATE_SYMBOL, f"slot {symbol.slot} was settled already: dropped")
+        self._tell(Event(EventKind.LATE_SYMBOL, slot=symbol.slot, cause=Dropped.SETTLED))
         within = self._slot - symbol.slot <= self._gap_samples_max * self.terms.symbols_per_word
         if within and self._schedule.is_replaced_by(symbol.slot, now_ns):
             self._schedule.take(symbol.slot, now_ns, anew=True)
@@ -332,13 +337,14 @@ class ReceiverSession:
         frames: list[Frame] = []
         if place.slot is None:
             self.counts["symbols_misplaced"] += 1
-            self._tell(EventKind.STALE, f"a symbol of slot ...{short.slot_low} is not due: dropped")
+            self._tell(Event(EventKind.STALE, slot=short.slot_low, cause=Dropped.NOT_DUE))
         elif place.in_time:
             symbol = Symbol(self.session_number, self.epoch, place.slot, short.number)
-            frames = self._take_symbol(symbol, now_ns, anew=True)
+            if not self._bounds.drops(self._bounds.of_symbol(symbol)):
+                frames = self._take_symbol(symbol, now_ns, anew=True)
         else:
             self.counts["symbols_late"] += 1
-            self._tell(EventKind.LATE_SYMBOL, f"slot {place.slot} came after its deadline: dropped")
+            self._tell(Event(EventKind.LATE_SYMBOL, slot=place.slot, cause=Dropped.PAST_DEADLINE))
         if place.anchor is not None:
             self._schedule.anchor(place.anchor)
         return frames
@@ -347,7 +353,7 @@ class ReceiverSession:
         """Decide what this slot's symbol was; at the end of a word, fly its sample."""
         if symbol is None:
             self.counts["erasures"] += 1
-            self._tell(EventKind.ERASED, f"slot {self._slot} is erased")
+            self._tell(Event(EventKind.ERASED, slot=self._slot))
         self._slot += 1
         self._word.append(symbol)
         if len(self._word) < self.terms.symbols_per_word:
@@ -371,23 +377,23 @@ class ReceiverSession:
         if last is None or (theirs.epoch, theirs.sample) > (last.epoch, last.sample):
             self.desync = theirs
             self.counts["desyncs"] += 1
-            self._tell(EventKind.DESYNC, difference_text(theirs), theirs.sample)
+            self._tell(difference_event(theirs))
             write_failure(self._recorder, self.terms, self.history, theirs)
         return [answer]
 
     def _is_current(self, session: int) -> bool:
         return self.phase is Phase.FLYING and session == self.session_number
 
-    def _end(self, reason: str) -> None:
+    def _end(self, end: End) -> None:
         if self.phase is not Phase.ENDED:
             self.phase = Phase.ENDED
-            self.end_reason = reason
+            self.end = end
             self.rest()
-            self._tell(EventKind.ENDED, reason)
+            self._tell(ended_event(end))
 
-    def _tell(self, kind: EventKind, text: str, sample: int | None = None) -> None:
-        at = self.state.sample if sample is None else sample
+    def _tell(self, event: Event) -> None:
+        at = self.state.sample if event.sample is None else event.sample
         flight_ns = self.state.sample * self.terms.sample_ns
-        event = Event(kind, flight_ns, at, text)
+        event = replace(event, time_ns=flight_ns, sample=at)
         self.events.append(event)
-        self._recorder.write(EVENT_CHANNEL, flight_ns, event_row(event))
+        write_event(self._recorder, event)

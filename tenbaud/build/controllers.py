@@ -9,7 +9,7 @@ from receiver.controllers.pid import Pid, PidGains
 from receiver.controllers.recorded import RecordedController
 from receiver.controllers.references import Constant, Csv, Reference, Sine, Square, Step
 from tenbaud.build.flight import read_flight_log
-from tenbaud.build.plugins import CONTROLLER, build_part
+from tenbaud.build.plugins import build_part
 from tenbaud.config.kinds import CONTROLLERS
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig, ReferenceSection
@@ -25,7 +25,7 @@ def build_controller(config: FlightConfig, reference: Reference | None = None) -
     )
     section = config.receiver
     controller: Controller = build_part(
-        config, CONTROLLERS, section.controller, context, section.controller_options, CONTROLLER
+        config, CONTROLLERS, section.controller, context, section.controller_options, Controller
     )
     return controller
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import secrets
+from collections.abc import Callable
 
 from channel.codec.codec import Codec
 from channel.line.impairments import Direction, ImpairedLine
@@ -12,14 +14,18 @@ from channel.line.uplink import Uplink
 from channel.protocol.recording import Recorder
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
 from channel.protocol.wire import Wire
+from receiver.controllers.base import Controller
 from receiver.controllers.references import Reference
 from receiver.endpoint import ReceiverEndpoint
 from receiver.session.session import ReceiverSession
+from tenbaud.build.codec import build_codec
 from tenbaud.build.controllers import build_controller, build_reference
 from tenbaud.build.flight import Agreement, ticks_of, watchdog_wanted_s
 from tenbaud.build.gauge import build_gauge
 from tenbaud.build.liveness import overtaking_ticks, watchdog_ticks
+from tenbaud.build.parts import Parts
 from tenbaud.build.rig import build_rig
+from tenbaud.config.kinds import CONTROLLERS
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
 from transmitter.guard import Guard, GuardSettings
@@ -42,21 +48,35 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
         sight=build_sight(agreement),
         overtaking_ticks=overtaking_ticks(terms, agreement.faults),
     )
-    reference = build_reference(config)
     gauge = build_gauge(agreement)
     scores = Scores(
         agreement.codec.model,
         agreement.window_start_tick,
         (terms.history_samples + 2) * terms.ticks_per_sample,
-        (lambda _tick: None) if config.receiver.controller == "recorded" else reference.angle_rad,
+        _followed(agreement),
         gauge.on_error if gauge is not None else lambda _error: None,
     )
     # Only a rig that hurts nobody is armed again by itself.
     rearm_s = config.link.peer_timeout_s if config.transmitter.rig == "simulated" else None
     rearm_ticks = None if rearm_s is None else ticks_of(rearm_s, config)
     return TransmitterNode(
-        session, build_rig(config), build_guard(agreement), scores, recorder, rearm_ticks, gauge
+        session,
+        build_rig(config, agreement.parts.plant),
+        build_guard(agreement),
+        scores,
+        recorder,
+        rearm_ticks,
+        gauge,
     )
+
+
+def _followed(agreement: Agreement) -> Callable[[int], float | None]:
+    """Return the set-point that the tracking error is against."""
+    if agreement.parts.controller is not None:
+        return agreement.parts.controller.reference_rad
+    if agreement.config.receiver.controller == "recorded":
+        return lambda _tick: None
+    return build_reference(agreement.config).angle_rad
 
 
 def build_sight(agreement: Agreement) -> Sight | None:
@@ -113,7 +133,7 @@ def build_receiver(
     session = ReceiverSession(
         sabotaged(agreement.codec, agreement.config.receiver.sabotage, agreement.live),
         agreement.terms,
-        build_controller(agreement.config, reference),
+        agreement.parts.controller or build_controller(agreement.config, reference),
         agreement.identity,
         secrets.randbits(31) + 1,
         recorder,
@@ -122,10 +142,34 @@ def build_receiver(
     return ReceiverEndpoint(session, wire)
 
 
-def check_parts(config: FlightConfig) -> None:
-    """Build what can be wrong in files and texts, so that it is told before anything starts."""
-    build_rig(config)
-    build_controller(config)
+def check_parts(config: FlightConfig, parts: Parts | None = None) -> None:
+    """Build what can be wrong in files and texts, so that it is reported before anything starts.
+
+    `parts` are objects in place of what is configured; they are checked already.
+    """
+    parts = parts or Parts()
+    build_rig(config, parts.plant)
+    if parts.controller is None:
+        controller = build_controller(config)
+        if config.receiver.controller not in CONTROLLERS.built_in:
+            _check_command(config, controller)
+
+
+def _check_command(config: FlightConfig, controller: Controller) -> None:
+    """Ask a controller from outside for its first command; ConfigError if no motor could follow it."""
+    model, name = build_codec(config).model, config.receiver.controller
+    try:
+        volts = [float(value) for value in controller.command(0, model.initial())]
+    except Exception as error:
+        raise ConfigError(
+            f"receiver.controller {name}: command(0, {model.initial()}) must return "
+            f"{model.input_size} voltages; it raised {type(error).__name__}: {error}"
+        ) from error
+    if len(volts) != model.input_size or not all(map(math.isfinite, volts)):
+        raise ConfigError(
+            f"receiver.controller {name}: command(0, {model.initial()}) must return "
+            f"{model.input_size} finite voltages, one for each motor of the model; it returned {volts}"
+        )
 
 
 def build_guard(agreement: Agreement) -> Guard:

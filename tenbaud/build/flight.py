@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -20,6 +20,7 @@ from channel.protocol.terms import Clock, Terms
 from channel.registry import RegistryError
 from tenbaud.build.codec import build_codec
 from tenbaud.build.liveness import RoundTrip, check_liveness, round_trip
+from tenbaud.build.parts import Parts
 from tenbaud.config.load import ConfigError
 from tenbaud.config.outside_code import require_allowed
 from tenbaud.config.schema import FlightConfig
@@ -47,6 +48,8 @@ class Agreement:
     identity: Identity
     live: bool = False
     """whether line, codec and set-point may be changed in flight, by hand"""
+    parts: Parts = field(default_factory=Parts)
+    """objects in place of what is configured"""
 
     @property
     def flight_ticks(self) -> int:
@@ -96,21 +99,22 @@ class Agreement:
         return start if start < self.flight_ticks else 0
 
 
-def agree(config: FlightConfig, clock: Clock) -> Agreement:
+def agree(config: FlightConfig, clock: Clock, parts: Parts | None = None) -> Agreement:
     """Return codec, terms and identity of a configuration; ConfigError where they make no flight."""
+    parts = parts or Parts()
     if clock == "virtual" and config.transmitter.rig in REAL_RIGS:
         raise ConfigError(
             f"the {config.transmitter.rig} rig moves in real time and has no virtual clock: "
             "add --clock real"
         )
     try:
-        codec = build_codec(config)
+        codec = build_codec(config, parts)
         terms = checked_terms(config, codec, clock)
     except ValueError as error:
         raise ConfigError(str(error)) from error
     shared = config.shared_json(terms.lead_ticks)
     identity = Identity(software_version(), shared, numerics_probe(codec))
-    return Agreement(config, clock, codec, terms, identity)
+    return Agreement(config, clock, codec, terms, identity, parts=parts)
 
 
 def watchdog_wanted_s(config: FlightConfig) -> float | None:

@@ -8,7 +8,7 @@ from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters, PitchPlant
 from plant_sim.plant import Plant, PlantContext
 from tenbaud.build.flight import REAL_RIGS, read_flight_log
-from tenbaud.build.plugins import PLANT, build_part
+from tenbaud.build.plugins import build_part
 from tenbaud.config.kinds import PLANTS
 from tenbaud.config.load import ConfigError
 from tenbaud.config.models import PitchModelSection
@@ -25,13 +25,16 @@ from transmitter.rigs.simulated import SimulatedRig
 MEASURED = ("pitch",)
 
 
-def build_rig(config: FlightConfig) -> Rig:
-    """Return the rig: a plant off the model by the configured mismatch, a recording, or a real one."""
+def build_rig(config: FlightConfig, plant: Plant | None = None) -> Rig:
+    """Return the rig: a plant off the model by the configured mismatch, a recording, or a real one.
+
+    `plant` takes the place of the configured one on the simulated rig.
+    """
     section = config.transmitter
     if section.rig in REAL_RIGS:
         rig: Rig = build_device(config, output=not section.dry_run)
     else:
-        rig = _build_other(config)
+        rig = _build_other(config, plant)
     return DryRig(rig) if section.dry_run else rig
 
 
@@ -77,7 +80,7 @@ def build_plant(config: FlightConfig, step_s: float) -> Plant:
         disturbance,
         section.initial_angle_rad,
     )
-    plant: Plant = build_part(config, PLANTS, section.kind, context, section.options, PLANT)
+    plant: Plant = build_part(config, PLANTS, section.kind, context, section.options, Plant)
     return plant
 
 
@@ -102,14 +105,16 @@ def nominal_plant(config: FlightConfig) -> PitchParameters:
     return PitchParameters(**section.model_dump(exclude={"kind"}), volts_max=config.limits.volts_max)
 
 
-def _build_other(config: FlightConfig) -> Rig:
+def _build_other(config: FlightConfig, plant: Plant | None) -> Rig:
     section = config.transmitter
     encoder = Encoder(
         section.encoder_counts_per_turn, section.encoder_sign, section.encoder_zero_counts
     )
     if section.rig == "replay":
         return ReplayRig(read_flight_log(config), (encoder,))
-    return SimulatedRig(build_plant(config, config.timing.tick_s), (encoder,), section.safe_volts)
+    if plant is None:
+        plant = build_plant(config, config.timing.tick_s)
+    return SimulatedRig(plant, (encoder,), section.safe_volts)
 
 
 def build_axes(config: FlightConfig) -> tuple[Axis, ...]:

@@ -21,9 +21,21 @@ from tenbaud.config.schema import FlightConfig
 
 ALLOW_OPTION = "--allow-code"
 
+OBJECT = "object"
+
 
 class CodeNotAllowed(ConfigError):
     """A configuration names code that nobody has allowed; the text says which, and from where."""
+
+
+def is_object(kind: str) -> bool:
+    """Return whether a kind stands for an object that a program gave to its flight: no code."""
+    return kind.startswith(f"{OBJECT}:")
+
+
+def object_kind(part: object) -> str:
+    """Return the kind that stands for an object in the configuration of its flight."""
+    return f"{OBJECT}:{type(part).__name__}"
 
 
 class OutsidePart(NamedTuple):
@@ -42,7 +54,9 @@ def outside_parts(config: FlightConfig) -> list[OutsidePart]:
         OutsidePart(PLANTS, config.transmitter.plant.kind),
         OutsidePart(LINKS, config.link.kind),
     )
-    return [part for part in named if part.name not in part.registry.built_in]
+    return [
+        part for part in named if part.name not in part.registry.built_in and not is_object(part.name)
+    ]
 
 
 def require_allowed(config: FlightConfig) -> None:

@@ -16,6 +16,7 @@ from rich.table import Table
 
 from receiver.loops.many import ManyService, Served
 from receiver.session.session import Phase
+from tenbaud.sentences import endings
 
 PERIOD_S = 1.0
 LINES_AROUND = 6
@@ -88,7 +89,7 @@ def _row(served: Served) -> tuple[str, ...]:
     state = session.state
     return (
         served.name,
-        session.phase.value,
+        endings.phase_text(session.phase.value),
         f"{state.sample * session.terms.sample_ns / 1e9:.1f} s",
         f"{state.model[0]:+.3f} rad",
         f"{session.codec.coder.ranges(state.coder)[0]:.3f}",

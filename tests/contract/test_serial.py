@@ -16,13 +16,14 @@ from channel.errors import LinkError
 from channel.links.serial.emulated import EmulatedLine
 from channel.links.serial.link import SerialLink
 from channel.links.serial.wire import SerialWire, stuff, stuff_notice
+from channel.protocol.endings import Ending
 from channel.protocol.frames import Bye, Symbol
 from channel.protocol.wire import encode
 from tests.contract.test_links import PATIENCE_S, SILENCE_S, until
 
 WIRE = SerialWire(2)
 NOTICE_BYTES = len(stuff_notice(b"?"))
-FRAME = encode(Bye(1, "a frame as any other"))
+FRAME = encode(Bye(1, Ending.OVER, "a frame as any other"))
 
 
 def symbol(slot: int) -> bytes:
@@ -168,7 +169,7 @@ def test_when_the_line_is_slow_then_a_long_message_is_not_repeated_at_once(
 def test_when_the_line_falls_far_behind_then_more_is_dropped_and_counted(line: EmulatedLine) -> None:
     with SerialLink("transmitter", str(line.transmitter_port), WIRE, line_rate_baud=300) as link:
         for number in range(20):
-            link.send(encode(Bye(number, "thirty bytes a second, no more")))
+            link.send(encode(Bye(number, Ending.OVER, "thirty bytes a second, no more")))
         assert link.counts.dropped["line busy"] > 10
 
 

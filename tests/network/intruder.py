@@ -18,6 +18,8 @@ import sys
 import time
 from pathlib import Path
 
+from channel.protocol.endings import Ending
+
 PORT = 7447
 GREETINGS = (
     b"GET / HTTP/1.0\r\n\r\n",
@@ -76,7 +78,13 @@ def insider(host: str, keys: str, transmitter: str, receiver: str) -> dict[str, 
     saw_a_peer = False
     nothing = Hello(1, "0", bytes(16), bytes(8))
     echo = Echo(10, 1, 0, (5000, -5000) * 10)
-    frames = (nothing, Unknown(1, 0), Claim(1, 0, 2), Commands(1, 0, (echo,)), Bye(1, "intruder"))
+    frames = (
+        nothing,
+        Unknown(1, 0),
+        Claim(1, 0, 2),
+        Commands(1, 0, (echo,)),
+        Bye(1, Ending.OVER, "intruder"),
+    )
     roles: tuple[tuple[Role, Part, str], ...] = (
         ("transmitter", "receiver", receiver),
         ("receiver", "transmitter", transmitter),

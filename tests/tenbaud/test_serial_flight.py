@@ -13,6 +13,7 @@ import pytest
 
 from channel.errors import LinkLost
 from channel.links.serial.emulated import EmulatedLine
+from tenbaud import MemoryRecorder
 from tenbaud.build.ends import build_receiver
 from tenbaud.build.flight import agree
 from tenbaud.build.transmitter_run import TransmitterRun
@@ -23,7 +24,6 @@ from tenbaud.flight.outcome import ExitCode, Outcome
 from tenbaud.recording.comparison import Verdict
 from tenbaud.recording.diff import compare_runs
 from tenbaud.recording.folder import RunFolder
-from tests.channel.codec.parts import ListRecorder
 from tests.tenbaud.processes import run
 
 
@@ -34,8 +34,8 @@ class Flown:
     transmitter: TransmitterRun
     receiver: Any
     outcome: Outcome
-    sent: ListRecorder
-    received: ListRecorder
+    sent: MemoryRecorder
+    received: MemoryRecorder
     dropped: dict[str, int]
     reconnects: int
     up_bytes: int
@@ -60,7 +60,7 @@ def fly(
     """
     config = load_config("paper-10baud", None, overrides)
     agreement = agree(config, "real")
-    sent, received = ListRecorder(), ListRecorder()
+    sent, received = MemoryRecorder(), MemoryRecorder()
     over = threading.Event()
     with ExitStack() as stack:
         ends = []

@@ -11,13 +11,15 @@ from channel.codec.codec import Vector
 from channel.line.line import Line
 from channel.line.shaper import SlotShaper, UplinkMeter
 from channel.line.uplink import Uplink
-from channel.protocol.events import EventKind
+from channel.protocol.endings import End, Ending
+from channel.protocol.events import EventKind, event_fields
 from channel.protocol.limits import CommandLimits
 from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters, PitchPlant
 from receiver.endpoint import ReceiverEndpoint
 from receiver.loops.real import serve_real
 from receiver.session.session import ReceiverSession
+from tenbaud.sentences.events import event_text
 from tests.channel.codec.parts import THREE_SIGNS, ConstantController, identity_of, pitch_codec, terms
 from tests.channel.links.memory_pair import MemoryLink, memory_pair
 from transmitter.guard import Guard, GuardSettings
@@ -80,7 +82,7 @@ def flown(rig: type[SimulatedRig], controller: ConstantController) -> RealFlight
         flight.greet(peer_timeout_s=10.0)
         flight.run(TICKS)
     finally:
-        flight.leave("the flight is over")
+        flight.leave(End(Ending.OVER, "the flight is over"))
         thread.join(timeout=20.0)
     assert not thread.is_alive()
     return flight
@@ -96,7 +98,7 @@ def test_when_an_end_is_too_slow_then_it_is_said_and_the_flight_goes_on(
 ) -> None:
     flight = flown(rig, controller)
     session = flight._node.session
-    told = [event.text for event in session.events if event.kind is EventKind.RATE]
+    told = [event_text(event_fields(event)) for event in session.events if event.kind is EventKind.RATE]
     assert told
     assert "1000 symbols/s are asked for" in told[0]
     assert flight.rate.kept_symbols_per_s is not None

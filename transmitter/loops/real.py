@@ -18,10 +18,11 @@ from channel.line.outbox import Outbox
 from channel.line.uplink import Uplink
 from channel.line.virtual import is_envelope
 from channel.links.base import Link
-from channel.protocol.events import EventKind
+from channel.protocol.endings import End
+from channel.protocol.events import Event, EventKind, Presence
 from channel.protocol.frames import Frame, Symbol
 from transmitter.loops.ramp_down import Landing
-from transmitter.node import STOPPED, TransmitterNode
+from transmitter.node import TransmitterNode
 from transmitter.session.rate_watch import RateWatch
 from transmitter.session.rejoin import ASK_AGAIN_NS
 from transmitter.session.session import Phase
@@ -90,7 +91,7 @@ class RealFlight:
         self._start_ns = time.monotonic_ns() + LEAD_IN_NS - first * tick_ns
         while tick < first + ticks and not node.over:
             if self._should_stop():
-                node.guard.trip(STOPPED)
+                node.stop()
             self._wait_until(tick * tick_ns)
             if self._now_ns() - tick * tick_ns >= tick_ns:
                 self._catch_up()
@@ -113,11 +114,11 @@ class RealFlight:
             tick += 1
         return tick
 
-    def finish(self, tick: int, reason: Callable[[], str]) -> None:
+    def finish(self, tick: int, farewell: Callable[[], End]) -> None:
         """Let the last echoes come in, end the session on both sides, take a real rig's motors down.
 
-        `tick` is the first one that was not flown, as `run` returns it; `reason` is asked for what the
-        receiver is told once the echoes are in.
+        `tick` is the first one that was not flown, as `run` returns it; `farewell` is asked for what
+        the receiver is told once the echoes are in.
         """
         terms = self._node.session.terms
         linger_ns = (
@@ -140,15 +141,15 @@ class RealFlight:
         # What the last echo was answered with: the report of a difference.
         self._send_due()
         self._node.rest()
-        self.leave(reason())
+        self.leave(farewell())
         while not landing.over:
             landing.step(self._now_ns())
             self._wait_until(min(landing.next_ns, self._now_ns() + terms.tick_ns))
 
-    def leave(self, reason: str) -> None:
+    def leave(self, end: End) -> None:
         """End the session on both sides at once; before the first tick nothing else is to be done."""
         # The farewell is spared the line's delay: this process is about to end.
-        for frame in self._node.session.bye(reason):
+        for frame in self._node.session.bye(end):
             self._link.send(self._uplink.counted(frame)[0])
 
     def _now_ns(self) -> int:
@@ -208,12 +209,13 @@ class RealFlight:
             self._link.send(data, is_symbol)
 
     def _watch_rate(self, tick: int) -> None:
-        text = self.rate.look(tick, self._node.session)
-        if text is not None:
-            self._node.tell(EventKind.RATE, text)
+        event = self.rate.look(tick, self._node.session)
+        if event is not None:
+            self._node.tell(event)
 
     def _watch_peer(self) -> None:
         present = self._link.peer_present()
         if present is not self._peer_told:
             self._peer_told = present
-            self._node.tell(EventKind.PEER, f"the receiver is {'there again' if present else 'gone'}")
+            cause = Presence.BACK if present else Presence.GONE
+            self._node.tell(Event(EventKind.PEER, cause=cause))

@@ -17,8 +17,9 @@ from channel.line.inlet import Inlet
 from channel.line.line import Delivery, Line
 from channel.line.uplink import Uplink
 from channel.line.virtual import Peer, Reply
+from channel.protocol.endings import End
 from channel.protocol.frames import Frame
-from transmitter.node import STOPPED, TransmitterNode
+from transmitter.node import TransmitterNode
 from transmitter.session.session import Phase
 
 GREETINGS_MAX = 1000
@@ -73,7 +74,7 @@ class VirtualFlight:
             if node.over:
                 return tick
             if should_stop():
-                node.guard.trip(STOPPED)
+                node.stop()
             frames = node.measure(tick)
             if frames is None:
                 return tick
@@ -83,10 +84,10 @@ class VirtualFlight:
             node.actuate(tick)
         return first + ticks
 
-    def finish(self, tick: int, reason: Callable[[], str]) -> None:
+    def finish(self, tick: int, farewell: Callable[[], End]) -> None:
         """Let the last echoes come in, then end the session on both sides.
 
-        `reason` is asked for what the receiver is told once they are in.
+        `farewell` is asked for what the receiver is told once they are in.
         """
         terms = self._node.session.terms
         now_ns = tick * terms.tick_ns
@@ -96,7 +97,7 @@ class VirtualFlight:
         self._pass_to(now_ns + linger_ns, deadlines=False)
         self._node.rest()
         # The farewell is spared what goes wrong on the line: the receiver's process must hear it.
-        for frame in self._node.session.bye(reason()):
+        for frame in self._node.session.bye(farewell()):
             self._step(now_ns + linger_ns, self._uplink.counted(frame)[0])
 
     def _offer(self, frames: Sequence[Frame], now_ns: int) -> None:

@@ -11,6 +11,7 @@ from channel.errors import FrameError
 from channel.line.impairments import FOR_EVER_NS, ImpairedLine, Impairments, parse_impairments
 from channel.line.line import Delivery
 from channel.protocol import wire
+from channel.protocol.endings import Ending
 from channel.protocol.frames import Bye, Symbol
 
 MS = 1_000_000
@@ -103,7 +104,7 @@ def test_when_a_symbol_is_flipped_then_it_is_a_valid_frame_with_another_symbol()
     ((delivery,),) = carried(one, 1)
     assert delivery.data is not None
     assert wire.decode(delivery.data) == Symbol(1, 0, 5, 0)
-    goodbye = wire.encode(Bye(1, "done"))
+    goodbye = wire.encode(Bye(1, Ending.OVER, "done"))
     assert one.carry(goodbye, False, 0) == [Delivery(0, goodbye)]
 
 

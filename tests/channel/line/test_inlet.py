@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from channel.line.inlet import Inlet
+from channel.protocol.endings import Ending
 from channel.protocol.frames import Bye, Symbol
 from channel.protocol.wire import encode
 
 SYMBOL = encode(Symbol(7, 0, 3, 1))
-BYE = encode(Bye(7, "enough"))
+BYE = encode(Bye(7, Ending.OVER, "enough"))
 
 
 def test_when_a_symbol_comes_then_its_bytes_are_no_control_bytes() -> None:
@@ -19,7 +20,7 @@ def test_when_a_symbol_comes_then_its_bytes_are_no_control_bytes() -> None:
 def test_when_a_farewell_comes_then_its_bytes_are_control_bytes() -> None:
     inlet = Inlet()
     inlet.take(SYMBOL)
-    assert inlet.take(BYE) == Bye(7, "enough")
+    assert inlet.take(BYE) == Bye(7, Ending.OVER, "enough")
     assert inlet.wire_bytes == len(SYMBOL) + len(BYE)
     assert inlet.control_bytes == len(BYE)
 

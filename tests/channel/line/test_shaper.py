@@ -11,6 +11,7 @@ from channel.line.line import Line
 from channel.line.shaper import BaudMeter, SlotShaper, UplinkMeter
 from channel.line.uplink import Uplink
 from channel.protocol import wire
+from channel.protocol.endings import Ending
 from channel.protocol.frames import Bye, Hello, Symbol
 from tests.channel.codec.parts import terms
 
@@ -103,7 +104,7 @@ def test_when_a_symbol_is_offered_out_of_its_slot_then_nothing_leaves_and_nothin
 
 def test_when_frames_are_offered_then_they_are_encoded_delayed_and_counted() -> None:
     uplink = Uplink(SlotShaper(terms()), Line(3, 1), UplinkMeter(Alphabet((-1, 1), 1)))
-    symbol, bye = Symbol(1, 0, 0, 1), Bye(1, "done")
+    symbol, bye = Symbol(1, 0, 0, 1), Bye(1, Ending.OVER, "done")
     assert uplink.offer(symbol, 100) == [(103, wire.encode(symbol))]
     assert uplink.offer(bye, 100) == [(101, wire.encode(bye))]
     assert uplink.meter.symbols == 1

@@ -14,6 +14,7 @@ import pytest
 from channel.codec.codec import CodecState
 from channel.codec.numerics import sin
 from channel.protocol.wire import DATAGRAM
+from tenbaud import MemoryRecorder
 from tenbaud.build.ends import build_receiver
 from tenbaud.build.flight import agree
 from tenbaud.config.kinds import CODERS, MODELS
@@ -25,7 +26,6 @@ from tenbaud.studies.compiled import compiled
 from tenbaud.studies.flights import CompiledPoint
 from tenbaud.studies.plain import fly_plain
 from tenbaud.studies.schedule import Uncommon
-from tests.channel.codec.parts import ListRecorder
 from transmitter.session.records import SAMPLE_CHANNEL
 
 PRESETS = ("paper-10baud", "tuned-20baud", "timed-10baud", "static-10baud", "usual-1000baud")
@@ -60,7 +60,7 @@ def config_of(preset: str, changes: dict[str, Any]) -> FlightConfig:
 def digests_of(config: FlightConfig) -> list[str]:
     """Return the digest of the transmitter's copy after each sample of an ordinary flight."""
     agreement = agree(config, "virtual")
-    recorder = ListRecorder()
+    recorder = MemoryRecorder()
     run = transmit.prepare(agreement, recorder, DATAGRAM)
     transmit.fly_virtual(run, build_receiver(agreement, None, DATAGRAM), lambda: False)
     return [str(value) for value in recorder.column(SAMPLE_CHANNEL.topic, "digest")]

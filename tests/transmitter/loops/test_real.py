@@ -12,6 +12,7 @@ from channel.line.line import Line
 from channel.line.shaper import SlotShaper, UplinkMeter
 from channel.line.uplink import Uplink
 from channel.line.virtual import Step, encode_step
+from channel.protocol.endings import End, Ending
 from channel.protocol.identity import Identity
 from channel.protocol.limits import CommandLimits
 from channel.protocol.terms import Terms
@@ -99,11 +100,11 @@ def test_when_a_flight_is_flown_in_real_time_then_every_sample_is_checked() -> N
         flight.greet(peer_timeout_s=10.0)
         assert session.phase is Phase.FLYING
         ticks = flight.run(TICKS)
-        flight.finish(ticks, lambda: "landed")
+        flight.finish(ticks, lambda: End(Ending.OVER, "landed"))
     assert service.error is None
     assert ticks == TICKS
     assert end.session.phase is ReceiverPhase.ENDED
-    assert "landed" in end.session.end_reason
+    assert end.session.end == End(Ending.OVER, "landed", by_peer=True)
     # Whatever the machine did meanwhile, both ends have seen the same, and say so sample by sample.
     checked = session.counts["digest_checks"]
     assert checked == end.session.state.sample == session.copies.confirmed.sample
@@ -163,6 +164,6 @@ def test_when_garbage_comes_in_greeting_then_it_is_counted_and_the_greeting_goes
     far.send(b"garbage")
     with Service(end, far):
         flight.greet(peer_timeout_s=10.0)
-        flight.finish(0, lambda: "enough")
+        flight.finish(0, lambda: End(Ending.OVER))
     assert flight.inlet.malformed == 1
     assert end.session.phase is ReceiverPhase.ENDED

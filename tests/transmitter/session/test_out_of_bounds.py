@@ -8,6 +8,7 @@ import struct
 
 import pytest
 
+from channel.protocol.endings import Ending
 from channel.protocol.frames import Echo, Hello, Refuse, Welcome, Why
 from channel.protocol.wire import encode
 from tests.transmitter.session.test_session import INCARNATION, SESSION, Far, flying, frame, transmitter
@@ -67,19 +68,31 @@ def test_when_the_digest_does_not_agree_then_the_commands_move_no_motor() -> Non
 def test_when_a_flight_is_refused_then_it_ends_at_the_third_refusal_of_a_request() -> None:
     session = rejoining()
     for _ in range(REFUSALS_BELIEVED - 1):
-        assert session.on_frame(Refuse(INCARNATION, "no", "")) == []
+        assert session.on_frame(Refuse(INCARNATION, Ending.MISMATCH, "no", "")) == []
     assert session.phase is Phase.REJOINING
     session.on_frame(Welcome(SESSION, 4, 101, INCARNATION, 1))
     session.rejoin(Why.GUARD, "again")
     for _ in range(REFUSALS_BELIEVED - 1):
-        session.on_frame(Refuse(INCARNATION, "no", ""))
+        session.on_frame(Refuse(INCARNATION, Ending.MISMATCH, "no", ""))
     assert session.phase is Phase.REJOINING
-    session.on_frame(Refuse(INCARNATION, "no", ""))
+    session.on_frame(Refuse(INCARNATION, Ending.MISMATCH, "no", ""))
     assert session.phase is Phase.ENDED
 
 
 def test_when_a_refusal_is_longer_than_a_frame_then_the_answer_still_fits_one() -> None:
     session = transmitter()
     theirs = json.dumps({f"field {number}": number for number in range(600)})
-    (answer,) = session.on_frame(Refuse(INCARNATION, "the configuration differs", theirs))
+    (answer,) = session.on_frame(Refuse(INCARNATION, Ending.MISMATCH, "differs", theirs))
     encode(answer)
+
+
+def test_when_the_receiver_has_begun_an_epoch_for_somebody_else_then_another_is_asked_for() -> None:
+    session = flying()
+    session.on_measurement(10, (0.0,))
+    elsewhere = Welcome(SESSION, 9, 2, INCARNATION, 77)
+    assert session.on_frame(elsewhere) == [], "commands may still come"
+    session.on_measurement(20, (0.0,))
+    (request,) = session.on_frame(elsewhere)
+    assert isinstance(request, Hello)
+    assert request.why is Why.UNKNOWN
+    assert session.phase is Phase.REJOINING

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import math
 import secrets
+import time
 from collections.abc import Callable
 
 from channel.codec.codec import Codec
-from channel.line.impairments import Direction, ImpairedLine
-from channel.line.line import Line
-from channel.line.shaper import SlotShaper, UplinkMeter
+from channel.line.clocks import SkewedClock
+from channel.line.downlink import Downlink
+from channel.line.impairments import Direction, ImpairedLine, SymbolWire
+from channel.line.line import CleanLine, Line
 from channel.line.uplink import Uplink
 from channel.protocol.recording import Recorder
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
 from channel.protocol.wire import Wire
 from receiver.controllers.base import Controller
 from receiver.controllers.references import Reference
-from receiver.endpoint import ReceiverEndpoint
+from receiver.endpoint import ReceiverEndpoint, SteppedEndpoint
 from receiver.session.session import ReceiverSession
 from tenbaud.build.codec import build_codec
 from tenbaud.build.controllers import build_controller, build_reference
@@ -92,21 +94,18 @@ def build_sight(agreement: Agreement) -> Sight | None:
 
 
 def build_uplink(agreement: Agreement, wire: Wire, recorder: Recorder | None = None) -> Uplink:
-    """Return the transmitter's way out onto a line: grid, delivery delay and meter."""
-    terms = agreement.terms
-    alphabet = agreement.codec.coder.alphabet
+    """Return the transmitter's way out onto a line."""
     line = build_line(agreement, "up", wire)
-    return Uplink(SlotShaper(terms), line, UplinkMeter(alphabet), wire, recorder)
+    return Uplink(agreement.terms, agreement.codec.coder.alphabet, line, wire, recorder)
 
 
-def build_line(agreement: Agreement, direction: Direction, wire: Wire) -> Line:
+def build_line(agreement: Agreement, direction: Direction, wire: SymbolWire) -> Line:
     """Return one direction of the line, with what goes wrong on it."""
     one = agreement.faults.up if direction == "up" else agreement.faults.down
-    delay_ns = agreement.terms.symbol_delay_ns if direction == "up" else 0
     if not one.any and not agreement.live:
-        return Line(delay_ns)
+        return CleanLine()
     alphabet = agreement.codec.coder.alphabet
-    return ImpairedLine(one, alphabet, f"{agreement.config.seed} {direction}", wire, delay_ns)
+    return ImpairedLine(one, alphabet, f"{agreement.config.seed} {direction}", wire)
 
 
 def sabotaged(codec: Codec, text: str, live: bool = False) -> Codec:
@@ -139,7 +138,12 @@ def build_receiver(
         recorder,
         take_over=take_over,
     )
-    return ReceiverEndpoint(session, wire)
+    if agreement.clock == "virtual":
+        # There the transmitter's process holds both directions of the line, and the receiver's clock.
+        return SteppedEndpoint(session, Downlink(wire))
+    faults = agreement.faults
+    clock = SkewedClock(faults, time.monotonic_ns()) if faults.bad_clock else None
+    return ReceiverEndpoint(session, Downlink(wire, build_line(agreement, "down", wire)), clock)
 
 
 def check_parts(config: FlightConfig, parts: Parts | None = None) -> None:

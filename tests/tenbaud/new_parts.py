@@ -119,7 +119,7 @@ class Datagrams(LinkBase):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(("127.0.0.1", own_port))
 
-    def send(self, data, is_symbol=False):
+    def send(self, data):
         self.socket.sendto(data, self.peer)
         self.counts.messages_out += 1
         self.counts.bytes_out += len(data)

@@ -91,10 +91,10 @@ class ZenohLink(LinkBase):
         # Declared last: who sees the token can be heard already.
         self._token = alive.declare_token(f"{root}/alive/{role}/{secrets.token_hex(4)}")
 
-    def send(self, data: bytes, is_symbol: bool = False) -> None:
+    def send(self, data: bytes) -> None:
         """Publish one message; it is lost in silence when the peer is not there."""
         try:
-            (self._symbols if is_symbol else self._control).put(data)
+            (self._symbols if self.wire.is_symbol(data) else self._control).put(data)
         except zenoh.ZError as error:
             raise LinkError(f"Zenoh could not send: {error}") from error
         self.counts.messages_out += 1

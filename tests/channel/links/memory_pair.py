@@ -25,7 +25,7 @@ class MemoryLink(LinkBase):
         self._peer: MemoryLink | None = None
         self._open = True
 
-    def send(self, data: bytes, is_symbol: bool = False) -> None:
+    def send(self, data: bytes) -> None:
         """Hand a message to the other end."""
         if not self._open:
             raise LinkError("the link is closed")

@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from channel.links.base import Link, Role
+from channel.links.kind import LinkEnd, NodePlace
 from channel.links.security import Security
 from channel.protocol.wire import DATAGRAM
 from receiver.endpoint import ReceiverEndpoint
@@ -33,9 +33,6 @@ from tenbaud.recording.writer import McapRecorder
 from tenbaud.telemetry.compose import ReceiverComposer, TransmitterComposer
 from tenbaud.telemetry.station import NO_WISH, Station, Wish, open_station
 from transmitter.loops.virtual_peer import LinkPeer
-
-if TYPE_CHECKING:
-    from channel.links.zenoh.node import NodePlace
 
 SWITCH_INTERVAL_S = 0.0002
 """A busy recorder thread may keep the loop waiting this long; Python's default is 5 ms."""
@@ -74,27 +71,10 @@ class Endpoints:
 def open_link(
     agreement: Agreement, role: Role, endpoints: Endpoints, stop: Stop = lambda: False
 ) -> Link:
-    """Return an open link for one end: over a serial line if it is configured so, else over Zenoh."""
-    if agreement.config.link.kind == "serial":
-        from tenbaud.flight.serial_ends import open_serial
-
-        return open_serial(
-            agreement, role, endpoints.insecure, lambda: _zenoh(agreement, role, endpoints, stop)
-        )
-    return _zenoh(agreement, role, endpoints, stop)
-
-
-def _zenoh(agreement: Agreement, role: Role, endpoints: Endpoints, stop: Stop) -> Link:
-    from channel.links.zenoh.link import ZenohLink
-
-    return ZenohLink(
-        role,
-        agreement.config.link.session,
-        **endpoints.node(),
-        best_effort=agreement.config.link.best_effort,
-        patience_s=agreement.config.link.peer_timeout_s,
-        should_stop=stop,
-    )
+    """Return an open link of the configured kind for one end."""
+    settings, terms = agreement.config.link, agreement.terms
+    end = LinkEnd(role, settings, terms, agreement.codec, endpoints.node(), stop)
+    return agreement.link.open(end)
 
 
 def run_transmitter(

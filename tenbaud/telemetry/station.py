@@ -14,7 +14,7 @@ from channel.links.security import Security
 from channel.protocol.recording import Recorder
 from receiver.controllers.steered import SteeredReference
 from receiver.endpoint import ReceiverEndpoint
-from tenbaud.build.ends import build_reference
+from tenbaud.build.controllers import build_reference
 from tenbaud.build.flight import Agreement
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.telemetry.commands import CommandQueue

@@ -14,8 +14,8 @@ import pytest
 from channel.errors import LinkError
 from channel.links.base import Link
 from channel.links.endpoints import free_endpoint
-from channel.links.memory import memory_pair
 from channel.protocol.frames import Symbol
+from tests.channel.links.memory_pair import memory_pair
 from tests.contract.serial_pairs import make_serial, make_split
 
 PATIENCE_S = 10.0

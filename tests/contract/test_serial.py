@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 
 from channel.errors import LinkError
+from channel.links.serial.emulated import EmulatedLine
 from channel.links.serial.link import SerialLink
 from channel.links.serial.wire import SerialWire, stuff, stuff_notice
 from channel.protocol.endings import Ending
 from channel.protocol.frames import Bye, Symbol
 from channel.protocol.wire import encode
-from tenbaud.flight.serial_line import EmulatedLine
 from tests.contract.test_links import PATIENCE_S, SILENCE_S, until
 
 WIRE = SerialWire(2)

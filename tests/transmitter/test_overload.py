@@ -9,7 +9,6 @@ import pytest
 
 from channel.codec.codec import Vector
 from channel.line.uplink import Uplink
-from channel.links.memory import MemoryLink, memory_pair
 from channel.protocol.endings import End, Ending
 from channel.protocol.events import EventKind, event_fields
 from channel.protocol.limits import CommandLimits
@@ -20,6 +19,7 @@ from receiver.loops.single import serve
 from receiver.session.session import ReceiverSession
 from tenbaud.sentences.events import event_text
 from tests.channel.codec.parts import THREE_SIGNS, ConstantController, identity_of, pitch_codec, terms
+from tests.channel.links.memory_pair import MemoryLink, memory_pair
 from transmitter.endpoint import TransmitterEndpoint
 from transmitter.guard import Guard, GuardSettings
 from transmitter.loops.real import RealFlight

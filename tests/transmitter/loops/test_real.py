@@ -10,7 +10,6 @@ import pytest
 from channel.errors import ConfigMismatch, LinkLost
 from channel.line.uplink import Uplink
 from channel.line.virtual import Step, encode_step
-from channel.links.memory import MemoryLink, memory_pair
 from channel.protocol.endings import End, Ending
 from channel.protocol.identity import Identity
 from channel.protocol.limits import CommandLimits
@@ -23,6 +22,7 @@ from receiver.loops.single import serve
 from receiver.session.session import Phase as ReceiverPhase
 from receiver.session.session import ReceiverSession
 from tests.channel.codec.parts import THREE_SIGNS, identity_of, pitch_codec, terms
+from tests.channel.links.memory_pair import MemoryLink, memory_pair
 from transmitter.endpoint import TransmitterEndpoint
 from transmitter.guard import Guard, GuardSettings
 from transmitter.loops.real import RealFlight

@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
-from collections import deque
-from typing import Any
-
-from receiver.session.schedule import Schedule, Timing
 from tenbaud.audit.base import Claim, Evidence, Findings, Place
 from tenbaud.audit.sent import symbol_place
 
@@ -60,15 +55,14 @@ def check_words(evidence: Evidence, findings: Findings) -> None:
     known = set()
     for row in samples:
         known.add(row.sample)
-        brought: list[int] | None = []
-        for slot in range(row.sample * count, (row.sample + 1) * count):
-            symbol = alphabet.symbol(found[slot]) if slot in found else None
-            brought = None if brought is None or symbol is None else [*brought, symbol]
+        slots = range(row.sample * count, (row.sample + 1) * count)
+        lacking = next((slot for slot in slots if slot not in found), None)
+        brought = None if lacking is not None else [alphabet.symbol(found[slot]) for slot in slots]
         if row.word != (None if brought is None else tuple(brought)):
             findings.leak(
                 Place("receiver", "sample", f"sample {row.sample}", "word"),
                 "it is not what its slots brought",
-                f"{row.word}; symbol, slot {row.sample * count} and on: {brought}",
+                f"{row.word}; symbol, slot {slots[0] if lacking is None else lacking}: {brought}",
             )
     last = max(known, default=-1)
     partial = _begun_words(evidence)
@@ -83,53 +77,19 @@ def check_words(evidence: Evidence, findings: Findings) -> None:
 
 
 def check_times(evidence: Evidence, findings: Findings) -> None:
-    """A word is decided when its last symbol comes, or when nothing can come any more."""
-    terms = evidence.agreement.terms
-    count = terms.symbols_per_word
-    symbols = deque(evidence.topic("receiver", "symbol"))
-    taken = [row for row in symbols if row.taken]
-    arrivals = {row.slot: row.arrived_ns for row in taken}
-    starts = {row.sample * count for row in evidence.topic("receiver", "epoch")}
-    slots = [row.slot for row in taken]
-    final = max(slots, default=-1)
-    schedule = Schedule(terms)
+    """A word is decided when its last symbol comes; words are decided one after another."""
+    count = evidence.agreement.terms.symbols_per_word
+    arrivals = {row.slot: row.arrived_ns for row in evidence.topic("receiver", "symbol") if row.taken}
     before_s: float | None = None
     for row in evidence.topic("receiver", "sample"):
         place = Place("receiver", "sample", f"sample {row.sample}", "arrival_s")
-        first, last = row.sample * count, (row.sample + 1) * count - 1
-        if first in starts:
-            schedule = Schedule(terms)
+        last = (row.sample + 1) * count - 1
         if before_s is not None and row.arrival_s < before_s:
             findings.leak(place, "it was decided before the one before it")
         before_s = row.arrival_s
-        _follow(schedule, symbols, last, row.arrival_s)
-        if last in arrivals:
-            allowed = {arrivals[last]}
-        else:
-            later = bisect_right(slots, last)
-            allowed = {taken[later].arrived_ns} if later < len(taken) else set()
-            due_ns = schedule.deadline_ns(last)
-            if due_ns is not None:
-                allowed.add(due_ns)
-        # After the last symbol erasures are noticed as the flight ends.
-        exact = last in arrivals or (evidence.is_virtual and last < final)
-        if exact and allowed and row.arrival_s not in {one / 1e9 for one in allowed}:
-            said = ", ".join(f"{one / 1e9!r} s" for one in sorted(allowed))
-            detail = f"{row.arrival_s!r} s; symbol, slot {last}, field arrived_ns: {said}"
-            findings.leak(place, "its slots say another time", detail)
-
-
-def _follow(schedule: Schedule, symbols: deque[Any], last: int, until_s: float) -> None:
-    """Show the receiver's schedule what came before a word was decided whose last slot is `last`."""
-    while symbols and (
-        symbols[0].slot <= last if symbols[0].taken else symbols[0].arrived_ns / 1e9 <= until_s
-    ):
-        row = symbols.popleft()
-        if row.taken:
-            fits = schedule.timing(row.slot, row.arrived_ns) is Timing.DUE
-            schedule.take(row.slot, row.arrived_ns, anew=not fits)
-        elif schedule.is_replaced_by(row.slot, row.arrived_ns):
-            schedule.take(row.slot, row.arrived_ns, anew=True)
+        if last in arrivals and row.arrival_s != arrivals[last] / 1e9:
+            detail = f"{row.arrival_s!r} s; symbol, slot {last}, field arrived_ns: {arrivals[last]}"
+            findings.leak(place, "its last symbol came at another time", detail)
 
 
 def check_origin(evidence: Evidence, findings: Findings) -> None:
@@ -139,7 +99,7 @@ def check_origin(evidence: Evidence, findings: Findings) -> None:
     sent = evidence.topic("transmitter", "symbol")
     end = evidence.end("transmitter")
     left = {row.slot: row for row in sent if row.left_ns is not None}
-    known = end is not None and sent.recorded and agreement.config.link.kind != "serial"
+    known = end is not None and sent.recorded and agreement.link.carries_slots
     last = None if end is not None and end.complete else max(left, default=-1)
     first = min(left, default=0)
     flips = bool(up.flip or up.raw) or evidence.is_steered

@@ -135,8 +135,8 @@ UNCLAIMED: tuple[Unclaimed, ...] = (
     Unclaimed(
         "transmitter",
         "event",
-        ("text", "sample"),
-        "for people; where the confirmed copy stood is in the samples",
+        _all_fields("transmitter", "event")[2:],
+        "what an event says beyond its kind; where the confirmed copy stood is in the samples",
     ),
     Unclaimed(
         "transmitter",
@@ -144,18 +144,23 @@ UNCLAIMED: tuple[Unclaimed, ...] = (
         (ORDER,),
         "a session stamps its events with the last tick that it measured, a guard with the present one",
     ),
-    Unclaimed("receiver", "event", ("text",), "for people"),
+    Unclaimed(
+        "receiver",
+        "event",
+        _all_fields("receiver", "event")[3:],
+        "what an event says beyond its kind and sample",
+    ),
     Unclaimed(
         "transmitter",
         "event",
         ("kind", "time_s", FILED),
         "of what only an event tells: kinds are known ones, and the summary has the number of all rows",
-        lambda row, _evidence: row.kind not in ("guard", "started"),
+        lambda row, _evidence: row.kind != "guard",
     ),
     Unclaimed(
         "receiver",
         "event",
-        ("kind",),
+        ("kind", ORDER),
         "of what only an event tells",
         lambda row, _evidence: row.kind not in ("started", "rejoin", "erased", "late_symbol", "desync"),
     ),
@@ -177,8 +182,8 @@ UNCLAIMED: tuple[Unclaimed, ...] = (
         "receiver",
         "sample",
         ("arrival_s",),
-        "of an erased word, on a real clock or after the last symbol: when the loop noticed",
-        lambda row, evidence: row.word is None and _is_noticed_late(row, evidence),
+        "of an erased word: when the receiver gave it up, after the one before it and before the next",
+        lambda row, evidence: _is_given_up(row, evidence),
     ),
     *(
         Unclaimed(
@@ -208,10 +213,10 @@ def _is_unconfirmed(row: Any, evidence: Evidence) -> bool:
     return row.slot // count not in confirmed and (not taken or bool(evidence.agreement.faults.up.flip))
 
 
-def _is_noticed_late(row: Any, evidence: Evidence) -> bool:
-    taken = (one.slot for one in evidence.topic("receiver", "symbol") if one.taken)
+def _is_given_up(row: Any, evidence: Evidence) -> bool:
     count = evidence.agreement.terms.symbols_per_word
-    return not evidence.is_virtual or (row.sample + 1) * count - 1 >= max(taken, default=-1)
+    last = (row.sample + 1) * count - 1
+    return not any(one.taken and one.slot == last for one in evidence.topic("receiver", "symbol"))
 
 
 def _is_within_word(row: Any, evidence: Evidence) -> bool:

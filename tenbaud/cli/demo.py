@@ -45,6 +45,7 @@ def demo(
     pace: options.Pace = None,
     out: options.Out = None,
     json: options.AsJson = False,
+    verbose: options.Verbose = False,
 ) -> None:
     """Fly both ends on this machine: two processes, one bit per sample between them.
 
@@ -88,12 +89,12 @@ def demo(
     agreements = _agree_all(preset, config, changes, clock)
     pace = _checked_pace(agreements[0], pace, view)
     wish = _view_wish(agreements, view, view_port, open_browser)
-    raise typer.Exit(_fly_all(agreements, out, json, wish, pace))
+    raise typer.Exit(_fly_all(agreements, out, json, verbose, wish, pace))
 
 
 def _checked_pace(agreement: Agreement, pace: float | None, view: bool) -> float | None:
     """Return how many times real time to fly at most; a flight that is looked at keeps to 1."""
-    virtual = agreement.clock == "virtual" and agreement.config.link.kind != "memory"
+    virtual = agreement.clock == "virtual" and not agreement.link.in_process
     if pace is not None and not virtual:
         raise typer.BadParameter("--pace slows the virtual clock of two processes down, and no other")
     return pace or (1.0 if view and virtual else None)
@@ -111,7 +112,7 @@ def _view_wish(
     from tenbaud.flight.viewing import ViewWish
     from tenbaud.view.server import Address, free_port, require_nicegui
 
-    if len(agreements) > 1 or agreements[0].config.link.kind == "memory":
+    if len(agreements) > 1 or agreements[0].link.in_process:
         raise typer.BadParameter("--view shows one flight of two processes: one --mismatch, no memory")
     require_nicegui()
     host = loopback_host()
@@ -142,6 +143,7 @@ def _fly_all(
     agreements: list[Agreement],
     out: options.Out,
     as_json: bool,
+    verbose: bool,
     wish: ViewWish | None,
     pace: float | None,
 ) -> int:
@@ -166,7 +168,7 @@ def _fly_all(
         if result.code:
             break
     if not as_json:
-        show_summaries([result.summary for result in results], folders)
+        show_summaries([result.summary for result in results], folders, verbose=verbose)
     return int(results[-1].code)
 
 

@@ -58,6 +58,7 @@ Out = Annotated[
 AsJson = Annotated[
     bool, typer.Option("--json", help="Summary on standard output as JSON, nothing else there.")
 ]
+Verbose = Annotated[bool, typer.Option("--verbose", help="Also print every figure of the summary.")]
 Settings = Annotated[
     list[str] | None,
     typer.Option("--set", help="Any field, such as --set coder.window_signs=3; repeatable."),
@@ -99,7 +100,12 @@ Mismatches = Annotated[
         show_default=False,
     ),
 ]
-Link = Annotated[str | None, typer.Option(help="zenoh, or serial with --port.", show_default=False)]
+Link = Annotated[
+    str | None,
+    typer.Option(
+        help="zenoh, serial with --port, or a kind from an installed package.", show_default=False
+    ),
+]
 DemoLink = Annotated[
     str | None,
     typer.Option(
@@ -268,6 +274,7 @@ class NodeOptions:
     allow_control: AllowControl = False
     out: Out = None
     json: AsJson = False
+    verbose: Verbose = False
     run_folder: RunFolder = None
     status: Status = "auto"
 

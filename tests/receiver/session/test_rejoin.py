@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from channel.protocol.endings import Ending
 from channel.protocol.frames import (
     Bye,
     Commands,
@@ -131,7 +132,7 @@ def test_when_the_transmitter_was_started_again_then_it_flies_on_in_the_receiver
         session.on_frame(symbol(slot, epoch=1), slot * 100 * MS)
     (answer,) = session.on_frame(request(5, 31), 2_800 * MS)
     assert isinstance(answer, Refuse)
-    assert session.on_frame(Bye(0, "so be it"), 0) == []
+    assert session.on_frame(Bye(0, Ending.OVER, "so be it"), 0) == []
 
 
 def test_when_nothing_comes_for_long_then_erasures_are_not_counted_for_ever() -> None:

@@ -33,6 +33,9 @@ from channel.protocol.frames import (
 from channel.protocol.identity import Identity
 from channel.protocol.terms import Terms
 
+WORLDS_SESSIONS = range(1000, 1100)
+"""What `World` numbers its receivers with."""
+
 HEARD_MAX = 400
 """Messages kept to be played back."""
 
@@ -54,8 +57,8 @@ class Intruder:
         self._identity = identity
         self._heard: deque[bytes] = deque(maxlen=HEARD_MAX)
         self._session = 1
-        self._sessions = {0, 1}
-        """all that were heard of"""
+        self._sessions = {0, 1, *WORLDS_SESSIONS}
+        """those whose farewell may end something"""
         self._epoch = 0
         self._incarnation = 1
         self._request = 0

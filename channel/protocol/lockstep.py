@@ -7,6 +7,7 @@ it happened, so the ring of states is longer than any lag that is allowed.
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 from typing import NamedTuple
 
 from channel.codec.codec import Codec, CodecState
@@ -97,6 +98,11 @@ def difference_text(report: Desync) -> str:
         f"the codecs differ after sample {report.sample}: transmitter "
         f"{report.transmitter_digest:016x}, receiver {report.receiver_digest:016x}"
     )
+
+
+def is_answer(report: Desync, own: Desync | None) -> bool:
+    """Return whether a report is the answer to this end's own: the same, with another state."""
+    return own is not None and own == replace(report, state=own.state)
 
 
 def unpacked(codec: Codec, data: bytes) -> CodecState | None:

@@ -18,6 +18,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
 from enum import Enum, auto
@@ -41,6 +42,9 @@ answer to the one before can have arrived."""
 PERSISTENT_REQUESTS = 3
 """Repetitions, each for a later sample, after which a request that contradicts what is known is
 believed, as long as the transmitter is not heard."""
+
+KNOWN_MAX = 64
+"""Transmitters remembered as admitted."""
 
 SILENT_SLOTS = 2
 """Slots missed in a row after which a transmitter may be taken for gone, if another one asks."""
@@ -74,6 +78,8 @@ class Greeter:
         """last answer given"""
         self._stranger: int | None = None
         self._symbols_since = 0
+        self._known: deque[int] = deque(maxlen=KNOWN_MAX)
+        """incarnations that were admitted"""
         self._doubted: Hello | None = None
         """last request that contradicted what is known"""
         self._persisted = 0
@@ -87,19 +93,26 @@ class Greeter:
         `in_reach`: the clock can have reached the request's sample.
         """
         last = self.welcome
+        if difference(hello, identity) is not None and hello.incarnation in self._known:
+            # A process does not change what it is: somebody else asks in its name.
+            return Verdict.IGNORE
         if last is None:
-            return _admitted(hello, identity)
+            return self._admit(hello, identity)
         if hello.incarnation != last.incarnation:
             return self._judge_stranger(hello, identity, advanced, silent_slots)
-        if difference(hello, identity) is not None:
-            # It was admitted, and a process does not change what it is: somebody else asks in its name.
-            return Verdict.IGNORE
         if not in_reach or hello.request < last.request or (hello.request == last.request and advanced):
             heard = advanced and silent_slots < SILENT_SLOTS
             return Verdict.BEGIN if self._persists(hello) and not heard else Verdict.IGNORE
         if hello.request == last.request:
             age = hello.sample - last.first_sample
             return Verdict.REPEAT if age <= self._answer_age_max else Verdict.BEGIN
+        return Verdict.BEGIN
+
+    def _admit(self, hello: Hello, identity: Identity) -> Verdict:
+        if difference(hello, identity) is not None:
+            return Verdict.REFUSE
+        if hello.incarnation not in self._known:
+            self._known.append(hello.incarnation)
         return Verdict.BEGIN
 
     def _persists(self, hello: Hello) -> bool:
@@ -122,17 +135,14 @@ class Greeter:
     def _judge_stranger(
         self, hello: Hello, identity: Identity, advanced: bool, silent_slots: int
     ) -> Verdict:
-        if hello.incarnation != self._stranger:
+        if hello.incarnation != self._stranger or silent_slots >= SILENT_SLOTS:
+            # What was on the line when the present one stopped proves nothing for long.
             self._stranger, self._symbols_since = hello.incarnation, 0
         if self._symbols_since >= ALIVE_SYMBOLS:
             return Verdict.BUSY
         if advanced and silent_slots < SILENT_SLOTS:
             return Verdict.IGNORE
-        return _admitted(hello, identity)
-
-
-def _admitted(hello: Hello, identity: Identity) -> Verdict:
-    return Verdict.BEGIN if difference(hello, identity) is None else Verdict.REFUSE
+        return self._admit(hello, identity)
 
 
 def difference(hello: Hello, ours: Identity) -> str | None:

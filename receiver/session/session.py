@@ -335,7 +335,8 @@ class ReceiverSession:
             self._tell(EventKind.STALE, f"a symbol of slot ...{short.slot_low} is not due: dropped")
         elif place.in_time:
             symbol = Symbol(self.session_number, self.epoch, place.slot, short.number)
-            frames = self._take_symbol(symbol, now_ns, anew=True)
+            if not self._bounds.drops(self._bounds.of_symbol(symbol)):
+                frames = self._take_symbol(symbol, now_ns, anew=True)
         else:
             self.counts["symbols_late"] += 1
             self._tell(EventKind.LATE_SYMBOL, f"slot {place.slot} came after its deadline: dropped")

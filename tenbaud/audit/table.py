@@ -177,8 +177,8 @@ UNCLAIMED: tuple[Unclaimed, ...] = (
         "receiver",
         "sample",
         ("arrival_s",),
-        "of an erased word, on a real clock or after the last symbol: when the loop noticed",
-        lambda row, evidence: row.word is None and _is_noticed_late(row, evidence),
+        "of an erased word: when the receiver gave it up, after the one before it and before the next",
+        lambda row, evidence: _is_given_up(row, evidence),
     ),
     *(
         Unclaimed(
@@ -208,10 +208,10 @@ def _is_unconfirmed(row: Any, evidence: Evidence) -> bool:
     return row.slot // count not in confirmed and (not taken or bool(evidence.agreement.faults.up.flip))
 
 
-def _is_noticed_late(row: Any, evidence: Evidence) -> bool:
-    taken = (one.slot for one in evidence.topic("receiver", "symbol") if one.taken)
+def _is_given_up(row: Any, evidence: Evidence) -> bool:
     count = evidence.agreement.terms.symbols_per_word
-    return not evidence.is_virtual or (row.sample + 1) * count - 1 >= max(taken, default=-1)
+    last = (row.sample + 1) * count - 1
+    return not any(one.taken and one.slot == last for one in evidence.topic("receiver", "symbol"))
 
 
 def _is_within_word(row: Any, evidence: Evidence) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import secrets
 from pathlib import Path
 
@@ -19,6 +20,7 @@ from receiver.controllers.recorded import RecordedController
 from receiver.controllers.references import Constant, Csv, Reference, Sine, Square, Step
 from receiver.endpoint import ReceiverEndpoint
 from receiver.session.session import ReceiverSession
+from tenbaud.build.codec import build_codec
 from tenbaud.build.flight import Agreement, read_flight_log, ticks_of, watchdog_wanted_s
 from tenbaud.build.gauge import build_gauge
 from tenbaud.build.liveness import overtaking_ticks, watchdog_ticks
@@ -130,7 +132,26 @@ def build_receiver(
 def check_parts(config: FlightConfig) -> None:
     """Build what can be wrong in files and texts, so that it is told before anything starts."""
     build_rig(config)
-    build_controller(config)
+    controller = build_controller(config)
+    if is_plugin(config.receiver.controller):
+        _check_command(config, controller)
+
+
+def _check_command(config: FlightConfig, controller: Controller) -> None:
+    """Ask a controller from outside for its first command; ConfigError if no motor could follow it."""
+    model, name = build_codec(config).model, config.receiver.controller
+    try:
+        volts = [float(value) for value in controller.command(0, model.initial())]
+    except Exception as error:
+        raise ConfigError(
+            f"receiver.controller {name}: command(0, {model.initial()}) must return "
+            f"{model.input_size} voltages; it raised {type(error).__name__}: {error}"
+        ) from error
+    if len(volts) != model.input_size or not all(map(math.isfinite, volts)):
+        raise ConfigError(
+            f"receiver.controller {name}: command(0, {model.initial()}) must return "
+            f"{model.input_size} finite voltages, one for each motor of the model; it returned {volts}"
+        )
 
 
 def build_guard(agreement: Agreement) -> Guard:

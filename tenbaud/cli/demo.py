@@ -45,6 +45,7 @@ def demo(
     pace: options.Pace = None,
     out: options.Out = None,
     json: options.AsJson = False,
+    verbose: options.Verbose = False,
 ) -> None:
     """Fly both ends on this machine: two processes, one bit per sample between them.
 
@@ -88,7 +89,7 @@ def demo(
     agreements = _agree_all(preset, config, changes, clock)
     pace = _checked_pace(agreements[0], pace, view)
     wish = _view_wish(agreements, view, view_port, open_browser)
-    raise typer.Exit(_fly_all(agreements, out, json, wish, pace))
+    raise typer.Exit(_fly_all(agreements, out, json, verbose, wish, pace))
 
 
 def _checked_pace(agreement: Agreement, pace: float | None, view: bool) -> float | None:
@@ -142,6 +143,7 @@ def _fly_all(
     agreements: list[Agreement],
     out: options.Out,
     as_json: bool,
+    verbose: bool,
     wish: ViewWish | None,
     pace: float | None,
 ) -> int:
@@ -166,7 +168,7 @@ def _fly_all(
         if result.code:
             break
     if not as_json:
-        show_summaries([result.summary for result in results], folders)
+        show_summaries([result.summary for result in results], folders, verbose=verbose)
     return int(results[-1].code)
 
 

@@ -143,9 +143,9 @@ def _run(
     if node.json:
         ends.write_json(summary)
     elif whole and summary["samples"]:
-        from tenbaud.flight.report import show_summary
+        from tenbaud.flight.report import show_summaries
 
-        show_summary(summary, folder)
+        show_summaries([summary], [folder], verbose=node.verbose)
     # What ended the flight is said last.
     for one in (*problems, *([outcome] if outcome.code is not ExitCode.OK else [])):
         typer.echo(f"tenbaud {role}: {one.text}", err=True)

@@ -58,6 +58,7 @@ Out = Annotated[
 AsJson = Annotated[
     bool, typer.Option("--json", help="Summary on standard output as JSON, nothing else there.")
 ]
+Verbose = Annotated[bool, typer.Option("--verbose", help="Also print every figure of the summary.")]
 Settings = Annotated[
     list[str] | None,
     typer.Option("--set", help="Any field, such as --set coder.window_signs=3; repeatable."),
@@ -268,6 +269,7 @@ class NodeOptions:
     allow_control: AllowControl = False
     out: Out = None
     json: AsJson = False
+    verbose: Verbose = False
     run_folder: RunFolder = None
     status: Status = "auto"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tenbaud.config.schema import FlightConfig
 from tenbaud.files.whole import WriteError, write_whole
@@ -12,6 +12,9 @@ from tenbaud.flight.outcome import ExitCode, Outcome, outcome_of
 from tenbaud.flight.summary import Summary
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RunFolder
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 ROWS: tuple[tuple[str, str, str], ...] = (
     ("plant", "plant", "{}"),
@@ -35,7 +38,7 @@ ROWS: tuple[tuple[str, str, str], ...] = (
     ("went wrong, up / down", "impaired", "{}"),
     ("largest pitch in the window", "pitch_amplitude_rad", "{:.3f} rad"),
     ("error of the codec: max / rms", "error_coded", "{}"),
-    ("error as lived: max / rms", "error_live", "{}"),
+    ("error of the prediction: max / rms", "error_live", "{}"),
     ("tracking, rms", "tracking_rms_rad", "{:.3f} rad"),
     ("disturbance found, density q", "disturbance_rad2_per_s3", "{:.2g} rad^2/s^3"),
     ("rms error over the least possible", "rms_over_floor", "{:.2f}"),
@@ -88,17 +91,26 @@ def figure_title(config: FlightConfig, summary: Summary) -> str:
     return f"{config.preset}: {summary.get('plant', '')}, {config.channel.rate_baud:g} bit/s"
 
 
-def show_summary(summary: Summary, folder: RunFolder) -> None:
-    """Print one flight."""
-    show_summaries([summary], [folder])
-
-
-def show_summaries(summaries: Sequence[Summary], folders: Sequence[RunFolder]) -> None:
-    """Print flights side by side, and where their files are."""
+def show_summaries(
+    summaries: Sequence[Summary], folders: Sequence[RunFolder], *, verbose: bool = False
+) -> None:
+    """Print how flights ended; with `verbose` also every figure, the flights side by side."""
     from rich.console import Console
-    from rich.table import Table
+
+    from tenbaud.flight.closing import closing_lines
+    from tenbaud.flight.screen import unicode_fits
 
     console = Console()
+    if verbose:
+        console.print(_table(summaries))
+    for summary, folder in zip(summaries, folders, strict=True):
+        lines = closing_lines(summary, folder, unicode=unicode_fits(console))
+        console.print("\n".join(lines), soft_wrap=True, highlight=False, markup=False)
+
+
+def _table(summaries: Sequence[Summary]) -> Table:
+    from rich.table import Table
+
     first = summaries[0]
     title = f"{first['preset']} over {first['link']}, {first['clock']} clock"
     table = Table(title=title, title_justify="left", show_header=False)
@@ -109,10 +121,7 @@ def show_summaries(summaries: Sequence[Summary], folders: Sequence[RunFolder]) -
         cells = [_cell(summary, name, form) for summary in summaries]
         if any(cells):
             table.add_row(label, *cells)
-    console.print(table)
-    for folder in folders:
-        figure = f"  figure {folder.figure.name}" if folder.figure.is_file() else ""
-        console.print(f"recorded in {folder.path}{figure}", soft_wrap=True, highlight=False)
+    return table
 
 
 def _cell(summary: Summary, name: str, form: str) -> str:
@@ -134,7 +143,8 @@ def _value(summary: Summary, name: str) -> Any:
                 return None
             return f"{asked:g} / {kept:.1f} / {get('symbols_missing_share'):.2%}"
         case "rejoins":
-            return f"{get('rejoins')}, {get('rejoin_bytes')} control bytes" if get("rejoins") else None
+            cost = f", {get('rejoin_bytes')} control bytes" if get("rejoin_bytes") is not None else ""
+            return f"{get('rejoins')}{cost}" if get("rejoins") else None
         case "impairments":
             return get(name) or None
         case "impaired":
@@ -153,6 +163,8 @@ def _value(summary: Summary, name: str) -> Any:
             if largest is None or rms is None:
                 return None
             return f"{largest:.2%} / {rms:.2%} of the largest pitch"
+        case "pitch_amplitude_rad":
+            return get(name) or None
         case "lateness":
             if get("loop_late_ms_p50") is None:
                 return None

@@ -171,8 +171,6 @@ def open_new_recording(path: Path) -> BinaryIO:
     try:
         stream = os.fdopen(os.open(path, flags, 0o666), "wb")
     except OSError as error:
-        if error.errno == errno.ELOOP:
-            raise RecordingError(f"{path} is a link, and nothing is recorded through one.") from error
         raise write_error(path, error) from error
     if not hold(stream.fileno()) or os.fstat(stream.fileno()).st_size > 0:
         stream.close()

@@ -19,7 +19,7 @@ from channel.line.impairments import ImpairedLine, Impairments
 from channel.line.shaper import SlotShaper, UplinkMeter
 from channel.line.uplink import Uplink
 from channel.protocol.frames import Frame, Symbol
-from channel.protocol.sabotage import SabotagedCodec
+from channel.protocol.sabotage import Sabotage, SabotagedCodec
 from channel.protocol.wire import decode
 from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters, PitchPlant
@@ -38,6 +38,7 @@ from transmitter.session.copies import Confirmed
 from transmitter.session.session import Phase, TransmitterSession
 
 ALIVE_TICKS = 10**6
+NEVER = Sabotage(-1, "coder", 0)
 
 RECOVERY_SAMPLES_MAX = 13
 """From the last fault to lockstep, beside the round trip and the command lead."""
@@ -97,6 +98,7 @@ class World:
         self.now_ns = 0
         self.calm_ns = 0
         """when faults stop, true time"""
+        self._sabotaged: list[SabotagedCodec] = []
         self._events: list[tuple[int, int, Callable[[], None]]] = []
         self._order = count()
         self._started = 0
@@ -161,6 +163,7 @@ class World:
         for which, sabotage in self.plan.sabotage:
             if which == end:
                 codec = SabotagedCodec(codec, sabotage)
+                self._sabotaged.append(codec)
         return codec
 
     # Time
@@ -313,3 +316,6 @@ class World:
             for name, number in line.counts.items():
                 self.faults[name] += number
             line.impairments = Impairments(delay_ns=usual.delay_ns)
+        for codec in self._sabotaged:
+            # An end that was started again may not have come to the sample yet.
+            codec.arm(NEVER)

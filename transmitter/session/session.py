@@ -12,7 +12,6 @@ symbol leaves any more; the session asks for a new epoch, and goes on from the s
 from __future__ import annotations
 
 from collections import Counter, deque
-from dataclasses import replace
 from enum import Enum
 
 from channel.codec.codec import Codec, Vector
@@ -36,7 +35,7 @@ from channel.protocol.frames import (
     Why,
 )
 from channel.protocol.identity import Identity, differing_fields
-from channel.protocol.lockstep import History, difference_text
+from channel.protocol.lockstep import History, difference_text, is_answer
 from channel.protocol.recording import NullRecorder, Recorder
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
@@ -189,10 +188,7 @@ class TransmitterSession:
         return self._command
 
     def take_confirmed(self) -> list[Confirmed]:
-        """Write the samples down that were confirmed since the last call, and return them.
-
-        It can wait until the next symbol has left.
-        """
+        """Write down and return what was confirmed since the last call; the next symbol goes first."""
         taken = list(self.confirmed)
         self.confirmed.clear()
         for done in taken:
@@ -209,11 +205,13 @@ class TransmitterSession:
                 return self._on_commands(frame)
             case Welcome() if self._asking.is_answered_by(frame):
                 return self._on_welcome(frame)
+            case Welcome() if self._is_current(frame.session) and self._is_left_behind(frame):
+                return self.rejoin(Why.UNKNOWN, f"the receiver has begun epoch {frame.epoch}, unasked")
             case Unknown() if self._is_current(frame.session) and frame.epoch == self.epoch:
                 return self._on_unknown()
             case Claim() if self._is_current(frame.session) and frame.epoch == self.epoch:
                 return self._on_claim(frame)
-            case Desync() if self._is_answer(frame):
+            case Desync() if not self._report_answered and is_answer(frame, self.desync):
                 self._report_answered = True
                 write_failure(self._recorder, self.terms, self.history, frame, frame.state)
             case Refuse() if frame.incarnation == self.incarnation:
@@ -368,10 +366,10 @@ class TransmitterSession:
         """Return the sample that this end's clock stands in."""
         return max(0, self._tick) // self.terms.ticks_per_sample
 
-    def _is_answer(self, frame: Desync) -> bool:
-        """Return whether this is the first answer to our last report: the same, with another state."""
-        own = self.desync
-        return own is not None and not self._report_answered and own == replace(frame, state=own.state)
+    def _is_left_behind(self, welcome: Welcome) -> bool:
+        """Return whether somebody else was answered in our name, and commands stay away."""
+        later = welcome.incarnation == self.incarnation and welcome.epoch > self.epoch
+        return later and self._claims.is_lost(self._tick, self.heard_tick)
 
     def _is_current(self, session: int) -> bool:
         return self.phase is Phase.FLYING and session == self.session_number

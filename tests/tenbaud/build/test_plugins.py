@@ -30,6 +30,14 @@ class Law:
     def reference_rad(self, tick):
         return self.context.reference.angle_rad(tick)
 
+class OneMotor(Law):
+    def command(self, tick, state):
+        return [1.0]
+
+class Raising(Law):
+    def command(self, tick, state):
+        return {}["gain"]
+
 class Cart:
     """A plant: a double integrator with friction."""
     def __init__(self, context, friction=0.5):
@@ -168,6 +176,8 @@ def test_a_coder_that_uses_rates_is_given_them(outside: Path) -> None:
         ("receiver.controller", "outside:Lav", r"no class 'Lav'; did you mean Law\?"),
         ("receiver.controller", "outside:NUMBER", "no class 'NUMBER'"),
         ("receiver.controller", "outside:Deaf", "its command must take 2 .*; it has no reference_rad"),
+        ("receiver.controller", "outside:OneMotor", r"2 finite voltages.* returned \[1\.0\]"),
+        ("receiver.controller", "outside:Raising", "2 voltages; it raised KeyError: 'gain'"),
         ("receiver.controller", "outside:Picky", "Picky.context. failed: RuntimeError: not today"),
         ("receiver.controller", "needy:Law", "needs a_library_that_nobody_has"),
         ("receiver.controller", "broken:Law", "broken cannot be imported: SyntaxError"),

@@ -83,3 +83,15 @@ def test_when_a_refusal_is_longer_than_a_frame_then_the_answer_still_fits_one() 
     theirs = json.dumps({f"field {number}": number for number in range(600)})
     (answer,) = session.on_frame(Refuse(INCARNATION, "the configuration differs", theirs))
     encode(answer)
+
+
+def test_when_the_receiver_has_begun_an_epoch_for_somebody_else_then_another_is_asked_for() -> None:
+    session = flying()
+    session.on_measurement(10, (0.0,))
+    elsewhere = Welcome(SESSION, 9, 2, INCARNATION, 77)
+    assert session.on_frame(elsewhere) == [], "commands may still come"
+    session.on_measurement(20, (0.0,))
+    (request,) = session.on_frame(elsewhere)
+    assert isinstance(request, Hello)
+    assert request.why is Why.UNKNOWN
+    assert session.phase is Phase.REJOINING

@@ -1,0 +1,144 @@
+"""The end of a flight at a glance: verdict, warnings, a few figures, what to open and do next."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from tenbaud.flight.summary import Summary
+from tenbaud.recording.folder import RunFolder
+
+LATE_SHARE_WORTH_A_WARNING = 0.01
+LABEL_WIDTH = 16
+
+
+def closing_lines(summary: Summary, folder: RunFolder, *, unicode: bool = True) -> list[str]:
+    """Return the lines that end a flight on a terminal; angles are in degrees."""
+    lines = [_verdict(summary, unicode)]
+    lines += [f"  {'! ' if not unicode else '⚠ '}{text}" for text in warnings_of(summary)]
+    lines += [f"  {label:{LABEL_WIDTH}}{text}" for label, text in _figures(summary, unicode)]
+    lines += [f"  {label:{LABEL_WIDTH}}{text}" for label, text in _what_next(summary, folder)]
+    return lines
+
+
+def _verdict(summary: Summary, unicode: bool) -> str:
+    code = int(summary["exit_code"])
+    if code:
+        mark = "✗" if unicode else "x"
+        return f"{mark} Flight failed (exit code {code}): {summary['outcome']}"
+    mark = "✓" if unicode else "+"
+    text = f"{mark} Flight finished: {float(summary['duration_s']):g} s"
+    checks, desyncs = summary.get("digest_checks"), summary.get("desyncs") or 0
+    if checks is None:
+        return f"{text}, {summary['samples']} samples"
+    if desyncs:
+        return f"{text}, {checks} checks of the two codecs, {desyncs} found a difference"
+    return f"{text}, both codecs equal in {checks} of {checks} checks"
+
+
+def warnings_of(summary: Summary) -> list[str]:
+    """Return what a person should know before the figures, most serious first."""
+    get = summary.get
+    counted = (
+        (
+            "bad_commands",
+            "the controller failed at {} ticks (wrong length, not finite, or an exception)",
+        ),
+        ("bad_references", "the reference failed at {} ticks"),
+        (
+            "desyncs",
+            "differences of the two codecs, resynchronised: {} (`tenbaud diff` names the field)",
+        ),
+        ("out_of_bounds", "{} frames held values out of bounds and were dropped"),
+        ("malformed", "{} messages were no frames and were dropped"),
+        ("recording_rows_lost", "the recording lost {} rows: the disk was too slow"),
+    )
+    found = [text.format(get(name)) for name, text in counted if get(name)]
+    if get("sensor_fault"):
+        found.append(f"sensor: {get('sensor_fault')}")
+    ticks = get("ticks_commanded")
+    if get("ticks_guard_down"):
+        found.append(f"the guard held the safe voltage for {get('ticks_guard_down')} ticks")
+    late = get("commands_late") or 0
+    if ticks and late > LATE_SHARE_WORTH_A_WARNING * ticks:
+        found.append(f"{late} commands came too late: the last one was held")
+    missing = get("symbols_missing_share") or 0.0
+    if missing > LATE_SHARE_WORTH_A_WARNING:
+        found.append(f"{missing:.1%} of the slots had no symbol in time")
+    return found
+
+
+def _figures(summary: Summary, unicode: bool) -> Iterator[tuple[str, str]]:
+    get = summary.get
+    degree = "°" if unicode else " deg"
+    flown = f"{get('preset')} over {get('link')}, {get('clock')} clock"
+    yield "Flown", f"{get('plant')}; {flown}" if get("plant") else flown
+    if get("coder_bits_up") is not None:
+        yield "Uplink", _uplink(summary)
+    largest, rms = get("error_live_max_rad"), get("error_live_rms_rad")
+    if largest is not None and rms is not None:
+        window = get("window_start_s") or 0.0
+        after = f", after the first {window:g} s" if window else ""
+        fractions = (get("error_live_rms_fraction"), get("error_live_max_fraction"))
+        share = " ({:.2%} and {:.2%} of the largest)".format(*fractions) if all(fractions) else ""
+        error = f"{math.degrees(rms):.2f}{degree} rms, {math.degrees(largest):.2f}{degree} max"
+        yield "Estimate error", error + share + after
+    tracking = get("tracking_rms_rad")
+    if tracking is not None:
+        yield "Tracking error", f"{math.degrees(tracking):.1f}{degree} rms, steps included"
+    yield "Link", _link(summary)
+    if get("impairments"):
+        yield "Impaired", f"{get('impairments')}"
+    if get("loop_late_ms_p99") is not None:
+        yield (
+            "Loop lateness",
+            f"{get('loop_late_ms_p50'):.2f} ms median, {get('loop_late_ms_p99'):.2f} ms p99",
+        )
+
+
+def _uplink(summary: Summary) -> str:
+    bits = summary["coder_bits_up"]
+    text = f"{bits:g} bits"
+    if summary.get("duration_s"):
+        text += f", {bits / float(summary['duration_s']):.3g} bit/s"
+    up, down = summary.get("wire_bytes_up"), summary.get("wire_bytes_down")
+    if up is not None and down is not None:
+        text += f"; with framing {_bytes(up)} up, {_bytes(down)} down"
+    return text
+
+
+def _bytes(count: int) -> str:
+    return f"{count / 1000:.1f} kB" if count < 1_000_000 else f"{count / 1e6:.1f} MB"
+
+
+def _link(summary: Summary) -> str:
+    get = summary.get
+    parts = [f"{get('erasures') or 0} symbols lost", f"{get('symbols_late') or 0} late"]
+    if get("rejoins") is not None:
+        cost = f" ({get('rejoin_bytes')} bytes)" if get("rejoins") and get("rejoin_bytes") else ""
+        parts.append(f"{get('rejoins')} resyncs{cost}")
+    if get("reconnects"):
+        parts.append(f"{get('reconnects')} reconnects")
+    return ", ".join(parts)
+
+
+def _what_next(summary: Summary, folder: RunFolder) -> Iterator[tuple[str, str]]:
+    path = _shown(folder.path)
+    if folder.figure.is_file():
+        yield "Open", f"{path}/{folder.figure.name}"
+    else:
+        yield "Recorded in", path
+    if int(summary["exit_code"]):
+        yield "Next", f"tenbaud inspect {path}   (every figure: --verbose)"
+    else:
+        yield (
+            "Next",
+            f"tenbaud replay {path}   (every figure: --verbose; live page: tenbaud demo --view)",
+        )
+
+
+def _shown(path: Path) -> str:
+    text: Any = str(path)
+    return f'"{text}"' if " " in text else text

@@ -1,0 +1,97 @@
+"""The lines that end a flight on a terminal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tenbaud.flight.closing import closing_lines, warnings_of
+from tenbaud.recording.folder import RunFolder
+
+FLOWN: dict[str, Any] = {
+    "preset": "tuned-10baud",
+    "plant": "pitch",
+    "link": "zenoh",
+    "clock": "virtual",
+    "outcome": "the flight is over",
+    "exit_code": 0,
+    "duration_s": 100.0,
+    "samples": 1000,
+    "coder_bits_up": 1000.0,
+    "wire_bytes_up": 15084,
+    "wire_bytes_down": 164873,
+    "erasures": 0,
+    "symbols_late": 0,
+    "rejoins": 0,
+    "rejoin_bytes": 0,
+    "digest_checks": 1000,
+    "desyncs": 0,
+    "window_start_s": 25.0,
+    "error_live_max_rad": 0.0197547,
+    "error_live_rms_rad": 0.0067732,
+    "error_live_max_fraction": 0.0087637,
+    "error_live_rms_fraction": 0.0030048,
+    "tracking_rms_rad": 0.8536,
+    "ticks_commanded": 10000,
+}
+
+
+def lines_of(tmp_path: Path, **changes: Any) -> list[str]:
+    return closing_lines(FLOWN | changes, RunFolder(tmp_path))
+
+
+def test_a_good_flight_is_ten_lines_at_most_and_begins_with_its_verdict(tmp_path: Path) -> None:
+    lines = lines_of(tmp_path)
+    assert lines[0] == "✓ Flight finished: 100 s, both codecs equal in 1000 of 1000 checks"
+    assert len(lines) <= 10
+    text = "\n".join(lines)
+    assert "1000 bits, 10 bit/s" in text
+    assert "0.39° rms, 1.13° max (0.30% and 0.88% of the largest), after the first 25 s" in text
+    assert "0 symbols lost, 0 late, 0 resyncs" in text
+    assert "rad" not in text
+
+
+@pytest.mark.parametrize("code", [1, 4, 5, 6, 7, 130])
+def test_a_flight_that_failed_does_not_say_finished(tmp_path: Path, code: int) -> None:
+    first = lines_of(tmp_path, exit_code=code, outcome="what happened")[0]
+    assert first == f"✗ Flight failed (exit code {code}): what happened"
+
+
+def test_a_flight_that_was_stopped_before_its_window_shows_no_figures_of_it(tmp_path: Path) -> None:
+    none = dict.fromkeys(name for name in FLOWN if name.startswith(("error_", "tracking")))
+    text = "\n".join(lines_of(tmp_path, **none))
+    assert "None" not in text
+    assert "0.000" not in text
+    assert "Estimate error" not in text
+
+
+def test_a_receiver_alone_has_no_checks_to_count(tmp_path: Path) -> None:
+    receiver = {name: FLOWN[name] for name in ("preset", "link", "clock", "outcome", "exit_code")}
+    lines = closing_lines(receiver | {"duration_s": 60.0, "samples": 600}, RunFolder(tmp_path))
+    assert lines[0] == "✓ Flight finished: 60 s, 600 samples"
+    assert "None" not in "\n".join(lines)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"bad_commands": 2000}, "controller failed at 2000 ticks"),
+        ({"desyncs": 1}, "differences of the two codecs"),
+        ({"recording_rows_lost": 7}, "lost 7 rows"),
+        ({"sensor_fault": "encoder stuck"}, "encoder stuck"),
+        ({"commands_late": 194}, "194 commands came too late"),
+        ({"symbols_missing_share": 0.3}, "30.0% of the slots"),
+    ],
+)
+def test_what_went_wrong_is_said_right_below_the_verdict(
+    tmp_path: Path, changes: dict[str, Any], said: str
+) -> None:
+    assert warnings_of(FLOWN) == []
+    assert said in lines_of(tmp_path, **changes)[1]
+
+
+def test_a_terminal_without_unicode_gets_plain_characters(tmp_path: Path) -> None:
+    text = "\n".join(closing_lines(FLOWN | {"bad_commands": 1}, RunFolder(tmp_path), unicode=False))
+    assert text.isascii()

@@ -28,6 +28,7 @@ from benchmarks.figures import Figure
 from benchmarks.throwaway_keys import tls_settings
 from channel.links.endpoints import free_endpoint
 from channel.links.zenoh.link import ZenohLink
+from channel.protocol.endings import Ending
 from channel.protocol.frames import Bye
 from channel.protocol.wire import decode, encode
 from tenbaud.build.flight import agree
@@ -178,7 +179,7 @@ def _flight(stack: ExitStack, ticks_per_sample: int, record: bool) -> Ping:
         answer = link.receive(1.0)
         if answer is not None:
             session.on_frame(decode(answer))
-    stack.callback(lambda: link.send(encode(Bye(session.session_number, "measured"))))
+    stack.callback(lambda: link.send(encode(Bye(session.session_number, Ending.OVER, "measured"))))
     sample = 0
 
     def ping() -> int:
@@ -188,7 +189,7 @@ def _flight(stack: ExitStack, ticks_per_sample: int, record: bool) -> Ping:
         (symbol,) = session.on_measurement(tick, (measured,))
         message = encode(symbol)
         sent_ns = time.perf_counter_ns()
-        link.send(message, is_symbol=True)
+        link.send(message)
         answer = link.receive(5.0)
         took_ns = time.perf_counter_ns() - sent_ns
         if answer is None:

@@ -6,19 +6,17 @@ numbers: no numpy, no `math.sin`.    python examples/own_coder.py
 
 import numpy as np
 
-from channel.codec.plugin_context import CoderContext
-from channel.codec.words import ERASED, Alphabet, Word
 from tenbaud import fly
-
-Vector = tuple[float, ...]
+from tenbaud.coders import ERASED, Alphabet, Vector, Word
 
 
 class Cells:
     """Cuts the range into 2^bits cells; an error in an outer cell widens it, any other narrows it."""
 
-    impulse = True
+    impulse = True  # a correction is added to the state at once
+    uses_rates = False  # it looks at angles alone
 
-    def __init__(self, context: CoderContext, bits: int = 2, gain: float = 0.9, rate: float = 1.0):
+    def __init__(self, bits: int, gain: float = 0.9, rate: float = 1.0):
         self.bits, self.cells = bits, 1 << bits
         self.gains = (gain, rate)  # of the correction: angle, rate (1/s)
         self.alphabet = Alphabet((0, 1), bits)
@@ -46,7 +44,7 @@ class Cells:
 
 if __name__ == "__main__":
     for bits in (2, 3, 4):  # all at 20 bit/s: more bits per word, fewer words
-        settings = {"coder.kind": "own_coder:Cells", "coder.options.bits": bits, "duration_s": 60.0}
-        settings |= {"channel.rate_baud": 20.0, "timing.symbol_period_s": bits / 20.0}
-        run = fly("tuned-20baud", settings=settings | {"transmitter.plant.mismatch": 0.1})
+        settings = {"channel.rate_baud": 20.0, "timing.symbol_period_s": bits / 20.0}
+        settings |= {"transmitter.plant.mismatch": 0.1, "duration_s": 60.0}
+        run = fly("tuned-20baud", settings=settings, coder=Cells(bits))
         print(f"{bits} bits per word: rms error {np.sqrt(np.mean(run.error_coded**2)):.4f} rad")

@@ -6,8 +6,8 @@ cd examples && tenbaud demo --set receiver.controller=own_controller:StateFeedba
 
 from __future__ import annotations
 
-from receiver.controllers.base import ControllerContext
 from tenbaud import fly
+from tenbaud.controllers import ControllerContext
 
 
 class StateFeedback:
@@ -48,10 +48,7 @@ if __name__ == "__main__":
     for controller in ("pid", "own_controller:StateFeedback"):
         run = fly(
             "tuned-10baud",
-            settings={
-                "receiver.controller": controller,
-                "transmitter.plant.mismatch": 0.1,
-                "duration_s": 75.0,
-            },
+            controller=controller,
+            settings={"transmitter.plant.mismatch": 0.1, "duration_s": 75.0},
         )
         print(f"{controller:32} tracking rms {run.summary['tracking_rms_rad']:.3f} rad")

@@ -35,6 +35,10 @@ class Disturbance(Protocol):
         """Angular acceleration (rad/s^2) held over step `step_index` (0 is the first)."""
         ...
 
+
+class PlannedDisturbance(Disturbance, Protocol):
+    """A disturbance whose torques can be had in advance, as studies ask for them."""
+
     def torques(self, steps: int) -> Torques:
         """The torques of steps `0 ... steps - 1` at once, to the last bit those of `torque`."""
         ...
@@ -128,7 +132,7 @@ class Sum:
 
     __slots__ = ("_parts",)
 
-    def __init__(self, *parts: Disturbance) -> None:
+    def __init__(self, *parts: PlannedDisturbance) -> None:
         """Add up `parts`; of none at all the sum is 0."""
         self._parts = parts
 
@@ -147,13 +151,13 @@ class Sum:
         return total
 
 
-def parse_disturbance(text: str, step_s: float, seed: int) -> Disturbance:
+def parse_disturbance(text: str, step_s: float, seed: int) -> PlannedDisturbance:
     """Build the disturbance a command line names, as `GRAMMAR` says.
 
     Raises ValueError that names the piece that is wrong and repeats the grammar.
     """
     _require_step(step_s)
-    parts: list[Disturbance] = []
+    parts: list[PlannedDisturbance] = []
     has_density = False
     for piece in text.split(","):
         kind, _, value = piece.strip().partition("=")

@@ -29,6 +29,39 @@ class GuardState(StrEnum):
     LATCHED = "latched"
 
 
+class GuardCause(StrEnum):
+    """Why the guard takes the voltage down."""
+
+    TIMED_OUT = "timed_out"
+    """commands stayed away: the one cause that commands can make good again"""
+    STOPPED = "stopped"
+    """a person or a signal stopped the flight"""
+    SESSION_ENDED = "session_ended"
+    FLIGHT_OVER = "flight_over"
+    """a real rig's motors are taken down after the flight"""
+    SENSOR = "sensor"
+    ANGLE_LIMIT = "angle_limit"
+    NO_ANGLE = "no_angle"
+    """an angle that is no finite number"""
+    BAD_COMMAND = "bad_command"
+    """a command that is no finite number"""
+
+
+@dataclass(frozen=True, slots=True)
+class GuardReason:
+    """A cause with its numbers."""
+
+    cause: GuardCause
+    tick: int | None = None
+    axis: int | None = None
+    value: float | None = None
+    limit: float | None = None
+    number: int | None = None
+    """ticks that were owed a command and had none"""
+    detail: str | None = None
+    """for people: what the sensor's device says"""
+
+
 @dataclass(frozen=True, slots=True)
 class GuardSettings:
     """When the guard steps in, and how. Times are in ticks."""
@@ -56,10 +89,8 @@ class Guard:
         self._limits = limits
         self._settings = settings
         self.state = GuardState.READY
-        self.reason = ""
+        self.reason: GuardReason | None = None
         """why it ramps or latched"""
-        self.timed_out = False
-        """whether that was nothing but commands that stayed away"""
         self.volts = settings.safe_volts
         self._age_ticks = 0
         self._ramp_from = settings.safe_volts
@@ -70,29 +101,29 @@ class Guard:
         """Return whether the guard no longer passes commands."""
         return self.state is GuardState.RAMPING or self.state is GuardState.LATCHED
 
+    @property
+    def timed_out(self) -> bool:
+        """Return whether it stopped for nothing but commands that stayed away."""
+        return self.reason is not None and self.reason.cause is GuardCause.TIMED_OUT
+
     def check_angles(self, tick: int, measured_rad: Vector) -> None:
         """Trip when an angle is beyond its soft limit or not a number."""
         limits = self._settings.soft_limits_rad
         for axis, angle in enumerate(measured_rad):
             if not math.isfinite(angle):
-                self.trip(f"axis {axis} reads {angle} at tick {tick}")
+                self.trip(GuardReason(GuardCause.NO_ANGLE, tick, axis, angle))
             elif limits and abs(angle) > limits[axis]:
-                self.trip(
-                    f"axis {axis} is at {angle:.3f} rad at tick {tick}, beyond its soft limit of "
-                    f"{limits[axis]:g} rad"
-                )
+                self.trip(GuardReason(GuardCause.ANGLE_LIMIT, tick, axis, angle, limits[axis]))
 
-    def trip(self, reason: str, timed_out: bool = False) -> None:
+    def trip(self, reason: GuardReason) -> None:
         """Take the voltage down from now on."""
         if not self.stopped:
             self.state = GuardState.RAMPING
             self.reason = reason
-            self.timed_out = timed_out
             self._ramp_from = self.volts
             self._ramp_tick = 0
-        elif self.timed_out and not timed_out:
+        elif self.timed_out and reason.cause is not GuardCause.TIMED_OUT:
             # Something worse than silence: no command makes it good again.
-            self.timed_out = False
             self.reason = reason
 
     def rearm(self) -> None:
@@ -100,8 +131,7 @@ class Guard:
         if not self.timed_out:
             raise RuntimeError(f"the guard cannot be re-armed: {self.reason or 'it is not stopped'}")
         self.state = GuardState.READY
-        self.reason = ""
-        self.timed_out = False
+        self.reason = None
         self._age_ticks = 0
 
     def apply(self, tick: int, command: Vector | None, owed: bool = True) -> Vector:
@@ -112,7 +142,7 @@ class Guard:
         if command is not None:
             for value in command:
                 if not math.isfinite(value):
-                    self.trip(f"the command of tick {tick} is not a number: {command}")
+                    self.trip(GuardReason(GuardCause.BAD_COMMAND, tick, value=value))
         if not self.stopped:
             self._take(tick, command, owed)
         if self.state is GuardState.RAMPING:
@@ -129,7 +159,7 @@ class Guard:
         if self.state is GuardState.RUNNING:
             self.state = GuardState.HOLDING
         if self._age_ticks > self._settings.timeout_ticks:
-            self.trip(f"no command for {self._age_ticks} ticks up to tick {tick}", timed_out=True)
+            self.trip(GuardReason(GuardCause.TIMED_OUT, tick, number=self._age_ticks))
 
     def _ramp(self) -> None:
         self._ramp_tick += 1

@@ -7,21 +7,20 @@ and calls `actuate`. Nothing here knows which driver it is.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from channel.codec.codec import Vector
-from channel.protocol.events import EVENT_CHANNEL, Event, EventKind, event_row
+from channel.protocol.events import Event, EventKind, write_event
 from channel.protocol.frames import Frame, Why
 from channel.protocol.recording import NullRecorder, Recorder
 from transmitter.encoder_watch import EncoderWatch
-from transmitter.guard import Guard, GuardState
+from transmitter.guard import Guard, GuardCause, GuardReason, GuardState
 from transmitter.metrics.gap import GAP_CHANNEL, GAP_EVERY_S, GapGauge
 from transmitter.metrics.scores import Scores
 from transmitter.rigs.base import Reading, Rig
 from transmitter.session.copies import Confirmed
 from transmitter.session.records import DEVICE_CHANNEL, TICK_CHANNEL, device_row
 from transmitter.session.session import Phase, TransmitterSession
-
-STOPPED = "stopped by the user"
 
 RESTLESS_SAMPLES_MAX = 32
 """Samples that may be confirmed before they are scored even if no driver finds the time."""
@@ -55,7 +54,7 @@ class TransmitterNode:
         """whose own command passed the guard"""
         self.ticks_down = 0
         """with the guard at the safe voltage, or on its way there"""
-        self.sensor_fault: str | None = None
+        self.sensor_fault: GuardReason | None = None
         self.tick = 0
         self.rearmed = 0
         self.at_tick: Callable[[int], None] | None = None
@@ -88,7 +87,7 @@ class TransmitterNode:
         if self.guard.stopped:
             if not self._may_rearm:
                 return []
-            asking = self.session.rejoin(Why.GUARD, "the guard stopped")
+            asking = self.session.rejoin(Why.GUARD)
         return asking + self.session.on_measurement(tick, reading.measured_rad)
 
     def deliver(self, frame: Frame) -> list[Frame]:
@@ -126,7 +125,7 @@ class TransmitterNode:
             raise RuntimeError(f"tick {tick} is actuated before it was measured")
         session = self.session
         if session.phase is Phase.ENDED:
-            self.guard.trip(session.end_reason)
+            self.guard.trip(GuardReason(GuardCause.SESSION_ENDED, tick))
         asleep = session.phase in (Phase.GREETING, Phase.ENDED)
         command = None if asleep else session.command(tick)
         owed = session.phase is Phase.FLYING and tick >= session.epoch_tick
@@ -177,29 +176,45 @@ class TransmitterNode:
             and self.tick - session.heard_tick <= self._rearm_ticks
         )
 
-    def tell(self, kind: EventKind, text: str) -> None:
+    def stop(self) -> None:
+        """Take the motors down because a person or a signal asked for it."""
+        self.guard.trip(GuardReason(GuardCause.STOPPED, self.tick))
+
+    def tell(self, event: Event) -> None:
         """Report something at the present tick."""
         time_ns = self.tick * self.session.terms.tick_ns
-        event = Event(kind, time_ns, self.session.copies.confirmed.sample, text)
+        event = replace(event, time_ns=time_ns, sample=self.session.copies.confirmed.sample)
         self.session.events.append(event)
-        self._recorder.write(EVENT_CHANNEL, time_ns, event_row(event))
+        write_event(self._recorder, event)
 
     def on_malformed(self, why: str) -> None:
         """Report a message that came and was no frame."""
-        self.tell(EventKind.MALFORMED, f"dropped a frame: {why}")
+        self.tell(Event(EventKind.MALFORMED, detail=why))
 
     def _check(self, tick: int, reading: Reading) -> None:
         session = self.session
         estimate = session.copies.confirmed.model if session.is_proven else None
         fault = reading.fault or self._watch.check(reading.counts, self._applied, estimate)
         if fault is not None and not self.guard.stopped:
-            self.sensor_fault = f"tick {tick}: {fault}"
-            self.tell(EventKind.SENSOR, self.sensor_fault)
+            self.sensor_fault = GuardReason(GuardCause.SENSOR, tick, detail=fault)
+            self.tell(Event(EventKind.SENSOR, tick=tick, detail=fault))
             self.guard.trip(self.sensor_fault)
         self.guard.check_angles(tick, reading.measured_rad)
 
     def _tell_guard(self) -> None:
         self._guard_told = self.guard.state
         if self.guard.state is not GuardState.RUNNING:
-            text = f"guard {self.guard.state.value}"
-            self.tell(EventKind.GUARD, f"{text}: {self.guard.reason}".rstrip(": "))
+            reason = self.guard.reason
+            event = Event(EventKind.GUARD, state=self.guard.state)
+            if reason is not None:
+                event = replace(
+                    event,
+                    tick=reason.tick,
+                    cause=reason.cause,
+                    axis=reason.axis,
+                    value=reason.value,
+                    limit=reason.limit,
+                    number=reason.number,
+                    detail=reason.detail,
+                )
+            self.tell(event)

@@ -18,16 +18,15 @@ that they would act on, and count what is dropped under `COUNTER`. The limits:
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 
 from channel.codec.codec import Codec, CodecState, is_coder_state, is_estimate
 from channel.codec.words import WIRE_ERASED
-from channel.protocol.events import EventKind
+from channel.protocol.events import Dropped, Event, EventKind, Tell
 from channel.protocol.frames import Bye, Commands, Desync, Echo, Frame, Hello, Refuse, Symbol, Welcome
 from channel.protocol.limits import to_millivolts
 from channel.protocol.terms import Terms
-
-Tell = Callable[[EventKind, str], None]
 
 COUNTER = "out_of_bounds"
 """Name under which sessions count, and summaries show, the frames dropped for what they hold."""
@@ -70,7 +69,7 @@ class Bounds:
         if problem is None:
             return False
         self._counts[COUNTER] += 1
-        self._tell(EventKind.STALE, f"dropped a frame that is out of bounds: {problem}")
+        self._tell(Event(EventKind.STALE, cause=Dropped.OUT_OF_BOUNDS, detail=problem))
         return True
 
     def of_symbol(self, symbol: Symbol) -> str | None:
@@ -175,9 +174,9 @@ def within_text_bounds(frame: Frame) -> Frame:
     """Return the frame with its texts as they may be shown and sent on."""
     match frame:
         case Bye():
-            return Bye(frame.session, shown(frame.reason))
+            return replace(frame, text=shown(frame.text))
         case Refuse():
-            return Refuse(frame.incarnation, shown(frame.reason), frame.config)
+            return replace(frame, text=shown(frame.text))
     return frame
 
 

@@ -1,11 +1,18 @@
-"""What a session tells about: one small record each, for the recording and for the person."""
+"""What a session reports: records with named fields, for recordings, telemetry and the page.
+
+Programs read the fields. Sentences are made where they are shown (`tenbaud.sentences`).
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from enum import StrEnum
+from enum import Enum, StrEnum
+from typing import Any
 
-from channel.protocol.recording import Field, RecordChannel
+from channel.protocol.endings import End
+from channel.protocol.recording import Field, RecordChannel, Recorder
 
 
 class EventKind(StrEnum):
@@ -15,6 +22,7 @@ class EventKind(StrEnum):
     ENDED = "ended"
     REFUSED = "refused"
     DESYNC = "desync"
+    REJOIN_ASKED = "rejoin_asked"
     REJOIN = "rejoin"
     ERASED = "erased"
     LATE_SYMBOL = "late_symbol"
@@ -28,17 +36,89 @@ class EventKind(StrEnum):
     RATE = "rate"
 
 
+class Dropped(Enum):
+    """Why a symbol or another frame was dropped: the causes of LATE_SYMBOL and STALE."""
+
+    SETTLED = "its slot was settled already"
+    PAST_DEADLINE = "it came after its deadline"
+    FAR_AHEAD = "its slot is too far ahead"
+    NOT_DUE = "no slot that is due has this symbol"
+    OUT_OF_BOUNDS = "it holds what no frame of this flight may hold"
+
+
+class Presence(Enum):
+    """What is known of the other end: the causes of PEER."""
+
+    GONE = "it is not there any more"
+    BACK = "it is there again"
+    SILENT = "no symbol came for a whole history"
+
+
+class Rate(Enum):
+    """Whether the symbol rate is kept: the causes of RATE."""
+
+    MISSED = "too few symbols arrive in time"
+    KEPT = "they arrive again"
+
+
+class Failing(Enum):
+    """What of the controller failed: the causes of CONTROLLER."""
+
+    REFERENCE = "its set-point"
+    COMMAND = "its command"
+
+
+class ByHand(Enum):
+    """What a person changed in flight: the causes of CONTROL."""
+
+    SET_POINT = "steer to an angle"
+    FOLLOW = "follow the reference"
+    PAUSE = "pause before a tick"
+    GO_ON = "go on after a pause"
+    PACE = "so many times real time"
+    IMPAIR = "what goes wrong on the line"
+    SPOIL = "one bit of a codec"
+    IGNORED = "something that cannot be done"
+
+
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something worth telling."""
+    """One thing that happened. A field that has no meaning for its kind is None."""
 
     kind: EventKind
-    time_ns: int
-    """flight time"""
-    sample: int | None
-    text: str
-    """a whole sentence, with the numbers in it"""
+    sample: int | None = None
+    """None: the session's present one"""
+    time_ns: int = 0
+    """flight time; the session fills it in"""
+    tick: int | None = None
+    slot: int | None = None
+    session: int | None = None
+    epoch: int | None = None
+    cause: Enum | None = None
+    """an `Ending`, a `Why`, or one of the causes that belong to the kind"""
+    state: Enum | None = None
+    by_peer: bool | None = None
+    axis: int | None = None
+    number: int | None = None
+    value: float | None = None
+    limit: float | None = None
+    missed_share: float | None = None
+    overdue_share: float | None = None
+    transmitter_digest: int | None = None
+    receiver_digest: int | None = None
+    detail: str | None = None
+    """for people: what a peer, a device, a plugin or an exception said"""
 
+
+ASKED = Event(EventKind.REJOIN_ASKED)
+
+
+def ended_event(end: End) -> Event:
+    """Return the event that reports the end of a session."""
+    return Event(EventKind.ENDED, cause=end.ending, by_peer=end.by_peer, detail=end.text or None)
+
+
+Tell = Callable[[Event], None]
 
 EVENT_CHANNEL = RecordChannel(
     "event",
@@ -46,11 +126,57 @@ EVENT_CHANNEL = RecordChannel(
         Field("time_s", "number", "s", "flight time"),
         Field("kind", "string", "", "what kind of event"),
         Field("sample", "integer", "", "sample it belongs to, if any"),
-        Field("text", "string", "", "what happened"),
+        Field("tick", "integer", "", "tick it belongs to, if any"),
+        Field("slot", "integer", "", "slot of the symbol; of a short symbol, its low digits"),
+        Field("session", "integer", "", "number of the session that begins or takes over"),
+        Field("epoch", "integer", "", "epoch that begins, or that is over"),
+        Field("cause", "string", "", "why, by name: an ending, a reason to rejoin, a guard cause ..."),
+        Field("state", "string", "", "state of the guard"),
+        Field("by_peer", "boolean", "", "whether the other end said so"),
+        Field("axis", "integer", "", "measured axis"),
+        Field("number", "integer", "", "how many samples or ticks nothing came, or slots ahead"),
+        Field("value", "number", "", "angle (rad), symbols per second, pace: what the cause is about"),
+        Field("limit", "number", "", "what the value should keep to"),
+        Field("missed_share", "number", "", "share of this process' ticks that it missed"),
+        Field("overdue_share", "number", "", "share of the other ticks with echoes overdue"),
+        Field("transmitter_digest", "string", "", "of the sample, where the two differ"),
+        Field("receiver_digest", "string", "", "of the sample, where the two differ"),
+        Field("detail", "string", "", "for people: what a peer, a device or a plugin said"),
     ),
 )
 
 
 def event_row(event: Event) -> tuple[object, ...]:
     """Return the row of `EVENT_CHANNEL` for an event."""
-    return (event.time_ns / 1e9, str(event.kind), event.sample, event.text)
+    return (
+        event.time_ns / 1e9,
+        event.kind.value,
+        *[_plain(getattr(event, name)) for name in _NAMES],
+        _hex(event.transmitter_digest),
+        _hex(event.receiver_digest),
+        event.detail,
+    )
+
+
+def write_event(recorder: Recorder, event: Event) -> None:
+    """Record an event under its flight time."""
+    recorder.write(EVENT_CHANNEL, event.time_ns, event_row(event))
+
+
+def event_fields(event: Event) -> dict[str, Any]:
+    """Return the same as a mapping, as recordings and telemetry hold it."""
+    names = [field.name for field in EVENT_CHANNEL.fields]
+    return dict(zip(names, event_row(event), strict=True))
+
+
+_NAMES = tuple(field.name for field in EVENT_CHANNEL.fields[2:-3])
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, float) and not math.isfinite(value):
+        return None  # JSON has no such number
+    return value.name.lower() if isinstance(value, Enum) else value
+
+
+def _hex(digest: int | None) -> str | None:
+    return None if digest is None else f"{digest:016x}"

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import TypeAlias
 
+from channel.protocol.endings import Ending
+
 
 class Why(IntEnum):
     """Why a transmitter asks for a session."""
@@ -77,7 +79,9 @@ class Refuse:
     """The receiver does not fly with this transmitter."""
 
     incarnation: int
-    reason: str
+    ending: Ending
+    text: str
+    """for people; may be empty"""
     config: str
     """shared part of the receiver's configuration as JSON, so that the other end can name fields"""
 
@@ -96,15 +100,29 @@ class Symbol:
 
 @dataclass(frozen=True, slots=True)
 class ShortSymbol:
-    """A symbol as a byte of a serial line carries it: the receiver finds its slot by the time.
+    """A symbol as a byte of a serial line carries it; the other end sent a Symbol.
 
-    Only ever received; the other end sent a Symbol.
+    The receiver's endpoint makes a LocatedSymbol of it.
     """
 
     number: int
     slot_low: int
     """the slot modulo `slot_modulus`"""
     slot_modulus: int
+
+
+@dataclass(frozen=True, slots=True)
+class LocatedSymbol:
+    """A symbol whose slot was found by the time at which it came, as the session takes it."""
+
+    number: int
+    slot: int | None
+    """None: no slot that may come now has it"""
+    slot_low: int
+    """what its byte said of the slot"""
+    in_time: bool
+    anchor: tuple[int, int] | None
+    """(slot, time in ns): where deadlines count from now on, if that has changed"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,7 +188,9 @@ class Bye:
 
     session: int
     """0 before there is one, and to a second receiver that is refused"""
-    reason: str
+    ending: Ending
+    text: str = ""
+    """for people; may be empty"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,6 +206,7 @@ Frame: TypeAlias = (
     | Refuse
     | Symbol
     | ShortSymbol
+    | LocatedSymbol
     | Commands
     | Desync
     | Unknown

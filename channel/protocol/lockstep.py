@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from channel.codec.codec import Codec, CodecState
 from channel.codec.words import Word
+from channel.protocol.events import Event, EventKind
 from channel.protocol.frames import Desync
 from channel.protocol.recording import Field, RecordChannel
 
@@ -92,11 +93,14 @@ class History:
         )
 
 
-def difference_text(report: Desync) -> str:
-    """Return the sentence that tells of a lockstep failure."""
-    return (
-        f"the codecs differ after sample {report.sample}: transmitter "
-        f"{report.transmitter_digest:016x}, receiver {report.receiver_digest:016x}"
+def difference_event(report: Desync) -> Event:
+    """Return the event that reports a lockstep failure."""
+    return Event(
+        EventKind.DESYNC,
+        report.sample,
+        epoch=report.epoch,
+        transmitter_digest=report.transmitter_digest,
+        receiver_digest=report.receiver_digest,
     )
 
 

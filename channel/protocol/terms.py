@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from channel.codec.codec import Vector
+from channel.codec.codec import Codec, Vector
 from channel.protocol.limits import CommandLimits
 from channel.protocol.lockstep import HISTORY_NS, HISTORY_SAMPLES
 
@@ -52,6 +52,46 @@ class Terms:
     downlink_line_ns: int = 0
     """on a line of finite rate: how long a command frame is on its way"""
 
+    @classmethod
+    def for_codec(
+        cls,
+        codec: Codec,
+        tick_s: float,
+        *,
+        rate_baud: float | None = None,
+        delivery: Delivery = "start",
+        lead_ticks: int | None = None,
+        deadline_allowance_s: float = 0.02,
+        downlink_budget_s: float = 0.01,
+        repeats: int = 2,
+        initial_command: Vector | None = None,
+        limits: CommandLimits | None = None,
+    ) -> Terms:
+        """Return the terms on which a codec flies with ticks of `tick_s` on the virtual clock.
+
+        Without more, the line carries just the symbols that the codec asks for, commands begin at zero,
+        and the command lead is the shortest that is possible. ValueError where they cannot be flown.
+        """
+        symbols_per_word = codec.coder.alphabet.symbols_per_word
+        tick_ns = round(tick_s * 1e9)
+        terms = cls(
+            tick_ns=tick_ns,
+            ticks_per_sample=codec.ticks_per_sample,
+            symbols_per_word=symbols_per_word,
+            lead_ticks=lead_ticks or 0,
+            rate_baud=rate_baud or 1e9 * symbols_per_word / (tick_ns * codec.ticks_per_sample),
+            delivery=delivery,
+            deadline_allowance_ns=round(deadline_allowance_s * 1e9),
+            downlink_budget_ns=round(downlink_budget_s * 1e9),
+            repeats=repeats,
+            initial_command=initial_command or (0.0,) * codec.model.input_size,
+            limits=limits or CommandLimits(),
+        )
+        if lead_ticks is None:
+            terms = terms.with_shortest_lead("virtual")
+        terms.check("virtual")
+        return terms
+
     @property
     def sample_ns(self) -> int:
         """Return the symbol period `T_s`."""
@@ -71,6 +111,15 @@ class Terms:
     def slot_ns(self, slot: int) -> int:
         """Return the flight time at which a slot begins."""
         return slot * self.tick_ns * self.ticks_per_sample // self.symbols_per_word
+
+    def linger_ns(self, line_delay_ns: int) -> int:
+        """Return how long after a flight's last tick its last echo may come.
+
+        `line_delay_ns`: by how much the two lines may delay messages beyond what is agreed here.
+        """
+        agreed_ns = self.uplink_delivery_ns + self.symbol_delay_ns + self.uplink_line_ns
+        agreed_ns += self.deadline_allowance_ns + self.downlink_budget_ns + self.downlink_line_ns
+        return agreed_ns + line_delay_ns
 
     def samples_in(self, time_ns: int, at_least: int) -> int:
         """Return a time as a number of samples, rounded up, and no fewer than `at_least`."""

@@ -9,11 +9,11 @@ there. Bodies, by kind:
                 probe 8 bytes, version text
     2 welcome   incarnation u32, request u32, first sample u32, motors u8, millivolts s16 ...,
                 state bytes
-    3 refuse    incarnation u32, reason text, config text
+    3 refuse    incarnation u32, ending u8, text, config text
     4 symbol    slot u32, number u8
     5 commands  last sample u32, echoes u8, then per echo: word u16, digest u64, millivolts s16 ...
     6 desync    sample u32, digests u64 u64, state bytes
-    7 bye       reason text
+    7 bye       ending u8, text
     8 unknown   nothing
     9 claim     session that takes over u32
 
@@ -25,10 +25,12 @@ from __future__ import annotations
 import struct
 from binascii import crc_hqx
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from typing import Protocol
 
 from channel.errors import FrameError
+from channel.protocol.endings import Ending
 from channel.protocol.frames import (
     Bye,
     Claim,
@@ -38,6 +40,7 @@ from channel.protocol.frames import (
     ForeignVersion,
     Frame,
     Hello,
+    LocatedSymbol,
     Refuse,
     ShortSymbol,
     Symbol,
@@ -46,7 +49,7 @@ from channel.protocol.frames import (
     Why,
 )
 
-WIRE_VERSION = 1
+WIRE_VERSION = 2
 FRAME_BYTES_MAX = 16_384
 """No frame of ours comes near it; longer ones are dropped unread."""
 CRC_START = 0xFFFF
@@ -55,12 +58,15 @@ _HEAD = struct.Struct("<BBIH")
 _CRC = struct.Struct("<H")
 _HELLO = struct.Struct("<IIIB16s8s")
 _WELCOME = struct.Struct("<IIIB")
+_REFUSE = struct.Struct("<IB")
+_BYE = struct.Struct("<B")
 _NUMBER = struct.Struct("<I")
 _SYMBOL = struct.Struct("<IB")
 _COMMANDS = struct.Struct("<IB")
 _ECHO = struct.Struct("<HQ")
 _DESYNC = struct.Struct("<IQQ")
 _TEXT = struct.Struct("<H")
+_SYMBOL_START = bytes((WIRE_VERSION, 4))
 
 
 class Wire(Protocol):
@@ -74,6 +80,12 @@ class Wire(Protocol):
 
     def size(self, data: bytes) -> int:
         """Return how many bytes a message takes on the line, framing included."""
+
+    def is_symbol(self, data: bytes) -> bool:
+        """Return whether a message of ours carries a symbol: the paid path of the uplink."""
+
+    def renumbered(self, data: bytes, shift: int, kinds: int) -> bytes:
+        """Return a symbol's message with the number `shift` further on in an alphabet of `kinds`."""
 
 
 class DatagramWire:
@@ -90,6 +102,17 @@ class DatagramWire:
     def size(self, data: bytes) -> int:
         """Return the length: the frame is all that we put on such a line."""
         return len(data)
+
+    def is_symbol(self, data: bytes) -> bool:
+        """Return whether the head of a frame says that it is a symbol."""
+        return data.startswith(_SYMBOL_START)
+
+    def renumbered(self, data: bytes, shift: int, kinds: int) -> bytes:
+        """Return a symbol's frame with another number, its checksum right again."""
+        frame = decode(data)
+        if not isinstance(frame, Symbol):
+            raise ValueError(f"{frame} is no symbol")
+        return encode(replace(frame, number=(frame.number + shift) % kinds))
 
 
 DATAGRAM = DatagramWire()
@@ -148,18 +171,18 @@ def _encode_body(frame: Frame) -> tuple[int, int, int, bytes]:
         case Welcome():
             return 2, frame.session, frame.epoch, _encode_welcome(frame)
         case Refuse():
-            body = _NUMBER.pack(frame.incarnation) + _text(frame.reason) + _text(frame.config)
-            return 3, 0, 0, body
+            body = _REFUSE.pack(frame.incarnation, frame.ending)
+            return 3, 0, 0, body + _text(frame.text) + _text(frame.config)
         case Desync():
             body = _DESYNC.pack(frame.sample, frame.transmitter_digest, frame.receiver_digest)
             return 6, frame.session, frame.epoch, body + frame.state
         case Bye():
-            return 7, frame.session, 0, _text(frame.reason)
+            return 7, frame.session, 0, _BYE.pack(frame.ending) + _text(frame.text)
         case Unknown():
             return 8, frame.session, frame.epoch, b""
         case Claim():
             return 9, frame.session, frame.epoch, _NUMBER.pack(frame.by)
-        case ForeignVersion() | ShortSymbol():
+        case ForeignVersion() | ShortSymbol() | LocatedSymbol():
             raise ValueError(f"{frame} is only ever received")
 
 
@@ -237,11 +260,11 @@ def _decode_welcome(session: int, epoch: int, body: bytes) -> Welcome:
 
 
 def _decode_refuse(session: int, epoch: int, body: bytes) -> Refuse:
-    (incarnation,) = _NUMBER.unpack_from(body)
-    reason, rest = _take_text(body[_NUMBER.size :])
+    incarnation, ending = _REFUSE.unpack_from(body)
+    text, rest = _take_text(body[_REFUSE.size :])
     config, rest = _take_text(rest)
     _nothing_left(rest)
-    return Refuse(incarnation, reason, config)
+    return Refuse(incarnation, Ending(ending), text, config)
 
 
 def _decode_symbol(session: int, epoch: int, body: bytes) -> Symbol:
@@ -255,9 +278,10 @@ def _decode_desync(session: int, epoch: int, body: bytes) -> Desync:
 
 
 def _decode_bye(session: int, epoch: int, body: bytes) -> Bye:
-    reason, rest = _take_text(body)
+    (ending,) = _BYE.unpack_from(body)
+    text, rest = _take_text(body[_BYE.size :])
     _nothing_left(rest)
-    return Bye(session, reason)
+    return Bye(session, Ending(ending), text)
 
 
 def _decode_unknown(session: int, epoch: int, body: bytes) -> Unknown:

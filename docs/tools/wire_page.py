@@ -13,6 +13,7 @@ from pathlib import Path
 
 from channel.line.virtual import Reply, Step, encode_reply, encode_step
 from channel.links.serial.wire import SerialWire, stuff
+from channel.protocol.endings import Ending
 from channel.protocol.frames import (
     Bye,
     Claim,
@@ -27,7 +28,8 @@ from channel.protocol.frames import (
     Welcome,
     Why,
 )
-from channel.protocol.wire import encode
+from channel.protocol.wire import WIRE_VERSION, encode
+from tenbaud.sentences.endings import ending_text
 
 TEXT = Path(__file__).with_name("wire_page.md")
 
@@ -109,10 +111,11 @@ FRAMES: dict[str, tuple[Frame, tuple[Field, ...]]] = {
         ),
     ),
     "refuse": (
-        Refuse(0xA1B2C3D4, "no", "{}"),
+        Refuse(0xA1B2C3D4, Ending.MISMATCH, "no", "{}"),
         (
             Field("incarnation", "u32", "of the greeting that is answered"),
-            Field("reason", "text", "for people"),
+            Field("ending", "u8", "see below"),
+            Field("text", "text", "for people; may be empty"),
             Field("config", "text", "the receiver's shared configuration as JSON"),
         ),
     ),
@@ -125,7 +128,13 @@ FRAMES: dict[str, tuple[Frame, tuple[Field, ...]]] = {
             Field("state", "rest", "the sender's state after the sample; empty: not kept"),
         ),
     ),
-    "bye": (Bye(SESSION, "over"), (Field("reason", "text", "for people"),)),
+    "bye": (
+        Bye(SESSION, Ending.OVER, "done"),
+        (
+            Field("ending", "u8", "see below"),
+            Field("text", "text", "for people; may be empty"),
+        ),
+    ),
     "unknown": (Unknown(SESSION, EPOCH), ()),
     "claim": (
         Claim(SESSION, EPOCH, 0x5E6F7081),
@@ -140,6 +149,8 @@ def wire_page() -> str:
     for name, (frame, fields) in FRAMES.items():
         table = "\n".join(_table(encode(frame), (*HEAD, *fields, *TAIL)))
         text = text.replace(f"{{{{{name}}}}}", table)
+    text = text.replace("{{version}}", str(WIRE_VERSION))
+    text = text.replace("{{endings}}", "\n".join(_endings()))
     text = text.replace("{{symbols}}", "\n".join(_symbols()))
     text = text.replace("{{stuffed}}", _hex(stuff(encode(FRAMES["unknown"][0]))))
     text = text.replace("{{unstuffed}}", _hex(encode(FRAMES["unknown"][0])))
@@ -161,6 +172,13 @@ def _table(message: bytes, fields: tuple[Field, ...]) -> Iterator[str]:
         raise ValueError(
             f"the fields cover {offset} of {len(message)} bytes: {[f.name for f in fields]}"
         )
+
+
+def _endings() -> Iterator[str]:
+    yield "| number | name | |"
+    yield "|---|---|---|"
+    for ending in Ending:
+        yield f"| {ending.value} | `{ending.name.lower()}` | {ending_text(ending)} |"
 
 
 NUMBERS = {"u8": "<B", "u16": "<H", "u32": "<I", "u64": "<Q", "s16": "<h", "s64": "<q"}

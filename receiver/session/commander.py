@@ -8,14 +8,13 @@ consumed and decided becomes an echo. It knows no slot, no frame and no peer.
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Callable
 from typing import NamedTuple
 
 from channel.codec.codec import Codec, CodecState, Vector
 from channel.codec.lead import FlownSample, fly_sample
 from channel.codec.words import Word
 from channel.errors import CodecDiverged
-from channel.protocol.events import EventKind
+from channel.protocol.events import Event, EventKind, Failing, Tell
 from channel.protocol.frames import Echo
 from channel.protocol.limits import are_plausible, from_millivolts, to_millivolts
 from channel.protocol.lockstep import History
@@ -24,8 +23,6 @@ from channel.protocol.terms import Terms
 from receiver.controllers.base import Controller
 from receiver.session.records import write_commands, write_sample
 from receiver.session.rejoin import carried_to
-
-Tell = Callable[[EventKind, str], None]
 
 UNWRITTEN_MAX = 32
 """Samples that may be flown before they are recorded even if nobody finds the time."""
@@ -162,7 +159,9 @@ class Commander:
             self._counts["bad_references"] += 1
             if self._counts["bad_references"] == 1:
                 problem = f"{type(error).__name__}: {error}"
-                self._tell(EventKind.CONTROLLER, f"the reference of tick {tick} failed: {problem}")
+                self._tell(
+                    Event(EventKind.CONTROLLER, tick=tick, cause=Failing.REFERENCE, detail=problem)
+                )
             return None
 
     def _ask(self, tick: int, state: Vector) -> Vector:
@@ -176,8 +175,5 @@ class Commander:
             problem = f"failed: {type(error).__name__}: {error}"
         self._counts["bad_commands"] += 1
         if self._counts["bad_commands"] == 1:
-            self._tell(
-                EventKind.CONTROLLER,
-                f"at tick {tick} the controller {problem}; its last command is kept",
-            )
+            self._tell(Event(EventKind.CONTROLLER, tick=tick, cause=Failing.COMMAND, detail=problem))
         return self.hold

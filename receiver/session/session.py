@@ -12,14 +12,15 @@ sample, the state to start from, and the command to hold until the first one dec
 from __future__ import annotations
 
 from collections import Counter, deque
+from dataclasses import replace
 from enum import Enum
 
 from channel.codec.codec import Codec, CodecState
 from channel.codec.words import ERASED
-from channel.line.shaper import BaudMeter
-from channel.links.serial.slot_finder import SlotFinder
+from channel.line.meters import BaudMeter
 from channel.protocol.bounds import Bounds, within_text_bounds
-from channel.protocol.events import EVENT_CHANNEL, Event, EventKind, event_row
+from channel.protocol.endings import End, Ending
+from channel.protocol.events import Dropped, Event, EventKind, Presence, ended_event, write_event
 from channel.protocol.frames import (
     Bye,
     Commands,
@@ -27,16 +28,17 @@ from channel.protocol.frames import (
     ForeignVersion,
     Frame,
     Hello,
+    LocatedSymbol,
     Refuse,
-    ShortSymbol,
     Symbol,
     Unknown,
     Welcome,
 )
 from channel.protocol.identity import Identity
 from channel.protocol.limits import to_millivolts
-from channel.protocol.lockstep import History, difference_text
+from channel.protocol.lockstep import History, difference_event
 from channel.protocol.recording import NullRecorder, Recorder
+from channel.protocol.slot_clock import SlotClock
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
 from receiver.controllers.base import Controller
@@ -52,7 +54,7 @@ EPOCH_MAX = 0xFFFF
 class Phase(Enum):
     """Where the receiver's session stands."""
 
-    WAITING = "waiting for a transmitter"
+    WAITING = "waiting"  # for a transmitter
     FLYING = "flying"
     ENDED = "ended"
 
@@ -86,30 +88,31 @@ class ReceiverSession:
         """samples (flown), samples_skipped (between epochs), erasures, symbols_late, symbols_misplaced,
         stale_frames, malformed, refused_hellos, bad_commands, bad_references, desyncs, rejoins,
         out_of_bounds"""
-        self.end_reason = ""
-        self.refusal: str | None = None
+        self.end: End | None = None
+        self.refusal: End | None = None
         self.desync: Desync | None = None
         self.events: deque[Event] = deque(maxlen=1000)
         self._greeter = Greeter(terms)
         self._stranger = Stranger(session_number, take_over)
         self._recorder = recorder or NullRecorder()
         self._commander = Commander(codec, terms, controller, self._recorder, self.counts, self._tell)
-        self._slot = 0
+        self._clock = SlotClock(terms)
         self._word: list[int | None] = []
         self._advanced = False
         """whether a symbol of this epoch has been received"""
-        self._silent_slots = 0
-        self._slots = SlotFinder(terms)
         self._bounds = Bounds(codec, terms, self.counts, self._tell)
         self._schedule = Schedule(terms)
         self._proven = Proven(self._commander.standing, self._schedule, 0, None)
-        self._gap_samples_max = terms.history_samples
-        """A symbol this far ahead is no gap any more; after as many erasures in a row none are due."""
 
     @property
     def state(self) -> CodecState:
         """Return the codec's state before the next sample."""
         return self._commander.state
+
+    @property
+    def due_slot(self) -> int | None:
+        """Return the slot that is not settled yet; None while no flight is on."""
+        return self._clock.slot if self.phase is Phase.FLYING else None
 
     @property
     def history(self) -> History:
@@ -124,55 +127,53 @@ class ReceiverSession:
         match frame:
             case Symbol():
                 return self._on_symbol(frame, now_ns)
-            case ShortSymbol():
-                return self._on_short_symbol(frame, now_ns)
+            case LocatedSymbol() if self.phase is Phase.FLYING:
+                return self._on_located_symbol(frame, now_ns)
             case Hello():
-                answer = self._on_hello(frame, now_ns)
-                self._slots.greeted(now_ns)
-                return answer
+                return self._on_hello(frame, now_ns)
             case Desync() if self._is_current(frame.session):
                 return self._on_desync(frame)
             case Bye() if self._is_current(frame.session):
-                self._end(f"the transmitter ended the flight: {frame.reason}")
+                self._end(End(frame.ending, frame.text, by_peer=True))
             case Bye() if frame.session == 0 and self._stranger.asked and self.phase is Phase.WAITING:
-                self._end(frame.reason)
+                self._end(End(frame.ending, frame.text, by_peer=True))
             case Bye() if self.refusal is not None and frame.session == 0:
-                self.refusal = f"{self.refusal}\n  as the transmitter sees it: {frame.reason}"
-                self._end("refused")
+                self.refusal = replace(self.refusal, answer=frame.text)
+                self._end(self.refusal)
             case ForeignVersion() if self.phase is Phase.WAITING:
-                self._refuse(foreign_version_text("transmitter", frame.version))
+                text = foreign_version_text("transmitter", frame.version)
+                self._refuse(End(Ending.WIRE_VERSION, text))
             case _:
                 self.counts["stale_frames"] += 1
         return []
 
     def next_deadline(self) -> int | None:
         """Return when the slot that is due is taken for erased; None while none is."""
-        return self._schedule.deadline_ns(self._slot) if self.phase is Phase.FLYING else None
+        return self._clock.deadline_ns if self.phase is Phase.FLYING else None
 
     def on_deadline(self, now_ns: int) -> list[Frame]:
         """Erase the slots whose deadline has passed by `now_ns`; return the frames to send."""
         frames: list[Frame] = []
-        deadline = self.next_deadline()
-        while deadline is not None and deadline <= now_ns:
-            self._silent_slots += 1
-            frames += self._settle(None, now_ns)
-            if self._silent_slots >= self._gap_samples_max * self.terms.symbols_per_word:
-                self._schedule.anchor(None)
-                text = f"no symbol for {self._gap_samples_max} samples: waiting for one"
-                self._tell(EventKind.PEER, text)
-            deadline = self.next_deadline()
+        if self.phase is not Phase.FLYING:
+            return frames
+        for slot in self._clock.expired(now_ns):
+            frames += self._settle(slot, None, now_ns)
+            if self._clock.is_silent:
+                self._clock.anchor(None)
+                number = self.terms.history_samples
+                self._tell(Event(EventKind.PEER, cause=Presence.SILENT, number=number))
         return frames
 
-    def bye(self, reason: str) -> list[Frame]:
+    def bye(self, end: End) -> list[Frame]:
         """End the session from this side."""
         was_flying = self.phase is Phase.FLYING
-        self._end(reason)
-        return [Bye(self.session_number, reason)] if was_flying else []
+        self._end(end)
+        return [Bye(self.session_number, end.ending, end.text)] if was_flying else []
 
     def on_malformed(self, why: str) -> None:
         """Note that bytes came which are no frame."""
         self.counts["malformed"] += 1
-        self._tell(EventKind.MALFORMED, f"dropped a message: {why}")
+        self._tell(Event(EventKind.MALFORMED, detail=why))
 
     def rest(self) -> None:
         """Do what can wait until the frames are on their way: the recording."""
@@ -182,12 +183,14 @@ class ReceiverSession:
 
     def _on_hello(self, hello: Hello, now_ns: int) -> list[Frame]:
         if self.phase is Phase.ENDED:
-            return [Refuse(hello.incarnation, f"this receiver has ended: {self.end_reason}", "")]
+            return [
+                Refuse(hello.incarnation, Ending.ALREADY_ENDED, self.end.text if self.end else "", "")
+            ]
         if self._bounds.drops(self._bounds.of_hello(hello)):
             return []
         schedule = self._schedule if self._advanced else self._proven.schedule
         in_reach = schedule.reaches(hello.sample, now_ns)
-        silent = self._silent_slots
+        silent = self._clock.silent_slots
         verdict = self._greeter.judge(hello, self.identity, self._advanced, silent, in_reach)
         if verdict is Verdict.REPEAT and self._greeter.welcome is not None:
             return [self._greeter.welcome]
@@ -196,13 +199,13 @@ class ReceiverSession:
         self.counts["refused_hellos"] += 1
         match verdict:
             case Verdict.BUSY:
-                return [Refuse(hello.incarnation, "this receiver is flying with another", "")]
+                return [Refuse(hello.incarnation, Ending.BUSY, "", "")]
             case Verdict.IGNORE if not in_reach:
                 self._bounds.drops(f"a request for sample {hello.sample}, ahead of the clock")
             case Verdict.REFUSE:
                 problem = difference(hello, self.identity) or ""
-                self._refuse(problem)
-                return [Refuse(hello.incarnation, problem, self.identity.config)]
+                self._refuse(End(Ending.MISMATCH, problem))
+                return [Refuse(hello.incarnation, Ending.MISMATCH, problem, self.identity.config)]
         return []
 
     def _begin(self, hello: Hello, now_ns: int) -> list[Frame]:
@@ -213,16 +216,13 @@ class ReceiverSession:
         proven = self._proven.incarnation
         first = first_sample(hello, own, self.terms, begun=proven is not None)
         count = self.terms.symbols_per_word
-        if last is None or hello.incarnation != last.incarnation:
-            ahead = first - hello.sample if hello.sample else 0
-            self._slots.begin(first * count, ahead * count)
         if last is None:
             self.phase = Phase.FLYING
             self.refusal = None
             self._commander.restart(first)
         elif self.epoch >= EPOCH_MAX:
-            self._end(f"{EPOCH_MAX} rejoins: something is wrong with this line")
-            return [Bye(self.session_number, self.end_reason)]
+            self._end(End(Ending.REJOINS))
+            return [Bye(self.session_number, Ending.REJOINS)]
         else:
             self.epoch += 1
             self.counts["rejoins"] += 1
@@ -233,10 +233,9 @@ class ReceiverSession:
             else:
                 # A rig that was started again is at rest, and so is what is known of it.
                 self._commander.restart(first)
-        self._slot, self._word = first * count, []
-        self._advanced, self._silent_slots = False, 0
+        self._clock, self._word, self._advanced = SlotClock(self.terms, first * count), [], False
         self._schedule = Schedule(self.terms)
-        self._schedule.begin(self._slot, now_ns)
+        self._schedule.begin(first * count, now_ns)
         hold = self._commander.hold
         told = () if hold == self.terms.initial_command else to_millivolts(hold)
         asked = (hello.incarnation, hello.request)
@@ -244,24 +243,24 @@ class ReceiverSession:
         self._greeter.welcome = welcome
         self._commander.write_down()
         write_epoch(self._recorder, self.terms, self.epoch, self.state, hold)
-        text = f"session {self.session_number:08x}, epoch {self.epoch}, begins at sample {first}"
-        self._tell(EventKind.STARTED if last is None else EventKind.REJOIN, text)
+        kind = EventKind.STARTED if last is None else EventKind.REJOIN
+        self._tell(Event(kind, first, session=self.session_number, epoch=self.epoch))
         return [welcome]
 
     def _stand_where_proven(self, last: Welcome | None) -> int:
         """Take back what was offered and never flown; return this end's next sample."""
         if self._advanced and last is not None:
-            standing, silent = self._commander.standing, self._silent_slots
+            standing, silent = self._commander.standing, self._clock.silent_slots
             self._proven = Proven(standing, self._schedule, silent, last.incarnation)
             return self.state.sample + (1 if self._word else 0)
         self._commander.go_back(self._proven.standing)
         return self.state.sample
 
-    def _refuse(self, problem: str) -> None:
+    def _refuse(self, refusal: End) -> None:
         if self.refusal is None:
-            self._tell(EventKind.REFUSED, problem)
+            self._tell(Event(EventKind.REFUSED, cause=refusal.ending, detail=refusal.text))
         if self.phase is Phase.WAITING:
-            self.refusal = problem
+            self.refusal = refusal
 
     # Symbols, slots, words
 
@@ -271,7 +270,7 @@ class ReceiverSession:
             return self._on_foreign_symbol(symbol)
         if self._bounds.drops(self._bounds.of_symbol(symbol)):
             return []
-        if symbol.slot < self._slot:
+        if symbol.slot < self._clock.slot:
             return self._on_late_symbol(symbol, now_ns)
         timing = self._schedule.timing(symbol.slot, now_ns)
         if timing is Timing.EARLY:
@@ -281,31 +280,30 @@ class ReceiverSession:
 
     def _take_symbol(self, symbol: Symbol, now_ns: int, *, anew: bool) -> list[Frame]:
         """Consume a symbol of a slot that is due. `anew`: it replaces the schedule."""
-        ahead = symbol.slot - self._slot
-        if ahead > self._gap_samples_max * self.terms.symbols_per_word:
+        if not self._clock.bridges(symbol.slot):
+            ahead = symbol.slot - self._clock.slot
             self.counts["stale_frames"] += 1
-            self._tell(EventKind.STALE, f"slot {symbol.slot} is {ahead} ahead: dropped")
+            self._tell(Event(EventKind.STALE, slot=symbol.slot, cause=Dropped.FAR_AHEAD, number=ahead))
             return [Unknown(symbol.session, symbol.epoch)]
         self._advanced = True
-        self._silent_slots = 0
         self._greeter.on_symbol()
         frames: list[Frame] = []
-        while self._slot < symbol.slot:
-            frames += self._settle(None, now_ns)
-        self._schedule.take(symbol.slot, now_ns, anew=anew)
+        for slot in self._clock.take(symbol.slot):
+            frames += self._settle(slot, None, now_ns)
+        self._clock.anchor(self._schedule.take(symbol.slot, now_ns, anew=anew))
         self.meter.on_symbol(now_ns)
         write_symbol(self._recorder, self.terms, symbol, now_ns, taken=True)
         value = self.codec.coder.alphabet.symbols[symbol.number]
-        return frames + self._settle(value, now_ns)
+        return frames + self._settle(symbol.slot, value, now_ns)
 
     def _on_late_symbol(self, symbol: Symbol, now_ns: int) -> list[Frame]:
         """Drop a symbol of a slot that is settled; a row of them means that the schedule is wrong."""
         self.counts["symbols_late"] += 1
         write_symbol(self._recorder, self.terms, symbol, now_ns, taken=False)
-        self._tell(EventKind.LATE_SYMBOL, f"slot {symbol.slot} was settled already: dropped")
-        within = self._slot - symbol.slot <= self._gap_samples_max * self.terms.symbols_per_word
-        if within and self._schedule.is_replaced_by(symbol.slot, now_ns):
-            self._schedule.take(symbol.slot, now_ns, anew=True)
+        self._tell(Event(EventKind.LATE_SYMBOL, slot=symbol.slot, cause=Dropped.SETTLED))
+        near = self._clock.bridges(symbol.slot)
+        if near and self._schedule.is_replaced_by(symbol.slot, now_ns):
+            self._clock.anchor(self._schedule.take(symbol.slot, now_ns, anew=True))
         return []
 
     def _on_foreign_symbol(self, symbol: Symbol) -> list[Frame]:
@@ -323,33 +321,28 @@ class ReceiverSession:
             return [welcome]
         return []
 
-    def _on_short_symbol(self, short: ShortSymbol, now_ns: int) -> list[Frame]:
-        """Take a symbol byte of a serial line, as the symbol of this session that it can only be."""
-        if self.phase is not Phase.FLYING:
-            self.counts["stale_frames"] += 1
-            return []
-        place = self._slots.find(short, self._slot, now_ns)
+    def _on_located_symbol(self, place: LocatedSymbol, now_ns: int) -> list[Frame]:
+        """Take a symbol that says no session, as one of this session, which it can only be."""
         frames: list[Frame] = []
         if place.slot is None:
             self.counts["symbols_misplaced"] += 1
-            self._tell(EventKind.STALE, f"a symbol of slot ...{short.slot_low} is not due: dropped")
+            self._tell(Event(EventKind.STALE, slot=place.slot_low, cause=Dropped.NOT_DUE))
         elif place.in_time:
-            symbol = Symbol(self.session_number, self.epoch, place.slot, short.number)
+            symbol = Symbol(self.session_number, self.epoch, place.slot, place.number)
             if not self._bounds.drops(self._bounds.of_symbol(symbol)):
                 frames = self._take_symbol(symbol, now_ns, anew=True)
         else:
             self.counts["symbols_late"] += 1
-            self._tell(EventKind.LATE_SYMBOL, f"slot {place.slot} came after its deadline: dropped")
+            self._tell(Event(EventKind.LATE_SYMBOL, slot=place.slot, cause=Dropped.PAST_DEADLINE))
         if place.anchor is not None:
-            self._schedule.anchor(place.anchor)
+            self._clock.anchor(place.anchor)
         return frames
 
-    def _settle(self, symbol: int | None, now_ns: int) -> list[Frame]:
+    def _settle(self, slot: int, symbol: int | None, now_ns: int) -> list[Frame]:
         """Decide what this slot's symbol was; at the end of a word, fly its sample."""
         if symbol is None:
             self.counts["erasures"] += 1
-            self._tell(EventKind.ERASED, f"slot {self._slot} is erased")
-        self._slot += 1
+            self._tell(Event(EventKind.ERASED, slot=slot))
         self._word.append(symbol)
         if len(self._word) < self.terms.symbols_per_word:
             return []
@@ -372,23 +365,23 @@ class ReceiverSession:
         if last is None or (theirs.epoch, theirs.sample) > (last.epoch, last.sample):
             self.desync = theirs
             self.counts["desyncs"] += 1
-            self._tell(EventKind.DESYNC, difference_text(theirs), theirs.sample)
+            self._tell(difference_event(theirs))
             write_failure(self._recorder, self.terms, self.history, theirs)
         return [answer]
 
     def _is_current(self, session: int) -> bool:
         return self.phase is Phase.FLYING and session == self.session_number
 
-    def _end(self, reason: str) -> None:
+    def _end(self, end: End) -> None:
         if self.phase is not Phase.ENDED:
             self.phase = Phase.ENDED
-            self.end_reason = reason
+            self.end = end
             self.rest()
-            self._tell(EventKind.ENDED, reason)
+            self._tell(ended_event(end))
 
-    def _tell(self, kind: EventKind, text: str, sample: int | None = None) -> None:
-        at = self.state.sample if sample is None else sample
+    def _tell(self, event: Event) -> None:
+        at = self.state.sample if event.sample is None else event.sample
         flight_ns = self.state.sample * self.terms.sample_ns
-        event = Event(kind, flight_ns, at, text)
+        event = replace(event, time_ns=flight_ns, sample=at)
         self.events.append(event)
-        self._recorder.write(EVENT_CHANNEL, flight_ns, event_row(event))
+        write_event(self._recorder, event)

@@ -101,14 +101,12 @@ def _told(curves: Curves, recording: Recording) -> Story:
             words[row["sample"]] = None if row["word"] is None else float(row["word"][0])
             digests[row["sample"]] = row["peer_digest"] in (None, row["digest"])
     events = []
-    epoch = 0
     for time_ns, row in recording.rows("event"):
         if row["kind"] == "desync":
             events.append((time_ns / 1e9, "one bit of one codec is wrong: found", False))
-        elif row["kind"] == "rejoin" and "begins" in row["text"]:
-            epoch += 1
+        elif row["kind"] == "rejoin":
             # Mended within two samples, which is too quick to read what was wrong.
-            events.append((time_ns / 1e9 + READ_S, f"a common state again: epoch {epoch}", True))
+            events.append((time_ns / 1e9 + READ_S, f"a common state again: epoch {row['epoch']}", True))
     start_s, length_s = (float(part) for part in CUT[4:].replace("s", "").split("+"))
     at = start_s
     while at < start_s + length_s:

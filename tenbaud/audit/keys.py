@@ -23,7 +23,7 @@ KEYED = (
 """Topics whose rows have a key each; that of every row is larger than the one before."""
 
 
-ONCE = ("started", "rejoin", "ended", "erased", "desync", "guard")
+ONCE = ("started", "rejoin_asked", "rejoin", "ended", "erased", "desync", "guard")
 """Kinds of events of which no two are alike."""
 
 

@@ -135,8 +135,8 @@ UNCLAIMED: tuple[Unclaimed, ...] = (
     Unclaimed(
         "transmitter",
         "event",
-        ("text", "sample"),
-        "for people; where the confirmed copy stood is in the samples",
+        _all_fields("transmitter", "event")[2:],
+        "what an event says beyond its kind; where the confirmed copy stood is in the samples",
     ),
     Unclaimed(
         "transmitter",
@@ -144,18 +144,23 @@ UNCLAIMED: tuple[Unclaimed, ...] = (
         (ORDER,),
         "a session stamps its events with the last tick that it measured, a guard with the present one",
     ),
-    Unclaimed("receiver", "event", ("text",), "for people"),
+    Unclaimed(
+        "receiver",
+        "event",
+        _all_fields("receiver", "event")[3:],
+        "what an event says beyond its kind and sample",
+    ),
     Unclaimed(
         "transmitter",
         "event",
         ("kind", "time_s", FILED),
         "of what only an event tells: kinds are known ones, and the summary has the number of all rows",
-        lambda row, _evidence: row.kind not in ("guard", "started"),
+        lambda row, _evidence: row.kind != "guard",
     ),
     Unclaimed(
         "receiver",
         "event",
-        ("kind",),
+        ("kind", ORDER),
         "of what only an event tells",
         lambda row, _evidence: row.kind not in ("started", "rejoin", "erased", "late_symbol", "desync"),
     ),

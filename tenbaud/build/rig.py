@@ -8,11 +8,12 @@ from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters, PitchPlant
 from plant_sim.plant import Plant, PlantContext
 from tenbaud.build.flight import REAL_RIGS, read_flight_log
-from tenbaud.build.plugins import PLANT, build_plugin
+from tenbaud.build.plugins import build_part
+from tenbaud.config.kinds import PLANTS
 from tenbaud.config.load import ConfigError
-from tenbaud.config.outside_code import is_plugin
+from tenbaud.config.models import PitchModelSection
 from tenbaud.config.rig_schema import AxisSection
-from tenbaud.config.schema import FlightConfig, PitchModelSection
+from tenbaud.config.schema import FlightConfig
 from transmitter.rigs.axes import Axis, Motors
 from transmitter.rigs.base import Rig
 from transmitter.rigs.device import DeviceRig, DeviceSettings
@@ -24,13 +25,16 @@ from transmitter.rigs.simulated import SimulatedRig
 MEASURED = ("pitch",)
 
 
-def build_rig(config: FlightConfig) -> Rig:
-    """Return the rig: a plant off the model by the configured mismatch, a recording, or a real one."""
+def build_rig(config: FlightConfig, plant: Plant | None = None) -> Rig:
+    """Return the rig: a plant off the model by the configured mismatch, a recording, or a real one.
+
+    `plant` takes the place of the configured one on the simulated rig.
+    """
     section = config.transmitter
     if section.rig in REAL_RIGS:
         rig: Rig = build_device(config, output=not section.dry_run)
     else:
-        rig = _build_other(config)
+        rig = _build_other(config, plant)
     return DryRig(rig) if section.dry_run else rig
 
 
@@ -68,24 +72,25 @@ def build_plant(config: FlightConfig, step_s: float) -> Plant:
             disturbance = parse_disturbance(section.disturbance, step_s, config.seed)
         except ValueError as error:
             raise ConfigError(f"transmitter.plant.disturbance: {error}") from error
-    if is_plugin(section.kind):
-        context = PlantContext(
-            step_s,
-            config.seed,
-            config.limits.volts_max,
-            section.mismatch,
-            disturbance,
-            section.initial_angle_rad,
-        )
-        plugin: Plant = build_plugin(
-            config, "transmitter.plant.kind", section.kind, context, section.options, PLANT
-        )
-        return plugin
-    return PitchPlant(
-        nominal_plant(config).mismatched(section.mismatch),
+    context = PlantContext(
         step_s,
+        config.seed,
+        config.limits.volts_max,
+        section.mismatch,
         disturbance,
-        initial_angle_rad=section.initial_angle_rad,
+        section.initial_angle_rad,
+    )
+    plant: Plant = build_part(config, PLANTS, section.kind, context, section.options, Plant)
+    return plant
+
+
+def pitch_plant(config: FlightConfig, context: PlantContext) -> PitchPlant:
+    """Return the pitch axis."""
+    return PitchPlant(
+        nominal_plant(config).mismatched(config.transmitter.plant.mismatch),
+        context.step_s,
+        context.disturbance,
+        initial_angle_rad=context.initial_angle_rad,
         # Not the C library's: a simulated flight is then the same on every machine.
         sine=sin,
     )
@@ -100,14 +105,16 @@ def nominal_plant(config: FlightConfig) -> PitchParameters:
     return PitchParameters(**section.model_dump(exclude={"kind"}), volts_max=config.limits.volts_max)
 
 
-def _build_other(config: FlightConfig) -> Rig:
+def _build_other(config: FlightConfig, plant: Plant | None) -> Rig:
     section = config.transmitter
     encoder = Encoder(
         section.encoder_counts_per_turn, section.encoder_sign, section.encoder_zero_counts
     )
     if section.rig == "replay":
         return ReplayRig(read_flight_log(config), (encoder,))
-    return SimulatedRig(build_plant(config, config.timing.tick_s), (encoder,), section.safe_volts)
+    if plant is None:
+        plant = build_plant(config, config.timing.tick_s)
+    return SimulatedRig(plant, (encoder,), section.safe_volts)
 
 
 def build_axes(config: FlightConfig) -> tuple[Axis, ...]:

@@ -6,7 +6,6 @@ written by a thread beside the loop; it hands over what is ready and rings.
 
 from __future__ import annotations
 
-import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -14,16 +13,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from channel.errors import FrameError, LinkLost
-from channel.line.clocks import SkewedClock
 from channel.line.virtual import Reply, decode_step, encode_reply, is_envelope
 from channel.links.zenoh.hub import ZenohHub
+from channel.protocol.endings import End, Ending
 from channel.protocol.frames import Bye, Frame, Hello, Refuse, Symbol, Unknown
 from channel.protocol.wire import DATAGRAM, decode, encode
 from receiver.loops.many import SURPLUS, Served
-from receiver.loops.real import RealService
-from receiver.loops.virtual import VirtualService
 from receiver.session.rejoin import difference
-from tenbaud.build.ends import build_line, build_receiver
+from tenbaud.build.ends import build_receiver
 from tenbaud.build.flight import Agreement
 from tenbaud.config.load import dump_config
 from tenbaud.files.whole import WriteError, write_error, write_whole
@@ -36,12 +33,12 @@ from tenbaud.flight.summary import Summary, receiver_part
 from tenbaud.recording.folder import RunFolder
 from tenbaud.recording.shared import SharedWriter
 from tenbaud.recording.writer import McapRecorder
+from tenbaud.sentences import endings
 
 Tell = Callable[[str], None]
 AgreementOf = Callable[[str], Agreement]
 """Session name -> what its flights are agreed on; raises TenbaudError where there is no such."""
 
-STOPPED = "the receiver was stopped"
 TOLD_MAX = 1000
 """Refusals remembered, so that a transmitter that keeps asking is told of once."""
 
@@ -108,7 +105,7 @@ class ManyHost:
         match frame:
             case Hello() if len(self._open.keys() | self._opening) >= self._rigs_max:
                 text = f"this receiver serves {self._rigs_max} rigs already, which is its limit"
-                answer = self._refusal(name, frame, text, "")
+                answer = self._refusal(name, frame, End(Ending.FULL, text), "")
             case Hello():
                 self._opening.add(name)
                 self._worker.submit(self._begin, name, frame, data, number)
@@ -118,7 +115,7 @@ class ManyHost:
             case Bye() if frame.session == 0 and name in self._unexplained:
                 # Once per refusal: a line on a terminal takes the loop's time.
                 self._unexplained.discard(name)
-                self._tell_stranger(f"{name}: as its transmitter sees it: {frame.reason}")
+                self._tell_stranger(f"{name}: as its transmitter sees it: {frame.text}")
             case _:
                 self.counts["strays"] += 1
         if answer is None:
@@ -147,20 +144,19 @@ class ManyHost:
         self._worker.submit(self._finish, flight, served, error)
 
     def _say_goodbye(self, served: Served, error: Exception | None) -> None:
-        if not isinstance(served.service, VirtualService):
-            reason = STOPPED if error is None else "the receiver failed"
-            if isinstance(error, LinkLost):
-                reason = "no word from the transmitter"
-            for message in served.service.endpoint.bye(reason):
-                self._hub.send(served.name, message)
-        served.service.endpoint.session.rest()
+        ending = Ending.STOPPED if error is None else Ending.FAILED
+        if isinstance(error, LinkLost):
+            ending = Ending.LINK_LOST
+        for message in served.endpoint.bye(End(ending)):
+            self._hub.send(served.name, message)
+        served.endpoint.session.rest()
 
     def close(self) -> None:
         """Wait until all files are finished; for after the loop."""
         self._worker.shutdown()
         # Opened when the loop had ended already: nobody flew it, but its file is there.
         for name, served in self.ready():
-            served.service.endpoint.bye(STOPPED)
+            served.endpoint.bye(End(Ending.STOPPED))
             self._finish(self._open[name], served, None)
         self._writer.close()
         self._tell_stranger.finish()
@@ -172,28 +168,30 @@ class ManyHost:
             agreement = self._agreement_of(name)
             problem = difference(hello, agreement.identity)
             if problem is not None:
-                self._turn_away(name, hello, problem, agreement.identity.config, number)
+                refusal = End(Ending.MISMATCH, problem)
+                self._turn_away(name, hello, refusal, agreement.identity.config, number)
                 return
             self._ready.append((name, self._serve(name, agreement, data)))
         except Exception as error:  # whatever it is, it concerns this session alone
             text = outcome_of(error).text
-            self._turn_away(name, hello, f"the receiver cannot serve {name}: {text}", "", number)
+            refusal = End(Ending.CANNOT_SERVE, f"the receiver cannot serve {name}: {text}")
+            self._turn_away(name, hello, refusal, "", number)
         self._hub.wake()
 
     def _turn_away(
-        self, name: str, hello: Hello, problem: str, config: str, number: int | None
+        self, name: str, hello: Hello, refusal: End, config: str, number: int | None
     ) -> None:
-        self._hub.send(name, _closed(self._refusal(name, hello, problem, config), number))
+        self._hub.send(name, _closed(self._refusal(name, hello, refusal, config), number))
         self._opening.discard(name)
 
-    def _refusal(self, name: str, hello: Hello, problem: str, config: str) -> Refuse:
+    def _refusal(self, name: str, hello: Hello, refusal: End, config: str) -> Refuse:
         if (name, hello.incarnation) not in self._refused:
             self._refused.append((name, hello.incarnation))
             if len(self._unexplained) < TOLD_MAX:
                 self._unexplained.add(name)
             self.counts["refused"] += 1
-            self._tell_stranger(f"{name}: refused: {problem}")
-        return Refuse(hello.incarnation, problem, config)
+            self._tell_stranger(f"{name}: refused: {refusal.text}")
+        return Refuse(hello.incarnation, refusal.ending, refusal.text, config)
 
     def _serve(self, name: str, agreement: Agreement, data: bytes) -> Served:
         folder = RunFolder(_new_folder(self._root, name))
@@ -206,22 +204,16 @@ class ManyHost:
         except BaseException:
             recorder.finish_soon()
             raise
-        timeout_s = link.peer_timeout_s
         self._open[name] = Flight(name, agreement, folder, recorder)
         self.counts["flights"] += 1
         self._tell(f"{name}: a flight begins, recording into {folder.path}")
-        if agreement.clock == "virtual":
-            return Served(name, VirtualService(endpoint, timeout_s), None, data)
-        endpoint.downlink = build_line(agreement, "down", DATAGRAM)
-        faults = agreement.faults
-        clock = SkewedClock(faults, time.monotonic_ns()) if faults.bad_clock else None
-        service = RealService(endpoint, timeout_s, endpoint.downlink, clock)
         symbols_per_s = 1e9 * agreement.terms.symbols_per_word / agreement.terms.sample_ns
-        return Served(name, service, SURPLUS * symbols_per_s, data)
+        allowed_per_s = SURPLUS * symbols_per_s if agreement.clock == "real" else None
+        return Served(name, endpoint, link.peer_timeout_s, allowed_per_s, data)
 
     def _finish(self, flight: Flight, served: Served, error: Exception | None) -> None:
         try:
-            endpoint = served.service.endpoint
+            endpoint = served.endpoint
             outcome = _outcome(flight.agreement, served, error)
             flight.recorder.close()
             flight.summary = {
@@ -253,11 +245,12 @@ class ManyHost:
 
 
 def _outcome(agreement: Agreement, served: Served, error: Exception | None) -> Outcome:
-    session = served.service.endpoint.session
+    session = served.endpoint.session
     if error is not None:
         return outcome_of(error)
-    if session.end_reason == STOPPED:
-        return Outcome(ExitCode.INTERRUPTED, session.end_reason)
+    end = session.end
+    if end is not None and end.ending is Ending.STOPPED and not end.by_peer:
+        return Outcome(ExitCode.INTERRUPTED, endings.end_text(end, "transmitter"))
     return ended_outcome(agreement, session)
 
 

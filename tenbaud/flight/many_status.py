@@ -16,6 +16,7 @@ from rich.table import Table
 
 from receiver.loops.many import ManyService, Served
 from receiver.session.session import Phase
+from tenbaud.sentences import endings
 
 PERIOD_S = 1.0
 LINES_AROUND = 6
@@ -72,7 +73,7 @@ class ManyStatus:
 
 
 def _calmness(served: Served) -> tuple[bool, int, list[str]]:
-    session = served.service.endpoint.session
+    session = served.endpoint.session
     trouble = session.counts["desyncs"] + session.counts["rejoins"] + served.dropped
     return session.phase is Phase.FLYING, -trouble, _natural(served.name)
 
@@ -83,12 +84,12 @@ def _natural(name: str) -> list[str]:
 
 
 def _row(served: Served) -> tuple[str, ...]:
-    session = served.service.endpoint.session
+    session = served.endpoint.session
     baud = session.meter.baud
     state = session.state
     return (
         served.name,
-        session.phase.value,
+        endings.phase_text(session.phase.value),
         f"{state.sample * session.terms.sample_ns / 1e9:.1f} s",
         f"{state.model[0]:+.3f} rad",
         f"{session.codec.coder.ranges(state.coder)[0]:.3f}",

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from channel.errors import ConfigMismatch, DesyncError, LinkLost, SafetyStop, TenbaudError
+from channel.protocol.endings import End, Ending
 from tenbaud.files.whole import WriteError
 from tenbaud.flight.verdict import NotFlown
+from tenbaud.sentences import endings
 
 
 class ExitCode(IntEnum):
@@ -32,14 +34,29 @@ class Outcome:
 
     code: ExitCode
     text: str
+    """for people; nothing reads it"""
     not_flown: tuple[NotFlown, ...] = ()
     """in what the flight fell short, for NOT_FLOWN"""
 
 
-FLIGHT_OVER = "the flight is over"
-
-
 SAFE = "the motors are at their safe voltage"
+
+
+_ENDINGS = {
+    ExitCode.OK: Ending.OVER,
+    ExitCode.NOT_FLOWN: Ending.OVER,
+    ExitCode.INTERRUPTED: Ending.STOPPED,
+    ExitCode.LINK_LOST: Ending.LINK_LOST,
+    ExitCode.DESYNC: Ending.DESYNC,
+    ExitCode.SAFETY_STOP: Ending.SAFETY_STOP,
+}
+"""What the other end is sent; whether the flight has flown it judges for itself."""
+
+
+def farewell_of(outcome: Outcome) -> End:
+    """Return what the other end is told about an outcome."""
+    ending = _ENDINGS.get(outcome.code, Ending.FAILED)
+    return End(ending, "" if ending in (Ending.OVER, Ending.STOPPED) else outcome.text)
 
 
 def first_cause(outcome: Outcome, trouble: str, consequence: str = "") -> Outcome:
@@ -90,5 +107,6 @@ def outcome_of_status(name: str, status: int, last_words: str = "") -> Outcome:
         code = ExitCode(status)
     except ValueError:
         code = ExitCode.FAILED
-    fallback = FLIGHT_OVER if code is ExitCode.OK else f"the {name} ended with exit code {status}"
-    return Outcome(code, last_words or fallback)
+    if code is ExitCode.OK:
+        return Outcome(code, last_words or endings.ending_text(Ending.OVER))
+    return Outcome(code, last_words or f"the {name} ended with exit code {status}")

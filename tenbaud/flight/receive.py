@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 
 from channel.errors import ConfigMismatch
-from channel.line.clocks import SkewedClock
 from channel.links.base import Link
+from channel.protocol.endings import End, Ending
 from receiver.endpoint import ReceiverEndpoint
-from receiver.loops.real import serve_real
-from receiver.loops.virtual import serve_virtual
+from receiver.loops.single import serve as serve_flight
 from receiver.session.session import Phase, ReceiverSession
-from tenbaud.build.ends import build_line
 from tenbaud.build.flight import Agreement
 from tenbaud.build.transmitter_run import Stop
-from tenbaud.flight.outcome import FLIGHT_OVER, ExitCode, Outcome
-from tenbaud.flight.transmit import desync_text
+from tenbaud.flight.outcome import ExitCode, Outcome
 from tenbaud.flight.verdict import FlightCounts, faults_of, settings_of, verdict_text
-from transmitter.node import STOPPED
+from tenbaud.sentences import endings
 
 
 def serve(
@@ -32,32 +28,27 @@ def serve(
     session = endpoint.session
     timeout_s = agreement.config.link.peer_timeout_s
     try:
-        if agreement.clock == "virtual":
-            # There the transmitter's process holds both directions of the line.
-            serve_virtual(endpoint, link, timeout_s, should_stop, meanwhile)
-        else:
-            endpoint.downlink = build_line(agreement, "down", link.wire)
-            clock = SkewedClock(agreement.faults, time.monotonic_ns())
-            serve_real(endpoint, link, timeout_s, should_stop, endpoint.downlink, clock)
+        serve_flight(endpoint, link, timeout_s, should_stop, meanwhile)
     finally:
-        if agreement.clock == "real" and session.phase is Phase.FLYING:
-            for message in endpoint.bye(STOPPED if should_stop() else "the receiver failed"):
+        if session.phase is Phase.FLYING:
+            for message in endpoint.bye(End(Ending.STOPPED if should_stop() else Ending.FAILED)):
                 link.send(message)
     if session.refusal is not None:
-        raise ConfigMismatch(f"refused the transmitter: {session.refusal}")
+        raise ConfigMismatch(f"refused the transmitter: {endings.refusal_text(session.refusal)}")
     if should_stop():
-        return Outcome(ExitCode.INTERRUPTED, STOPPED)
+        return Outcome(ExitCode.INTERRUPTED, endings.ending_text(Ending.STOPPED))
     return ended_outcome(agreement, session)
 
 
 def ended_outcome(agreement: Agreement, session: ReceiverSession) -> Outcome:
     """Return the outcome of a session that has ended."""
-    if session.desync is not None and not session.end_reason.endswith(FLIGHT_OVER):
-        return Outcome(ExitCode.DESYNC, desync_text(session.desync))
-    over = session.end_reason.endswith((FLIGHT_OVER, STOPPED))
-    if not over:
-        return Outcome(ExitCode.LINK_LOST, session.end_reason)
-    return _not_flown(agreement, session) or Outcome(ExitCode.OK, session.end_reason)
+    ending = None if session.end is None else session.end.ending
+    if session.desync is not None and ending is not Ending.OVER:
+        return Outcome(ExitCode.DESYNC, endings.desync_text(session.desync))
+    text = endings.end_text(session.end, "transmitter")
+    if ending not in (Ending.OVER, Ending.STOPPED):
+        return Outcome(ExitCode.LINK_LOST, text)
+    return _not_flown(agreement, session) or Outcome(ExitCode.OK, text)
 
 
 def _not_flown(agreement: Agreement, session: ReceiverSession) -> Outcome | None:

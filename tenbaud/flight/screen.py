@@ -15,6 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from tenbaud.flight.status import Status
+from tenbaud.sentences import endings
 
 GAUGE_DEGREES = 180
 GAUGE_CELLS = 41
@@ -48,7 +49,8 @@ class Screen:
         table = Table.grid(padding=(0, 1))
         table.add_column(justify="right", style="dim", min_width=9)
         table.add_column()
-        head = Text(status["phase"], style="bold" if status["phase"] == "flying" else "yellow")
+        style = "bold" if status["phase"] == "flying" else "yellow"
+        head = Text(endings.phase_text(status["phase"]), style=style)
         head.append(_time_text(status))
         table.add_row(status["role"], head)
         if status.get("pitch_rad") is not None:

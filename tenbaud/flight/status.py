@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
+from tenbaud.sentences import endings
+
 StatusMode = Literal["auto", "lines", "none"]
 Status = dict[str, Any]
 
 
 def status_line(status: Status) -> str:
     """Return a status as one line for a terminal."""
-    words = [f"{status['role']}: {status['phase']}"]
+    words = [f"{status['role']}: {endings.phase_text(status['phase'])}"]
     if status.get("time_s") is not None:
         words.append(f"{status['time_s']:7.1f} s")
     for name, label, form in (

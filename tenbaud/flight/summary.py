@@ -6,15 +6,15 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from channel.line.impairments import ImpairedLine
-from channel.line.line import Line
 from channel.links.base import Link
 from channel.protocol.bounds import COUNTER
+from channel.protocol.endings import End
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build.flight import Agreement
 from tenbaud.build.transmitter_run import TransmitterRun
 from tenbaud.config.schema import TransmitterSection
 from tenbaud.flight.outcome import Outcome
+from tenbaud.sentences import events
 from transmitter.metrics.gap import Gap
 from transmitter.metrics.scores import ErrorMeter
 
@@ -27,7 +27,7 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
     session, scores, meter = node.session, node.scores, run.uplink.meter
     flown_s = run.ticks * terms.tick_ns / 1e9
     return {
-        **_common(run.agreement, outcome),
+        **_common(run.agreement, outcome, session.end),
         "plant": _plant_name(run.agreement),
         "seed": config.seed,
         "duration_s": flown_s,
@@ -49,8 +49,8 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         "ticks_guard_down": node.ticks_down,
         "ticks_commanded": node.ticks_commanded,
         "impairments": config.link.impairments,
-        "impaired_up": impaired(run.uplink.line),
-        "impaired_down": impaired(run.downlink),
+        "impaired_up": dict(run.uplink.line.counts),
+        "impaired_down": dict(run.downlink.counts),
         "window_start_s": run.agreement.window_start_tick * terms.tick_ns / 1e9,
         "pitch_amplitude_rad": scores.angle_max_rad,
         "reference_amplitude_rad": scores.reference_max_rad or None,
@@ -62,7 +62,7 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         "symbols_refused": run.uplink.shaper.refused,
         "words_missed": session.counts["words_missed"],
         **_rate(run),
-        "sensor_fault": node.sensor_fault,
+        "sensor_fault": events.guard_text(node.sensor_fault) or None,
         "loop_late_ms_p50": None,
         "loop_late_ms_p99": None,
         "loop_late_ms_max": None,
@@ -99,11 +99,11 @@ def receiver_part(agreement: Agreement, endpoint: ReceiverEndpoint, outcome: Out
     """Return what the receiver knows: symbols as they arrived, on its own clock."""
     session = endpoint.session
     return {
-        **_common(agreement, outcome),
+        **_common(agreement, outcome, session.end),
         "samples": session.state.sample,
         "baud_measured": session.meter.baud,
         "wire_bytes_up": endpoint.inlet.wire_bytes,
-        "wire_bytes_down": endpoint.wire_bytes_down,
+        "wire_bytes_down": endpoint.downlink.wire_bytes,
         "erasures": session.counts["erasures"],
         "symbols_late": session.counts["symbols_late"],
         "symbols_misplaced": session.counts["symbols_misplaced"],
@@ -113,7 +113,7 @@ def receiver_part(agreement: Agreement, endpoint: ReceiverEndpoint, outcome: Out
         "malformed": endpoint.inlet.malformed,
         "desyncs": session.counts["desyncs"],
         "rejoins": session.counts["rejoins"],
-        "impaired_down": impaired(endpoint.downlink),
+        "impaired_down": dict(endpoint.downlink.line.counts),
     }
 
 
@@ -152,17 +152,14 @@ def joined(transmitter: Summary, receiver: Summary) -> Summary:
     return {**transmitter, **both, **{name: receiver.get(name) for name in own}}
 
 
-def impaired(line: Line) -> dict[str, int]:
-    """Return how many messages a line did what to, on purpose."""
-    return dict(line.counts) if isinstance(line, ImpairedLine) else {}
-
-
-def _common(agreement: Agreement, outcome: Outcome) -> Summary:
+def _common(agreement: Agreement, outcome: Outcome, end: End | None) -> Summary:
     config = agreement.config
     return {
         "preset": config.preset,
         "outcome": outcome.text,
         "exit_code": int(outcome.code),
+        "ending": end and end.ending.name.lower(),
+        "ended_by_peer": end and end.by_peer,
         "not_flown": [fault.value for fault in outcome.not_flown],
         "link": config.link.kind,
         "clock": agreement.clock,

@@ -7,28 +7,34 @@ from collections.abc import Callable
 
 from channel.errors import ConfigMismatch, LinkLost
 from channel.line.clocks import SkewedClock, SkewedPeer
+from channel.line.line import CleanLine
 from channel.line.virtual import Peer
 from channel.links.base import Link
-from channel.protocol.frames import Desync
+from channel.protocol.endings import End, Ending
 from channel.protocol.recording import Recorder
 from channel.protocol.wire import Wire
 from tenbaud.build.ends import build_line, build_transmitter, build_uplink
 from tenbaud.build.flight import Agreement
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
-from tenbaud.flight.outcome import FLIGHT_OVER, SAFE, ExitCode, Outcome
+from tenbaud.flight.outcome import SAFE, ExitCode, Outcome, farewell_of
 from tenbaud.flight.verdict import FlightCounts, faults_of, settings_of, verdict_text
+from tenbaud.sentences import endings, events
+from transmitter.endpoint import TransmitterEndpoint
+from transmitter.guard import GuardCause
+from transmitter.loops.flight import Flight
 from transmitter.loops.real import RealFlight
 from transmitter.loops.virtual import VirtualFlight
 from transmitter.loops.virtual_peer import LinkPeer
-from transmitter.node import STOPPED
 from transmitter.session.session import Phase
 
 
 def prepare(agreement: Agreement, recorder: Recorder | None, wire: Wire) -> TransmitterRun:
     """Return a transmitter that is ready to fly."""
     node = build_transmitter(agreement, recorder)
-    downlink = build_line(agreement, "down", wire)
-    return TransmitterRun(agreement, node, build_uplink(agreement, wire, recorder), downlink)
+    endpoint = TransmitterEndpoint(node, build_uplink(agreement, wire, recorder))
+    virtual = agreement.clock == "virtual"
+    downlink = build_line(agreement, "down", wire) if virtual else CleanLine()
+    return TransmitterRun(agreement, endpoint, downlink)
 
 
 def fly_virtual(run: TransmitterRun, peer: Peer, should_stop: Stop) -> Outcome:
@@ -36,59 +42,53 @@ def fly_virtual(run: TransmitterRun, peer: Peer, should_stop: Stop) -> Outcome:
     faults = run.agreement.faults
     if faults.bad_clock:
         peer = SkewedPeer(peer, SkewedClock(faults))
-    flight = VirtualFlight(run.node, run.uplink, run.downlink, peer)
-    with run.node.rig:
-        flight.greet()
-        _check_welcome(run)
-        greeting_bytes = _control_bytes(run, flight)
-        started = time.perf_counter()
-        first = run.node.session.epoch_tick
-        try:
-            end = flight.run(run.agreement.flight_ticks, should_stop)
-            run.ticks = end - first
-            run.rejoin_bytes = _control_bytes(run, flight) - greeting_bytes
-            ending = _Ending(run, _outcome(run, True))
-            flight.finish(end, ending.farewell)
-        finally:
-            run.flight_s = time.perf_counter() - started
-            run.wire_bytes_down = flight.inlet.wire_bytes
-            run.extra["malformed"] = flight.inlet.malformed
-    return ending.outcome
+    return _fly(run, VirtualFlight(run.endpoint, run.downlink, peer, should_stop), should_stop)
 
 
 def fly_real(run: TransmitterRun, link: Link, should_stop: Stop) -> Outcome:
     """Fly on the real clock over a link."""
-    flight = RealFlight(run.node, run.uplink, link, should_stop)
-    run.rate = flight.rate
-    with run.node.rig:
-        flight.greet(run.agreement.config.link.peer_timeout_s)
+    timeout_s = run.agreement.config.link.peer_timeout_s
+    flight = RealFlight(run.endpoint, link, timeout_s, should_stop)
+    try:
+        return _fly(run, flight, should_stop, link.peer_present)
+    finally:
+        lateness = run.endpoint.lateness
+        run.extra |= {
+            "ticks_missed": run.endpoint.ticks_missed,
+            "loop_late_ms_p50": lateness.percentile_ms(50.0),
+            "loop_late_ms_p99": lateness.percentile_ms(99.0),
+            "loop_late_ms_max": lateness.largest_ns / 1e6,
+        }
+
+
+def _fly(
+    run: TransmitterRun,
+    flight: Flight,
+    should_stop: Stop,
+    peer_present: Callable[[], bool] = lambda: True,
+) -> Outcome:
+    inlet, rig = run.endpoint.inlet, run.node.rig
+    with rig:
+        flight.greet()
         if should_stop():
             # A session may have begun meanwhile, whose receiver would wait for the flight.
-            flight.leave(STOPPED)
-            return Outcome(ExitCode.INTERRUPTED, STOPPED)
+            flight.leave(End(Ending.STOPPED))
+            return Outcome(ExitCode.INTERRUPTED, endings.ending_text(Ending.STOPPED))
         _check_welcome(run)
-        greeting_bytes = _control_bytes(run, flight)
+        greeting_bytes = _control_bytes(run)
         started = time.perf_counter()
         first = run.node.session.epoch_tick
         try:
-            end = flight.run(run.agreement.flight_ticks)
-            run.ticks = end - first
-            run.rejoin_bytes = _control_bytes(run, flight) - greeting_bytes
-            ending = _Ending(run, _outcome(run, link.peer_present()))
-            flight.finish(end, ending.farewell)
+            run.ticks = flight.run(run.agreement.flight_ticks) - first
+            run.rejoin_bytes = _control_bytes(run) - greeting_bytes
+            ending = _Ending(run, _outcome(run, peer_present()))
+            flight.finish(ending.farewell)
         finally:
             run.flight_s = time.perf_counter() - started
-            run.wire_bytes_down = flight.inlet.wire_bytes
-            if figures := run.node.rig.figures():
+            run.wire_bytes_down = inlet.wire_bytes
+            run.extra["malformed"] = inlet.malformed
+            if figures := rig.figures():
                 run.extra["rig"] = figures
-            lateness = flight.lateness
-            run.extra |= {
-                "malformed": flight.inlet.malformed,
-                "ticks_missed": flight.ticks_missed,
-                "loop_late_ms_p50": lateness.percentile_ms(50.0),
-                "loop_late_ms_p99": lateness.percentile_ms(99.0),
-                "loop_late_ms_max": lateness.largest_ns / 1e6,
-            }
     return ending.outcome
 
 
@@ -105,13 +105,13 @@ def link_peer(
 def _check_welcome(run: TransmitterRun) -> None:
     session = run.node.session
     if session.refusal is not None:
-        raise ConfigMismatch(f"the receiver refused: {session.refusal}")
+        raise ConfigMismatch(f"the receiver refused: {endings.refusal_text(session.refusal)}")
     if session.phase is Phase.GREETING:
         raise LinkLost("no answer to any request for a session came through this line")
 
 
-def _control_bytes(run: TransmitterRun, flight: VirtualFlight | RealFlight) -> int:
-    return run.uplink.meter.control_bytes + flight.inlet.control_bytes
+def _control_bytes(run: TransmitterRun) -> int:
+    return run.uplink.meter.control_bytes + run.endpoint.inlet.control_bytes
 
 
 class _Ending:
@@ -124,15 +124,13 @@ class _Ending:
         self.outcome = outcome
         self._run = run
 
-    def farewell(self) -> str:
+    def farewell(self) -> End:
         """Settle the outcome, now that the last echoes are in; return what the receiver is told."""
         if self.outcome.code is ExitCode.OK:
             self.outcome = _desync_outcome(self._run) or self.outcome
         if self.outcome.code is ExitCode.OK or self._went_to_its_end:
             self.outcome = _not_flown(self._run) or self.outcome
-        # Whether it has flown, the receiver judges for itself.
-        over = self.outcome.code in (ExitCode.OK, ExitCode.NOT_FLOWN)
-        return FLIGHT_OVER if over else self.outcome.text
+        return farewell_of(self.outcome)
 
     @property
     def _went_to_its_end(self) -> bool:
@@ -146,26 +144,26 @@ class _Ending:
 def _outcome(run: TransmitterRun, peer_present: bool) -> Outcome:
     node, session = run.node, run.node.session
     if session.refusal is not None:
-        raise ConfigMismatch(f"the receiver refused to go on: {session.refusal}")
+        text = endings.refusal_text(session.refusal)
+        raise ConfigMismatch(f"the receiver refused to go on: {text}")
     if session.desync is not None and session.phase is Phase.ENDED:
-        return Outcome(ExitCode.DESYNC, desync_text(session.desync))
-    if node.guard.reason == STOPPED:
-        return Outcome(ExitCode.INTERRUPTED, STOPPED)
+        return Outcome(ExitCode.DESYNC, endings.desync_text(session.desync))
+    if node.guard.reason is not None and node.guard.reason.cause is GuardCause.STOPPED:
+        return Outcome(ExitCode.INTERRUPTED, endings.ending_text(Ending.STOPPED))
     if session.phase is Phase.ENDED or (node.guard.stopped and not peer_present):
-        return Outcome(
-            ExitCode.LINK_LOST,
-            f"{session.end_reason or 'the receiver is gone'}; {SAFE}",
-        )
+        gone = session.end is None
+        text = "the receiver is gone" if gone else endings.end_text(session.end, "receiver")
+        return Outcome(ExitCode.LINK_LOST, f"{text}; {SAFE}")
     if node.guard.stopped:
         return Outcome(
             ExitCode.SAFETY_STOP,
-            f"the guard took the motors to their safe voltage: {node.guard.reason}",
+            f"the guard took the motors to their safe voltage: {events.guard_text(node.guard.reason)}",
         )
     if session.phase is not Phase.FLYING:
         return Outcome(
             ExitCode.LINK_LOST, "the flight ended while the transmitter was asking for a common state"
         )
-    return _desync_outcome(run) or Outcome(ExitCode.OK, FLIGHT_OVER)
+    return _desync_outcome(run) or Outcome(ExitCode.OK, endings.ending_text(Ending.OVER))
 
 
 def _not_flown(run: TransmitterRun) -> Outcome | None:
@@ -203,21 +201,13 @@ def _desync_outcome(run: TransmitterRun) -> Outcome | None:
     if session.desync is None:
         return None
     if run.agreement.config.transmitter.on_desync == "stop":
-        return Outcome(ExitCode.DESYNC, desync_text(session.desync))
+        return Outcome(ExitCode.DESYNC, endings.desync_text(session.desync))
     desyncs = session.counts["desyncs"]
     if desyncs <= run.agreement.desyncs_expected + run.desyncs_asked:
         return None
     return Outcome(
         ExitCode.DESYNC,
         f"the copies of the codec differed {desyncs} time(s) and nobody asked for it; the flight "
-        f"went on, but this should never happen: {desync_text(session.desync)}. Both states are "
-        "in the recordings (`tenbaud diff RUN`); please report it",
-    )
-
-
-def desync_text(desync: Desync) -> str:
-    """Return a lockstep failure as a sentence."""
-    return (
-        f"the codecs differ after sample {desync.sample}: transmitter "
-        f"{desync.transmitter_digest:016x}, receiver {desync.receiver_digest:016x}"
+        f"went on, but this should never happen: {endings.desync_text(session.desync)}. Both "
+        "states are in the recordings (`tenbaud diff RUN`); please report it",
     )

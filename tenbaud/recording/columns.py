@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from channel.protocol.events import EVENT_CHANNEL
 from channel.protocol.recording import Field
 from tenbaud.recording.run import Run
 from tenbaud.recording.table import Table
@@ -70,12 +71,17 @@ def _spread(table: Table, one: Field) -> list[Column]:
 def event_columns(run: Run) -> list[Column]:
     """Return the events of both ends."""
     events = run.events
-    numbers = ("time_s", "sample")
+    described = (Field("end", "string", "", "which end reported it"), *EVENT_CHANNEL.fields, _TEXT)
     columns = []
-    for name, unit in (("end", ""), ("time_s", "s"), ("kind", ""), ("sample", ""), ("text", "")):
-        told = [event.get(name) for event in events]
-        columns.append(Column(name, np.array(told, dtype=float if name in numbers else object), unit))
+    for one in described:
+        values = [event.get(one.name) for event in events]
+        number = one.type != "string"
+        array = np.array(values, dtype=float if number else object)
+        columns.append(Column(one.name, array, one.unit, one.description))
     return columns
+
+
+_TEXT = Field("text", "string", "", "a sentence made from the fields")
 
 
 def all_columns(run: Run) -> dict[str, list[Column]]:

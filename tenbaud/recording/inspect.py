@@ -17,6 +17,7 @@ from tenbaud.recording.holes import Hole
 from tenbaud.recording.notes import hole_notes, printable, stray_notes, version_notes
 from tenbaud.recording.reader import Recording, TopicSummary
 from tenbaud.recording.rows import Row
+from tenbaud.sentences import events
 
 EVENT_TOPIC = "event"
 EVENTS_SHOWN = 20
@@ -197,4 +198,4 @@ def _event_line(row: Row) -> str:
     time_s = row.get("time_s")
     time = f"{time_s:9.3f} s" if isinstance(time_s, int | float) else " " * 11
     sample = "" if row.get("sample") is None else f" (sample {row['sample']})"
-    return f"{time}  {row.get('kind', '')}: {row.get('text', '')}{sample}"
+    return f"{time}  {row.get('kind', '')}: {events.event_text(row)}{sample}"

@@ -28,7 +28,7 @@ FIELDS: dict[str, tuple[str, ...]] = {
     "tick": ("tick", "true_rad", "measured_rad", "reference_rad"),
     "estimate": ("tick", "coded_state", "live_state"),
     "sample": ("range", "word", "word_sent"),
-    "event": ("kind", "text"),
+    "event": ("kind",),
 }
 """The topics and fields that are looked at."""
 
@@ -132,12 +132,9 @@ class Overview:
         self._last_word = (times_s[-1], words[-1])
 
     def _add_events(self, times: Series, columns: Columns) -> None:
-        kinds, texts = columns("kind") or [], columns("text") or []
-        for time_s, kind, text in zip(times, kinds, texts, strict=False):
-            if kind == "desync":
-                self._mark("desync", np.array([time_s]))
-            elif kind == "rejoin" and "begins" in str(text):
-                self._mark("rejoin", np.array([time_s]))
+        for time_s, kind in zip(times, columns("kind") or [], strict=False):
+            if kind in ("desync", "rejoin"):
+                self._mark(kind, np.array([time_s]))
 
     def _mark(self, name: str, times: Series) -> None:
         self.marks[name].add(times, np.zeros(len(times)))

@@ -31,6 +31,7 @@ from tenbaud.recording.encoding import END_METADATA, RUN_METADATA, channel_from_
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.gaps import HoleFinder
 from tenbaud.recording.holes import HOLES_METADATA, Hole, unpacked_holes
+from tenbaud.recording.old_events import of_today
 from tenbaud.recording.rows import Row, RowDecoder, channel_of_names, check_channel
 
 METADATA_RECORDS_MAX = 100
@@ -153,7 +154,7 @@ class MessageStream:
             channel = channel_of_names(data)
             self._topics[channel_id] = None if channel is None else channel.topic
             if channel is not None:
-                self.channels.setdefault(channel.topic, channel)
+                self.channels.setdefault(channel.topic, of_today(channel))
         unknown = {channel_id for channel_id in there if self._topics[channel_id] is None}
         if unknown:
             self.strays += sum(message[0] in unknown for message in messages)
@@ -168,7 +169,7 @@ class MessageStream:
                 f"{record.topic!r} is not described as tenbaud does ({error}). "
                 "Open it with the program that wrote it."
             ) from error
-        return channel
+        return of_today(channel)
 
 
 @dataclass(slots=True)

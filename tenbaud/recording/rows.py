@@ -18,6 +18,7 @@ from channel.protocol.lockstep import LOCKSTEP_CHANNEL
 from channel.protocol.recording import Field, RecordChannel
 from receiver.session import records as receiver
 from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.old_events import OLD_EVENT_CHANNEL, filled
 from transmitter.metrics.gap import GAP_CHANNEL
 from transmitter.session import records as transmitter
 
@@ -33,8 +34,9 @@ KNOWN = (
     *(transmitter.TICK_CHANNEL, transmitter.SAMPLE_CHANNEL, transmitter.ESTIMATE_CHANNEL),
     *(transmitter.DEVICE_CHANNEL, receiver.TICK_CHANNEL, receiver.SAMPLE_CHANNEL, SENT_CHANNEL),
     *(ARRIVED_CHANNEL, EPOCH_CHANNEL, EVENT_CHANNEL, LOCKSTEP_CHANNEL, GAP_CHANNEL),
+    OLD_EVENT_CHANNEL,
 )
-"""What the two ends of this version write."""
+"""What the two ends of this version write, and of those before it what has changed."""
 
 NEVER_NULL = {
     ("epoch", "epoch"),
@@ -131,6 +133,8 @@ class RowDecoder:
         if set(map(type, rows)) - {dict}:
             bad = next(index for index, row in enumerate(rows) if type(row) is not dict)
             raise self._error(bad, "is no JSON object")
+        if self._channel.topic == OLD_EVENT_CHANNEL.topic:
+            rows = [filled(row) for row in rows]
         for one in self._fields:
             self._check(one, rows)
         return rows  # type: ignore[no-any-return]

@@ -14,7 +14,7 @@ import tomllib
 from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 import orjson
@@ -32,6 +32,7 @@ from tenbaud.recording.folder import (
 )
 from tenbaud.recording.signals import SIGNALS, Signal, Source, TimeBase
 from tenbaud.recording.table import Series, Table, Tables, read_tables
+from tenbaud.sentences import events
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,6 +47,22 @@ TICK_S_MIN = 1e-6
 TICKS_PER_SAMPLE_MAX = 1_000_000
 
 
+class RecordedSignal:
+    """A signal as an attribute of a `Run`: its values. AttributeError where it was not recorded."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+        unit, meaning = next(row[1:3] for row in SIGNALS if row[0] == name)
+        self.__doc__ = f"{meaning}, {unit}" if unit else meaning
+
+    @overload
+    def __get__(self, run: None, owner: type) -> RecordedSignal: ...
+    @overload
+    def __get__(self, run: Run, owner: type) -> Series: ...
+    def __get__(self, run: Run | None, owner: type) -> Series | RecordedSignal:
+        return self if run is None else run.values_of(self._name)
+
+
 class Run:
     """One flight: its signals as numpy arrays on a common time base, and everything beside them.
 
@@ -53,6 +70,27 @@ class Run:
     read when something in it is first asked for. A recording that was cut by a crash is read up to
     the cut (`run.complete` is then False).
     """
+
+    # One attribute for each of `SIGNALS`, so that editors and type checkers know them.
+    reference = RecordedSignal()
+    pitch = RecordedSignal()
+    measured = RecordedSignal()
+    estimate = RecordedSignal()
+    estimate_live = RecordedSignal()
+    estimate_rate = RecordedSignal()
+    error_coded = RecordedSignal()
+    error_live = RecordedSignal()
+    range = RecordedSignal()
+    symbol = RecordedSignal()
+    symbol_sent = RecordedSignal()
+    erased = RecordedSignal()
+    front_command = RecordedSignal()
+    rear_command = RecordedSignal()
+    front = RecordedSignal()
+    rear = RecordedSignal()
+    late = RecordedSignal()
+    lateness = RecordedSignal()
+    gap_to_floor = RecordedSignal()
 
     def __init__(self, path: str | Path) -> None:
         """`path` is the folder of a run, or one recording; RecordingError if there is none."""
@@ -116,9 +154,10 @@ class Run:
             self._made[name] = None if values is None else Signal(name, values, unit, meaning)
         return self._made[name]
 
-    def __getattr__(self, name: str) -> Series:
+    def values_of(self, name: str) -> Series:
+        """Return the values of one signal; AttributeError, with the reason, if it is not there."""
         known = [row[0] for row in SIGNALS]
-        if name.startswith("_") or name not in known:
+        if name not in known:
             raise AttributeError(f"a run has no {name!r}; its signals are {', '.join(known)}")
         signal = self.signal(name)
         if signal is None:
@@ -127,8 +166,10 @@ class Run:
             )
         return signal.values
 
-    def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *(row[0] for row in SIGNALS)]
+    if not TYPE_CHECKING:  # else every name would be taken for a signal
+
+        def __getattr__(self, name: str) -> Series:
+            return self.values_of(name)
 
     def _why_missing(self) -> str:
         absent = [end for end in ENDS if end not in self._files]
@@ -152,9 +193,12 @@ class Run:
 
     @property
     def events(self) -> list[dict[str, Any]]:
-        """What both ends reported, in order of flight time; each with its `end`."""
+        """What both ends reported, in order of flight time: the fields recorded, `end` and `text`.
+
+        The text is a sentence made from the fields, for people.
+        """
         told = [
-            {"end": end, **row}
+            {"end": end, **row, "text": events.event_text(row)}
             for end in self.ends
             for row in (self.table(end, "event").rows if "event" in self.topics(end) else [])
         ]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from receiver.controllers.base import Controller
 from receiver.controllers.references import Reference
-from tenbaud.build.ends import build_controller, build_reference
+from tenbaud.build.controllers import build_controller, build_reference
 from tenbaud.config.schema import FlightConfig
 from tenbaud.replay.record import FlightRecord
 
@@ -15,18 +15,24 @@ from tenbaud.replay.record import FlightRecord
 class RecordedCommands:
     """A `Controller` that repeats recorded commands; a tick without one keeps the last."""
 
-    def __init__(self, commands: Mapping[int, tuple[float, ...]], initial: tuple[float, ...]) -> None:
+    def __init__(
+        self,
+        commands: Mapping[int, tuple[float, ...]],
+        initial: tuple[float, ...],
+        references: Mapping[int, float | None],
+    ) -> None:
         self._commands = commands
         self._last = initial
+        self._references = references
 
     def command(self, tick: int, state: tuple[float, ...]) -> tuple[float, ...]:
         """Return the command that was recorded for `tick`."""
         self._last = self._commands.get(tick, self._last)
         return self._last
 
-    def reference_rad(self, tick: int) -> None:
-        """Return None: what the controller followed is not asked again."""
-        return None
+    def reference_rad(self, tick: int) -> float | None:
+        """Return the set-point that was recorded for `tick`; None without one."""
+        return self._references.get(tick)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,10 +87,11 @@ def recorded_commands(record: FlightRecord) -> RecordedCommands | None:
     rows = record.rows.get("receiver")
     if rows is not None and rows.topic("tick").recorded:
         commands = {row.tick: row.command_volts for row in rows.topic("tick")}
-        return RecordedCommands(commands, initial)
+        references = {row.tick: row.reference_rad for row in rows.topic("tick")}
+        return RecordedCommands(commands, initial, references)
     beside = record.rows.get("transmitter")
     if beside is None or not beside.topic("tick").recorded:
         return None
     ticks = beside.topic("tick").rows
     commands = {row.tick: row.commanded_volts for row in ticks if row.commanded_volts is not None}
-    return RecordedCommands(commands, initial) if len(commands) == len(ticks) else None
+    return RecordedCommands(commands, initial, {}) if len(commands) == len(ticks) else None

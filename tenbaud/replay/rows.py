@@ -63,7 +63,22 @@ class EventRow(NamedTuple):
     time_s: float
     kind: str
     sample: int | None
-    text: str
+    tick: int | None
+    slot: int | None
+    session: int | None
+    epoch: int | None
+    cause: str | None
+    state: str | None
+    by_peer: bool | None
+    axis: int | None
+    number: int | None
+    value: float | None
+    limit: float | None
+    missed_share: float | None
+    overdue_share: float | None
+    transmitter_digest: str | None
+    receiver_digest: str | None
+    detail: str | None
 
 
 class LockstepFailure(NamedTuple):
@@ -166,7 +181,7 @@ class Kind(NamedTuple):
 
 
 _EPOCH = Kind(EpochStart, EPOCH_CHANNEL)
-_EVENT = Kind(EventRow, EVENT_CHANNEL, frozenset({"sample"}))
+_EVENT = Kind(EventRow, EVENT_CHANNEL, frozenset(EventRow._fields[2:]))
 _LOCKSTEP = Kind(
     LockstepFailure,
     LOCKSTEP_CHANNEL,

@@ -6,6 +6,7 @@ from collections import deque
 from typing import Any
 
 from channel.codec.codec import Vector
+from channel.protocol.events import EVENT_CHANNEL
 from channel.protocol.recording import RecordChannel
 from receiver.endpoint import ReceiverEndpoint
 from receiver.session.records import SAMPLE_CHANNEL as TAKEN
@@ -74,10 +75,8 @@ class _Composer:
             "takes_commands": self.agreement.live,
             "epoch": session.epoch,
             "impairments": impairments,
-            "events": [
-                {"time_s": time_s, "kind": kind, "sample": sample, "text": text[:EVENT_TEXT_MAX]}
-                for time_s, kind, sample, text in events
-            ],
+            "ending": session.end and session.end.ending.name.lower(),
+            "events": [_event(row) for row in events],
             "dropped": self.tap.dropped + self.skipped,
         }
 
@@ -242,6 +241,15 @@ class ReceiverComposer(_Composer):
 
 COUNTED_UP = ("erasures", "desyncs", "rejoins", "digest_checks", "words_missed", "stale_frames")
 COUNTED_DOWN = ("erasures", "desyncs", "rejoins", "symbols_late", "stale_frames")
+
+
+def _event(row: Row) -> dict[str, Any]:
+    """Return the fields of an event that have a value, its text for people cut."""
+    pairs = zip(EVENT_CHANNEL.fields, row, strict=True)
+    fields = {field.name: value for field, value in pairs if value is not None}
+    if "detail" in fields:
+        fields["detail"] = fields["detail"][:EVENT_TEXT_MAX]
+    return fields
 
 
 def _word(word: object) -> list[int] | None:

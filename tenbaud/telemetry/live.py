@@ -15,10 +15,11 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
-from channel.line.impairments import ImpairedLine, parse_impairments
+from channel.line.impairments import impair, parse_impairments
 from channel.links.base import Role
-from channel.protocol.events import EVENT_CHANNEL, Event, EventKind, event_row
+from channel.protocol.events import ByHand, Event, EventKind, write_event
 from channel.protocol.recording import Recorder
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
 from receiver.controllers.steered import SteeredReference
@@ -71,28 +72,28 @@ class LiveTransmitter:
 
     def _obey(self, tick: int) -> None:
         while self.queue is not None and (command := self.queue.take()) is not None:
-            told = self._one(command, tick)
-            if told:
-                self._run.node.tell(EventKind.CONTROL, f"by hand, before tick {tick}: {told}")
+            event = self._one(command, tick)
+            if event is not None:
+                self._run.node.tell(replace(event, tick=tick))
 
-    def _one(self, command: Command, tick: int) -> str | None:
+    def _one(self, command: Command, tick: int) -> Event | None:
         """Obey one command; return what to write down, None where it is the other end's alone."""
         match command:
             case Pause() | Step() | Pace() if not self._virtual:
-                return "a real clock can be neither stopped nor paced: ignored"
+                return _ignored("a real clock can be neither stopped nor paced")
             case Pause(paused=True):
                 self._pause_tick = self._next_sample_tick(tick)
-                return f"pause before tick {self._pause_tick}"
+                return _by_hand(ByHand.PAUSE, number=self._pause_tick)
             case Pause():
                 self._pause_tick = None
-                return "go on"
+                return _by_hand(ByHand.GO_ON)
             case Step(samples=samples):
                 per_sample = self._run.agreement.terms.ticks_per_sample
                 self._pause_tick = self._next_sample_tick(tick) + samples * per_sample
-                return f"pause before tick {self._pause_tick}"
+                return _by_hand(ByHand.PAUSE, number=self._pause_tick)
             case Pace(factor=factor):
                 self.pace, self._anchor = factor, None
-                return f"{factor!r} times real time"
+                return _by_hand(ByHand.PACE, value=factor)
             case Impair(text=text):
                 return self._impair(text)
             case Spoil(end=end, field=field):
@@ -101,22 +102,21 @@ class LiveTransmitter:
                 self._run.node.scores.forget_reference()
         return None
 
-    def _impair(self, text: str) -> str:
+    def _impair(self, text: str) -> Event:
         faults = parse_impairments(text)
         self.impairments = text
-        _set_faults(self._run.uplink.line, faults.up)
-        if self._virtual:
-            _set_faults(self._run.downlink, faults.down)
+        impair(self._run.uplink.line, faults.up)
+        impair(self._run.downlink, faults.down)
         if faults.up.raw or faults.down.raw:
             self._run.desyncs_asked = math.inf
-        return line_text(text)
+        return _by_hand(ByHand.IMPAIR, detail=text)
 
-    def _spoil(self, end: Role, field: str) -> str | None:
+    def _spoil(self, end: Role, field: str) -> Event | None:
         session = self._run.node.session
         # Both codecs are the same kind: what this one cannot do, the receiver's refuses too.
-        told, spoils = spoil(session, field, session.copies.confirmed.sample, end == "transmitter")
-        self._run.desyncs_asked += spoils
-        return told if end == "transmitter" else None
+        event = spoil(session, field, session.copies.confirmed.sample, end == "transmitter")
+        self._run.desyncs_asked += event.cause is ByHand.SPOIL
+        return event if end == "transmitter" else None
 
     def _next_sample_tick(self, tick: int) -> int:
         per_sample = self._run.agreement.terms.ticks_per_sample
@@ -169,60 +169,60 @@ class LiveReceiver:
     def __call__(self) -> bool:
         """Obey what has been asked; return whether the flight was asked to stop."""
         while self.queue is not None and (command := self.queue.take()) is not None:
-            told = self._one(command)
-            if told:
-                self._tell(told)
+            event = self._one(command)
+            if event is not None:
+                self._tell(event)
         return self._should_stop()
 
-    def _one(self, command: Command) -> str | None:
+    def _one(self, command: Command) -> Event | None:
         session = self._endpoint.session
         match command:
             case SetPoint(angle_rad=angle_rad):
                 if self.steering is None:
-                    return "this controller has no set-point: ignored"
+                    return _ignored("this controller has no set-point")
                 self.steering.by_hand_rad = angle_rad
-                return "follow the reference" if angle_rad is None else f"set-point {angle_rad!r} rad"
+                cause = ByHand.FOLLOW if angle_rad is None else ByHand.SET_POINT
+                return _by_hand(cause, value=angle_rad)
             case Impair(text=text):
                 self.impairments = text
-                if isinstance(self._endpoint.downlink, ImpairedLine):
-                    _set_faults(self._endpoint.downlink, parse_impairments(text).down)
-                    return line_text(text)
+                if impair(self._endpoint.downlink.line, parse_impairments(text).down):
+                    return _by_hand(ByHand.IMPAIR, detail=text)
             case Spoil(end="receiver", field=field):
-                return spoil(session, field, session.state.sample)[0]
+                return spoil(session, field, session.state.sample)
         return None
 
-    def _tell(self, text: str) -> None:
+    def _tell(self, event: Event) -> None:
         session = self._endpoint.session
         sample = session.state.sample
         time_ns = sample * session.terms.sample_ns
-        event = Event(EventKind.CONTROL, time_ns, sample, f"by hand, before sample {sample}: {text}")
+        event = replace(event, time_ns=time_ns, sample=sample)
         session.events.append(event)
-        self._recorder.write(EVENT_CHANNEL, time_ns, event_row(event))
+        write_event(self._recorder, event)
 
 
-def spoil(session: object, field: str, sample: int, arm: bool = True) -> tuple[str, bool]:
-    """Spoil one field of a session's codec in one bit after a sample; `arm` False: only look.
+def spoil(session: object, field: str, sample: int, arm: bool = True) -> Event:
+    """Change one field of a session's codec in one bit after a sample; `arm` False: only look.
 
-    Return the words for it, and whether the codec has such a field at all: a person's command must
-    not end the flight.
+    Return the event; its cause is IGNORED for a codec without such a field: a person's command must not
+    end the flight.
     """
     codec = getattr(session, "codec", None)
     if not isinstance(codec, SabotagedCodec):
-        return "this codec cannot be spoilt: ignored", False
+        return _ignored("this codec cannot be changed")
     sabotage = parse_sabotage(f"sample={sample},field={field}")
     try:
         # Arming checks too.
         (codec.arm if arm else codec.check)(sabotage)
     except ValueError as error:
-        return f"{error}: ignored", False
-    return f"one bit of this codec's {field} spoilt after sample {sample}", True
+        return _ignored(str(error))
+    return _by_hand(ByHand.SPOIL, detail=field)
 
 
-def line_text(text: str) -> str:
-    """Return the words for what the line suffers from now on."""
-    return f"the line suffers {text}" if text else "the line is clean"
+def _by_hand(
+    cause: ByHand, *, value: float | None = None, number: int | None = None, detail: str | None = None
+) -> Event:
+    return Event(EventKind.CONTROL, cause=cause, value=value, number=number, detail=detail)
 
 
-def _set_faults(line: object, impairments: object) -> None:
-    if isinstance(line, ImpairedLine):
-        line.impairments = impairments  # type: ignore[assignment]
+def _ignored(why: str) -> Event:
+    return _by_hand(ByHand.IGNORED, detail=why)

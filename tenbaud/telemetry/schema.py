@@ -10,8 +10,9 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, field_validator
 
 from channel.line.impairments import parse_impairments
+from channel.protocol.events import EventKind
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 ANGLE_MAX_RAD = 1.6
 
 
@@ -57,12 +58,27 @@ class TakenSample(_Message):
 
 
 class Happening(_Message):
-    """An event of the flight."""
+    """An event, as recordings have it; fields without meaning for its kind are left out."""
 
     time_s: float
-    kind: str
-    sample: int | None
-    text: str
+    kind: EventKind
+    sample: int | None = None
+    tick: int | None = None
+    slot: int | None = None
+    session: int | None = None
+    epoch: int | None = None
+    cause: str | None = Field(None, description="why, by name")
+    state: str | None = Field(None, description="of the guard")
+    by_peer: bool | None = None
+    axis: int | None = None
+    number: int | None = None
+    value: float | None = None
+    limit: float | None = None
+    missed_share: float | None = None
+    overdue_share: float | None = None
+    transmitter_digest: str | None = None
+    receiver_digest: str | None = None
+    detail: str | None = Field(None, description="for people")
 
 
 class Lateness(_Message):
@@ -74,11 +90,14 @@ class Lateness(_Message):
 
 
 class _EndMessage(_Message):
-    version: Literal[1] = Field(description="of this schema")
+    version: Literal[2] = Field(description="of this schema")
     session: str = Field(description="name of the session")
     flight: int = Field(description="number of the session, 0 while there is none")
     number: int = Field(description="counts the messages of this end")
-    phase: str = Field(description="where the session stands, in words")
+    phase: Literal["greeting", "waiting", "flying", "rejoining", "ended"] = Field(
+        description="where the session stands"
+    )
+    ending: str | None = Field(None, description="how the session ended, by name; null: not yet")
     clock: Literal["real", "virtual"]
     takes_commands: bool = Field(description="whether the flight was started with control allowed")
     time_s: float = Field(description="flight time reached")

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import orjson
 
+from tenbaud.sentences import events
 from tenbaud.telemetry.schema import SCHEMA_VERSION
 
 POINTS_KEPT = 1200
@@ -43,7 +44,7 @@ class Board:
         self._points: deque[list[Any]] = deque(maxlen=POINTS_KEPT)
         self._decisions: deque[list[Any]] = deque(maxlen=POINTS_KEPT)
         self._samples: dict[int, list[Any]] = {}
-        self._events: deque[list[Any]] = deque(maxlen=EVENTS_KEPT)
+        self._events: deque[dict[str, Any]] = deque(maxlen=EVENTS_KEPT)
         self._news: deque[News] = deque(maxlen=NEWS_KEPT)
         self._index = 0
         self._fresh = self._nothing()
@@ -97,7 +98,7 @@ class Board:
         else:
             self._on_receiver(message)
         for event in message["events"]:
-            row = [role, event["time_s"], event["kind"], event["text"]]
+            row = {"role": role, **event, "text": events.event_text(event)}
             self._events.append(row)
             self._fresh["events"].append(row)
 

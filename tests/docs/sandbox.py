@@ -22,7 +22,9 @@ from pathlib import Path
 from tests.docs.blocks import Block
 from tests.rules.sources import TOP
 
-LEFT_OUT = (".git", ".venv", "runs", "site", "dist", "build", "*.egg-info", ".*_cache", ".hypothesis")
+LEFT_OUT = (".git", ".venv", "*.egg-info", ".*_cache", ".hypothesis")
+LEFT_OUT_AT_TOP = {"runs", "site", "dist", "build"}
+"""Left out of the top folder only: `tenbaud/build` is a package."""
 COMMANDS = {"tenbaud": "-m tenbaud", "python": "", "python3": "", "pytest": "-m pytest"}
 COMMANDS |= {name: f"-m {name}" for name in ("ruff", "mypy", "mkdocs")}
 LOOPBACK_PORT = re.compile(r"(?<=127\.0\.0\.1:)(\d+)\b|(?<=localhost:)(\d+)\b")
@@ -51,7 +53,7 @@ class Sandbox:
 
     def __enter__(self) -> Sandbox:
         self.top = self.folder / "tenbaud"
-        shutil.copytree(TOP, self.top, ignore=shutil.ignore_patterns(*LEFT_OUT), symlinks=True)
+        shutil.copytree(TOP, self.top, ignore=_left_out, symlinks=True)
         (self.folder / "home").mkdir()
         self._exchange_default_port()
         for name in ("demo", "view"):  # the live page's port: any free one
@@ -172,6 +174,12 @@ class Sandbox:
         text = path.read_text()
         assert DEFAULT_ENDPOINT in text
         path.write_text(LOOPBACK_PORT.sub(self._free_port, text))
+
+
+def _left_out(folder: str, names: list[str]) -> set[str]:
+    """Return which entries of a folder are not copied."""
+    at_top = LEFT_OUT_AT_TOP & set(names) if Path(folder) == TOP else set()
+    return shutil.ignore_patterns(*LEFT_OUT)(folder, names) | at_top
 
 
 def _ends(process: subprocess.Popen[str], within_s: float) -> bool:

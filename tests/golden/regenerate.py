@@ -25,6 +25,7 @@ from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
 from channel.codec.models.hold import HoldModel
 from channel.codec.models.pitch import PitchModel, PitchParameters
 from channel.protocol import frames, wire
+from channel.protocol.endings import Ending
 from channel.protocol.limits import from_millivolts
 
 FOLDER = Path(__file__).resolve().parent
@@ -61,7 +62,7 @@ def example_frames() -> list[frames.Frame]:
         frames.Hello(9, "1", bytes(16), bytes(8), 3, 0x01020304, 5, 77, frames.Why.GAP),
         frames.Welcome(0x01020304, 5, 6, 0xDEADBEEF),
         frames.Welcome(0x01020304, 5, 6, 0xDEADBEEF, 3, (1500, -1500), bytes(range(40))),
-        frames.Refuse(0xDEADBEEF, "versions differ: 1 and \u00b5", '{"rate_baud": 10.0}'),
+        frames.Refuse(0xDEADBEEF, Ending.MISMATCH, "versions: 1 and \u00b5", '{"rate_baud": 10.0}'),
         frames.Symbol(0x01020304, 5, 0x0A0B0C0D, 1),
         frames.Symbol(0xFFFFFFFF, 0xFFFF, 0xFFFFFFFF, 0xFF),
         frames.Commands(0x01020304, 5, (echo,)),
@@ -69,8 +70,8 @@ def example_frames() -> list[frames.Frame]:
         frames.Commands(0x01020304, 0, (frames.Echo(0, 0, 0, ()),)),
         frames.Desync(0x01020304, 5, 300, digest, digest + 1, bytes(range(32))),
         frames.Desync(0x01020304, 5, 0, 0, 1, b""),
-        frames.Bye(0x01020304, "done"),
-        frames.Bye(0, ""),
+        frames.Bye(0x01020304, Ending.OVER, "done"),
+        frames.Bye(0, Ending(200)),
         frames.Unknown(0x01020304, 5),
         frames.Claim(0x01020304, 5, 0x0A0B0C0D),
     ]

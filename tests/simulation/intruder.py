@@ -15,6 +15,7 @@ from collections.abc import Callable
 from channel.codec.codec import STATE_MAX, Codec
 from channel.errors import FrameError
 from channel.protocol import wire
+from channel.protocol.endings import Ending
 from channel.protocol.frames import (
     Bye,
     Claim,
@@ -69,7 +70,7 @@ class Intruder:
             "symbol": self._symbol,
             "commands": self._commands,
             "desync": self._desync,
-            "bye": lambda: Bye(self._number(self._session, U32), self._text()),
+            "bye": lambda: Bye(self._number(self._session, U32), self._ending(), self._text()),
             "unknown": lambda: Unknown(*self._flight()),
             "claim": lambda: Claim(*self._flight(), self._number(self._session, U32)),
         }
@@ -140,6 +141,9 @@ class Intruder:
     def _text(self) -> str:
         return self.chance.choice(TEXTS)
 
+    def _ending(self) -> Ending:
+        return Ending(self.chance.randrange(256))
+
     def _float(self) -> float:
         if self.chance.random() < 0.2:
             return self.chance.choice(NOT_NUMBERS)
@@ -205,7 +209,8 @@ class Intruder:
         )
 
     def _refuse(self) -> Refuse:
-        return Refuse(self._number(self._incarnation, U32), self._text(), self._text())
+        incarnation = self._number(self._incarnation, U32)
+        return Refuse(incarnation, self._ending(), self._text(), self._text())
 
     def _symbol(self) -> Symbol:
         slot = self._sample * self._terms.symbols_per_word

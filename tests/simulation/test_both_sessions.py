@@ -12,11 +12,11 @@ from channel.protocol.frames import Frame, Symbol
 from channel.protocol.lockstep import HISTORY_SAMPLES
 from receiver.session.session import Phase as ReceiverPhase
 from receiver.session.session import ReceiverSession
+from tenbaud import MemoryRecorder
 from tests.channel.codec.parts import (
     THREE_SIGNS,
     TICK_NS,
     ConstantController,
-    ListRecorder,
     identity_of,
     pitch_codec,
     terms,
@@ -41,14 +41,15 @@ class BothSessions(RuleBasedStateMachine):
         self.decided: dict[tuple[int, int, int], str] = {}
         self.epochs: dict[int, int] = {}
         self.slots: set[tuple[int, int, int]] = set()
-        self.recorder = ListRecorder()
+        self.recorder = MemoryRecorder()
         self.transmitter = TransmitterSession(CODEC, TERMS, IDENTITY, 5, self.recorder)
         self.start_receiver()
         self.up.append(self.transmitter.hello())
 
     def start_receiver(self) -> None:
         self.started += 1
-        self.receiver_rows = ListRecorder()
+        self.receiver_rows = MemoryRecorder()
+        self.rows_seen = 0
         self.receiver = ReceiverSession(
             CODEC, TERMS, ConstantController(1.5, -0.5), IDENTITY, self.started, self.receiver_rows
         )
@@ -91,10 +92,10 @@ class BothSessions(RuleBasedStateMachine):
         frame = self._take(self.down, back, keep)
         if frame is None:
             return
-        before = len(self.recorder.rows.get("sample", []))
+        before = len(self.recorder.column("sample", "sample"))
         self.up += self.transmitter.on_frame(frame)
         session = self.transmitter
-        for row in self.recorder.rows.get("sample", [])[before:]:
+        for row in self.recorder.topic("sample")[before:]:
             key = (session.session_number, session.epoch, row["sample"])
             assert row["digest"] == self.decided.get(key), "two states of one sample"
 
@@ -127,7 +128,9 @@ class BothSessions(RuleBasedStateMachine):
 
     def answered(self, frames: list[Frame]) -> None:
         session = self.receiver
-        for row in self.receiver_rows.rows.pop("sample", []):
+        rows = self.receiver_rows.topic("sample")[self.rows_seen :]
+        self.rows_seen += len(rows)
+        for row in rows:
             key = (session.session_number, session.epoch, row["sample"])
             assert key not in self.decided, "one sample was decided twice"
             self.decided[key] = str(row["digest"])

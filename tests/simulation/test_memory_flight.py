@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from channel.codec import numerics
 from channel.codec.codec import Codec
 from channel.codec.models import pitch
-from channel.line.line import Delivery, Line
+from channel.errors import ConfigMismatch
+from channel.line.line import CleanLine, Delivery, Line
+from channel.protocol.events import event_fields
+from channel.protocol.frames import Why
+from tenbaud.sentences.events import event_text
 from tests.channel.codec.parts import PAPER, THREE_SIGNS
-from tests.simulation.flight import assert_lockstep, pitch_flight
+from tests.simulation.flight import assert_lockstep, largest_share, pitch_flight
 from tests.simulation.lines import DelayingLine, JitterLine, LossyLine, SlowDownlink
 from transmitter.session.session import Phase
 
@@ -36,10 +42,11 @@ MS = 1_000_000
 def test_when_the_paper_is_flown_then_the_error_is_within_its_bound(
     zoom: object, ticks: int, mismatch: float, bound: float
 ) -> None:
-    flight = pitch_flight(zoom, ticks_per_sample=ticks, mismatch=mismatch).fly(100.0)  # type: ignore[arg-type]
-    assert flight.ticks == 10_000
+    flight = pitch_flight(zoom, ticks_per_sample=ticks, mismatch=mismatch)
+    result = flight.fly(100.0)  # type: ignore[arg-type]
+    assert result.ticks == 10_000
     assert_lockstep(flight, 10_000 // ticks)
-    assert 0.001 < flight.largest_share < bound
+    assert 0.001 < largest_share(flight) < bound
     assert flight.node.scores.live.largest == flight.node.scores.coded.largest
     assert flight.node.scores.angle_max_rad > 1.5
     assert flight.node.commands_late == 0
@@ -47,29 +54,31 @@ def test_when_the_paper_is_flown_then_the_error_is_within_its_bound(
 
 
 def test_when_ten_baud_are_flown_then_one_bit_per_sample_is_paid_and_measured() -> None:
-    flight = pitch_flight().fly(30.0)
-    meter = flight.virtual._uplink.meter
+    flight = pitch_flight()
+    flight.fly(30.0)
+    meter = flight.uplink.meter
     assert meter.coder_bits == 300
     assert flight.receiver.meter.baud == pytest.approx(10.0)
     assert flight.endpoint.inlet.wire_bytes == meter.wire_bytes
-    assert flight.endpoint.wire_bytes_down == flight.virtual.inlet.wire_bytes
-    assert flight.virtual._uplink.shaper.refused == 0
+    assert flight.endpoint.downlink.wire_bytes == flight.loop.endpoint.inlet.wire_bytes
+    assert flight.uplink.shaper.refused == 0
 
 
 def test_when_bits_arrive_at_the_end_of_their_slot_then_the_live_error_stays_bounded() -> None:
-    flight = pitch_flight(THREE_SIGNS, mismatch=0.1, delivery="end", lead_ticks=13).fly(100.0)
+    flight = pitch_flight(THREE_SIGNS, mismatch=0.1, delivery="end", lead_ticks=13)
+    flight.fly(100.0)
     assert_lockstep(flight, 1000)
     scores = flight.node.scores
     assert scores.coded.largest < scores.live.largest < 0.05 * scores.angle_max_rad
-    assert flight.largest_share < 0.02
+    assert largest_share(flight) < 0.02
     assert flight.node.commands_late == 0
 
 
 def test_when_a_flight_is_flown_twice_then_every_digest_is_the_same() -> None:
-    one, other = (pitch_flight(mismatch=0.1).fly(30.0) for _ in range(2))
-    assert one.digests == other.digests
-    assert one.sent.rows == other.sent.rows
-    assert one.received.rows == other.received.rows
+    one, other = (pitch_flight(mismatch=0.1) for _ in range(2))
+    assert one.fly(30.0).digests == other.fly(30.0).digests
+    assert one.transmitter_rows.rows == other.transmitter_rows.rows
+    assert one.receiver_rows.rows == other.receiver_rows.rows
 
 
 @pytest.mark.parametrize(
@@ -79,72 +88,78 @@ def test_when_symbols_are_lost_then_both_ends_count_them_and_stay_in_lockstep(
     share: float, bound: float
 ) -> None:
     line = LossyLine(share)
-    flight = pitch_flight(THREE_SIGNS, mismatch=0.1, lead_ticks=3, uplink_line=line).fly(100.0)
+    flight = pitch_flight(THREE_SIGNS, mismatch=0.1, lead_ticks=3, uplink_line=line)
+    result = flight.fly(100.0)
     # The end of the flight may leave a lost last symbol undecided.
     samples = flight.receiver.state.sample
     assert 990 <= samples <= 1000
     assert flight.transmitter.counts["digest_checks"] == samples
     assert flight.transmitter.counts["desyncs"] == 0
     assert flight.transmitter.copies.confirmed == flight.receiver.state
-    assert flight.digests == flight.received.column("sample", "digest")
+    assert list(result.digests) == flight.receiver_rows.column("sample", "digest")
     erasures = flight.transmitter.counts["erasures"]
     assert erasures == flight.receiver.counts["erasures"]
     assert line.losses - (1000 - samples) == erasures > 0.7 * share * 1000
-    assert flight.largest_share < bound
+    assert largest_share(flight) < bound
 
 
 def test_when_the_first_symbols_are_lost_then_their_samples_are_erased() -> None:
     line = LossyLine(lost=frozenset({0, 1}))
-    flight = pitch_flight(THREE_SIGNS, lead_ticks=3, uplink_line=line).fly(5.0)
+    flight = pitch_flight(THREE_SIGNS, lead_ticks=3, uplink_line=line)
+    result = flight.fly(5.0)
     assert_lockstep(flight, 50)
-    words = flight.sent.column("sample", "word")
-    assert words[:2] == [None, None]
-    assert None not in words[2:]
+    assert result.words[:2] == (None, None)
+    assert None not in result.words[2:]
     assert flight.receiver.counts["erasures"] == 2
 
 
 def test_when_symbols_miss_their_deadlines_then_they_are_erased_and_dropped() -> None:
     late = frozenset({10, 20, 21, 40})
     line = DelayingLine(late, 25 * MS)
-    flight = pitch_flight(THREE_SIGNS, lead_ticks=3, uplink_line=line).fly(10.0)
+    flight = pitch_flight(THREE_SIGNS, lead_ticks=3, uplink_line=line)
+    result = flight.fly(10.0)
     assert_lockstep(flight, 100)
     assert flight.receiver.counts["symbols_late"] == 4
     assert flight.receiver.counts["erasures"] == flight.transmitter.counts["erasures"] == 4
-    words = flight.received.column("sample", "word")
+    words = flight.receiver_rows.column("sample", "word")
     assert {sample for sample, word in enumerate(words) if word is None} == late
-    sent = flight.sent.column("sample", "word_sent")
-    assert all(word is not None for word in sent)
+    assert None not in result.words_sent
 
 
 def test_when_symbols_arrive_at_other_times_within_their_deadlines_then_states_are_equal() -> None:
     # A deadline counts from the last arrival, so the jitter may be as long as the allowance.
-    lines: list[Line] = [Line(), JitterLine(20 * MS), DelayingLine(frozenset(range(3, 90, 7)), 20 * MS)]
-    flights = [pitch_flight(mismatch=0.1, lead_ticks=3, uplink_line=line).fly(30.0) for line in lines]
+    delaying = DelayingLine(frozenset(range(3, 90, 7)), 20 * MS)
+    lines: list[Line] = [CleanLine(), JitterLine(20 * MS), delaying]
+    flights = [pitch_flight(mismatch=0.1, lead_ticks=3, uplink_line=line) for line in lines]
+    results = [flight.fly(30.0) for flight in flights]
     assert_lockstep(flights[0], 300)
-    arrivals = [flight.received.column("sample", "arrival_s") for flight in flights]
+    arrivals = [flight.receiver_rows.column("sample", "arrival_s") for flight in flights]
     assert arrivals[0] != arrivals[1] != arrivals[2]
-    for flight in flights[1:]:
+    for flight, result in zip(flights[1:], results[1:], strict=True):
         assert flight.receiver.counts["erasures"] == 0
         assert flight.node.commands_late == 0
-        assert flight.digests == flights[0].digests
-        columns = [one.sent.column("tick", "applied_volts") for one in (flight, flights[0])]
-        assert columns[0] == columns[1]
+        assert result.digests == results[0].digests
+        np.testing.assert_array_equal(result.commands, results[0].commands)
 
 
 @pytest.mark.parametrize(("delay_ms", "late"), [(10, False), (30, False), (31, True)])
 def test_when_the_downlink_is_slow_then_commands_are_late_only_beyond_the_lead(
     delay_ms: int, late: bool
 ) -> None:
-    flight = pitch_flight(lead_ticks=3, downlink_line=SlowDownlink(delay_ms * MS)).fly(10.0)
+    flight = pitch_flight(lead_ticks=3, downlink_line=SlowDownlink(delay_ms * MS))
+    result = flight.fly(10.0)
     assert (flight.node.commands_late > 0) is late
     assert flight.transmitter.counts["desyncs"] == 0
-    assert flight.digests == flight.received.column("sample", "digest")[: len(flight.digests)]
-    assert len(flight.digests) >= 99
+    assert (
+        list(result.digests) == flight.receiver_rows.column("sample", "digest")[: len(result.digests)]
+    )
+    assert len(result.digests) >= 99
 
 
 def test_when_the_downlink_is_slow_then_the_handshake_is_still_over_before_the_flight() -> None:
-    line = Line(delay_ns=10 * MS)
-    flight = pitch_flight(lead_ticks=3, downlink_line=line).fly(10.0)
+    line = CleanLine(delay_ns=10 * MS)
+    flight = pitch_flight(lead_ticks=3, downlink_line=line)
+    flight.fly(10.0)
     assert flight.transmitter.counts["words_missed"] == 0
     assert flight.receiver.counts["erasures"] == 0
 
@@ -179,8 +194,9 @@ def test_when_one_end_computes_a_sine_one_ulp_off_then_it_is_reported_and_ends_s
     codec = twin.receiver.codec
     wrong = WrongSine(codec, first_tick=3000)
     receiver_codec = Codec(wrong, codec.coder, codec.ticks_per_sample)
-    flight = pitch_flight(mismatch=0.1, receiver_codec=receiver_codec, stop_on_desync=True).fly(60.0)
-    twin.fly(60.0)
+    flight = pitch_flight(mismatch=0.1, receiver_codec=receiver_codec, stop_on_desync=True)
+    result = flight.fly(60.0)
+    twin_result = twin.fly(60.0)
 
     report = flight.transmitter.desync
     assert report is not None
@@ -188,68 +204,71 @@ def test_when_one_end_computes_a_sine_one_ulp_off_then_it_is_reported_and_ends_s
     # The wrong sine acts from sample 300 on, and the last bit it changes may need a sample or two to
     # reach the state; the report comes with the first digest that differs, not later.
     assert 300 <= report.sample <= 303
-    own = [int(str(digest), 16) for digest in flight.sent.column("sample", "digest")]
-    peer = [int(str(digest), 16) for digest in flight.sent.column("sample", "peer_digest")]
+    own = [int(str(digest), 16) for digest in flight.transmitter_rows.column("sample", "digest")]
+    peer = [int(str(digest), 16) for digest in flight.transmitter_rows.column("sample", "peer_digest")]
     assert own[:-1] == peer[:-1]
-    assert own[:-1] == [int(str(digest), 16) for digest in twin.digests[: len(own) - 1]]
+    assert own[:-1] == [int(str(digest), 16) for digest in twin_result.digests[: len(own) - 1]]
     assert (own[-1], peer[-1]) == (report.transmitter_digest, report.receiver_digest)
     assert own[-1] != peer[-1]
     assert len(own) == report.sample + 1
     assert codec.digest(codec.unpack(report.state)) == report.transmitter_digest
     for session in (flight.transmitter, flight.receiver):
         assert session.counts["desyncs"] == 1
-        text = " ".join(event.text for event in session.events)
+        text = " ".join(event_text(event_fields(event)) for event in session.events)
         assert f"{own[-1]:016x}" in text
         assert f"{peer[-1]:016x}" in text
 
     assert flight.transmitter.phase is Phase.ENDED
     assert flight.node.latched
     assert flight.node.guard.volts == (0.0, 0.0)
-    assert flight.ticks <= report.sample * 10 + 60
-    applied = flight.sent.column("tick", "applied_volts")
+    assert result.ticks <= report.sample * 10 + 60
+    applied = flight.transmitter_rows.column("tick", "applied_volts")
     assert applied[-1] == (0.0, 0.0)
 
 
 def test_when_command_frames_are_lost_within_the_repeats_then_nothing_is_missing() -> None:
-    class DownlinkLoss(Line):
+    class DownlinkLoss(CleanLine):
         def __init__(self) -> None:
             super().__init__()
             self.frames = 0
 
-        def carry(self, data: bytes, is_symbol: bool, now_ns: int) -> list[Delivery]:
+        def carry(self, data: bytes, now_ns: int) -> list[Delivery]:
             self.frames += 1
             lost = self.frames > 1 and self.frames % 10 in (3, 4)
             return [Delivery(now_ns, None if lost else data)]
 
-    flight = pitch_flight(lead_ticks=33, downlink_line=DownlinkLoss()).fly(20.0)
+    flight = pitch_flight(lead_ticks=33, downlink_line=DownlinkLoss())
+    flight.fly(20.0)
     assert_lockstep(flight, 200)
     assert flight.node.commands_late == 0
 
 
 def test_when_more_command_frames_are_lost_than_repeated_then_the_ends_rejoin() -> None:
-    class Gap(Line):
+    class Gap(CleanLine):
         def __init__(self) -> None:
             super().__init__()
             self.frames = 0
 
-        def carry(self, data: bytes, is_symbol: bool, now_ns: int) -> list[Delivery]:
+        def carry(self, data: bytes, now_ns: int) -> list[Delivery]:
             self.frames += 1
             return [Delivery(now_ns, None if 50 <= self.frames < 53 else data)]
 
-    flight = pitch_flight(lead_ticks=33, downlink_line=Gap()).fly(20.0)
+    flight = pitch_flight(lead_ticks=33, downlink_line=Gap())
+    result = flight.fly(20.0)
     assert flight.transmitter.counts["desyncs"] == 0
     assert flight.transmitter.counts["rejoins"] == 1
     assert flight.transmitter.epoch == flight.receiver.epoch == 1
-    assert any("never came" in event.text for event in flight.transmitter.events)
-    assert flight.ticks == 2000
-    assert flight.digests[-1] == flight.received.column("sample", "digest")[-1]
+    assert any(event.cause is Why.GAP for event in flight.transmitter.events)
+    assert result.ticks == 2000
+    assert result.digests[-1] == flight.receiver_rows.column("sample", "digest")[-1]
 
 
 def test_when_the_receivers_configuration_differs_then_no_symbol_leaves() -> None:
     flight = pitch_flight()
-    flight.receiver.identity = replace(flight.receiver.identity, config='{"rate_baud": 20.0}')
-    flight.virtual.greet()
+    other = json.dumps(json.loads(flight.receiver.identity.config) | {"rate_baud": 20.0})
+    flight.receiver.identity = replace(flight.receiver.identity, config=other)
+    with pytest.raises(ConfigMismatch, match=r"rate_baud: here 10\.0, there 20\.0"):
+        flight.fly(1.0)
     assert flight.transmitter.phase is Phase.GREETING
-    assert "rate_baud: here 10.0, there 20.0" in str(flight.transmitter.refusal)
     assert "rate_baud" in str(flight.receiver.refusal)
-    assert flight.virtual._uplink.meter.symbols == 0
+    assert flight.uplink.meter.symbols == 0

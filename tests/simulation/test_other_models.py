@@ -7,6 +7,7 @@ import pytest
 from channel.codec.codec import Codec
 from channel.codec.coders.zoom import ZoomCoder
 from channel.codec.words import WIRE_ERASED, Alphabet
+from tenbaud import MemoryFlight
 from tests.channel.codec.chua import (
     CHUA_TICK_S,
     CHUA_TICKS_PER_SAMPLE,
@@ -16,7 +17,7 @@ from tests.channel.codec.chua import (
 )
 from tests.channel.codec.parts import ConstantController, terms
 from tests.channel.codec.two_axes import TWO_AXES_ZOOM, TwoAxes, TwoAxesPlant
-from tests.simulation.flight import assemble, assert_lockstep
+from tests.simulation.flight import assert_lockstep
 from tests.simulation.lines import LossyLine
 
 MS = 1_000_000
@@ -26,17 +27,17 @@ def test_when_chua_is_flown_through_both_sessions_then_no_command_is_needed() ->
     codec = Codec(ChuaModel(CHUA_TICK_S), ZoomCoder(CHUA_ZOOM), CHUA_TICKS_PER_SAMPLE)
     flight_terms = terms(tick_ns=5 * MS, rate_baud=20.0, initial_command=(), lead_ticks=7)
     flight_terms.check("real")
-    flight = assemble(
+    flight = MemoryFlight(
         codec,
         flight_terms,
         ChuaPlant(CHUA_TICK_S),
         ConstantController(),
         uplink_line=LossyLine(0.05),
-        window_start_tick=4000,
-        safe_volts=(),
-        counts_per_turn=100_000,
-    ).fly(100.0)
-    assert flight.ticks == 20_000
+        scored_from_s=20.0,
+        encoder_counts_per_turn=100_000,
+    )
+    result = flight.fly(100.0)
+    assert result.ticks == 20_000
     assert flight.transmitter.counts["digest_checks"] == flight.receiver.state.sample >= 1990
     assert flight.transmitter.counts["desyncs"] == 0
     assert flight.node.commands_late == 0
@@ -56,13 +57,14 @@ def test_when_two_axes_are_flown_then_a_word_takes_two_slots(ticks: int) -> None
         def command(self, tick, state):  # type: ignore[no-untyped-def]
             return (-4.0 * state[0] - 4.0 * state[2], -4.0 * state[1] - 4.0 * state[3])
 
-    flight = assemble(
-        codec, flight_terms, TwoAxesPlant(0.01, (0.4, -0.2, 0.0, 0.3)), Damper(), window_start_tick=1000
-    ).fly(20.0)
+    flight = MemoryFlight(
+        codec, flight_terms, TwoAxesPlant(0.01, (0.4, -0.2, 0.0, 0.3)), Damper(), scored_from_s=10.0
+    )
+    flight.fly(20.0)
     samples = 2000 // ticks
     assert_lockstep(flight, samples)
     assert flight.receiver.counts["erasures"] == 0
-    assert flight.virtual._uplink.meter.symbols == 2 * samples
+    assert flight.uplink.meter.symbols == 2 * samples
     assert flight.node.scores.coded.largest < 0.05
     assert flight.node.scores.angle_max_rad < 0.2
 
@@ -71,14 +73,15 @@ def test_when_one_symbol_of_a_word_of_two_is_lost_then_both_ends_see_the_word_er
     codec = Codec(TwoAxes(0.01), ZoomCoder(TWO_AXES_ZOOM), 4)
     flight_terms = terms(ticks_per_sample=4, symbols_per_word=2, rate_baud=50.0, lead_ticks=8)
     lost = frozenset({20, 31, 40, 41})
-    flight = assemble(
+    flight = MemoryFlight(
         codec,
         flight_terms,
         TwoAxesPlant(0.01, (0.1, 0.0, 0.0, 0.0)),
         ConstantController(0.0, 0.0),
         uplink_line=LossyLine(lost=lost),
-    ).fly(2.0)
+    )
+    result = flight.fly(2.0)
     assert_lockstep(flight, 50)
-    words = flight.sent.column("sample", "word")
+    words = list(result.words)
     assert [sample for sample, word in enumerate(words) if word is None] == [10, 15, 20]
     assert Alphabet((-1, 1), 2).word(WIRE_ERASED) is None

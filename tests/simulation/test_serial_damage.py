@@ -7,15 +7,16 @@ from typing import Any
 import pytest
 
 from channel.links.serial.wire import SerialWire
+from tenbaud import MemoryFlight
 from tests.channel.codec.parts import THREE_SIGNS
-from tests.simulation.flight import Flight, pitch_flight
+from tests.simulation.flight import pitch_flight
 from tests.simulation.serial_lines import StreamLine
 
 DAMAGE = 0.01
 WIRE = SerialWire(2)
 
 
-def damaged_flight(seed: int, damage_down: float, **changes: Any) -> tuple[Flight, StreamLine]:
+def damaged_flight(seed: int, damage_down: float, **changes: Any) -> tuple[MemoryFlight, StreamLine]:
     up = StreamLine(WIRE, DAMAGE, 2 * seed, upward=True)
     down = StreamLine(WIRE, damage_down, 2 * seed + 1, upward=False)
     flight = pitch_flight(
@@ -24,21 +25,21 @@ def damaged_flight(seed: int, damage_down: float, **changes: Any) -> tuple[Fligh
     return flight, up
 
 
-def fly_on(flight: Flight, samples: int) -> int:
+def fly_on(flight: MemoryFlight, samples: int) -> int:
     """Fly so many samples or to the end of the session; return how many were confirmed."""
-    flight.virtual.greet()
-    flight.ticks = flight.virtual.run(samples * flight.transmitter.terms.ticks_per_sample)
-    flight.virtual.finish(flight.ticks, lambda: "done")
+    flight.fly(samples * flight.terms.sample_ns / 1e9)
     return flight.transmitter.copies.confirmed.sample
 
 
-def assert_nothing_silent(flight: Flight) -> None:
+def assert_nothing_silent(flight: MemoryFlight) -> None:
     """Every digest that was confirmed is the receiver's own of that sample, or was reported."""
-    received = flight.received.rows["sample"]
+    received = flight.receiver_rows.topic("sample")
     theirs = {row["sample"]: row["digest"] for row in received}
     assert len(theirs) == len(received)
-    assert len(flight.digests) == flight.transmitter.counts["digest_checks"]
-    differing = [row for row in flight.sent.rows["sample"] if row["digest"] != theirs[row["sample"]]]
+    assert len(flight.transmitter_rows.topic("sample")) == flight.transmitter.counts["digest_checks"]
+    differing = [
+        row for row in flight.transmitter_rows.topic("sample") if row["digest"] != theirs[row["sample"]]
+    ]
     assert len(differing) <= flight.transmitter.counts["desyncs"]
     # A frame that was damaged unseen may also show a difference where there is none.
     assert flight.transmitter.counts["rejoins"] >= flight.transmitter.counts["desyncs"]
@@ -98,13 +99,13 @@ def test_when_a_hundred_thousand_symbols_fly_with_damage_both_ways_then_nothing_
 
 
 def test_when_nothing_is_damaged_then_the_serial_wire_changes_no_bit_of_the_flight() -> None:
-    plain = pitch_flight(THREE_SIGNS, mismatch=0.1).fly(20.0)
+    plain = pitch_flight(THREE_SIGNS, mismatch=0.1)
+    plain_result = plain.fly(20.0)
     up = StreamLine(WIRE, 0.0, 0, upward=True)
     down = StreamLine(WIRE, 0.0, 1, upward=False)
-    serial = pitch_flight(THREE_SIGNS, mismatch=0.1, uplink_line=up, downlink_line=down, wire=WIRE).fly(
-        20.0
-    )
-    assert serial.digests == plain.digests
+    serial = pitch_flight(THREE_SIGNS, mismatch=0.1, uplink_line=up, downlink_line=down, wire=WIRE)
+    serial_result = serial.fly(20.0)
+    assert serial_result.digests == plain_result.digests
     assert not up.dropped
     assert not down.dropped
     # Hello, one byte per symbol, farewell.

@@ -7,25 +7,27 @@ from channel.codec.coders.words import WordsCoder, WordsParameters
 from channel.codec.models.hold import HoldModel
 from plant_sim.pitch import PitchParameters, PitchPlant
 from receiver.controllers.pid import PAPER_GAINS, Pid
+from tenbaud import MemoryFlight
 from tests.channel.codec.parts import TICK_S, terms
-from tests.simulation.flight import REFERENCE, assemble
+from tests.simulation.flight import REFERENCE
 
 
 def test_when_a_word_of_ten_symbols_goes_up_per_tick_then_every_word_arrives_on_the_grid() -> None:
     codec = Codec(HoldModel(TICK_S), WordsCoder(WordsParameters()), 1)
     agreed = terms(ticks_per_sample=1, symbols_per_word=10, rate_baud=1000.0, lead_ticks=4)
     agreed.check("virtual")
-    flight = assemble(
+    flight = MemoryFlight(
         codec,
         agreed,
         PitchPlant(PitchParameters(), TICK_S),
         Pid(PAPER_GAINS, REFERENCE, TICK_S),
-        counts_per_turn=1024,
-    ).fly(20.0)
+        encoder_counts_per_turn=1024,
+    )
+    flight.fly(20.0)
     assert flight.transmitter.counts["digest_checks"] == 2000
     assert flight.transmitter.counts["desyncs"] == 0
     assert flight.receiver.counts["erasures"] == 0
-    assert flight.virtual._uplink.shaper.refused == 0
+    assert flight.uplink.shaper.refused == 0
     assert flight.receiver.meter.baud is not None
     assert abs(flight.receiver.meter.baud - 1000.0) < 1e-6
     assert flight.node.scores.coded.largest < 0.02 / 2

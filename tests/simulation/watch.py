@@ -197,7 +197,7 @@ class Watch:
                 f"not locked at the end: {node and node.session.phase}, "
                 f"{endpoint and endpoint.session.phase}, guard {node and node.guard.state}, lag "
                 f"{node and node.session.copies.lag_samples}; last events "
-                f"{node and [event.text for event in list(node.session.events)[-3:]]}"
+                f"{node and list(node.session.events)[-3:]}"
             )
         self.check_recovery(world)
         if world.plan.is_slow:

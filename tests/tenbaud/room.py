@@ -11,6 +11,7 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, Self
 
+from channel.protocol.endings import End, Ending
 from channel.protocol.frames import Frame
 from channel.protocol.wire import decode, encode
 from receiver.loops.many import ManyService
@@ -149,5 +150,5 @@ class Rig:
         return self
 
     def bye(self) -> None:
-        for frame in self.session.bye("the flight is over"):
+        for frame in self.session.bye(End(Ending.OVER, "the flight is over")):
             self.put(encode(frame))

@@ -10,6 +10,7 @@ import pytest
 from channel.errors import TenbaudError
 from channel.line.virtual import Step, encode_step
 from channel.links.endpoints import free_endpoint
+from channel.protocol.endings import End, Ending
 from channel.protocol.frames import Bye, Symbol, Unknown
 from channel.protocol.wire import decode, encode
 from receiver.loops.many import BURST_MESSAGES
@@ -82,11 +83,11 @@ def test_when_a_handshake_does_not_fit_then_it_is_refused_told_once_and_leaves_n
         other.put(encode(other.session.hello()))
         other.hear()
         for _ in range(5):
-            other.put(encode(Bye(0, "as I see it")))
+            other.put(encode(Bye(0, Ending.OVER, "as I see it")))
         good.fly(2)
     # The first is what it said of itself when it was refused.
     assert len([text for text in room.told if "as its transmitter sees it" in text]) == 1
-    assert "coder.window_signs" in (other.session.refusal or "")
+    assert "coder.window_signs" in str(other.session.refusal)
     assert len([text for text in room.told if "rig/other: refused" in text]) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["rig-good"]
 
@@ -115,7 +116,7 @@ def test_when_one_rig_breaks_its_service_then_only_its_flight_ends(tmp_path: Pat
         bad.hear()
         room.until_ended(1)
         good.fly(5)
-    assert "the receiver failed" in bad.session.end_reason
+    assert bad.session.end == End(Ending.FAILED, by_peer=True)
     assert room.summary("rig/bad")["exit_code"] == 3
     assert room.summary("rig/good")["samples"] == 5
 
@@ -162,13 +163,13 @@ def test_when_no_configuration_can_be_had_then_the_rig_is_told_why(tmp_path: Pat
     with Room(tmp_path, agreement_of) as room:
         odd = Rig(room, "rig/odd").greet()
         Rig(room, "rig/good").greet().fly(2)
-    assert "no such thing" in (odd.session.refusal or "")
+    assert "no such thing" in str(odd.session.refusal)
 
 
 def test_when_there_are_too_many_rigs_then_the_next_is_refused_until_one_ends(tmp_path: Path) -> None:
     with Room(tmp_path, rigs_max=1) as room:
         first = Rig(room, "rig/1").greet()
-        assert "its limit" in (Rig(room, "rig/2").greet().session.refusal or "")
+        assert "its limit" in str(Rig(room, "rig/2").greet().session.refusal)
         first.bye()
         room.until_ended(1)
         Rig(room, "rig/2", 2).greet().fly(1)
@@ -213,7 +214,7 @@ def test_when_a_flight_cannot_be_built_then_its_file_is_finished_too(
     monkeypatch.setattr(many, "build_receiver", fail)
     with Room(tmp_path) as room:
         odd = Rig(room, "rig/odd").greet()
-        assert "no controller" in (odd.session.refusal or "")
+        assert "no controller" in str(odd.session.refusal)
         (recorder,) = opened
         assert recorder._finished.wait(PATIENCE_S)
 
@@ -226,7 +227,7 @@ def test_when_recording_one_rig_fails_then_only_its_flight_ends(tmp_path: Path) 
         def fail() -> None:
             raise RuntimeError("a coder of the user's")
 
-        served.service.endpoint.session._commander.write_down = fail  # type: ignore[method-assign]
+        served.endpoint.session._commander.write_down = fail  # type: ignore[method-assign]
         bad.put(encode(bad.session.on_measurement(0, (0.0,))[0]))
         good.fly(5)
         assert [one.name for one in room.service.served] == ["rig/good"]

@@ -7,9 +7,11 @@ import math
 import pytest
 
 from channel.protocol.limits import CommandLimits
-from transmitter.guard import Guard, GuardSettings, GuardState
+from transmitter.guard import Guard, GuardCause, GuardReason, GuardSettings, GuardState
 
 SAFE = (0.5, -0.5)
+
+STOPPED = GuardReason(GuardCause.STOPPED, 1)
 
 
 def guard(
@@ -34,7 +36,7 @@ def test_when_commands_stay_away_then_it_holds_then_ramps_then_latches() -> None
     latched = (SAFE, GuardState.LATCHED)
     assert walk == [held] * 3 + [(volts, GuardState.RAMPING) for volts in down] + [latched] * 3
     assert one.stopped
-    assert "no command for 4 ticks up to tick 4" in one.reason
+    assert one.reason == GuardReason(GuardCause.TIMED_OUT, 4, number=4)
 
 
 def test_when_commands_come_back_in_time_then_it_runs_on_and_the_age_starts_anew() -> None:
@@ -65,27 +67,27 @@ def test_when_no_command_is_owed_then_the_last_one_is_held_and_does_not_age() ->
         assert one.apply(tick, None) == (1.0, 1.0)
     one.apply(53, None)
     assert one.state is GuardState.RAMPING
-    assert "no command for 4 ticks up to tick 53" in one.reason
+    assert one.reason == GuardReason(GuardCause.TIMED_OUT, 53, number=4)
 
 
 def test_when_it_ramps_or_is_latched_then_no_command_passes_any_more() -> None:
     one = guard()
     one.apply(0, (4.5, 3.5))
-    one.trip("for a test")
+    one.trip(STOPPED)
     volts = [one.apply(tick, (5.0, 5.0)) for tick in range(1, 8)]
     assert volts[:2] == [(3.5, 2.5), (2.5, 1.5)]
     assert volts[3:] == [SAFE] * 4
-    assert one.reason == "for a test"
+    assert one.reason is STOPPED
 
 
 def test_when_it_trips_again_then_the_first_reason_stands_and_the_ramp_goes_on() -> None:
     one = guard()
     one.apply(0, (4.5, 3.5))
-    one.trip("first")
+    one.trip(STOPPED)
     one.apply(1, None)
-    one.trip("second")
+    one.trip(GuardReason(GuardCause.SENSOR))
     assert one.apply(2, None) == (2.5, 1.5)
-    assert one.reason == "first"
+    assert one.reason is STOPPED
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
@@ -95,7 +97,8 @@ def test_when_a_command_is_not_finite_then_it_never_reaches_the_motors(value: fl
     volts = one.apply(1, (1.0, value))
     assert volts == (3.5, 2.5)
     assert one.state is GuardState.RAMPING
-    assert "the command of tick 1 is not a number" in one.reason
+    assert one.reason is not None
+    assert (one.reason.cause, one.reason.tick) == (GuardCause.BAD_COMMAND, 1)
 
 
 def test_when_a_command_is_beyond_both_limits_then_the_clamp_comes_before_the_slew() -> None:
@@ -118,8 +121,9 @@ def test_when_an_angle_is_beyond_its_soft_limit_then_the_voltage_is_taken_down(a
     one.apply(0, (4.5, 3.5))
     one.check_angles(1, (angle, 0.0))
     assert one.apply(1, (5.0, 5.0)) == (3.5, 2.5)
-    assert "axis 0" in one.reason
-    assert "tick 1" in one.reason
+    cause = GuardCause.ANGLE_LIMIT if math.isfinite(angle) else GuardCause.NO_ANGLE
+    assert one.reason is not None
+    assert (one.reason.cause, one.reason.axis, one.reason.tick) == (cause, 0, 1)
 
 
 def test_when_angles_are_at_their_soft_limits_then_commands_pass() -> None:
@@ -127,7 +131,7 @@ def test_when_angles_are_at_their_soft_limits_then_commands_pass() -> None:
     one.check_angles(0, (-1.0, 2.0))
     assert not one.stopped
     one.check_angles(0, (1.0, 2.1))
-    assert "axis 1 is at 2.100 rad" in one.reason
+    assert one.reason == GuardReason(GuardCause.ANGLE_LIMIT, 0, 1, 2.1, 2.0)
 
 
 def test_when_there_are_no_soft_limits_then_any_number_is_an_angle() -> None:

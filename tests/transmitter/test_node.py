@@ -7,10 +7,13 @@ import itertools
 import pytest
 
 from channel.codec.codec import Vector
-from channel.protocol.events import EventKind
+from channel.protocol.endings import End, Ending
+from channel.protocol.events import EventKind, event_fields
 from channel.protocol.frames import Commands, Echo, Welcome
-from tests.channel.codec.parts import ListRecorder, identity_of, pitch_codec, terms
-from transmitter.guard import Guard, GuardSettings, GuardState
+from tenbaud import MemoryRecorder
+from tenbaud.sentences.events import event_text, guard_text
+from tests.channel.codec.parts import identity_of, pitch_codec, terms
+from transmitter.guard import Guard, GuardCause, GuardReason, GuardSettings, GuardState
 from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode
 from transmitter.rigs.base import Reading, RigBase
@@ -41,7 +44,7 @@ class ScriptedRig(RigBase):
         self.written.append((tick, volts))
 
 
-def node_with(rig: ScriptedRig, recorder: ListRecorder | None = None) -> TransmitterNode:
+def node_with(rig: ScriptedRig, recorder: MemoryRecorder | None = None) -> TransmitterNode:
     session = TransmitterSession(CODEC, terms(), identity_of(CODEC), 5, recorder)
     guard = Guard(session.terms.limits, GuardSettings(20, 10, (0.0, 0.0), (1.0,)))
     scores = Scores(CODEC.model, 0, 640, lambda _: None)
@@ -90,7 +93,7 @@ def test_when_no_command_has_come_then_it_is_counted_as_late_and_the_last_one_is
 def test_when_the_guard_has_stopped_then_no_symbol_leaves_although_the_session_flies() -> None:
     node = node_with(ScriptedRig())
     fly_sample(node, 0)
-    node.guard.trip("for a test")
+    node.stop()
     for tick in range(10, 40):
         assert node.measure(tick) == []
         node.actuate(tick)
@@ -104,12 +107,12 @@ def test_when_the_session_ends_then_the_voltage_is_taken_down_with_its_reason() 
     rig = ScriptedRig()
     node = node_with(rig)
     fly_sample(node, 0)
-    node.session.bye("enough")
+    node.session.bye(End(Ending.OVER, "enough"))
     for tick in range(10, 20):
         node.measure(tick)
         node.actuate(tick)
     assert node.latched
-    assert node.guard.reason == "enough"
+    assert node.guard.reason == GuardReason(GuardCause.SESSION_ENDED, 10)
     assert rig.written[-1] == (19, (0.0, 0.0))
     fronts = [volts[0] for tick, volts in rig.written if tick >= 9]
     assert fronts == sorted(fronts, reverse=True)
@@ -127,17 +130,16 @@ def test_when_the_session_ends_then_the_voltage_is_taken_down_with_its_reason() 
 def test_when_the_sensor_or_the_angle_is_wrong_then_the_guard_trips_and_it_is_told(
     rig: ScriptedRig, text: str
 ) -> None:
-    recorder = ListRecorder()
+    recorder = MemoryRecorder()
     node = node_with(rig, recorder)
     for sample in range(5):
         fly_sample(node, sample)
     assert node.latched
-    assert text in node.guard.reason
-    told = [event.text for event in node.session.events if event.kind is EventKind.GUARD]
-    assert len(told) == 2
-    assert told[0].startswith("guard ramping: ")
-    assert told[1].startswith("guard latched: ")
-    assert text in told[0]
+    assert text in guard_text(node.guard.reason)
+    told = [event for event in node.session.events if event.kind is EventKind.GUARD]
+    assert [event.state for event in told] == [GuardState.RAMPING, GuardState.LATCHED]
+    assert event_text(event_fields(told[0])).startswith("guard ramping: ")
+    assert text in event_text(event_fields(told[0]))
     assert recorder.column("tick", "guard")[-1] == "latched"
     assert (node.sensor_fault is not None) == ("cable" in text)
 
@@ -154,12 +156,12 @@ def test_when_a_tick_is_actuated_before_it_was_measured_then_it_is_an_error() ->
 
 
 def test_when_a_row_is_recorded_then_commanded_and_applied_voltages_stand_side_by_side() -> None:
-    recorder = ListRecorder()
+    recorder = MemoryRecorder()
     node = node_with(ScriptedRig(), recorder)
     fly_sample(node, 0)
     node.measure(10)
     node.actuate(10)
-    rows = recorder.rows["tick"]
+    rows = recorder.topic("tick")
     assert [row["tick"] for row in rows] == list(range(11))
     assert rows[3]["commanded_volts"] == rows[3]["applied_volts"] == (2.0, -2.0)
     assert rows[10]["commanded_volts"] is None

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import sys
 
+from transmitter.guard import GuardCause, GuardReason
 from transmitter.node import TransmitterNode
-
-FLIGHT_ENDED = "the flight has ended"
 
 
 class Landing:
@@ -24,7 +23,7 @@ class Landing:
         self._tick_ns = node.session.terms.tick_ns
         self.over = not node.rig.ramps_down or node.latched
         if not self.over:
-            node.guard.trip(FLIGHT_ENDED)
+            node.guard.trip(GuardReason(GuardCause.FLIGHT_OVER))
 
     @property
     def next_ns(self) -> int:

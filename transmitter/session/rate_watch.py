@@ -6,6 +6,7 @@ how many are kept. Symbols that the line alone has lost are not the processes' f
 
 from __future__ import annotations
 
+from channel.protocol.events import Event, EventKind, Rate
 from channel.protocol.terms import Terms
 from transmitter.session.session import TransmitterSession
 
@@ -38,39 +39,40 @@ class RateWatch:
         self._looks = 0
         self._slow = 0
 
-    def look(self, tick: int, session: TransmitterSession) -> str | None:
-        """Take one tick that was flown; return what is to be told, if something is."""
+    def look(self, tick: int, session: TransmitterSession) -> Event | None:
+        """Take one tick that was flown; return what is to be reported, if something is."""
         if self._from_tick is None:
             self._begin(tick, session)
         self._looks += 1
         self._slow += session.copies.lag_samples > self._lag_usual
         if tick - (self._from_tick or 0) < self._window_ticks:
             return None
-        text = self._judge(tick - (self._from_tick or 0), session)
+        event = self._judge(tick - (self._from_tick or 0), session)
         self._begin(tick, session)
-        return text
+        return event
 
     def _begin(self, tick: int, session: TransmitterSession) -> None:
         self._from_tick, self._looks, self._slow = tick, 0, 0
         self._received = _received(session)
 
-    def _judge(self, ticks: int, session: TransmitterSession) -> str | None:
+    def _judge(self, ticks: int, session: TransmitterSession) -> Event | None:
         samples = ticks / self._terms.ticks_per_sample
         share = (_received(session) - self._received) / samples
         missed = 1.0 - self._looks / ticks
         slow = self._slow / self._looks
         before, self.kept_symbols_per_s = self.kept_symbols_per_s, None
         if share >= KEPT_SHARE or (missed <= OWN_SHARE and slow <= SLOW_SHARE):
-            return None if before is None else "the symbol rate is kept again"
+            return None if before is None else Event(EventKind.RATE, cause=Rate.KEPT)
         self.kept_symbols_per_s = share * self.asked_symbols_per_s
         if before is not None:
             return None
-        return (
-            f"the symbol rate is not kept: {self.asked_symbols_per_s:g} symbols/s are asked for, "
-            f"{self.kept_symbols_per_s:.0f} arrive in time, {1.0 - share:.1%} of the symbols are late "
-            f"or were never sent. This process missed {missed:.1%} of its ticks; in {slow:.1%} of the "
-            "others echoes were overdue. Lower channel.rate_baud, or leave both processes more of a "
-            "processor"
+        return Event(
+            EventKind.RATE,
+            cause=Rate.MISSED,
+            value=self.kept_symbols_per_s,
+            limit=self.asked_symbols_per_s,
+            missed_share=missed,
+            overdue_share=slow,
         )
 
 

@@ -12,13 +12,15 @@ symbol leaves any more; the session asks for a new epoch, and goes on from the s
 from __future__ import annotations
 
 from collections import Counter, deque
+from dataclasses import replace
 from enum import Enum
 
 from channel.codec.codec import Codec, Vector
 from channel.codec.words import ERASED
 from channel.protocol.audit_trail import EPOCH_CHANNEL, epoch_row
 from channel.protocol.bounds import Bounds, shown, within_text_bounds
-from channel.protocol.events import EVENT_CHANNEL, Event, EventKind, event_row
+from channel.protocol.endings import End, Ending
+from channel.protocol.events import ASKED, Event, EventKind, ended_event, write_event
 from channel.protocol.frames import (
     Bye,
     Claim,
@@ -35,7 +37,7 @@ from channel.protocol.frames import (
     Why,
 )
 from channel.protocol.identity import Identity, differing_fields
-from channel.protocol.lockstep import History, difference_text, is_answer
+from channel.protocol.lockstep import History, difference_event, is_answer
 from channel.protocol.recording import NullRecorder, Recorder
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
@@ -51,9 +53,9 @@ from transmitter.session.takeover import Claims
 class Phase(Enum):
     """Where the transmitter's session stands."""
 
-    GREETING = "waiting for a receiver"
+    GREETING = "greeting"  # waiting for a receiver
     FLYING = "flying"
-    REJOINING = "asking for a common state"
+    REJOINING = "rejoining"  # asking for a common state
     ENDED = "ended"
 
 
@@ -90,8 +92,8 @@ class TransmitterSession:
         """digest_checks, desyncs, rejoins, stale_frames, words_missed, erasures, claims_refused,
         take_overs, out_of_bounds, diverged"""
         self.rejoins_asked: Counter[Why] = Counter()
-        self.end_reason = ""
-        self.refusal: str | None = None
+        self.end: End | None = None
+        self.refusal: End | None = None
         self.desync: Desync | None = None
         """the last one"""
         self._report_answered = False
@@ -144,7 +146,7 @@ class TransmitterSession:
             return []
         sample, offset = divmod(tick, self.terms.ticks_per_sample)
         if sample - self.copies.confirmed.sample > self._lag_samples_max:
-            return self.rejoin(Why.LAG, f"no echo for {self._lag_samples_max} samples")
+            return self.rejoin(Why.LAG, replace(ASKED, number=self._lag_samples_max))
         if frames := self._check_gap():
             return frames
         while self.copies.next_sample < sample:
@@ -162,14 +164,14 @@ class TransmitterSession:
         here = (self.session_number, self.epoch)
         return [Symbol(*here, slot, number(symbol)) for slot, symbol in enumerate(word, first)]
 
-    def rejoin(self, why: Why, text: str) -> list[Frame]:
+    def rejoin(self, why: Why, details: Event = ASKED) -> list[Frame]:
         """Stop sending symbols and ask for a new epoch; return the frames that do."""
         if self.phase is not Phase.FLYING:
             return []
         self.phase = Phase.REJOINING
         self.rejoins_asked[why] += 1
         self._asking.begin(why, self._tick)
-        self._tell(EventKind.REJOIN, f"{text}: asking for a new epoch after {self.epoch}")
+        self._tell(replace(details, epoch=self.epoch, cause=why))
         return self._ask()
 
     def _ask(self) -> list[Frame]:
@@ -206,7 +208,8 @@ class TransmitterSession:
             case Welcome() if self._asking.is_answered_by(frame):
                 return self._on_welcome(frame)
             case Welcome() if self._is_current(frame.session) and self._is_left_behind(frame):
-                return self.rejoin(Why.UNKNOWN, f"the receiver has begun epoch {frame.epoch}, unasked")
+                detail = f"the receiver has begun epoch {frame.epoch}, unasked"
+                return self.rejoin(Why.UNKNOWN, replace(ASKED, detail=detail))
             case Unknown() if self._is_current(frame.session) and frame.epoch == self.epoch:
                 return self._on_unknown()
             case Claim() if self._is_current(frame.session) and frame.epoch == self.epoch:
@@ -217,36 +220,33 @@ class TransmitterSession:
             case Refuse() if frame.incarnation == self.incarnation:
                 return self._on_refuse(frame)
             case Bye() if self._has_session and frame.session == self.session_number:
-                self._end(f"the receiver ended the flight: {frame.reason}")
+                self._end(End(frame.ending, frame.text, by_peer=True))
             case ForeignVersion() if self.phase is Phase.GREETING:
-                self.refusal = foreign_version_text("receiver", frame.version)
+                text = foreign_version_text("receiver", frame.version)
+                self.refusal = End(Ending.WIRE_VERSION, text)
             case _:
                 self.counts["stale_frames"] += 1
         return []
 
-    def bye(self, reason: str) -> list[Frame]:
+    def bye(self, end: End) -> list[Frame]:
         """End the session from this side."""
         had_session = self._has_session
-        self._end(reason)
-        return [Bye(self.session_number, reason)] if had_session else []
+        self._end(end)
+        return [Bye(self.session_number, end.ending, end.text)] if had_session else []
 
     def _on_unknown(self) -> list[Frame]:
         """Believe it of a receiver that has stopped commanding; refuse it of a second one."""
         if self._claims.is_lost(self._tick, self.heard_tick):
-            return self.rejoin(Why.UNKNOWN, "the receiver does not know this session (any more)")
+            return self.rejoin(Why.UNKNOWN)
         if not self._claims.is_second():
             return []
         self.counts["claims_refused"] += 1
-        reason = (
-            "the transmitter flies with another receiver and stays with it; to take the flight over on "
-            "purpose: tenbaud receive --take-over"
-        )
-        self._tell(EventKind.REFUSED, "a second receiver asked for this flight: refused")
-        return [Bye(0, reason)]
+        self._tell(Event(EventKind.REFUSED, cause=Ending.SECOND_RECEIVER))
+        return [Bye(0, Ending.SECOND_RECEIVER)]
 
     def _on_claim(self, claim: Claim) -> list[Frame]:
         self._claims.name_successor(claim.by, self._tick)
-        return self.rejoin(Why.TAKEN_OVER, f"receiver session {claim.by:08x} takes over on purpose")
+        return self.rejoin(Why.TAKEN_OVER, replace(ASKED, session=claim.by))
 
     def _on_welcome(self, welcome: Welcome) -> list[Frame]:
         newer = welcome.session == self.session_number and welcome.epoch > self.epoch
@@ -262,7 +262,7 @@ class TransmitterSession:
         farewell: list[Frame] = []
         if successor is not None and welcome.session != self.session_number:
             self.counts["take_overs"] += 1
-            farewell = [Bye(self.session_number, "another receiver has taken the flight over")]
+            farewell = [Bye(self.session_number, Ending.TAKEN_OVER)]
         self._claims.settle()
         self.session_number = welcome.session
         self.epoch = welcome.epoch
@@ -276,28 +276,31 @@ class TransmitterSession:
         begins_ns = state.sample * self.terms.sample_ns
         self._recorder.write(EPOCH_CHANNEL, begins_ns, epoch_row(self.epoch, state, hold))
         self.counts["rejoins"] += again
-        text = f"session {welcome.session:08x}, epoch {welcome.epoch}, begins at sample {state.sample}"
-        self._tell(EventKind.REJOIN if again else EventKind.STARTED, text)
+        kind = EventKind.REJOIN if again else EventKind.STARTED
+        self._tell(Event(kind, state.sample, session=welcome.session, epoch=welcome.epoch))
         return farewell
 
     def _on_refuse(self, refuse: Refuse) -> list[Frame]:
         if self.phase not in (Phase.GREETING, Phase.REJOINING):
             return []
-        if self._claims.successor(self._tick) is not None:
+        refused = Event(EventKind.REFUSED, cause=refuse.ending, by_peer=True)
+        successor = self._claims.successor(self._tick)
+        if successor is not None:
             # The present receiver has been asked too, and goes on instead.
             self._claims.settle()
-            self._tell(EventKind.REFUSED, f"the receiver that takes over refused: {refuse.reason}")
+            self._tell(replace(refused, session=successor, detail=refuse.text))
             return []
         if self.phase is Phase.REJOINING and not self._asking.is_refused():
             return []
-        lines = [refuse.reason]
+        lines = [refuse.text] if refuse.text else []
         if refuse.config and refuse.config != self.identity.config:
             lines += differing_fields(self.identity.config, refuse.config)
-        self.refusal = shown("\n  ".join(lines))
-        self._tell(EventKind.REFUSED, self.refusal)
+        refusal = End(refuse.ending, shown("\n  ".join(lines)), by_peer=True)
+        self.refusal = refusal
+        self._tell(replace(refused, detail=refusal.text))
         if self.phase is Phase.REJOINING:
-            self._end(f"the receiver refused to go on: {refuse.reason}")
-        return [Bye(0, self.refusal)]
+            self._end(refusal)
+        return [Bye(0, refusal.ending, refusal.text)]
 
     def _on_commands(self, frame: Commands) -> list[Frame]:
         if frame.echoes[-1].sample < self.copies.confirmed.sample:
@@ -319,7 +322,7 @@ class TransmitterSession:
     def _check_gap(self) -> list[Frame]:
         if not self._echoes.is_lost(expected := self.copies.confirmed.sample, self._tick):
             return []
-        return self.rejoin(Why.GAP, f"the echo of sample {expected} never came, nor a repetition of it")
+        return self.rejoin(Why.GAP, replace(ASKED, sample=expected))
 
     def _confirm(self, echo: Echo) -> list[Frame]:
         """Advance the confirmed copy by one echo; return the report of a desync, if it is one."""
@@ -347,17 +350,16 @@ class TransmitterSession:
         state = self.codec.pack(done.flown.state)
         digests = (done.digest, done.peer_digest)
         self.desync = Desync(self.session_number, self.epoch, done.sample, *digests, state)
-        self._tell(EventKind.DESYNC, difference_text(self.desync), done.sample)
+        self._tell(difference_event(self.desync))
         write_failure(self._recorder, self.terms, self.history, self.desync, b"")
-        text = "the two copies of the codec disagree"
         if self._stop_on_desync:
-            return [self.desync, *self.bye(text)]
-        return self.rejoin(Why.DESYNC, text)
+            return [self.desync, *self.bye(End(Ending.DESYNC))]
+        return self.rejoin(Why.DESYNC, replace(ASKED, sample=done.sample))
 
     def _on_diverged(self, error: Exception) -> list[Frame]:
         """Ask for another state: the receiver flies on from its own, so this one is not the same."""
         self.counts["diverged"] += 1
-        return self.rejoin(Why.LAG, f"this end's copy of the codec cannot go on ({error!r})")
+        return self.rejoin(Why.LAG, replace(ASKED, detail=repr(error)))
 
     # Reports
 
@@ -384,15 +386,15 @@ class TransmitterSession:
     def _has_session(self) -> bool:
         return self.phase in (Phase.FLYING, Phase.REJOINING)
 
-    def _end(self, reason: str) -> None:
+    def _end(self, end: End) -> None:
         if self.phase is not Phase.ENDED:
             self.phase = Phase.ENDED
-            self.end_reason = reason
-            self._tell(EventKind.ENDED, reason)
+            self.end = end
+            self._tell(ended_event(end))
 
-    def _tell(self, kind: EventKind, text: str, sample: int | None = None) -> None:
+    def _tell(self, event: Event) -> None:
         now_ns = self._tick * self.terms.tick_ns
-        at = self.copies.confirmed.sample if sample is None else sample
-        event = Event(kind, now_ns, at, text)
+        at = self.copies.confirmed.sample if event.sample is None else event.sample
+        event = replace(event, time_ns=now_ns, sample=at)
         self.events.append(event)
-        self._recorder.write(EVENT_CHANNEL, now_ns, event_row(event))
+        write_event(self._recorder, event)

@@ -10,7 +10,7 @@ const SIGNS = { waiting: "M12 7v6M12 16.5v.5", silent: "M7 12h10", lockstep: "M7
 const at = (id) => document.getElementById(id);
 const memory = { heads: {}, points: [], decisions: [], samples: new Map(), events: [] };
 let ink = colours();
-let connected = false, heardAt = 0, everHeard = false, brokenAt = -1e9, brokenText = "", broken = null, mended = "", asked = false, dirty = true, tapeDirty = true;
+let connected = false, heardAt = 0, everHeard = false, brokenAt = -1e9, broken = null, mended = "", asked = false, dirty = true, tapeDirty = true;
 
 // ---- the stream
 
@@ -29,7 +29,7 @@ function take(news) {
   if (news.reset) {
     Object.assign(memory, { heads: {}, points: [], decisions: [], events: [] });
     memory.samples.clear();
-    mended = ""; brokenAt = -1e9;
+    mended = ""; brokenAt = -1e9; broken = null;
   }
   Object.assign(memory.heads, news.heads);
   memory.points.push(...news.points);
@@ -44,26 +44,28 @@ function take(news) {
 }
 
 function happened(event, old) {
-  const [role, time, kind, text] = event;
+  const { role, kind } = event;
   if (role === "transmitter" && kind === "desync") {
     if (!old) brokenAt = performance.now();
-    brokenText = text.split(": transmitter")[0];
-    broken = text.match(/transmitter ([0-9a-f]{16}), receiver ([0-9a-f]{16})/);
-    memory.brokenTime = time;
+    broken = event;
     mended = "";
   }
-  if (role === "transmitter" && kind === "rejoin" && text.startsWith("session") && memory.brokenTime !== undefined) {
-    const sample = text.match(/sample (\d+)/)?.[1];
-    const was = brokenText.match(/sample (\d+)/)?.[1];
-    mended = `broken after sample ${was}, at ${memory.brokenTime.toFixed(1)} s; equal again from sample ${sample}`;
+  if (role === "transmitter" && kind === "rejoin" && broken) {
+    mended = `broken after sample ${broken.sample}, at ${broken.time_s.toFixed(1)} s; equal again from sample ${event.sample}`;
   }
   // Left out: what the tape shows, what passes by itself, and what the other end has told already.
-  if (kind === "erased" || kind === "late_symbol" || text === "guard holding") return;
+  if (kind === "erased" || kind === "late_symbol" || event.state === "holding") return;
   if (role === "receiver" && ["desync", "rejoin", "ended"].includes(kind)) return;
   const last = memory.events[0];
-  if (last && last[2] === kind && last[3] === text) return;
+  if (last && same(last, event)) return;
   memory.events.unshift(event);
   memory.events.length = Math.min(memory.events.length, EVENTS_SHOWN);
+}
+
+// Repetitions of one event differ in their time and sample alone.
+function same(one, other) {
+  const names = new Set([...Object.keys(one), ...Object.keys(other)]);
+  return [...names].every((name) => ["time_s", "sample", "text"].includes(name) || one[name] === other[name]);
 }
 
 // ---- the picture
@@ -111,14 +113,18 @@ function state(now) {
   if (!head) return ["waiting", "Waiting", "for a sensor node"];
   const silent = now - heardAt > STALE_MS;
   if (silent && head.phase !== "ended") return ["silent", "Not known", "nothing is heard of this flight"];
-  if (now - brokenAt < BROKEN_SHOWN_MS) return ["broken", "Lockstep broken", brokenText];
-  if (head.phase.startsWith("asking")) return ["rejoining", "Finding a common state", `epoch ${head.epoch} is over; no bit counts until both ends have started anew`];
+  if (now - brokenAt < BROKEN_SHOWN_MS) return ["broken", "Lockstep broken", brokenText()];
+  if (head.phase === "rejoining") return ["rejoining", "Finding a common state", `epoch ${head.epoch} is over; no bit counts until both ends have started anew`];
   if (head.phase === "ended") return ["waiting", "The flight is over", `${head.counts.digest_checks} digests compared, ${head.counts.desyncs} differed`];
   const sample = lastCompared();
   if (!sample) return ["waiting", "Waiting", "for the first digests"];
-  if (sample[3] !== sample[4]) return ["broken", "Lockstep broken", brokenText];
+  if (sample[3] !== sample[4]) return ["broken", "Lockstep broken", brokenText()];
   const text = mended || `${head.counts.digest_checks} digests compared, ${head.counts.desyncs} differed`;
   return ["lockstep", "In lockstep", text];
+}
+
+function brokenText() {
+  return broken ? `the codecs differ after sample ${broken.sample}` : "";
 }
 
 function lastCompared() {
@@ -137,7 +143,7 @@ function showLight(now) {
   set("light-title", title);
   set("light-text", text);
   if (name === "broken") {
-    if (broken) { set("digest-up", broken[1]); set("digest-down", broken[2]); return; }
+    if (broken) { set("digest-up", broken.transmitter_digest); set("digest-down", broken.receiver_digest); return; }
   }
   const sample = lastCompared();
   set("digest-up", sample ? sample[3] : "–");
@@ -167,7 +173,7 @@ function showText(now) {
     set("f-error", degrees(point[1] - point[2], 2));
     set("f-range", degrees(point[3], 2).slice(1));
   }
-  const rows = memory.events.map(([role, time, kind, text]) =>
+  const rows = memory.events.map(({ role, time_s: time, kind, text }) =>
     [role === "transmitter" ? "sensor" : "controller", time, kind === "desync" || kind === "refused", text]);
   const key = JSON.stringify(rows);
   if (rows.length && at("events").dataset.key !== key) {

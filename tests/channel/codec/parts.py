@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import replace
 
 from channel.codec.codec import Codec, Vector
@@ -11,7 +10,6 @@ from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
 from channel.codec.models.pitch import PitchModel, PitchParameters
 from channel.protocol.identity import Identity, numerics_probe
 from channel.protocol.limits import CommandLimits
-from channel.protocol.recording import RecordChannel
 from channel.protocol.terms import Terms
 
 TICK_S = 0.01
@@ -64,18 +62,3 @@ class ConstantController:
 
     def reference_rad(self, tick: int) -> float | None:
         return None
-
-
-class ListRecorder:
-    """Keeps every row in memory, by topic."""
-
-    def __init__(self) -> None:
-        self.rows: dict[str, list[dict[str, object]]] = {}
-
-    def write(self, channel: RecordChannel, time_ns: int, row: Sequence[object]) -> None:
-        names = [field.name for field in channel.fields]
-        named = dict(zip(names, row, strict=True))
-        self.rows.setdefault(channel.topic, []).append(named)
-
-    def column(self, topic: str, name: str) -> list[object]:
-        return [row[name] for row in self.rows.get(topic, [])]

@@ -20,6 +20,7 @@ from channel.line.virtual import (
     is_envelope,
 )
 from channel.protocol import wire
+from channel.protocol.endings import Ending
 from channel.protocol.frames import Bye
 
 SEED = 20240616
@@ -57,7 +58,7 @@ def test_when_a_frame_as_long_as_any_travels_in_an_envelope_then_it_comes_back()
 
 
 def test_when_a_plain_frame_comes_then_it_is_no_envelope() -> None:
-    data = wire.encode(Bye(1, "done"))
+    data = wire.encode(Bye(1, Ending.OVER, "done"))
     assert wire.WIRE_VERSION != MAGIC
     assert not is_envelope(data)
     assert not is_envelope(b"")

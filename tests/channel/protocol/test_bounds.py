@@ -20,7 +20,8 @@ from channel.protocol.bounds import (
     shown,
     within_text_bounds,
 )
-from channel.protocol.events import EventKind
+from channel.protocol.endings import Ending
+from channel.protocol.events import Dropped, Event, EventKind
 from channel.protocol.frames import Bye, Commands, Desync, Echo, Hello, Refuse, Symbol, Welcome
 from tests.channel.codec.parts import pitch_codec, terms
 from tests.golden.regenerate import GOLDEN_CODECS
@@ -141,12 +142,12 @@ def test_when_symbols_requests_and_reports_are_out_of_bounds_then_it_is_said() -
 
 def test_when_a_frame_is_dropped_then_it_is_counted_and_told() -> None:
     counts: Counter[str] = Counter()
-    told: list[tuple[EventKind, str]] = []
-    ours = Bounds(CODEC, TERMS, counts, lambda kind, text: told.append((kind, text)))
+    told: list[Event] = []
+    ours = Bounds(CODEC, TERMS, counts, told.append)
     assert not ours.drops(None)
     assert ours.drops("too much")
     assert counts == {COUNTER: 1}
-    assert told == [(EventKind.STALE, "dropped a frame that is out of bounds: too much")]
+    assert told == [Event(EventKind.STALE, cause=Dropped.OUT_OF_BOUNDS, detail="too much")]
 
 
 @pytest.mark.parametrize("name", GOLDEN_CODECS)
@@ -184,10 +185,10 @@ def test_when_a_coder_cannot_be_in_a_state_then_it_says_so(name: str, coder: tup
 def test_when_a_text_would_steer_a_terminal_or_fill_a_frame_then_it_is_cut_and_made_harmless() -> None:
     assert shown("the line\nis cut: 3 \u00b5s") == "the line\nis cut: 3 \u00b5s"
     assert shown("\x1b]0;mine\x07 \u202e") == "?]0;mine? ?"
-    long = within_text_bounds(Bye(7, "\U0001f681" * 4000))
+    long = within_text_bounds(Bye(7, Ending.OVER, "\U0001f681" * 4000))
     assert isinstance(long, Bye)
-    assert len(long.reason) == TEXT_CHARACTERS_MAX
+    assert len(long.text) == TEXT_CHARACTERS_MAX
     # A receiver that has ended quotes the reason to whoever asks.
-    wire.encode(Refuse(5, f"this receiver has ended: {long.reason}", ""))
-    refuse = within_text_bounds(Refuse(5, "\x9b2J", "{}"))
-    assert refuse == Refuse(5, "?2J", "{}")
+    wire.encode(Refuse(5, Ending.ALREADY_ENDED, long.text, ""))
+    refuse = within_text_bounds(Refuse(5, Ending.BUSY, "\x9b2J", "{}"))
+    assert refuse == Refuse(5, Ending.BUSY, "?2J", "{}")

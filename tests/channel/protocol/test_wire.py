@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from channel.errors import FrameError
 from channel.protocol import wire
+from channel.protocol.endings import Ending
 from channel.protocol.frames import (
     Bye,
     Commands,
@@ -35,6 +36,8 @@ u16 = st.integers(0, 2**16 - 1)
 u32 = st.integers(0, 2**32 - 1)
 u64 = st.integers(0, 2**64 - 1)
 texts = st.text(max_size=200)
+endings = u8.map(Ending)
+"""those of later versions too"""
 sixteen_bytes = st.binary(min_size=16, max_size=16)
 eight_bytes = st.binary(min_size=8, max_size=8)
 
@@ -59,11 +62,11 @@ def commands(draw: st.DrawFn) -> Commands:
 frames = st.one_of(
     st.builds(Hello, u32, texts, sixteen_bytes, eight_bytes),
     st.builds(Welcome, u32, u16, u32, u32),
-    st.builds(Refuse, u32, texts, texts),
+    st.builds(Refuse, u32, endings, texts, texts),
     st.builds(Symbol, u32, u16, u32, u8),
     commands(),
     st.builds(Desync, u32, u16, u32, u64, u64, st.binary(max_size=300)),
-    st.builds(Bye, u32, texts),
+    st.builds(Bye, u32, endings, texts),
 )
 
 
@@ -85,9 +88,16 @@ def test_when_the_pinned_bytes_are_decoded_then_they_are_the_examples() -> None:
     }  # fmt: skip
 
 
+def test_when_an_ending_is_of_a_later_version_then_its_number_is_kept() -> None:
+    frame = wire.decode(wire.encode(Bye(1, Ending(200), "for people")))
+    assert isinstance(frame, Bye)
+    assert (frame.ending.value, frame.ending.name) == (200, "UNKNOWN_200")
+    assert frame.ending not in list(Ending)
+
+
 def test_when_a_symbol_is_encoded_then_it_takes_fifteen_bytes_in_the_stated_order() -> None:
     data = wire.encode(Symbol(0x01020304, 5, 6, 1))
-    assert data[:-2] == bytes.fromhex("01 04 04030201 0500 06000000 01")
+    assert data[:-2] == bytes.fromhex("02 04 04030201 0500 06000000 01")
     assert int.from_bytes(data[-2:], "little") == crc_hqx(data[:-2], 0xFFFF)
 
 
@@ -95,7 +105,7 @@ def test_when_the_checksum_is_computed_then_it_is_ccitt_false() -> None:
     assert crc_hqx(b"123456789", wire.CRC_START) == 0x29B1
 
 
-@pytest.mark.parametrize("version", [0, 2, 0xF5, 255])
+@pytest.mark.parametrize("version", [0, 1, 0xF5, 255])
 def test_when_a_whole_frame_is_of_another_version_then_it_is_told_and_not_read(version: int) -> None:
     message = bytes((version,)) + b"whatever follows, 20 bytes or so"
     data = message + crc_hqx(message, 0xFFFF).to_bytes(2, "little")
@@ -113,9 +123,9 @@ def test_when_a_whole_frame_is_of_another_version_then_it_is_told_and_not_read(v
         Symbol(0, 0, 0, 256),
         Symbol(0, 0, -1, 0),
         Welcome(0, 0, 2**32, 0),
-        Bye(0, "x" * 70_000),
-        Bye(0, "x" * 16_383),
-        Bye(0, "\ud800"),
+        Bye(0, Ending.OVER, "x" * 70_000),
+        Bye(0, Ending.OVER, "x" * 16_383),
+        Bye(0, Ending.OVER, "\ud800"),
         Commands(0, 0, (Echo(0, 0, 0, (32768,)),)),
         Commands(0, 0, (Echo(0, 0, 2**64, ()),)),
         Commands(0, 0, tuple(Echo(sample, 0, 0, ()) for sample in range(256))),
@@ -149,8 +159,8 @@ def test_when_a_frame_would_not_come_back_as_it_is_then_encoding_refuses(frame: 
 
 
 def test_when_the_longest_frame_is_encoded_then_it_is_decoded_and_one_byte_more_is_not() -> None:
-    room = wire.FRAME_BYTES_MAX - len(wire.encode(Bye(0, "")))
-    longest = Bye(0, "x" * room)
+    room = wire.FRAME_BYTES_MAX - len(wire.encode(Bye(0, Ending.OVER, "")))
+    longest = Bye(0, Ending.OVER, "x" * room)
     assert wire.decode(wire.encode(longest)) == longest
     with pytest.raises(ValueError, match="at most 16384 bytes"):
-        wire.encode(Bye(0, "x" * (room + 1)))
+        wire.encode(Bye(0, Ending.OVER, "x" * (room + 1)))

@@ -133,11 +133,11 @@ def test_when_the_kind_is_unknown_then_it_is_named(kind: int) -> None:
 @pytest.mark.parametrize(
     ("kind", "body", "text"),
     [
-        (7, b"\x0a\x00abc", "truncated text: 3 of 10 bytes"),
-        (7, b"\x02\x00abc", "1 bytes too many"),
+        (7, b"\x01\x0a\x00abc", "truncated text: 3 of 10 bytes"),
+        (7, b"\x01\x02\x00abc", "1 bytes too many"),
         (1, bytes(37) + b"\x05\x00ab", "truncated text"),
-        (3, bytes(4) + b"\x01\x00a" + b"\xff\xff", "truncated text"),
-        (3, bytes(4) + b"\x01\x00a" + b"\x00\x00" + b"x", "1 bytes too many"),
+        (3, bytes(5) + b"\x01\x00a" + b"\xff\xff", "truncated text"),
+        (3, bytes(5) + b"\x01\x00a" + b"\x00\x00" + b"x", "1 bytes too many"),
         (5, bytes(5), "malformed commands: 0 echoes"),
         (5, bytes(4) + b"\x02" + bytes(20), "malformed commands: 2 echoes"),  # sample -1
         (5, bytes(4) + b"\x01" + bytes(11), "malformed commands"),  # half a voltage
@@ -145,7 +145,7 @@ def test_when_the_kind_is_unknown_then_it_is_named(kind: int) -> None:
         (5, b"\xff" * 4 + b"\x03" + bytes(31), "malformed commands"),  # unequal echoes
         (4, bytes(4), "malformed frame of kind 4"),
         (4, bytes(6), "malformed frame of kind 4"),
-        (7, b"\x01\x00\xff", "malformed frame of kind 7"),
+        (7, b"\x01\x01\x00\xff", "malformed frame of kind 7"),
     ],
 )
 def test_when_a_length_lies_then_the_refusal_says_how(kind: int, body: bytes, text: str) -> None:

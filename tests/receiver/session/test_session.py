@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from channel.protocol import wire
+from channel.protocol.endings import End, Ending
 from channel.protocol.events import EventKind
 from channel.protocol.frames import (
     Bye,
@@ -70,9 +71,9 @@ def test_when_the_ends_differ_then_it_is_refused_and_said_in_what(
     assert answer.incarnation == PEER
     assert answer.config == IDENTITY.config
     for word in words:
-        assert word in answer.reason
+        assert word in answer.text
     assert session.phase is Phase.WAITING
-    assert session.refusal == answer.reason
+    assert session.refusal == End(Ending.MISMATCH, answer.text)
     assert session.counts["refused_hellos"] == 1
     assert kinds(session) == [EventKind.REFUSED]
     assert session.on_frame(symbol(0), 0) == []
@@ -82,16 +83,17 @@ def test_when_the_ends_differ_then_it_is_refused_and_said_in_what(
 def test_when_a_refused_transmitter_explains_itself_then_the_session_ends_with_both_views() -> None:
     session = receiver()
     session.on_frame(hello(version="2.0"), 0)
-    session.on_frame(Bye(0, "rate_baud: here 20, there 10"), 0)
+    session.on_frame(Bye(0, Ending.OVER, "rate_baud: here 20, there 10"), 0)
     assert session.phase is Phase.ENDED
-    assert "versions differ" in str(session.refusal)
-    assert "rate_baud: here 20, there 10" in str(session.refusal)
+    assert session.refusal is not None
+    assert "versions differ" in session.refusal.text
+    assert session.refusal.answer == "rate_baud: here 20, there 10"
 
 
 def test_when_the_transmitter_speaks_another_wire_version_then_both_are_named() -> None:
     session = receiver()
     assert session.on_frame(ForeignVersion(9), 0) == []
-    assert "wire version 9, this end 1" in str(session.refusal)
+    assert "wire version 9, this end 2" in str(session.refusal)
     assert session.phase is Phase.WAITING
 
 
@@ -102,7 +104,7 @@ def test_when_a_second_transmitter_greets_then_it_is_refused_once_the_first_is_h
     for slot in (1, 2, 3):
         assert word_numbers(session.on_frame(symbol(slot), 100 * slot * MS)) == [1]
     (answer,) = session.on_frame(hello(PEER + 1), 310 * MS)
-    assert answer == Refuse(PEER + 1, "this receiver is flying with another", "")
+    assert answer == Refuse(PEER + 1, Ending.BUSY, "", "")
     assert session.phase is Phase.FLYING
     assert session.refusal is None
     assert session.epoch == 0
@@ -112,7 +114,7 @@ def test_when_a_second_transmitter_greets_then_it_is_refused_once_the_first_is_h
 def test_when_a_second_transmitter_leaves_then_the_flight_goes_on() -> None:
     session = flying()
     session.on_frame(hello(PEER + 1), 0)
-    session.on_frame(Bye(0, "this receiver is flying with another"), 0)
+    session.on_frame(Bye(0, Ending.OVER, "this receiver is flying with another"), 0)
     assert session.phase is Phase.FLYING
 
 
@@ -136,10 +138,10 @@ def test_when_a_foreign_version_text_is_long_then_the_refusal_can_still_be_sent(
 
 def test_when_the_session_has_ended_then_a_greeting_is_refused_with_the_reason() -> None:
     session = flying()
-    session.bye("landed")
+    session.bye(End(Ending.OVER, "landed"))
     (answer,) = session.on_frame(hello(PEER + 1), 0)
     assert isinstance(answer, Refuse)
-    assert "landed" in answer.reason
+    assert (answer.ending, answer.text) == (Ending.ALREADY_ENDED, "landed")
 
 
 # Ends
@@ -155,17 +157,16 @@ def test_when_the_transmitter_reports_a_desync_then_both_digests_are_told_and_it
     assert session.phase is Phase.FLYING
     assert session.counts["desyncs"] == 1
     (event,) = [event for event in session.events if event.kind is EventKind.DESYNC]
-    assert "0000000000000abc" in event.text
-    assert "0000000000000def" in event.text
+    assert (event.transmitter_digest, event.receiver_digest) == (0xABC, 0xDEF)
 
 
 def test_when_the_transmitter_says_bye_then_the_flight_ends_with_its_reason() -> None:
     session = flying()
-    session.on_frame(Bye(SESSION + 1, "not me"), 0)
+    session.on_frame(Bye(SESSION + 1, Ending.OVER, "not me"), 0)
     assert session.phase is Phase.FLYING
-    session.on_frame(Bye(SESSION, "landed"), 0)
+    session.on_frame(Bye(SESSION, Ending.OVER, "landed"), 0)
     assert session.phase is Phase.ENDED
-    assert "landed" in session.end_reason
+    assert session.end == End(Ending.OVER, "landed", by_peer=True)
 
 
 def test_when_bytes_are_no_frame_then_it_is_counted_and_told() -> None:
@@ -181,4 +182,4 @@ def test_when_an_identity_is_compared_then_the_configuration_comes_first() -> No
     message = Hello(1, other.version, other.config_digest, other.numerics_probe)
     (answer,) = session.on_frame(message, 0)
     assert isinstance(answer, Refuse)
-    assert "configuration" in answer.reason
+    assert "configuration" in answer.text

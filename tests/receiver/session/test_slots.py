@@ -7,6 +7,7 @@ import math
 import pytest
 
 from channel.codec.words import WIRE_ERASED
+from channel.protocol.endings import End, Ending
 from channel.protocol.events import EventKind
 from channel.protocol.frames import (
     Bye,
@@ -119,7 +120,8 @@ def test_when_a_slot_is_far_ahead_then_it_is_dropped_and_not_a_gap() -> None:
 
 
 @pytest.mark.parametrize(
-    "frame", [Welcome(SESSION, 0, 0, PEER), Refuse(PEER, "", ""), Commands(SESSION, 0, ())]
+    "frame",
+    [Welcome(SESSION, 0, 0, PEER), Refuse(PEER, Ending.MISMATCH, "", ""), Commands(SESSION, 0, ())],
 )
 def test_when_a_frame_goes_the_wrong_way_then_it_is_dropped_and_counted(frame: Frame) -> None:
     session = flying()
@@ -173,10 +175,10 @@ def test_when_time_has_passed_over_several_deadlines_then_each_slot_is_erased() 
 def test_when_the_session_has_ended_then_there_is_no_deadline() -> None:
     session = flying()
     session.on_frame(symbol(0), 0)
-    assert session.bye("enough") == [Bye(SESSION, "enough")]
+    assert session.bye(End(Ending.OVER, "enough")) == [Bye(SESSION, Ending.OVER, "enough")]
     assert session.next_deadline() is None
     assert session.on_deadline(10**12) == []
-    assert session.bye("again") == []
+    assert session.bye(End(Ending.OVER, "again")) == []
 
 
 # Words of two symbols

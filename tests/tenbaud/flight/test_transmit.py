@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from channel.links.memory import memory_pair
+from channel.protocol.endings import End, Ending
 from channel.protocol.wire import DATAGRAM
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build.ends import build_receiver
@@ -17,7 +17,7 @@ from tenbaud.build.transmitter_run import TransmitterRun
 from tenbaud.config.load import load_config
 from tenbaud.flight import receive, transmit
 from tenbaud.flight.outcome import ExitCode, Outcome
-from transmitter.node import STOPPED
+from tests.channel.links.memory_pair import memory_pair
 from transmitter.session.session import Phase
 
 SECONDS = 2.0
@@ -70,18 +70,22 @@ def test_when_the_last_echo_differs_then_the_flight_is_a_desync(on_desync: str) 
     outcome, endpoint = fly_virtual(on_desync=on_desync)
     assert outcome.code is ExitCode.DESYNC
     assert f"differ after sample {LAST_SAMPLE}" in outcome.text
-    assert on_desync == "stop" or endpoint.session.end_reason.endswith(outcome.text)
+    told = End(Ending.DESYNC, outcome.text, by_peer=True)
+    assert on_desync == "stop" or endpoint.session.end == told
 
 
 def test_when_the_last_echo_differs_on_the_real_clock_then_the_flight_is_a_desync() -> None:
     endpoint = spoilt_receiver("real")
     outcome = fly_real(endpoint, lambda _: False)
     assert outcome.code is ExitCode.DESYNC
-    assert f"differ after sample {LAST_SAMPLE}" in endpoint.session.end_reason
+    end = endpoint.session.end
+    assert end is not None
+    assert end.ending is Ending.DESYNC
+    assert f"differ after sample {LAST_SAMPLE}" in end.text
 
 
 def test_when_it_is_stopped_as_the_welcome_arrives_then_the_receiver_is_told() -> None:
     endpoint = build_receiver(agreement_on("real"), None, DATAGRAM)
     outcome = fly_real(endpoint, lambda run: run.node.session.phase is Phase.FLYING)
     assert outcome.code is ExitCode.INTERRUPTED
-    assert endpoint.session.end_reason.endswith(STOPPED)
+    assert endpoint.session.end == End(Ending.STOPPED, by_peer=True)

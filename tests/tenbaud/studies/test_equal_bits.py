@@ -14,9 +14,10 @@ import pytest
 from channel.codec.codec import CodecState
 from channel.codec.numerics import sin
 from channel.protocol.wire import DATAGRAM
-from tenbaud.build.codec import CODERS, MODELS
+from tenbaud import MemoryRecorder
 from tenbaud.build.ends import build_receiver
 from tenbaud.build.flight import agree
+from tenbaud.config.kinds import CODERS, MODELS
 from tenbaud.config.load import load_config
 from tenbaud.config.schema import FlightConfig
 from tenbaud.flight import transmit
@@ -25,7 +26,6 @@ from tenbaud.studies.compiled import compiled
 from tenbaud.studies.flights import CompiledPoint
 from tenbaud.studies.plain import fly_plain
 from tenbaud.studies.schedule import Uncommon
-from tests.channel.codec.parts import ListRecorder
 from transmitter.session.records import SAMPLE_CHANNEL
 
 PRESETS = ("paper-10baud", "tuned-20baud", "timed-10baud", "static-10baud", "usual-1000baud")
@@ -60,7 +60,7 @@ def config_of(preset: str, changes: dict[str, Any]) -> FlightConfig:
 def digests_of(config: FlightConfig) -> list[str]:
     """Return the digest of the transmitter's copy after each sample of an ordinary flight."""
     agreement = agree(config, "virtual")
-    recorder = ListRecorder()
+    recorder = MemoryRecorder()
     run = transmit.prepare(agreement, recorder, DATAGRAM)
     transmit.fly_virtual(run, build_receiver(agreement, None, DATAGRAM), lambda: False)
     return [str(value) for value in recorder.column(SAMPLE_CHANNEL.topic, "digest")]
@@ -97,8 +97,8 @@ def test_when_a_flight_is_compiled_then_no_bit_differs(preset: str, changes: dic
 def test_when_a_kind_of_model_or_coder_exists_then_a_preset_above_flies_it() -> None:
     configs = [load_config(preset) for preset in (*PRESETS, "fixed-10baud")]
     # A coder that is shown rates flies in a study as it does in the nodes, by their own sessions.
-    assert {config.coder.kind for config in configs} == set(CODERS) - {"history"}
-    assert {config.model.kind for config in configs} == set(MODELS)
+    assert {config.coder.kind for config in configs} == set(CODERS.built_in) - {"history"}
+    assert {config.model.kind for config in configs} == set(MODELS.built_in)
 
 
 def test_when_a_recorded_flight_is_compiled_then_no_figure_differs(tmp_path: Path) -> None:

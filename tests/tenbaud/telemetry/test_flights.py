@@ -16,6 +16,7 @@ from channel.links.endpoints import free_endpoint
 from tenbaud.recording.comparison import Verdict
 from tenbaud.recording.diff import compare_runs
 from tenbaud.recording.reader import Recording
+from tenbaud.sentences.events import event_text
 from tenbaud.telemetry.schema import TELEMETRY, ReceiverTelemetry, TransmitterTelemetry
 from tests.tenbaud.processes import Ended, finish, run, start
 
@@ -93,7 +94,7 @@ def watched(folder: Path, *arguments: str, transmitter: tuple[str, ...] = ()) ->
 
 def controls(path: Path) -> list[str]:
     rows = [row for _, row in Recording(path).rows("event")]
-    return [row["text"] for row in rows if row["kind"] == "control"]
+    return [event_text(row) for row in rows if row["kind"] == "control"]
 
 
 def test_when_a_flight_is_looked_at_then_every_message_keeps_to_the_schema(tmp_path: Path) -> None:

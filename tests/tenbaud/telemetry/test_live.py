@@ -7,16 +7,17 @@ from dataclasses import replace
 
 import pytest
 
-from channel.protocol.events import EventKind
+from channel.protocol.events import EventKind, event_fields
 from channel.protocol.wire import DATAGRAM
+from tenbaud import MemoryRecorder
 from tenbaud.build.ends import build_receiver
 from tenbaud.build.flight import agree
 from tenbaud.config.load import load_config
 from tenbaud.flight import transmit
 from tenbaud.flight.outcome import ExitCode
+from tenbaud.sentences.events import event_text
 from tenbaud.telemetry.commands import CommandQueue
 from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
-from tests.channel.codec.parts import ListRecorder
 
 
 @pytest.mark.parametrize("end", ["transmitter", "receiver"])
@@ -32,12 +33,14 @@ def test_when_a_field_is_to_be_spoilt_that_the_codec_lacks_then_it_is_told_and_t
         # The static coder has no state, hence no range.
         queue.offer(json.dumps({"kind": "spoil", "end": end, "field": "range"}).encode())
     run.node.at_tick = LiveTransmitter(run, queues[0], lambda: False).at_tick
-    live = LiveReceiver(endpoint, queues[1], lambda: False, ListRecorder(), None, "")
+    live = LiveReceiver(endpoint, queues[1], lambda: False, MemoryRecorder(), None, "")
     assert not live()
     outcome = transmit.fly_virtual(run, endpoint, lambda: False)
     assert outcome.code is ExitCode.OK, outcome.text
     assert run.desyncs_asked == 0
     session = run.node.session if end == "transmitter" else endpoint.session
-    told = [event.text for event in session.events if event.kind is EventKind.CONTROL]
+    told = [
+        event_text(event_fields(event)) for event in session.events if event.kind is EventKind.CONTROL
+    ]
     assert len(told) == 1
     assert told[0].endswith("coder state has 0 value(s): ignored")

@@ -9,9 +9,9 @@ import pytest
 
 from channel.errors import LinkError
 from channel.links.zenoh.telemetry import TelemetryPort
+from tenbaud import MemoryRecorder
 from tenbaud.telemetry.place import endpoint_for
 from tenbaud.telemetry.station import Station, Wish, open_station
-from tests.channel.codec.parts import ListRecorder
 from tests.tenbaud.room import agreement
 
 
@@ -23,7 +23,7 @@ class Silent:
 
 
 def station(wish: Wish) -> Station:
-    return open_station(agreement(), "receiver", ListRecorder(), wish)  # type: ignore[arg-type]
+    return open_station(agreement(), "receiver", MemoryRecorder(), wish)  # type: ignore[arg-type]
 
 
 def test_when_the_usual_place_is_taken_then_the_flight_goes_on_without(

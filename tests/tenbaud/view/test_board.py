@@ -17,16 +17,16 @@ def transmitter(number: int = 1, flight: int = 7, **more: Any) -> bytes:
         "sample": number, "word_sent": [1], "word": None, "digest": "aa", "peer_digest": "ab",
     }  # fmt: skip
     message = {
-        "version": 1, "role": "transmitter", "session": "lab", "flight": flight, "phase": "flying",
+        "version": 2, "role": "transmitter", "session": "lab", "flight": flight, "phase": "flying",
         "takes_commands": False, "points": [point], "samples": [sample],
-        "events": [{"time_s": 1.0, "kind": "erased", "sample": number, "text": "gone"}],
+        "events": [{"time_s": 1.0, "kind": "erased", "sample": number, "slot": number}],
     }  # fmt: skip
     return json.dumps({**message, **more}).encode()
 
 
 def receiver(number: int = 1, flight: int = 7, **more: Any) -> bytes:
     message = {
-        "version": 1, "role": "receiver", "session": "lab", "flight": flight, "phase": "flying",
+        "version": 2, "role": "receiver", "session": "lab", "flight": flight, "phase": "flying",
         "takes_commands": True, "events": [],
         "points": [{"time_s": number / 20, "reference_rad": 0.5, "live_rad": 0.1}],
         "samples": [{"sample": number, "word": [-1], "digest": "cc"}],
@@ -46,7 +46,9 @@ def test_both_ends_are_joined_by_sample() -> None:
     assert whole["samples"] == [[3, [1], None, "aa", "ab"]]
     assert whole["points"] == [[0.15, 0.11, 0.12, 0.05]]
     assert whole["decisions"] == [[0.15, 0.5]]
-    assert whole["events"] == [["transmitter", 1.0, "erased", "gone"]]
+    (event,) = whole["events"]
+    assert (event["role"], event["kind"], event["slot"]) == ("transmitter", "erased", event["sample"])
+    assert event["text"] == f"slot {event['slot']} is erased"
     assert set(whole["heads"]) == {"transmitter", "receiver"}
     assert "points" not in whole["heads"]["transmitter"]
     assert board.takes_commands
@@ -88,7 +90,7 @@ def test_without_news_there_is_none() -> None:
 
 def test_what_is_no_telemetry_is_counted_and_left() -> None:
     board = Board()
-    junk = [b"", b"[]", b"{}", b"\xff", transmitter(version=2), b'{"version":1,"role":"pilot"}']
+    junk = [b"", b"[]", b"{}", b"\xff", transmitter(version=1), b'{"version":2,"role":"pilot"}']
     junk += [transmitter(role="pilot"), transmitter(role=5)]
     assert not board.take(junk, 0.0)
     assert board.foreign == len(junk)

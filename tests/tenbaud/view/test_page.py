@@ -188,7 +188,7 @@ def test_the_gap_to_the_limit_is_shown_when_there_is_one(chromium: Any, tmp_path
 
     place = f"unixsock-stream/{tmp_path}/t.sock"
     message = {
-        "role": "transmitter", "version": 1, "session": "lab", "flight": 5, "number": 1,
+        "role": "transmitter", "version": 2, "session": "lab", "flight": 5, "number": 1,
         "phase": "flying", "clock": "real", "takes_commands": False, "time_s": 1.0, "epoch": 0,
         "impairments": "", "counts": {"erasures": 0, "desyncs": 0, "rejoins": 0, "digest_checks": 1},
         "events": [], "dropped": 0, "preset": "x", "tick_s": 0.01, "symbol_period_s": 0.1,

@@ -7,19 +7,19 @@ from typing import Any
 import pytest
 
 from channel.protocol.wire import DATAGRAM
+from tenbaud import MemoryRecorder
 from tenbaud.build.ends import build_receiver
 from tenbaud.build.flight import agree
 from tenbaud.config.load import load_config
 from tenbaud.flight import transmit
 from tenbaud.flight.summary import transmitter_part
-from tests.channel.codec.parts import ListRecorder
 from transmitter.metrics.gap import GAP_CHANNEL, MEMORY_S, GapGauge, Limit, Running, StrengthMeter
 
 
-def fly(preset: str, seconds: float = 60.0, **changed: Any) -> tuple[dict[str, Any], ListRecorder]:
+def fly(preset: str, seconds: float = 60.0, **changed: Any) -> tuple[dict[str, Any], MemoryRecorder]:
     """Fly in memory; return the transmitter's summary and what it recorded."""
     agreement = agree(load_config(preset, None, {"duration_s": seconds, **changed}), "virtual")
-    recorder = ListRecorder()
+    recorder = MemoryRecorder()
     run = transmit.prepare(agreement, recorder, DATAGRAM)
     outcome = transmit.fly_virtual(run, build_receiver(agreement, None, DATAGRAM), lambda: False)
     return transmitter_part(run, outcome), recorder

@@ -8,6 +8,8 @@ import struct
 
 import pytest
 
+from channel.protocol.endings import Ending
+from channel.protocol.events import ASKED
 from channel.protocol.frames import Echo, Hello, Refuse, Welcome, Why
 from channel.protocol.wire import encode
 from tests.transmitter.session.test_session import INCARNATION, SESSION, Far, flying, frame, transmitter
@@ -67,21 +69,21 @@ def test_when_the_digest_does_not_agree_then_the_commands_move_no_motor() -> Non
 def test_when_a_flight_is_refused_then_it_ends_at_the_third_refusal_of_a_request() -> None:
     session = rejoining()
     for _ in range(REFUSALS_BELIEVED - 1):
-        assert session.on_frame(Refuse(INCARNATION, "no", "")) == []
+        assert session.on_frame(Refuse(INCARNATION, Ending.MISMATCH, "no", "")) == []
     assert session.phase is Phase.REJOINING
     session.on_frame(Welcome(SESSION, 4, 101, INCARNATION, 1))
-    session.rejoin(Why.GUARD, "again")
+    session.rejoin(Why.GUARD, ASKED)
     for _ in range(REFUSALS_BELIEVED - 1):
-        session.on_frame(Refuse(INCARNATION, "no", ""))
+        session.on_frame(Refuse(INCARNATION, Ending.MISMATCH, "no", ""))
     assert session.phase is Phase.REJOINING
-    session.on_frame(Refuse(INCARNATION, "no", ""))
+    session.on_frame(Refuse(INCARNATION, Ending.MISMATCH, "no", ""))
     assert session.phase is Phase.ENDED
 
 
 def test_when_a_refusal_is_longer_than_a_frame_then_the_answer_still_fits_one() -> None:
     session = transmitter()
     theirs = json.dumps({f"field {number}": number for number in range(600)})
-    (answer,) = session.on_frame(Refuse(INCARNATION, "the configuration differs", theirs))
+    (answer,) = session.on_frame(Refuse(INCARNATION, Ending.MISMATCH, "differs", theirs))
     encode(answer)
 
 

@@ -10,6 +10,7 @@ import pytest
 from channel.codec.codec import Codec, CodecState, Vector
 from channel.codec.coders.zoom import ZoomCoder
 from channel.codec.words import ERASED, WIRE_ERASED, Word
+from channel.protocol.endings import End, Ending
 from channel.protocol.events import EventKind
 from channel.protocol.frames import (
     Bye,
@@ -93,7 +94,7 @@ def test_when_it_is_welcome_then_it_flies_in_that_session_and_epoch() -> None:
 def test_when_somebody_else_is_welcome_then_it_goes_on_waiting() -> None:
     session = transmitter()
     session.on_frame(Welcome(SESSION, 0, 0, INCARNATION + 1))
-    session.on_frame(Refuse(INCARNATION + 1, "no", ""))
+    session.on_frame(Refuse(INCARNATION + 1, Ending.MISMATCH, "no", ""))
     assert session.phase is Phase.GREETING
     assert session.refusal is None
     assert session.counts["stale_frames"] == 2
@@ -114,18 +115,18 @@ def test_when_it_has_not_been_welcomed_then_no_symbol_leaves() -> None:
 def test_when_it_is_refused_for_its_configuration_then_the_fields_are_named_to_both() -> None:
     session = transmitter()
     theirs = json.dumps({"rate_baud": 20.0})
-    (answer,) = session.on_frame(Refuse(INCARNATION, "the configuration differs", theirs))
+    (answer,) = session.on_frame(Refuse(INCARNATION, Ending.MISMATCH, "differs", theirs))
     assert isinstance(answer, Bye)
     assert answer.session == 0
-    assert "rate_baud: here 10.0, there 20.0" in answer.reason
-    assert session.refusal == answer.reason
+    assert "rate_baud: here 10.0, there 20.0" in answer.text
+    assert session.refusal == End(Ending.MISMATCH, answer.text, by_peer=True)
     assert session.phase is Phase.GREETING
 
 
 def test_when_the_receiver_speaks_another_wire_version_then_both_are_named() -> None:
     session = transmitter()
     session.on_frame(ForeignVersion(9))
-    assert "wire version 9, this end 1" in str(session.refusal)
+    assert "wire version 9, this end 2" in str(session.refusal)
 
 
 def test_when_a_frame_of_another_version_comes_in_flight_then_it_is_no_refusal() -> None:
@@ -207,7 +208,8 @@ def test_when_echoes_stay_away_then_slots_do_not_wait_until_a_rejoin_is_asked_fo
     for tick in range(640, 660):
         sent += session.on_measurement(tick, (1.0,))
     assert session.phase is Phase.REJOINING
-    assert f"no echo for {HISTORY_SAMPLES} samples" in session.events[-1].text
+    asked = session.events[-1]
+    assert (asked.kind, asked.cause, asked.number) == (EventKind.REJOIN_ASKED, Why.LAG, HISTORY_SAMPLES)
     symbols = [one for one in sent if isinstance(one, Symbol)]
     assert len(symbols) <= HISTORY_SAMPLES + 1
     requests = [one for one in sent if isinstance(one, Hello)]
@@ -271,7 +273,8 @@ def test_when_a_sample_was_not_repeated_often_enough_then_a_rejoin_is_asked_for(
     assert isinstance(request, Hello)
     assert (request.why, request.sample, request.session, request.epoch) == (Why.GAP, 4, SESSION, 3)
     assert session.phase is Phase.REJOINING
-    assert "the echo of sample 0 never came, nor a repetition of it" in session.events[-1].text
+    asked = session.events[-1]
+    assert (asked.kind, asked.cause, asked.sample) == (EventKind.REJOIN_ASKED, Why.GAP, 0)
 
 
 def test_when_a_symbol_was_lost_then_the_copy_follows_what_was_received() -> None:
@@ -335,8 +338,8 @@ def test_when_the_digests_differ_and_it_is_told_to_stop_then_it_reports_and_ends
     assert session.phase is Phase.ENDED
     assert session.counts["desyncs"] == 1
     (event,) = [event for event in session.events if event.kind is EventKind.DESYNC]
-    assert f"{echo.digest:016x}" in event.text
-    assert f"{echo.digest ^ 1:016x}" in event.text
+    assert (event.transmitter_digest, event.receiver_digest) == (echo.digest, echo.digest ^ 1)
+    assert goodbye.ending is Ending.DESYNC
     assert session.on_measurement(10, (1.0,)) == []
 
 
@@ -356,18 +359,19 @@ def test_when_several_digests_differ_in_one_frame_then_the_first_is_reported() -
 
 def test_when_either_side_says_bye_then_the_session_ends_once() -> None:
     session = flying()
-    assert session.on_frame(Bye(SESSION + 1, "not mine")) == []
+    assert session.on_frame(Bye(SESSION + 1, Ending.OVER, "not mine")) == []
     assert session.phase is Phase.FLYING
-    session.on_frame(Bye(SESSION, "tired"))
+    session.on_frame(Bye(SESSION, Ending.OVER, "tired"))
     assert session.phase is Phase.ENDED
-    assert "tired" in session.end_reason
-    assert session.bye("me too") == []
-    assert "tired" in session.end_reason
+    end = End(Ending.OVER, "tired", by_peer=True)
+    assert session.end == end
+    assert session.bye(End(Ending.OVER, "me too")) == []
+    assert session.end == end
 
 
 def test_when_it_says_bye_in_flight_then_the_receiver_is_told() -> None:
-    assert flying().bye("landed") == [Bye(SESSION, "landed")]
-    assert transmitter().bye("never flew") == []
+    assert flying().bye(End(Ending.OVER, "landed")) == [Bye(SESSION, Ending.OVER, "landed")]
+    assert transmitter().bye(End(Ending.OVER, "never flew")) == []
 
 
 def test_when_erasures_are_echoed_then_their_number_is_the_erased_one() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from channel.protocol.endings import Ending
 from channel.protocol.events import EventKind
 from channel.protocol.frames import (
     Bye,
@@ -50,7 +51,7 @@ def test_when_a_second_receiver_asks_then_it_is_refused_and_reported_and_the_fli
     (bye,) = answers
     assert isinstance(bye, Bye)
     assert bye.session == 0
-    assert "--take-over" in bye.reason
+    assert bye.ending is Ending.SECOND_RECEIVER
     assert node.session.phase is Phase.FLYING
     assert node.session.counts["rejoins"] == 0
     assert node.session.counts["claims_refused"] == 1
@@ -95,7 +96,7 @@ def test_when_a_receiver_takes_over_then_only_its_answer_counts_and_the_old_one_
     assert node.deliver(Welcome(SESSION, 1, 8, 5, hello.request)) == []
     assert node.session.phase is Phase.REJOINING
     (bye,) = node.deliver(Welcome(OTHER, 0, 8, 5, hello.request))
-    assert bye == Bye(SESSION, "another receiver has taken the flight over")
+    assert bye == Bye(SESSION, Ending.TAKEN_OVER)
     assert node.session.session_number == OTHER
     assert node.session.phase is Phase.FLYING
     assert node.session.counts["take_overs"] == 1
@@ -104,7 +105,7 @@ def test_when_a_receiver_takes_over_then_only_its_answer_counts_and_the_old_one_
 def test_when_the_new_receiver_refuses_then_the_old_one_goes_on() -> None:
     node = flying()
     hello = request_of(node.deliver(Claim(SESSION, 0, OTHER)))
-    assert node.deliver(Refuse(5, "another configuration", "")) == []
+    assert node.deliver(Refuse(5, Ending.MISMATCH, "another configuration", "")) == []
     assert node.session.phase is Phase.REJOINING
     assert node.deliver(Welcome(SESSION, 1, 8, 5, hello.request)) == []
     assert (node.session.session_number, node.session.epoch) == (SESSION, 1)

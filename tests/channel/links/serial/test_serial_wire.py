@@ -8,6 +8,7 @@ import pytest
 
 from channel.errors import FrameError
 from channel.links.serial.wire import SerialWire, stuff, stuff_notice, unstuff
+from channel.protocol.endings import Ending
 from channel.protocol.frames import Bye, ForeignVersion, ShortSymbol, Symbol
 from channel.protocol.wire import DATAGRAM, encode
 from tests.golden.regenerate import example_frames
@@ -110,7 +111,17 @@ def test_when_a_symbol_is_sized_then_it_is_one_byte() -> None:
 
 @pytest.mark.parametrize(
     "message",
-    [b"", b"\0", b"\x80", b"x", b"\xf3ab", b"\xf4ab", b"\xff" * 400, bytes(300), encode(Bye(1, "é"))],
+    [
+        b"",
+        b"\0",
+        b"\x80",
+        b"x",
+        b"\xf3ab",
+        b"\xf4ab",
+        b"\xff" * 400,
+        bytes(300),
+        encode(Bye(1, Ending.OVER, "é")),
+    ],
 )
 def test_when_any_message_is_stuffed_then_it_comes_back_and_no_code_looks_like_a_symbol(
     message: bytes,

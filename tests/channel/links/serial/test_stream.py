@@ -9,6 +9,7 @@ import pytest
 
 from channel.links.serial.stream import RUN, Deframer
 from channel.links.serial.wire import STUFFED_BYTES_MAX, SerialWire, stuff, stuff_notice
+from channel.protocol.endings import Ending
 from channel.protocol.frames import Bye, Commands, Echo, Hello, Symbol
 from channel.protocol.wire import encode
 
@@ -135,7 +136,7 @@ def noisy_stream(chooser: random.Random) -> bytes:
             piece = b"".join(symbols(slot, chooser.randrange(1, 9)))
             slot += 5
         elif kind < 6:
-            piece = stuff(chooser.choice((HELLO, COMMANDS, encode(Bye(9, "done")))))
+            piece = stuff(chooser.choice((HELLO, COMMANDS, encode(Bye(9, Ending.OVER, "done")))))
         elif kind == 6:
             piece = chooser.randbytes(chooser.randrange(1, 30))
         else:

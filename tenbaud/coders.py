@@ -1,0 +1,36 @@
+"""Coders: which word a measurement asks for, and what a word means at both ends.
+
+Each is built from its parameters, `coders.ZoomCoder(coders.ZoomParameters(window=3))`, and plugs into a
+`Codec`. A coder of your own is a class that fulfils the protocol `Coder`: it declares its symbols with
+an `Alphabet`, and is given `ERASED` for a word that did not arrive.
+"""
+
+from __future__ import annotations
+
+from channel.codec.codec import Coder, Vector
+from channel.codec.coders.history import HistoryCoder, HistoryParameters
+from channel.codec.coders.static import StaticCoder, StaticParameters
+from channel.codec.coders.timed import TimedCoder, TimedParameters
+from channel.codec.coders.words import WordsCoder, WordsParameters
+from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
+from channel.codec.plugin_context import CoderContext
+from channel.codec.words import ERASED, Alphabet, Word
+
+__all__ = [
+    "ERASED",
+    "Alphabet",
+    "Coder",
+    "CoderContext",
+    "HistoryCoder",
+    "HistoryParameters",
+    "StaticCoder",
+    "StaticParameters",
+    "TimedCoder",
+    "TimedParameters",
+    "Vector",
+    "Word",
+    "WordsCoder",
+    "WordsParameters",
+    "ZoomCoder",
+    "ZoomParameters",
+]

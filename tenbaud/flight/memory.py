@@ -1,0 +1,198 @@
+"""A flight from objects, both ends in this process, on the virtual clock: no configuration, no file."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+
+from channel.codec.codec import Codec, Vector
+from channel.errors import ConfigMismatch, LinkLost
+from channel.line.downlink import Downlink
+from channel.line.impairments import LineFaults
+from channel.line.line import CleanLine, Line
+from channel.line.uplink import Uplink
+from channel.protocol.endings import End, Ending
+from channel.protocol.identity import Identity, numerics_probe
+from channel.protocol.recording import Recorder
+from channel.protocol.terms import Terms
+from channel.protocol.wire import DATAGRAM, Wire
+from plant_sim.encoder import Encoder
+from plant_sim.plant import Plant
+from receiver.controllers.base import Controller
+from receiver.endpoint import ReceiverEndpoint
+from receiver.session.session import ReceiverSession
+from tenbaud.build.flight import software_version
+from tenbaud.build.liveness import round_trip, watchdog_ticks
+from tenbaud.build.parts import PartError, Parts, check_codec
+from tenbaud.flight.memory_result import FlightResult, result_of
+from tenbaud.recording.memory import MemoryRecorder
+from tenbaud.sentences.endings import end_text, refusal_text
+from tenbaud.sentences.events import guard_text
+from transmitter.endpoint import TransmitterEndpoint
+from transmitter.guard import Guard, GuardSettings
+from transmitter.loops.virtual import VirtualFlight
+from transmitter.metrics.scores import Scores
+from transmitter.node import TransmitterNode
+from transmitter.rigs.simulated import SimulatedRig
+from transmitter.session.session import Phase, TransmitterSession
+
+INCARNATION, SESSION_NUMBER = 1, 1
+"""Fixed: a process of its own would draw them, and a flight in memory is the same every time."""
+RAMP_TICKS = 50
+REARM_S = 10.0
+"""A guard that stopped for want of commands is armed again, by a rejoin, within this time: the plant is
+simulated and hurts nobody."""
+SPAN_SAMPLES = 2
+"""Samples beyond the history that an angle waits for its estimate."""
+
+
+class MemoryFlight:
+    """Both ends of one flight, from objects that fulfil the protocols of their parts.
+
+    `codec` and `terms` are what both ends share, `plant` is what is flown, and `controller` turns
+    estimates into commands. The plant and the controller move with the flight, so a MemoryFlight
+    flies once. PartError, naming the member, for an object that lacks something; ValueError for terms
+    that do not go with the codec.
+
+    `receiver_codec`: a codec of its own for the receiver, for studies of lost lockstep.
+    `uplink_line`, `downlink_line`: lines that delay, lose or change messages; clean ones without.
+    `encoder_counts_per_turn`: what each measured angle is rounded to.
+    `scored_from_s`: flight time at which `node.scores` begins to count errors.
+    `stop_on_desync`: end the flight at the first digest that differs, instead of a new epoch.
+    `recorder`, `receiver_recorder`: take every row of the transmitter and of the receiver as well.
+
+    The parts of the two ends are attributes, to be looked at before, during and after the flight.
+    """
+
+    def __init__(
+        self,
+        codec: Codec,
+        terms: Terms,
+        plant: Plant,
+        controller: Controller,
+        *,
+        receiver_codec: Codec | None = None,
+        uplink_line: Line | None = None,
+        downlink_line: Line | None = None,
+        encoder_counts_per_turn: int = 4096,
+        safe_volts: Vector | None = None,
+        scored_from_s: float = 0.0,
+        stop_on_desync: bool = False,
+        recorder: Recorder | None = None,
+        receiver_recorder: Recorder | None = None,
+        wire: Wire = DATAGRAM,
+    ) -> None:
+        _check(codec, terms, plant, controller)
+        self.codec = codec
+        self.terms = terms
+        self.plant = plant
+        self.controller = controller
+        self.transmitter_rows = MemoryRecorder(recorder)
+        self.receiver_rows = MemoryRecorder(receiver_recorder)
+        identity = Identity(
+            software_version(), json.dumps(asdict(terms), sort_keys=True), numerics_probe(codec)
+        )
+        self.transmitter = TransmitterSession(
+            codec, terms, identity, INCARNATION, self.transmitter_rows, stop_on_desync=stop_on_desync
+        )
+        self.receiver = ReceiverSession(
+            receiver_codec or codec, terms, controller, identity, SESSION_NUMBER, self.receiver_rows
+        )
+        uplink_line = uplink_line or CleanLine()
+        downlink_line = downlink_line or CleanLine()
+        up_ns = uplink_line.longest_delay_ns + terms.symbol_delay_ns
+        delay_ns = max(up_ns, downlink_line.longest_delay_ns)
+        self.node = self._node(
+            encoder_counts_per_turn, safe_volts, round(scored_from_s * 1e9), delay_ns
+        )
+        self.uplink = Uplink(terms, codec.coder.alphabet, uplink_line, wire)
+        self.endpoint = ReceiverEndpoint(self.receiver, Downlink(wire))
+        self.loop = VirtualFlight(
+            TransmitterEndpoint(self.node, self.uplink), downlink_line, self.endpoint
+        )
+        self._flown = False
+
+    def _node(
+        self, counts_per_turn: int, safe_volts: Vector | None, scored_from_ns: int, delay_ns: int
+    ) -> TransmitterNode:
+        terms = self.terms
+        if safe_volts is None:
+            safe_volts = (0.0,) * self.codec.model.input_size
+        trip = round_trip(terms, LineFaults(), "virtual")
+        timeout_ticks = watchdog_ticks(None, terms, trip) - (-delay_ns // terms.tick_ns)
+        return TransmitterNode(
+            self.transmitter,
+            SimulatedRig(
+                self.plant, tuple(Encoder(counts_per_turn) for _ in self.plant.measured_rad), safe_volts
+            ),
+            Guard(terms.limits, GuardSettings(timeout_ticks, RAMP_TICKS, safe_volts)),
+            Scores(
+                self.codec.model,
+                scored_from_ns // terms.tick_ns,
+                (terms.history_samples + SPAN_SAMPLES) * terms.ticks_per_sample,
+                self.controller.reference_rad,
+            ),
+            self.transmitter_rows,
+            round(REARM_S * 1e9) // terms.tick_ns,
+        )
+
+    def fly(self, seconds: float) -> FlightResult:
+        """Fly so many seconds of flight time; return everything that was seen at both ends.
+
+        A flight that ends before its time (the guard, a lost lockstep with `stop_on_desync`) returns
+        too: `ended_by` says why. Raises ConfigMismatch where the receiver refuses, and LinkLost where
+        no request for a session came through the line.
+        """
+        ticks = round(seconds * 1e9 / self.terms.tick_ns)
+        if ticks < 1:
+            raise ValueError(
+                f"seconds = {seconds:g} is less than one tick, {self.terms.tick_ns / 1e9:g} s"
+            )
+        if self._flown:
+            raise RuntimeError("a MemoryFlight flies once: make another, of a new plant and controller")
+        self._flown = True
+        self.loop.greet()
+        if self.transmitter.refusal is not None:
+            raise ConfigMismatch(f"the receiver refused: {refusal_text(self.transmitter.refusal)}")
+        if self.transmitter.phase is Phase.GREETING:
+            raise LinkLost("no request for a session came through the line")
+        flown = self.loop.run(ticks)
+        ended_by = "" if flown == ticks else self._ended_by()
+        end = End(Ending.OVER) if flown == ticks else self.transmitter.end or End(Ending.SAFETY_STOP)
+        self.loop.finish(lambda: end)
+        self.receiver.rest()
+        rows = (self.transmitter_rows, self.receiver_rows)
+        return result_of(
+            self.codec.model, self.terms, self.transmitter, self.receiver, rows, flown, ended_by
+        )
+
+    def _ended_by(self) -> str:
+        """Return what ended a flight before its time, for people."""
+        end = self.transmitter.end
+        return guard_text(self.node.guard.reason) if end is None else end_text(end, "receiver")
+
+
+def _check(codec: Codec, terms: Terms, plant: Plant, controller: Controller) -> None:
+    """Raise PartError or ValueError for parts that do not make a flight."""
+    if not isinstance(codec, Codec):
+        raise PartError(
+            f"the codec ({type(codec).__name__}) is no Codec: give Codec(model, coder, "
+            "ticks_per_sample)"
+        )
+    Parts(codec.model, codec.coder, plant, controller).check()
+    for name, ours, theirs in (
+        ("ticks_per_sample", terms.ticks_per_sample, codec.ticks_per_sample),
+        ("symbols_per_word", terms.symbols_per_word, codec.coder.alphabet.symbols_per_word),
+    ):
+        if ours != theirs:
+            raise ValueError(
+                f"terms.{name} is {ours}, and the codec's is {theirs}; Terms.for_codec(codec, tick_s) "
+                "makes terms that agree"
+            )
+    check_codec("the codec", codec, terms.initial_command)
+    predicted, measured = codec.model.measured(codec.model.initial()), plant.measured_rad
+    if len(predicted) != len(measured):
+        raise PartError(
+            f"the plant ({type(plant).__name__}) measures {len(measured)} angle(s) and the model "
+            f"({type(codec.model).__name__}) predicts {len(predicted)}; they must be the same ones"
+        )

@@ -1,0 +1,206 @@
+"""One sentence for each event, from its fields as recordings and telemetry hold them.
+
+Only what shows something to a person calls this module and `endings`; nothing reads what they return.
+Call them through the module (`events.event_text`), so that a test can replace every sentence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from channel.protocol.endings import Ending
+from tenbaud.sentences import endings
+from transmitter.guard import GuardReason
+
+Fields = Mapping[str, Any]
+"""names of `EVENT_CHANNEL` to values; a field that is missing counts as null"""
+
+
+def event_text(fields: Fields) -> str:
+    """Return the sentence for an event; the recorded one for an event of a version that recorded it."""
+    recorded = fields.get("text")
+    if recorded is not None:
+        return str(recorded)
+    render = _EVENTS.get(str(fields.get("kind")))
+    try:
+        return render(_Known(fields)) if render is not None else _plain(fields)
+    except (KeyError, TypeError, ValueError):
+        # Fields of another version, or of a file that was changed.
+        return _plain(fields)
+
+
+def guard_text(reason: GuardReason | None) -> str:
+    """Return why the guard took the voltage down."""
+    if reason is None:
+        return ""
+    return _guard_cause(_Known({name: getattr(reason, name) for name in GuardReason.__slots__}))
+
+
+class _Known(dict[str, Any]):
+    """Fields by name; null where there is none."""
+
+    def __missing__(self, name: str) -> None:
+        return None
+
+
+def _plain(fields: Fields) -> str:
+    """Return the fields themselves."""
+    left = {name: value for name, value in fields.items() if value is not None}
+    shown = [f"{name} {left[name]}" for name in left if name not in ("time_s", "kind", "sample")]
+    return ", ".join(shown)
+
+
+def _with(text: str, detail: object) -> str:
+    return f"{text}: {detail}" if detail else text
+
+
+def _begins(one: Fields) -> str:
+    return f"session {one['session']:08x}, epoch {one['epoch']}, begins at sample {one['sample']}"
+
+
+def _ending(name: object) -> str:
+    known = Ending.__members__.get(str(name).upper())
+    return str(name).replace("_", " ") if known is None else endings.ending_text(known)
+
+
+def _ended(one: Fields) -> str:
+    said = one["detail"] or _ending(one["cause"])
+    return f"the other end ended the flight: {said}" if one["by_peer"] else str(said)
+
+
+def _refused(one: Fields) -> str:
+    if one["cause"] == "second_receiver":
+        return "a second receiver asked for this flight: refused"
+    said = str(one["detail"] or _ending(one["cause"]))
+    return f"the receiver that takes over refused: {said}" if one["session"] is not None else said
+
+
+def _rejoin_asked(one: Fields) -> str:
+    why: dict[str, Callable[[], str]] = {
+        "desync": lambda: f"the two copies of the codec differ after sample {one['sample']}",
+        "gap": lambda: f"the echo of sample {one['sample']} never came, nor a repetition of it",
+        "lag": lambda: _lag(one),
+        "unknown": lambda: "the receiver does not know this session (any more)",
+        "guard": lambda: "the guard stopped",
+        "taken_over": lambda: f"receiver session {one['session']:08x} takes over on purpose",
+    }
+    return f"{why[one['cause']]()}: asking for a new epoch after {one['epoch']}"
+
+
+def _lag(one: Fields) -> str:
+    if one["detail"]:
+        return f"this end's copy of the codec cannot go on ({one['detail']})"
+    return f"no echo for {one['number']} samples"
+
+
+def _dropped(one: Fields) -> str:
+    texts = {
+        "settled": f"slot {one['slot']} was settled already: dropped",
+        "past_deadline": f"slot {one['slot']} came after its deadline: dropped",
+        "far_ahead": f"slot {one['slot']} is {one['number']} ahead: dropped",
+        "not_due": f"a symbol of slot ...{one['slot']} is not due: dropped",
+        "out_of_bounds": f"dropped a frame that is out of bounds: {one['detail']}",
+    }
+    return texts[one["cause"]]
+
+
+def _guard(one: Fields) -> str:
+    return _with(f"guard {one['state']}", _guard_cause(one) if one["cause"] else "")
+
+
+def _guard_cause(one: Fields) -> str:
+    axis, tick, value, limit = one["axis"], one["tick"], one["value"], one["limit"]
+    match str(one["cause"]):
+        case "timed_out":
+            return f"no command for {one['number']} ticks up to tick {tick}"
+        case "stopped":
+            return endings.ending_text(Ending.STOPPED)
+        case "session_ended":
+            return "the session has ended"
+        case "flight_over":
+            return "the flight has ended"
+        case "sensor":
+            return f"tick {tick}: {one['detail']}"
+        case "angle_limit":
+            return (
+                f"axis {axis} is at {value:.3f} rad at tick {tick}, beyond its soft limit of "
+                f"{limit:g} rad"
+            )
+        case "no_angle":
+            return f"axis {axis} reads no number at tick {tick}"
+        case "bad_command":
+            return f"the command of tick {tick} is not a number"
+    return str(one["cause"])
+
+
+def _controller(one: Fields) -> str:
+    if one["cause"] == "reference":
+        return f"the reference of tick {one['tick']} failed: {one['detail']}"
+    return f"at tick {one['tick']} the controller {one['detail']}; its last command is kept"
+
+
+def _peer(one: Fields) -> str:
+    texts = {
+        "gone": "the receiver is gone",
+        "back": "the receiver is there again",
+        "silent": f"no symbol for {one['number']} samples: waiting for one",
+    }
+    return texts[one["cause"]]
+
+
+def _rate(one: Fields) -> str:
+    if one["cause"] == "kept":
+        return "the symbol rate is kept again"
+    return (
+        f"the symbol rate is not kept: {one['limit']:g} symbols/s are asked for, "
+        f"{one['value']:.0f} arrive in time, {1.0 - one['value'] / one['limit']:.1%} of the symbols "
+        f"are late or were never sent. This process missed {one['missed_share']:.1%} of its ticks; in "
+        f"{one['overdue_share']:.1%} of the others echoes were overdue. Lower channel.rate_baud, or "
+        "leave both processes more of a processor"
+    )
+
+
+def _control(one: Fields) -> str:
+    tick = one["tick"]
+    before = f"tick {tick}" if tick is not None else f"sample {one['sample']}"
+    texts: dict[str, Callable[[], str]] = {
+        "set_point": lambda: f"set-point {one['value']!r} rad",
+        "follow": lambda: "follow the reference",
+        "pause": lambda: f"pause before tick {one['number']}",
+        "go_on": lambda: "go on",
+        "pace": lambda: f"{one['value']!r} times real time",
+        "impair": lambda: line_text(one["detail"] or ""),
+        "spoil": lambda: (
+            f"one bit of this codec's {one['detail']} changed after sample {one['sample']}"
+        ),
+        "ignored": lambda: f"{one['detail']}: ignored",
+    }
+    return f"by hand, before {before}: {texts[one['cause']]()}"
+
+
+def line_text(impairments: str) -> str:
+    """Return what the line suffers from now on."""
+    return f"the line suffers {impairments}" if impairments else "the line is clean"
+
+
+_EVENTS: Mapping[str, Callable[[Fields], str]] = {
+    "started": _begins,
+    "ended": _ended,
+    "refused": _refused,
+    "desync": lambda one: endings.difference_text(
+        one["sample"], one["transmitter_digest"], one["receiver_digest"]
+    ),
+    "rejoin_asked": _rejoin_asked,
+    "rejoin": _begins,
+    "erased": lambda one: f"slot {one['slot']} is erased",
+    "late_symbol": _dropped,
+    "stale": _dropped,
+    "malformed": lambda one: f"dropped a message: {one['detail']}",
+    "guard": _guard,
+    "sensor": lambda one: f"tick {one['tick']}: {one['detail']}",
+    "controller": _controller,
+    "peer": _peer,
+    "control": _control,
+    "rate": _rate,
+}

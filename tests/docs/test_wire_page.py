@@ -143,7 +143,7 @@ def bits(text: str) -> list[int]:
 
 
 @pytest.mark.parametrize(
-    ("page", "title"), [(PAGE, "On a serial line"), (SERIAL_PAGE, "What is on the line")]
+    ("page", "title"), [(PAGE, "On a serial line"), (SERIAL_PAGE, "Line format")]
 )
 def test_when_the_symbol_byte_is_split_as_the_page_says_then_slot_and_number_come_out(
     page: str, title: str

@@ -160,7 +160,7 @@ def test_when_part_of_a_range_is_no_coder_then_it_is_penalised_and_counted() -> 
     assert 3 < tuned.penalised < 17
     assert tuned.values["coder.decay"] <= 1.0
     assert tuned.train_after < 0.1 < PENALTY_RAD
-    assert f"{tuned.penalised} of the 20 sets of constants" in preset_text(tuning_of(free), tuned)
+    assert f"{tuned.penalised} of the 20 parameter sets" in preset_text(tuning_of(free), tuned)
 
 
 def test_when_the_model_is_fitted_then_the_simulated_plant_stays() -> None:

@@ -55,15 +55,14 @@ def check_words(evidence: Evidence, findings: Findings) -> None:
     known = set()
     for row in samples:
         known.add(row.sample)
-        brought: list[int] | None = []
-        for slot in range(row.sample * count, (row.sample + 1) * count):
-            symbol = alphabet.symbol(found[slot]) if slot in found else None
-            brought = None if brought is None or symbol is None else [*brought, symbol]
+        slots = range(row.sample * count, (row.sample + 1) * count)
+        lacking = next((slot for slot in slots if slot not in found), None)
+        brought = None if lacking is not None else [alphabet.symbol(found[slot]) for slot in slots]
         if row.word != (None if brought is None else tuple(brought)):
             findings.leak(
                 Place("receiver", "sample", f"sample {row.sample}", "word"),
                 "it is not what its slots brought",
-                f"{row.word}; symbol, slot {row.sample * count} and on: {brought}",
+                f"{row.word}; symbol, slot {slots[0] if lacking is None else lacking}: {brought}",
             )
     last = max(known, default=-1)
     partial = _begun_words(evidence)
@@ -100,7 +99,7 @@ def check_origin(evidence: Evidence, findings: Findings) -> None:
     sent = evidence.topic("transmitter", "symbol")
     end = evidence.end("transmitter")
     left = {row.slot: row for row in sent if row.left_ns is not None}
-    known = end is not None and sent.recorded and agreement.config.link.kind != "serial"
+    known = end is not None and sent.recorded and agreement.link.carries_slots
     last = None if end is not None and end.complete else max(left, default=-1)
     first = min(left, default=0)
     flips = bool(up.flip or up.raw) or evidence.is_steered

@@ -18,10 +18,12 @@ def symbol_place(end: str, slot: int, field: str = "") -> Place:
 
 
 def check_recorded(evidence: Evidence, findings: Findings) -> None:
-    """Each end recorded which symbol was in which slot, if there was one at all."""
+    """Each end recorded which symbol was in which slot, and what its samples start from."""
     for end in evidence.rows:
         if not evidence.topic(end, "symbol").recorded:
             findings.gap(Place(end, "symbol", "every slot"), "no symbols were recorded")
+        if evidence.topic(end, "sample").rows and not evidence.topic(end, "epoch").rows:
+            findings.gap(Place(end, "epoch", "first epoch"), "no epochs were recorded")
 
 
 def check_slots(evidence: Evidence, findings: Findings) -> None:

@@ -86,13 +86,16 @@ def _check_keys(
     found = set(evidence.topic(end, topic).by_key())
     wanted = set(keys)
     complete = evidence.rows[end].complete
+    terms = evidence.agreement.terms
+    count, lead = terms.ticks_per_sample, terms.lead_ticks if end == "receiver" else 0
     last = max(found, default=-1)
     for key in sorted(wanted - found):
         if complete or key < last:
             findings.gap(Place(end, topic, f"{name} {key}", name), MISSING)
     for key in sorted(found - wanted):
         if complete:
-            findings.leak(Place(end, topic, f"{name} {key}", name), ORPHAN)
+            sample = f"sample {(key - lead) // count}" if name == "tick" else ""
+            findings.leak(Place(end, topic, f"{name} {key}", name), ORPHAN, sample)
 
 
 def _compare(

@@ -134,7 +134,7 @@ def _trip(
         raise TimeoutError("the bridge saw no sample")
     measured = rig.read(tick).measured_rad
     for symbol in session.on_measurement(tick, measured):
-        link.send(link.wire.encode(symbol), is_symbol=True)
+        link.send(link.wire.encode(symbol))
     while session.copies.confirmed.sample <= tick:
         data = link.receive(2.0)
         if data is None:

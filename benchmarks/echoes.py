@@ -86,7 +86,7 @@ def receiver(address: str, _: bytes, settings: dict[str, Any]) -> None:
     """Be a receiver, recording or not; it is configured as a receiver is."""
     from channel.links.zenoh.link import ZenohLink
     from channel.protocol.recording import Recorder
-    from receiver.loops.real import serve_real
+    from receiver.loops.single import serve
     from tenbaud.build.ends import build_receiver
     from tenbaud.build.flight import agree
     from tenbaud.config.load import load_config
@@ -100,7 +100,7 @@ def receiver(address: str, _: bytes, settings: dict[str, Any]) -> None:
             recorder = open_recorder(agreement, "receiver", Path(folder) / "receiver.mcap")
         with ZenohLink("receiver", "ping", listen=(address,)) as link:
             _ready()
-            serve_real(build_receiver(agreement, recorder, link.wire), link, 3600.0)
+            serve(build_receiver(agreement, recorder, link.wire), link, 3600.0)
 
 
 KINDS = {"udp": udp, "tcp": tcp, "zenoh": bare, "receiver": receiver}

@@ -189,7 +189,7 @@ def _flight(stack: ExitStack, ticks_per_sample: int, record: bool) -> Ping:
         (symbol,) = session.on_measurement(tick, (measured,))
         message = encode(symbol)
         sent_ns = time.perf_counter_ns()
-        link.send(message, is_symbol=True)
+        link.send(message)
         answer = link.receive(5.0)
         took_ns = time.perf_counter_ns() - sent_ns
         if answer is None:

@@ -16,7 +16,7 @@ import time
 from contextlib import ExitStack
 from dataclasses import dataclass
 
-from channel.line.inlet import Inlet
+from channel.line.line import Inlet
 from channel.links.zenoh.link import ZenohLink
 from channel.protocol.endings import End, Ending
 from channel.protocol.wire import encode
@@ -53,7 +53,7 @@ class LightRig:
         self.session.command(tick)
         angle = 0.8 * math.sin(0.5 * sample * terms.sample_ns / 1e9)
         for frame in self.session.on_measurement(tick, (angle,)):
-            self.link.send(encode(frame), is_symbol=True)
+            self.link.send(encode(frame))
 
     def end(self) -> None:
         """Take the last echo in and end the flight."""

@@ -105,7 +105,7 @@ def _round_trips(rig: ZenohLink, turns: int) -> list[float]:
     taken = []
     for _ in range(turns):
         started = time.perf_counter_ns()
-        rig.send(SYMBOL, is_symbol=True)
+        rig.send(SYMBOL)
         if rig.receive(PATIENCE_S) is None:
             raise RuntimeError("a round trip was lost")
         taken.append((time.perf_counter_ns() - started) / 1000.0)

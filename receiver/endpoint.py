@@ -1,56 +1,151 @@
-"""The controller node without time and transport: bytes in, bytes out.
+"""The controller node without time and transport: messages and times in, messages out.
 
-Both drivers of the receiver, and a flight within one process, go through it.
+`ReceiverEndpoint` is for a real clock, `SteppedEndpoint` for the virtual one of a transmitter in
+another process. A loop (`receiver.loops`) asks either when it is due, gives it what came, and sends
+what it returns. A flight within one process steps the endpoint directly.
 """
 
 from __future__ import annotations
 
-from channel.line.inlet import Inlet
-from channel.line.line import Line
-from channel.line.virtual import Reply
+from channel.errors import ConfigMismatch, FrameError, LinkLost
+from channel.line.clocks import SkewedClock
+from channel.line.downlink import Downlink
+from channel.line.line import Inlet
+from channel.line.virtual import Reply, decode_step, encode_reply, is_envelope
+from channel.links.serial.slot_finder import SlotFinder
 from channel.protocol.endings import End
-from channel.protocol.frames import Frame
-from channel.protocol.wire import DATAGRAM, Wire
-from receiver.session.session import ReceiverSession
+from channel.protocol.frames import Frame, Hello, ShortSymbol
+from receiver.session.session import Phase, ReceiverSession
+
+REFUSAL_LINGER_S = 1.0
+"""How long a refused transmitter has to say in which fields it differs."""
 
 
 class ReceiverEndpoint:
-    """Decodes what arrives for a session and encodes what it answers."""
+    """A session with its way in and its way out. Times are of one monotonic clock.
 
-    def __init__(self, session: ReceiverSession, wire: Wire = DATAGRAM) -> None:
+    `clock` is what this end takes for the time, where it is a bad one on purpose.
+    """
+
+    def __init__(
+        self,
+        session: ReceiverSession,
+        downlink: Downlink | None = None,
+        clock: SkewedClock | None = None,
+    ) -> None:
         self.session = session
-        self.wire = wire
-        self.wire_bytes_down = 0
-        self.inlet = Inlet(wire, session.on_malformed)
-        self.downlink = Line()
-        """this end's own way out, on a real clock"""
+        self.downlink = downlink or Downlink()
+        self.inlet = Inlet(self.downlink.wire, session.on_malformed)
+        self._slots = SlotFinder(session.terms)
+        """of the symbol bytes of a serial line"""
+        self._clock = clock
+        self._heard_ns: int | None = None
 
-    def on_bytes(self, data: bytes, now_ns: int) -> list[bytes]:
-        """Take one message that arrived at `now_ns`; return the messages to send."""
-        frame = self.inlet.take(data)
-        if frame is None:
-            return []
-        return self._encode(self.session.on_frame(frame, now_ns))
+    def next_due_ns(self, now_ns: int) -> int | None:
+        """Return when there is something to do without a message; None: nothing is planned."""
+        due_ns = self.session.next_deadline()
+        if due_ns is not None and self._clock is not None:
+            due_ns = self._clock.reached(due_ns, now_ns)
+        sending_ns = self.downlink.next_due_ns
+        if due_ns is None or sending_ns is None:
+            return sending_ns if due_ns is None else due_ns
+        return min(due_ns, sending_ns)
 
-    def on_time(self, now_ns: int) -> list[bytes]:
-        """Let the deadlines up to `now_ns` pass; return the messages to send."""
-        return self._encode(self.session.on_deadline(now_ns))
+    def take(self, data: bytes | None, now_ns: int) -> list[bytes]:
+        """Take a message, or none, and let time pass to `now_ns`; return what is to be sent now.
+
+        Raises ConfigMismatch when the peer flies on the virtual clock.
+        """
+        shown_ns = now_ns if self._clock is None else self._clock.shown(now_ns)
+        frames: list[Frame] = []
+        if data is not None:
+            self._heard_ns = now_ns
+            if is_envelope(data):
+                raise ConfigMismatch(
+                    "the transmitter flies on the virtual clock, this end on the real one; give "
+                    "both the same --clock"
+                )
+            frames += self._on_message(data, shown_ns)
+        frames += self.session.on_deadline(shown_ns)
+        return self.downlink.offer(frames, now_ns)
+
+    def over(self, now_ns: int, peer_timeout_s: float) -> bool:
+        """Return whether the flight is over; LinkLost when nothing came for too long."""
+        if self._heard_ns is None:
+            self._heard_ns = now_ns
+        quiet_s = (now_ns - self._heard_ns) / 1e9
+        if self.session.phase is Phase.ENDED:
+            return True
+        if self.session.refusal is not None and quiet_s > REFUSAL_LINGER_S:
+            return True
+        if quiet_s > peer_timeout_s:
+            raise LinkLost(
+                f"nothing came from a transmitter for {peer_timeout_s:g} s; is it running, with "
+                "the same session name and the other end of this endpoint?"
+            )
+        return False
 
     def bye(self, end: End) -> list[bytes]:
         """End the session; return the messages that tell the peer."""
-        return self._encode(self.session.bye(end))
+        return self.downlink.encoded(self.session.bye(end))
 
     def step(self, time_ns: int, data: bytes | None) -> Reply:
         """Do one step of the virtual clock within this process (`channel.line.virtual.Peer`).
 
         A symbol that arrives exactly at its deadline is in time, so it is taken first.
         """
-        messages = self.on_bytes(data, time_ns) if data is not None else []
-        messages += self.on_time(time_ns)
-        return Reply(0, self.session.next_deadline(), tuple(messages))
+        frames = [] if data is None else self._on_message(data, time_ns)
+        frames += self.session.on_deadline(time_ns)
+        return Reply(0, self.session.next_deadline(), tuple(self.downlink.encoded(frames)))
 
-    def _encode(self, frames: list[Frame]) -> list[bytes]:
-        messages = [self.wire.encode(frame) for frame in frames]
-        for message in messages:
-            self.wire_bytes_down += self.wire.size(message)
-        return messages
+    def _on_message(self, data: bytes, now_ns: int) -> list[Frame]:
+        session = self.session
+        frame = self.inlet.take(data)
+        if frame is None:
+            return []
+        if isinstance(frame, ShortSymbol) and session.due_slot is not None:
+            frame = self._slots.located(frame, session.due_slot, now_ns)
+        answers = session.on_frame(frame, now_ns)
+        if isinstance(frame, Hello):
+            self._slots.answered(frame, answers, now_ns)
+        return answers
+
+
+class SteppedEndpoint(ReceiverEndpoint):
+    """The same on the virtual clock: steps in, replies out. The transmitter's process has the time."""
+
+    _last_number = -1
+    _last_reply = b""
+
+    def next_due_ns(self, now_ns: int) -> int | None:
+        """Return None: time passes by steps alone."""
+        return None
+
+    def take(self, data: bytes | None, now_ns: int) -> list[bytes]:
+        """Take one step, or none; return its reply. A repeated step gets the same one.
+
+        Raises ConfigMismatch when the peer flies on the real clock.
+        """
+        if data is None:
+            return []
+        self._heard_ns = now_ns
+        if not is_envelope(data):
+            raise ConfigMismatch(
+                "the transmitter flies on the real clock, this end on the virtual one; give both "
+                "the same --clock"
+            )
+        try:
+            step = decode_step(data)
+        except FrameError as error:
+            self.session.on_malformed(str(error))
+            return []
+        if step.number != self._last_number:
+            reply = self.step(step.time_ns, step.data)
+            self._last_number = step.number
+            self._last_reply = encode_reply(reply._replace(number=step.number))
+        return [self._last_reply]
+
+    def bye(self, end: End) -> list[bytes]:
+        """End the session; there is nothing to send, since the peer waits for replies alone."""
+        super().bye(end)
+        return []

@@ -22,13 +22,11 @@ import random
 import re
 from collections import Counter
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, Protocol
 
 from channel.codec.words import Alphabet
-from channel.errors import FrameError
-from channel.line.line import Delivery, Line
-from channel.protocol.frames import Symbol
-from channel.protocol.wire import DATAGRAM, Wire
+from channel.line.line import CleanLine, Delivery, Line
+from channel.protocol.wire import DATAGRAM
 
 Direction = Literal["up", "down"]
 FOR_EVER_NS = 2**62
@@ -190,15 +188,25 @@ def _time_ns(text: str) -> int:
     return round(float(match[1]) * _UNITS_NS[match[2]])
 
 
+class SymbolWire(Protocol):
+    """What a line asks its wire, to invert symbols."""
+
+    def is_symbol(self, data: bytes) -> bool:
+        """Return whether a message carries a symbol."""
+
+    def renumbered(self, data: bytes, shift: int, kinds: int) -> bytes:
+        """Return a symbol's message with the number `shift` further on in an alphabet of `kinds`."""
+
+
 @dataclass(slots=True)
-class ImpairedLine(Line):
-    """A line with impairments; `counts` says what it did to how many messages."""
+class ImpairedLine:
+    """A line with impairments before it; `counts` says what they did to how many messages."""
 
     impairments: Impairments
     alphabet: Alphabet
     seed: str
-    wire: Wire = DATAGRAM
-    symbol_delay_ns: int = 0
+    wire: SymbolWire = DATAGRAM
+    line: Line = field(default_factory=CleanLine)
     counts: Counter[str] = field(default_factory=Counter)
     _chance: random.Random = field(init=False)
     _in_burst: bool = field(init=False, default=False)
@@ -212,30 +220,30 @@ class ImpairedLine(Line):
         """Return how long a message may be under way."""
         one = self.impairments
         held_ns = one.reorder_ns if one.reorder or one.duplicate else 0
-        return self.symbol_delay_ns + one.delay_ns + one.jitter_ns + held_ns
+        return self.line.longest_delay_ns + one.delay_ns + one.jitter_ns + held_ns
 
-    def carry(self, data: bytes, is_symbol: bool, now_ns: int) -> list[Delivery]:
+    def carry(self, data: bytes, now_ns: int) -> list[Delivery]:
         """Return the arrivals of a message put on the line at flight time `now_ns`."""
         one, chance = self.impairments, self._chance.random
-        arrival_ns = now_ns + one.delay_ns + (self.symbol_delay_ns if is_symbol else 0)
+        enters_ns = now_ns + one.delay_ns
         if one.jitter_ns:
-            arrival_ns += round((2.0 * chance() - 1.0) * one.jitter_ns)
+            enters_ns += round((2.0 * chance() - 1.0) * one.jitter_ns)
         if self._is_lost(now_ns):
-            return [Delivery(arrival_ns, None)]
+            return [Delivery(arrival_ns, None) for arrival_ns, _ in self.line.carry(data, enters_ns)]
         if one.reorder and chance() < one.reorder:
             self.counts["reordered"] += 1
-            arrival_ns += round(chance() * one.reorder_ns)
-        if is_symbol and one.flip and chance() < one.flip:
+            enters_ns += round(chance() * one.reorder_ns)
+        if one.flip and self.wire.is_symbol(data) and chance() < one.flip:
             data = self._flipped(data)
         if one.raw and chance() < one.raw:
             self.counts["corrupted"] += 1
             bit = self._chance.randrange(8 * len(data))
             byte = data[bit >> 3] ^ (1 << (bit & 7))
             data = data[: bit >> 3] + bytes((byte,)) + data[(bit >> 3) + 1 :]
-        deliveries = [Delivery(arrival_ns, data)]
+        deliveries = self.line.carry(data, enters_ns)
         if one.duplicate and chance() < one.duplicate:
             self.counts["duplicated"] += 1
-            deliveries.append(Delivery(arrival_ns + round(chance() * one.reorder_ns), data))
+            deliveries += self.line.carry(data, enters_ns + round(chance() * one.reorder_ns))
         return deliveries
 
     def _is_lost(self, now_ns: int) -> bool:
@@ -256,14 +264,15 @@ class ImpairedLine(Line):
         return False
 
     def _flipped(self, data: bytes) -> bytes:
-        """Return the message with another symbol, its check made good again."""
-        try:
-            frame = self.wire.decode(data)
-        except FrameError:
-            return data
-        if not isinstance(frame, Symbol):
-            return data
+        """Return the message of a symbol with another symbol in it, whole."""
         self.counts["flipped"] += 1
         kinds = len(self.alphabet.symbols)
-        other = (frame.number + 1 + self._chance.randrange(kinds - 1)) % kinds
-        return self.wire.encode(replace(frame, number=other))
+        return self.wire.renumbered(data, 1 + self._chance.randrange(kinds - 1), kinds)
+
+
+def impair(line: Line, impairments: Impairments) -> bool:
+    """Change what goes wrong on a line from now on; return whether it is one that can be impaired."""
+    if not isinstance(line, ImpairedLine):
+        return False
+    line.impairments = impairments
+    return True

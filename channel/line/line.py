@@ -1,12 +1,20 @@
 """One direction of a line as the flight experiences it: when, and whether, a message arrives.
 
 On the virtual clock the transmitter's process asks the line of each direction; on a real clock each
-sender asks its own and holds the message back until it is due.
+sender asks its own and holds the message back until it is due (`Outbox`). A line carries bytes: what a
+message is, its wire can tell. `Inlet` is the other end of a line: bytes counted, frames decoded.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import heapq
+from collections import Counter
+from collections.abc import Callable, Iterable
+from typing import NamedTuple, Protocol
+
+from channel.errors import FrameError
+from channel.protocol.frames import Commands, Frame, ShortSymbol, Symbol
+from channel.protocol.wire import DATAGRAM, Wire
 
 
 class Delivery(NamedTuple):
@@ -16,24 +24,91 @@ class Delivery(NamedTuple):
     data: bytes | None
 
 
-class Line:
-    """A clean line with a fixed delay for symbols and another for every other message."""
-
-    def __init__(self, symbol_delay_ns: int = 0, delay_ns: int = 0) -> None:
-        self._symbol_delay_ns = symbol_delay_ns
-        self._delay_ns = delay_ns
+class Line(Protocol):
+    """One direction of a line."""
 
     @property
     def longest_delay_ns(self) -> int:
         """Return how long a message may be under way."""
-        return max(self._symbol_delay_ns, self._delay_ns)
 
     @property
-    def at_once(self) -> bool:
-        """Return whether every message arrives, as it is, when it is sent."""
-        return type(self) is Line and self.longest_delay_ns == 0
+    def counts(self) -> Counter[str]:
+        """Return how many messages it did what to, on purpose."""
 
-    def carry(self, data: bytes, is_symbol: bool, now_ns: int) -> list[Delivery]:
+    def carry(self, data: bytes, now_ns: int) -> list[Delivery]:
         """Return the arrivals of a message put on the line at flight time `now_ns`."""
-        delay = self._symbol_delay_ns if is_symbol else self._delay_ns
-        return [Delivery(now_ns + delay, data)]
+
+
+class CleanLine:
+    """Every message arrives as it is, after the same delay."""
+
+    def __init__(self, delay_ns: int = 0) -> None:
+        self.longest_delay_ns = delay_ns
+        self.counts: Counter[str] = Counter()
+
+    def carry(self, data: bytes, now_ns: int) -> list[Delivery]:
+        """Return the one arrival of a message put on the line at flight time `now_ns`."""
+        return [Delivery(now_ns + self.longest_delay_ns, data)]
+
+
+class Outbox:
+    """Messages held back until the line would have delivered them: for senders on a real clock.
+
+    What is due at the same time leaves in the order in which it was put here.
+    """
+
+    def __init__(self) -> None:
+        self._waiting: list[tuple[int, int, bytes]] = []
+        self._order = 0
+
+    def __len__(self) -> int:
+        """Return how many messages wait."""
+        return len(self._waiting)
+
+    @property
+    def next_due_ns(self) -> int | None:
+        """Return when the next message is due, None when none waits."""
+        return self._waiting[0][0] if self._waiting else None
+
+    def put(self, deliveries: Iterable[Delivery]) -> None:
+        """Hold what a line makes of a message; a lost one leaves nothing."""
+        for arrival_ns, data in deliveries:
+            if data is not None:
+                self._order += 1
+                heapq.heappush(self._waiting, (arrival_ns, self._order, data))
+
+    def take(self, now_ns: int) -> list[bytes]:
+        """Return all that is due by now."""
+        due: list[bytes] = []
+        while self._waiting and self._waiting[0][0] <= now_ns:
+            due.append(heapq.heappop(self._waiting)[2])
+        return due
+
+
+class Inlet:
+    """Turns messages into frames. `on_malformed` is called with the reason when one is dropped."""
+
+    def __init__(
+        self, wire: Wire = DATAGRAM, on_malformed: Callable[[str], None] | None = None
+    ) -> None:
+        self.wire = wire
+        self.wire_bytes = 0
+        self.control_bytes = 0
+        """of `wire_bytes`, those of frames that carried neither a symbol nor commands"""
+        self.malformed = 0
+        self._on_malformed = on_malformed
+
+    def take(self, data: bytes) -> Frame | None:
+        """Return the frame in a message; None when there is none."""
+        size = self.wire.size(data)
+        self.wire_bytes += size
+        try:
+            frame = self.wire.decode(data)
+        except FrameError as error:
+            self.malformed += 1
+            if self._on_malformed is not None:
+                self._on_malformed(str(error))
+            return None
+        if not isinstance(frame, (Commands, Symbol, ShortSymbol)):
+            self.control_bytes += size
+        return frame

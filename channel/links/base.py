@@ -46,8 +46,8 @@ class Link(Protocol):
     def counts(self) -> LinkCounts:
         """Return what went over it until now."""
 
-    def send(self, data: bytes, is_symbol: bool = False) -> None:
-        """Put one message on the line. `is_symbol` marks the paid path of the uplink."""
+    def send(self, data: bytes) -> None:
+        """Put one message on the line; which path it takes there, the wire can tell from its bytes."""
 
     def receive(self, timeout_s: float) -> bytes | None:
         """Return the next message, or None after `timeout_s` seconds (0: only what is there)."""

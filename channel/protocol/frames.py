@@ -100,15 +100,29 @@ class Symbol:
 
 @dataclass(frozen=True, slots=True)
 class ShortSymbol:
-    """A symbol as a byte of a serial line carries it: the receiver finds its slot by the time.
+    """A symbol as a byte of a serial line carries it; the other end sent a Symbol.
 
-    Only ever received; the other end sent a Symbol.
+    The receiver's endpoint makes a LocatedSymbol of it.
     """
 
     number: int
     slot_low: int
     """the slot modulo `slot_modulus`"""
     slot_modulus: int
+
+
+@dataclass(frozen=True, slots=True)
+class LocatedSymbol:
+    """A symbol whose slot was found by the time at which it came, as the session takes it."""
+
+    number: int
+    slot: int | None
+    """None: no slot that may come now has it"""
+    slot_low: int
+    """what its byte said of the slot"""
+    in_time: bool
+    anchor: tuple[int, int] | None
+    """(slot, time in ns): where deadlines count from now on, if that has changed"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,6 +206,7 @@ Frame: TypeAlias = (
     | Refuse
     | Symbol
     | ShortSymbol
+    | LocatedSymbol
     | Commands
     | Desync
     | Unknown

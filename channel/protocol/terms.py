@@ -112,6 +112,15 @@ class Terms:
         """Return the flight time at which a slot begins."""
         return slot * self.tick_ns * self.ticks_per_sample // self.symbols_per_word
 
+    def linger_ns(self, line_delay_ns: int) -> int:
+        """Return how long after a flight's last tick its last echo may come.
+
+        `line_delay_ns`: by how much the two lines may delay messages beyond what is agreed here.
+        """
+        agreed_ns = self.uplink_delivery_ns + self.symbol_delay_ns + self.uplink_line_ns
+        agreed_ns += self.deadline_allowance_ns + self.downlink_budget_ns + self.downlink_line_ns
+        return agreed_ns + line_delay_ns
+
     def samples_in(self, time_ns: int, at_least: int) -> int:
         """Return a time as a number of samples, rounded up, and no fewer than `at_least`."""
         return max(at_least, -(-time_ns // self.sample_ns))

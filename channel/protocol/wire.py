@@ -25,6 +25,7 @@ from __future__ import annotations
 import struct
 from binascii import crc_hqx
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from typing import Protocol
 
@@ -39,6 +40,7 @@ from channel.protocol.frames import (
     ForeignVersion,
     Frame,
     Hello,
+    LocatedSymbol,
     Refuse,
     ShortSymbol,
     Symbol,
@@ -64,6 +66,7 @@ _COMMANDS = struct.Struct("<IB")
 _ECHO = struct.Struct("<HQ")
 _DESYNC = struct.Struct("<IQQ")
 _TEXT = struct.Struct("<H")
+_SYMBOL_START = bytes((WIRE_VERSION, 4))
 
 
 class Wire(Protocol):
@@ -77,6 +80,12 @@ class Wire(Protocol):
 
     def size(self, data: bytes) -> int:
         """Return how many bytes a message takes on the line, framing included."""
+
+    def is_symbol(self, data: bytes) -> bool:
+        """Return whether a message of ours carries a symbol: the paid path of the uplink."""
+
+    def renumbered(self, data: bytes, shift: int, kinds: int) -> bytes:
+        """Return a symbol's message with the number `shift` further on in an alphabet of `kinds`."""
 
 
 class DatagramWire:
@@ -93,6 +102,17 @@ class DatagramWire:
     def size(self, data: bytes) -> int:
         """Return the length: the frame is all that we put on such a line."""
         return len(data)
+
+    def is_symbol(self, data: bytes) -> bool:
+        """Return whether the head of a frame says that it is a symbol."""
+        return data.startswith(_SYMBOL_START)
+
+    def renumbered(self, data: bytes, shift: int, kinds: int) -> bytes:
+        """Return a symbol's frame with another number, its checksum right again."""
+        frame = decode(data)
+        if not isinstance(frame, Symbol):
+            raise ValueError(f"{frame} is no symbol")
+        return encode(replace(frame, number=(frame.number + shift) % kinds))
 
 
 DATAGRAM = DatagramWire()
@@ -162,7 +182,7 @@ def _encode_body(frame: Frame) -> tuple[int, int, int, bytes]:
             return 8, frame.session, frame.epoch, b""
         case Claim():
             return 9, frame.session, frame.epoch, _NUMBER.pack(frame.by)
-        case ForeignVersion() | ShortSymbol():
+        case ForeignVersion() | ShortSymbol() | LocatedSymbol():
             raise ValueError(f"{frame} is only ever received")
 
 

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from tenbaud.config.kinds import PartName
 from tenbaud.config.schema import KINDS, SHARED_SECTIONS, FlightConfig
 
 UNITS = (
@@ -132,6 +133,12 @@ def _allowed(annotation: Any, metadata: list[Any]) -> str:
         return _allowed_list(get_args(annotation))
     if get_origin(annotation) is dict:
         return "table"
+    for check in (getattr(item, "func", None) for item in metadata):
+        if isinstance(check, PartName):
+            known = ", ".join(f"`{_plain(name)}`" for name in check.registry.built_in)
+            return f"{known}, one that a package offers" + (
+                " or `module:Class`" if check.registry.classes else ""
+            )
     names = {
         float: "number",
         int: "whole number",

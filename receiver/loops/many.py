@@ -1,9 +1,9 @@
 """The controller node of many rigs: one loop that serves each of them as if it were alone.
 
-Every session has a service of its own (`RealService`, `VirtualService`); this loop takes in what comes
-for all of them and keeps their deadlines. What goes wrong in one ends that one: an exception closes its
-service, and a transmitter that sends more than its channel carries has the surplus dropped unread,
-so that it costs the others a few microseconds a message.
+Every session has an endpoint of its own; this loop takes in what comes for all of them and keeps their
+deadlines. What goes wrong in one ends that one: an exception closes it, and a transmitter that sends
+more than its channel carries has the surplus dropped unread, so that it costs the others a few
+microseconds a message.
 
 Opening and closing a session reads and writes files, so the host does it on another thread; the loop
 only picks up what is ready.
@@ -17,8 +17,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from channel.line.lateness import LatenessMeter
-from receiver.loops.service import Service
+from channel.line.meters import LatenessMeter
+from receiver.endpoint import ReceiverEndpoint
 
 POLL_NS = 200_000_000
 """How often every service is asked whether its flight is over."""
@@ -62,7 +62,8 @@ class Served:
     """One session in the loop."""
 
     name: str
-    service: Service
+    endpoint: ReceiverEndpoint
+    peer_timeout_s: float
     messages_per_s: float | None
     """what it may send; None: as much as it likes, as on the virtual clock"""
     first: bytes
@@ -154,10 +155,10 @@ class ManyService:
             self._guarded(served, self._give, now_ns, data)
 
     def _give(self, served: Served, now_ns: int, data: bytes | None = None) -> None:
-        for message in served.service.take(data, now_ns):
+        for message in served.endpoint.take(data, now_ns):
             self._hub.send(served.name, message)
         self._touched[served.name] = served
-        due_ns = served.service.next_due_ns(now_ns)
+        due_ns = served.endpoint.next_due_ns(now_ns)
         if due_ns is not None and (served.queued_ns is None or due_ns < served.queued_ns):
             served.queued_ns = due_ns
             heapq.heappush(self._due, (due_ns, served.name))
@@ -177,7 +178,7 @@ class ManyService:
             if served is None or served.queued_ns != queued_ns:
                 heapq.heappop(self._due)
                 continue
-            due_ns = served.service.next_due_ns(now_ns)
+            due_ns = served.endpoint.next_due_ns(now_ns)
             if due_ns is not None and due_ns <= queued_ns:
                 return queued_ns
             served.queued_ns = due_ns
@@ -202,7 +203,7 @@ class ManyService:
             self._guarded(served, self._give, now_ns, served.first)
 
     def _check(self, served: Served, now_ns: int) -> None:
-        if served.service.over(now_ns):
+        if served.endpoint.over(now_ns, served.peer_timeout_s):
             self._close(served, None)
 
     def _guarded(self, served: Served, action: Callable[..., None], *arguments: object) -> None:
@@ -219,4 +220,4 @@ class ManyService:
 
 
 def _rest(served: Served) -> None:
-    served.service.endpoint.session.rest()
+    served.endpoint.session.rest()

@@ -43,6 +43,10 @@ PERSISTENT_REQUESTS = 3
 """Repetitions, each for a later sample, after which a request that contradicts what is known is
 believed, as long as the transmitter is not heard."""
 
+AHEAD_SAMPLES_MAX = 8
+"""This end counts samples by its own clock, so it is hardly ahead of the transmitter. If it is by more,
+symbols that nobody sent have moved it on, and the start is the transmitter's."""
+
 KNOWN_MAX = 64
 """Transmitters remembered as admitted."""
 
@@ -74,6 +78,7 @@ class Greeter:
 
     def __init__(self, terms: Terms) -> None:
         self._answer_age_max = terms.samples_in(ANSWER_AGE_NS, ANSWER_AGE_SAMPLES_MAX)
+        self._ahead_max = AHEAD_SAMPLES_MAX + _lead_samples(terms)
         self.welcome: Welcome | None = None
         """last answer given"""
         self._stranger: int | None = None
@@ -103,10 +108,14 @@ class Greeter:
         if not in_reach or hello.request < last.request or (hello.request == last.request and advanced):
             heard = advanced and silent_slots < SILENT_SLOTS
             return Verdict.BEGIN if self._persists(hello) and not heard else Verdict.IGNORE
-        if hello.request == last.request:
-            age = hello.sample - last.first_sample
-            return Verdict.REPEAT if age <= self._answer_age_max else Verdict.BEGIN
+        if hello.request == last.request and self._still_stands(last.first_sample, hello):
+            return Verdict.REPEAT
         return Verdict.BEGIN
+
+    def _still_stands(self, first: int, hello: Hello) -> bool:
+        """Return whether a transmitter that asks like this can still begin at this sample."""
+        ahead = first - hello.sample
+        return -self._answer_age_max <= ahead and (not hello.sample or ahead <= self._ahead_max)
 
     def _admit(self, hello: Hello, identity: Identity) -> Verdict:
         if difference(hello, identity) is not None:
@@ -172,10 +181,12 @@ def first_sample(hello: Hello, own: int, terms: Terms, begun: bool) -> int:
     """
     if not begun and hello.sample == 0:
         return own
-    margin = -(-terms.lead_ticks // terms.ticks_per_sample)
-    first = hello.sample + margin
-    # By its own clock this end runs on for the history at most: further ahead, its count is wrong.
-    return first if hello.sample and own - first > terms.history_samples else max(own, first)
+    first = hello.sample + _lead_samples(terms)
+    return first if hello.sample and own - first > AHEAD_SAMPLES_MAX else max(own, first)
+
+
+def _lead_samples(terms: Terms) -> int:
+    return -(-terms.lead_ticks // terms.ticks_per_sample)
 
 
 def desync_answer(theirs: Desync, history: History, codec: Codec) -> Desync:

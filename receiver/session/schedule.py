@@ -62,20 +62,6 @@ class Schedule:
         self._is_guess = True
         """whether no symbol of the epoch has come, so that `_zero_ns` is the earliest that can be"""
         self._rival: _Rival | None = None
-        self._anchor: tuple[int, int] | None = None
-        """slot and time that deadlines count from; None: no slot is due by the clock"""
-
-    def deadline_ns(self, slot: int) -> int | None:
-        """Return when a slot is taken for erased; None: not by the clock."""
-        if self._anchor is None:
-            return None
-        anchor_slot, anchor_ns = self._anchor
-        due = self._terms.slot_ns(slot) - self._terms.slot_ns(anchor_slot)
-        return anchor_ns + due + self._terms.deadline_allowance_ns
-
-    def anchor(self, at: tuple[int, int] | None) -> None:
-        """Count deadlines from this (slot, time), or from nothing any more."""
-        self._anchor = at
 
     def begin(self, slot: int, now_ns: int) -> None:
         """Begin an epoch at a slot that is not due before now."""
@@ -106,8 +92,11 @@ class Schedule:
         self._rival = _Rival(slot, now_ns, count)
         return count >= RIVALS
 
-    def take(self, slot: int, now_ns: int, *, anew: bool = False) -> None:
-        """Take a symbol: the next deadlines count from it. `anew`: it replaces the schedule."""
+    def take(self, slot: int, now_ns: int, *, anew: bool = False) -> tuple[int, int]:
+        """Take a symbol; return the (slot, time) that the next deadlines count from.
+
+        `anew`: it replaces the schedule.
+        """
         zero_ns = now_ns - self._terms.slot_ns(slot)
         if anew or self._is_guess:
             self._zero_ns = zero_ns
@@ -118,7 +107,7 @@ class Schedule:
         self._heard_ns = now_ns
         self._is_guess = False
         self._rival = None
-        self._anchor = (slot, now_ns - off_ns if early else now_ns)
+        return slot, now_ns - off_ns if early else now_ns
 
     def _early(self, slot: int, now_ns: int) -> float:
         """Return by how much a slot lies ahead of the clock, ns, doubts about the clock taken off."""

@@ -17,8 +17,7 @@ from enum import Enum
 
 from channel.codec.codec import Codec, CodecState
 from channel.codec.words import ERASED
-from channel.line.shaper import BaudMeter
-from channel.links.serial.slot_finder import SlotFinder
+from channel.line.meters import BaudMeter
 from channel.protocol.bounds import Bounds, within_text_bounds
 from channel.protocol.endings import End, Ending
 from channel.protocol.events import Dropped, Event, EventKind, Presence, ended_event, write_event
@@ -29,8 +28,8 @@ from channel.protocol.frames import (
     ForeignVersion,
     Frame,
     Hello,
+    LocatedSymbol,
     Refuse,
-    ShortSymbol,
     Symbol,
     Unknown,
     Welcome,
@@ -39,6 +38,7 @@ from channel.protocol.identity import Identity
 from channel.protocol.limits import to_millivolts
 from channel.protocol.lockstep import History, difference_event
 from channel.protocol.recording import NullRecorder, Recorder
+from channel.protocol.slot_clock import SlotClock
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
 from receiver.controllers.base import Controller
@@ -96,22 +96,23 @@ class ReceiverSession:
         self._stranger = Stranger(session_number, take_over)
         self._recorder = recorder or NullRecorder()
         self._commander = Commander(codec, terms, controller, self._recorder, self.counts, self._tell)
-        self._slot = 0
+        self._clock = SlotClock(terms)
         self._word: list[int | None] = []
         self._advanced = False
         """whether a symbol of this epoch has been received"""
-        self._silent_slots = 0
-        self._slots = SlotFinder(terms)
         self._bounds = Bounds(codec, terms, self.counts, self._tell)
         self._schedule = Schedule(terms)
         self._proven = Proven(self._commander.standing, self._schedule, 0, None)
-        self._gap_samples_max = terms.history_samples
-        """A symbol this far ahead is no gap any more; after as many erasures in a row none are due."""
 
     @property
     def state(self) -> CodecState:
         """Return the codec's state before the next sample."""
         return self._commander.state
+
+    @property
+    def due_slot(self) -> int | None:
+        """Return the slot that is not settled yet; None while no flight is on."""
+        return self._clock.slot if self.phase is Phase.FLYING else None
 
     @property
     def history(self) -> History:
@@ -126,12 +127,10 @@ class ReceiverSession:
         match frame:
             case Symbol():
                 return self._on_symbol(frame, now_ns)
-            case ShortSymbol():
-                return self._on_short_symbol(frame, now_ns)
+            case LocatedSymbol() if self.phase is Phase.FLYING:
+                return self._on_located_symbol(frame, now_ns)
             case Hello():
-                answer = self._on_hello(frame, now_ns)
-                self._slots.greeted(now_ns)
-                return answer
+                return self._on_hello(frame, now_ns)
             case Desync() if self._is_current(frame.session):
                 return self._on_desync(frame)
             case Bye() if self._is_current(frame.session):
@@ -150,20 +149,19 @@ class ReceiverSession:
 
     def next_deadline(self) -> int | None:
         """Return when the slot that is due is taken for erased; None while none is."""
-        return self._schedule.deadline_ns(self._slot) if self.phase is Phase.FLYING else None
+        return self._clock.deadline_ns if self.phase is Phase.FLYING else None
 
     def on_deadline(self, now_ns: int) -> list[Frame]:
         """Erase the slots whose deadline has passed by `now_ns`; return the frames to send."""
         frames: list[Frame] = []
-        deadline = self.next_deadline()
-        while deadline is not None and deadline <= now_ns:
-            self._silent_slots += 1
-            frames += self._settle(None, now_ns)
-            if self._silent_slots >= self._gap_samples_max * self.terms.symbols_per_word:
-                self._schedule.anchor(None)
-                number = self._gap_samples_max
+        if self.phase is not Phase.FLYING:
+            return frames
+        for slot in self._clock.expired(now_ns):
+            frames += self._settle(slot, None, now_ns)
+            if self._clock.is_silent:
+                self._clock.anchor(None)
+                number = self.terms.history_samples
                 self._tell(Event(EventKind.PEER, cause=Presence.SILENT, number=number))
-            deadline = self.next_deadline()
         return frames
 
     def bye(self, end: End) -> list[Frame]:
@@ -192,7 +190,7 @@ class ReceiverSession:
             return []
         schedule = self._schedule if self._advanced else self._proven.schedule
         in_reach = schedule.reaches(hello.sample, now_ns)
-        silent = self._silent_slots
+        silent = self._clock.silent_slots
         verdict = self._greeter.judge(hello, self.identity, self._advanced, silent, in_reach)
         if verdict is Verdict.REPEAT and self._greeter.welcome is not None:
             return [self._greeter.welcome]
@@ -218,9 +216,6 @@ class ReceiverSession:
         proven = self._proven.incarnation
         first = first_sample(hello, own, self.terms, begun=proven is not None)
         count = self.terms.symbols_per_word
-        if last is None or hello.incarnation != last.incarnation:
-            ahead = first - hello.sample if hello.sample else 0
-            self._slots.begin(first * count, ahead * count)
         if last is None:
             self.phase = Phase.FLYING
             self.refusal = None
@@ -238,10 +233,9 @@ class ReceiverSession:
             else:
                 # A rig that was started again is at rest, and so is what is known of it.
                 self._commander.restart(first)
-        self._slot, self._word = first * count, []
-        self._advanced, self._silent_slots = False, 0
+        self._clock, self._word, self._advanced = SlotClock(self.terms, first * count), [], False
         self._schedule = Schedule(self.terms)
-        self._schedule.begin(self._slot, now_ns)
+        self._schedule.begin(first * count, now_ns)
         hold = self._commander.hold
         told = () if hold == self.terms.initial_command else to_millivolts(hold)
         asked = (hello.incarnation, hello.request)
@@ -256,7 +250,7 @@ class ReceiverSession:
     def _stand_where_proven(self, last: Welcome | None) -> int:
         """Take back what was offered and never flown; return this end's next sample."""
         if self._advanced and last is not None:
-            standing, silent = self._commander.standing, self._silent_slots
+            standing, silent = self._commander.standing, self._clock.silent_slots
             self._proven = Proven(standing, self._schedule, silent, last.incarnation)
             return self.state.sample + (1 if self._word else 0)
         self._commander.go_back(self._proven.standing)
@@ -276,7 +270,7 @@ class ReceiverSession:
             return self._on_foreign_symbol(symbol)
         if self._bounds.drops(self._bounds.of_symbol(symbol)):
             return []
-        if symbol.slot < self._slot:
+        if symbol.slot < self._clock.slot:
             return self._on_late_symbol(symbol, now_ns)
         timing = self._schedule.timing(symbol.slot, now_ns)
         if timing is Timing.EARLY:
@@ -286,31 +280,30 @@ class ReceiverSession:
 
     def _take_symbol(self, symbol: Symbol, now_ns: int, *, anew: bool) -> list[Frame]:
         """Consume a symbol of a slot that is due. `anew`: it replaces the schedule."""
-        ahead = symbol.slot - self._slot
-        if ahead > self._gap_samples_max * self.terms.symbols_per_word:
+        if not self._clock.bridges(symbol.slot):
+            ahead = symbol.slot - self._clock.slot
             self.counts["stale_frames"] += 1
             self._tell(Event(EventKind.STALE, slot=symbol.slot, cause=Dropped.FAR_AHEAD, number=ahead))
             return [Unknown(symbol.session, symbol.epoch)]
         self._advanced = True
-        self._silent_slots = 0
         self._greeter.on_symbol()
         frames: list[Frame] = []
-        while self._slot < symbol.slot:
-            frames += self._settle(None, now_ns)
-        self._schedule.take(symbol.slot, now_ns, anew=anew)
+        for slot in self._clock.take(symbol.slot):
+            frames += self._settle(slot, None, now_ns)
+        self._clock.anchor(self._schedule.take(symbol.slot, now_ns, anew=anew))
         self.meter.on_symbol(now_ns)
         write_symbol(self._recorder, self.terms, symbol, now_ns, taken=True)
         value = self.codec.coder.alphabet.symbols[symbol.number]
-        return frames + self._settle(value, now_ns)
+        return frames + self._settle(symbol.slot, value, now_ns)
 
     def _on_late_symbol(self, symbol: Symbol, now_ns: int) -> list[Frame]:
         """Drop a symbol of a slot that is settled; a row of them means that the schedule is wrong."""
         self.counts["symbols_late"] += 1
         write_symbol(self._recorder, self.terms, symbol, now_ns, taken=False)
         self._tell(Event(EventKind.LATE_SYMBOL, slot=symbol.slot, cause=Dropped.SETTLED))
-        within = self._slot - symbol.slot <= self._gap_samples_max * self.terms.symbols_per_word
-        if within and self._schedule.is_replaced_by(symbol.slot, now_ns):
-            self._schedule.take(symbol.slot, now_ns, anew=True)
+        near = self._clock.bridges(symbol.slot)
+        if near and self._schedule.is_replaced_by(symbol.slot, now_ns):
+            self._clock.anchor(self._schedule.take(symbol.slot, now_ns, anew=True))
         return []
 
     def _on_foreign_symbol(self, symbol: Symbol) -> list[Frame]:
@@ -328,33 +321,28 @@ class ReceiverSession:
             return [welcome]
         return []
 
-    def _on_short_symbol(self, short: ShortSymbol, now_ns: int) -> list[Frame]:
-        """Take a symbol byte of a serial line, as the symbol of this session that it can only be."""
-        if self.phase is not Phase.FLYING:
-            self.counts["stale_frames"] += 1
-            return []
-        place = self._slots.find(short, self._slot, now_ns)
+    def _on_located_symbol(self, place: LocatedSymbol, now_ns: int) -> list[Frame]:
+        """Take a symbol that says no session, as one of this session, which it can only be."""
         frames: list[Frame] = []
         if place.slot is None:
             self.counts["symbols_misplaced"] += 1
-            self._tell(Event(EventKind.STALE, slot=short.slot_low, cause=Dropped.NOT_DUE))
+            self._tell(Event(EventKind.STALE, slot=place.slot_low, cause=Dropped.NOT_DUE))
         elif place.in_time:
-            symbol = Symbol(self.session_number, self.epoch, place.slot, short.number)
+            symbol = Symbol(self.session_number, self.epoch, place.slot, place.number)
             if not self._bounds.drops(self._bounds.of_symbol(symbol)):
                 frames = self._take_symbol(symbol, now_ns, anew=True)
         else:
             self.counts["symbols_late"] += 1
             self._tell(Event(EventKind.LATE_SYMBOL, slot=place.slot, cause=Dropped.PAST_DEADLINE))
         if place.anchor is not None:
-            self._schedule.anchor(place.anchor)
+            self._clock.anchor(place.anchor)
         return frames
 
-    def _settle(self, symbol: int | None, now_ns: int) -> list[Frame]:
+    def _settle(self, slot: int, symbol: int | None, now_ns: int) -> list[Frame]:
         """Decide what this slot's symbol was; at the end of a word, fly its sample."""
         if symbol is None:
             self.counts["erasures"] += 1
-            self._tell(Event(EventKind.ERASED, slot=self._slot))
-        self._slot += 1
+            self._tell(Event(EventKind.ERASED, slot=slot))
         self._word.append(symbol)
         if len(self._word) < self.terms.symbols_per_word:
             return []

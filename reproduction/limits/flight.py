@@ -16,7 +16,8 @@ from channel.errors import CodecDiverged
 from channel.protocol.limits import from_millivolts, to_millivolts
 from plant_sim.encoder import Encoder
 from reproduction.limits.candidates import ENTRANTS, PRESETS
-from tenbaud.build.ends import build_controller, build_sight
+from tenbaud.build.controllers import build_controller
+from tenbaud.build.ends import build_sight
 from tenbaud.build.flight import Agreement, agree
 from tenbaud.build.rig import build_plant
 from tenbaud.config.load import load_config

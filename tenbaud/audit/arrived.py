@@ -99,7 +99,7 @@ def check_origin(evidence: Evidence, findings: Findings) -> None:
     sent = evidence.topic("transmitter", "symbol")
     end = evidence.end("transmitter")
     left = {row.slot: row for row in sent if row.left_ns is not None}
-    known = end is not None and sent.recorded and agreement.config.link.kind != "serial"
+    known = end is not None and sent.recorded and agreement.link.carries_slots
     last = None if end is not None and end.complete else max(left, default=-1)
     first = min(left, default=0)
     flips = bool(up.flip or up.raw) or evidence.is_steered

@@ -57,7 +57,7 @@ def _wanted(evidence: Evidence, end: str) -> dict[tuple[str, ...], int]:
     if count == 1:
         samples = {row.sample for row in evidence.topic(end, "sample")}
         wanted["erased",] = len(samples - taken)
-    if evidence.agreement.config.link.kind != "serial":
+    if evidence.agreement.link.carries_slots:
         wanted["late_symbol",] = sum(not row.taken for row in symbols)
     return wanted
 

@@ -73,7 +73,7 @@ def _figures(evidence: Evidence) -> list[tuple[str, str, str, int]]:
         ]
         if "coder_bits_up" not in evidence.summary("transmitter"):
             found.clear()  # they are the receiver's
-    if evidence.end("receiver") is not None and evidence.agreement.config.link.kind != "serial":
+    if evidence.end("receiver") is not None and evidence.agreement.link.carries_slots:
         # A serial line's receiver does not write down what came after its deadline.
         late = sum(not row.taken for row in evidence.topic("receiver", "symbol"))
         found.append(("receiver", "symbol", "symbols_late", late))

@@ -16,11 +16,6 @@ DOUBLE_INTEGRATOR = 8.0 / 27.0 / LN2**3
 """0.890: that of the double integrator times R^3/q"""
 
 
-def wiener_floor(density: float, rate_bit_s: float) -> float:
-    """Return the mean square error floor of the Wiener process, q / (2 R ln 2)."""
-    return WIENER * density / rate_bit_s
-
-
 def double_integrator_floor(density: float, rate_bit_s: float) -> float:
     """Return that of an angle under white torque, (8/27) q / (R ln 2)^3, in rad^2."""
     return DOUBLE_INTEGRATOR * density / rate_bit_s**3

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from tenbaud.bounds.closed import DOUBLE_INTEGRATOR
-from tenbaud.bounds.floor import floor, rate_for
+from tenbaud.bounds.floor import floor
 from tenbaud.bounds.linear import LinearModel
 
 
@@ -18,13 +18,11 @@ def encoder_floor(counts_per_turn: int) -> float:
     return math.tau / counts_per_turn / math.sqrt(12.0)
 
 
-def rate_at_encoder_floor(model: LinearModel, counts_per_turn: int) -> float:
-    """Return the bit/s at which an ideal code's error is as small as the encoder's rounding."""
-    return rate_for(model, encoder_floor(counts_per_turn) ** 2)
-
-
 def double_integrator_rate_at_encoder_floor(density: float, counts_per_turn: int) -> float:
-    """Return the same for an angle under white torque: (0.890 q / (width^2 / 12))^(1/3)."""
+    """Return the bit/s at which an ideal code's error is as small as the encoder's rounding.
+
+    For an angle under white torque: (0.890 q / (width^2 / 12))^(1/3).
+    """
     width_squared = encoder_floor(counts_per_turn) ** 2
     return float((DOUBLE_INTEGRATOR * density / width_squared) ** (1.0 / 3.0))
 

@@ -28,8 +28,6 @@ from tenbaud.bounds.convex import Value, log_determinant, minimise, traces
 from tenbaud.bounds.linear import LinearModel, Matrix, rate_needed, sampled
 
 QUADRATURE_POINTS = 12
-RATE_LIMITS = (1e-6, 1e7)
-"""bit/s between which a rate is looked for"""
 
 
 class RateTooLow(ValueError):
@@ -63,26 +61,6 @@ def word_floor(model: LinearModel, bits: float, period_s: float, erased: float =
     nats = rate * period_s * LN2
     covariance = minimise(problem, problem.start(nats), nats)
     return unit * (float(np.trace(problem.cost @ covariance)) + problem.between)
-
-
-def rate_for(model: LinearModel, mean_square: float) -> float:
-    """Return the bit/s that an ideal code needs for this mean square error of the output.
-
-    What even `RATE_LIMITS` cannot do, or needs no bit for, gives the limit itself.
-    """
-    if not mean_square > 0.0:
-        raise ValueError(f"mean_square is {mean_square}; it must be above 0")
-    low = max(RATE_LIMITS[0], rate_needed(model.dynamics) * (1.0 + 1e-6))
-    high = RATE_LIMITS[1]
-
-    def excess(log_rate: float) -> float:
-        return math.log(floor(model, math.exp(log_rate)) / mean_square)
-
-    if excess(math.log(low)) <= 0.0:
-        return low
-    if excess(math.log(high)) >= 0.0:
-        return high
-    return math.exp(brentq(excess, math.log(low), math.log(high), xtol=1e-7))
 
 
 def _paid(model: LinearModel, rate_bit_s: float, erased: float) -> float:

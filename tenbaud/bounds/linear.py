@@ -122,11 +122,6 @@ def rate_needed(dynamics: ArrayLike) -> float:
     return float(growth[growth > slack].sum()) / math.log(2.0)
 
 
-def bits_needed_per_sample(dynamics: ArrayLike, sample_s: float) -> float:
-    """Return the bits that a word must have on average: `sum log2 |lambda|` of the sampled plant."""
-    return rate_needed(dynamics) * sample_s
-
-
 def sampled(model: LinearModel, period_s: float) -> tuple[Matrix, Matrix]:
     """Return transition matrix and noise covariance over a period (Van Loan, IEEE TAC 23, 1978)."""
     states = model.states

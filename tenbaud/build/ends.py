@@ -4,33 +4,32 @@ from __future__ import annotations
 
 import math
 import secrets
+import time
 from collections.abc import Callable
-from pathlib import Path
 
 from channel.codec.codec import Codec
-from channel.line.impairments import Direction, ImpairedLine
-from channel.line.line import Line
-from channel.line.shaper import SlotShaper, UplinkMeter
+from channel.line.clocks import SkewedClock
+from channel.line.downlink import Downlink
+from channel.line.impairments import Direction, ImpairedLine, SymbolWire
+from channel.line.line import CleanLine, Line
 from channel.line.uplink import Uplink
 from channel.protocol.recording import Recorder
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
 from channel.protocol.wire import Wire
-from receiver.controllers.base import Controller, ControllerContext
-from receiver.controllers.pid import Pid, PidGains
-from receiver.controllers.recorded import RecordedController
-from receiver.controllers.references import Constant, Csv, Reference, Sine, Square, Step
-from receiver.endpoint import ReceiverEndpoint
+from receiver.controllers.base import Controller
+from receiver.controllers.references import Reference
+from receiver.endpoint import ReceiverEndpoint, SteppedEndpoint
 from receiver.session.session import ReceiverSession
 from tenbaud.build.codec import build_codec
-from tenbaud.build.flight import Agreement, read_flight_log, ticks_of, watchdog_wanted_s
+from tenbaud.build.controllers import build_controller, build_reference
+from tenbaud.build.flight import Agreement, ticks_of, watchdog_wanted_s
 from tenbaud.build.gauge import build_gauge
 from tenbaud.build.liveness import overtaking_ticks, watchdog_ticks
 from tenbaud.build.parts import Parts
-from tenbaud.build.plugins import build_plugin
 from tenbaud.build.rig import build_rig
+from tenbaud.config.kinds import CONTROLLERS
 from tenbaud.config.load import ConfigError
-from tenbaud.config.outside_code import is_plugin
-from tenbaud.config.schema import FlightConfig, ReferenceSection
+from tenbaud.config.schema import FlightConfig
 from transmitter.guard import Guard, GuardSettings
 from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode
@@ -95,21 +94,18 @@ def build_sight(agreement: Agreement) -> Sight | None:
 
 
 def build_uplink(agreement: Agreement, wire: Wire, recorder: Recorder | None = None) -> Uplink:
-    """Return the transmitter's way out onto a line: grid, delivery delay and meter."""
-    terms = agreement.terms
-    alphabet = agreement.codec.coder.alphabet
+    """Return the transmitter's way out onto a line."""
     line = build_line(agreement, "up", wire)
-    return Uplink(SlotShaper(terms), line, UplinkMeter(alphabet), wire, recorder)
+    return Uplink(agreement.terms, agreement.codec.coder.alphabet, line, wire, recorder)
 
 
-def build_line(agreement: Agreement, direction: Direction, wire: Wire) -> Line:
+def build_line(agreement: Agreement, direction: Direction, wire: SymbolWire) -> Line:
     """Return one direction of the line, with what goes wrong on it."""
     one = agreement.faults.up if direction == "up" else agreement.faults.down
-    delay_ns = agreement.terms.symbol_delay_ns if direction == "up" else 0
     if not one.any and not agreement.live:
-        return Line(delay_ns)
+        return CleanLine()
     alphabet = agreement.codec.coder.alphabet
-    return ImpairedLine(one, alphabet, f"{agreement.config.seed} {direction}", wire, delay_ns)
+    return ImpairedLine(one, alphabet, f"{agreement.config.seed} {direction}", wire)
 
 
 def sabotaged(codec: Codec, text: str, live: bool = False) -> Codec:
@@ -142,7 +138,12 @@ def build_receiver(
         recorder,
         take_over=take_over,
     )
-    return ReceiverEndpoint(session, wire)
+    if agreement.clock == "virtual":
+        # There the transmitter's process holds both directions of the line, and the receiver's clock.
+        return SteppedEndpoint(session, Downlink(wire))
+    faults = agreement.faults
+    clock = SkewedClock(faults, time.monotonic_ns()) if faults.bad_clock else None
+    return ReceiverEndpoint(session, Downlink(wire, build_line(agreement, "down", wire)), clock)
 
 
 def check_parts(config: FlightConfig, parts: Parts | None = None) -> None:
@@ -154,7 +155,7 @@ def check_parts(config: FlightConfig, parts: Parts | None = None) -> None:
     build_rig(config, parts.plant)
     if parts.controller is None:
         controller = build_controller(config)
-        if is_plugin(config.receiver.controller):
+        if config.receiver.controller not in CONTROLLERS.built_in:
             _check_command(config, controller)
 
 
@@ -191,60 +192,3 @@ def guard_settings(agreement: Agreement) -> GuardSettings:
         safe_volts=section.safe_volts,
         soft_limits_rad=soft,
     )
-
-
-def build_controller(config: FlightConfig, reference: Reference | None = None) -> Controller:
-    """Return the controller; it follows `reference` instead of the configured one if it is given."""
-    section = config.receiver
-    if section.controller == "recorded":
-        return RecordedController(read_flight_log(config))
-    if is_plugin(section.controller):
-        context = ControllerContext(
-            config.timing.tick_s,
-            reference or build_reference(config),
-            config.limits.volts_max,
-            config.limits.initial_volts,
-        )
-        plugin: Controller = build_plugin(
-            config,
-            "receiver.controller",
-            section.controller,
-            context,
-            section.controller_options,
-            Controller,
-        )
-        return plugin
-    pid = section.pid
-    return Pid(
-        PidGains(pid.proportional, pid.integral, pid.derivative, pid.unit),
-        reference or build_reference(config),
-        config.timing.tick_s,
-        volts_max=config.limits.volts_max,
-        normal_force_volts=pid.normal_force_volts,
-        anti_windup=pid.anti_windup,
-    )
-
-
-def build_reference(config: FlightConfig) -> Reference:
-    """Return the set-point over the ticks."""
-    return reference_of(config.receiver.reference, config.timing.tick_s)
-
-
-def reference_of(section: ReferenceSection, tick_s: float) -> Reference:
-    """Return the set-point that a section describes."""
-    match section.kind:
-        case "square":
-            return Square(section.amplitude_rad, section.period_s, tick_s)
-        case "sine":
-            return Sine(section.amplitude_rad, section.period_s, tick_s)
-        case "step":
-            return Step(section.amplitude_rad, section.start_s, tick_s)
-        case "constant":
-            return Constant(section.amplitude_rad, tick_s)
-        case "csv":
-            if not section.file:
-                raise ConfigError("receiver.reference.file names no file for the csv reference")
-            try:
-                return Csv(Path(section.file), tick_s)
-            except ValueError as error:
-                raise ConfigError(f"receiver.reference: {error}") from error

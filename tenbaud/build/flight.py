@@ -12,14 +12,17 @@ from channel.codec.codec import Codec
 from channel.errors import TenbaudError
 from channel.flight_log import FlightColumns, FlightLog
 from channel.line.impairments import LineFaults, parse_impairments
+from channel.links.kind import LinkKind
+from channel.links.registry import LINKS, link_kind
 from channel.protocol.identity import Identity, numerics_probe
 from channel.protocol.limits import CommandLimits
 from channel.protocol.terms import Clock, Terms
+from channel.registry import RegistryError
 from tenbaud.build.codec import build_codec
 from tenbaud.build.liveness import RoundTrip, check_liveness, round_trip
 from tenbaud.build.parts import Parts
-from tenbaud.build.serial_terms import on_serial_line
 from tenbaud.config.load import ConfigError
+from tenbaud.config.outside_code import require_allowed
 from tenbaud.config.schema import FlightConfig
 
 REAL_RIGS = ("serial", "quarc", "hil")
@@ -53,6 +56,11 @@ class Agreement:
         """Return the ticks of the flight: whole samples, at least one."""
         samples = round(self.config.duration_s * 1e9) // self.terms.sample_ns
         return max(1, samples) * self.terms.ticks_per_sample
+
+    @property
+    def link(self) -> LinkKind:
+        """Return what the configured kind of link says about itself."""
+        return kind_of_link(self.config)
 
     @property
     def faults(self) -> LineFaults:
@@ -140,8 +148,7 @@ def build_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:
         initial_command=config.limits.initial_volts,
         limits=build_limits(config),
     )
-    if config.link.kind == "serial":
-        terms = on_serial_line(config.link, codec, terms)
+    terms = kind_of_link(config).terms(config.link, codec, terms)
     if lead != "auto":
         return terms
     shortest = terms.with_shortest_lead(clock)
@@ -149,6 +156,16 @@ def build_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:
     if not delay_ns:
         return shortest
     return replace(terms, lead_ticks=terms.lead_needed_ticks + -(-delay_ns // terms.tick_ns))
+
+
+def kind_of_link(config: FlightConfig) -> LinkKind:
+    """Return the configured kind of link; ConfigError where it is not there or not allowed."""
+    if config.link.kind not in LINKS.built_in:
+        require_allowed(config)
+    try:
+        return link_kind(config.link.kind)
+    except RegistryError as error:
+        raise ConfigError(str(error)) from error
 
 
 def build_limits(config: FlightConfig) -> CommandLimits:

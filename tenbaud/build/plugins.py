@@ -16,6 +16,7 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
 
+from channel.registry import Registry, RegistryError
 from tenbaud.build.parts import PartError, check_part
 from tenbaud.config.outside_code import is_object, require_allowed
 from tenbaud.config.schema import FlightConfig
@@ -23,23 +24,26 @@ from tenbaud.config.schema import FlightConfig
 
 def build_plugin(
     config: FlightConfig,
-    field: str,
+    registry: Registry,
     name: str,
     context: object,
     options: Mapping[str, Any],
     protocol: type,
 ) -> Any:
-    """Return the object that `module:Class` builds; PartError if it is not what `field` needs.
+    """Return the object that a class from outside builds; PartError if it is not what is needed.
 
-    CodeNotAllowed if nobody allowed the configuration's code to run.
+
+    `name` is `module:Class` or what an installed package offers. CodeNotAllowed if nobody allowed the
+    configuration's code to run.
     """
     require_allowed(config)
+    field = registry.field
     if is_object(name):
         raise PartError(
             f"{field} = {name!r} was an object in a program, and a recording does not keep objects: "
             "run that program again, or name its class as module:Class"
         )
-    found = _load_class(field, name)
+    found = _load_class(field, name) if ":" in name else _offered(registry, name)
     try:
         part = found(context, **options)
     except Exception as error:  # it is the user's code, and anything may be wrong in it
@@ -82,6 +86,27 @@ def _load_class(field: str, name: str) -> Any:
         hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(classes) or 'no class'}."
         raise PartError(f"{field} = {name!r}: {module_name} has no class {class_name!r}; {hint}")
     return found
+
+
+def build_part(
+    config: FlightConfig,
+    registry: Registry,
+    name: str,
+    context: object,
+    options: Mapping[str, Any],
+    protocol: type,
+) -> Any:
+    """Return a plant or controller: built in as a function of the configuration, or as a class."""
+    if name in registry.built_in and not inspect.isclass(part := registry.load(name)):
+        return part(config, context)
+    return build_plugin(config, registry, name, context, options, protocol)
+
+
+def _offered(registry: Registry, name: str) -> Any:
+    try:
+        return registry.load(name)
+    except RegistryError as error:
+        raise PartError(str(error)) from error
 
 
 def _call(options: Mapping[str, Any]) -> str:

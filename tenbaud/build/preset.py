@@ -10,7 +10,7 @@ from channel.codec.codec import Codec
 from channel.protocol.terms import Terms
 from plant_sim.plant import Plant
 from receiver.controllers.base import Controller
-from tenbaud.build.ends import build_controller
+from tenbaud.build.controllers import build_controller
 from tenbaud.build.flight import agree
 from tenbaud.build.rig import build_plant
 from tenbaud.config.load import load_config, nested

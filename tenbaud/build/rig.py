@@ -8,11 +8,12 @@ from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters, PitchPlant
 from plant_sim.plant import Plant, PlantContext
 from tenbaud.build.flight import REAL_RIGS, read_flight_log
-from tenbaud.build.plugins import build_plugin
+from tenbaud.build.plugins import build_part
+from tenbaud.config.kinds import PLANTS
 from tenbaud.config.load import ConfigError
-from tenbaud.config.outside_code import is_plugin
+from tenbaud.config.models import PitchModelSection
 from tenbaud.config.rig_schema import AxisSection
-from tenbaud.config.schema import FlightConfig, PitchModelSection
+from tenbaud.config.schema import FlightConfig
 from transmitter.rigs.axes import Axis, Motors
 from transmitter.rigs.base import Rig
 from transmitter.rigs.device import DeviceRig, DeviceSettings
@@ -71,24 +72,25 @@ def build_plant(config: FlightConfig, step_s: float) -> Plant:
             disturbance = parse_disturbance(section.disturbance, step_s, config.seed)
         except ValueError as error:
             raise ConfigError(f"transmitter.plant.disturbance: {error}") from error
-    if is_plugin(section.kind):
-        context = PlantContext(
-            step_s,
-            config.seed,
-            config.limits.volts_max,
-            section.mismatch,
-            disturbance,
-            section.initial_angle_rad,
-        )
-        plugin: Plant = build_plugin(
-            config, "transmitter.plant.kind", section.kind, context, section.options, Plant
-        )
-        return plugin
-    return PitchPlant(
-        nominal_plant(config).mismatched(section.mismatch),
+    context = PlantContext(
         step_s,
+        config.seed,
+        config.limits.volts_max,
+        section.mismatch,
         disturbance,
-        initial_angle_rad=section.initial_angle_rad,
+        section.initial_angle_rad,
+    )
+    plant: Plant = build_part(config, PLANTS, section.kind, context, section.options, Plant)
+    return plant
+
+
+def pitch_plant(config: FlightConfig, context: PlantContext) -> PitchPlant:
+    """Return the pitch axis."""
+    return PitchPlant(
+        nominal_plant(config).mismatched(config.transmitter.plant.mismatch),
+        context.step_s,
+        context.disturbance,
+        initial_angle_rad=context.initial_angle_rad,
         # Not the C library's: a simulated flight is then the same on every machine.
         sine=sin,
     )

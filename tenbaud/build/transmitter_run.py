@@ -9,8 +9,8 @@ from typing import Any
 from channel.line.line import Line
 from channel.line.uplink import Uplink
 from tenbaud.build.flight import Agreement
+from transmitter.endpoint import TransmitterEndpoint
 from transmitter.node import TransmitterNode
-from transmitter.session.rate_watch import RateWatch
 
 Stop = Callable[[], bool]
 
@@ -20,10 +20,9 @@ class TransmitterRun:
     """The parts of one transmitter, before, during and after its flight."""
 
     agreement: Agreement
-    node: TransmitterNode
-    uplink: Uplink
+    endpoint: TransmitterEndpoint
     downlink: Line
-    """on the virtual clock; on a real one the receiver has its own"""
+    """of the virtual clock; on a real one the receiver has its own"""
     ticks: int = 0
     """flown by this process"""
     rejoin_bytes: int = 0
@@ -33,7 +32,15 @@ class TransmitterRun:
     wire_bytes_down: int = 0
     desyncs_asked: float = 0.0
     """lockstep failures that were asked for while the flight went on"""
-    rate: RateWatch | None = None
-    """whether the symbol rate is kept; on a real clock"""
     extra: dict[str, Any] = field(default_factory=dict)
     """figures of the clock that was flown on"""
+
+    @property
+    def node(self) -> TransmitterNode:
+        """Return the sensor node."""
+        return self.endpoint.node
+
+    @property
+    def uplink(self) -> Uplink:
+        """Return its way out."""
+        return self.endpoint.uplink

@@ -139,9 +139,12 @@ def _zenoh() -> list[Finding]:
     from channel.errors import LinkError
     from channel.links.endpoints import free_endpoint
     from channel.links.zenoh.link import ZenohLink
+    from channel.protocol.frames import Symbol
+    from channel.protocol.wire import encode
 
     endpoint = free_endpoint()
     trips_ms = []
+    there = encode(Symbol(1, 0, 0, 0))
     try:
         with (
             ZenohLink("receiver", "doctor", listen=(endpoint,)) as receiver,
@@ -151,7 +154,7 @@ def _zenoh() -> list[Finding]:
                 return [Finding("problem", "Zenoh", f"two sessions at {endpoint} did not meet")]
             for _ in range(ROUND_TRIPS):
                 begun = time.perf_counter()
-                transmitter.send(b"there", is_symbol=True)
+                transmitter.send(there)
                 if receiver.receive(TRIP_TIMEOUT_S) is None:
                     return [Finding("problem", "Zenoh", f"a message at {endpoint} did not arrive")]
                 receiver.send(b"back")

@@ -32,15 +32,17 @@ def endpoints_of(
     `sessions` is the pattern of session names of an end that serves many.
     """
     from channel.links.endpoints import check_endpoints, default_endpoint, with_protocol
+    from tenbaud.build.flight import kind_of_link
     from tenbaud.flight.ends import Endpoints
 
     listen, connect = tuple(addresses.listen or ()), tuple(addresses.connect or ())
     router = tuple(addresses.router or ())
     security = security_of(role, addresses, sessions or config.link.session)
-    if config.link.kind == "serial" and config.link.downlink != "zenoh":
+    if not kind_of_link(config).uses_addresses(config.link):
         if listen or connect or router or addresses.scout:
             raise typer.BadParameter(
-                "--listen, --connect, --router and --scout are Zenoh's; a serial line has --port"
+                "--listen, --connect, --router and --scout are Zenoh's; a serial line has --port, and "
+                "other kinds of link have their fields in [link]"
             )
     elif not listen and not connect and not router and not addresses.scout:
         # Without any address both ends meet on this machine: the receiver listens.

@@ -94,7 +94,7 @@ def demo(
 
 def _checked_pace(agreement: Agreement, pace: float | None, view: bool) -> float | None:
     """Return how many times real time to fly at most; a flight that is looked at keeps to 1."""
-    virtual = agreement.clock == "virtual" and agreement.config.link.kind != "memory"
+    virtual = agreement.clock == "virtual" and not agreement.link.in_process
     if pace is not None and not virtual:
         raise typer.BadParameter("--pace slows the virtual clock of two processes down, and no other")
     return pace or (1.0 if view and virtual else None)
@@ -112,7 +112,7 @@ def _view_wish(
     from tenbaud.flight.viewing import ViewWish
     from tenbaud.view.server import Address, free_port, require_nicegui
 
-    if len(agreements) > 1 or agreements[0].config.link.kind == "memory":
+    if len(agreements) > 1 or agreements[0].link.in_process:
         raise typer.BadParameter("--view shows one flight of two processes: one --mismatch, no memory")
     require_nicegui()
     host = loopback_host()

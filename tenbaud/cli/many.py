@@ -51,8 +51,8 @@ def serve(
 
     agreement_of = agreements(node.preset, node.config, many.configs, changed, node.clock.value)
     common = agreement_of("")
-    if common.config.link.kind != "zenoh":
-        raise typer.BadParameter("--sessions needs Zenoh; a serial line has one rig at its other end")
+    if not common.link.serves_many:
+        raise typer.BadParameter("--sessions needs Zenoh; other links have one rig at their other end")
     check_parts(common.config)
     where = endpoints_of("receiver", addresses, common.config, sessions=many.sessions)
     places = ", ".join(where.listen + where.connect + where.router)

@@ -156,22 +156,24 @@ def _run(
 
 def _check_link(config: FlightConfig, insecure: bool) -> None:
     """Refuse, before there is a run folder, a link that one end by itself cannot open."""
-    if config.link.kind == "memory":
-        raise typer.BadParameter(
-            "link.kind = memory joins two ends in one process: `tenbaud demo --link memory`"
-        )
-    if config.link.kind == "serial":
-        from channel.links.serial.port import check_port
+    from tenbaud.build.flight import kind_of_link
 
-        check_port(config.link.port, insecure)
+    kind = kind_of_link(config)
+    if kind.in_process:
+        raise typer.BadParameter(
+            f"link.kind = {config.link.kind} joins two ends in one process: "
+            f"`tenbaud demo --link {config.link.kind}`"
+        )
+    kind.check(config.link, insecure)
 
 
 def _introduce(
     role: Role, identity: Any, config: FlightConfig, endpoints: Endpoints, folder: RunFolder
 ) -> None:
-    link = config.link
-    ports = tuple(filter(None, (link.port, link.downlink))) if link.kind == "serial" else ()
-    places = [*ports, *endpoints.listen, *endpoints.connect, *endpoints.router]
+    from tenbaud.build.flight import kind_of_link
+
+    own = kind_of_link(config).where(config.link)
+    places = [*own, *endpoints.listen, *endpoints.connect, *endpoints.router]
     if endpoints.scouting:
         places.append("whatever answers in this network")
     typer.echo(

@@ -100,7 +100,12 @@ Mismatches = Annotated[
         show_default=False,
     ),
 ]
-Link = Annotated[str | None, typer.Option(help="zenoh, or serial with --port.", show_default=False)]
+Link = Annotated[
+    str | None,
+    typer.Option(
+        help="zenoh, serial with --port, or a kind from an installed package.", show_default=False
+    ),
+]
 DemoLink = Annotated[
     str | None,
     typer.Option(

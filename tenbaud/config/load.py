@@ -13,8 +13,9 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from channel.errors import TenbaudError
-from tenbaud.config.schema import KINDS, PLUGIN_SECTIONS, FlightConfig
-from tenbaud.config.section import Section
+from tenbaud.config.kinds import CODERS, MODELS
+from tenbaud.config.schema import KINDS, FlightConfig
+from tenbaud.config.section import OutsideSection, Section
 
 DEFAULT_PRESET = "paper-10baud"
 
@@ -155,7 +156,8 @@ def _describe(detail: ErrorDetails) -> tuple[str, str]:
         return name, f"unknown field{_nearest(place, kind)}"
     if detail["type"] == "union_tag_invalid":
         tag = detail["ctx"]["tag"]
-        return f"{name}.kind", f"known are {', '.join(KINDS[name])} and module:Class, got {tag!r}"
+        hint = (MODELS if name == "model" else CODERS).hint(str(tag))
+        return f"{name}.kind = {tag!r}", hint
     if detail["type"] == "string_pattern_mismatch" and place[-1] in ("controller", "kind"):
         return f"{name} = {detail['input']!r}", "a class from outside is written module:Class"
     message = detail["msg"].removeprefix("Value error, ")
@@ -166,8 +168,8 @@ def _describe(detail: ErrorDetails) -> tuple[str, str]:
 
 def _kinds(section: str) -> dict[str, type[Section]]:
     """Return what a section may be, by the tag that its errors carry."""
-    plugin = {"plugin": PLUGIN_SECTIONS[section]} if section in PLUGIN_SECTIONS else {}
-    return KINDS.get(section, {}) | plugin
+    kinds: dict[str, type[Section]] = dict(KINDS.get(section, {}))
+    return kinds | {"plugin": OutsideSection} if kinds else kinds
 
 
 def _nearest(place: list[str], kind: str | None) -> str:

@@ -13,6 +13,9 @@ from importlib.machinery import PathFinder
 from pathlib import Path
 from typing import NamedTuple
 
+from channel.links.registry import LINKS
+from channel.registry import Registry
+from tenbaud.config.kinds import CODERS, CONTROLLERS, MODELS, PLANTS
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
 
@@ -23,11 +26,6 @@ OBJECT = "object"
 
 class CodeNotAllowed(ConfigError):
     """A configuration names code that nobody has allowed; the text says which, and from where."""
-
-
-def is_plugin(kind: str) -> bool:
-    """Return whether a kind names a class from outside."""
-    return ":" in kind
 
 
 def is_object(kind: str) -> bool:
@@ -43,19 +41,22 @@ def object_kind(part: object) -> str:
 class OutsidePart(NamedTuple):
     """A class from outside, as a configuration names it."""
 
-    field: str
+    registry: Registry
     name: str
 
 
 def outside_parts(config: FlightConfig) -> list[OutsidePart]:
     """Return the classes from outside that a configuration names."""
     named = (
-        OutsidePart("model.kind", config.model.kind),
-        OutsidePart("coder.kind", config.coder.kind),
-        OutsidePart("receiver.controller", config.receiver.controller),
-        OutsidePart("transmitter.plant.kind", config.transmitter.plant.kind),
+        OutsidePart(MODELS, config.model.kind),
+        OutsidePart(CODERS, config.coder.kind),
+        OutsidePart(CONTROLLERS, config.receiver.controller),
+        OutsidePart(PLANTS, config.transmitter.plant.kind),
+        OutsidePart(LINKS, config.link.kind),
     )
-    return [part for part in named if is_plugin(part.name) and not is_object(part.name)]
+    return [
+        part for part in named if part.name not in part.registry.built_in and not is_object(part.name)
+    ]
 
 
 def require_allowed(config: FlightConfig) -> None:
@@ -63,7 +64,7 @@ def require_allowed(config: FlightConfig) -> None:
     parts = outside_parts(config)
     if not parts or config.code_allowed:
         return
-    named = [f"{field} = {name!r}: {_what_would_run(name)}" for field, name in parts]
+    named = [f"{part.registry.field} = {part.name!r}: {_what_would_run(part)}" for part in parts]
     raise CodeNotAllowed(
         "\n  ".join(["the configuration names code that is no part of tenbaud:", *named])
         + "\nNone of it was imported. Imported code can do whatever you can do on this machine. "
@@ -86,7 +87,10 @@ def require_regular_files(config: FlightConfig) -> None:
             raise ConfigError(f"{field} = {name!r} is not a regular file, so it is not opened")
 
 
-def _what_would_run(name: str) -> str:
+def _what_would_run(part: OutsidePart) -> str:
+    name = part.name
+    if ":" not in name:
+        return f"would import what {part.registry.offered_by(name)}"
     module, _, called = name.partition(":")
     origin = find_origin(module)
     if origin is None:

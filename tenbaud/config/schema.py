@@ -7,24 +7,33 @@ alike, and the handshake compares their digest. The others concern one end, or h
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from channel.line.impairments import parse_impairments
+from channel.links.registry import LINKS
 from channel.protocol.sabotage import parse_sabotage
+from tenbaud.config.coders import ZoomCoderSection
+from tenbaud.config.kinds import (
+    CODERS,
+    CONTROLLERS,
+    MODELS,
+    PLANTS,
+    PartName,
+    sections_of,
+    union_of,
+)
+from tenbaud.config.models import PitchModelSection
 from tenbaud.config.permission import CodePermission
 from tenbaud.config.rig_schema import BridgeSection, HilSection, QuarcSection, SerialSection
 from tenbaud.config.section import (
-    AngleRange,
     Counts,
-    Factor,
     Gain,
+    KindSection,
     Mismatch,
     NotNegative,
     Options,
-    PluginName,
     Positive,
     Section,
     Volts,
@@ -78,160 +87,18 @@ class ChannelSection(Section):
     """W: earlier samples that each command frame repeats"""
 
 
-class PitchModelSection(Section):
-    """The pitch model (11),(12) that both codecs predict with."""
+if TYPE_CHECKING:
+    ModelSection: TypeAlias = KindSection
+    CoderSection: TypeAlias = KindSection
+else:
+    ModelSection = union_of(MODELS)
+    CoderSection = union_of(CODERS)
 
-    kind: Literal["pitch"] = "pitch"
-    rate_damping_per_s: Annotated[float, Field(ge=0.0, le=100.0)] = 0.1
-    stiffness_per_s2: Annotated[float, Field(ge=-100.0, le=1000.0)] = 0.5
-    torque_gain_rad_per_v_s2: Annotated[float, Field(ge=-100.0, le=100.0)] = 0.35
-    equilibrium_rad: Annotated[float, Field(ge=-3.2, le=3.2)] = -0.115
-    motor_lag_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.08
-
-
-class HoldModelSection(Section):
-    """No model: angle and rate stay as the last word set them. For the coder `words`."""
-
-    kind: Literal["hold"] = "hold"
-
-
-class PluginModelSection(Section):
-    """A model from outside."""
-
-    kind: PluginName
-    """module:Class"""
-    options: Options = Field(default_factory=dict)
-    """what the class is built with"""
-
-
-class ZoomCoderSection(Section):
-    """The paper's coder (16)-(22) and the observer gains."""
-
-    kind: Literal["zoom"] = "zoom"
-    window_signs: Annotated[int, Field(ge=1, le=16)] = 2
-    """how many signs the saturation test of (19) looks at; the paper's has two"""
-    initial_range_rad: AngleRange = 0.5
-    minimum_range_rad: AngleRange = 0.05
-    decay: Annotated[float, Field(ge=1e-6, le=1.0)] = 0.95
-    correction: Literal["held", "impulse"] = "held"
-    """held over the sample as in (22), or added to the state at once"""
-    gains: tuple[Factor, Factor] = (4.1, 8.6)
-    """l1 and l2 of (23): 1/s and 1/s^2 when held, per unit when impulse"""
-
-
-class FixedCoderSection(Section):
-    """One sign per sample and a range that never changes."""
-
-    kind: Literal["fixed"] = "fixed"
-    range_rad: AngleRange = 0.1
-    correction: Literal["held", "impulse"] = "held"
-    gains: tuple[Factor, Factor] = (4.1, 8.6)
-
-
-class TimedCoderSection(Section):
-    """One sign per sample and a range that shrinks with time: time-based zooming."""
-
-    kind: Literal["timed"] = "timed"
-    initial_range_rad: AngleRange = 0.5
-    minimum_range_rad: AngleRange = 0.05
-    decay: Annotated[float, Field(ge=1e-6, le=1.0)] = 0.95
-    correction: Literal["held", "impulse"] = "held"
-    gains: tuple[Factor, Factor] = (4.1, 8.6)
-
-
-class StaticCoderSection(Section):
-    """The measurement itself in a few bits, without memory (16)."""
-
-    kind: Literal["static"] = "static"
-    bits: Annotated[int, Field(ge=1, le=15)] = 1
-    range_rad: AngleRange = 3.141592653589793
-    """half the width that the cells cover"""
-    correction: Literal["held", "impulse"] = "held"
-    gains: tuple[Factor, Factor] = (4.1, 8.6)
-
-
-class WordsCoderSection(Section):
-    """The usual loop: the angle as a word, the rate by differences. For the model `hold`."""
-
-    kind: Literal["words"] = "words"
-    bits: Annotated[int, Field(ge=1, le=15)] = 10
-    range_rad: AngleRange = 3.141592653589793
-    rate_filter_s: NotNegative = 0.0
-    """tau of a low-pass behind the differentiator; 0: none"""
-
-
-class HistoryCoderSection(Section):
-    """One sign that looks ahead when it is formed and back when it is read; ranges in rad."""
-
-    kind: Literal["history"] = "history"
-    rows: Annotated[tuple[tuple[Factor, Factor, Factor], ...], Field(min_length=1, max_length=512)] = (
-        (1.0, 0.75, 1.0),
-    )
-    """(angle, rate, range) of each pattern of the last signs: corrections in units of the range, the
-    rate's per symbol period, and what the range is multiplied by. Bit j of a row's number says that the
-    sign j + 1 samples ago was the present one"""
-    initial_range_rad: AngleRange = 0.01
-    minimum_range_rad: AngleRange = 0.001
-    maximum_range_rad: AngleRange = 3.0
-    weights: tuple[Factor, Factor, Factor] = (0.7, 0.45, 0.75)
-    """of the error that is left after the look-ahead: angle, angle times swing, swing"""
-    lookahead: Annotated[int, Field(ge=0, le=6)] = 1
-    """samples that the transmitter looks ahead"""
-
-
-class PluginCoderSection(Section):
-    """A coder from outside."""
-
-    kind: PluginName
-    """module:Class"""
-    options: Options = Field(default_factory=dict)
-    """what the class is built with"""
-
-
-def _kind_or(default: str) -> Callable[[Any], str]:
-    """Return the discriminator of a section whose `kind` may be left out."""
-
-    def kind(value: Any) -> str:
-        named = (
-            value.get("kind", default) if isinstance(value, dict) else getattr(value, "kind", default)
-        )
-        return "plugin" if ":" in str(named) else str(named)
-
-    return kind
-
-
-ModelSection: TypeAlias = Annotated[
-    Annotated[PitchModelSection, Tag("pitch")]
-    | Annotated[HoldModelSection, Tag("hold")]
-    | Annotated[PluginModelSection, Tag("plugin")],
-    Discriminator(_kind_or("pitch")),
-]
-CoderSection: TypeAlias = Annotated[
-    Annotated[ZoomCoderSection, Tag("zoom")]
-    | Annotated[FixedCoderSection, Tag("fixed")]
-    | Annotated[TimedCoderSection, Tag("timed")]
-    | Annotated[StaticCoderSection, Tag("static")]
-    | Annotated[WordsCoderSection, Tag("words")]
-    | Annotated[HistoryCoderSection, Tag("history")]
-    | Annotated[PluginCoderSection, Tag("plugin")],
-    Discriminator(_kind_or("zoom")),
-]
-
-KINDS: dict[str, dict[str, type[Section]]] = {
-    "model": {"pitch": PitchModelSection, "hold": HoldModelSection},
-    "coder": {
-        "zoom": ZoomCoderSection,
-        "fixed": FixedCoderSection,
-        "timed": TimedCoderSection,
-        "static": StaticCoderSection,
-        "words": WordsCoderSection,
-        "history": HistoryCoderSection,
-    },
+KINDS: dict[str, dict[str, type[KindSection]]] = {
+    "model": sections_of(MODELS),
+    "coder": sections_of(CODERS),
 }
 """Sections that come in kinds; the first kind is what a section without `kind` is."""
-
-PLUGIN_SECTIONS: dict[str, type[Section]] = {"model": PluginModelSection, "coder": PluginCoderSection}
-"""The same sections where `kind` names a class from outside; their tag is "plugin"."""
 
 
 class Limits(Section):
@@ -246,8 +113,8 @@ class Limits(Section):
 class PlantSection(Section):
     """The simulated plant, relative to the codec's model."""
 
-    kind: Literal["pitch"] | PluginName = "pitch"
-    """the pitch axis, or module:Class"""
+    kind: Annotated[str, AfterValidator(PartName(PLANTS))] = "pitch"
+    """the pitch axis, or a plant from outside"""
     options: Options = Field(default_factory=dict)
     """what a class from outside is built with"""
     relative_to: Literal["model", "pitch"] = "model"
@@ -319,8 +186,8 @@ class ReferenceSection(Section):
 class ReceiverSection(Section):
     """The controller node."""
 
-    controller: Literal["pid", "recorded"] | PluginName = "pid"
-    """the PID law, the voltages of a recorded flight, or module:Class"""
+    controller: Annotated[str, AfterValidator(PartName(CONTROLLERS))] = "pid"
+    """the PID law, the voltages of a recorded flight, or a law from outside"""
     controller_options: Options = Field(default_factory=dict)
     """what a class from outside is built with"""
     pid: PidSection = PidSection()
@@ -342,7 +209,7 @@ class FlightLogSection(Section):
 class LinkSection(Section):
     """Where the other end is."""
 
-    kind: Literal["zenoh", "serial", "memory"] = "zenoh"
+    kind: Annotated[str, AfterValidator(PartName(LINKS))] = "zenoh"
     session: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+(/[A-Za-z0-9_.-]+)*$")] = "helicopter"
     peer_timeout_s: Annotated[float, Field(ge=0.01, le=3600.0)] = 10.0
     """silence after which an end gives the other one up"""
@@ -356,6 +223,8 @@ class LinkSection(Section):
     """serial: of that second port"""
     best_effort: bool = False
     """Zenoh: a congested network may drop symbols instead of letting them wait"""
+    options: Options = Field(default_factory=dict)
+    """for a kind from an installed package"""
     impairments: str = ""
     """such as "loss=0.2,up:flip=0.01,delay=30ms±10ms": what goes wrong on the line, on purpose"""
 

@@ -18,6 +18,8 @@ Counts = Annotated[int, Field(ge=-(2**31), lt=2**31)]
 
 PluginName = Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$")]
 """A class from outside, `module:Class`."""
+OfferedName = Annotated[str, Field(pattern=r"^[A-Za-z_][\w.-]*(:[A-Za-z_]\w*)?$")]
+"""The same, or a name that an installed package offers."""
 Options = dict[str, JsonValue]
 """What it is built with, beside what it is told of the flight."""
 
@@ -26,3 +28,18 @@ class Section(BaseModel):
     """Unknown fields are errors; values do not change after loading."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class KindSection(Section):
+    """A section that comes in kinds."""
+
+    kind: str
+
+
+class OutsideSection(KindSection):
+    """A class from outside: named here, or offered by an installed package under a name of its own."""
+
+    kind: OfferedName
+    """module:Class, or the name that a package offers"""
+    options: Options = Field(default_factory=dict)
+    """what the class is built with"""

@@ -1,6 +1,6 @@
 """Both ends on this machine: two processes of the same command.
 
-Zenoh on loopback joins them, or a serial line that this process emulates.
+Zenoh on loopback joins them, or whatever the configured kind of link has for two processes.
 """
 
 from __future__ import annotations
@@ -9,23 +9,20 @@ import json
 import signal
 import subprocess
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import IO
 
 from channel.links.base import Role
-from channel.links.endpoints import free_endpoint
+from channel.links.kind import Meeting
 from tenbaud.build.flight import Agreement
-from tenbaud.config.load import dump_config
+from tenbaud.config.load import dump_config, flattened
 from tenbaud.files.whole import write_whole
 from tenbaud.flight.ends import run_in_memory
 from tenbaud.flight.lifeline import start_child
 from tenbaud.flight.outcome import ExitCode, Outcome, first_code, outcome_of_status
 from tenbaud.flight.report import write_up
-from tenbaud.flight.serial_line import EmulatedLine
 from tenbaud.flight.status import Status
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, joined
@@ -58,10 +55,10 @@ def fly_demo(
     """Fly once into an existing, empty run folder; write summary and, if wished, figure there.
 
     `view`: serve the live page beside the flight, which may then be steered from it. `pace`: on the
-    virtual clock, at most so many times real time; not for the link "memory".
+    virtual clock, at most so many times real time; not for a link within one process.
     """
     write_whole(folder.config, dump_config(agreement.config))
-    if agreement.config.link.kind == "memory":
+    if agreement.link.in_process:
         outcome, upper, lower = run_in_memory(agreement, folder, "auto")
         messages = [] if outcome.code is ExitCode.OK else [outcome.text]
         result = DemoResult(joined(upper, lower), outcome.code, messages)
@@ -80,8 +77,8 @@ def fly_demo(
 def _fly_processes(
     agreement: Agreement, folder: RunFolder, on_status: OnStatus, viewing: Viewing, stop: StopFlag
 ) -> DemoResult:
-    with _meeting_place(agreement) as (up, down):
-        down, up = down + viewing.receiver, up + viewing.transmitter
+    with agreement.link.meeting(agreement.config.link) as meetings:
+        up, down = _words(meetings[0]) + viewing.transmitter, _words(meetings[1]) + viewing.receiver
         receiver = _Child("receiver", agreement, folder, down, on_status)
         transmitter = _Child("transmitter", agreement, folder, up, on_status)
         ends = (transmitter, receiver)
@@ -115,32 +112,14 @@ def _result(agreement: Agreement, transmitter: _Child, receiver: _Child) -> Demo
     return DemoResult(summary, code, [outcome.text for outcome in reversed(outcomes)])
 
 
-@contextmanager
-def _meeting_place(agreement: Agreement) -> Iterator[tuple[list[str], list[str]]]:
-    """Within the `with`, the two ends can meet: options for the transmitter and the receiver."""
-    section = agreement.config.link
-    if section.kind != "serial":
-        endpoint = free_endpoint()
-        yield ["--connect", endpoint], ["--listen", endpoint]
-        return
-    with ExitStack() as stack:
-        up = _emulated(stack, section.line_rate_baud)
-        transmitter = ["--port", str(up.transmitter_port)]
-        receiver = ["--port", str(up.receiver_port)]
-        if section.downlink == "zenoh":
-            endpoint = free_endpoint()
-            transmitter += ["--connect", endpoint]
-            receiver += ["--listen", endpoint]
-        elif section.downlink:
-            down = _emulated(stack, section.downlink_rate_baud)
-            transmitter += ["--downlink", str(down.transmitter_port)]
-            receiver += ["--downlink", str(down.receiver_port)]
-        yield transmitter, receiver
-
-
-def _emulated(stack: ExitStack, rate_baud: float) -> EmulatedLine:
-    folder = Path(stack.enter_context(TemporaryDirectory(prefix="tenbaud-line-")))
-    return stack.enter_context(EmulatedLine(folder, rate_baud))
+def _words(meeting: Meeting) -> list[str]:
+    """Return the options of one end that say where it meets the other."""
+    words = []
+    for name, value in flattened(meeting.settings, "link."):
+        words += ["--set", f"{name}={json.dumps(value)}"]
+    for option, endpoint in (("--listen", meeting.listen), ("--connect", meeting.connect)):
+        words += [option, endpoint] if endpoint else []
+    return words
 
 
 def _wait(ends: tuple[_Child, _Child], stop: StopFlag) -> None:

@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from channel.links.base import Link, Role
+from channel.links.kind import LinkEnd, NodePlace
 from channel.links.security import Security
 from channel.protocol.wire import DATAGRAM
 from receiver.endpoint import ReceiverEndpoint
@@ -31,11 +31,8 @@ from tenbaud.recording.gather import OverviewRecorder
 from tenbaud.recording.shared import SharedWriter
 from tenbaud.recording.writer import McapRecorder
 from tenbaud.telemetry.compose import ReceiverComposer, TransmitterComposer
-from tenbaud.telemetry.live import LiveTransmitter
 from tenbaud.telemetry.station import NO_WISH, Station, Wish, open_station
-
-if TYPE_CHECKING:
-    from channel.links.zenoh.node import NodePlace
+from transmitter.loops.virtual_peer import LinkPeer
 
 SWITCH_INTERVAL_S = 0.0002
 """A busy recorder thread may keep the loop waiting this long; Python's default is 5 ms."""
@@ -74,27 +71,10 @@ class Endpoints:
 def open_link(
     agreement: Agreement, role: Role, endpoints: Endpoints, stop: Stop = lambda: False
 ) -> Link:
-    """Return an open link for one end: over a serial line if it is configured so, else over Zenoh."""
-    if agreement.config.link.kind == "serial":
-        from tenbaud.flight.serial_ends import open_serial
-
-        return open_serial(
-            agreement, role, endpoints.insecure, lambda: _zenoh(agreement, role, endpoints, stop)
-        )
-    return _zenoh(agreement, role, endpoints, stop)
-
-
-def _zenoh(agreement: Agreement, role: Role, endpoints: Endpoints, stop: Stop) -> Link:
-    from channel.links.zenoh.link import ZenohLink
-
-    return ZenohLink(
-        role,
-        agreement.config.link.session,
-        **endpoints.node(),
-        best_effort=agreement.config.link.best_effort,
-        patience_s=agreement.config.link.peer_timeout_s,
-        should_stop=stop,
-    )
+    """Return an open link of the configured kind for one end."""
+    settings, terms = agreement.config.link, agreement.terms
+    end = LinkEnd(role, settings, terms, agreement.codec, endpoints.node(), stop)
+    return agreement.link.open(end)
 
 
 def run_transmitter(
@@ -106,12 +86,14 @@ def run_transmitter(
         with knocks(endpoints) as refused, open_link(agreement, "transmitter", endpoints, stop) as link:
             trouble = Trouble(link, endpoints.security, refused, stop)
             run = transmit.prepare(agreement, station.recorder, link.wire)
-            live = station.fly_transmitter(run, trouble.should_stop)
+            peer = _peer(run, link, trouble.should_stop, recorder)
+            keep_alive = peer.keep_alive if peer is not None else None
+            live = station.fly_transmitter(run, trouble.should_stop, keep_alive)
             with (
                 station.publishing(lambda tap: TransmitterComposer(run, tap, live)),
                 StatusReporter(lambda: transmitter_status(run), status),
             ):
-                outcome = _guarded(lambda: _fly(run, link, trouble.should_stop, recorder, live))
+                outcome = _guarded(lambda: _fly(run, link, peer, trouble.should_stop))
                 outcome = trouble.first_cause(outcome, SAFE)
             run.node.rest()
         summary = transmitter_part(run, outcome) | link_part(link, refused) | station.summary()
@@ -221,7 +203,7 @@ def transmitter_status(run: TransmitterRun) -> Status:
         "rejoins": node.session.counts["rejoins"],
         "words": node.session.history.last_words(WORDS_SHOWN),
         "guard": node.guard.state.value,
-        "kept_symbols_per_s": run.rate and run.rate.kept_symbols_per_s,
+        "kept_symbols_per_s": run.endpoint.rate.kept_symbols_per_s,
         **gap_part(node.gauge.now if node.gauge is not None else None),
     }
 
@@ -271,23 +253,22 @@ def _station(agreement: Agreement, role: Role, recorder: McapRecorder, endpoints
     )
 
 
-def _fly(
-    run: TransmitterRun,
-    link: Link,
-    stop: Stop,
-    recorder: McapRecorder,
-    live: LiveTransmitter,
-) -> Outcome:
-    if run.agreement.clock == "real":
+def _fly(run: TransmitterRun, link: Link, peer: LinkPeer | None, stop: Stop) -> Outcome:
+    if peer is None:
         return transmit.fly_real(run, link, stop)
+    return transmit.fly_virtual(run, peer, stop)
+
+
+def _peer(run: TransmitterRun, link: Link, stop: Stop, recorder: McapRecorder) -> LinkPeer | None:
+    """Return the receiver as a virtual flight steps it; None on a real clock."""
+    if run.agreement.clock == "real":
+        return None
 
     def meanwhile() -> None:
         run.node.rest()
         recorder.help_out()
 
-    peer = transmit.link_peer(run, link, stop, meanwhile)
-    live.keep_alive = peer.keep_alive
-    return transmit.fly_virtual(run, peer, stop)
+    return transmit.link_peer(run, link, stop, meanwhile)
 
 
 def _guarded(fly: Callable[[], Outcome]) -> Outcome:

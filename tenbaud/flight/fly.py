@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from channel.errors import TenbaudError
 
@@ -34,7 +34,7 @@ def fly(
     settings: dict[str, Any] | None = None,
     config: str | Path | None = None,
     out: str | Path | None = None,
-    link: Literal["memory", "zenoh", "serial"] = "memory",
+    link: str = "memory",
     clock: Clock = "virtual",
     draw: bool = False,
     model: Model | str | None = None,

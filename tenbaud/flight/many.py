@@ -6,7 +6,6 @@ written by a thread beside the loop; it hands over what is ready and rings.
 
 from __future__ import annotations
 
-import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -14,17 +13,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from channel.errors import FrameError, LinkLost
-from channel.line.clocks import SkewedClock
 from channel.line.virtual import Reply, decode_step, encode_reply, is_envelope
 from channel.links.zenoh.hub import ZenohHub
 from channel.protocol.endings import End, Ending
 from channel.protocol.frames import Bye, Frame, Hello, Refuse, Symbol, Unknown
 from channel.protocol.wire import DATAGRAM, decode, encode
 from receiver.loops.many import SURPLUS, Served
-from receiver.loops.real import RealService
-from receiver.loops.virtual import VirtualService
 from receiver.session.rejoin import difference
-from tenbaud.build.ends import build_line, build_receiver
+from tenbaud.build.ends import build_receiver
 from tenbaud.build.flight import Agreement
 from tenbaud.config.load import dump_config
 from tenbaud.files.whole import WriteError, write_error, write_whole
@@ -148,20 +144,19 @@ class ManyHost:
         self._worker.submit(self._finish, flight, served, error)
 
     def _say_goodbye(self, served: Served, error: Exception | None) -> None:
-        if not isinstance(served.service, VirtualService):
-            ending = Ending.STOPPED if error is None else Ending.FAILED
-            if isinstance(error, LinkLost):
-                ending = Ending.LINK_LOST
-            for message in served.service.endpoint.bye(End(ending)):
-                self._hub.send(served.name, message)
-        served.service.endpoint.session.rest()
+        ending = Ending.STOPPED if error is None else Ending.FAILED
+        if isinstance(error, LinkLost):
+            ending = Ending.LINK_LOST
+        for message in served.endpoint.bye(End(ending)):
+            self._hub.send(served.name, message)
+        served.endpoint.session.rest()
 
     def close(self) -> None:
         """Wait until all files are finished; for after the loop."""
         self._worker.shutdown()
         # Opened when the loop had ended already: nobody flew it, but its file is there.
         for name, served in self.ready():
-            served.service.endpoint.bye(End(Ending.STOPPED))
+            served.endpoint.bye(End(Ending.STOPPED))
             self._finish(self._open[name], served, None)
         self._writer.close()
         self._tell_stranger.finish()
@@ -209,22 +204,16 @@ class ManyHost:
         except BaseException:
             recorder.finish_soon()
             raise
-        timeout_s = link.peer_timeout_s
         self._open[name] = Flight(name, agreement, folder, recorder)
         self.counts["flights"] += 1
         self._tell(f"{name}: a flight begins, recording into {folder.path}")
-        if agreement.clock == "virtual":
-            return Served(name, VirtualService(endpoint, timeout_s), None, data)
-        endpoint.downlink = build_line(agreement, "down", DATAGRAM)
-        faults = agreement.faults
-        clock = SkewedClock(faults, time.monotonic_ns()) if faults.bad_clock else None
-        service = RealService(endpoint, timeout_s, endpoint.downlink, clock)
         symbols_per_s = 1e9 * agreement.terms.symbols_per_word / agreement.terms.sample_ns
-        return Served(name, service, SURPLUS * symbols_per_s, data)
+        allowed_per_s = SURPLUS * symbols_per_s if agreement.clock == "real" else None
+        return Served(name, endpoint, link.peer_timeout_s, allowed_per_s, data)
 
     def _finish(self, flight: Flight, served: Served, error: Exception | None) -> None:
         try:
-            endpoint = served.service.endpoint
+            endpoint = served.endpoint
             outcome = _outcome(flight.agreement, served, error)
             flight.recorder.close()
             flight.summary = {
@@ -256,7 +245,7 @@ class ManyHost:
 
 
 def _outcome(agreement: Agreement, served: Served, error: Exception | None) -> Outcome:
-    session = served.service.endpoint.session
+    session = served.endpoint.session
     if error is not None:
         return outcome_of(error)
     end = session.end

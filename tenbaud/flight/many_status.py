@@ -73,7 +73,7 @@ class ManyStatus:
 
 
 def _calmness(served: Served) -> tuple[bool, int, list[str]]:
-    session = served.service.endpoint.session
+    session = served.endpoint.session
     trouble = session.counts["desyncs"] + session.counts["rejoins"] + served.dropped
     return session.phase is Phase.FLYING, -trouble, _natural(served.name)
 
@@ -84,7 +84,7 @@ def _natural(name: str) -> list[str]:
 
 
 def _row(served: Served) -> tuple[str, ...]:
-    session = served.service.endpoint.session
+    session = served.endpoint.session
     baud = session.meter.baud
     state = session.state
     return (

@@ -7,9 +7,9 @@ from dataclasses import asdict
 
 from channel.codec.codec import Codec, Vector
 from channel.errors import ConfigMismatch, LinkLost
+from channel.line.downlink import Downlink
 from channel.line.impairments import LineFaults
-from channel.line.line import Line
-from channel.line.shaper import SlotShaper, UplinkMeter
+from channel.line.line import CleanLine, Line
 from channel.line.uplink import Uplink
 from channel.protocol.endings import End, Ending
 from channel.protocol.identity import Identity, numerics_probe
@@ -28,6 +28,7 @@ from tenbaud.flight.memory_result import FlightResult, result_of
 from tenbaud.recording.memory import MemoryRecorder
 from tenbaud.sentences.endings import end_text, refusal_text
 from tenbaud.sentences.events import guard_text
+from transmitter.endpoint import TransmitterEndpoint
 from transmitter.guard import Guard, GuardSettings
 from transmitter.loops.virtual import VirtualFlight
 from transmitter.metrics.scores import Scores
@@ -97,15 +98,18 @@ class MemoryFlight:
         self.receiver = ReceiverSession(
             receiver_codec or codec, terms, controller, identity, SESSION_NUMBER, self.receiver_rows
         )
-        uplink_line = uplink_line or Line(terms.symbol_delay_ns)
-        downlink_line = downlink_line or Line()
-        delay_ns = max(uplink_line.longest_delay_ns, downlink_line.longest_delay_ns)
+        uplink_line = uplink_line or CleanLine()
+        downlink_line = downlink_line or CleanLine()
+        up_ns = uplink_line.longest_delay_ns + terms.symbol_delay_ns
+        delay_ns = max(up_ns, downlink_line.longest_delay_ns)
         self.node = self._node(
             encoder_counts_per_turn, safe_volts, round(scored_from_s * 1e9), delay_ns
         )
-        self.uplink = Uplink(SlotShaper(terms), uplink_line, UplinkMeter(codec.coder.alphabet), wire)
-        self.endpoint = ReceiverEndpoint(self.receiver, wire)
-        self.loop = VirtualFlight(self.node, self.uplink, downlink_line, self.endpoint)
+        self.uplink = Uplink(terms, codec.coder.alphabet, uplink_line, wire)
+        self.endpoint = ReceiverEndpoint(self.receiver, Downlink(wire))
+        self.loop = VirtualFlight(
+            TransmitterEndpoint(self.node, self.uplink), downlink_line, self.endpoint
+        )
         self._flown = False
 
     def _node(
@@ -155,7 +159,7 @@ class MemoryFlight:
         flown = self.loop.run(ticks)
         ended_by = "" if flown == ticks else self._ended_by()
         end = End(Ending.OVER) if flown == ticks else self.transmitter.end or End(Ending.SAFETY_STOP)
-        self.loop.finish(flown, lambda: end)
+        self.loop.finish(lambda: end)
         self.receiver.rest()
         rows = (self.transmitter_rows, self.receiver_rows)
         return result_of(

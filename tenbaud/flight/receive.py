@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 
 from channel.errors import ConfigMismatch
-from channel.line.clocks import SkewedClock
 from channel.links.base import Link
 from channel.protocol.endings import End, Ending
 from receiver.endpoint import ReceiverEndpoint
-from receiver.loops.real import serve_real
-from receiver.loops.virtual import serve_virtual
+from receiver.loops.single import serve as serve_flight
 from receiver.session.session import Phase, ReceiverSession
-from tenbaud.build.ends import build_line
 from tenbaud.build.flight import Agreement
 from tenbaud.build.transmitter_run import Stop
 from tenbaud.flight.outcome import ExitCode, Outcome
@@ -32,15 +28,9 @@ def serve(
     session = endpoint.session
     timeout_s = agreement.config.link.peer_timeout_s
     try:
-        if agreement.clock == "virtual":
-            # There the transmitter's process holds both directions of the line.
-            serve_virtual(endpoint, link, timeout_s, should_stop, meanwhile)
-        else:
-            endpoint.downlink = build_line(agreement, "down", link.wire)
-            clock = SkewedClock(agreement.faults, time.monotonic_ns())
-            serve_real(endpoint, link, timeout_s, should_stop, endpoint.downlink, clock)
+        serve_flight(endpoint, link, timeout_s, should_stop, meanwhile)
     finally:
-        if agreement.clock == "real" and session.phase is Phase.FLYING:
+        if session.phase is Phase.FLYING:
             for message in endpoint.bye(End(Ending.STOPPED if should_stop() else Ending.FAILED)):
                 link.send(message)
     if session.refusal is not None:

@@ -6,8 +6,6 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from channel.line.impairments import ImpairedLine
-from channel.line.line import Line
 from channel.links.base import Link
 from channel.protocol.bounds import COUNTER
 from channel.protocol.endings import End
@@ -51,8 +49,8 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         "ticks_guard_down": node.ticks_down,
         "ticks_commanded": node.ticks_commanded,
         "impairments": config.link.impairments,
-        "impaired_up": impaired(run.uplink.line),
-        "impaired_down": impaired(run.downlink),
+        "impaired_up": dict(run.uplink.line.counts),
+        "impaired_down": dict(run.downlink.counts),
         "window_start_s": run.agreement.window_start_tick * terms.tick_ns / 1e9,
         "pitch_amplitude_rad": scores.angle_max_rad,
         "reference_amplitude_rad": scores.reference_max_rad or None,
@@ -105,7 +103,7 @@ def receiver_part(agreement: Agreement, endpoint: ReceiverEndpoint, outcome: Out
         "samples": session.state.sample,
         "baud_measured": session.meter.baud,
         "wire_bytes_up": endpoint.inlet.wire_bytes,
-        "wire_bytes_down": endpoint.wire_bytes_down,
+        "wire_bytes_down": endpoint.downlink.wire_bytes,
         "erasures": session.counts["erasures"],
         "symbols_late": session.counts["symbols_late"],
         "symbols_misplaced": session.counts["symbols_misplaced"],
@@ -115,7 +113,7 @@ def receiver_part(agreement: Agreement, endpoint: ReceiverEndpoint, outcome: Out
         "malformed": endpoint.inlet.malformed,
         "desyncs": session.counts["desyncs"],
         "rejoins": session.counts["rejoins"],
-        "impaired_down": impaired(endpoint.downlink),
+        "impaired_down": dict(endpoint.downlink.line.counts),
     }
 
 
@@ -152,11 +150,6 @@ def joined(transmitter: Summary, receiver: Summary) -> Summary:
     if receiver.get("impaired_down"):
         both["impaired_down"] = receiver["impaired_down"]
     return {**transmitter, **both, **{name: receiver.get(name) for name in own}}
-
-
-def impaired(line: Line) -> dict[str, int]:
-    """Return how many messages a line did what to, on purpose."""
-    return dict(line.counts) if isinstance(line, ImpairedLine) else {}
 
 
 def _common(agreement: Agreement, outcome: Outcome, end: End | None) -> Summary:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from channel.errors import ConfigMismatch, LinkLost
 from channel.line.clocks import SkewedClock, SkewedPeer
+from channel.line.line import CleanLine
 from channel.line.virtual import Peer
 from channel.links.base import Link
 from channel.protocol.endings import End, Ending
@@ -18,7 +19,9 @@ from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.flight.outcome import SAFE, ExitCode, Outcome, farewell_of
 from tenbaud.flight.verdict import FlightCounts, faults_of, settings_of, verdict_text
 from tenbaud.sentences import endings, events
+from transmitter.endpoint import TransmitterEndpoint
 from transmitter.guard import GuardCause
+from transmitter.loops.flight import Flight
 from transmitter.loops.real import RealFlight
 from transmitter.loops.virtual import VirtualFlight
 from transmitter.loops.virtual_peer import LinkPeer
@@ -28,8 +31,10 @@ from transmitter.session.session import Phase
 def prepare(agreement: Agreement, recorder: Recorder | None, wire: Wire) -> TransmitterRun:
     """Return a transmitter that is ready to fly."""
     node = build_transmitter(agreement, recorder)
-    downlink = build_line(agreement, "down", wire)
-    return TransmitterRun(agreement, node, build_uplink(agreement, wire, recorder), downlink)
+    endpoint = TransmitterEndpoint(node, build_uplink(agreement, wire, recorder))
+    virtual = agreement.clock == "virtual"
+    downlink = build_line(agreement, "down", wire) if virtual else CleanLine()
+    return TransmitterRun(agreement, endpoint, downlink)
 
 
 def fly_virtual(run: TransmitterRun, peer: Peer, should_stop: Stop) -> Outcome:
@@ -37,59 +42,53 @@ def fly_virtual(run: TransmitterRun, peer: Peer, should_stop: Stop) -> Outcome:
     faults = run.agreement.faults
     if faults.bad_clock:
         peer = SkewedPeer(peer, SkewedClock(faults))
-    flight = VirtualFlight(run.node, run.uplink, run.downlink, peer)
-    with run.node.rig:
-        flight.greet()
-        _check_welcome(run)
-        greeting_bytes = _control_bytes(run, flight)
-        started = time.perf_counter()
-        first = run.node.session.epoch_tick
-        try:
-            end = flight.run(run.agreement.flight_ticks, should_stop)
-            run.ticks = end - first
-            run.rejoin_bytes = _control_bytes(run, flight) - greeting_bytes
-            ending = _Ending(run, _outcome(run, True))
-            flight.finish(end, ending.farewell)
-        finally:
-            run.flight_s = time.perf_counter() - started
-            run.wire_bytes_down = flight.inlet.wire_bytes
-            run.extra["malformed"] = flight.inlet.malformed
-    return ending.outcome
+    return _fly(run, VirtualFlight(run.endpoint, run.downlink, peer, should_stop), should_stop)
 
 
 def fly_real(run: TransmitterRun, link: Link, should_stop: Stop) -> Outcome:
     """Fly on the real clock over a link."""
-    flight = RealFlight(run.node, run.uplink, link, should_stop)
-    run.rate = flight.rate
-    with run.node.rig:
-        flight.greet(run.agreement.config.link.peer_timeout_s)
+    timeout_s = run.agreement.config.link.peer_timeout_s
+    flight = RealFlight(run.endpoint, link, timeout_s, should_stop)
+    try:
+        return _fly(run, flight, should_stop, link.peer_present)
+    finally:
+        lateness = run.endpoint.lateness
+        run.extra |= {
+            "ticks_missed": run.endpoint.ticks_missed,
+            "loop_late_ms_p50": lateness.percentile_ms(50.0),
+            "loop_late_ms_p99": lateness.percentile_ms(99.0),
+            "loop_late_ms_max": lateness.largest_ns / 1e6,
+        }
+
+
+def _fly(
+    run: TransmitterRun,
+    flight: Flight,
+    should_stop: Stop,
+    peer_present: Callable[[], bool] = lambda: True,
+) -> Outcome:
+    inlet, rig = run.endpoint.inlet, run.node.rig
+    with rig:
+        flight.greet()
         if should_stop():
             # A session may have begun meanwhile, whose receiver would wait for the flight.
             flight.leave(End(Ending.STOPPED))
             return Outcome(ExitCode.INTERRUPTED, endings.ending_text(Ending.STOPPED))
         _check_welcome(run)
-        greeting_bytes = _control_bytes(run, flight)
+        greeting_bytes = _control_bytes(run)
         started = time.perf_counter()
         first = run.node.session.epoch_tick
         try:
-            end = flight.run(run.agreement.flight_ticks)
-            run.ticks = end - first
-            run.rejoin_bytes = _control_bytes(run, flight) - greeting_bytes
-            ending = _Ending(run, _outcome(run, link.peer_present()))
-            flight.finish(end, ending.farewell)
+            run.ticks = flight.run(run.agreement.flight_ticks) - first
+            run.rejoin_bytes = _control_bytes(run) - greeting_bytes
+            ending = _Ending(run, _outcome(run, peer_present()))
+            flight.finish(ending.farewell)
         finally:
             run.flight_s = time.perf_counter() - started
-            run.wire_bytes_down = flight.inlet.wire_bytes
-            if figures := run.node.rig.figures():
+            run.wire_bytes_down = inlet.wire_bytes
+            run.extra["malformed"] = inlet.malformed
+            if figures := rig.figures():
                 run.extra["rig"] = figures
-            lateness = flight.lateness
-            run.extra |= {
-                "malformed": flight.inlet.malformed,
-                "ticks_missed": flight.ticks_missed,
-                "loop_late_ms_p50": lateness.percentile_ms(50.0),
-                "loop_late_ms_p99": lateness.percentile_ms(99.0),
-                "loop_late_ms_max": lateness.largest_ns / 1e6,
-            }
     return ending.outcome
 
 
@@ -111,8 +110,8 @@ def _check_welcome(run: TransmitterRun) -> None:
         raise LinkLost("no answer to any request for a session came through this line")
 
 
-def _control_bytes(run: TransmitterRun, flight: VirtualFlight | RealFlight) -> int:
-    return run.uplink.meter.control_bytes + flight.inlet.control_bytes
+def _control_bytes(run: TransmitterRun) -> int:
+    return run.uplink.meter.control_bytes + run.endpoint.inlet.control_bytes
 
 
 class _Ending:

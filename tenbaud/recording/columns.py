@@ -75,7 +75,7 @@ def event_columns(run: Run) -> list[Column]:
     columns = []
     for one in described:
         values = [event.get(one.name) for event in events]
-        number = one.type in ("number", "integer")
+        number = one.type != "string"
         array = np.array(values, dtype=float if number else object)
         columns.append(Column(one.name, array, one.unit, one.description))
     return columns

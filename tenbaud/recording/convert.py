@@ -93,10 +93,15 @@ def _stretches(columns: list[Column]) -> Iterator[slice]:
 def _csv_cells(column: Column, rows: slice) -> list[str]:
     values = column.values[rows].tolist()
     if column.is_text:
-        return ["" if value is None else _quoted(value) for value in values]
+        return ["" if value is None else _quoted(_text(value)) for value in values]
     if column.values.dtype == np.float64:
         return ["" if value != value else repr(value) for value in values]  # NaN is unlike itself
     return [str(value) for value in values]
+
+
+def _text(value: object) -> str:
+    """Return a cell of an event: a text, or a number or truth value as JSON has it."""
+    return value if isinstance(value, str) else orjson.dumps(value).decode()
 
 
 def _quoted(text: str) -> str:

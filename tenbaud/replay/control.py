@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from receiver.controllers.base import Controller
 from receiver.controllers.references import Reference
-from tenbaud.build.ends import build_controller, build_reference
+from tenbaud.build.controllers import build_controller, build_reference
 from tenbaud.config.schema import FlightConfig
 from tenbaud.replay.record import FlightRecord
 

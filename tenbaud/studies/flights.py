@@ -18,8 +18,9 @@ from plant_sim.disturbance import parse_disturbance
 from plant_sim.pitch import pitch_constants
 from receiver.controllers.pid import Pid, PidConstants
 from receiver.controllers.recorded import RecordedController
-from tenbaud.build.ends import build_controller, guard_settings, reference_of
-from tenbaud.build.flight import Agreement, read_flight_log
+from tenbaud.build.controllers import build_controller, reference_of
+from tenbaud.build.ends import guard_settings
+from tenbaud.build.flight import Agreement, kind_of_link, read_flight_log
 from tenbaud.build.rig import nominal_plant
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig, FlightLogSection, ReferenceSection
@@ -198,8 +199,8 @@ def _require_ordinary(config: FlightConfig, codec: Codec) -> None:
         raise Uncommon("a plant from outside")
     if config.transmitter.sabotage or config.receiver.sabotage or config.transmitter.dry_run:
         raise Uncommon("sabotage and dry runs")
-    if config.link.kind == "serial":
-        raise Uncommon("serial lines")
+    if kind_of_link(config).changes_terms:
+        raise Uncommon("a link on which bytes take time, such as a serial line")
     model, coder = codec.model, codec.coder
     if not (hasattr(model, "tick_function") and isinstance(coder, FunctionCoder)):
         raise Uncommon("a model or coder that is not written as functions")

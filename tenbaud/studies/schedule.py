@@ -1,8 +1,8 @@
 """What becomes of every symbol and every echo of a flight, and when, before anything is computed.
 
 Loss, delay and erasure do not depend on what a symbol says. So the line is flown once on its own, in
-the order of events of the virtual clock (`transmitter.loops.virtual`) and with the receiver's rule
-for what was received in time (`receiver.session.session`), over the lines that a flight would use
+the order of events of the virtual clock (`transmitter.loops.virtual`) and with the receiver's own slot
+clock and schedule, over the lines that a flight would use
 and with their seeds. What comes out are arrays that a compiled flight reads.
 """
 
@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from channel.errors import FrameError
 from channel.line.line import Delivery
-from channel.protocol.frames import Frame, Symbol
+from channel.protocol.slot_clock import SlotClock
+from receiver.session import schedule as receiver
 from tenbaud.build.ends import build_line
 from tenbaud.build.flight import Agreement
 from transmitter.loops.virtual import GREETINGS_MAX
@@ -81,31 +81,21 @@ def _arrays(
 
 
 def _linger_ns(agreement: Agreement) -> int:
-    """Return how long echoes are waited for after the last tick, as `VirtualFlight.finish` does."""
-    terms = agreement.terms
-    linger_ns = terms.uplink_delivery_ns + terms.symbol_delay_ns + terms.downlink_budget_ns
+    """Return how long echoes are waited for after the last tick, as a virtual flight does."""
     lines = (build_line(agreement, "up", _WIRE), build_line(agreement, "down", _WIRE))
-    return linger_ns + sum(line.longest_delay_ns for line in lines)
+    return agreement.terms.linger_ns(sum(line.longest_delay_ns for line in lines))
 
 
 class _NumberWire:
-    """A wire whose symbols are their numbers: enough for a line to flip one."""
+    """Symbols are their numbers: enough for a line to flip one."""
 
-    def encode(self, frame: Frame) -> bytes:
-        """Return a symbol's number."""
-        if not isinstance(frame, Symbol):
-            raise ValueError(f"{frame} is no symbol")
-        return bytes((frame.number,))
+    def is_symbol(self, data: bytes) -> bool:
+        """Return whether there is a number."""
+        return len(data) == 1
 
-    def decode(self, data: bytes) -> Frame:
-        """Return the symbol of a number."""
-        if len(data) != 1:
-            raise FrameError("no symbol")
-        return Symbol(0, 0, 0, data[0])
-
-    def size(self, data: bytes) -> int:
-        """Return the length."""
-        return len(data)
+    def renumbered(self, data: bytes, shift: int, kinds: int) -> bytes:
+        """Return another number."""
+        return bytes(((data[0] + shift) % kinds,))
 
 
 _WIRE = _NumberWire()
@@ -139,12 +129,9 @@ class _LineFlight:
         self._down = build_line(agreement, "down", _WIRE)
         self._arrivals: list[_Arrival] = []
         self._order = count()
-        self._slot = 0
-        self._silent = 0
-        self._shift_ns: int | None = None
-        """deadline of a slot less its own time, by the last symbol in time; None: no deadline"""
-        self._deadline_ns = _NEVER_NS
-        """of the slot that is due"""
+        self._clock = SlotClock(terms)
+        self._timing = receiver.Schedule(terms)
+        self._timing.begin(0, 0)
         self._expected = 0
         """sample whose echo is due at the transmitter"""
 
@@ -159,7 +146,7 @@ class _LineFlight:
             first = sample * terms.symbols_per_word
             for slot in range(first, first + terms.symbols_per_word):
                 leaves_ns = max(terms.slot_ns(slot), now_ns)
-                self._push_all(self._up.carry(b"\0", True, leaves_ns), slot, 0)
+                self._push_all(self._symbols(leaves_ns), slot, 0)
             self._pass_to(now_ns)
         self._pass_to((self._ticks - 1) * terms.tick_ns)
         last_ns = self._ticks * terms.tick_ns + _linger_ns(self._agreement)
@@ -168,21 +155,24 @@ class _LineFlight:
     def _greet(self) -> None:
         """Draw the chances of the handshake, which goes over the same lines."""
         for _ in range(GREETINGS_MAX):
-            pending = [
-                (one.arrival_ns, True) for one in self._up.carry(b"", False, 0) if one.data is not None
-            ]
+            pending = [(one.arrival_ns, True) for one in self._up.carry(b"", 0) if one.data is not None]
             met = False
             while pending:
                 pending.sort()
                 time_ns, upward = pending.pop(0)
                 if upward:
-                    answers = self._down.carry(b"", False, time_ns)
+                    answers = self._down.carry(b"", time_ns)
                     pending += [(one.arrival_ns, False) for one in answers if one.data is not None]
                 else:
                     met = True
             if met:
                 return
         raise Uncommon("no handshake gets through this line")
+
+    def _symbols(self, leaves_ns: int) -> list[Delivery]:
+        delay_ns = self._terms.symbol_delay_ns
+        carried = self._up.carry(b"\0", leaves_ns)
+        return [Delivery(arrival_ns + delay_ns, data) for arrival_ns, data in carried]
 
     def _push_all(self, deliveries: list[Delivery], slot: int, sample: int) -> None:
         for one in deliveries:
@@ -195,7 +185,7 @@ class _LineFlight:
     def _pass_to(self, now_ns: int, deadlines: bool = True) -> None:
         while True:
             arrival_ns = self._arrivals[0].time_ns if self._arrivals else _NEVER_NS
-            deadline_ns = self._deadline_ns if deadlines else _NEVER_NS
+            deadline_ns = (self._clock.deadline_ns if deadlines else None) or _NEVER_NS
             if arrival_ns > now_ns and deadline_ns > now_ns:
                 return
             if deadline_ns < arrival_ns:
@@ -210,33 +200,35 @@ class _LineFlight:
                 self._on_deadline(arrival.time_ns)
 
     def _on_deadline(self, now_ns: int) -> None:
-        while self._deadline_ns <= now_ns:
-            self._silent += 1
-            self._settle(-1, now_ns)
-            if self._silent >= self._terms.history_samples * self._terms.symbols_per_word:
+        for slot in self._clock.expired(now_ns):
+            self._settle(slot, -1, now_ns)
+            if self._clock.is_silent:
                 raise Uncommon("the line is silent for longer than the receiver waits")
 
     def _on_symbol(self, arrival: _Arrival) -> None:
-        if arrival.slot < self._slot:
+        clock, timing = self._clock, self._timing
+        if arrival.slot < clock.slot:
+            near = clock.bridges(arrival.slot)
+            if near and timing.is_replaced_by(arrival.slot, arrival.time_ns):
+                clock.anchor(timing.take(arrival.slot, arrival.time_ns, anew=True))
             return
-        if arrival.slot - self._slot > self._terms.history_samples * self._terms.symbols_per_word:
+        fits = timing.timing(arrival.slot, arrival.time_ns)
+        if fits is receiver.Timing.EARLY:
+            return
+        if not clock.bridges(arrival.slot):
             raise Uncommon("a gap that is longer than the receiver bridges")
-        self._silent = 0
-        while self._slot < arrival.slot:
-            self._settle(-1, arrival.time_ns)
-        late_ns = arrival.time_ns - self._terms.slot_ns(arrival.slot)
-        self._shift_ns = late_ns + self._terms.deadline_allowance_ns
-        self._settle(arrival.shift, arrival.time_ns)
+        for slot in clock.take(arrival.slot):
+            self._settle(slot, -1, arrival.time_ns)
+        anew = fits is receiver.Timing.NEW
+        clock.anchor(timing.take(arrival.slot, arrival.time_ns, anew=anew))
+        self._settle(arrival.slot, arrival.shift, arrival.time_ns)
 
-    def _settle(self, shift: int, now_ns: int) -> None:
-        if self._slot < len(self.shifts):
-            self.shifts[self._slot] = shift
-        self._slot += 1
-        if self._shift_ns is not None:
-            self._deadline_ns = self._terms.slot_ns(self._slot) + self._shift_ns
-        sample, left = divmod(self._slot, self._terms.symbols_per_word)
+    def _settle(self, slot: int, shift: int, now_ns: int) -> None:
+        if slot < len(self.shifts):
+            self.shifts[slot] = shift
+        sample, left = divmod(slot + 1, self._terms.symbols_per_word)
         if left == 0:
-            self._push_all(self._down.carry(b"", False, now_ns), -1, sample - 1)
+            self._push_all(self._down.carry(b"", now_ns), -1, sample - 1)
 
     def _on_echo(self, arrival: _Arrival) -> None:
         """Take a frame of echoes up to `arrival.sample`; the older ones in it are repeats."""

@@ -123,14 +123,3 @@ def _table(path: Path) -> Any:
     # Opened by Python, which takes names that are no text.
     with path.open("rb") as stream:
         return pq.read_table(stream)
-
-
-def read_results(path: Path) -> Any:
-    """Return the table of a finished study; StudyError where it cannot be read."""
-    require("pyarrow")
-    import pyarrow as pa
-
-    try:
-        return _table(path)
-    except (pa.ArrowException, OSError) as error:
-        raise StudyError(f"cannot read the results {path}: {error}") from error

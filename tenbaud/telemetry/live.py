@@ -17,7 +17,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-from channel.line.impairments import ImpairedLine, parse_impairments
+from channel.line.impairments import impair, parse_impairments
 from channel.links.base import Role
 from channel.protocol.events import ByHand, Event, EventKind, write_event
 from channel.protocol.recording import Recorder
@@ -105,9 +105,8 @@ class LiveTransmitter:
     def _impair(self, text: str) -> Event:
         faults = parse_impairments(text)
         self.impairments = text
-        _set_faults(self._run.uplink.line, faults.up)
-        if self._virtual:
-            _set_faults(self._run.downlink, faults.down)
+        impair(self._run.uplink.line, faults.up)
+        impair(self._run.downlink, faults.down)
         if faults.up.raw or faults.down.raw:
             self._run.desyncs_asked = math.inf
         return _by_hand(ByHand.IMPAIR, detail=text)
@@ -186,8 +185,7 @@ class LiveReceiver:
                 return _by_hand(cause, value=angle_rad)
             case Impair(text=text):
                 self.impairments = text
-                if isinstance(self._endpoint.downlink, ImpairedLine):
-                    _set_faults(self._endpoint.downlink, parse_impairments(text).down)
+                if impair(self._endpoint.downlink.line, parse_impairments(text).down):
                     return _by_hand(ByHand.IMPAIR, detail=text)
             case Spoil(end="receiver", field=field):
                 return spoil(session, field, session.state.sample)
@@ -228,8 +226,3 @@ def _by_hand(
 
 def _ignored(why: str) -> Event:
     return _by_hand(ByHand.IGNORED, detail=why)
-
-
-def _set_faults(line: object, impairments: object) -> None:
-    if isinstance(line, ImpairedLine):
-        line.impairments = impairments  # type: ignore[assignment]

@@ -14,7 +14,7 @@ from channel.links.security import Security
 from channel.protocol.recording import Recorder
 from receiver.controllers.steered import SteeredReference
 from receiver.endpoint import ReceiverEndpoint
-from tenbaud.build.ends import build_reference
+from tenbaud.build.controllers import build_reference
 from tenbaud.build.flight import Agreement
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.telemetry.commands import CommandQueue
@@ -62,9 +62,11 @@ class Station:
     """whether this telemetry was asked for, so that a flight without it is refused"""
     publisher: Publisher | None = field(default=None)
 
-    def fly_transmitter(self, run: TransmitterRun, stop: Stop) -> LiveTransmitter:
+    def fly_transmitter(
+        self, run: TransmitterRun, stop: Stop, keep_alive: Callable[[], None] | None = None
+    ) -> LiveTransmitter:
         """Return what obeys commands for this transmitter, hung into its loop where it has work."""
-        live = LiveTransmitter(run, self.queue, stop, self.pace)
+        live = LiveTransmitter(run, self.queue, stop, self.pace, keep_alive or (lambda: None))
         if self.queue is not None or self.pace is not None:
             run.node.at_tick = live.at_tick
         return live

@@ -7,11 +7,11 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from channel.links.base import Link
-from channel.links.memory import memory_pair
+from channel.links.serial.emulated import EmulatedLine
 from channel.links.serial.link import SerialLink
 from channel.links.serial.split import SplitLink
 from channel.links.serial.wire import SerialWire
-from tenbaud.flight.serial_line import EmulatedLine
+from tests.channel.links.memory_pair import memory_pair
 
 FAST_BAUD = 4_000_000
 """The links believe in such a line; the emulated one passes bytes on as fast as it goes."""

@@ -14,7 +14,8 @@ import pytest
 from channel.errors import LinkError
 from channel.links.base import Link
 from channel.links.endpoints import free_endpoint
-from channel.links.memory import memory_pair
+from channel.protocol.frames import Symbol
+from tests.channel.links.memory_pair import memory_pair
 from tests.contract.serial_pairs import make_serial, make_split
 
 PATIENCE_S = 10.0
@@ -94,8 +95,9 @@ def test_when_many_messages_are_sent_then_they_come_whole_and_in_order(way: Pair
 def test_when_symbols_are_sent_in_their_slots_then_they_come_in_order(ends: Pair) -> None:
     transmitter, receiver = ends
     for number in range(100):
-        transmitter.send(b"symbol %d" % number, is_symbol=True)
-        assert received(receiver, 1) == [b"symbol %d" % number]
+        symbol = transmitter.wire.encode(Symbol(1, 0, number, number % 2))
+        transmitter.send(symbol)
+        assert received(receiver, 1) == [symbol]
 
 
 @pytest.mark.parametrize(

@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 
 from channel.errors import LinkError
+from channel.links.serial.emulated import EmulatedLine
 from channel.links.serial.link import SerialLink
 from channel.links.serial.wire import SerialWire, stuff, stuff_notice
 from channel.protocol.endings import Ending
 from channel.protocol.frames import Bye, Symbol
 from channel.protocol.wire import encode
-from tenbaud.flight.serial_line import EmulatedLine
 from tests.contract.test_links import PATIENCE_S, SILENCE_S, until
 
 WIRE = SerialWire(2)
@@ -52,7 +52,7 @@ def test_when_a_symbol_is_sent_then_it_is_one_byte_on_the_line(
 ) -> None:
     transmitter, receiver = ends
     for slot in range(20):
-        transmitter.send(symbol(slot), is_symbol=True)
+        transmitter.send(symbol(slot))
         assert receiver.receive(PATIENCE_S) == symbol(slot)
     assert until(lambda: line.carried("up") == transmitter.counts.line_bytes_out)
     # Beside the symbols a question on opening and an answer to the other's, which may come late.
@@ -86,9 +86,9 @@ def test_when_noise_is_on_the_line_then_it_is_counted_and_the_next_messages_come
     transmitter, receiver = ends
     line.inject("up", noise)
     assert until(lambda: receiver.counts.dropped[kind] > 0)
-    transmitter.send(symbol(7), is_symbol=True)
+    transmitter.send(symbol(7))
     transmitter.send(FRAME)
-    transmitter.send(symbol(0), is_symbol=True)
+    transmitter.send(symbol(0))
     came = [receiver.receive(PATIENCE_S) for _ in range(3)]
     assert came == [symbol(7), FRAME, symbol(0)]
     assert receiver.receive(SILENCE_S) is None
@@ -107,7 +107,7 @@ def test_when_it_is_unplugged_and_plugged_in_again_then_both_ends_come_back(
     for end in ends:
         assert until(end.peer_present)
         assert end.counts.reconnects == 1
-    ends[0].send(symbol(3), is_symbol=True)
+    ends[0].send(symbol(3))
     assert ends[1].receive(PATIENCE_S) == symbol(3)
     ends[1].send(FRAME)
     assert ends[0].receive(PATIENCE_S) == FRAME
@@ -143,7 +143,7 @@ def test_when_a_symbol_has_waited_too_long_then_it_is_dropped(line: EmulatedLine
         SerialLink("receiver", str(line.receiver_port), WIRE, symbol_age_max_s=0.0) as receiver,
     ):
         assert until(transmitter.peer_present)
-        transmitter.send(symbol(1), is_symbol=True)
+        transmitter.send(symbol(1))
         transmitter.send(FRAME)
         assert receiver.receive(PATIENCE_S) == FRAME
         assert receiver.counts.dropped["stale symbol"] == 1

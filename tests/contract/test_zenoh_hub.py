@@ -8,6 +8,8 @@ from channel.errors import LinkError
 from channel.links.endpoints import free_endpoint
 from channel.links.zenoh.hub import ZenohHub
 from channel.links.zenoh.link import ZenohLink
+from channel.protocol.frames import Symbol
+from channel.protocol.wire import encode
 from tests.contract.test_links import PATIENCE_S, SILENCE_S, until
 
 
@@ -17,6 +19,9 @@ from tests.contract.test_links import PATIENCE_S, SILENCE_S, until
 def test_when_a_pattern_is_no_key_then_it_is_refused(pattern: str) -> None:
     with pytest.raises(LinkError, match="sessions"):
         ZenohHub(pattern, listen=(free_endpoint(),))
+
+
+SYMBOL = encode(Symbol(1, 0, 0, 1))
 
 
 def test_when_an_endpoint_leaves_this_machine_then_it_is_refused_unless_insecure() -> None:
@@ -48,10 +53,10 @@ def test_when_two_transmitters_speak_then_each_is_heard_by_name_and_answered_alo
         assert reach(hub, one, two)
         assert until(lambda: len(list(hub._session.info.transports())) == 3)
         stranger.send(b"not for you")
-        one.send(b"a", is_symbol=True)
+        one.send(SYMBOL)
         two.send(b"b")
         heard = {hub.receive(PATIENCE_S), hub.receive(PATIENCE_S)}
-        assert heard == {("rig/1", b"a"), ("rig/2", b"b")}
+        assert heard == {("rig/1", SYMBOL), ("rig/2", b"b")}
         assert hub.receive(SILENCE_S) is None
         hub.join("rig/1")
         assert until(one.peer_present)

@@ -16,6 +16,8 @@ from channel.links.zenoh.gate import reason_of
 from channel.links.zenoh.hub import ZenohHub
 from channel.links.zenoh.link import ZenohLink
 from channel.links.zenoh.router import ZenohRouter
+from channel.protocol.frames import Symbol
+from channel.protocol.wire import encode
 from tests.contract.security import SESSION, credentials, free_tls_endpoint, security
 from tests.contract.test_links import PATIENCE_S, SILENCE_S, Pair, until
 
@@ -40,9 +42,14 @@ def pair(endpoint: str) -> Iterator[Pair]:
         yield rig, desk
 
 
+def symbol(slot: int) -> bytes:
+    """Return a message for the paid path of the uplink, which has a key of its own."""
+    return encode(Symbol(1, 0, slot, 1))
+
+
 def check_both_ways(rig: ZenohLink, desk: ZenohLink) -> None:
-    rig.send(b"symbol", is_symbol=True)
-    assert desk.receive(PATIENCE_S) == b"symbol"
+    rig.send(symbol(6))
+    assert desk.receive(PATIENCE_S) == symbol(6)
     rig.send(b"control")
     assert desk.receive(PATIENCE_S) == b"control"
     desk.send(b"command")
@@ -60,13 +67,13 @@ def test_when_a_valid_node_is_not_invited_then_it_neither_hears_nor_is_heard(
     as_rig = security("intern", ("desk", "receiver"))
     as_desk = security("intern", ("desk", "transmitter"))
     with ZenohLink("transmitter", SESSION, connect=(endpoint,), security=as_rig) as intern:
-        intern.send(b"symbol of a stranger", is_symbol=True)
+        intern.send(symbol(1))
         intern.send(b"hello of a stranger")
         assert desk.receive(SILENCE_S) is None
         assert not intern.peer_present()
     with ZenohLink("receiver", SESSION, connect=(endpoint,), security=as_desk) as intern:
-        rig.send(b"symbol", is_symbol=True)
-        assert desk.receive(PATIENCE_S) == b"symbol"
+        rig.send(symbol(6))
+        assert desk.receive(PATIENCE_S) == symbol(6)
         assert intern.receive(SILENCE_S) is None
         intern.send(b"command of a stranger")
         assert rig.receive(SILENCE_S) is None
@@ -152,7 +159,7 @@ def test_when_a_viewer_is_invited_then_it_sees_and_cannot_send(pair: Pair, endpo
         desk.send(b"command")
         assert page.receive(PATIENCE_S) == b"command"
         assert rig.receive(PATIENCE_S) == b"command"
-        page.send(b"symbol of a viewer", is_symbol=True)
+        page.send(symbol(2))
         page.send(b"hello of a viewer")
         assert desk.receive(SILENCE_S) is None
 
@@ -176,12 +183,12 @@ def test_when_many_rigs_are_served_then_each_is_confined_to_its_own_session(endp
         hub.join("lab/1")
         hub.join("lab/2")
         assert until(lambda: one.peer_present() and two.peer_present())
-        one.send(b"symbol of one", is_symbol=True)
-        assert hub.receive(PATIENCE_S) == ("lab/1", b"symbol of one")
-        wrong.send(b"symbol of a thief", is_symbol=True)
+        one.send(symbol(3))
+        assert hub.receive(PATIENCE_S) == ("lab/1", symbol(3))
+        wrong.send(symbol(4))
         assert hub.receive(SILENCE_S) is None
-        two.send(b"symbol of two", is_symbol=True)
-        assert hub.receive(PATIENCE_S) == ("lab/2", b"symbol of two")
+        two.send(symbol(5))
+        assert hub.receive(PATIENCE_S) == ("lab/2", symbol(5))
         hub.send("lab/2", b"command for two")
         assert two.receive(PATIENCE_S) == b"command for two"
         assert one.receive(SILENCE_S) is None
@@ -229,7 +236,7 @@ def test_when_everybody_is_behind_a_router_then_they_talk_and_the_uninvited_do_n
         assert until(desk.peer_present)
         assert until(rig.peer_present)
         check_both_ways(rig, desk)
-        intern.send(b"symbol", is_symbol=True)
+        intern.send(symbol(6))
         assert desk.receive(SILENCE_S) is None
         assert not intern.peer_present()
         assert router.refused == {"uninvited certificate intern": 1}

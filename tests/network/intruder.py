@@ -70,7 +70,7 @@ def insider(host: str, keys: str, transmitter: str, receiver: str) -> dict[str, 
     from channel.links.base import Role
     from channel.links.security import Invited, Part, Security
     from channel.links.zenoh.link import ZenohLink
-    from channel.protocol.frames import Bye, Claim, Commands, Echo, Hello, Unknown
+    from channel.protocol.frames import Bye, Claim, Commands, Echo, Hello, Symbol, Unknown
     from channel.protocol.wire import encode
     from tenbaud.keys.store import read_node
 
@@ -80,6 +80,7 @@ def insider(host: str, keys: str, transmitter: str, receiver: str) -> dict[str, 
     echo = Echo(10, 1, 0, (5000, -5000) * 10)
     frames = (
         nothing,
+        Symbol(1, 0, 10, 1),
         Unknown(1, 0),
         Claim(1, 0, 2),
         Commands(1, 0, (echo,)),
@@ -95,7 +96,6 @@ def insider(host: str, keys: str, transmitter: str, receiver: str) -> dict[str, 
         with ZenohLink(role, "helicopter", connect=(f"tls/{host}:{PORT}",), security=security) as link:
             for _ in range(10):
                 for frame in frames:
-                    link.send(encode(frame), is_symbol=True)
                     link.send(encode(frame))
                 heard += link.receive(0.1) is not None
                 saw_a_peer = saw_a_peer or link.peer_present()

@@ -21,14 +21,14 @@ def greeted() -> ReceiverEndpoint:
     end = endpoint()
     identity = end.session.identity
     hello = Hello(5, identity.version, identity.config_digest, identity.numerics_probe)
-    (answer,) = end.on_bytes(wire.encode(hello), 0)
+    (answer,) = end.take(wire.encode(hello), 0)
     assert isinstance(wire.decode(answer), Welcome)
     return end
 
 
 def test_when_bytes_are_garbage_then_they_are_counted_and_nothing_is_answered() -> None:
     end = endpoint()
-    assert end.on_bytes(b"garbage", 0) == []
+    assert end.take(b"garbage", 0) == []
     assert end.inlet.malformed == end.session.counts["malformed"] == 1
     assert end.inlet.wire_bytes == 7
 
@@ -36,10 +36,10 @@ def test_when_bytes_are_garbage_then_they_are_counted_and_nothing_is_answered() 
 def test_when_messages_pass_then_wire_bytes_of_both_ways_are_counted() -> None:
     end = greeted()
     data = wire.encode(Symbol(77, 0, 0, 1))
-    up, down = end.inlet.wire_bytes, end.wire_bytes_down
-    (answer,) = end.on_bytes(data, 0)
+    up, down = end.inlet.wire_bytes, end.downlink.wire_bytes
+    (answer,) = end.take(data, 0)
     assert end.inlet.wire_bytes - up == len(data)
-    assert end.wire_bytes_down - down == len(answer)
+    assert end.downlink.wire_bytes - down == len(answer)
 
 
 def test_when_a_symbol_comes_exactly_at_its_deadline_then_it_is_in_time() -> None:

@@ -160,12 +160,11 @@ class IntrudedWorld(World):
         second = self._second
         if second is None:
             return
-        messages = second.on_bytes(data, self.now_ns) if data is not None else []
-        messages += second.on_time(self.now_ns)
+        messages = second.step(self.now_ns, data).frames
         second.session.rest()
         if second.session.phase is Phase.ENDED:
             self._second = None
         for message in messages:
-            for arrival_ns, out in self._second_down.carry(message, False, self.now_ns):
+            for arrival_ns, out in self._second_down.carry(message, self.now_ns):
                 if out is not None:
                     self.at(arrival_ns, lambda out=out: self._take(out))

@@ -24,10 +24,10 @@ class StreamLine:
         seed: int,
         *,
         upward: bool,
-        symbol_delay_ns: int = 0,
         spared: int = 1,
     ) -> None:
-        self.longest_delay_ns = symbol_delay_ns
+        self.longest_delay_ns = 0
+        self.counts: Counter[str] = Counter()
         self.dropped: Counter[str] = Counter()
         self.bytes_carried = 0
         self.bytes_damaged = 0
@@ -37,12 +37,11 @@ class StreamLine:
         self._damage = damage
         self._chooser = random.Random(seed)
         self._deframer = Deframer(wire if upward else None, self._drop)
-        self._symbol_delay_ns = symbol_delay_ns
         self._spared = spared
 
-    def carry(self, data: bytes, is_symbol: bool, now_ns: int) -> list[Delivery]:
+    def carry(self, data: bytes, now_ns: int) -> list[Delivery]:
+        is_symbol = self._wire.is_symbol(data)
         raw = data if is_symbol else stuff(data)
-        arrival_ns = now_ns + (self._symbol_delay_ns if is_symbol else 0)
         if self._spared:
             self._spared -= 1
             damaged = raw
@@ -51,7 +50,7 @@ class StreamLine:
         self.symbols_changed += is_symbol and damaged != raw and self._wire.is_symbol(damaged)
         self.bytes_carried += len(raw)
         messages = [received.message for received in self._deframer.feed(damaged)]
-        return [Delivery(arrival_ns, message) for message in messages or [None]]
+        return [Delivery(now_ns, message) for message in messages or [None]]
 
     def _maybe_damaged(self, byte: int) -> int:
         if self._chooser.random() >= self._damage:

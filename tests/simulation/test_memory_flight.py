@@ -13,7 +13,7 @@ from channel.codec import numerics
 from channel.codec.codec import Codec
 from channel.codec.models import pitch
 from channel.errors import ConfigMismatch
-from channel.line.line import Delivery, Line
+from channel.line.line import CleanLine, Delivery, Line
 from channel.protocol.events import event_fields
 from channel.protocol.frames import Why
 from tenbaud.sentences.events import event_text
@@ -60,7 +60,7 @@ def test_when_ten_baud_are_flown_then_one_bit_per_sample_is_paid_and_measured() 
     assert meter.coder_bits == 300
     assert flight.receiver.meter.baud == pytest.approx(10.0)
     assert flight.endpoint.inlet.wire_bytes == meter.wire_bytes
-    assert flight.endpoint.wire_bytes_down == flight.loop.inlet.wire_bytes
+    assert flight.endpoint.downlink.wire_bytes == flight.loop.endpoint.inlet.wire_bytes
     assert flight.uplink.shaper.refused == 0
 
 
@@ -128,7 +128,8 @@ def test_when_symbols_miss_their_deadlines_then_they_are_erased_and_dropped() ->
 
 def test_when_symbols_arrive_at_other_times_within_their_deadlines_then_states_are_equal() -> None:
     # A deadline counts from the last arrival, so the jitter may be as long as the allowance.
-    lines: list[Line] = [Line(), JitterLine(20 * MS), DelayingLine(frozenset(range(3, 90, 7)), 20 * MS)]
+    delaying = DelayingLine(frozenset(range(3, 90, 7)), 20 * MS)
+    lines: list[Line] = [CleanLine(), JitterLine(20 * MS), delaying]
     flights = [pitch_flight(mismatch=0.1, lead_ticks=3, uplink_line=line) for line in lines]
     results = [flight.fly(30.0) for flight in flights]
     assert_lockstep(flights[0], 300)
@@ -156,7 +157,7 @@ def test_when_the_downlink_is_slow_then_commands_are_late_only_beyond_the_lead(
 
 
 def test_when_the_downlink_is_slow_then_the_handshake_is_still_over_before_the_flight() -> None:
-    line = Line(delay_ns=10 * MS)
+    line = CleanLine(delay_ns=10 * MS)
     flight = pitch_flight(lead_ticks=3, downlink_line=line)
     flight.fly(10.0)
     assert flight.transmitter.counts["words_missed"] == 0
@@ -226,12 +227,12 @@ def test_when_one_end_computes_a_sine_one_ulp_off_then_it_is_reported_and_ends_s
 
 
 def test_when_command_frames_are_lost_within_the_repeats_then_nothing_is_missing() -> None:
-    class DownlinkLoss(Line):
+    class DownlinkLoss(CleanLine):
         def __init__(self) -> None:
             super().__init__()
             self.frames = 0
 
-        def carry(self, data: bytes, is_symbol: bool, now_ns: int) -> list[Delivery]:
+        def carry(self, data: bytes, now_ns: int) -> list[Delivery]:
             self.frames += 1
             lost = self.frames > 1 and self.frames % 10 in (3, 4)
             return [Delivery(now_ns, None if lost else data)]
@@ -243,12 +244,12 @@ def test_when_command_frames_are_lost_within_the_repeats_then_nothing_is_missing
 
 
 def test_when_more_command_frames_are_lost_than_repeated_then_the_ends_rejoin() -> None:
-    class Gap(Line):
+    class Gap(CleanLine):
         def __init__(self) -> None:
             super().__init__()
             self.frames = 0
 
-        def carry(self, data: bytes, is_symbol: bool, now_ns: int) -> list[Delivery]:
+        def carry(self, data: bytes, now_ns: int) -> list[Delivery]:
             self.frames += 1
             return [Delivery(now_ns, None if 50 <= self.frames < 53 else data)]
 

@@ -16,7 +16,6 @@ from channel.codec.codec import Codec, Vector
 from channel.errors import FrameError
 from channel.line.clocks import SkewedClock
 from channel.line.impairments import ImpairedLine, Impairments
-from channel.line.shaper import SlotShaper, UplinkMeter
 from channel.line.uplink import Uplink
 from channel.protocol.frames import Frame, Symbol
 from channel.protocol.sabotage import Sabotage, SabotagedCodec
@@ -91,9 +90,7 @@ class World:
         plant = PitchPlant(PitchParameters().mismatched(plan.mismatch), TICK_S)
         self.rig = WorldRig(plant, self.watch)
         alphabet = self.codec.coder.alphabet
-        self.up = ImpairedLine(
-            plan.up, alphabet, f"{plan.seed} up", symbol_delay_ns=self.terms.symbol_delay_ns
-        )
+        self.up = ImpairedLine(plan.up, alphabet, f"{plan.seed} up")
         self.down = ImpairedLine(plan.down, alphabet, f"{plan.seed} down")
         self.now_ns = 0
         self.calm_ns = 0
@@ -152,7 +149,7 @@ class World:
         scores = Scores(self.codec.model, 0, 2000, REFERENCE.angle_rad)
         self.node = TransmitterNode(session, self.rig, guard, scores, recorder, ALIVE_TICKS)
         self.watch.node = self.node
-        self.uplink = Uplink(SlotShaper(self.terms), self.up, UplinkMeter(self.codec.coder.alphabet))
+        self.uplink = Uplink(self.terms, self.codec.coder.alphabet, self.up)
         self._greeted = False
         self._origin_ns = self.now_ns
         self.rig.volts = (0.0, 0.0)
@@ -279,11 +276,10 @@ class World:
         if self.endpoint is None:
             return
         shown_ns = self.clock.shown(self.now_ns)
-        messages = self.endpoint.on_bytes(data, shown_ns) if data is not None else []
-        messages += self.endpoint.on_time(shown_ns)
+        messages = self.endpoint.step(shown_ns, data).frames
         self.endpoint.session.rest()
         for message in messages:
-            for arrival_ns, out in self.down.carry(message, False, self.now_ns):
+            for arrival_ns, out in self.down.carry(message, self.now_ns):
                 if out is not None:
                     self.at(arrival_ns, lambda out=out: self._take(out))
 

@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from tenbaud.flight.serial_line import EmulatedLine
+from channel.links.serial.emulated import EmulatedLine
 from tests.tenbaud.processes import REPOSITORY
 
 PATIENCE_S = 30.0

@@ -227,7 +227,7 @@ def test_when_recording_one_rig_fails_then_only_its_flight_ends(tmp_path: Path) 
         def fail() -> None:
             raise RuntimeError("a coder of the user's")
 
-        served.service.endpoint.session._commander.write_down = fail  # type: ignore[method-assign]
+        served.endpoint.session._commander.write_down = fail  # type: ignore[method-assign]
         bad.put(encode(bad.session.on_measurement(0, (0.0,))[0]))
         good.fly(5)
         assert [one.name for one in room.service.served] == ["rig/good"]

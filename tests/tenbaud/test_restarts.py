@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from channel.links.endpoints import free_endpoint
-from tenbaud.flight.serial_line import EmulatedLine
+from channel.links.serial.emulated import EmulatedLine
 from tenbaud.recording.reader import Recording
 from tests.tenbaud.ends import Pair, Relay, over_serial, over_zenoh
 

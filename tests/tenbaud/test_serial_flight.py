@@ -12,23 +12,19 @@ from typing import Any
 import pytest
 
 from channel.errors import LinkLost
+from channel.links.serial.emulated import EmulatedLine
 from tenbaud import MemoryRecorder
 from tenbaud.build.ends import build_receiver
 from tenbaud.build.flight import agree
 from tenbaud.build.transmitter_run import TransmitterRun
 from tenbaud.config.load import ConfigError, load_config
 from tenbaud.flight import receive, transmit
+from tenbaud.flight.ends import Endpoints, open_link
 from tenbaud.flight.outcome import ExitCode, Outcome
-from tenbaud.flight.serial_ends import open_serial
-from tenbaud.flight.serial_line import EmulatedLine
 from tenbaud.recording.comparison import Verdict
 from tenbaud.recording.diff import compare_runs
 from tenbaud.recording.folder import RunFolder
 from tests.tenbaud.processes import run
-
-
-def no_zenoh() -> Any:
-    raise AssertionError("a serial flight opens no Zenoh link")
 
 
 @dataclass
@@ -74,7 +70,7 @@ def fly(
         ):
             section = config.link.model_copy(update={"port": str(port)})
             changed = agree(config.model_copy(update={"link": section}), "real")
-            ends.append(stack.enter_context(open_serial(changed, role, False, no_zenoh)))  # type: ignore[arg-type]
+            ends.append(stack.enter_context(open_link(changed, role, Endpoints())))  # type: ignore[arg-type]
         lower, upper = ends
         endpoint = build_receiver(agreement, received, lower.wire)
         service = threading.Thread(

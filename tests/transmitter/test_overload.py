@@ -8,20 +8,19 @@ import time
 import pytest
 
 from channel.codec.codec import Vector
-from channel.line.line import Line
-from channel.line.shaper import SlotShaper, UplinkMeter
 from channel.line.uplink import Uplink
-from channel.links.memory import MemoryLink, memory_pair
 from channel.protocol.endings import End, Ending
 from channel.protocol.events import EventKind, event_fields
 from channel.protocol.limits import CommandLimits
 from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters, PitchPlant
 from receiver.endpoint import ReceiverEndpoint
-from receiver.loops.real import serve_real
+from receiver.loops.single import serve
 from receiver.session.session import ReceiverSession
 from tenbaud.sentences.events import event_text
 from tests.channel.codec.parts import THREE_SIGNS, ConstantController, identity_of, pitch_codec, terms
+from tests.channel.links.memory_pair import MemoryLink, memory_pair
+from transmitter.endpoint import TransmitterEndpoint
 from transmitter.guard import Guard, GuardSettings
 from transmitter.loops.real import RealFlight
 from transmitter.metrics.scores import Scores
@@ -68,18 +67,17 @@ def flight_over(link: MemoryLink, kind: type[SimulatedRig]) -> RealFlight:
         Scores(CODEC.model, 0, 1000, lambda _: None),
         rearm_ticks=10_000,
     )
-    uplink = Uplink(SlotShaper(TERMS), Line(0), UplinkMeter(CODEC.coder.alphabet))
-    return RealFlight(node, uplink, link)
+    return RealFlight(TransmitterEndpoint(node, Uplink(TERMS, CODEC.coder.alphabet)), link, 10.0)
 
 
 def flown(rig: type[SimulatedRig], controller: ConstantController) -> RealFlight:
     near, far = memory_pair()
     end = ReceiverEndpoint(ReceiverSession(CODEC, TERMS, controller, IDENTITY, 77))
-    thread = threading.Thread(target=serve_real, args=(end, far, 20.0))
+    thread = threading.Thread(target=serve, args=(end, far, 20.0))
     flight = flight_over(near, rig)
     thread.start()
     try:
-        flight.greet(peer_timeout_s=10.0)
+        flight.greet()
         flight.run(TICKS)
     finally:
         flight.leave(End(Ending.OVER, "the flight is over"))
@@ -97,12 +95,12 @@ def test_when_an_end_is_too_slow_then_it_is_said_and_the_flight_goes_on(
     rig: type[SimulatedRig], controller: ConstantController
 ) -> None:
     flight = flown(rig, controller)
-    session = flight._node.session
+    session = flight.endpoint.node.session
     told = [event_text(event_fields(event)) for event in session.events if event.kind is EventKind.RATE]
     assert told
     assert "1000 symbols/s are asked for" in told[0]
-    assert flight.rate.kept_symbols_per_s is not None
-    assert 0.0 < flight.rate.kept_symbols_per_s < 950.0
+    assert flight.endpoint.rate.kept_symbols_per_s is not None
+    assert 0.0 < flight.endpoint.rate.kept_symbols_per_s < 950.0
     assert session.counts["desyncs"] == 0
     # Without the common state there is no flight: it is asked for now and then, not all the time.
     assert session.counts["digest_checks"] > TICKS // 25
@@ -111,7 +109,7 @@ def test_when_an_end_is_too_slow_then_it_is_said_and_the_flight_goes_on(
 
 def test_when_only_the_transmitter_is_too_slow_then_no_common_state_is_asked_for() -> None:
     flight = flown(SlowRig, ConstantController(1.0, -1.0))
-    session = flight._node.session
-    assert flight.ticks_missed > TICKS // 2
+    session = flight.endpoint.node.session
+    assert flight.endpoint.ticks_missed > TICKS // 2
     assert session.counts["rejoins"] == 0
     assert session.counts["digest_checks"] > TICKS * 9 // 10

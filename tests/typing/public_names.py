@@ -72,6 +72,6 @@ def flights(plant: plants.Plant) -> None:
     assert_type(load_preset("tuned-10baud"), Preset)
     assert_type(load_preset("tuned-10baud").codec, Codec)
     try:
-        fly("tuned-10baud", link="carrier-pigeon")  # type: ignore[arg-type]
+        fly("tuned-10baud", link="carrier-pigeon")
     except errors.ConfigError as error:
         assert_type(error, errors.ConfigError)

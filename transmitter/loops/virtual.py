@@ -9,18 +9,14 @@ message. So virtual time never passes an arrival that could still change it.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from itertools import count
 from typing import NamedTuple
 
-from channel.line.inlet import Inlet
 from channel.line.line import Delivery, Line
-from channel.line.uplink import Uplink
-from channel.line.virtual import Peer, Reply
-from channel.protocol.endings import End
-from channel.protocol.frames import Frame
-from transmitter.node import TransmitterNode
-from transmitter.session.session import Phase
+from channel.line.virtual import Peer
+from transmitter.endpoint import TransmitterEndpoint
+from transmitter.loops.flight import Flight
 
 GREETINGS_MAX = 1000
 """Requests for a session before the line is given up."""
@@ -33,81 +29,69 @@ class _Arrival(NamedTuple):
     data: bytes | None
 
 
-class VirtualFlight:
-    """Flies a node against a peer; see the module's text."""
+class VirtualFlight(Flight):
+    """Flies an endpoint against a peer, whose line down is held here too; see the module's text."""
 
-    def __init__(self, node: TransmitterNode, uplink: Uplink, downlink: Line, peer: Peer) -> None:
-        self._node = node
-        self._uplink = uplink
+    def __init__(
+        self,
+        endpoint: TransmitterEndpoint,
+        downlink: Line,
+        peer: Peer,
+        should_stop: Callable[[], bool] = lambda: False,
+    ) -> None:
+        super().__init__(endpoint, should_stop)
         self._downlink = downlink
         self._peer = peer
         self._arrivals: list[_Arrival] = []
         self._order = count()
+        self._time_ns = 0
         self._deadline_ns: int | None = None
-        self.inlet = Inlet(uplink.wire, node.on_malformed)
+        self._greetings = 0
 
-    def greet(self) -> None:
-        """Carry the handshake out; the session then flies or holds a refusal, or nobody answered.
+    def _now_ns(self) -> int:
+        return self._time_ns
 
-        It takes place before the flight's time begins, however long the line takes.
-        """
-        session = self._node.session
-        for _ in range(GREETINGS_MAX):
-            self._offer([session.hello()], 0)
-            while self._arrivals:
-                self._pass_to(self._arrivals[0].time_ns)
-            if session.phase is not Phase.GREETING or session.refusal is not None:
-                return
+    def _may_ask(self) -> bool:
+        # The handshake takes place before the flight's time begins, however long the line takes.
+        self._greetings += 1
+        return self._greetings <= GREETINGS_MAX
 
-    def run(self, ticks: int, should_stop: Callable[[], bool] = lambda: False) -> int:
-        """Fly so many ticks, or until the end of the rig or the safe voltage; return the tick reached.
+    def _await_answer(self) -> None:
+        while self._arrivals:
+            self._pass_to(self._arrivals[0].time_ns)
 
-        The first tick is that of the session's first sample, which is not 0 when the receiver has
-        been flying before.
-        """
-        node = self._node
-        tick_ns = node.session.terms.tick_ns
-        first = node.session.epoch_tick
-        for tick in range(first, first + ticks):
-            now_ns = tick * tick_ns
-            self._pass_to(now_ns)
-            if node.over:
-                return tick
-            if should_stop():
-                node.stop()
-            frames = node.measure(tick)
-            if frames is None:
-                return tick
-            if frames:
-                self._offer(frames, now_ns)
-                self._pass_to(now_ns)
-            node.actuate(tick)
-        return first + ticks
+    def _begin(self) -> None:
+        """Do nothing: the flight's time begins with its first tick."""
 
-    def finish(self, tick: int, farewell: Callable[[], End]) -> None:
-        """Let the last echoes come in, then end the session on both sides.
+    def _rest(self) -> None:
+        """Do nothing: all that can wait is done while the peer is waited for."""
 
-        `farewell` is asked for what the receiver is told once they are in.
-        """
-        terms = self._node.session.terms
-        now_ns = tick * terms.tick_ns
-        # What is still on the line arrives within one delivery and one deadline either way.
-        linger_ns = terms.uplink_delivery_ns + terms.symbol_delay_ns + terms.downlink_budget_ns
-        linger_ns += self._uplink.line.longest_delay_ns + self._downlink.longest_delay_ns
-        self._pass_to(now_ns + linger_ns, deadlines=False)
-        self._node.rest()
-        # The farewell is spared what goes wrong on the line: the receiver's process must hear it.
-        for frame in self._node.session.bye(farewell()):
-            self._step(now_ns + linger_ns, self._uplink.counted(frame)[0])
+    def _land(self) -> None:
+        """Do nothing: no motor turns on this clock."""
 
-    def _offer(self, frames: Sequence[Frame], now_ns: int) -> None:
-        for frame in frames:
-            for delivery in self._uplink.offer(frame, now_ns):
-                self._push(delivery, upward=True)
+    def _wait_until(self, due_ns: int) -> None:
+        self._time_ns = due_ns
+        self._pass_to(due_ns)
 
-    def _push(self, delivery: Delivery, upward: bool) -> None:
-        arrival = _Arrival(delivery.arrival_ns, next(self._order), upward, delivery.data)
-        heapq.heappush(self._arrivals, arrival)
+    def _linger(self) -> None:
+        endpoint = self.endpoint
+        terms = endpoint.node.session.terms
+        line_ns = endpoint.uplink.line.longest_delay_ns + self._downlink.longest_delay_ns
+        self._time_ns = endpoint.tick * terms.tick_ns + terms.linger_ns(line_ns)
+        self._pass_to(self._time_ns, deadlines=False)
+
+    def _send(self, messages: list[Delivery]) -> None:
+        if messages:
+            self._push(messages, upward=True)
+            if not self.endpoint.greeting:
+                self._pass_to(self._time_ns)
+
+    def _send_past_line(self, message: bytes) -> None:
+        self._step(self._time_ns, message)
+
+    def _push(self, messages: list[Delivery], upward: bool) -> None:
+        for arrival_ns, data in messages:
+            heapq.heappush(self._arrivals, _Arrival(arrival_ns, next(self._order), upward, data))
 
     def _pass_to(self, now_ns: int, deadlines: bool = True) -> None:
         """Let virtual time pass to `now_ns`, this moment included."""
@@ -125,18 +109,12 @@ class VirtualFlight:
             if arrival.upward:
                 self._step(arrival.time_ns, arrival.data)
             elif arrival.data is not None:
-                self._take(arrival.data, arrival.time_ns)
+                self._push(self.endpoint.take(arrival.data, arrival.time_ns), upward=True)
 
     def _step(self, time_ns: int, data: bytes | None) -> None:
-        reply: Reply = self._peer.step(time_ns, data)
+        reply = self._peer.step(time_ns, data)
         # A peer in another process had it done while it was waited for.
-        self._node.rest()
+        self.endpoint.node.rest()
         self._deadline_ns = reply.deadline_ns
-        for frame in reply.frames:
-            for delivery in self._downlink.carry(frame, False, time_ns):
-                self._push(delivery, upward=False)
-
-    def _take(self, data: bytes, now_ns: int) -> None:
-        frame = self.inlet.take(data)
-        if frame is not None:
-            self._offer(self._node.deliver(frame), now_ns)
+        for message in reply.frames:
+            self._push(self._downlink.carry(message, time_ns), upward=False)

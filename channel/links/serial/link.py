@@ -87,11 +87,11 @@ class SerialLink(LinkBase):
         self._thread.start()
         self._notify(_ASK)
 
-    def send(self, data: bytes, is_symbol: bool = False) -> None:
+    def send(self, data: bytes) -> None:
         """Put one message on the line; dropped and counted when the line is gone or far behind."""
         if self._stop.is_set():
             raise LinkError("the link is closed")
-        raw = data if is_symbol and self._symbols.is_symbol(data) else stuff(data)
+        raw = data if self._symbols.is_symbol(data) else stuff(data)
         now = time.monotonic()
         duration_s = self._duration_s(raw)
         last, again_at = self._last_message

@@ -12,10 +12,11 @@ Before the first symbol the schedule is known from the handshake: tick 0 lies be
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from channel.protocol.frames import ShortSymbol
+from channel.protocol.frames import Frame, Hello, LocatedSymbol, ShortSymbol, Welcome
 from channel.protocol.terms import Terms
 
 START_NS = 250_000_000
@@ -30,13 +31,11 @@ GAIN_MIN = 1.0 / 16.0
 
 
 class Place(NamedTuple):
-    """What became of a symbol byte."""
+    """What became of a symbol byte; as in `LocatedSymbol`."""
 
     slot: int | None
-    """the slot, None for a byte that does not fit"""
     in_time: bool
     anchor: tuple[int, int] | None
-    """(slot, time in ns): where the receiver's deadlines count from now on, if that has changed"""
 
 
 @dataclass(slots=True)
@@ -60,6 +59,23 @@ class SlotFinder:
         """when slot 0 would have arrived, by the schedule"""
         self._taken = 0
         self._rival: _Rival | None = None
+        self._symbols_per_word = terms.symbols_per_word
+        self._incarnation: int | None = None
+        """of the transmitter that flies"""
+
+    def answered(self, hello: Hello, answers: Iterable[Frame], now_ns: int) -> None:
+        """Note a hello that came at `now_ns`, and what the session answered."""
+        for answer in answers:
+            if isinstance(answer, Welcome) and answer.incarnation != self._incarnation:
+                self._incarnation = answer.incarnation
+                ahead = answer.first_sample - hello.sample if hello.sample else 0
+                self.begin(answer.first_sample * self._symbols_per_word, ahead * self._symbols_per_word)
+        self.greeted(now_ns)
+
+    def located(self, symbol: ShortSymbol, due_slot: int, now_ns: int) -> LocatedSymbol:
+        """Return a symbol byte that came at `now_ns` with its slot; `due_slot` is not settled yet."""
+        place = self.find(symbol, due_slot, now_ns)
+        return LocatedSymbol(symbol.number, place.slot, symbol.slot_low, place.in_time, place.anchor)
 
     def greeted(self, now_ns: int) -> None:
         """Note the time of a hello that was answered with a welcome."""

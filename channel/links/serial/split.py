@@ -32,6 +32,14 @@ class SplitWire:
         downward = len(data) > 1 and data[1] in DOWNWARD_KINDS
         return (self._down if downward else self._up).size(data)
 
+    def is_symbol(self, data: bytes) -> bool:
+        """Return whether a message carries a symbol, as the upward line has them."""
+        return self._up.is_symbol(data)
+
+    def renumbered(self, data: bytes, shift: int, kinds: int) -> bytes:
+        """Return a symbol's message with another number."""
+        return self._up.renumbered(data, shift, kinds)
+
 
 class SplitLink:
     """Sends on one link and hears on the other, as the role asks; owns and closes both."""
@@ -57,9 +65,9 @@ class SplitLink:
             line_bytes_in=out.line_bytes_in + come.line_bytes_in,
         )
 
-    def send(self, data: bytes, is_symbol: bool = False) -> None:
+    def send(self, data: bytes) -> None:
         """Put one message on the outward line."""
-        self._out.send(data, is_symbol)
+        self._out.send(data)
 
     def receive(self, timeout_s: float) -> bytes | None:
         """Return the next message of the inward line, or None after `timeout_s` seconds."""

@@ -102,6 +102,11 @@ class SerialWire:
         """Return whether a message is one symbol byte."""
         return len(data) == 1 and data[0] in self._symbols
 
+    def renumbered(self, data: bytes, shift: int, kinds: int) -> bytes:
+        """Return a symbol byte of the same slot with another number."""
+        symbol = self._symbols[data[0]]
+        return bytes((self._byte(symbol.slot_low, (symbol.number + shift) % kinds),))
+
     def _byte(self, slot: int, number: int) -> int:
         value = slot << self._number_bits | number
         width = self._number_bits + self._slot_bits

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 import secrets
+from contextlib import ExitStack
 from typing import Unpack
 
 import zenoh
@@ -52,15 +53,16 @@ class ZenohHub:
         self._joined: dict[str, tuple[zenoh.Publisher, zenoh.LivelinessToken]] = {}
         self._names: dict[str, str] = {}
         """session names by the keys of those joined, which nearly all messages have"""
-        self._inbox: ChannelInbox | None = None
-        self._closed = False
-        self._gate: Gate | None = None
+        self._parts = ExitStack()
         self._session = open_node(**node)
+        self._parts.callback(self._session.close)
         try:
-            self._gate = Gate(self._session, node.get("security"), self.counts.refused)
+            gate = Gate(self._session, node.get("security"), self.counts.refused)
+            self._parts.callback(gate.close)
             self._inbox = ChannelInbox(
                 self._session, f"{KEY_ROOT}/{pattern}/up/*", CHANNEL_MESSAGES_MAX
             )
+            self._parts.callback(self._inbox.close)
         except BaseException:
             self.close()
             raise
@@ -70,7 +72,7 @@ class ZenohHub:
 
         None too, at once, for a message under a name that no session can have: it is counted.
         """
-        sample = self._inbox.sample(timeout_s) if self._inbox is not None else None
+        sample = self._inbox.sample(timeout_s)
         if sample is None:
             return None
         key = str(sample.key_expr)
@@ -86,8 +88,7 @@ class ZenohHub:
 
     def wake(self) -> None:
         """End the wait of the thread that receives; for other threads."""
-        if self._inbox is not None:
-            self._inbox.interrupt()
+        self._inbox.interrupt()
 
     def join(self, name: str) -> None:
         """Show the transmitter of this session that its receiver is there."""
@@ -136,13 +137,7 @@ class ZenohHub:
 
     def close(self) -> None:
         """Close the Zenoh session; what was sent before is still delivered."""
-        if not self._closed:
-            self._closed = True
-            if self._inbox is not None:
-                self._inbox.close()
-            if self._gate is not None:
-                self._gate.close()
-            self._session.close()
+        self._parts.close()
 
     def __enter__(self) -> ZenohHub:
         return self

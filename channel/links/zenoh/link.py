@@ -14,6 +14,7 @@ Keys, `NAME` being the session's name:
 from __future__ import annotations
 
 import secrets
+from contextlib import ExitStack
 from typing import Unpack
 
 import zenoh
@@ -52,13 +53,13 @@ class ZenohLink(LinkBase):
                 f"session name {session_name!r}: letters, digits, '_', '-', '.', and '/' between "
                 "parts, none of which is '.' or '..'"
             )
-        self._inbox: ChannelInbox | None = None
-        self._gate: Gate | None = None
         self._peers: set[str] = set()
-        self._closed = False
+        self._parts = ExitStack()
         self._session = open_node(**node)
+        self._parts.callback(self._session.close)
         try:
-            self._gate = Gate(self._session, node.get("security"), self.counts.refused)
+            gate = Gate(self._session, node.get("security"), self.counts.refused)
+            self._parts.callback(gate.close)
             self._declare(role, f"{KEY_ROOT}/{session_name}", best_effort)
         except BaseException:
             self.close()
@@ -67,6 +68,7 @@ class ZenohLink(LinkBase):
     def _declare(self, role: Role, root: str, best_effort: bool) -> None:
         inbound, other = ("down", "receiver") if role == "transmitter" else ("up", "transmitter")
         self._inbox = ChannelInbox(self._session, f"{root}/{inbound}/*")
+        self._parts.callback(self._inbox.close)
         alive = self._session.liveliness()
         self._watch = alive.declare_subscriber(
             f"{root}/alive/{other}/*",
@@ -89,10 +91,10 @@ class ZenohLink(LinkBase):
         # Declared last: who sees the token can be heard already.
         self._token = alive.declare_token(f"{root}/alive/{role}/{secrets.token_hex(4)}")
 
-    def send(self, data: bytes, is_symbol: bool = False) -> None:
+    def send(self, data: bytes) -> None:
         """Publish one message; it is lost in silence when the peer is not there."""
         try:
-            (self._symbols if is_symbol else self._control).put(data)
+            (self._symbols if self.wire.is_symbol(data) else self._control).put(data)
         except zenoh.ZError as error:
             raise LinkError(f"Zenoh could not send: {error}") from error
         self.counts.messages_out += 1
@@ -100,7 +102,7 @@ class ZenohLink(LinkBase):
 
     def receive(self, timeout_s: float) -> bytes | None:
         """Return the next message, or None after `timeout_s` seconds."""
-        data = self._inbox.get(timeout_s) if self._inbox is not None else None
+        data = self._inbox.get(timeout_s)
         if data is None:
             return None
         self.counts.messages_in += 1
@@ -113,13 +115,7 @@ class ZenohLink(LinkBase):
 
     def close(self) -> None:
         """Close the Zenoh session; what was sent before is still delivered."""
-        if not self._closed:
-            self._closed = True
-            if self._inbox is not None:
-                self._inbox.close()
-            if self._gate is not None:
-                self._gate.close()
-            self._session.close()
+        self._parts.close()
 
     def _on_alive(self, sample: zenoh.Sample) -> None:
         # On a thread of Zenoh; calls nothing of Zenoh.

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from typing import TypedDict
 
 import zenoh
 
 from channel.errors import LinkError
 from channel.links.endpoints import check_endpoints
+from channel.links.kind import NodePlace
 from channel.links.security import Security
 from channel.links.zenoh.config import SESSIONS_MAX, open_session, zenoh_config, zenoh_settings
 
@@ -19,17 +19,6 @@ _NAME = re.compile(r"[A-Za-z0-9_.-]+(/[A-Za-z0-9_.-]+)*")
 def is_session_name(name: str) -> bool:
     """Return whether a session may have this name; names become keys, file names and printed text."""
     return bool(_NAME.fullmatch(name)) and not {".", ".."} & set(name.split("/"))
-
-
-class NodePlace(TypedDict, total=False):
-    """Where a node is and whom it lets in: `open_node`, for those that hand it on."""
-
-    listen: tuple[str, ...]
-    connect: tuple[str, ...]
-    router: tuple[str, ...]
-    scouting: bool
-    insecure: bool
-    security: Security | None
 
 
 class NodeOptions(NodePlace, total=False):

@@ -9,10 +9,11 @@ import pytest
 from channel.codec.words import Alphabet
 from channel.errors import FrameError
 from channel.line.impairments import FOR_EVER_NS, ImpairedLine, Impairments, parse_impairments
-from channel.line.line import Delivery
+from channel.line.line import CleanLine, Delivery
+from channel.links.serial.wire import SerialWire
 from channel.protocol import wire
 from channel.protocol.endings import Ending
-from channel.protocol.frames import Bye, Symbol
+from channel.protocol.frames import Bye, ShortSymbol, Symbol
 
 MS = 1_000_000
 SECOND = 1_000_000_000
@@ -26,7 +27,7 @@ def line(seed: str = "a", **changes: Any) -> ImpairedLine:
 
 
 def carried(one: ImpairedLine, count: int = MESSAGES) -> list[list[Delivery]]:
-    return [one.carry(SYMBOL, True, index * MS) for index in range(count)]
+    return [one.carry(SYMBOL, index * MS) for index in range(count)]
 
 
 def test_when_a_text_names_everything_then_both_directions_have_it() -> None:
@@ -105,7 +106,7 @@ def test_when_a_symbol_is_flipped_then_it_is_a_valid_frame_with_another_symbol()
     assert delivery.data is not None
     assert wire.decode(delivery.data) == Symbol(1, 0, 5, 0)
     goodbye = wire.encode(Bye(1, Ending.OVER, "done"))
-    assert one.carry(goodbye, False, 0) == [Delivery(0, goodbye)]
+    assert one.carry(goodbye, 0) == [Delivery(0, goodbye)]
 
 
 def test_when_raw_bits_are_inverted_then_the_check_finds_it() -> None:
@@ -140,3 +141,20 @@ def test_when_the_seed_is_the_same_then_so_is_what_goes_wrong() -> None:
     changes = {"loss": 0.2, "flip": 0.1, "raw": 0.1, "duplicate": 0.2}
     assert carried(line(**changes), 500) == carried(line(**changes), 500)
     assert carried(line(**changes), 500) != carried(line("b", **changes), 500)
+
+
+def test_when_a_symbol_byte_of_a_serial_line_is_flipped_then_its_slot_stays() -> None:
+    serial = SerialWire(2)
+    one = ImpairedLine(Impairments(flip=1.0), BITS, "a", serial)
+    ((_, data),) = one.carry(serial.encode(Symbol(1, 0, 5, 1)), 0)
+    assert data is not None
+    assert serial.decode(data) == ShortSymbol(0, 5, serial.slot_modulus)
+    assert one.counts["flipped"] == 1
+
+
+def test_when_a_line_has_a_delay_of_its_own_then_impairments_come_on_top() -> None:
+    one = ImpairedLine(Impairments(delay_ns=2), BITS, "a", line=CleanLine(5))
+    assert one.longest_delay_ns == 7
+    assert one.carry(SYMBOL, 1) == [Delivery(8, SYMBOL)]
+    lost = ImpairedLine(Impairments(loss=1.0), BITS, "a", line=CleanLine(5))
+    assert lost.carry(SYMBOL, 1) == [Delivery(6, None)]

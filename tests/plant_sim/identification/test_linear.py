@@ -10,7 +10,8 @@ from scipy.signal import cont2discrete, dlsim
 
 from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.excitation import PseudoRandom
-from plant_sim.identification.linear import LinearIdentifier
+from plant_sim.identification.state_filter import StateFilter
+from tests.plant_sim.identification.linear import LinearIdentifier
 
 H = 0.01
 
@@ -51,22 +52,17 @@ def test_when_a_plant_of_any_order_is_excited_then_its_coefficients_are_found(
 
 
 @pytest.mark.parametrize(
-    ("order", "input_order", "polynomial", "text"),
+    ("polynomial", "text"),
     [
-        (2, 2, [1.0, 2.0, 2.0], "do not match"),
-        (0, 0, [1.0, 1.0], "do not match"),
-        (2, 0, [1.0, 2.0], "degree 1"),
-        (2, 0, [1.0, -2.0, 2.0], "not Hurwitz"),
-        (2, 0, [1.0, 0.0, 2.0], "not Hurwitz"),
-        (2, 0, [2.0, 2.0, 2.0], "begin with 1"),
-        (1, 0, [1.0, math.nan], "finite"),
+        ([1.0, -2.0, 2.0], "not Hurwitz"),
+        ([1.0, 0.0, 2.0], "not Hurwitz"),
+        ([2.0, 2.0, 2.0], "begin with 1"),
+        ([1.0, math.nan], "finite"),
     ],
 )
-def test_when_orders_or_filter_make_no_sense_then_they_are_refused(
-    order: int, input_order: int, polynomial: list[float], text: str
-) -> None:
+def test_when_a_filter_makes_no_sense_then_it_is_refused(polynomial: list[float], text: str) -> None:
     with pytest.raises(IdentificationError, match=text):
-        LinearIdentifier(order, input_order, polynomial, H)
+        StateFilter(polynomial, H, count=2)
 
 
 def test_when_the_excitation_fades_then_the_gain_stays_bounded_and_the_estimates_rest() -> None:

@@ -62,8 +62,8 @@ def test_when_a_rejoin_is_asked_for_then_a_new_epoch_begins_ahead_of_both() -> N
 
 
 def test_when_the_receiver_is_ahead_then_the_start_is_its_own_next_sample() -> None:
-    session = flown(30)
-    assert only_welcome(session.on_frame(request(1, 12), 12 * 100 * MS)).first_sample == 30
+    session = flown(20)
+    assert only_welcome(session.on_frame(request(1, 12), 1_950 * MS)).first_sample == 20
 
 
 def test_when_the_request_is_repeated_then_so_is_the_answer_until_it_is_used_or_old() -> None:
@@ -188,6 +188,13 @@ def test_when_a_fresh_receiver_was_sent_far_ahead_then_the_next_request_brings_i
     session = receiver()
     assert only_welcome(session.on_frame(request(3, 2**30, PEER + 1), 0)).first_sample == 2**30
     assert only_welcome(session.on_frame(request(1, 50), 10 * MS)).first_sample == 50
+
+
+def test_when_an_answer_is_for_a_sample_far_ahead_then_it_is_not_repeated_for_another() -> None:
+    session = receiver()
+    forged = only_welcome(session.on_frame(request(3, 2**30), 0))
+    assert session.on_frame(request(3, 2**30 + 1), 100 * MS) == [forged]
+    assert only_welcome(session.on_frame(request(3, 50), 100 * MS)).first_sample == 50
 
 
 def test_when_an_answer_is_never_used_then_the_next_one_follows_from_the_flight_before_it() -> None:

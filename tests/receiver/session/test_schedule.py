@@ -27,10 +27,9 @@ def test_when_symbols_jitter_within_the_allowance_then_all_are_due() -> None:
     for slot in range(50, 500):
         now_ns = slot * PERIOD_NS + chance.randrange(-ALLOWANCE_NS, ALLOWANCE_NS)
         assert schedule.timing(slot, now_ns) is Timing.DUE
-        schedule.take(slot, now_ns)
-        deadline = schedule.deadline_ns(slot + 1)
-        assert deadline is not None
-        assert 0 <= deadline - (now_ns + PERIOD_NS + ALLOWANCE_NS) <= 2 * ALLOWANCE_NS
+        anchor, from_ns = schedule.take(slot, now_ns)
+        assert anchor == slot
+        assert 0 <= from_ns - now_ns <= 2 * ALLOWANCE_NS
 
 
 def test_when_a_symbol_is_far_too_early_then_it_is_not_due_and_changes_nothing() -> None:
@@ -39,15 +38,14 @@ def test_when_a_symbol_is_far_too_early_then_it_is_not_due_and_changes_nothing()
     assert schedule.timing(50 + EARLY_SAMPLES, now_ns) is Timing.DUE
     assert schedule.timing(50 + EARLY_SAMPLES + 1, now_ns) is Timing.EARLY
     assert schedule.timing(2**31, now_ns) is Timing.EARLY
-    assert schedule.deadline_ns(50) == now_ns + ALLOWANCE_NS
+    assert schedule.take(50, now_ns) == (50, now_ns)
 
 
 def test_when_a_symbol_is_somewhat_early_then_the_deadlines_stay_where_they_were() -> None:
     schedule = running()
-    schedule.take(53, 50 * PERIOD_NS)
-    deadline = schedule.deadline_ns(54)
-    assert deadline is not None
-    assert abs(deadline - 54 * PERIOD_NS - ALLOWANCE_NS) <= PERIOD_NS // 16
+    slot, from_ns = schedule.take(53, 50 * PERIOD_NS)
+    assert slot == 53
+    assert abs(from_ns - 53 * PERIOD_NS) <= PERIOD_NS // 16
 
 
 def test_when_many_forged_symbols_come_at_once_then_they_do_not_drag_the_schedule_along() -> None:

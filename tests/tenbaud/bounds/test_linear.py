@@ -10,10 +10,9 @@ import pytest
 from tenbaud.bounds.encoder import (
     double_integrator_rate_at_encoder_floor,
     encoder_floor,
-    rate_at_encoder_floor,
 )
+from tenbaud.bounds.floor import floor
 from tenbaud.bounds.linear import (
-    bits_needed_per_sample,
     integrators,
     linear_model,
     pitch,
@@ -35,7 +34,6 @@ def test_when_a_pendulum_stands_then_its_rate_is_the_published_one() -> None:
 def test_when_modes_grow_in_a_pair_then_both_count() -> None:
     dynamics = [[1.0, 5.0], [-5.0, 1.0]]
     assert rate_needed(dynamics) == pytest.approx(2.0 / math.log(2.0))
-    assert bits_needed_per_sample(dynamics, 0.1) == pytest.approx(0.2 / math.log(2.0))
 
 
 def test_when_the_body_hangs_upside_down_then_the_pitch_needs_bits() -> None:
@@ -78,4 +76,5 @@ def test_when_bits_stop_mattering_then_the_closed_form_and_the_solver_agree(
 ) -> None:
     closed = double_integrator_rate_at_encoder_floor(density, 4096)
     assert closed == pytest.approx(rate, abs=0.06)
-    assert rate_at_encoder_floor(integrators(2, density), 4096) == pytest.approx(closed, rel=1e-6)
+    solved = floor(integrators(2, density), closed)
+    assert math.sqrt(solved) == pytest.approx(encoder_floor(4096), rel=1e-6)

@@ -10,7 +10,8 @@ import pytest
 
 from tenbaud import Run
 from tenbaud.audit.audit import audit
-from tenbaud.build.ends import build_controller, check_parts
+from tenbaud.build.controllers import build_controller
+from tenbaud.build.ends import check_parts
 from tenbaud.build.flight import agree
 from tenbaud.config.load import ConfigError, load_config, nested
 from tenbaud.config.schema import FlightConfig
@@ -185,7 +186,7 @@ def test_a_coder_that_uses_rates_is_given_them(outside: Path) -> None:
         ("receiver.controller", "outside:Picky", "Picky.context. failed: RuntimeError: not today"),
         ("receiver.controller", "needy:Law", "needs a_library_that_nobody_has"),
         ("receiver.controller", "broken:Law", "broken cannot be imported: SyntaxError"),
-        ("receiver.controller", "pidd", "'recorded' or a class from outside is written module:Class"),
+        ("receiver.controller", "pidd", r"pid, recorded and module:Class; did you mean pid\?"),
         ("receiver.controller", "a b:C", "a class from outside is written module:Class"),
         (
             "transmitter.plant.kind",
@@ -195,7 +196,7 @@ def test_a_coder_that_uses_rates_is_given_them(outside: Path) -> None:
         ("coder.kind", "outside:Law", r"is no coder: it has no attribute alphabet \(Alphabet\)"),
         ("coder.kind", "outside:Growing", "cannot run one sample: .* number of states changed"),
         ("model.kind", "outside:Steps", r"it has no attribute state_size \(int\)"),
-        ("coder.kind", "zom", "known are zoom, .* and module:Class, got 'zom'"),
+        ("coder.kind", "zom", r"= 'zom': known are zoom, .* and module:Class; did you mean zoom\?"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_used_is_refused_in_words(

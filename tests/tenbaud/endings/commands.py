@@ -93,7 +93,10 @@ READERS: dict[str, Arguments] = {
     "view": lambda *_: ["view", "--schema"],
     "keys show": lambda inputs, _: ["keys", "show", inputs.keys],
     "keys renew": lambda inputs, _: ["keys", "renew", "rig", "--folder", inputs.keys],
-    "keys add": lambda inputs, _: ["keys", "add", "more", "--role", "viewer", "--folder", inputs.keys],
+    "keys add": lambda inputs, out: [
+        *("keys", "add", Path(out).parent.name or "more", "--role", "viewer"),
+        *("--folder", inputs.keys),
+    ],
     "doctor": lambda *_: ["doctor"],
 }
 """Commands that leave nothing new, or only beside what they read."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from channel.links.serial.emulated import EmulatedLine
 from tenbaud.flight.outcome import SAFE, ExitCode, Outcome, first_cause
-from tenbaud.flight.serial_line import EmulatedLine
 from tests.tenbaud.ends import Pair, over_serial
 
 

@@ -105,8 +105,10 @@ def test_a_lasting_command_ends(name: str, after_s: float, number: int, tmp_path
     time.sleep(after_s)
     process.send_signal(number)
     ended = finish(process)
-    # A rig and a router end like this in the ordinary way.
-    assert ended.code in (ExitCode.INTERRUPTED, -number, 0), (ended.code, ended.err)
+    # A rig and a router end with 0 in the ordinary way. Interrupted in an `exec` of a text, as when a
+    # dataclass is made, Python 3.11 dies of SIGINT after all, which a shell calls 130 too.
+    codes = (ExitCode.INTERRUPTED, -number, -signal.SIGINT, 0)
+    assert ended.code in codes, (ended.code, ended.err)
     assert "Traceback" not in ended.err, ended.err
     nothing_half_is_left(tmp_path)
     assert not (tmp_path / "port").is_symlink(), "its port is left"

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from channel.codec.words import ERASED
-from channel.line.line import Delivery, Line
+from channel.line.line import CleanLine, Delivery
+from channel.protocol.wire import DATAGRAM
 from tenbaud import Codec, MemoryFlight, MemoryRecorder, Run, Terms, coders, fly, load_preset
 from tenbaud.audit.audit import audit
 from tenbaud.errors import ConfigError, PartError
@@ -85,9 +86,9 @@ def test_when_own_objects_fly_then_the_result_has_what_both_ends_saw() -> None:
 
 
 def test_when_a_line_loses_a_symbol_then_its_word_is_an_erasure() -> None:
-    class Lossy(Line):
-        def carry(self, data: bytes, is_symbol: bool, now_ns: int) -> list[Delivery]:
-            lost = is_symbol and now_ns == 5 * TERMS.sample_ns
+    class Lossy(CleanLine):
+        def carry(self, data: bytes, now_ns: int) -> list[Delivery]:
+            lost = DATAGRAM.is_symbol(data) and now_ns == 5 * TERMS.sample_ns
             return [Delivery(now_ns, None if lost else data)]
 
     terms = Terms.for_codec(CODEC, TICK_S, lead_ticks=3)

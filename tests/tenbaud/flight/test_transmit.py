@@ -8,7 +8,6 @@ from typing import Any
 
 import pytest
 
-from channel.links.memory import memory_pair
 from channel.protocol.endings import End, Ending
 from channel.protocol.wire import DATAGRAM
 from receiver.endpoint import ReceiverEndpoint
@@ -18,6 +17,7 @@ from tenbaud.build.transmitter_run import TransmitterRun
 from tenbaud.config.load import load_config
 from tenbaud.flight import receive, transmit
 from tenbaud.flight.outcome import ExitCode, Outcome
+from tests.channel.links.memory_pair import memory_pair
 from transmitter.session.session import Phase
 
 SECONDS = 2.0

@@ -15,9 +15,9 @@ from channel.codec.codec import CodecState
 from channel.codec.numerics import sin
 from channel.protocol.wire import DATAGRAM
 from tenbaud import MemoryRecorder
-from tenbaud.build.codec import CODERS, MODELS
 from tenbaud.build.ends import build_receiver
 from tenbaud.build.flight import agree
+from tenbaud.config.kinds import CODERS, MODELS
 from tenbaud.config.load import load_config
 from tenbaud.config.schema import FlightConfig
 from tenbaud.flight import transmit
@@ -97,8 +97,8 @@ def test_when_a_flight_is_compiled_then_no_bit_differs(preset: str, changes: dic
 def test_when_a_kind_of_model_or_coder_exists_then_a_preset_above_flies_it() -> None:
     configs = [load_config(preset) for preset in (*PRESETS, "fixed-10baud")]
     # A coder that is shown rates flies in a study as it does in the nodes, by their own sessions.
-    assert {config.coder.kind for config in configs} == set(CODERS) - {"history"}
-    assert {config.model.kind for config in configs} == set(MODELS)
+    assert {config.coder.kind for config in configs} == set(CODERS.built_in) - {"history"}
+    assert {config.model.kind for config in configs} == set(MODELS.built_in)
 
 
 def test_when_a_recorded_flight_is_compiled_then_no_figure_differs(tmp_path: Path) -> None:

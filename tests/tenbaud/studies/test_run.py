@@ -22,11 +22,12 @@ from tenbaud.studies.chunk import ChunkResult, ChunkTask, fly_chunk
 from tenbaud.studies.run import run_study
 from tenbaud.studies.settings import StudyError
 from tenbaud.studies.study import Study
-from tenbaud.studies.table import Results, read_results
+from tenbaud.studies.table import Results
 from tests.rules.sources import TOP
 from tests.tenbaud.studies.small import SMALL, study_of
 
 psutil: Any = import_module("psutil")
+pq: Any = import_module("pyarrow.parquet")
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(TOP), "OMP_NUM_THREADS": "1"}
 
 
@@ -46,7 +47,7 @@ def expected(tmp_path: Path) -> Any:
 def test_when_two_processes_fly_then_the_table_is_that_of_one(tmp_path: Path, expected: Any) -> None:
     table = flown(study_of(), tmp_path / "pool", workers=2)
     assert table.equals(expected)
-    assert read_results(tmp_path / "pool" / "results.parquet").equals(expected)
+    assert pq.read_table(tmp_path / "pool" / "results.parquet").equals(expected)
     assert table.num_rows == 12
     assert table["flight"].to_pylist() == list(range(12))
     assert len(set(table["error_live_rms"].to_pylist())) == 12
@@ -139,7 +140,7 @@ def test_when_the_command_is_killed_then_the_same_command_goes_on(
     kept = {one: one.stat().st_mtime_ns for one in (out / "chunks").glob("*.parquet")}
     subprocess.run(command, env=ENVIRONMENT, check=True, capture_output=True, timeout=60)
     assert all(one.stat().st_mtime_ns == written for one, written in kept.items())
-    assert read_results(out / "results.parquet").equals(expected)
+    assert pq.read_table(out / "results.parquet").equals(expected)
 
 
 def test_when_the_command_is_killed_then_its_processes_do_not_outlive_it(tmp_path: Path) -> None:

@@ -8,24 +8,22 @@ from typing import Any
 import pytest
 
 from channel.errors import ConfigMismatch, LinkLost
-from channel.line.line import Line
-from channel.line.shaper import SlotShaper, UplinkMeter
 from channel.line.uplink import Uplink
 from channel.line.virtual import Step, encode_step
-from channel.links.memory import MemoryLink, memory_pair
 from channel.protocol.endings import End, Ending
 from channel.protocol.identity import Identity
 from channel.protocol.limits import CommandLimits
-from channel.protocol.terms import Terms
 from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters, PitchPlant
 from receiver.controllers.pid import PAPER_GAINS, Pid
 from receiver.controllers.references import Constant
 from receiver.endpoint import ReceiverEndpoint
-from receiver.loops.real import serve_real
+from receiver.loops.single import serve
 from receiver.session.session import Phase as ReceiverPhase
 from receiver.session.session import ReceiverSession
 from tests.channel.codec.parts import THREE_SIGNS, identity_of, pitch_codec, terms
+from tests.channel.links.memory_pair import MemoryLink, memory_pair
+from transmitter.endpoint import TransmitterEndpoint
 from transmitter.guard import Guard, GuardSettings
 from transmitter.loops.real import RealFlight
 from transmitter.metrics.scores import Scores
@@ -49,8 +47,10 @@ TERMS = terms(
 IDENTITY = identity_of(CODEC)
 
 
-def flight_over(link: MemoryLink, some: Terms = TERMS, identity: Identity = IDENTITY) -> RealFlight:
-    session = TransmitterSession(CODEC, some, identity, 5)
+def flight_over(
+    link: MemoryLink, identity: Identity = IDENTITY, peer_timeout_s: float = 10.0
+) -> RealFlight:
+    session = TransmitterSession(CODEC, TERMS, identity, 5)
     plant = PitchPlant(PitchParameters(), TICK_S)
     node = TransmitterNode(
         session,
@@ -58,8 +58,8 @@ def flight_over(link: MemoryLink, some: Terms = TERMS, identity: Identity = IDEN
         Guard(CommandLimits(5.0), GuardSettings(400, 10, (0.0, 0.0))),
         Scores(CODEC.model, 0, 1000, lambda _: None),
     )
-    uplink = Uplink(SlotShaper(some), Line(some.symbol_delay_ns), UplinkMeter(CODEC.coder.alphabet))
-    return RealFlight(node, uplink, link)
+    endpoint = TransmitterEndpoint(node, Uplink(TERMS, CODEC.coder.alphabet))
+    return RealFlight(endpoint, link, peer_timeout_s)
 
 
 def endpoint() -> ReceiverEndpoint:
@@ -77,7 +77,7 @@ class Service:
 
     def _serve(self, end: ReceiverEndpoint, link: MemoryLink) -> None:
         try:
-            serve_real(end, link, peer_timeout_s=20.0, should_stop=self.stop.is_set)
+            serve(end, link, peer_timeout_s=20.0, should_stop=self.stop.is_set)
         except Exception as error:
             self.error = error
 
@@ -95,12 +95,12 @@ class Service:
 def test_when_a_flight_is_flown_in_real_time_then_every_sample_is_checked() -> None:
     near, far = memory_pair()
     flight, end = flight_over(near), endpoint()
-    node, session = flight._node, flight._node.session
+    node, session = flight.endpoint.node, flight.endpoint.node.session
     with Service(end, far) as service:
-        flight.greet(peer_timeout_s=10.0)
+        flight.greet()
         assert session.phase is Phase.FLYING
         ticks = flight.run(TICKS)
-        flight.finish(ticks, lambda: End(Ending.OVER, "landed"))
+        flight.finish(lambda: End(Ending.OVER, "landed"))
     assert service.error is None
     assert ticks == TICKS
     assert end.session.phase is ReceiverPhase.ENDED
@@ -111,20 +111,20 @@ def test_when_a_flight_is_flown_in_real_time_then_every_sample_is_checked() -> N
     assert session.copies.confirmed == end.session.state
     assert session.counts["desyncs"] == end.session.counts["desyncs"] == 0
     assert session.counts["erasures"] == end.session.counts["erasures"]
-    meter = flight._uplink.meter
+    meter, shaper = flight.endpoint.uplink.meter, flight.endpoint.uplink.shaper
     assert meter.symbols == end.session.meter.symbols <= TICKS // 4
-    assert meter.symbols + session.counts["words_missed"] + flight._uplink.shaper.refused >= TICKS // 4
-    assert flight.lateness.count == TICKS - flight.ticks_missed
-    assert flight.inlet.wire_bytes == end.wire_bytes_down
+    assert meter.symbols + session.counts["words_missed"] + shaper.refused >= TICKS // 4
+    assert flight.endpoint.lateness.count == TICKS - flight.endpoint.ticks_missed
+    assert flight.endpoint.inlet.wire_bytes == end.downlink.wire_bytes
     assert end.inlet.wire_bytes == meter.wire_bytes, "the farewell is counted too"
-    assert flight.inlet.malformed == end.inlet.malformed == 0
+    assert flight.endpoint.inlet.malformed == end.inlet.malformed == 0
     assert not node.latched
 
 
 def test_when_nobody_answers_then_greeting_ends_with_link_lost() -> None:
     near, _ = memory_pair()
     with pytest.raises(LinkLost, match="no receiver answered"):
-        flight_over(near).greet(peer_timeout_s=0.01)
+        flight_over(near, peer_timeout_s=0.01).greet()
 
 
 def test_when_the_configuration_differs_then_both_sides_know_and_nothing_flies() -> None:
@@ -132,30 +132,30 @@ def test_when_the_configuration_differs_then_both_sides_know_and_nothing_flies()
     end = endpoint()
     flight = flight_over(near, identity=identity_of(CODEC, {"rate_baud": 11.0}))
     with Service(end, far) as service:
-        flight.greet(peer_timeout_s=10.0)
+        flight.greet()
     assert service.error is None
-    assert flight._node.session.phase is Phase.GREETING
-    assert "rate_baud: here 11.0, there 10.0" in str(flight._node.session.refusal)
+    assert flight.endpoint.node.session.phase is Phase.GREETING
+    assert "rate_baud: here 11.0, there 10.0" in str(flight.endpoint.node.session.refusal)
     assert "rate_baud" in str(end.session.refusal)
-    assert flight._uplink.meter.symbols == 0
+    assert flight.endpoint.uplink.meter.symbols == 0
 
 
 def test_when_a_real_service_is_stepped_virtually_then_it_says_so() -> None:
     near, far = memory_pair()
     near.send(encode_step(Step(1, 0, None)))
     with pytest.raises(ConfigMismatch, match="virtual clock"):
-        serve_real(endpoint(), far, peer_timeout_s=5.0)
+        serve(endpoint(), far, peer_timeout_s=5.0)
 
 
 def test_when_no_transmitter_comes_then_the_service_ends_with_link_lost() -> None:
     _, far = memory_pair()
     with pytest.raises(LinkLost, match="nothing came from a transmitter"):
-        serve_real(endpoint(), far, peer_timeout_s=0.01)
+        serve(endpoint(), far, peer_timeout_s=0.01)
 
 
 def test_when_a_service_is_told_to_stop_then_it_returns() -> None:
     _, far = memory_pair()
-    serve_real(endpoint(), far, peer_timeout_s=5.0, should_stop=lambda: True)
+    serve(endpoint(), far, peer_timeout_s=5.0, should_stop=lambda: True)
 
 
 def test_when_garbage_comes_in_greeting_then_it_is_counted_and_the_greeting_goes_on() -> None:
@@ -163,7 +163,7 @@ def test_when_garbage_comes_in_greeting_then_it_is_counted_and_the_greeting_goes
     flight, end = flight_over(near), endpoint()
     far.send(b"garbage")
     with Service(end, far):
-        flight.greet(peer_timeout_s=10.0)
-        flight.finish(0, lambda: End(Ending.OVER))
-    assert flight.inlet.malformed == 1
+        flight.greet()
+        flight.finish(lambda: End(Ending.OVER))
+    assert flight.endpoint.inlet.malformed == 1
     assert end.session.phase is ReceiverPhase.ENDED

@@ -9,6 +9,7 @@ import struct
 import pytest
 
 from channel.protocol.endings import Ending
+from channel.protocol.events import ASKED
 from channel.protocol.frames import Echo, Hello, Refuse, Welcome, Why
 from channel.protocol.wire import encode
 from tests.transmitter.session.test_session import INCARNATION, SESSION, Far, flying, frame, transmitter
@@ -71,7 +72,7 @@ def test_when_a_flight_is_refused_then_it_ends_at_the_third_refusal_of_a_request
         assert session.on_frame(Refuse(INCARNATION, Ending.MISMATCH, "no", "")) == []
     assert session.phase is Phase.REJOINING
     session.on_frame(Welcome(SESSION, 4, 101, INCARNATION, 1))
-    session.rejoin(Why.GUARD, "again")
+    session.rejoin(Why.GUARD, ASKED)
     for _ in range(REFUSALS_BELIEVED - 1):
         session.on_frame(Refuse(INCARNATION, Ending.MISMATCH, "no", ""))
     assert session.phase is Phase.REJOINING

@@ -9,6 +9,7 @@ import socket
 from pathlib import Path
 from typing import Protocol
 
+from channel.links.serial.pseudo_terminal import PseudoTerminal
 from transmitter.rigs.errors import RigError
 
 READ_BYTES = 4096
@@ -36,57 +37,24 @@ class DeviceLine(Protocol):
         """Send; return whether it went out whole."""
 
 
-class PtyLine:
-    """A pseudo-terminal, made anew at every plugging in; `link` names it all the same."""
+class PtyLine(PseudoTerminal):
+    """A pseudo-terminal; `link` names it all the same after every plugging in."""
 
     def __init__(self, link: str = "") -> None:
-        self._link = Path(link) if link else None
-        self._master = self._slave = -1
-        self.address = link
-
-    def plug(self) -> None:
-        """Make the pseudo-terminal."""
-        import tty
-
-        self._master, self._slave = os.openpty()
-        # Our own hold on the other side keeps reads from failing while nobody has it open.
-        tty.setraw(self._slave)
-        os.set_blocking(self._master, False)
-        path = os.ttyname(self._slave)
-        if self._link is None:
-            self.address = path
-            return
-        try:
-            if self._link.is_symlink():
-                self._link.unlink()
-            self._link.symlink_to(path)
-        except OSError as error:
-            self.unplug()
-            # Of the two names it would give the wrong one.
-            raise OSError(error.errno, error.strerror, str(self._link)) from error
-
-    def unplug(self) -> None:
-        """Let it vanish."""
-        for handle in (self._master, self._slave):
-            if handle >= 0:
-                os.close(handle)
-        self._master = self._slave = -1
-        if self._link is not None and self._link.is_symlink():
-            with contextlib.suppress(OSError):
-                self._link.unlink()
+        super().__init__(Path(link) if link else None)
 
     def wait(self, timeout_s: float) -> None:
         """Wait for bytes."""
-        _wait(self._master, timeout_s)
+        _wait(self.handle, timeout_s)
 
     def read(self) -> bytes:
         """Return what the other side wrote."""
-        return _read_fd(self._master)
+        return _read_fd(self.handle)
 
     def write(self, data: bytes) -> bool:
         """Write as much as its buffer holds."""
         try:
-            return self._master >= 0 and os.write(self._master, data) == len(data)
+            return self.handle >= 0 and os.write(self.handle, data) == len(data)
         except OSError:
             return False
 

@@ -1,4 +1,4 @@
-"""Identification of any linear plant of one input and one output: (5)-(10).
+"""The paper's algorithm (5)-(10) for any plant of one input and one output, from the product's parts.
 
     y^(n) + a_1 y^(n-1) + ... + a_n y = b_0 u^(m) + ... + b_m u                      (5)
     y^(n) = phi' Omega,   Omega = [-a_1, ..., -a_n, b_0, ..., b_m]                   (6)
@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.estimator import Array, Estimator
 from plant_sim.identification.state_filter import StateFilter
 
@@ -48,17 +47,7 @@ class LinearIdentifier:
         gain_bound: float | None = None,
         block_s: float = 6.0,
     ) -> None:
-        if order < 1 or not 0 <= input_order < order:
-            raise IdentificationError(
-                f"the orders (n, m) = ({order}, {input_order}) do not match: n is at least 1 and m is "
-                "0 ... n - 1, as the output may not follow the input at once"
-            )
         self._filter = StateFilter(polynomial, step_s, count=2)
-        if self._filter.order != order:
-            raise IdentificationError(
-                f"the filter polynomial has degree {self._filter.order}, the plant's order n is "
-                f"{order}; they must be equal"
-            )
         self.order = order
         self.input_order = input_order
         self.estimator = Estimator(

@@ -7,9 +7,9 @@ import math
 import pytest
 
 from channel.codec.words import Alphabet
-from channel.line.line import Line
-from channel.line.shaper import BaudMeter, SlotShaper, UplinkMeter
-from channel.line.uplink import Uplink
+from channel.line.line import CleanLine
+from channel.line.meters import BaudMeter
+from channel.line.uplink import SlotShaper, Uplink, UplinkMeter
 from channel.protocol import wire
 from channel.protocol.endings import Ending
 from channel.protocol.frames import Bye, Hello, Symbol
@@ -96,16 +96,16 @@ def test_when_two_symbols_come_at_once_then_no_rate_is_made_up() -> None:
 
 
 def test_when_a_symbol_is_offered_out_of_its_slot_then_nothing_leaves_and_nothing_is_paid() -> None:
-    uplink = Uplink(SlotShaper(terms()), Line(3, 1), UplinkMeter(Alphabet((-1, 1), 1)))
+    uplink = Uplink(terms(delivery="end"), Alphabet((-1, 1), 1), CleanLine(3))
     assert uplink.offer(Symbol(1, 0, 2, 0), 0) == []
     assert uplink.meter.wire_bytes == 0
     assert uplink.shaper.refused == 1
 
 
 def test_when_frames_are_offered_then_they_are_encoded_delayed_and_counted() -> None:
-    uplink = Uplink(SlotShaper(terms()), Line(3, 1), UplinkMeter(Alphabet((-1, 1), 1)))
+    uplink = Uplink(terms(delivery="end"), Alphabet((-1, 1), 1), CleanLine(3))
     symbol, bye = Symbol(1, 0, 0, 1), Bye(1, Ending.OVER, "done")
-    assert uplink.offer(symbol, 100) == [(103, wire.encode(symbol))]
-    assert uplink.offer(bye, 100) == [(101, wire.encode(bye))]
+    assert uplink.offer(symbol, 100) == [(100 * MS + 103, wire.encode(symbol))]
+    assert uplink.offer(bye, 100) == [(103, wire.encode(bye))]
     assert uplink.meter.symbols == 1
     assert uplink.meter.control_bytes == len(wire.encode(bye))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from channel.line.lateness import LatenessMeter
+from channel.line.meters import LatenessMeter
 
 
 def test_when_latenesses_are_added_then_percentiles_are_right_within_a_bin() -> None:

@@ -1,4 +1,4 @@
-"""How late a loop gets to what was due: percentiles without keeping every value."""
+"""What a loop measures: how late it gets to what was due, and how many symbols a second arrive."""
 
 from __future__ import annotations
 
@@ -30,3 +30,25 @@ class LatenessMeter:
             if left <= 0.0 and index < self.BINS:
                 return min((index + 1) * self.BIN_NS, self.largest_ns) / 1e6
         return self.largest_ns / 1e6
+
+
+class BaudMeter:
+    """Measures symbols per second on the receiver's clock, between the first symbol and the last."""
+
+    def __init__(self) -> None:
+        self.symbols = 0
+        self._first_ns = 0
+        self._last_ns = 0
+
+    def on_symbol(self, now_ns: int) -> None:
+        """Count one symbol that arrived in time."""
+        if self.symbols == 0:
+            self._first_ns = now_ns
+        self._last_ns = now_ns
+        self.symbols += 1
+
+    @property
+    def baud(self) -> float | None:
+        """Return the measured rate; None before two symbols came at different times."""
+        span_ns = self._last_ns - self._first_ns
+        return (self.symbols - 1) * 1e9 / span_ns if span_ns > 0 else None

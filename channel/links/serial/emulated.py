@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Literal, Self
 
 from channel.links.serial.budget import LINE_BITS_PER_BYTE
+from channel.links.serial.pseudo_terminal import PseudoTerminal
 
 Way = Literal["up", "down"]
 
@@ -112,8 +113,7 @@ class EmulatedLine:
             "up": _Direction(rate_baud, damage, random.Random(2 * seed)),
             "down": _Direction(rate_baud, down, random.Random(2 * seed + 1)),
         }
-        self._masters: tuple[int, int] | None = None
-        self._slaves: tuple[int, int] | None = None
+        self._ends = (PseudoTerminal(self.transmitter_port), PseudoTerminal(self.receiver_port))
         self._lock = threading.Lock()
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._run, name="emulated line", daemon=True)
@@ -130,11 +130,13 @@ class EmulatedLine:
 
     def carried(self, way: Way) -> int:
         """Return how many bytes have gone in this direction."""
-        return self._ways[way].carried
+        with self._lock:  # else a byte may be read at its end before it is counted
+            return self._ways[way].carried
 
     def damaged(self, way: Way) -> int:
         """Return how many of them were changed on the way."""
-        return self._ways[way].damaged
+        with self._lock:
+            return self._ways[way].damaged
 
     def spoil(self, way: Way, share: float) -> None:
         """Change this share of the bytes from now on."""
@@ -147,40 +149,24 @@ class EmulatedLine:
 
     def plug(self) -> None:
         """Plug both ends in: two new pseudo-terminals under the same names."""
-        import tty
-
-        pairs = [os.openpty(), os.openpty()]
-        for (master, slave), port in zip(
-            pairs, (self.transmitter_port, self.receiver_port), strict=True
-        ):
-            tty.setraw(slave)
-            os.set_blocking(master, False)
-            port.unlink(missing_ok=True)
-            port.symlink_to(os.ttyname(slave))
         with self._lock:
-            self._masters = (pairs[0][0], pairs[1][0])
-            # Held open, so that an end which is not there yet or any more is no error here.
-            self._slaves = (pairs[0][1], pairs[1][1])
+            for one in self._ends:
+                one.plug()
 
     def unplug(self) -> None:
         """Pull both ends out: whoever has them open gets an error, and their names are gone."""
         with self._lock:
-            if self._masters is None or self._slaves is None:
-                return
-            self.transmitter_port.unlink(missing_ok=True)
-            self.receiver_port.unlink(missing_ok=True)
-            for number in self._slaves + self._masters:
-                os.close(number)
-            self._masters = self._slaves = None
+            for one in self._ends:
+                one.unplug()
 
     def _run(self) -> None:
         while not self._stop.is_set():
             with self._lock:
                 wait_s = self._pass_on()
                 readable = [
-                    master
-                    for master, way in zip(self._masters or (), self._ways.values(), strict=False)
-                    if way.room > 0
+                    end.handle
+                    for end, way in zip(self._ends, self._ways.values(), strict=True)
+                    if end.handle >= 0 and way.room > 0
                 ]
             try:
                 select.select(readable, [], [], wait_s)
@@ -189,9 +175,9 @@ class EmulatedLine:
 
     def _pass_on(self) -> float:
         """Move what can be moved; return how long to wait."""
-        if self._masters is None:
+        near, far = (end.handle for end in self._ends)
+        if near < 0 or far < 0:
             return STEP_S * 10
-        near, far = self._masters
         now = time.monotonic()
         for way, source, target in (
             (self._ways["up"], near, far),

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tenbaud.flight.serial_line import EmulatedLine, Way
+from channel.links.serial.emulated import EmulatedLine, Way
 from tests.contract.test_links import PATIENCE_S, until
 
 

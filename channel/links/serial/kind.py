@@ -1,0 +1,119 @@
+"""A serial line as a kind of link: what it can carry, how long bytes take, and how an end opens it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from channel.codec.codec import Codec
+from channel.links.base import Link
+from channel.links.kind import LinkEnd, LinkKind, LinkSettings, Meeting
+from channel.links.serial.budget import check_slot_counter, serial_budget
+from channel.links.serial.wire import SerialWire
+from channel.links.zenoh.kind import ZenohKind
+from channel.protocol.terms import Terms
+
+ZENOH = "zenoh"
+"""`link.downlink` that sends the commands back over Zenoh."""
+
+
+class SerialKind(LinkKind):
+    """A line with a port at either end; the downlink may go another way."""
+
+    changes_terms = True
+    carries_slots = False
+
+    def uses_addresses(self, settings: LinkSettings) -> bool:
+        """Return whether the downlink goes over Zenoh."""
+        return settings.downlink == ZENOH
+
+    def where(self, settings: LinkSettings) -> tuple[str, ...]:
+        """Return the ports."""
+        return tuple(filter(None, (settings.port, settings.downlink)))
+
+    def check(self, settings: LinkSettings, insecure: bool) -> None:
+        """Refuse a port that is none, or one on another machine without `insecure`."""
+        from channel.links.serial.port import check_port
+
+        check_port(settings.port, insecure)
+
+    def terms(self, settings: LinkSettings, codec: Codec, terms: Terms) -> Terms:
+        """Return the terms with the times that bytes take on the line.
+
+        Raises ValueError, with the arithmetic, for a line that cannot carry both directions and for a
+        coder whose symbols do not fit a byte.
+        """
+        check_slot_counter(terms, _wire(codec))
+        budget = serial_budget(terms, codec.model.input_size)
+        budget.check_up(settings.line_rate_baud)
+        if settings.downlink == ZENOH:
+            down_ns = 0
+        else:
+            rate = settings.downlink_rate_baud if settings.downlink else settings.line_rate_baud
+            budget.check_down(rate)
+            down_ns = budget.command_ns(rate)
+        up_ns = budget.symbol_ns(settings.line_rate_baud)
+        return replace(terms, uplink_line_ns=up_ns, downlink_line_ns=down_ns)
+
+    def open(self, end: LinkEnd) -> Link:
+        """Return the open link of one end, the downlink on a line of its own if so configured."""
+        from channel.links.serial.link import SerialLink
+        from channel.links.serial.split import SplitLink
+
+        settings = end.settings
+        wire = _wire(end.codec)
+        slot_s = end.terms.sample_ns / end.terms.symbols_per_word / 1e9
+
+        def on_port(port: str, rate_baud: int) -> SerialLink:
+            return SerialLink(
+                end.role,
+                port,
+                wire,
+                line_rate_baud=rate_baud,
+                symbol_age_max_s=slot_s * wire.slot_modulus / 2,
+                insecure=end.place.get("insecure", False),
+            )
+
+        up = on_port(settings.port, settings.line_rate_baud)
+        if not settings.downlink:
+            return up
+        try:
+            if settings.downlink == ZENOH:
+                down = ZenohKind().open(end)
+            else:
+                down = on_port(settings.downlink, settings.downlink_rate_baud)
+        except BaseException:
+            up.close()
+            raise
+        return SplitLink(end.role, up, down)
+
+    @contextmanager
+    def meeting(self, settings: LinkSettings) -> Iterator[tuple[Meeting, Meeting]]:
+        """Join two processes by emulated lines of the configured rates."""
+        with ExitStack() as stack:
+            near, far = _emulated(stack, "port", settings.line_rate_baud)
+            if settings.downlink == ZENOH:
+                up, down = stack.enter_context(ZenohKind().meeting(settings))
+                yield replace(up, settings=near), replace(down, settings=far)
+                return
+            if settings.downlink:
+                second = _emulated(stack, "downlink", settings.downlink_rate_baud)
+                near, far = near | second[0], far | second[1]
+            yield Meeting(near), Meeting(far)
+
+
+def _wire(codec: Codec) -> SerialWire:
+    return SerialWire(len(codec.coder.alphabet.symbols))
+
+
+def _emulated(stack: ExitStack, field: str, rate_baud: float) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the settings of either end for a new emulated line, which lasts as long as the stack."""
+    from channel.links.serial.emulated import EmulatedLine
+
+    folder = Path(stack.enter_context(TemporaryDirectory(prefix="tenbaud-line-")))
+    line = stack.enter_context(EmulatedLine(folder, rate_baud))
+    return {field: str(line.transmitter_port)}, {field: str(line.receiver_port)}

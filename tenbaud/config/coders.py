@@ -1,0 +1,169 @@
+"""The kinds of coders: what each one's section may hold, and what is built from it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from channel.codec.codec import Coder
+from channel.codec.coders.history import HistoryCoder, HistoryParameters
+from channel.codec.coders.static import StaticCoder, StaticParameters
+from channel.codec.coders.timed import TimedCoder, TimedParameters
+from channel.codec.coders.words import WordsCoder, WordsParameters
+from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
+from channel.codec.plugin_context import CoderContext
+from tenbaud.config.kinds import Kind
+from tenbaud.config.section import AngleRange, Factor, KindSection, NotNegative
+
+
+class ZoomCoderSection(KindSection):
+    """The paper's coder (16)-(22) and the observer gains."""
+
+    kind: Literal["zoom"] = "zoom"
+    window_signs: Annotated[int, Field(ge=1, le=16)] = 2
+    """how many signs the saturation test of (19) looks at; the paper's has two"""
+    initial_range_rad: AngleRange = 0.5
+    minimum_range_rad: AngleRange = 0.05
+    decay: Annotated[float, Field(ge=1e-6, le=1.0)] = 0.95
+    correction: Literal["held", "impulse"] = "held"
+    """held over the sample as in (22), or added to the state at once"""
+    gains: tuple[Factor, Factor] = (4.1, 8.6)
+    """l1 and l2 of (23): 1/s and 1/s^2 when held, per unit when impulse"""
+
+
+class FixedCoderSection(KindSection):
+    """One sign per sample and a range that never changes."""
+
+    kind: Literal["fixed"] = "fixed"
+    range_rad: AngleRange = 0.1
+    correction: Literal["held", "impulse"] = "held"
+    gains: tuple[Factor, Factor] = (4.1, 8.6)
+
+
+class TimedCoderSection(KindSection):
+    """One sign per sample and a range that shrinks with time: time-based zooming."""
+
+    kind: Literal["timed"] = "timed"
+    initial_range_rad: AngleRange = 0.5
+    minimum_range_rad: AngleRange = 0.05
+    decay: Annotated[float, Field(ge=1e-6, le=1.0)] = 0.95
+    correction: Literal["held", "impulse"] = "held"
+    gains: tuple[Factor, Factor] = (4.1, 8.6)
+
+
+class StaticCoderSection(KindSection):
+    """The measurement itself in a few bits, without memory (16)."""
+
+    kind: Literal["static"] = "static"
+    bits: Annotated[int, Field(ge=1, le=15)] = 1
+    range_rad: AngleRange = 3.141592653589793
+    """half the width that the cells cover"""
+    correction: Literal["held", "impulse"] = "held"
+    gains: tuple[Factor, Factor] = (4.1, 8.6)
+
+
+class WordsCoderSection(KindSection):
+    """The usual loop: the angle as a word, the rate by differences. For the model `hold`."""
+
+    kind: Literal["words"] = "words"
+    bits: Annotated[int, Field(ge=1, le=15)] = 10
+    range_rad: AngleRange = 3.141592653589793
+    rate_filter_s: NotNegative = 0.0
+    """tau of a low-pass behind the differentiator; 0: none"""
+
+
+class HistoryCoderSection(KindSection):
+    """One sign that looks ahead when it is formed and back when it is read; ranges in rad."""
+
+    kind: Literal["history"] = "history"
+    rows: Annotated[tuple[tuple[Factor, Factor, Factor], ...], Field(min_length=1, max_length=512)] = (
+        (1.0, 0.75, 1.0),
+    )
+    """(angle, rate, range) of each pattern of the last signs: corrections in units of the range, the
+    rate's per symbol period, and what the range is multiplied by. Bit j of a row's number says that the
+    sign j + 1 samples ago was the present one"""
+    initial_range_rad: AngleRange = 0.01
+    minimum_range_rad: AngleRange = 0.001
+    maximum_range_rad: AngleRange = 3.0
+    weights: tuple[Factor, Factor, Factor] = (0.7, 0.45, 0.75)
+    """of the error that is left after the look-ahead: angle, angle times swing, swing"""
+    lookahead: Annotated[int, Field(ge=0, le=6)] = 1
+    """samples that the transmitter looks ahead"""
+
+
+def _gains(gains: tuple[float, float]) -> tuple[tuple[float, ...], ...]:
+    return tuple((gain,) for gain in gains)
+
+
+def _common(section: Any) -> dict[str, Any]:
+    """Return what every coder of signs and gains takes."""
+    return {"gains": _gains(section.gains), "impulse": section.correction == "impulse"}
+
+
+def _zoom(section: ZoomCoderSection, context: CoderContext) -> Coder:
+    return ZoomCoder(
+        ZoomParameters(
+            initial_range=section.initial_range_rad,
+            minimum_range=section.minimum_range_rad,
+            decay=section.decay,
+            window=section.window_signs,
+            **_common(section),
+        )
+    )
+
+
+def _timed(section: TimedCoderSection, context: CoderContext) -> Coder:
+    return TimedCoder(
+        TimedParameters(
+            initial_range=section.initial_range_rad,
+            minimum_range=section.minimum_range_rad,
+            decay=section.decay,
+            **_common(section),
+        )
+    )
+
+
+def _fixed(section: FixedCoderSection, context: CoderContext) -> Coder:
+    """A timed coder whose range has nowhere to go."""
+    size = section.range_rad
+    return TimedCoder(
+        TimedParameters(initial_range=size, minimum_range=size, decay=1.0, **_common(section))
+    )
+
+
+def _static(section: StaticCoderSection, context: CoderContext) -> Coder:
+    return StaticCoder(StaticParameters(bits=section.bits, range=section.range_rad, **_common(section)))
+
+
+def _words(section: WordsCoderSection, context: CoderContext) -> Coder:
+    return WordsCoder(
+        WordsParameters(
+            bits=section.bits,
+            range=section.range_rad,
+            period_s=context.symbol_period_s,
+            rate_filter_s=section.rate_filter_s,
+        )
+    )
+
+
+def _history(section: HistoryCoderSection, context: CoderContext) -> Coder:
+    return HistoryCoder(
+        HistoryParameters(
+            rows=section.rows,
+            initial_range=section.initial_range_rad,
+            minimum_range=section.minimum_range_rad,
+            maximum_range=section.maximum_range_rad,
+            period_s=context.symbol_period_s,
+            weights=section.weights,
+            lookahead=section.lookahead,
+        )
+    )
+
+
+ZOOM = Kind(ZoomCoderSection, _zoom)
+FIXED = Kind(FixedCoderSection, _fixed)
+TIMED = Kind(TimedCoderSection, _timed)
+STATIC = Kind(StaticCoderSection, _static)
+WORDS = Kind(WordsCoderSection, _words)
+HISTORY = Kind(HistoryCoderSection, _history)

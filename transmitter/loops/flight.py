@@ -1,0 +1,99 @@
+"""The course of a flight, the same on either clock: greet, fly tick by tick, finish.
+
+What differs is how time passes (`transmitter.loops.real`, `transmitter.loops.virtual`).
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+
+from channel.line.line import Delivery
+from channel.protocol.endings import End
+from transmitter.endpoint import TransmitterEndpoint
+
+
+class Flight(ABC):
+    """Flies an endpoint; times are flight times."""
+
+    def __init__(self, endpoint: TransmitterEndpoint, should_stop: Callable[[], bool]) -> None:
+        self.endpoint = endpoint
+        self._should_stop = should_stop
+
+    def greet(self) -> None:
+        """Ask for a session until there is one, a refusal, or no sense in going on."""
+        while self.endpoint.greeting and self._may_ask():
+            self._send(self.endpoint.hello(self._now_ns()))
+            self._await_answer()
+
+    def run(self, ticks: int) -> int:
+        """Fly so many ticks, or to the end of the rig or the safe voltage; return the tick reached."""
+        endpoint = self.endpoint
+        endpoint.begin(ticks)
+        self._begin()
+        while (due_ns := endpoint.next_due_ns) is not None:
+            self._wait_until(due_ns)
+            if self._should_stop():
+                endpoint.node.stop()
+            messages = endpoint.begin_tick(self._now_ns())
+            if messages is None:
+                break
+            self._send(messages)
+            endpoint.end_tick()
+            self._rest()
+        return endpoint.tick
+
+    def finish(self, farewell: Callable[[], End]) -> None:
+        """Let the last echoes come in, end the session on both sides, take a real rig's motors down.
+
+        `farewell` is asked for what the receiver is told once the echoes are in.
+        """
+        self._linger()
+        self.endpoint.node.rest()
+        self.leave(farewell())
+        self._land()
+
+    def leave(self, end: End) -> None:
+        """End the session on both sides at once; before the first tick nothing else is to be done."""
+        for message in self.endpoint.farewell(end):
+            self._send_past_line(message)
+
+    @abstractmethod
+    def _begin(self) -> None:
+        """Begin the flight's time at the first tick."""
+
+    @abstractmethod
+    def _rest(self) -> None:
+        """Do what can wait until a tick is over."""
+
+    @abstractmethod
+    def _land(self) -> None:
+        """Take the motors to their safe voltage, where the rig asks for it."""
+
+    @abstractmethod
+    def _now_ns(self) -> int:
+        """Return the time."""
+
+    @abstractmethod
+    def _may_ask(self) -> bool:
+        """Return whether a session may be asked for once more; LinkLost when nobody will answer."""
+
+    @abstractmethod
+    def _await_answer(self) -> None:
+        """Take in what comes until it is time to ask again."""
+
+    @abstractmethod
+    def _wait_until(self, due_ns: int) -> None:
+        """Take in what comes until a tick is due."""
+
+    @abstractmethod
+    def _linger(self) -> None:
+        """Take in what comes until no echo can come any more."""
+
+    @abstractmethod
+    def _send(self, messages: list[Delivery]) -> None:
+        """Put messages on the line."""
+
+    @abstractmethod
+    def _send_past_line(self, message: bytes) -> None:
+        """Hand a message to the receiver without the line's delays and faults."""

@@ -20,7 +20,7 @@ def audit_text(result: Audit) -> str:
         if texts:
             lines += [heading, *(f"  {text}" for text in texts)]
     if result.passed:
-        lines.append("passed: the flight rested on its paid symbols alone")
+        lines.append("passed: the flight used only the symbols it sent")
     elif result.leaks:
         lines.append(f"failed: {len(result.leaks)} finding(s)")
     else:

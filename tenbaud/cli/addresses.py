@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from tenbaud.flight.ends import Endpoints
 
 INSECURE = (
-    "tenbaud: --insecure: whoever reaches this address can read the symbols, command the motors and "
-    "stop the flight; nothing is encrypted and nobody is checked"
+    "tenbaud: --insecure: anybody who reaches this address can read the symbols, command the motors "
+    "and stop the flight; there is no encryption and no authentication"
 )
 
 
@@ -79,7 +79,7 @@ def security_of(role: Role, addresses: options.Addresses, session: str) -> Secur
     other: Part = "receiver" if role == "transmitter" else "transmitter"
     if not addresses.peer:
         raise typer.BadParameter(
-            f"--keys without --peer lets nobody in; name the {other}'s certificate: --peer NAME"
+            f"--keys without --peer refuses every node; name the {other}'s certificate: --peer NAME"
         )
     node = usable(addresses.keys, NodeRole(role))
     warning = expiry_warning(node)

@@ -11,7 +11,7 @@ import typer
 from tenbaud.cli.checkout import need_checkout
 from tenbaud.cli.figures import DATA_VARIABLE, found_data
 
-bench = typer.Typer(no_args_is_help=True, help="Measure coders against what is possible.")
+bench = typer.Typer(no_args_is_help=True, help="Compare coders with the theoretical minimum.")
 
 
 @bench.callback()
@@ -21,11 +21,9 @@ def _root() -> None:
 
 @bench.command()
 def coders(
-    quick: Annotated[
-        bool, typer.Option("--quick", help="A small form: fewer seeds, wider intervals.")
-    ] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer seeds, wider intervals.")] = False,
     docs: Annotated[
-        Path, typer.Option(help="Folder for LIMITS.md and, in figures/, its pictures.")
+        Path, typer.Option(help="Folder for LIMITS.md and, in figures/, its plots.")
     ] = Path("runs/bench-coders"),
     data: Annotated[
         Path | None, typer.Option(help="Folder of the recorded flights.", envvar=DATA_VARIABLE)

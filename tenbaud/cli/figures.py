@@ -25,8 +25,8 @@ def figures(
     docs: Annotated[
         Path | None,
         typer.Option(
-            help="Folder for REPRODUCTION.md and, in figures/, its pictures, such as docs; not "
-            "given: they go into the run's folder.",
+            help="Folder for REPRODUCTION.md and, in figures/, its plots, such as docs; not given: "
+            "the run's folder.",
             show_default=False,
         ),
     ] = None,

@@ -30,7 +30,7 @@ def convert(
         Path | None,
         typer.Option(help="File, or folder for csv and parquet; into the run's folder if not given."),
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace what exists already.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace existing files.")] = False,
 ) -> None:
     """Write a run for other tools, with units: all signals on one time base, samples, events.
 
@@ -52,10 +52,10 @@ def recover(
     run: RunArgument,
     out: Annotated[
         Path | None,
-        typer.Option(help="Where the whole file goes; the damaged one then stays."),
+        typer.Option(help="Path of the repaired file; the damaged file then stays in place."),
     ] = None,
 ) -> None:
-    """Make whole files of recordings that were cut or damaged; the damaged ones are kept.
+    """Repair recordings that were truncated or damaged; the damaged files are kept.
 
     [dim]tenbaud recover runs/2026-11-23T10-00-00_paper-10baud[/dim]
     """

@@ -60,7 +60,7 @@ def identify(
         ),
     ] = None,
     mismatch: Annotated[
-        float | None, typer.Option(help="Simulated plant off the preset's model, 0.1 for 10 %.")
+        float | None, typer.Option(help="Model mismatch of the simulated plant, 0.1 for 10 %.")
     ] = None,
     disturbance: Annotated[
         str | None, typer.Option(help='Torque on the plant, such as "q=2e-3,step=0.5@30".')

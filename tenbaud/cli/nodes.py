@@ -25,7 +25,7 @@ def transmit(
     rig: options.Rig = None,
     dry_run: options.DryRun = False,
     mismatch: Annotated[
-        float | None, typer.Option(help="Simulated plant off the codec's model, 0.1 for 10 %.")
+        float | None, typer.Option(help="Model mismatch of the simulated plant, 0.1 for 10 %.")
     ] = None,
     disturbance: options.Disturbance = None,
     on_desync: options.OnDesync = None,

@@ -30,7 +30,7 @@ AllowCode = Annotated[
     bool,
     typer.Option(
         "--allow-code",
-        help="Import and run the classes from outside (module:Class) that the configuration names.",
+        help="Import and run the external classes (module:Class) that the configuration names.",
     ),
 ]
 Duration = Annotated[
@@ -47,11 +47,11 @@ Lead = Annotated[
 ]
 Delivery = Annotated[
     str | None,
-    typer.Option(help="start: a bit is there at once (the paper); end: after its slot (a wire)."),
+    typer.Option(
+        help="start: a bit arrives at once (the paper); end: at the end of its slot (a wire)."
+    ),
 ]
-Clock = Annotated[
-    ClockOption, typer.Option(help="virtual: as fast as messages go; real: in real time.")
-]
+Clock = Annotated[ClockOption, typer.Option(help="virtual: as fast as possible; real: in real time.")]
 Out = Annotated[
     Path | None, typer.Option(help="New folder for the run; runs/<time>_<name> if not given.")
 ]
@@ -81,12 +81,13 @@ Configs = Annotated[
     ),
 ]
 RigsMax = Annotated[
-    int, typer.Option(help="With --sessions: flights at a time, at most.", min=1, max=100_000)
+    int,
+    typer.Option(help="With --sessions: maximum number of simultaneous flights.", min=1, max=100_000),
 ]
 Flights = Annotated[
     int | None,
     typer.Option(
-        help="With --sessions: end after so many flights.", min=1, max=10**9, show_default=False
+        help="With --sessions: end after this number of flights.", min=1, max=10**9, show_default=False
     ),
 ]
 Listen = Annotated[list[str] | None, typer.Option(help="Zenoh endpoint to listen on; repeatable.")]
@@ -95,7 +96,7 @@ Mismatches = Annotated[
     list[float] | None,
     typer.Option(
         "--mismatch",
-        help="Simulated plant off the codec's model, 0.1 for 10 %; repeatable. Not given: 0 "
+        help="Model mismatch of the simulated plant, 0.1 for 10 %; repeatable. Not given: 0 "
         "and 0.1, one flight each (one as configured with --json or --config).",
         show_default=False,
     ),
@@ -126,7 +127,7 @@ LineRate = Annotated[
 Downlink = Annotated[
     str | None,
     typer.Option(
-        help="Commands come back another way than the serial line: zenoh, or a second port.",
+        help="Separate link for the commands: zenoh, or a second serial port.",
         show_default=False,
     ),
 ]
@@ -137,15 +138,15 @@ Disturbance = Annotated[
 Impair = Annotated[
     str | None,
     typer.Option(
-        help='What goes wrong on the line, such as "up:loss=0.3,delay=30ms". On a real '
-        "clock each end spoils what it sends: give both the same text.",
+        help='Impairments of the line, such as "up:loss=0.3,delay=30ms". On a real clock they '
+        "apply to outgoing messages; pass the same value to both ends.",
         show_default=False,
     ),
 ]
 Sabotage = Annotated[
     str | None,
     typer.Option(
-        help="Spoil this end's codec in one bit, such as sample=500,field=range, to see it found out.",
+        help="Corrupt one bit of this end's codec on purpose, such as sample=500,field=range.",
         show_default=False,
     ),
 ]
@@ -153,7 +154,7 @@ OnDesync = Annotated[
     str | None,
     typer.Option(
         "--on-desync",
-        help="When the two codecs differ: rejoin (go on from a common state) or stop (exit code 5).",
+        help="If the codecs differ: rejoin (continue from a common state) or stop (exit code 5).",
         show_default=False,
     ),
 ]
@@ -171,16 +172,17 @@ Keys = Annotated[
 Peer = Annotated[
     list[str] | None,
     typer.Option(
-        help="With --keys: who may be at the other end, by the name in its certificate; behind a "
-        "router the router's name. Repeatable. Among many --sessions, NAME=SESSION for its own alone."
+        help="With --keys: certificate name accepted at the other end; behind a router the router's "
+        "name. Repeatable. With --sessions, NAME=SESSION restricts it to one session."
     ),
 ]
 Viewer = Annotated[
-    list[str] | None, typer.Option(help="With --keys: who may listen, and send nothing. Repeatable.")
+    list[str] | None,
+    typer.Option(help="With --keys: certificate name that may watch but not send. Repeatable."),
 ]
 Router = Annotated[
     list[str] | None,
-    typer.Option(help="Zenoh router behind which the other end is, instead of --listen and --connect."),
+    typer.Option(help="Zenoh router between the ends, instead of --listen and --connect."),
 ]
 Scout = Annotated[
     bool, typer.Option("--scout", help="Look for the other end by multicast in this network.")
@@ -189,7 +191,7 @@ TakeOver = Annotated[
     bool,
     typer.Option(
         "--take-over",
-        help="Take a flight over from the receiver that has it: on purpose, while it flies.",
+        help="Take over a running flight from its present receiver.",
     ),
 ]
 RunFolder = Annotated[
@@ -215,7 +217,7 @@ Pace = Annotated[
     typer.Option(
         min=0.05,
         max=1e6,
-        help="Virtual clock: at most so many times real time.",
+        help="Virtual clock: maximum speed as a multiple of real time.",
         show_default=False,
     ),
 ]
@@ -223,7 +225,7 @@ View = Annotated[
     bool,
     typer.Option(
         "--view",
-        help="Serve a live page of the flight, from which it can be steered and broken. It flies in "
+        help="Serve a live page to watch, control and disturb the flight. It flies in "
         "real time (--pace for other speeds) for an hour, or --duration, or until Ctrl-C.",
     ),
 ]
@@ -235,7 +237,7 @@ OpenBrowser = Annotated[
 ]
 Status = Annotated[str, typer.Option(hidden=True, help="auto, lines or none.")]
 DryRun = Annotated[
-    bool, typer.Option("--dry-run", help="Read the rig and never drive it: no command is sent.")
+    bool, typer.Option("--dry-run", help="Read the rig only: no command is sent to the motors.")
 ]
 
 

@@ -13,7 +13,7 @@ from tenbaud.flight.outcome import ExitCode
 OtherRun = Annotated[
     Path | None,
     typer.Argument(
-        help="Folder of the other machine, where each kept its own end.", show_default=False
+        help="Run folder of the other machine, if each recorded its own end.", show_default=False
     ),
 ]
 
@@ -74,9 +74,9 @@ def audit(
     other: OtherRun = None,
     allow_code: options.AllowCode = False,
 ) -> None:
-    """Show that a flight rested on its paid symbols alone, and what was counted.
+    """Verify that a flight used only the symbols it sent, and count them.
 
-    Exit code 1 if something leaked, or if the recordings cannot show that nothing did.
+    Exit code 1 if information leaked, or if the recordings are not sufficient to verify it.
 
     [dim]tenbaud audit runs/2026-11-23T10-00-00_paper-10baud[/dim]
     """

@@ -31,13 +31,13 @@ def rig(
     config: options.ConfigFile = None,
     seed: options.Seed = None,
     mismatch: Annotated[
-        float | None, typer.Option(help="Body off the codec's model, 0.1 for 10 %.")
+        float | None, typer.Option(help="Model mismatch of the body, 0.1 for 10 %.")
     ] = None,
     disturbance: Annotated[
         str | None, typer.Option(help='Torque on the body, such as "q=2e-3,step=0.5@30".')
     ] = None,
     replay: Annotated[
-        str | None, typer.Option(help="Recorded flight that turns the encoder instead of a body.")
+        str | None, typer.Option(help="Recorded flight that drives the encoder instead of a body.")
     ] = None,
     samples_per_s: Annotated[
         float | None,
@@ -46,11 +46,11 @@ def rig(
     lines: Annotated[
         str, typer.Option(help="ascii: checked (E,...*HH), plain (t_us,c0,c1,c2), counts (c0 c1 c2).")
     ] = "checked",
-    polled: Annotated[bool, typer.Option(help="ascii: a sample for every line `e`.")] = False,
+    polled: Annotated[bool, typer.Option(help="ascii: answer each line `e` with a sample.")] = False,
     watchdog: Annotated[
         float,
         typer.Option(
-            help="Seconds without a command after which the outputs go off.", min=0.001, max=3600.0
+            help="Seconds without a command until the outputs turn off.", min=0.001, max=3600.0
         ),
     ] = 0.1,
     fault: Annotated[
@@ -58,13 +58,13 @@ def rig(
         typer.Option(help="Such as stuck@5..8, silent@5, unplug@5..7, reset@5, drop=0.01; repeatable."),
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(help="Seconds to run; for ever if not given.", min=0.0, max=1e7)
+        float | None, typer.Option(help="Seconds to run; until Ctrl-C if not given.", min=0.0, max=1e7)
     ] = None,
     settings: options.Settings = None,
     allow_code: options.AllowCode = False,
     json: options.AsJson = False,
 ) -> None:
-    """Behave like a real rig in real time: encoders, motors, a watchdog, and faults on request.
+    """Emulate a rig in real time: encoders, motors, a watchdog, and faults on request.
 
     [dim]tenbaud rig --format cobs --port pty:./rig --mismatch 0.1[/dim]
 
@@ -134,11 +134,11 @@ def rig_check(
     rig: options.Rig = None,
     preset: options.Preset = None,
     config: options.ConfigFile = None,
-    seconds: Annotated[float, typer.Option(help="How long to look.", min=0.1, max=86_400.0)] = 10.0,
+    seconds: Annotated[float, typer.Option(help="Seconds to read.", min=0.1, max=86_400.0)] = 10.0,
     settings: options.Settings = None,
     json: options.AsJson = False,
 ) -> None:
-    """Read a rig's encoders and say what comes; its output is never opened.
+    """Read encoders and check the samples; motors stay disabled.
 
     Turn each axis by hand while it runs: counts, angles, signs, rates and gaps are shown.
 

@@ -33,12 +33,12 @@ def router(
     connections_max: Annotated[
         int,
         typer.Option(
-            min=1, max=100_000, help="Nodes connected at a time at most: rigs, receivers, viewers."
+            min=1, max=100_000, help="Maximum number of connected nodes: rigs, receivers, viewers."
         ),
     ] = 64,
     print_config: Annotated[
         bool,
-        typer.Option("--print-config", help="Do not route: print the settings for a zenohd that does."),
+        typer.Option("--print-config", help="Print the settings for zenohd and exit."),
     ] = False,
 ) -> None:
     """Route between two ends that cannot reach each other but both reach this machine.
@@ -74,7 +74,7 @@ def _security(keys: Path | None, flights: list[str]) -> Security | None:
         return None
     if not flights:
         raise typer.BadParameter(
-            "--keys without --flight lets nobody in: --flight SESSION=TRANSMITTER,RECEIVER"
+            "--keys without --flight refuses every node: --flight SESSION=TRANSMITTER,RECEIVER"
         )
     node = usable(keys, NodeRole.ROUTER)
     warning = expiry_warning(node)

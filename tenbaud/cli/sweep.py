@@ -14,9 +14,7 @@ from tenbaud.cli import options
 
 
 def sweep(
-    study: Annotated[
-        Path, typer.Argument(help="Study file (TOML); docs/studies.md says what is in it.")
-    ],
+    study: Annotated[Path, typer.Argument(help="Study file (TOML); see docs/studies.md.")],
     out: Annotated[
         Path | None,
         typer.Option(help="Folder of the results; studies/<name> if not given. Resumes what is there."),
@@ -43,7 +41,7 @@ def sweep(
 ) -> None:
     """Fly a study: settings swept on a grid or sampled, many seeds, results as Parquet and plots.
 
-    The same command goes on with what is missing after a stop or a kill.
+    After a stop or a kill the same command continues with the missing flights.
     """
     from tenbaud.studies.run import run_study
     from tenbaud.studies.settings import StudyError
@@ -59,7 +57,9 @@ def sweep(
         with _Bar(what.file.name) as bar:
             table = run_study(what, results, bar.update, workers or os.cpu_count() or 1, scheduler)
     except KeyboardInterrupt:
-        typer.echo(f"stopped; what was flown is kept in {folder}. The same command goes on", err=True)
+        typer.echo(
+            f"stopped; finished flights are kept in {folder}. The same command continues", err=True
+        )
         raise
     drawn = []
     if plots:

@@ -1,4 +1,4 @@
-"""`tenbaud tune`: fit a coder's constants on some flights and judge them on others."""
+"""`tenbaud tune`: fit a coder's constants on some flights and validate them on others."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ class MethodOption(StrEnum):
     SIMPLEX = "nelder-mead"
 
 
-Out = Annotated[Path, typer.Option(help="File for the preset that was found; must not exist yet.")]
+Out = Annotated[Path, typer.Option(help="New file for the fitted preset.")]
 Rig = Annotated[
     str | None,
     typer.Option(help="simulated, or replay:FILE to fit on a recorded flight.", show_default=False),
 ]
-Mismatch = Annotated[float | None, typer.Option(help="Plant off the model, 0.1 for 10 %.")]
+Mismatch = Annotated[float | None, typer.Option(help="Model mismatch of the plant, 0.1 for 10 %.")]
 Free = Annotated[
     list[str] | None,
     typer.Option(
@@ -49,22 +49,22 @@ Seeds = Annotated[int, typer.Option(min=1, max=100_000, help="Simulated flights 
 TestSeeds = Annotated[
     int,
     typer.Option(
-        min=1, max=100_000, help="Simulated flights for the judgement, of the seeds after those."
+        min=1, max=100_000, help="Simulated flights for validation, with the seeds after those."
     ),
 ]
 TrainShare = Annotated[
     float,
     typer.Option(
-        min=0.05, max=0.95, help="Share of a recorded flight for the fit; the rest is to judge."
+        min=0.05, max=0.95, help="Share of a recorded flight for the fit; the rest is for validation."
     ),
 ]
-Method = Annotated[MethodOption, typer.Option(help="How to search.")]
+Method = Annotated[MethodOption, typer.Option(help="Search method.")]
 Evaluations = Annotated[
     int,
     typer.Option(
         min=1,
         max=10_000_000,
-        help="Sets of constants to fly at most, those configured included; each is flown on all "
+        help="Maximum number of parameter sets, including the configured one; each is flown on all "
         "flights for the fit.",
     ),
 ]
@@ -92,15 +92,15 @@ def tune(
     allow_code: options.AllowCode = False,
     as_json: options.AsJson = False,
 ) -> None:
-    """Fit a coder's constants, and with --model the model's, on flights; judge them on others.
+    """Fit a coder's constants, and with --model the model's, on flights; validate them on others.
 
-    What is made small is the rms error of what the receiver believed. Simulated flights of --seeds
-    seeds are for the fit, and --test-seeds others for the judgement; of a recorded flight the first
-    --train-share, and the rest. Both errors are reported, before and after.
+    Minimises the receiver's rms estimation error. Simulated flights: --seeds seeds for the fit, and
+    --test-seeds others for validation. Recorded flights: the first --train-share for the fit, the
+    rest for validation. Both errors are reported, before and after.
 
     The preset written to --out has the sections timing, channel, model and coder over the preset that
-    the fit started from. Plant, disturbance, line and recording are not in it. Ctrl-C ends the search
-    and keeps the best that it has found; a second one ends at once.
+    the fit started from. It does not contain plant, disturbance, line and recording. Ctrl-C ends the
+    search and keeps the best result; a second Ctrl-C ends at once.
     """
     from tenbaud.flight.outcome import ExitCode
     from tenbaud.flight.stop import StopFlag

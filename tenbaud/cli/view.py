@@ -21,7 +21,7 @@ def view(
     connect: Annotated[
         list[str] | None,
         typer.Option(
-            help="Where an end was told to listen with --telemetry; repeatable. Not given: flights of "
+            help="Telemetry endpoint of an end (its --telemetry); repeatable. Not given: flights of "
             "this user on this machine are found.",
             show_default=False,
         ),
@@ -39,7 +39,7 @@ def view(
         bool, typer.Option(help="Allow other machines to reach the page, which is not encrypted.")
     ] = False,
     view_only: Annotated[
-        bool, typer.Option("--view-only", help="Print no address that steers, only one for looking.")
+        bool, typer.Option("--view-only", help="Print only the view-only address.")
     ] = False,
     schema: Annotated[
         bool, typer.Option("--schema", help="Print the JSON schema of the telemetry and end.")
@@ -47,8 +47,8 @@ def view(
 ) -> None:
     """Serve a live page of a flight, for the browser: picture, curves, bits, lockstep, controls.
 
-    Two addresses are printed: one that steers, where the flight allows it, and one for looking only.
-    Each holds a secret; without one of them nothing of the page is served.
+    Two addresses are printed: one that can control the flight, if the flight allows it, and one that
+    is view-only. Each contains a secret; without a secret nothing of the page is served.
 
     [dim]tenbaud demo --view[/dim]
 

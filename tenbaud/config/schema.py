@@ -78,11 +78,11 @@ class ChannelSection(Section):
     rate_baud: Annotated[float, Field(ge=0.001, le=100_000.0)] = 10.0
     """R: symbols per second that may go up the link"""
     delivery: Literal["start", "end"] = "start"
-    """a symbol is there when its slot begins (the paper), or when its slot is over (a real wire)"""
+    """a symbol arrives at the start of its slot (the paper), or at its end (a real wire)"""
     deadline_allowance_s: Annotated[float, Field(ge=0.0, le=3600.0)] = 0.02
-    """how long after its due time a symbol may come before its slot is erased"""
+    """how long after its due time a symbol may arrive before its slot is erased"""
     downlink_budget_s: Annotated[float, Field(ge=0.0, le=3600.0)] = 0.01
-    """time set aside for a command frame to reach the plant"""
+    """time reserved for a command frame to reach the plant"""
     repeats: Annotated[int, Field(ge=0, le=32)] = 2
     """W: earlier samples that each command frame repeats"""
 
@@ -116,9 +116,9 @@ class PlantSection(Section):
     kind: Annotated[str, AfterValidator(PartName(PLANTS))] = "pitch"
     """the pitch axis, or a plant from outside"""
     options: Options = Field(default_factory=dict)
-    """what a class from outside is built with"""
+    """options of an external class"""
     relative_to: Literal["model", "pitch"] = "model"
-    """the codec's model, so that the plant moves with it; or the constants in `pitch`"""
+    """the codec's model, so that the plant changes with it; or the constants in `pitch`"""
     pitch: PitchModelSection = PitchModelSection()
     """what the plant is relative to where the codec's model is none, or `relative_to` says so"""
     mismatch: Mismatch | tuple[Mismatch, Mismatch, Mismatch] = 0.0
@@ -133,29 +133,29 @@ class TransmitterSection(Section):
 
     rig: Literal["simulated", "replay", "serial", "quarc", "hil"] = "simulated"
     dry_run: bool = False
-    """read the rig and never drive it"""
+    """read the rig and never move it"""
     sight_bandwidth_rad_s: Annotated[float, Field(ge=0.001, le=10_000.0)] = 30.0
-    """how fast the observer of the rate follows the encoder, for coders that use rates"""
+    """bandwidth of the rate observer, for coders that use rates"""
     encoder_counts_per_turn: Annotated[int, Field(ge=2, le=10_000_000)] = 4096
     encoder_sign: Literal[-1, 1] = 1
     encoder_zero_counts: Counts = 0
     plant: PlantSection = PlantSection()
     watchdog_s: Positive | Literal["auto"] = "auto"
-    """age of the last command after which the voltage is taken down; "auto": the largest of 5 T_s,
+    """age of the last command after which the watchdog trips; "auto": the largest of 5 T_s,
     0.1 s, command lead + 2 T_s and round trip + 2 T_s"""
     ramp_s: Positive = 1.0
     """time from the held voltage to the safe one"""
     safe_volts: tuple[Volts, Volts] = (0.0, 0.0)
     soft_limit_rad: Positive | None = None
-    """largest measured angle before the motors are taken down; none: no limit"""
+    """largest measured angle before the guard ramps down; none: no limit"""
     bridge: BridgeSection = BridgeSection()
     serial: SerialSection = SerialSection()
     quarc: QuarcSection = QuarcSection()
     hil: HilSection = HilSection()
     on_desync: Literal["rejoin", "stop"] = "rejoin"
-    """after digests that differ: go on from a common state, or end the flight (exit code 5)"""
+    """after unequal digests: continue from a common state, or end the flight (exit code 5)"""
     sabotage: SabotageText = ""
-    """such as "sample=500,field=range": spoil this end's codec in one bit, to see it found out"""
+    """such as "sample=500,field=range": corrupt one bit of this end's codec on purpose"""
 
 
 class PidSection(Section):
@@ -172,13 +172,13 @@ class PidSection(Section):
 
 
 class ReferenceSection(Section):
-    """What the controller steers to."""
+    """The set-point of the controller."""
 
     kind: Literal["square", "step", "sine", "constant", "csv"] = "square"
     amplitude_rad: Annotated[float, Field(ge=-6.3, le=6.3)] = 1.5707963267948966
     period_s: Positive = 25.0
     start_s: NotNegative = 1.0
-    """when the step happens"""
+    """time of the step"""
     file: str = ""
     """for csv: columns time_s, angle_rad"""
 
@@ -189,11 +189,11 @@ class ReceiverSection(Section):
     controller: Annotated[str, AfterValidator(PartName(CONTROLLERS))] = "pid"
     """the PID law, the voltages of a recorded flight, or a law from outside"""
     controller_options: Options = Field(default_factory=dict)
-    """what a class from outside is built with"""
+    """options of an external class"""
     pid: PidSection = PidSection()
     reference: ReferenceSection = ReferenceSection()
     sabotage: SabotageText = ""
-    """such as "sample=500,field=range": spoil this end's codec in one bit, to see it found out"""
+    """such as "sample=500,field=range": corrupt one bit of this end's codec on purpose"""
 
 
 class FlightLogSection(Section):
@@ -212,13 +212,13 @@ class LinkSection(Section):
     kind: Annotated[str, AfterValidator(PartName(LINKS))] = "zenoh"
     session: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+(/[A-Za-z0-9_.-]+)*$")] = "helicopter"
     peer_timeout_s: Annotated[float, Field(ge=0.01, le=3600.0)] = 10.0
-    """silence after which an end gives the other one up"""
+    """silence after which the other end counts as lost"""
     port: str = ""
     """serial: this end's port, /dev/ttyUSB0, COM3, socket://HOST:PORT, rfc2217://HOST:PORT"""
     line_rate_baud: Annotated[int, Field(ge=50, le=10_000_000)] = 115_200
     """serial: bits per second on the line, ten of them for a byte"""
     downlink: str = ""
-    """serial: "zenoh", or a second port for the commands; empty: the same line carries them back"""
+    """serial: "zenoh", or a second port for the commands; empty: the same line"""
     downlink_rate_baud: Annotated[int, Field(ge=50, le=10_000_000)] = 115_200
     """serial: of that second port"""
     best_effort: bool = False
@@ -226,7 +226,7 @@ class LinkSection(Section):
     options: Options = Field(default_factory=dict)
     """for a kind from an installed package"""
     impairments: str = ""
-    """such as "loss=0.2,up:flip=0.01,delay=30ms±10ms": what goes wrong on the line, on purpose"""
+    """such as "loss=0.2,up:flip=0.01,delay=30ms±10ms": simulated impairments of the line"""
 
     @field_validator("impairments")
     @classmethod
@@ -246,7 +246,7 @@ class FlightConfig(CodePermission):
     """Everything about a flight."""
 
     preset: str = "paper-10baud"
-    """which preset the file builds on"""
+    """preset that the file is based on"""
     description: str = ""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
     duration_s: Annotated[float, Field(ge=1e-5, le=1e7)] = 100.0

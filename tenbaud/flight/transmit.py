@@ -81,7 +81,8 @@ def _fly(
         try:
             run.ticks = flight.run(run.agreement.flight_ticks) - first
             run.rejoin_bytes = _control_bytes(run) - greeting_bytes
-            ending = _Ending(run, _outcome(run, peer_present()))
+            present = peer_present()
+            ending = _Ending(run, _outcome(run, present), present)
             flight.finish(ending.farewell)
         finally:
             run.flight_s = time.perf_counter() - started
@@ -120,15 +121,17 @@ class _Ending:
     Of these, only that the copies differ counts: a flight that was flown to its end is over.
     """
 
-    def __init__(self, run: TransmitterRun, outcome: Outcome) -> None:
+    def __init__(self, run: TransmitterRun, outcome: Outcome, peer_present: bool) -> None:
         self.outcome = outcome
         self._run = run
+        self._peer_present = peer_present
 
     def farewell(self) -> End:
         """Settle the outcome, now that the last echoes are in; return what the receiver is told."""
         if self.outcome.code is ExitCode.OK:
             self.outcome = _desync_outcome(self._run) or self.outcome
-        if self.outcome.code is ExitCode.OK or self._went_to_its_end:
+        # Where the other end is gone, that is the cause of everything that the counts show.
+        if self.outcome.code is ExitCode.OK or (self._peer_present and self._went_to_its_end):
             self.outcome = _not_flown(self._run) or self.outcome
         return farewell_of(self.outcome)
 

@@ -190,18 +190,18 @@ def report(tuned: Tuned) -> Iterator[str]:
     """Yield lines with the errors of both parts, and what they leave out."""
     for what, part in (
         (f"fit on {tuned.train_what}", "train"),
-        (f"judged on {tuned.test_what}", "test"),
+        (f"validated on {tuned.test_what}", "test"),
     ):
         before, after = (math.degrees(getattr(tuned, f"{part}_{when}")) for when in ("before", "after"))
         yield f"{what}: rms error {before:.4g} -> {after:.4g} degrees"
     for name, lost in tuned.without_figures.items():
         part, when = name.split("_")
-        flights = "flights for the fit" if part == "train" else "flights for the judgement"
-        yield (f"{lost} of the {flights} had no figures {when} and count as {PENALTY_RAD:g} rad each")
+        flights = "flights for the fit" if part == "train" else "flights for validation"
+        yield f"{lost} of the {flights} failed {when} the fit and were scored {PENALTY_RAD:g} rad each"
     if tuned.penalised:
         yield (
-            f"{tuned.penalised} of the {tuned.evaluations} sets of constants tried made no flight, or "
-            f"left some without figures, and were counted with {PENALTY_RAD:g} rad for each"
+            f"{tuned.penalised} of the {tuned.evaluations} parameter sets had failed flights, which "
+            f"were scored {PENALTY_RAD:g} rad each"
         )
 
 

@@ -142,9 +142,7 @@ def bits(text: str) -> list[int]:
     return [int(bit) for bit in re.findall(r"\d", text)]
 
 
-@pytest.mark.parametrize(
-    ("page", "title"), [(PAGE, "On a serial line"), (SERIAL_PAGE, "What is on the line")]
-)
+@pytest.mark.parametrize(("page", "title"), [(PAGE, "On a serial line"), (SERIAL_PAGE, "Line format")])
 def test_when_the_symbol_byte_is_split_as_the_page_says_then_slot_and_number_come_out(
     page: str, title: str
 ) -> None:

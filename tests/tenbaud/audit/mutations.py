@@ -70,7 +70,9 @@ class Original:
                     for field in fields:
                         for row in _some(count, rows_per_topic, noise):
                             mutation = Mutation(end, topic, row, what, field)
-                            if what == "edit" or self.row(mutation)[field] is not None:
+                            there = field == FILED or self.row(mutation).get(field) is not None
+                            # Most fields of most events are null, and are no claim when they are not.
+                            if there or (what == "edit" and topic != "event"):
                                 yield mutation
                 for what in ("delete", "double"):
                     for row in _some(count, rows_per_topic, noise):

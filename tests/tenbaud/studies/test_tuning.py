@@ -1,4 +1,4 @@
-"""Fitting: better on the flights that it saw, judged on those that it did not, the same every time."""
+"""Fitting: better on the flights that it saw, validated on others, the same every time."""
 
 from __future__ import annotations
 
@@ -160,7 +160,7 @@ def test_when_part_of_a_range_is_no_coder_then_it_is_penalised_and_counted() -> 
     assert 3 < tuned.penalised < 17
     assert tuned.values["coder.decay"] <= 1.0
     assert tuned.train_after < 0.1 < PENALTY_RAD
-    assert f"{tuned.penalised} of the 20 sets of constants" in preset_text(tuning_of(free), tuned)
+    assert f"{tuned.penalised} of the 20 parameter sets" in preset_text(tuning_of(free), tuned)
 
 
 def test_when_the_model_is_fitted_then_the_simulated_plant_stays() -> None:
@@ -303,7 +303,7 @@ def test_when_a_recording_is_split_then_fit_and_judgement_see_different_halves(
     )
     config = load_config(None, found)
     assert config.coder.model_dump()["gains"][1] == pytest.approx(summary["values"]["coder.gains.1"])
-    assert "judged on 10 ... 20 s of it" in found.read_text()
+    assert "validated on 10 ... 20 s of it" in found.read_text()
     assert f"flight_log.file='{log}'" in found.read_text()
     again = CliRunner().invoke(app, command)
     assert again.exit_code != 0

@@ -29,10 +29,12 @@ def _verdict(summary: Summary, unicode: bool) -> str:
         mark = "✗" if unicode else "x"
         return f"{mark} Flight failed (exit code {code}): {summary['outcome']}"
     mark = "✓" if unicode else "+"
-    text = f"{mark} Flight finished: {float(summary['duration_s']):g} s"
+    text = f"{mark} Flight finished: "
+    duration_s = summary.get("duration_s")  # a receiver knows samples, and not the flight's time
+    text += f"{summary['samples']} samples" if duration_s is None else f"{float(duration_s):g} s"
     checks, desyncs = summary.get("digest_checks"), summary.get("desyncs") or 0
     if checks is None:
-        return f"{text}, {summary['samples']} samples"
+        return text
     if desyncs:
         return f"{text}, {checks} checks of the two codecs, {desyncs} found a difference"
     return f"{text}, both codecs equal in {checks} of {checks} checks"

@@ -7,7 +7,7 @@ from importlib.util import find_spec
 import pytest
 from typer.testing import CliRunner
 
-from tenbaud.cli.app import app
+from tenbaud.cli.commands import app
 from tenbaud.config.load import ConfigError
 
 

@@ -168,11 +168,12 @@ class Sandbox:
         return self.ports.get(port, port)
 
     def _exchange_default_port(self) -> None:
-        from channel.links.endpoints import DEFAULT_ENDPOINT
+        from channel.links.endpoints import DEFAULT_PORT
 
         path = self.top / "channel" / "links" / "endpoints.py"
-        text = path.read_text()
-        assert DEFAULT_ENDPOINT in text
+        text, setting = path.read_text(), f"DEFAULT_PORT = {DEFAULT_PORT}"
+        assert text.count(setting) == 1
+        text = text.replace(setting, re.sub(r"\d+", self._free_port, setting))
         path.write_text(LOOPBACK_PORT.sub(self._free_port, text))
 
 

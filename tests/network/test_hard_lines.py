@@ -90,7 +90,8 @@ def test_a_peer_that_vanishes_without_a_word_is_noticed_within_the_lease(
     events = [(time_ns / 1e9, str(row)) for time_ns, row in recording.rows("event")]
     gone = [at for at, text in events if "the receiver is gone" in text and at >= cut_s]
     assert gone
-    assert gone[0] - cut_s < LEASE_MS / 1e3 + 1.0
+    # The status that gives `cut_s` is up to 0.2 s old, and a busy machine looks at the lease late.
+    assert gone[0] - cut_s < LEASE_MS / 1e3 + 1.5
     ticks = [row for _, row in recording.rows("tick")]
     # Hold, ramp, safe: watchdog and ramp are 0.5 s and 1 s, and a status is up to 0.2 s old.
     safe_from = cut_s + 0.5 + 1.0 + 0.5

@@ -17,7 +17,8 @@ KINDS = ("hello", "welcome", "refuse", "symbol", "commands", "desync", "bye", "u
 def check(messages: int, seed: int, flood: bool) -> None:
     counts = forgeries(messages, seed, flood)
     assert sum(counts[f"forged {kind}"] for kind in KINDS) >= messages
-    assert min(counts[f"forged {kind}"] for kind in KINDS) > messages // 20
+    # A tenth of each kind, and fewer farewells: those that would end the flight are not sent.
+    assert min(counts[f"forged {kind}"] for kind in KINDS) > messages // 50
     assert counts["out of bounds"] > messages // 100
     assert counts["rejoins"] > counts["flights"]
 

@@ -111,7 +111,7 @@ def test_insecure_says_what_is_given_up(tmp_path: Path) -> None:
     ended = run("receive", *arguments, cwd=tmp_path)
     assert ended.code == 4
     assert "command the motors" in ended.err
-    assert "nothing is encrypted" in ended.err
+    assert "no encryption" in ended.err
 
 
 def test_the_keys_commands_lead_from_one_to_the_next(tenbaud: Callable[..., Said]) -> None:

@@ -72,13 +72,13 @@ def test_when_a_study_was_interrupted_then_only_what_is_missing_is_flown(
     # One chunk is half written, as after a power cut; one write was never finished.
     damaged = folder / "chunks" / "000001.parquet"
     damaged.write_bytes(damaged.read_bytes()[:200])
-    (folder / "chunks" / "000004.part").write_bytes(b"half")
+    (folder / "chunks" / ".000004.parquet.0123abcd.part").write_bytes(b"half")
     monkeypatch.setattr(
         running, "fly_chunk", lambda task: flights.append(task.chunk) or fly_chunk(task)
     )
     assert flown(study_of(), folder).equals(expected)
     assert flights[3:] == [1, 3, 4, 5]
-    assert not list((folder / "chunks").glob("*.part"))
+    assert not list((folder / "chunks").glob(".*.part"))
 
 
 def test_when_a_folder_holds_another_study_then_it_is_left_alone(tmp_path: Path) -> None:

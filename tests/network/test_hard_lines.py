@@ -28,6 +28,8 @@ from tests.network.flights import (
 from tests.network.namespaces import Lab, Machine
 from tests.tenbaud.ends import End, wait_for
 
+pytestmark = pytest.mark.real_time
+
 TENBAUD = (sys.executable, "-m", "tenbaud")
 
 

@@ -18,6 +18,8 @@ from tenbaud.flight.summary import transmitter_part
 from tenbaud.recording.reader import MessageStream
 from tests.tenbaud.emulated_flight import PATIENT, RigProcess, demo, fly_emulated
 
+pytestmark = pytest.mark.real_time
+
 SECONDS = 5.0
 SOAK_SECONDS = 60.0
 OFF = [0.0, 0.0]

@@ -28,6 +28,8 @@ from transmitter.node import TransmitterNode
 from transmitter.rigs.simulated import SimulatedRig
 from transmitter.session.session import TransmitterSession
 
+pytestmark = [pytest.mark.real_time, pytest.mark.both_cores]
+
 TICK_S = 0.001
 TICKS = 2500
 TOO_LONG_S = 0.003

@@ -40,6 +40,8 @@ def _shared_fixture(item: pytest.Item) -> bool:
 
 
 def _rank(item: pytest.Item) -> int:
+    if item.get_closest_marker("both_cores") is not None:
+        return len(LONGEST_FIRST) + 1  # at the end, when no module-wide fixture is at work any more
     ranks = [rank for rank, start in enumerate(LONGEST_FIRST) if item.nodeid.startswith(start)]
     return ranks[0] if ranks else len(LONGEST_FIRST)
 

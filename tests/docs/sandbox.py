@@ -30,8 +30,8 @@ COMMANDS |= {name: f"-m {name}" for name in ("ruff", "mypy", "mkdocs")}
 LOOPBACK_PORT = re.compile(r"(?<=127\.0\.0\.1:)(\d+)\b|(?<=localhost:)(\d+)\b")
 VIEW_PORT = 8710
 BLOCK_TIMEOUT_S = 150.0
-STARTED_WITHIN_S = 20.0
-ENDED_WITHIN_S = 15.0
+STARTED_WITHIN_S = 60.0
+ENDED_WITHIN_S = 60.0
 SETTLED_WITHIN_S = 4.0
 LEFT_ALONE_S = 1.5
 """How long a block in the background may take to end by itself before Ctrl-C is pressed."""

@@ -90,11 +90,11 @@ def test_a_peer_that_vanishes_without_a_word_is_noticed_within_the_lease(
         (rig_code, _), (desk_code, _) = flight.rig.ended(), flight.desk.ended()
     assert rig_code == desk_code == ExitCode.LINK_LOST, flight.rig.said + flight.desk.said
     recording = Recording(tmp_path / "rig" / "transmitter.mcap")
-    events = [(time_ns / 1e9, str(row)) for time_ns, row in recording.rows("event")]
-    gone = [at for at, text in events if "the receiver is gone" in text and at >= cut_s]
+    events = [(time_ns / 1e9, row) for time_ns, row in recording.rows("event")]
+    gone = [at for at, row in events if (row["kind"], row["cause"]) == ("peer", "gone") and at >= cut_s]
     assert gone
     # The status that gives `cut_s` is up to 0.2 s old, and a busy machine looks at the lease late.
-    assert gone[0] - cut_s < 2 * LEASE_MS / 1e3
+    assert gone[0] - cut_s < LEASE_MS / 1e3 + 1.5
     ticks = [row for _, row in recording.rows("tick")]
     # Hold, ramp, safe: watchdog and ramp are 0.5 s and 1 s, and a status is up to 0.2 s old.
     safe_from = cut_s + 0.5 + 1.0 + 0.5

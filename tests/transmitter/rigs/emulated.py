@@ -16,7 +16,6 @@ from transmitter.rigs.device import DeviceRig
 from transmitter.rigs.emulator.loop import RigEmulator
 
 PATIENCE_S = 0.5
-WATCHDOG_S = 1.5
 
 
 def rig_config(**transmitter: Any) -> FlightConfig:
@@ -31,7 +30,7 @@ def emulated(
 
     Its watchdog is patient: it shares this machine with whatever else runs on it.
     """
-    options.setdefault("watchdog_s", WATCHDOG_S)
+    options.setdefault("watchdog_s", PATIENCE_S)
     emulator = build_emulator(config or load_config(), form, port, **options)
     stop = threading.Event()
     emulator.line.plug()

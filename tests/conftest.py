@@ -15,6 +15,8 @@ import pytest
 # which takes longer than most flights.
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+# Beside other tests the threads of the linear algebra mostly wait for each other, and wait by spinning.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 LONGEST_FIRST = ("tests/docs/",)
 """What takes longest: started last, it would keep one worker busy and the others idle."""

@@ -77,7 +77,7 @@ class ByHand(Enum):
     GO_ON = "go on after a pause"
     PACE = "so many times real time"
     IMPAIR = "what goes wrong on the line"
-    SPOIL = "one bit of a codec"
+    CORRUPT = "one bit of a codec"
     IGNORED = "something that cannot be done"
 
 

@@ -47,7 +47,7 @@ class Hub(Protocol):
 class Host(Protocol):
     """Opens and closes services. Its methods return at once."""
 
-    def knock(self, name: str, data: bytes) -> list[bytes]:
+    def on_unserved(self, name: str, data: bytes) -> list[bytes]:
         """Take a message of a session that has no service; return what to answer."""
 
     def ready(self) -> Iterable[tuple[str, Served]]:
@@ -149,7 +149,7 @@ class ManyService:
         now_ns = time.monotonic_ns()
         served = self._served.get(name)
         if served is None:
-            for message in self._host.knock(name, data):
+            for message in self._host.on_unserved(name, data):
                 self._hub.send(name, message)
         elif served.may_send(now_ns):
             self._guarded(served, self._give, now_ns, data)
@@ -220,4 +220,4 @@ class ManyService:
 
 
 def _rest(served: Served) -> None:
-    served.endpoint.session.rest()
+    served.endpoint.session.flush_records()

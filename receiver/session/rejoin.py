@@ -81,7 +81,7 @@ class Greeter:
         self._ahead_max = AHEAD_SAMPLES_MAX + _lead_samples(terms)
         self.welcome: Welcome | None = None
         """last answer given"""
-        self._stranger: int | None = None
+        self._unknown_incarnation: int | None = None
         self._symbols_since = 0
         self._known: deque[int] = deque(maxlen=KNOWN_MAX)
         """incarnations that were admitted"""
@@ -104,7 +104,7 @@ class Greeter:
         if last is None:
             return self._admit(hello, identity)
         if hello.incarnation != last.incarnation:
-            return self._judge_stranger(hello, identity, advanced, silent_slots)
+            return self._judge_unknown_peer(hello, identity, advanced, silent_slots)
         if not in_reach or hello.request < last.request or (hello.request == last.request and advanced):
             heard = advanced and silent_slots < SILENT_SLOTS
             return Verdict.BEGIN if self._persists(hello) and not heard else Verdict.IGNORE
@@ -141,12 +141,12 @@ class Greeter:
         """Note that the present transmitter is heard."""
         self._symbols_since += 1
 
-    def _judge_stranger(
+    def _judge_unknown_peer(
         self, hello: Hello, identity: Identity, advanced: bool, silent_slots: int
     ) -> Verdict:
-        if hello.incarnation != self._stranger or silent_slots >= SILENT_SLOTS:
+        if hello.incarnation != self._unknown_incarnation or silent_slots >= SILENT_SLOTS:
             # What was on the line when the present one stopped proves nothing for long.
-            self._stranger, self._symbols_since = hello.incarnation, 0
+            self._unknown_incarnation, self._symbols_since = hello.incarnation, 0
         if self._symbols_since >= ALIVE_SYMBOLS:
             return Verdict.BUSY
         if advanced and silent_slots < SILENT_SLOTS:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from channel.protocol.frames import Claim, Frame, Symbol, Unknown
 
 
-class Stranger:
+class Takeover:
     """Answers the symbols of a foreign session."""
 
     def __init__(self, session_number: int, take_over: bool) -> None:

@@ -63,7 +63,7 @@ costs more than the rounding itself. At 20 bit/s the yardstick alone is {behind_
 
 ## Coders over the floor: closed loop
 
-The same error while the paper's controller flies its square wave on what it is told, angle exact.
+The same error while the paper's controller flies its square wave on the estimate, with exact angles.
 
 {closed}
 
@@ -135,9 +135,9 @@ holds that the errors are, to the last bit, those of both sessions in memory.
 
 SUMMARY: Final = """\
 At 10 bit/s the paper's coder as printed stands at {paper:.1f} times the floor, the same kind of coder
-with tuned constants at {tuned:.2f}, the history coder at {told:.2f} when it is told how strong the
+with tuned constants at {tuned:.2f}, the history coder at {knows_q:.2f} when it knows how strong the
 disturbance is and at {found:.2f} when it has to find out; at 20 bit/s at {paper_20:.1f},
-{tuned_20:.2f}, {told_20:.2f} and {found_20:.2f}."""
+{tuned_20:.2f}, {knows_q_20:.2f} and {found_20:.2f}."""
 
 RECORDED: Final = """\
 Rms / largest error as fractions of the largest pitch. For the UIUC recording both coders were tuned on

@@ -22,7 +22,14 @@ CODERS = ("paper", "three", "tuned")
 PUSH = "step=2@40..41"
 """A shove of 2 rad/s^2 for one second: as much as 2.9 V on each motor."""
 
-ZOOMINGS = ("paper-10baud", "three", "fixed-10baud", "timed-10baud", "static-10baud", "tuned-10baud")
+ZOOMINGS = (
+    "paper-10baud",
+    "three",
+    "fixed-10baud",
+    "open-loop-zoom-10baud",
+    "static-10baud",
+    "tuned-10baud",
+)
 
 
 def plant(

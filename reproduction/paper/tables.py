@@ -183,7 +183,7 @@ def zooming_table(results: Results) -> str:
         "three": "adaptive, window of three",
         "tuned-10baud": "adaptive, tuned",
         "fixed-10baud": "fixed range, 0.1 rad",
-        "timed-10baud": "time-based zooming",
+        "open-loop-zoom-10baud": "time-based zooming",
         "static-10baud": "static: the sign of the angle (16)",
     }
     rows = []
@@ -202,11 +202,11 @@ def recorded_table(results: Results) -> str:
     rows = []
     for rate, period_s in real.RATES:
         cells = []
-        for kind in ("words", "paper", "tuned"):
+        for kind in ("pcm", "paper", "tuned"):
             one = results.flown[f"uiuc-{kind}-{rate}"]
             cells.append(f"{percent(one.rms)} / {percent(one.largest)}")
         rows.append((f"{1.0 / period_s:.3g} bit/s", *cells))
-    usual = results.flown["uiuc-words-500"]
+    usual = results.flown["uiuc-pcm-500"]
     rows.append(("500 bit/s", f"{percent(usual.rms)} / {percent(usual.largest)}", "", ""))
     head = (
         "second half, rms / largest error",

@@ -41,7 +41,7 @@ def serve(
     from tenbaud.build.ends import check_parts
     from tenbaud.cli.addresses import endpoints_of
     from tenbaud.files.whole import write_whole
-    from tenbaud.flight.ends import SWITCH_INTERVAL_S, knocks
+    from tenbaud.flight.ends import SWITCH_INTERVAL_S, refused_connections
     from tenbaud.flight.many import ManyHost
     from tenbaud.flight.many_status import ManyStatus
     from tenbaud.flight.outcome import ExitCode
@@ -59,7 +59,7 @@ def serve(
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     with (
         StopFlag() as stop,
-        knocks(where) as refused,
+        refused_connections(where) as refused,
         ZenohHub(
             many.sessions,
             **where.node(),

@@ -15,6 +15,7 @@ from channel.line.impairments import parse_impairments
 from channel.links.registry import LINKS
 from channel.protocol.sabotage import parse_sabotage
 from tenbaud.config.coders import ZoomCoderSection
+from tenbaud.config.deprecated import DIGEST_KINDS
 from tenbaud.config.kinds import (
     CODERS,
     CONTROLLERS,
@@ -134,7 +135,7 @@ class TransmitterSection(Section):
     rig: Literal["simulated", "replay", "serial", "quarc", "hil"] = "simulated"
     dry_run: bool = False
     """read the rig and never move it"""
-    sight_bandwidth_rad_s: Annotated[float, Field(ge=0.001, le=10_000.0)] = 30.0
+    rate_observer_bandwidth_rad_s: Annotated[float, Field(ge=0.001, le=10_000.0)] = 30.0
     """bandwidth of the rate observer, for coders that use rates"""
     encoder_counts_per_turn: Annotated[int, Field(ge=2, le=10_000_000)] = 4096
     encoder_sign: Literal[-1, 1] = 1
@@ -265,4 +266,5 @@ class FlightConfig(CodePermission):
         """Return the shared part as canonical JSON, with the command lead that was chosen."""
         shared = self.model_dump(mode="json", include=set(SHARED_SECTIONS))
         shared["timing"]["lead_ticks"] = lead_ticks
+        shared["coder"]["kind"] = DIGEST_KINDS.get(self.coder.kind, self.coder.kind)
         return json.dumps(shared, sort_keys=True, separators=(",", ":"))

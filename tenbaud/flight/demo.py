@@ -26,7 +26,7 @@ from tenbaud.flight.report import write_up
 from tenbaud.flight.status import Status
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, joined
-from tenbaud.flight.viewing import Viewing, ViewWish, page_beside
+from tenbaud.flight.viewing import Viewing, ViewOptions, page_beside
 from tenbaud.recording.folder import RunFolder
 
 OnStatus = Callable[[Status], None]
@@ -49,7 +49,7 @@ def fly_demo(
     on_status: OnStatus,
     *,
     draw: bool = True,
-    view: ViewWish | None = None,
+    view: ViewOptions | None = None,
     pace: float | None = None,
 ) -> DemoResult:
     """Fly once into an existing, empty run folder; write summary and, if wished, figure there.

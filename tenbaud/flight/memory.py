@@ -160,7 +160,7 @@ class MemoryFlight:
         ended_by = "" if flown == ticks else self._ended_by()
         end = End(Ending.OVER) if flown == ticks else self.transmitter.end or End(Ending.SAFETY_STOP)
         self.loop.finish(lambda: end)
-        self.receiver.rest()
+        self.receiver.flush_records()
         rows = (self.transmitter_rows, self.receiver_rows)
         return result_of(
             self.codec.model, self.terms, self.transmitter, self.receiver, rows, flown, ended_by

@@ -17,7 +17,7 @@ CHARACTERS_MAX = 2000
 """Of a line, whose text may come from outside."""
 
 
-class SparingTeller:
+class RateLimitedLog:
     """Hands lines on to `tell`, from any thread; `clock_s` gives a time that does not run back."""
 
     def __init__(
@@ -28,7 +28,7 @@ class SparingTeller:
         self._lock = threading.Lock()
         self._allowance = float(LINES_AT_ONCE)
         self._seen_s = clock_s()
-        self._untold = 0
+        self._omitted = 0
 
     def __call__(self, text: str) -> None:
         """Tell a line, or count it."""
@@ -38,18 +38,18 @@ class SparingTeller:
             self._seen_s = now_s
             self._allowance = min(float(LINES_AT_ONCE), self._allowance + earned)
             if self._allowance < 1.0:
-                self._untold += 1
+                self._omitted += 1
                 return
             self._allowance -= 1.0
-            untold, self._untold = self._untold, 0
-        self._tell(_plain(text) + _left_out(untold))
+            left_out, self._omitted = self._omitted, 0
+        self._tell(_plain(text) + _left_out(left_out))
 
     def finish(self) -> None:
         """Tell how many lines were left out since the last one, if any were."""
         with self._lock:
-            untold, self._untold = self._untold, 0
-        if untold:
-            self._tell(_left_out(untold).strip())
+            left_out, self._omitted = self._omitted, 0
+        if left_out:
+            self._tell(_left_out(left_out).strip())
 
 
 def _left_out(count: int) -> str:

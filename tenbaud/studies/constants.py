@@ -20,7 +20,7 @@ CODER_RANGES = {
         "coder.range_rad": (0.1, 10.0, "log"),
         **GAINS,
     },
-    "timed": {
+    "open-loop-zoom": {
         "coder.minimum_range_rad": (0.1, 10.0, "log"),
         **GAINS,
     },

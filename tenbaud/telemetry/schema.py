@@ -183,16 +183,16 @@ class Impair(_Message):
         return value
 
 
-class Spoil(_Message):
-    """Spoil the codec of one end in one bit, at its next sample."""
+class Corrupt(_Message):
+    """Corrupt the codec of one end in one bit, at its next sample."""
 
-    kind: Literal["spoil"]
+    kind: Literal["corrupt"]
     end: Literal["transmitter", "receiver"]
     field: Annotated[str, Field(pattern=r"^(range|angle|rate)$")] = "range"
 
 
 Telemetry = TransmitterTelemetry | ReceiverTelemetry
-Command = SetPoint | Pause | Step | Pace | Impair | Spoil
+Command = SetPoint | Pause | Step | Pace | Impair | Corrupt
 
 TELEMETRY: TypeAdapter[Telemetry] = TypeAdapter(Annotated[Telemetry, Field(discriminator="role")])
 COMMAND: TypeAdapter[Command] = TypeAdapter(Annotated[Command, Field(discriminator="kind")])

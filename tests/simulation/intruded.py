@@ -161,7 +161,7 @@ class IntrudedWorld(World):
         if second is None:
             return
         messages = second.step(self.now_ns, data).frames
-        second.session.rest()
+        second.session.flush_records()
         if second.session.phase is Phase.ENDED:
             self._second = None
         for message in messages:

@@ -51,7 +51,7 @@ def test_when_the_line_is_impaired_twice_alike_then_the_flights_are_equal(tmp_pa
 
 
 @pytest.mark.parametrize("link", ["memory", "zenoh"])
-def test_when_one_end_is_spoilt_then_both_write_it_down_and_the_flight_goes_on(
+def test_when_one_end_is_corrupted_then_both_write_it_down_and_the_flight_goes_on(
     tmp_path: Path, link: str
 ) -> None:
     ended = demo(tmp_path, "--sabotage", "sample=150,field=range", "--set", f"link.kind={link}")

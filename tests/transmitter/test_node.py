@@ -75,7 +75,7 @@ def test_when_commands_come_then_they_are_on_the_motors_at_their_ticks() -> None
     assert [fly_sample(node, sample) for sample in range(5)] == [1] * 5
     assert rig.written == [(tick, (2.0, -2.0)) for tick in range(50)]
     assert node.commands_late == 0
-    node.rest()
+    node.flush_records()
     assert node.scores.coded.count == node.scores.live.count == 50
 
 

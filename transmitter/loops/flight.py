@@ -49,7 +49,7 @@ class Flight(ABC):
         `farewell` is asked for what the receiver is told once the echoes are in.
         """
         self._linger()
-        self.endpoint.node.rest()
+        self.endpoint.node.flush_records()
         self.leave(farewell())
         self._land()
 

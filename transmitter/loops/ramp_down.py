@@ -11,7 +11,7 @@ from transmitter.guard import GuardCause, GuardReason
 from transmitter.node import TransmitterNode
 
 
-class Landing:
+class RampDown:
     """Takes a node's motors to their safe voltage; for a rig that does not ask for it, nothing.
 
     `tick` is the first one that was not flown.

@@ -18,7 +18,7 @@ from channel.links.base import Link
 from channel.protocol.events import Event, EventKind, Presence
 from transmitter.endpoint import TransmitterEndpoint
 from transmitter.loops.flight import Flight
-from transmitter.loops.ramp_down import Landing
+from transmitter.loops.ramp_down import RampDown
 from transmitter.session.rejoin import ASK_AGAIN_NS
 from transmitter.session.session import Phase
 
@@ -51,7 +51,7 @@ class RealFlight(Flight):
         """what was last told about the receiver: it is there"""
         terms = endpoint.node.session.terms
         self._tick_ns = terms.tick_ns
-        self._landing: Landing | None = None
+        self._ramp_down: RampDown | None = None
         self._ask_again_ns = min(max(terms.sample_ns, ASK_AGAIN_NS), HELLO_PERIOD_NS)
 
     def _now_ns(self) -> int:
@@ -80,29 +80,29 @@ class RealFlight(Flight):
 
     def _rest(self) -> None:
         endpoint = self.endpoint
-        endpoint.node.rest()
+        endpoint.node.flush_records()
         self._watch_peer()
         self._watch_rate(endpoint.tick - 1)
 
     def _linger(self) -> None:
         session = self.endpoint.node.session
-        landing = self._landing = Landing(self.endpoint.node, self.endpoint.tick)
+        ramp_down = self._ramp_down = RampDown(self.endpoint.node, self.endpoint.tick)
         until_ns = self._now_ns() + session.terms.linger_ns(self.endpoint.uplink.line.longest_delay_ns)
         while (now_ns := self._now_ns()) < until_ns:
             if session.phase is not Phase.FLYING or (
                 session.copies.lag_samples == 0 and not self._outbox
             ):
                 break
-            landing.step(now_ns)
-            self._take_in((min(until_ns, landing.next_ns) - self._now_ns()) / 1e9)
+            ramp_down.step(now_ns)
+            self._take_in((min(until_ns, ramp_down.next_ns) - self._now_ns()) / 1e9)
         # What the last echo was answered with: the report of a difference.
         self._send_due()
 
     def _land(self) -> None:
-        landing = self._landing
-        while landing is not None and not landing.over:
-            landing.step(self._now_ns())
-            self._take_in_until(min(landing.next_ns, self._now_ns() + self._tick_ns))
+        ramp_down = self._ramp_down
+        while ramp_down is not None and not ramp_down.over:
+            ramp_down.step(self._now_ns())
+            self._take_in_until(min(ramp_down.next_ns, self._now_ns() + self._tick_ns))
 
     def _wait_until(self, due_ns: int) -> None:
         self._take_in_until(due_ns)

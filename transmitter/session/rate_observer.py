@@ -22,7 +22,7 @@ RATE_MAX = 1e3
 """rad/s; a body that seems faster has a broken encoder, and the observer starts anew"""
 
 
-class Sight:
+class RateObserver:
     """Angle and rate at each tick, from angles and commands. Serves one measured axis.
 
     `bandwidth_rad_s`: how fast it follows; slow hides the encoder's steps, fast catches shoves.

@@ -20,7 +20,7 @@ SUCCESSOR_SAMPLES = 3
 a round trip: short enough that the present one can go on before the watchdog has had enough."""
 
 
-class Claims:
+class Takeover:
     """Judges receivers that are not the present one; times are ticks."""
 
     def __init__(self, terms: Terms) -> None:

@@ -138,7 +138,7 @@ class EmulatedLine:
         with self._lock:
             return self._ways[way].damaged
 
-    def spoil(self, way: Way, share: float) -> None:
+    def corrupt(self, way: Way, share: float) -> None:
         """Change this share of the bytes from now on."""
         self._ways[way].damage = share
 

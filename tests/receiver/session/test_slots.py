@@ -237,7 +237,7 @@ def test_when_the_controller_has_no_reference_then_the_flight_goes_on_and_says_s
     session._commander._controller.reference_rad = fail  # type: ignore[method-assign]
     for slot in range(2):
         session.on_frame(symbol(slot), 0)
-        session.rest()
+        session.flush_records()
     assert session.counts["bad_references"] == 20
     assert kinds(session).count(EventKind.CONTROLLER) == 1
 

@@ -65,7 +65,7 @@ def test_a_rough_flight_with_a_rejoin_passes_too(rough: Run) -> None:
     [
         ("usual-1000baud", {"duration_s": 3.0}),
         ("static-10baud", {}),
-        ("timed-10baud", {"channel.delivery": "end"}),
+        ("open-loop-zoom-10baud", {"channel.delivery": "end"}),
     ],
 )
 def test_words_of_many_symbols_and_other_coders_pass(

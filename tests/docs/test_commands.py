@@ -14,9 +14,6 @@ from docs.tools.commands_page import commands_page
 from tests.docs.blocks import COMMAND, Block, NoteError, blocks_of, needed, pages, parse, stray_commands
 from tests.docs.sandbox import BlockFailed, Sandbox
 
-# The pages' commands meet at the default port, so one worker runs them all.
-pytestmark = pytest.mark.xdist_group("default port")
-
 ELSEWHERE = ("README.md",)
 """Walked by `test_newcomer.py`, which looks at what comes of it as well."""
 ON_MACHINES = ("docs/two-machines.md", "docs/router.md")
@@ -24,7 +21,7 @@ ON_MACHINES = ("docs/two-machines.md", "docs/router.md")
 RUN = {page: [block for block in blocks_of(page) if block.runs] for page in pages()}
 NORMAL = [
     page
-    for page, blocks in RUN.items()
+    for page, blocks in sorted(RUN.items(), key=lambda item: -len(item[1]))  # the longest first
     if page not in (*ELSEWHERE, *ON_MACHINES) and any(not (one.skip or one.soak) for one in blocks)
 ]
 LONG = [

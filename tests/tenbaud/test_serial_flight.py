@@ -26,6 +26,8 @@ from tenbaud.recording.diff import compare_runs
 from tenbaud.recording.folder import RunFolder
 from tests.tenbaud.processes import run
 
+pytestmark = pytest.mark.real_time
+
 
 @dataclass
 class Flown:

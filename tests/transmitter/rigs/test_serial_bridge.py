@@ -87,7 +87,7 @@ def test_without_output_not_one_byte_is_sent() -> None:
 
 def test_bytes_that_are_lost_cost_samples_and_nothing_else() -> None:
     with (
-        emulated("cobs", faults=("drop=0.005",)) as emulator,
+        emulated("cobs", faults=("drop=0.005",), watchdog_s=3.0) as emulator,
         serial_rig(emulator.line.address) as rig,
     ):
         assert fly(rig, 2.0) is None

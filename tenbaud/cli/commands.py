@@ -7,10 +7,8 @@ from typing import Annotated
 import typer
 
 from tenbaud.cli import (
-    bench,
     demo,
     doctor,
-    figures,
     files,
     identify,
     keys,
@@ -23,6 +21,7 @@ from tenbaud.cli import (
     tune,
     view,
 )
+from tenbaud.cli.checkout import add_commands
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -62,9 +61,9 @@ for panel, commands in (
         (runs.inspect, runs.diff, replays.replay, replays.audit, files.convert, files.recover),
     ),
     ("Rigs and machines", (doctor.doctor, rig.rig, rig.rig_check, router.router)),
-    ("Models, coders, studies", (identify.identify, figures.figures, sweep.sweep, tune.tune)),
+    ("Models, coders, studies", (identify.identify, sweep.sweep, tune.tune)),
 ):
     for command in commands:
         app.command(rich_help_panel=panel)(command)
 app.add_typer(keys.app, name="keys", rich_help_panel="Rigs and machines")
-app.add_typer(bench.bench, name="bench", rich_help_panel="Models, coders, studies")
+add_commands(app)

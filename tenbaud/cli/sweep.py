@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from tenbaud.cli import options
+from tenbaud.studies.progress import progress_bar
 
 
 def sweep(
@@ -51,11 +52,18 @@ def sweep(
     if scheduler is not None and workers is not None:
         raise StudyError("--workers is of this machine and --scheduler of a cluster: give one of them")
     what = read_study(study, seeds, allow_code=allow_code)
-    folder = out or Path("studies") / what.file.name
+    name = what.file.name
+    folder = out or Path("studies") / name
     results = Results(what, folder)
     try:
-        with _Bar(what.file.name) as bar:
-            table = run_study(what, results, bar.update, workers or os.cpu_count() or 1, scheduler)
+        with progress_bar(name, counted=True) as update:
+            table = run_study(
+                what,
+                results,
+                lambda done, total: update(done, total, name),
+                workers or os.cpu_count() or 1,
+                scheduler,
+            )
     except KeyboardInterrupt:
         typer.echo(
             f"stopped; finished flights are kept in {folder}. The same command continues", err=True
@@ -65,10 +73,10 @@ def sweep(
     if plots:
         from tenbaud.studies.plots import draw_study
 
-        drawn = draw_study(table, what.names, what.file.description or what.file.name, folder)
+        drawn = draw_study(table, what.names, what.file.description or name, folder)
     why = Counter(one for one in table["outcome"].to_pylist() if one != "ok")
     summary = {
-        "study": what.file.name,
+        "study": name,
         "points": len(what.points),
         "seeds": len(what.seeds),
         "flights": what.flights,
@@ -94,32 +102,3 @@ def _tell(summary: dict[str, Any], why: Counter[str]) -> None:
         typer.echo(f"{why.total()} have no figures (column outcome). {count} of them: {most}")
     for path in summary["plots"]:
         typer.echo(f"  {path}")
-
-
-class _Bar:
-    """A progress bar on standard error."""
-
-    def __init__(self, name: str) -> None:
-        from rich.console import Console
-        from rich.progress import (
-            BarColumn,
-            MofNCompleteColumn,
-            Progress,
-            TextColumn,
-            TimeRemainingColumn,
-        )
-
-        columns = (TextColumn(name), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        self._progress = Progress(*columns, console=Console(stderr=True))
-        self._task = self._progress.add_task(name, total=None)
-
-    def __enter__(self) -> _Bar:
-        self._progress.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._progress.stop()
-
-    def update(self, done: int, total: int) -> None:
-        """Show how far it is."""
-        self._progress.update(self._task, completed=done, total=total)

@@ -6,12 +6,16 @@ import json
 import os
 from collections import Counter
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tenbaud.cli import options
 from tenbaud.studies.progress import progress_bar
+
+if TYPE_CHECKING:
+    from tenbaud.studies.study import Study
+    from tenbaud.studies.table import Results
 
 
 def sweep(
@@ -44,7 +48,6 @@ def sweep(
 
     After a stop or a kill the same command continues with the missing flights.
     """
-    from tenbaud.studies.run import run_study
     from tenbaud.studies.settings import StudyError
     from tenbaud.studies.study import read_study
     from tenbaud.studies.table import Results
@@ -56,14 +59,7 @@ def sweep(
     folder = out or Path("studies") / name
     results = Results(what, folder)
     try:
-        with progress_bar(name, counted=True) as update:
-            table = run_study(
-                what,
-                results,
-                lambda done, total: update(done, total, name),
-                workers or os.cpu_count() or 1,
-                scheduler,
-            )
+        table = _fly(what, results, workers or os.cpu_count() or 1, scheduler)
     except KeyboardInterrupt:
         typer.echo(
             f"stopped; finished flights are kept in {folder}. The same command continues", err=True
@@ -89,6 +85,16 @@ def sweep(
         typer.echo(json.dumps(summary, indent=2))
         return
     _tell(summary, why)
+
+
+def _fly(what: Study, results: Results, workers: int, scheduler: str | None) -> Any:
+    from tenbaud.studies.run import run_study
+
+    name = what.file.name
+    with progress_bar(name, counted=True) as update:
+        return run_study(
+            what, results, lambda done, total: update(done, total, name), workers, scheduler
+        )
 
 
 def _tell(summary: dict[str, Any], why: Counter[str]) -> None:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from channel.codec.codec import Vector
-from transmitter.rigs.base import Reading, Rig, RigBase
+from transmitter.rigs.base import Reading, Rig
 
 
-class DryRig(RigBase):
+class DryRig(Rig):
     """Reads another rig. A real one must have been built without its output as well."""
 
     def __init__(self, rig: Rig, motors: int = 2) -> None:

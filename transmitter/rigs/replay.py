@@ -5,10 +5,10 @@ from __future__ import annotations
 from channel.codec.codec import Vector
 from channel.flight_log import FlightLog
 from plant_sim.encoder import Encoder, angles_rad
-from transmitter.rigs.base import Reading, RigBase
+from transmitter.rigs.base import Reading, Rig
 
 
-class ReplayRig(RigBase):
+class ReplayRig(Rig):
     """Reads one row per tick; what is written to it changes nothing."""
 
     name = "replay"

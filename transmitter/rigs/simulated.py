@@ -5,10 +5,10 @@ from __future__ import annotations
 from channel.codec.codec import Vector
 from plant_sim.encoder import Encoder, angles_rad
 from plant_sim.plant import Plant
-from transmitter.rigs.base import Reading, RigBase
+from transmitter.rigs.base import Reading, Rig
 
 
-class SimulatedRig(RigBase):
+class SimulatedRig(Rig):
     """A plant that goes on by itself: at tick `n` it has had `n` steps, whoever was held up."""
 
     name = "simulated"

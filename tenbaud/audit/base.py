@@ -16,9 +16,6 @@ from tenbaud.replay.rows import EndRows, Topic
 FILED = "(time)"
 """The flight time that a row is filed under, as if it were a field of each topic."""
 
-ORDER = "(order)"
-"""The place of a row among the others of its topic, as if it were a field."""
-
 
 class Place(NamedTuple):
     """Where in the recordings something was found."""

@@ -8,12 +8,9 @@ import typer
 
 from tenbaud.cli import (
     demo,
-    doctor,
-    files,
     identify,
     keys,
     nodes,
-    replays,
     rig,
     router,
     runs,
@@ -58,9 +55,9 @@ for panel, commands in (
     ("Fly", (demo.demo, nodes.transmit, nodes.receive, view.view, runs.presets)),
     (
         "What was flown",
-        (runs.inspect, runs.diff, replays.replay, replays.audit, files.convert, files.recover),
+        (runs.inspect, runs.diff, runs.replay, runs.audit, runs.convert, runs.recover),
     ),
-    ("Rigs and machines", (doctor.doctor, rig.rig, rig.rig_check, router.router)),
+    ("Rigs and machines", (rig.doctor, rig.rig, rig.rig_check, router.router)),
     ("Models, coders, studies", (identify.identify, sweep.sweep, tune.tune)),
 ):
     for command in commands:

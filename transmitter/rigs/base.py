@@ -7,6 +7,11 @@ from dataclasses import dataclass
 from typing import NamedTuple, Self
 
 from channel.codec.codec import Vector
+from channel.errors import TenbaudError
+
+
+class RigError(TenbaudError):
+    """A rig that cannot be opened or used; the text says what to do next."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,8 +22,7 @@ from dataclasses import dataclass
 
 from channel.codec.codec import Vector
 from transmitter.rigs.axes import Axis, Motors
-from transmitter.rigs.base import DeviceNote, Reading, Rig
-from transmitter.rigs.errors import RigError
+from transmitter.rigs.base import DeviceNote, Reading, Rig, RigError
 from transmitter.rigs.formats.samples import DeviceFlag, DeviceSample, RawSample, Timeline, Wraps
 
 REARM_TIMEOUT_S = 1.0

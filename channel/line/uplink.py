@@ -11,9 +11,8 @@ from math import log2
 
 from channel.codec.words import Alphabet
 from channel.line.line import CleanLine, Delivery, Line
-from channel.protocol.audit_trail import SENT_CHANNEL
 from channel.protocol.frames import Frame, Symbol
-from channel.protocol.recording import NullRecorder, Recorder
+from channel.protocol.recording import SENT_CHANNEL, NullRecorder, Recorder
 from channel.protocol.terms import Terms
 from channel.protocol.wire import DATAGRAM, Wire
 

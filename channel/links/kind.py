@@ -131,3 +131,15 @@ class LinkKind(ABC):
             "`tenbaud transmit` with the same settings"
         )
         yield Meeting(), Meeting()
+
+
+class MemoryKind(LinkKind):
+    """No line at all; the flight is as fast as it computes."""
+
+    in_process = True
+
+    def open(self, end: LinkEnd) -> Link:
+        """Refuse: one end by itself has nobody to talk to."""
+        raise LinkError(
+            "link.kind = memory joins two ends in one process: `tenbaud demo --link memory`"
+        )

@@ -7,10 +7,16 @@ from collections.abc import Callable
 from channel.codec.codec import CodecState, Vector
 from channel.codec.lead import FlownSample
 from channel.codec.words import Word
-from channel.protocol.audit_trail import ARRIVED_CHANNEL, EPOCH_CHANNEL, epoch_row
 from channel.protocol.frames import Desync, Symbol
 from channel.protocol.lockstep import LOCKSTEP_CHANNEL, History
-from channel.protocol.recording import Field, RecordChannel, Recorder
+from channel.protocol.recording import (
+    ARRIVED_CHANNEL,
+    EPOCH_CHANNEL,
+    Field,
+    RecordChannel,
+    Recorder,
+    epoch_row,
+)
 from channel.protocol.terms import Terms
 
 ReferenceOf = Callable[[int], float | None]

@@ -13,12 +13,13 @@ from reproduction.limits.intervals import exponent, ratio
 from reproduction.limits.page_template import NOT_RECORDED, PAGE, RECORDED, SUMMARY
 from reproduction.limits.plan import DENSITIES, NOMINAL, RATES, Outcome
 from reproduction.limits.recorded import Row
-from tenbaud.bounds.closed import DOUBLE_INTEGRATOR, WIENER
-from tenbaud.bounds.encoder import (
+from reproduction.limits.yardsticks import (
+    WIENER,
     double_integrator_rate_at_encoder_floor,
     encoder_floor,
     floor_behind_encoder,
 )
+from tenbaud.bounds.closed import DOUBLE_INTEGRATOR
 from tenbaud.bounds.linear import linear_model, rate_needed
 from tenbaud.files.whole import write_whole
 

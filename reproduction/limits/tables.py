@@ -13,8 +13,8 @@ from reproduction.limits.recorded import Row
 from reproduction.limits.tracking import DISTURBANCES, USUAL
 from reproduction.limits.tracking import PRESETS as LOOPS
 from reproduction.limits.trials import TRIALS, fly_trial
-from tenbaud.bounds.encoder import floor_behind_encoder
-from tenbaud.bounds.floor import floor, word_floor
+from reproduction.limits.yardsticks import floor_behind_encoder, word_floor
+from tenbaud.bounds.floor import floor
 from tenbaud.bounds.linear import integrators, pitch
 
 

@@ -16,9 +16,6 @@ from tenbaud.replay.rows import EndRows, Topic
 FILED = "(time)"
 """The flight time that a row is filed under, as if it were a field of each topic."""
 
-ORDER = "(order)"
-"""The place of a row among the others of its topic, as if it were a field."""
-
 
 class Place(NamedTuple):
     """Where in the recordings something was found."""
@@ -104,7 +101,7 @@ class Evidence:
         """Return the rows of an end, None if it is not here."""
         return self.rows.get(name)
 
-    def topic(self, end: str, name: str) -> Topic[Any]:
+    def topic(self, end: str, name: str) -> Topic:
         """Return a topic; without rows where it or the end was not recorded."""
         rows = self.rows.get(end)
         return Topic() if rows is None else rows.topic(name)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from channel.codec.codec import Codec, Coder, Model
+from channel.codec.codec import Codec, Coder, CoderContext, Model, ModelContext
 from channel.codec.coders.pcm import PcmCoder
 from channel.codec.models.hold import HoldModel
-from channel.codec.plugin_context import CoderContext, ModelContext
 from tenbaud.build.parts import Parts, check_codec
 from tenbaud.build.plugins import build_plugin
 from tenbaud.config.kinds import CODERS, MODELS, kind_of

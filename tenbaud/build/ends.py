@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 
 from channel.codec.codec import Codec
+from channel.codec.models.pitch import PitchModel
 from channel.line.clocks import SkewedClock
 from channel.line.downlink import Downlink
 from channel.line.impairments import Direction, ImpairedLine, SymbolWire
@@ -20,10 +21,10 @@ from receiver.controllers.base import Controller
 from receiver.controllers.references import Reference
 from receiver.endpoint import ReceiverEndpoint, SteppedEndpoint
 from receiver.session.session import ReceiverSession
+from tenbaud.bounds.closed import double_integrator_floor, double_integrator_rate
 from tenbaud.build.codec import build_codec
 from tenbaud.build.controllers import build_controller, build_reference
 from tenbaud.build.flight import Agreement, ticks_of, watchdog_wanted_s
-from tenbaud.build.gauge import build_gauge
 from tenbaud.build.liveness import overtaking_ticks, watchdog_ticks
 from tenbaud.build.parts import Parts
 from tenbaud.build.rig import build_rig
@@ -31,6 +32,7 @@ from tenbaud.config.kinds import CONTROLLERS
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
 from transmitter.guard import Guard, GuardSettings
+from transmitter.metrics.gap import GapGauge, Limit, StrengthMeter
 from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode
 from transmitter.session.rate_observer import RateObserver
@@ -194,3 +196,25 @@ def guard_settings(agreement: Agreement) -> GuardSettings:
         safe_volts=section.safe_volts,
         soft_limits_rad=soft,
     )
+
+
+def build_gauge(agreement: Agreement) -> GapGauge | None:
+    """Return the gauge; None for a model that does not predict what its commands do.
+
+    The floor is that of the double integrator (see `tenbaud.bounds.closed`) at the rate that is paid:
+    every slot of the grid, whether its symbol arrives or not.
+    """
+    codec, terms, config = agreement.codec, agreement.terms, agreement.config
+    if not isinstance(codec.model, PitchModel):
+        return None
+    tick_s = terms.tick_ns / 1e9
+    alphabet = codec.coder.alphabet
+    bits = alphabet.symbols_per_word * math.log2(len(alphabet.symbols))
+    rate_bit_s = bits / (terms.sample_ns / 1e9)
+    limit = Limit(
+        double_integrator_floor(1.0, rate_bit_s),
+        lambda per_density: double_integrator_rate(1.0, per_density),
+    )
+    step_rad = math.tau / config.transmitter.encoder_counts_per_turn
+    strength = StrengthMeter(codec, tick_s, step_rad)
+    return GapGauge(limit, strength, terms.ticks_per_sample, tick_s)

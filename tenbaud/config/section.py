@@ -16,10 +16,8 @@ Mismatch = Annotated[float, Field(ge=-0.999, le=10.0)]
 Volts = Annotated[float, Field(ge=-32.0, le=32.0)]
 Counts = Annotated[int, Field(ge=-(2**31), lt=2**31)]
 
-PluginName = Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$")]
-"""A class from outside, `module:Class`."""
 OfferedName = Annotated[str, Field(pattern=r"^[A-Za-z_][\w.-]*(:[A-Za-z_]\w*)?$")]
-"""The same, or a name that an installed package offers."""
+"""A class from outside, `module:Class`, or a name that an installed package offers."""
 Options = dict[str, JsonValue]
 """What it is built with, beside what it is told of the flight."""
 

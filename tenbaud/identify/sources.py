@@ -12,8 +12,7 @@ import numpy as np
 
 from channel.flight_log import parse_number, read_columns
 from plant_sim.identification.errors import IdentificationError
-from plant_sim.identification.excitation import parse_excitation
-from plant_sim.identification.experiment import excite
+from plant_sim.identification.excitation import excite, parse_excitation
 from plant_sim.identification.record import PitchRecord
 from tenbaud.build.rig import build_rig
 from tenbaud.config.schema import FlightConfig

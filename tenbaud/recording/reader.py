@@ -19,7 +19,6 @@ from mcap.records import Channel, Footer, Metadata, MetadataIndex, Schema
 from mcap.writer import MCAP0_MAGIC
 
 from channel.protocol.recording import RecordChannel
-from tenbaud.recording.blocks import blocks_of_file
 from tenbaud.recording.chunks import (
     Damage,
     Described,
@@ -32,6 +31,7 @@ from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.gaps import HoleFinder
 from tenbaud.recording.holes import HOLES_METADATA, Hole, unpacked_holes
 from tenbaud.recording.old_events import of_today
+from tenbaud.recording.resync import blocks_of_file
 from tenbaud.recording.rows import Row, RowDecoder, channel_of_names, check_channel
 
 METADATA_RECORDS_MAX = 100

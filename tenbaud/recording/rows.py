@@ -12,10 +12,15 @@ from typing import Any
 
 import orjson
 
-from channel.protocol.audit_trail import ARRIVED_CHANNEL, EPOCH_CHANNEL, SENT_CHANNEL
 from channel.protocol.events import EVENT_CHANNEL
 from channel.protocol.lockstep import LOCKSTEP_CHANNEL
-from channel.protocol.recording import Field, RecordChannel
+from channel.protocol.recording import (
+    ARRIVED_CHANNEL,
+    EPOCH_CHANNEL,
+    SENT_CHANNEL,
+    Field,
+    RecordChannel,
+)
 from receiver.session import records as receiver
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.old_events import OLD_EVENT_CHANNEL, filled

@@ -36,6 +36,7 @@ SOURCES = (*PACKAGES[:-1], "tenbaud.build", "tenbaud.config", "tenbaud.flight", 
 BESIDE = (
     *("constants.py", "judging.py", "tuning.py"),
     *("plots.py", "run.py", "table.py", "study.py", "study_file.py", "points.py", "settings.py"),
+    "progress.py",
 )
 """Modules of the studies that no figure of a flight depends on."""
 

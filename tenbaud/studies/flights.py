@@ -95,10 +95,6 @@ class CompiledPoint:
 
         self._work = _work(codec, self._samples, ticks, self._ahead)
 
-    def machine_code(self) -> list[str]:
-        """Return what the flight was compiled to, for whoever wants to read it."""
-        return list(_compiled_flight(self.agreement.codec).inspect_asm().values())
-
     @property
     def _samples(self) -> int:
         return -(-self.numbers.ticks // self.numbers.per_sample)
@@ -123,7 +119,7 @@ class CompiledPoint:
         work = self._work
         torque = torque_of(agreement.config, agreement.config.seed, self.numbers.ticks)
         given = self.given(schedule, torque)
-        flight = _compiled_flight(agreement.codec)
+        flight = compiled_flight(agreement.codec)
         try:
             status, motion, errors = flight(self.numbers, self.constants, given, work)
         except ValueError as error:
@@ -176,7 +172,7 @@ class CompiledPoint:
         )
 
 
-def _compiled_flight(codec: Codec) -> Any:
+def compiled_flight(codec: Codec) -> Any:
     """Return the compiled flight for a codec's kinds of model and coder."""
     encode, decode = codec.coder.functions  # type: ignore[attr-defined]
     parts = (

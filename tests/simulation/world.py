@@ -32,7 +32,7 @@ from tests.simulation.watch import Watch
 from transmitter.guard import Guard, GuardSettings
 from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode
-from transmitter.rigs.base import Reading, RigBase
+from transmitter.rigs.base import Reading, Rig
 from transmitter.session.copies import Confirmed
 from transmitter.session.session import Phase, TransmitterSession
 
@@ -46,7 +46,7 @@ CALM_REJOINS_MAX = 4
 """After the last fault."""
 
 
-class WorldRig(RigBase):
+class WorldRig(Rig):
     """A plant that outlives the transmitter's process: its ticks are counted from true time 0."""
 
     name = "world"

@@ -16,14 +16,14 @@ from tests.channel.codec.parts import identity_of, pitch_codec, terms
 from transmitter.guard import Guard, GuardCause, GuardReason, GuardSettings, GuardState
 from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode
-from transmitter.rigs.base import Reading, RigBase
+from transmitter.rigs.base import Reading, Rig
 from transmitter.session.session import Phase, TransmitterSession
 
 CODEC = pitch_codec()
 TICKS = 200
 
 
-class ScriptedRig(RigBase):
+class ScriptedRig(Rig):
     """Gives the readings that it was told to, and notes the voltages."""
 
     def __init__(

@@ -8,6 +8,7 @@ ticks still takes in what has come before it goes on: without the echoes it coul
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable
 
@@ -17,8 +18,9 @@ from channel.line.virtual import is_envelope
 from channel.links.base import Link
 from channel.protocol.events import Event, EventKind, Presence
 from transmitter.endpoint import TransmitterEndpoint
+from transmitter.guard import GuardCause, GuardReason
 from transmitter.loops.flight import Flight
-from transmitter.loops.ramp_down import RampDown
+from transmitter.node import TransmitterNode
 from transmitter.session.rejoin import ASK_AGAIN_NS
 from transmitter.session.session import Phase
 
@@ -28,6 +30,35 @@ LEAD_IN_NS = 20_000_000
 """Between the handshake and tick 0."""
 CATCH_UP_MESSAGES_MAX = 64
 """Messages taken in a row by a loop that is behind its ticks."""
+
+
+class RampDown:
+    """Takes a node's motors to their safe voltage; for a rig that does not ask for it, nothing.
+
+    A body that hovers and loses its lift at once drops by as much as its stand allows, so the voltages
+    go down along the guard's ramp. `tick` is the first one that was not flown.
+    """
+
+    def __init__(self, node: TransmitterNode, tick: int) -> None:
+        self._node = node
+        self._tick = tick
+        self._tick_ns = node.session.terms.tick_ns
+        self.over = not node.rig.ramps_down or node.latched
+        if not self.over:
+            node.guard.trip(GuardReason(GuardCause.FLIGHT_OVER))
+
+    @property
+    def next_ns(self) -> int:
+        """Return the flight time at which `step` has something to do."""
+        return sys.maxsize if self.over else self._tick * self._tick_ns
+
+    def step(self, now_ns: int) -> None:
+        """Write the voltages of a tick that is due."""
+        if self.over or now_ns < self.next_ns:
+            return
+        self._node.rig.write(self._tick, self._node.guard.apply(self._tick, None))
+        self._tick = max(self._tick, now_ns // self._tick_ns) + 1
+        self.over = self._node.latched
 
 
 class RealFlight(Flight):

@@ -22,8 +22,7 @@ from dataclasses import dataclass
 
 from channel.codec.codec import Vector
 from transmitter.rigs.axes import Axis, Motors
-from transmitter.rigs.base import DeviceNote, Reading, RigBase
-from transmitter.rigs.errors import RigError
+from transmitter.rigs.base import DeviceNote, Reading, Rig, RigError
 from transmitter.rigs.formats.samples import DeviceFlag, DeviceSample, RawSample, Timeline, Wraps
 
 REARM_TIMEOUT_S = 1.0
@@ -47,7 +46,7 @@ class DeviceSettings:
     """False: never send a command, not even a zero"""
 
 
-class DeviceRig(RigBase):
+class DeviceRig(Rig):
     """Base of the rigs that talk to a device.
 
     `axes` are all encoders; `measured` are the names of those that the codec measures, in its order.

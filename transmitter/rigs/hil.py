@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from transmitter.rigs.axes import Axis, Motors
+from transmitter.rigs.base import RigError
 from transmitter.rigs.device import DeviceRig, DeviceSettings
-from transmitter.rigs.errors import RigError
 from transmitter.rigs.formats.samples import RawSample, Wraps
 from transmitter.rigs.hil_library import HilLibrary
 

@@ -13,8 +13,8 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from transmitter.rigs.axes import Axis, Motors
+from transmitter.rigs.base import RigError
 from transmitter.rigs.device import DeviceRig, DeviceSettings
-from transmitter.rigs.errors import RigError
 from transmitter.rigs.formats.base import SerialFormat
 
 if TYPE_CHECKING:

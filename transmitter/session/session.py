@@ -15,7 +15,6 @@ from enum import Enum
 
 from channel.codec.codec import Codec, Vector
 from channel.codec.words import ERASED
-from channel.protocol.audit_trail import EPOCH_CHANNEL, epoch_row
 from channel.protocol.bounds import Bounds, shown, within_text_bounds
 from channel.protocol.endings import End, Ending
 from channel.protocol.events import ASKED, Event, EventKind, ended_event, write_event
@@ -36,7 +35,7 @@ from channel.protocol.frames import (
 )
 from channel.protocol.identity import Identity, differing_fields
 from channel.protocol.lockstep import History, difference_event, is_answer
-from channel.protocol.recording import NullRecorder, Recorder
+from channel.protocol.recording import EPOCH_CHANNEL, NullRecorder, Recorder, epoch_row
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
 from transmitter.session.copies import CANNOT_FLY, Confirmed, Copies

@@ -9,8 +9,7 @@ import pytest
 
 from plant_sim.identification.crosscheck import fit
 from plant_sim.identification.errors import IdentificationError
-from plant_sim.identification.excitation import PseudoRandom, parse_excitation
-from plant_sim.identification.experiment import REST_S, excite
+from plant_sim.identification.excitation import REST_S, PseudoRandom, excite, parse_excitation
 from plant_sim.identification.pitch import PitchIdentifier, PitchSettings
 from plant_sim.identification.record import PitchRecord, identify, quiescent_angle
 from tests.plant_sim.identification.experiments import (

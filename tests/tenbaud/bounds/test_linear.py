@@ -7,9 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from tenbaud.bounds.encoder import (
+from reproduction.limits.yardsticks import (
     double_integrator_rate_at_encoder_floor,
     encoder_floor,
+    sampled,
 )
 from tenbaud.bounds.floor import floor
 from tenbaud.bounds.linear import (
@@ -17,7 +18,6 @@ from tenbaud.bounds.linear import (
     linear_model,
     pitch,
     rate_needed,
-    sampled,
 )
 
 

@@ -10,7 +10,7 @@ import pytest
 from channel.codec.codec import Vector
 from channel.protocol.limits import CommandLimits
 from transmitter.guard import Guard, GuardSettings
-from transmitter.loops.ramp_down import RampDown
+from transmitter.loops.real import RampDown
 
 TICK_NS = 10_000_000
 RAMP_TICKS = 50

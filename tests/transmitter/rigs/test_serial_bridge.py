@@ -14,8 +14,8 @@ import serial
 import serial.rfc2217
 
 from tests.transmitter.rigs.emulated import emulated, fly, serial_rig, wait_until
+from transmitter.rigs.base import RigError
 from transmitter.rigs.emulator.loop import RigEmulator
-from transmitter.rigs.errors import RigError
 
 OFF = [0.0, 0.0]
 

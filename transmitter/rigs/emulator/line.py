@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Protocol
 
 from channel.links.serial.pseudo_terminal import PseudoTerminal
-from transmitter.rigs.errors import RigError
+from transmitter.rigs.base import RigError
 
 READ_BYTES = 4096
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from transmitter.rigs.base import RigError
 from transmitter.rigs.emulator.line import DeviceLine, parse_line
-from transmitter.rigs.errors import RigError
 
 
 def read_all(line: DeviceLine, count: int) -> bytes:

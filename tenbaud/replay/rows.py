@@ -25,8 +25,8 @@ from transmitter.session import records as transmitter_records
 KEY_MAX = 2**48
 """No flight has a tick, sample or slot beyond this."""
 
-ANGLES = ("measured_rad", "true_rad")
-"""A rig may read an angle that is no number, which a recording holds as null."""
+WITH_HOLES = ("measured", "true", "reference")
+"""A rig may read what is no number, and an output may have no set-point: a recording holds null."""
 
 
 class SentSymbol(NamedTuple):
@@ -101,10 +101,10 @@ class PlantTick(NamedTuple):
 
     tick: int
     time_s: float
-    measured_rad: Vector
-    true_rad: Vector | None
-    commanded_volts: Vector | None
-    applied_volts: Vector
+    measured: Vector
+    true: Vector | None
+    commanded: Vector | None
+    applied: Vector
     late: bool
     lateness_ms: float
     guard: str
@@ -155,9 +155,9 @@ class CommandTick(NamedTuple):
     """A command that the receiver decided."""
 
     tick: int
-    reference_rad: float | None
+    reference: tuple[float | None, ...]
     live_state: Vector
-    command_volts: Vector
+    command: Vector
 
 
 class ConsumedSample(NamedTuple):
@@ -197,7 +197,7 @@ KINDS: dict[str, dict[str, Kind]] = {
         "tick": Kind(
             PlantTick,
             transmitter_records.TICK_CHANNEL,
-            frozenset({"true_rad", "commanded_volts"}),
+            frozenset({"true", "commanded"}),
         ),
         "sample": Kind(
             ConfirmedSample, transmitter_records.SAMPLE_CHANNEL, frozenset({"word_sent", "word"})
@@ -211,7 +211,7 @@ KINDS: dict[str, dict[str, Kind]] = {
         "epoch": _EPOCH,
         "event": _EVENT,
         "lockstep_failure": _LOCKSTEP,
-        "tick": Kind(CommandTick, receiver_records.TICK_CHANNEL, frozenset({"reference_rad"})),
+        "tick": Kind(CommandTick, receiver_records.TICK_CHANNEL),
         "sample": Kind(ConsumedSample, receiver_records.SAMPLE_CHANNEL, frozenset({"word"})),
     },
 }
@@ -322,7 +322,7 @@ def _fits(value: Any, one: Field, nullable: frozenset[str]) -> bool:
         case "integers":
             return type(value) is tuple and _all_of(value, int)
         case _:
-            holes = one.name in ANGLES
+            holes = one.name in WITH_HOLES
             return type(value) is tuple and all(
                 type(entry) in (int, float) or (holes and entry is None) for entry in value
             )

@@ -26,9 +26,9 @@ TICK_CHANNEL = RecordChannel(
     "tick",
     (
         Field("tick", "integer", "", "tick that the command is for"),
-        Field("reference_rad", "number", "rad", "set-point of the controller at that tick"),
+        Field("reference", "numbers", "", "set-point of each output; null: it has none"),
         Field("live_state", "numbers", "", "model state believed, in advance, of that tick"),
-        Field("command_volts", "numbers", "V", "motor voltages commanded, as on the wire"),
+        Field("command", "numbers", "", "command for each input, as on the wire"),
     ),
 )
 
@@ -37,7 +37,7 @@ SAMPLE_CHANNEL = RecordChannel(
     (
         Field("sample", "integer", "", "index of the sample"),
         Field("word", "integers", "", "symbols consumed; null: erased"),
-        Field("range", "numbers", "rad", "range M of each axis before the word"),
+        Field("range", "numbers", "", "range M of each output before the word"),
         Field("state", "numbers", "", "codec's model state after the sample"),
         Field("coder", "numbers", "", "coder state after the sample"),
         Field("digest", "string", "", "64-bit digest of the codec state after the sample"),
@@ -67,7 +67,7 @@ def write_commands(
     """Write down the commands that were decided with one sample, and what they steered to."""
     tick = sample * terms.ticks_per_sample + terms.lead_ticks
     for believed, command in zip(flown.live, flown.commands, strict=True):
-        row = (tick, reference_rad(tick), believed, command)
+        row = (tick, (reference_rad(tick),), believed, command)
         recorder.write(TICK_CHANNEL, tick * terms.tick_ns, row)
         tick += 1
 

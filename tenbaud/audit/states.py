@@ -14,7 +14,7 @@ ORPHAN = "no sample that was recorded brings it"
 
 SAMPLE_FIELDS = ("word", "range", "state", "coder", "digest")
 ESTIMATE_FIELDS = ("coded_state", "live_state")
-COMMAND_FIELDS = ("reference_rad", "live_state", "command_volts")
+COMMAND_FIELDS = ("reference", "live_state", "command")
 
 
 def check_samples(evidence: Evidence, findings: Findings) -> None:
@@ -74,7 +74,7 @@ def check_steering(evidence: Evidence, findings: Findings) -> None:
     """A set-point that is not the configuration's was given by hand, and that is an event."""
     if evidence.steps and not evidence.is_steered:
         tick, angle = evidence.steps[0]
-        place = Place("receiver", "tick", f"tick {tick}", "reference_rad")
+        place = Place("receiver", "tick", f"tick {tick}", "reference")
         findings.leak(place, "nobody was recorded to have moved the set-point", f"{angle!r} rad")
 
 

@@ -87,7 +87,7 @@ def result_of(
     up, down = rows
     first = model.measured(model.initial())
     axes, inputs = len(first), model.input_size
-    angles = _per_tick(up, "tick", "true_rad", ticks, axes)
+    angles = _per_tick(up, "tick", "true", ticks, axes)
     states = _per_tick(up, "estimate", "coded_state", ticks, model.state_size)
     live = _per_tick(up, "estimate", "live_state", ticks, model.state_size)
     events = sorted([*transmitter.events, *receiver.events], key=lambda event: event.time_ns)
@@ -95,11 +95,11 @@ def result_of(
         ticks=ticks,
         time_s=np.asarray(np.arange(ticks) * (terms.tick_ns / 1e9), dtype=np.float64),
         angles_rad=angles,
-        measured_rad=_per_tick(up, "tick", "measured_rad", ticks, axes),
-        reference_rad=_per_tick(down, "tick", "reference_rad", ticks, 1)[:, 0],
+        measured_rad=_per_tick(up, "tick", "measured", ticks, axes),
+        reference_rad=_per_tick(down, "tick", "reference", ticks, 1)[:, 0],
         states=states,
         live_states=live,
-        commands=_per_tick(up, "tick", "applied_volts", ticks, inputs),
+        commands=_per_tick(up, "tick", "applied", ticks, inputs),
         errors=angles - _measured(model, states, axes),
         live_errors=angles - _measured(model, live, axes),
         samples=tuple(up.column("sample", "sample")),

@@ -73,10 +73,10 @@ def from_run(folder: Path) -> PitchRecord:
     recording = Recording(find_recordings(folder)[0])
     ticks, rows = [], []
     for _, row in recording.rows("tick"):
-        if not row.get("measured_rad") or len(row.get("applied_volts") or ()) != 2:
+        if not row.get("measured") or len(row.get("applied") or ()) != 2:
             continue  # a tick without a reading: a gap, told below
         ticks.append(row["tick"])
-        rows.append((row["measured_rad"][0], *row["applied_volts"]))
+        rows.append((row["measured"][0], *row["applied"]))
     if not ticks:
         raise IdentificationError(
             f"{recording.path} holds no measured angles; give the run's transmitter.mcap"

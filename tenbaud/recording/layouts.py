@@ -52,7 +52,7 @@ RECORDING_PLOTS = (
     Plot(
         "pitch, rad",
         (
-            Curve("tick", "measured_rad", 0, "measured", PITCH),
+            Curve("tick", "measured", 0, "measured", PITCH),
             Curve("estimate", "coded_state", 0, "coded estimate", CODED),
             Curve("estimate", "live_state", 0, "live estimate", LIVE),
         ),
@@ -68,8 +68,8 @@ RECORDING_PLOTS = (
     Plot(
         "motors, V",
         (
-            Curve("tick", "applied_volts", 0, "front", FRONT),
-            Curve("tick", "applied_volts", 1, "rear", REAR),
+            Curve("tick", "applied", 0, "front", FRONT),
+            Curve("tick", "applied", 1, "rear", REAR),
         ),
     ),
     Plot("lateness of the loop, ms", (Curve("tick", "lateness_ms", None, "lateness", LIVE),)),

@@ -25,7 +25,7 @@ CURVES = ("pitch", "reference", "coded", "live", "error_coded", "error_live", "r
 MARKS = ("erased", "flipped", "desync", "rejoin")
 
 FIELDS: dict[str, tuple[str, ...]] = {
-    "tick": ("tick", "true_rad", "measured_rad", "reference_rad"),
+    "tick": ("tick", "true", "measured", "reference"),
     "estimate": ("tick", "coded_state", "live_state"),
     "sample": ("range", "word", "word_sent"),
     "event": ("kind",),
@@ -68,14 +68,14 @@ class Overview:
             self.symbols.add(*_symbols([time_s, time_s], [word]))
 
     def _add_ticks(self, times: Series, columns: Columns) -> None:
-        reference = columns("reference_rad")
+        reference = columns("reference")
         if reference is not None:
-            self.curves["reference"].add(times, np.array(reference, dtype=np.float64))
-        measured = columns("measured_rad")
+            self.curves["reference"].add(times, _first(reference))
+        measured = columns("measured")
         if measured is None:
             return
         pitch = _first(measured)
-        true = columns("true_rad")
+        true = columns("true")
         if true is not None:
             known = _first(true)
             pitch = np.where(np.isnan(known), pitch, known)
@@ -147,11 +147,8 @@ def marks_of(envelope: Envelope) -> Series:
 
 
 def _first(values: Sequence[Any]) -> Series:
-    """The first axis of recorded numbers or lists of numbers; NaN for null."""
-    first = [
-        (value[0] if value else None) if isinstance(value, list | tuple) else value for value in values
-    ]
-    return np.array(first, dtype=np.float64)
+    """The first axis of recorded lists of numbers; NaN for null."""
+    return np.array([value[0] if value else None for value in values], dtype=np.float64)
 
 
 def _symbols(times_s: list[float], words: Sequence[Sequence[Any] | None]) -> tuple[Series, Series]:

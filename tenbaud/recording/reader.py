@@ -30,7 +30,7 @@ from tenbaud.recording.encoding import END_METADATA, RUN_METADATA, channel_from_
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.gaps import HoleFinder
 from tenbaud.recording.holes import HOLES_METADATA, Hole, unpacked_holes
-from tenbaud.recording.old_events import of_today
+from tenbaud.recording.old_rows import of_today
 from tenbaud.recording.resync import blocks_of_file
 from tenbaud.recording.rows import Row, RowDecoder, channel_of_names, check_channel
 
@@ -161,7 +161,7 @@ class MessageStream:
 
     def _channel(self, record: Channel) -> RecordChannel:
         try:
-            channel = channel_from_schema(record.topic, self._schemas[record.schema_id].data)
+            channel = of_today(channel_from_schema(record.topic, self._schemas[record.schema_id].data))
             check_channel(channel)
         except (ValueError, KeyError, AttributeError, TypeError) as error:
             raise RecordingError(
@@ -169,7 +169,7 @@ class MessageStream:
                 f"{record.topic!r} is not described as tenbaud does ({error}). "
                 "Open it with the program that wrote it."
             ) from error
-        return of_today(channel)
+        return channel
 
 
 @dataclass(slots=True)

@@ -127,8 +127,8 @@ def _samples(name: str, axis: int | None = 0) -> Maker:
 
 
 def _pitch(source: Source) -> Series | None:
-    true = source.ticks("transmitter", "tick", "true_rad", 0)
-    measured = source.ticks("transmitter", "tick", "measured_rad", 0)
+    true = source.ticks("transmitter", "tick", "true", 0)
+    measured = source.ticks("transmitter", "tick", "measured", 0)
     if true is None or measured is None:
         return measured if true is None else true
     return np.where(np.isnan(true), measured, true)
@@ -149,8 +149,8 @@ def _less(one: Series | None, other: Series | None) -> Series | None:
 
 def _volts(axis: int) -> Maker:
     def make(source: Source) -> Series | None:
-        sent = source.ticks("receiver", "tick", "command_volts", axis)
-        known = source.ticks("transmitter", "tick", "commanded_volts", axis)
+        sent = source.ticks("receiver", "tick", "command", axis)
+        known = source.ticks("transmitter", "tick", "commanded", axis)
         return known if sent is None else sent
 
     return make
@@ -182,10 +182,10 @@ SIGNALS: tuple[tuple[str, str, str, Maker], ...] = (
         "reference",
         "rad",
         "set-point of the controller",
-        _ticks("receiver", "tick", "reference_rad", None),
+        _ticks("receiver", "tick", "reference"),
     ),
     ("pitch", "rad", "true angle where the rig knows it, else as measured", _pitch),
-    ("measured", "rad", "angle as the encoder gives it", _ticks("transmitter", "tick", "measured_rad")),
+    ("measured", "rad", "angle as the encoder gives it", _ticks("transmitter", "tick", "measured")),
     ("estimate", "rad", "the codec's estimate of the angle", lambda source: _estimate(source, 0)),
     ("estimate_live", "rad", "what the receiver believed of the tick, in advance", _live),
     ("estimate_rate", "rad/s", "the codec's estimate of the rate", lambda source: _estimate(source, 1)),
@@ -212,8 +212,8 @@ SIGNALS: tuple[tuple[str, str, str, Maker], ...] = (
     ("erased", "", "1 where the sample's word was erased", _erased),
     ("front_command", "V", "voltage commanded, front motor", _volts(0)),
     ("rear_command", "V", "voltage commanded, rear motor", _volts(1)),
-    ("front", "V", "voltage applied, front motor", _ticks("transmitter", "tick", "applied_volts", 0)),
-    ("rear", "V", "voltage applied, rear motor", _ticks("transmitter", "tick", "applied_volts", 1)),
+    ("front", "V", "voltage applied, front motor", _ticks("transmitter", "tick", "applied", 0)),
+    ("rear", "V", "voltage applied, rear motor", _ticks("transmitter", "tick", "applied", 1)),
     (
         "late",
         "",

@@ -73,9 +73,9 @@ def _add(agreement: Agreement, copies: Copies, one: Reflown, expected: Expected)
     for tick, reference, live, command in one.ticks:
         expected.commands[tick] = {
             "tick": tick,
-            "reference_rad": reference,
+            "reference": reference,
             "live_state": live,
-            "command_volts": command,
+            "command": command,
         }
 
 

@@ -35,7 +35,7 @@ class Reflown(NamedTuple):
     model: Vector
     coder: Vector
     digest: str
-    ticks: list[tuple[int, float | None, Vector, Vector]]
+    ticks: list[tuple[int, tuple[float | None, ...], Vector, Vector]]
     """(tick, reference, live state, command) of the ticks decided with it"""
 
 
@@ -67,7 +67,7 @@ class _Rows:
 
     def __init__(self) -> None:
         self.samples: list[Sequence[object]] = []
-        self.ticks: list[tuple[int, float | None, Vector, Vector]] = []
+        self.ticks: list[tuple[int, tuple[float | None, ...], Vector, Vector]] = []
 
     def write(self, channel: RecordChannel, time_ns: int, row: Sequence[object]) -> None:
         """Keep samples and ticks."""

@@ -36,13 +36,13 @@ def _at(channel: RecordChannel, *names: str) -> list[int]:
 
 
 T_TICK, T_TIME, T_MEASURED, T_TRUE, T_APPLIED, T_LATE_MS = _at(
-    TICK_CHANNEL, "tick", "time_s", "measured_rad", "true_rad", "applied_volts", "lateness_ms"
+    TICK_CHANNEL, "tick", "time_s", "measured", "true", "applied", "lateness_ms"
 )
 E_TICK, E_CODED, E_LIVE = _at(ESTIMATE_CHANNEL, "tick", "coded_state", "live_state")
 S_SAMPLE, S_SENT, S_WORD, S_RANGE, S_DIGEST, S_PEER = _at(
     SAMPLE_CHANNEL, "sample", "word_sent", "word", "range", "digest", "peer_digest"
 )
-D_TICK, D_REFERENCE, D_LIVE = _at(DECIDED, "tick", "reference_rad", "live_state")
+D_TICK, D_REFERENCE, D_LIVE = _at(DECIDED, "tick", "reference", "live_state")
 R_SAMPLE, R_WORD, R_DIGEST = _at(TAKEN, "sample", "word", "digest")
 
 
@@ -211,7 +211,7 @@ class ReceiverComposer(_Composer):
         points = [
             {
                 "time_s": row[D_TICK] * terms.tick_ns / 1e9,
-                "reference_rad": row[D_REFERENCE],
+                "reference_rad": row[D_REFERENCE][0],
                 "live_rad": self._measured(row[D_LIVE])[0],
             }
             for topic, row in rows

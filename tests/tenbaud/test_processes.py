@@ -59,7 +59,7 @@ def test_when_one_ends_sine_changes_in_flight_then_the_first_sample_is_named(
         assert f"after sample {last['sample']}: transmitter {last['digest']}" in ended.err
         assert f"receiver {last['peer_digest']}" in ended.err
     ticks = [row for _, row in recording.rows("tick")]
-    assert ticks[-1]["applied_volts"] == [0.0, 0.0]
+    assert ticks[-1]["applied"] == [0.0, 0.0]
     assert ticks[-1]["guard"] == "latched"
 
 
@@ -148,4 +148,4 @@ def test_when_one_end_is_stopped_or_killed_then_the_other_ends_safely(
     assert upper.topics["tick"].rows > 100
     if codes["transmit"] != -9:
         last = list(upper.rows("tick"))[-1][1]
-        assert last["applied_volts"] == [0.0, 0.0]
+        assert last["applied"] == [0.0, 0.0]

@@ -163,7 +163,7 @@ def test_when_a_row_is_recorded_then_commanded_and_applied_voltages_stand_side_b
     node.actuate(10)
     rows = recorder.topic("tick")
     assert [row["tick"] for row in rows] == list(range(11))
-    assert rows[3]["commanded_volts"] == rows[3]["applied_volts"] == (2.0, -2.0)
-    assert rows[10]["commanded_volts"] is None
-    assert rows[10]["applied_volts"] == (2.0, -2.0)
+    assert rows[3]["commanded"] == rows[3]["applied"] == (2.0, -2.0)
+    assert rows[10]["commanded"] is None
+    assert rows[10]["applied"] == (2.0, -2.0)
     assert [row["late"] for row in rows] == [False] * 10 + [True]

@@ -56,13 +56,13 @@ def test_the_gap_gauge_holds_its_last_value(lossy: Run) -> None:
 def test_signals_are_what_the_rows_say(lossy: Run) -> None:
     ticks = lossy.table("transmitter", "tick")
     for row in ticks.rows[::97]:
-        assert lossy.pitch[row["tick"]] == row["true_rad"][0]
-        assert lossy.front[row["tick"]] == row["applied_volts"][0]
+        assert lossy.pitch[row["tick"]] == row["true"][0]
+        assert lossy.front[row["tick"]] == row["applied"][0]
     for row in lossy.table("transmitter", "estimate").rows[::97]:
         assert lossy.estimate[row["tick"]] == row["coded_state"][0]
     for row in lossy.table("receiver", "tick").rows[::97]:
         if row["tick"] < TICKS:
-            assert lossy.reference[row["tick"]] == row["reference_rad"]
+            assert lossy.reference[row["tick"]] == row["reference"][0]
     np.testing.assert_array_equal(lossy.error_coded, lossy.pitch - lossy.estimate)
 
 

@@ -184,9 +184,9 @@ def test_when_a_flight_is_steered_then_every_command_takes_hold_and_is_written_d
     down = controls(tmp_path / "lower" / "receiver.mcap")
     assert [text.split(": ")[1].split()[0] for text in down] == ["set-point", "one"]
     ticks = [row for _, row in Recording(tmp_path / "lower" / "receiver.mcap").rows("tick")]
-    steered = next(row["tick"] for row in ticks if row["reference_rad"] == 0.25)
+    steered = next(row["tick"] for row in ticks if row["reference"] == [0.25])
     assert f"before sample {steered // 10}:" in down[0]
-    assert all(row["reference_rad"] == 0.25 for row in ticks if row["tick"] >= steered)
+    assert all(row["reference"] == [0.25] for row in ticks if row["tick"] >= steered)
 
 
 def test_when_control_is_not_allowed_then_commands_do_nothing(tmp_path: Path) -> None:

@@ -26,8 +26,8 @@ demo: $(FLY) ## fly: both processes on this machine, the plant simulated
 # Most tests wait for their processes half of the time: three at once keep two cores busy. Flights on
 # the real clock come after them, two at once; those that need both cores see to it themselves.
 test: chromium $(DEVELOP) ## run the tests: most of them first, then those on the real clock
-	$(BIN)/python -m pytest -n 3 --dist loadgroup -m "not soak and not real_time"
-	$(BIN)/python -m pytest -n 2 --dist loadgroup -m "not soak and real_time"
+	$(BIN)/python -m pytest -n 3 -m "not soak and not real_time"
+	$(BIN)/python -m pytest -n 2 -m "not soak and real_time"
 
 check: $(DEVELOP) ## lint, format, types, and the project's own rules
 	$(BIN)/ruff check .

@@ -12,8 +12,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
-from plant_sim.disturbance import Disturbance
+if TYPE_CHECKING:
+    from plant_sim.disturbance import Disturbance
 
 PitchState = tuple[float, float, float, float]
 """Angle (rad), rate (rad/s), lagged front voltage (V), lagged rear voltage (V)."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from plant_sim.disturbance import Disturbance
+if TYPE_CHECKING:
+    from plant_sim.disturbance import Disturbance
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,9 @@ import os
 import sys
 import tempfile
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -15,28 +17,40 @@ import pytest
 # which takes longer than most flights.
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+# Beside other tests the threads of the linear algebra mostly wait for each other, and wait by spinning.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 LONGEST_FIRST = ("tests/docs/",)
 """What takes longest: started last, it would keep one worker busy and the others idle."""
 
+COMPILED_ONCE = ("tests/tenbaud/studies/test_equal_bits.py",)
+"""Their tests stay together too: the first compiles, the others read its machine code from disk."""
+
 _MACHINE = Path(tempfile.gettempdir()) / f"tenbaud-tests-{os.getuid()}.lock"
 
 
-@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Bring tests of one module-wide fixture together on one worker, and the longest to the front."""
-    for item in items:
-        shared = _shared_fixture(item)
-        if shared and item.get_closest_marker("xdist_group") is None:
-            item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))
+    """Bring the longest to the front."""
     items.sort(key=_rank)
 
 
-def _shared_fixture(item: pytest.Item) -> bool:
-    """Return whether a fixture that is made once per module is among the test's."""
-    found = getattr(item, "_fixtureinfo", None)
-    definitions = found.name2fixturedefs.values() if found else ()
-    return any(one.scope == "module" for several in definitions for one in several)
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Keep the tests of a file with a module-wide fixture on one worker, so that it is made once."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class ByFixture(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file = nodeid.partition("::")[0]
+            together = file in COMPILED_ONCE or _has_shared_fixture(config.rootpath / file)
+            return file if together else nodeid
+
+    return ByFixture(config, log)
+
+
+@cache
+def _has_shared_fixture(path: Path) -> bool:
+    return '(scope="module")' in path.read_text(encoding="utf-8")
 
 
 def _rank(item: pytest.Item) -> int:

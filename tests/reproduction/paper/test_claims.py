@@ -19,13 +19,18 @@ JOBS = {
     for job in plan.pitch_jobs() + plan.unit_jobs() + plan.zooming_jobs()
 }
 """As planned, but all in this process: equal inputs give equal states."""
+SIGNS_FLOWN = (0, 2, 5)
+"""Of the eight combinations of signs; all of them with the long tests."""
 
 
 def flown(name: str) -> Flown:
     return fly(JOBS[name], Path())
 
 
-@pytest.mark.parametrize("index", range(8))
+@pytest.mark.parametrize(
+    "index",
+    [pytest.param(one, marks=() if one in SIGNS_FLOWN else pytest.mark.soak) for one in range(8)],
+)
 @pytest.mark.parametrize(
     ("coder", "rate", "largest", "of_reference"),
     [

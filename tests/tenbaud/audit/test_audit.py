@@ -81,7 +81,9 @@ def test_a_serial_line_in_real_time_passes_too(tmp_path: Path) -> None:
     assert run_command("demo", "--json", *flight, cwd=tmp_path).code == 0
     result = audit(tmp_path / "run")
     assert result.passed, result.leaks + result.gaps
-    assert result.counted.symbols_sent == result.counted.symbol_bytes == 30
+    counted = result.counted
+    # A busy machine may hold an end up past a slot, which then carries no symbol.
+    assert 30 - counted.erased <= counted.symbols_sent == counted.symbol_bytes <= 30
 
 
 # What was doctored, and what the audit must say

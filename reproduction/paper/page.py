@@ -91,9 +91,9 @@ Largest error, of the largest pitch / of the reference's amplitude:
 
 With a plant 10 % off the model the paper's claim holds, at 10 bit/s and as a fraction of the
 reference's amplitude only just. With an exact model it does not hold: the observer's error then
-consists of its own corrections alone, the signs enter the limit cycle `++--`, the rule takes every second pair for
-saturation, and the range never decreases. A window of three signs does not take two equal signs for
-saturation.
+consists of its own corrections alone, the signs enter the limit cycle `++--`, the rule takes every
+second pair for saturation, and the range never decreases. A window of three signs does not take two
+equal signs for saturation.
 
 The unit of the gains in (24), plant 10 % off:
 

@@ -21,7 +21,7 @@ PluginName = Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$")]
 OfferedName = Annotated[str, Field(pattern=r"^[A-Za-z_][\w.-]*(:[A-Za-z_]\w*)?$")]
 """The same, or a name that an installed package offers."""
 Options = dict[str, JsonValue]
-"""What it is built with, beside what it is told of the flight."""
+"""Constructor arguments, beside the context of the flight."""
 
 
 class Section(BaseModel):
@@ -37,7 +37,7 @@ class KindSection(Section):
 
 
 class OutsideSection(KindSection):
-    """A class from outside: named here, or offered by an installed package under a name of its own."""
+    """A class from outside: named here, or offered by an installed package under its name."""
 
     kind: OfferedName
     """module:Class, or the name that a package offers"""

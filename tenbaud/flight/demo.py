@@ -146,7 +146,7 @@ def _wait(ends: tuple[_Child, _Child], stop: StopFlag) -> None:
 
 @dataclass(slots=True)
 class _Child:
-    """One end as a process of its own; its two pipes are read by two threads."""
+    """One end as a separate process; its two pipes are read by two threads."""
 
     role: Role
     agreement: Agreement

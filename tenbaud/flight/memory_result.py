@@ -35,13 +35,13 @@ class FlightResult:
     states: Series
     """the codec's estimate, a column per model state"""
     live_states: Series
-    """what the receiver believed of the tick when it decided the tick's command"""
+    """the receiver\'s predicted estimate of the tick when it decided the tick's command"""
     commands: Series
     """motor voltages applied, a column per input"""
     errors: Series
     """true angle less the codec's estimate, a column per measured axis"""
     live_errors: Series
-    """true angle less what the receiver believed of it"""
+    """true angle less the receiver\'s predicted estimate of it"""
     samples: tuple[int, ...]
     """the samples that were confirmed: both ends hold equal states after them"""
     words: tuple[Word, ...]

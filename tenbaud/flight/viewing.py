@@ -1,4 +1,4 @@
-"""The live page beside a demonstration: a process of its own, and where the two ends meet it."""
+"""The live page beside a demonstration: a separate process, and where the two ends meet it."""
 
 from __future__ import annotations
 

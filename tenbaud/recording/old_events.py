@@ -1,6 +1,6 @@
 """Events as recordings held them up to wire version 1: kind, sample and a sentence.
 
-The fields of today are filled from there, so that whoever reads an event need not know how old it is.
+The fields of today are filled from there, so that readers of an event need not know its version.
 The sentence stays, as `text`, for people.
 """
 

@@ -1,7 +1,7 @@
 """Reads recordings: whole ones, those cut by a crash, and those that somebody else gave you.
 
 Every file is read from its beginning: of one without an end, a reader that starts from the index at
-the end gets nothing. What is damaged is left out and told of (`MessageStream.holes`); what was never
+the end gets nothing. Damaged parts are left out and listed in `MessageStream.holes`; what was never
 written by tenbaud is a RecordingError. Every command that reads a recording does it through here.
 """
 

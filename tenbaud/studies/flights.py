@@ -38,7 +38,7 @@ NO_PAIRS = np.zeros((0, 2))
 
 @dataclass(slots=True)
 class Trace:
-    """States of a compiled flight, for whoever wants to compare them."""
+    """States of a compiled flight, for comparisons."""
 
     models: Any
     coders: Any
@@ -96,7 +96,7 @@ class CompiledPoint:
         self._work = _work(codec, self._samples, ticks, self._ahead)
 
     def machine_code(self) -> list[str]:
-        """Return what the flight was compiled to, for whoever wants to read it."""
+        """Return the machine code of the flight."""
         return list(_compiled_flight(self.agreement.codec).inspect_asm().values())
 
     @property

@@ -19,7 +19,7 @@ LABELS = {
     "density": "torque density q in rad²/s³",
 }
 QUANTITIES = {
-    "error_live_rms": "rms error of what the receiver believed",
+    "error_live_rms": "rms error of the receiver's predicted estimate",
     "error_coded_rms": "rms error of the codec",
     "tracking_rms": "rms distance from the reference",
 }

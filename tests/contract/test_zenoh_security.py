@@ -43,7 +43,7 @@ def pair(endpoint: str) -> Iterator[Pair]:
 
 
 def symbol(slot: int) -> bytes:
-    """Return a message for the paid path of the uplink, which has a key of its own."""
+    """Return a message for the paid path of the uplink, which has a separate key."""
     return encode(Symbol(1, 0, slot, 1))
 
 

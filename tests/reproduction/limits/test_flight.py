@@ -58,11 +58,11 @@ def test_when_a_coder_is_told_the_density_then_its_ratio_does_not_depend_on_it()
 
 def test_when_the_innovation_filter_settles_then_its_gains_are_a_fixed_point() -> None:
     """P+ = P - (2/pi) P c c' P / c'Pc,  P = F P+ F' + Q: checked from the gains alone."""
-    angle, rate_term = innovation_gains()
+    angle, rate = innovation_gains()
     variance = math.pi / 2.0 * angle * angle
-    cross = angle * rate_term * math.pi / 2.0
+    cross = angle * rate * math.pi / 2.0
     share = 2.0 / math.pi
-    # The rate_term's variance: what a sample adds is what a sign takes.
+    # The rate's variance: what a sample adds is what a sign takes.
     assert share * cross * cross / variance == pytest.approx(1.0)
 
 

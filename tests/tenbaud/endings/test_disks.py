@@ -43,7 +43,7 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Inputs:
 
 @pytest.fixture
 def said(capfd: pytest.CaptureFixture[str]) -> Iterator[Callable[[], str]]:
-    """The streams of a process of its own; called, returns what was written to standard error."""
+    """The streams of a separate process; called, returns what was written to standard error."""
     before = sys.stdout, sys.stderr
     prepare_streams()
 

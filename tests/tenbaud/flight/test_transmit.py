@@ -48,7 +48,7 @@ def fly_virtual(**transmitter: Any) -> tuple[Outcome, ReceiverEndpoint]:
 
 
 def fly_real(endpoint: ReceiverEndpoint, should_stop: Callable[[TransmitterRun], bool]) -> Outcome:
-    """Fly over a memory link in real time, the receiver in a thread of its own."""
+    """Fly over a memory link in real time, the receiver in a separate thread."""
     agreement = agreement_on("real")
     near, far = memory_pair()
 

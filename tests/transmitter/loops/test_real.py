@@ -68,7 +68,7 @@ def endpoint() -> ReceiverEndpoint:
 
 
 class Service:
-    """The receiver's driver in a thread of its own; what it raised is kept."""
+    """The receiver's driver in a separate thread; what it raised is kept."""
 
     def __init__(self, end: ReceiverEndpoint, link: MemoryLink, **options: Any) -> None:
         self.error: Exception | None = None

@@ -3,7 +3,7 @@
 Each has a session, a link and a separate Zenoh session, and keeps its slots; only the measurement is
 a sine wave, and nothing is recorded. `python -m benchmarks.light_rigs ENDPOINT RIGS SECONDS SHARDS`
 prints what they saw as JSON. With SHARDS above 0 the endpoint is a router's, and the names of the rigs
-spread them over so many receivers.
+spread them over the receivers.
 """
 
 from __future__ import annotations

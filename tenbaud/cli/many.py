@@ -34,7 +34,7 @@ class Many:
 def serve(
     many: Many, node: options.NodeOptions, addresses: options.Addresses, changed: dict[str, Any]
 ) -> None:
-    """Serve until interrupted, or until so many flights have ended; see `docs/many-rigs.md`."""
+    """Serve until interrupted, or until enough flights have ended; see `docs/many-rigs.md`."""
     from channel.links.zenoh.config import SESSIONS_MAX
     from channel.links.zenoh.hub import ZenohHub
     from receiver.loops.many import ManyService

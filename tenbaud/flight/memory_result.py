@@ -83,7 +83,7 @@ def result_of(
     ticks: int,
     ended_by: str,
 ) -> FlightResult:
-    """Return the result of a flight of so many ticks, from the `rows` of transmitter and receiver."""
+    """Return the result of a flight of `ticks` ticks, from the `rows` of transmitter and receiver."""
     up, down = rows
     first = model.measured(model.initial())
     axes, inputs = len(first), model.input_size

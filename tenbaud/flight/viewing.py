@@ -35,7 +35,7 @@ class ViewOptions:
 
 @dataclass(slots=True)
 class Viewing:
-    """What the two ends have to be told, so that the page hears them."""
+    """Options of the two ends for the page to receive their telemetry."""
 
     transmitter: list[str] = field(default_factory=list)
     receiver: list[str] = field(default_factory=list)

@@ -46,7 +46,7 @@ class MessageStream:
     """
 
     def __init__(self, path: Path, topic: str | None = None, size: int | None = None) -> None:
-        """`topic` restricts the stream to one topic, `size` to so many bytes of a file that grows.
+        """`topic` restricts the stream to one topic, `size` to the first bytes of a file that grows.
 
         Raises RecordingError for a wrong file.
         """

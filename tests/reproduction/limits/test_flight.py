@@ -49,7 +49,7 @@ def test_when_the_history_coder_flies_then_it_is_within_1_78_of_the_floor(rate: 
         assert ratio(squares, floor(pitch(2e-3), rate)).value < 1.78
 
 
-def test_when_a_coder_is_told_the_density_then_its_ratio_does_not_depend_on_it() -> None:
+def test_when_a_coder_knows_the_density_then_its_ratio_does_not_depend_on_it() -> None:
     known = next(one for one in CANDIDATES if one.key == "history-known-q")
     assert known.section(10.0, 8e-3)["initial_range_rad"] == pytest.approx(2.0 * unit_rad(0.1, 2e-3))
     blind = next(one for one in CANDIDATES if one.key == "history")

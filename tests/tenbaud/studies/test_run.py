@@ -1,4 +1,4 @@
-"""Running studies: the same figures whoever flies, and nothing lost when somebody dies."""
+"""Running studies: the same figures from every runner, and nothing lost when somebody dies."""
 
 from __future__ import annotations
 

@@ -102,7 +102,7 @@ class LinkKind(ABC):
     """bytes take time on the line, so `terms` changes what a flight is"""
     carries_slots = True
     """a symbol arrives with the number of its slot, whole and checked; without it, a symbol that comes
-    after its deadline cannot be told from a later one's"""
+    after its deadline cannot be distinguished from a later one's"""
 
     def uses_addresses(self, settings: LinkSettings) -> bool:
         """Return whether ends meet at Zenoh endpoints, with its keys: `--listen`, `--connect` ..."""

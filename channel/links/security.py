@@ -163,6 +163,6 @@ def _rules_of(invited: Invited, prefix: str) -> list[Rule]:
 
 
 def _subscribed(keys: Sequence[str]) -> list[str]:
-    """Return what is subscribed to by whoever takes these keys: `up/*` for `up/symbol`."""
+    """Return the key expressions that a subscriber to these keys declares: `up/*` for `up/symbol`."""
     folders = (key.rpartition("/") for key in keys)
     return list(dict.fromkeys(f"{folder}{slash}*" if slash else key for folder, slash, key in folders))

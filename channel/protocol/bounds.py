@@ -161,7 +161,7 @@ class Bounds:
         if state.sample != welcome.first_sample:
             return f"a state of sample {state.sample} for sample {welcome.first_sample}"
         if not is_flyable(self._codec, state):
-            return f"a state that is none of this codec: {state}"
+            return f"not a state of this codec: {state}"
         return None
 
 

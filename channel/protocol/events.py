@@ -75,7 +75,7 @@ class ByHand(Enum):
     FOLLOW = "follow the reference"
     PAUSE = "pause before a tick"
     GO_ON = "go on after a pause"
-    PACE = "so many times real time"
+    PACE = "a multiple of real time"
     IMPAIR = "what goes wrong on the line"
     CORRUPT = "one bit of a codec"
     IGNORED = "something that cannot be done"

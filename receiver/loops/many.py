@@ -1,6 +1,6 @@
 """The controller node of many rigs: one loop that serves each of them as if it were alone.
 
-Every session has an endpoint of its own; this loop takes in what comes for all of them and keeps their
+Every session has its own endpoint; this loop takes in what comes for all of them and keeps their
 deadlines. What goes wrong in one ends that one: an exception closes it, and a transmitter that sends
 more than its channel carries has the surplus dropped unread, so that it costs the others a few
 microseconds a message.
@@ -31,7 +31,7 @@ BATCH_MESSAGES_MAX = 64
 
 BURST_MESSAGES = 50
 SURPLUS = 4.0
-"""A session may send this many times its symbol rate, and so many messages at once, for control."""
+"""A session may send this many times its symbol rate, and this many messages at once, for control."""
 
 
 class Hub(Protocol):

@@ -27,7 +27,7 @@ TICK_CHANNEL = RecordChannel(
     (
         Field("tick", "integer", "", "tick that the command is for"),
         Field("reference", "numbers", "", "set-point of each output; null: it has none"),
-        Field("live_state", "numbers", "", "model state believed, in advance, of that tick"),
+        Field("live_state", "numbers", "", "predicted model state of that tick"),
         Field("command", "numbers", "", "command for each input, as on the wire"),
     ),
 )
@@ -66,8 +66,8 @@ def write_commands(
 ) -> None:
     """Write down the commands that were decided with one sample, and what they steered to."""
     tick = sample * terms.ticks_per_sample + terms.lead_ticks
-    for believed, command in zip(flown.live, flown.commands, strict=True):
-        row = (tick, (reference_rad(tick),), believed, command)
+    for predicted, command in zip(flown.live, flown.commands, strict=True):
+        row = (tick, (reference_rad(tick),), predicted, command)
         recorder.write(TICK_CHANNEL, tick * terms.tick_ns, row)
         tick += 1
 

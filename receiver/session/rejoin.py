@@ -5,7 +5,7 @@
 * A second transmitter is refused while the first one is heard. When the first has fallen silent, the
   second is taken for the same rig started again.
 * A request that contradicts what is known, older than one that was answered or for a sample that the
-  clock cannot have reached, is believed when it persists: one forged or delayed request does nothing.
+  clock cannot have reached, is accepted when it persists: one forged or delayed request does nothing.
 * An answer on which no symbol has come is no more than an offer: the next request is answered from
   where the flight stood before it (`receiver.session.commander.Standing`).
 * The first sample is `max(own next sample, first sample that the transmitter can still send + m)`,
@@ -36,12 +36,12 @@ from channel.protocol.terms import Terms
 ANSWER_AGE_SAMPLES_MAX = 4
 ANSWER_AGE_NS = 50_000_000
 """A start that lies further back than both is not offered again: the motors would have no command for
-so long. In samples alone, every request of a fast flight would begin an epoch of its own before the
+so long. In samples alone, every request of a fast flight would begin a new epoch before the
 answer to the one before can have arrived."""
 
 PERSISTENT_REQUESTS = 3
 """Repetitions, each for a later sample, after which a request that contradicts what is known is
-believed, as long as the transmitter is not heard."""
+accepted, as long as the transmitter is not heard."""
 
 AHEAD_SAMPLES_MAX = 8
 """This end counts samples by its own clock, so it is hardly ahead of the transmitter. If it is by more,

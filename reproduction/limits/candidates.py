@@ -131,16 +131,16 @@ def innovation_gains() -> tuple[float, float]:
     return size * aa, size * ar
 
 
-def aimed_weights(angle: float, rate_term: float, aim: float) -> tuple[float, float, float]:
+def aimed_weights(angle: float, rate: float, aim: float) -> tuple[float, float, float]:
     """Return weights with which one row asks for the sign of `e + aim r`, r the rate error times T."""
     if aim > 0.0:
-        return 1.0 / angle, 0.0, aim / rate_term
+        return 1.0 / angle, 0.0, aim / rate
     small = 0.1 / angle
-    return 1.0 / angle, -small * rate_term / angle, small
+    return 1.0 / angle, -small * rate / angle, small
 
 
-def _aimed(angle: float, rate_term: float, aim: float) -> Callable[[float, float], Section]:
-    return _history(((angle, rate_term, 1.0),), aimed_weights(angle, rate_term, aim), 0, 1.0)
+def _aimed(angle: float, rate: float, aim: float) -> Callable[[float, float], Section]:
+    return _history(((angle, rate, 1.0),), aimed_weights(angle, rate, aim), 0, 1.0)
 
 
 CANDIDATES = (

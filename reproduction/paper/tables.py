@@ -114,7 +114,7 @@ def claims_table(results: Results) -> str:
         (
             "the same, the plant exactly the model's",
             f"20 bit/s: {both(exact[0])}; 10 bit/s: {both(exact[1])}",
-            _holds(_largest(exact) <= CLAIM) + ": the window of two locks",
+            _holds(_largest(exact) <= CLAIM) + ": limit cycle of the window of two",
         ),
         (
             "Fig. 8: at 10 bit/s the observer's rate is as useful as differences at 1000 bit/s",
@@ -194,7 +194,7 @@ def zooming_table(results: Results) -> str:
             lost = one.pitch_rad > 6.3
             cells.append("the loop is lost" if lost else percent(one.largest))
         rows.append((label, *cells))
-    return table(("10 bit/s", "exact plant", "10 % off", "10 % off, and a shove at 40 s"), rows)
+    return table(("10 bit/s", "exact plant", "10 % off", "10 % off, and a push at 40 s"), rows)
 
 
 def recorded_table(results: Results) -> str:

@@ -90,9 +90,8 @@ def build_rate_observer(agreement: Agreement) -> RateObserver | None:
         return None
     tick_s = agreement.terms.tick_ns / 1e9
     try:
-        return RateObserver(
-            codec.model, tick_s, agreement.config.transmitter.rate_observer_bandwidth_rad_s
-        )
+        bandwidth = agreement.config.transmitter.rate_observer_bandwidth_rad_s
+        return RateObserver(codec.model, tick_s, bandwidth)
     except ValueError as error:
         raise ConfigError(f"coder.kind = {agreement.config.coder.kind!r}: {error}") from error
 

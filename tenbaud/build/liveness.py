@@ -15,8 +15,8 @@ from channel.protocol.terms import Clock, Terms
 AUTO_SAMPLES = 5
 AUTO_LEAST_S = 0.1
 AUTO_MARGIN_SAMPLES = 2
-"""The automatic watchdog: so many sample periods, but this long at least, and long enough for a request
-for a new epoch and its answer, one of which may be lost."""
+"""The automatic watchdog: this many sample periods, but at least this long, and long enough for a
+request for a new epoch and its answer, one of which may be lost."""
 
 
 @dataclass(frozen=True, slots=True)

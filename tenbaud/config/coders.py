@@ -86,7 +86,7 @@ class HistoryCoderSection(KindSection):
     minimum_range_rad: AngleRange = 0.001
     maximum_range_rad: AngleRange = 3.0
     weights: tuple[Factor, Factor, Factor] = (0.7, 0.45, 0.75)
-    """of the error that is left after the look-ahead: angle, angle times swing, swing"""
+    """of the error that is left after the look-ahead: angle, angle times T rate, T rate"""
     lookahead: Annotated[int, Field(ge=0, le=6)] = 1
     """samples that the transmitter looks ahead"""
 

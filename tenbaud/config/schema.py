@@ -237,7 +237,7 @@ class LinkSection(Section):
 
 
 class TelemetrySection(Section):
-    """What viewers are told while the flight goes on."""
+    """Telemetry for viewers during the flight."""
 
     rate_hz: Annotated[float, Field(ge=0.01, le=100.0)] = 20.0
     """messages per second of each end"""

@@ -55,7 +55,7 @@ def fly_demo(
     """Fly once into an existing, empty run folder; write summary and, if wished, figure there.
 
     `view`: serve the live page beside the flight, which may then be steered from it. `pace`: on the
-    virtual clock, at most so many times real time; not for a link within one process.
+    virtual clock, at most this factor of real time; not for a link within one process.
     """
     write_whole(folder.config, dump_config(agreement.config))
     if agreement.link.in_process:
@@ -146,7 +146,7 @@ def _wait(ends: tuple[_Child, _Child], stop: StopFlag) -> None:
 
 @dataclass(slots=True)
 class _Child:
-    """One end as a process of its own; its two pipes are read by two threads."""
+    """One end as a separate process; its two pipes are read by two threads."""
 
     role: Role
     agreement: Agreement

@@ -84,7 +84,7 @@ def run_transmitter(
     with _end(agreement, "transmitter", folder) as (recorder, stop):
         telemetry = _telemetry(agreement, "transmitter", recorder, endpoints)
         with (
-            refused_connections(endpoints) as refused,
+            refusals(endpoints) as refused,
             open_link(agreement, "transmitter", endpoints, stop) as link,
         ):
             trouble = Trouble(link, endpoints.security, refused, stop)
@@ -109,10 +109,7 @@ def run_receiver(
     """Serve one flight as the receiver; the outcome says how it ended."""
     with _end(agreement, "receiver", folder) as (recorder, stop):
         telemetry = _telemetry(agreement, "receiver", recorder, endpoints)
-        with (
-            refused_connections(endpoints) as refused,
-            open_link(agreement, "receiver", endpoints, stop) as link,
-        ):
+        with refusals(endpoints) as refused, open_link(agreement, "receiver", endpoints, stop) as link:
             trouble = Trouble(link, endpoints.security, refused, stop)
             endpoint = build_receiver(
                 agreement, telemetry.recorder, link.wire, endpoints.take_over, telemetry.steering
@@ -133,7 +130,7 @@ def run_receiver(
 
 
 @contextmanager
-def refused_connections(endpoints: Endpoints) -> Iterator[Counter[str]]:
+def refusals(endpoints: Endpoints) -> Iterator[Counter[str]]:
     """Within a `with`, connections that fail to prove who they are get counted by reason."""
     if endpoints.security is None or not endpoints.listen:
         yield Counter()

@@ -40,7 +40,7 @@ AgreementOf = Callable[[str], Agreement]
 """Session name -> what its flights are agreed on; raises TenbaudError where there is no such."""
 
 LOGGED_MAX = 1000
-"""Refusals remembered, so that a transmitter that keeps asking is told of once."""
+"""Refusals remembered, so that repeated requests of a transmitter are logged once."""
 
 
 @dataclass(slots=True)

@@ -20,10 +20,10 @@ WORDS_SHARE_MIN = 0.1
 DOWN_SHARE_MAX = 0.5
 """of the ticks, with the guard at the safe voltage or on its way there"""
 COMMANDED_SHARE_MIN = 0.1
-"""of the ticks, with a command of their own"""
+"""of the ticks, with their own command"""
 REJOINS_MIN = 10
 EPOCH_SAMPLES_MIN = 20
-"""So many rejoins, with fewer confirmed samples than this to each of them, are rejoins without end."""
+"""This many rejoins, with fewer confirmed samples than this for each, are rejoins without end."""
 
 
 class NotFlown(StrEnum):

@@ -1,4 +1,4 @@
-"""The live page beside a demonstration: a process of its own, and where the two ends meet it."""
+"""The live page beside a demonstration: a separate process, and where the two ends meet it."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class ViewOptions:
 
 @dataclass(slots=True)
 class Viewing:
-    """What the two ends have to be told, so that the page hears them."""
+    """Options of the two ends for the page to receive their telemetry."""
 
     transmitter: list[str] = field(default_factory=list)
     receiver: list[str] = field(default_factory=list)

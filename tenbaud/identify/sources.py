@@ -74,7 +74,7 @@ def from_run(folder: Path) -> PitchRecord:
     ticks, rows = [], []
     for _, row in recording.rows("tick"):
         if not row.get("measured") or len(row.get("applied") or ()) != 2:
-            continue  # a tick without a reading: a gap, told below
+            continue  # a tick without a reading: a gap, reported below
         ticks.append(row["tick"])
         rows.append((row["measured"][0], *row["applied"]))
     if not ticks:
@@ -142,6 +142,6 @@ def _even_step(
         raise IdentificationError(
             f"{path}, line {lines[row + 1]}, column {name}: {clock[row + 1]:g} after {clock[row]:g}, "
             f"where the usual step is {usual:g}; a gap cannot be identified across: choose a stretch "
-            "with --from and --to before or after it, as a file of its own"
+            "with --from and --to before or after it, as a separate file"
         )
     return usual if timed else tick_s

@@ -59,7 +59,7 @@ class Pem:
 
 
 def new_authority(name: str, days: float = AUTHORITY_DAYS) -> Pem:
-    """Return a fresh authority of this name, valid for so many days."""
+    """Return a fresh authority of this name, valid for a number of days."""
     from cryptography import x509
     from cryptography.hazmat.primitives import hashes
 

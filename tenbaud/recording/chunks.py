@@ -34,7 +34,7 @@ EXPANSION_FREE_BYTES = 64 << 10
 """Content of a chunk that may be larger than that: a few rows, all alike."""
 
 RawMessage = tuple[int, int, bytes]
-"""(channel id, log time in ns, data): a plain tuple, as there are so many."""
+"""(channel id, log time in ns, data): a plain tuple, as there are very many."""
 
 Described = Schema | Channel | Metadata | Footer
 

@@ -2,7 +2,7 @@
 
 A recorder keeps an overview beside the rows that it writes and stores it at the end of a long recording
 so that ten million ticks are drawn at once when they have been flown. Everybody
-else reads the rows: what a file says of its own rows may not be so.
+else reads the rows: the statements of a file about its rows may be false.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Reads recordings: whole ones, those cut by a crash, and those that somebody else gave you.
 
 Every file is read from its beginning: of one without an end, a reader that starts from the index at
-the end gets nothing. What is damaged is left out and told of (`MessageStream.holes`); what was never
+the end gets nothing. Damaged parts are left out and listed in `MessageStream.holes`; what was never
 written by tenbaud is a RecordingError. Every command that reads a recording does it through here.
 """
 
@@ -46,7 +46,7 @@ class MessageStream:
     """
 
     def __init__(self, path: Path, topic: str | None = None, size: int | None = None) -> None:
-        """`topic` restricts the stream to one topic, `size` to so many bytes of a file that grows.
+        """`topic` restricts the stream to one topic, `size` to the first bytes of a file that grows.
 
         Raises RecordingError for a wrong file.
         """

@@ -1,7 +1,7 @@
 """Rows of a recording checked against what their channel declares, many at a time.
 
-Whoever gets a row from here may rely on every declared field being there with a value of its type, or
-null; on a whole number, not null, in the field that counts the rows; and on `NEVER_NULL`.
+Every row has all declared fields, each with a value of its type or null, and a whole number, not null,
+in the field that counts the rows; `NEVER_NULL` names further fields.
 """
 
 from __future__ import annotations

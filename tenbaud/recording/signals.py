@@ -187,7 +187,7 @@ SIGNALS: tuple[tuple[str, str, str, Maker], ...] = (
     ("pitch", "rad", "true angle where the rig knows it, else as measured", _pitch),
     ("measured", "rad", "angle as the encoder gives it", _ticks("transmitter", "tick", "measured")),
     ("estimate", "rad", "the codec's estimate of the angle", lambda source: _estimate(source, 0)),
-    ("estimate_live", "rad", "what the receiver believed of the tick, in advance", _live),
+    ("estimate_live", "rad", "the receiver's predicted estimate of the tick", _live),
     ("estimate_rate", "rad/s", "the codec's estimate of the rate", lambda source: _estimate(source, 1)),
     (
         "error_coded",

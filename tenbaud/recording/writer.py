@@ -1,4 +1,4 @@
-"""Writes a flight into an MCAP file from a thread of its own.
+"""Writes a flight into an MCAP file from a separate thread.
 
 The flight only appends to a queue. The thread takes the rows out ten times a second, encodes them
 and writes them in chunks; what a killed process loses is the chunk that was

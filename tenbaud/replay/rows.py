@@ -1,7 +1,7 @@
 """The rows of a recording as typed records, checked one by one as they are read.
 
 A recording may come from anybody. So the types are those that the nodes write, not those that the file
-says it has, and a row that does not fit is told by topic, row and field instead of failing later.
+says it has, and an error names topic, row and field of a row that does not fit.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ class EndRows:
 
 
 def read_rows(end: str, tables: Tables) -> EndRows:
-    """Return the rows of one end; those that do not fit are left out and told as misfits."""
+    """Return the rows of one end; those that do not fit are left out and listed as misfits."""
     misfits: list[Misfit] = []
     topics: dict[str, Topic] = {}
     for name, kind in KINDS[end].items():

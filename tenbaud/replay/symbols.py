@@ -98,7 +98,7 @@ NUMBER_MAX = 1 << 53
 
 
 def unpack(path: Path, *, allow_code: bool = False) -> Unpacked:
-    """Read a symbols file; RecordingError for a file that is none, or not a whole one.
+    """Read a symbols file; RecordingError for an invalid or incomplete file.
 
     CodeNotAllowed if its configuration names classes from outside, unless `allow_code` permits them.
     """

@@ -85,7 +85,7 @@ class Work(NamedTuple):
     coded: Any
     """per tick: the codec's angle"""
     live: Any
-    """per tick: the angle believed in advance"""
+    """per tick: the predicted angle"""
     front: Any
     rear: Any
     """per tick: commanded"""

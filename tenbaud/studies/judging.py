@@ -2,7 +2,8 @@
 
 On simulated flights, one set of seeds is for the fit and another for the judgement. On a recorded
 flight, the first part is for the fit and the rest for the judgement; there the codec flies through the
-whole recording and only the rest counts. The measure is the rms error of what the receiver believed.
+whole recording and only the rest counts. The measure is the rms error of the receiver's predicted
+estimate.
 """
 
 from __future__ import annotations

@@ -95,7 +95,7 @@ def tune(
 
 
 class _Spent(Exception):
-    """As many sets of constants were flown as were asked for, or the search was told to stop."""
+    """The search has flown the requested number of sets of constants, or was stopped."""
 
 
 @dataclass(slots=True)

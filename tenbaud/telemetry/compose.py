@@ -258,7 +258,7 @@ def _word(word: object) -> list[int] | None:
 
 
 def _thinned(points: list[Any], most: int) -> list[Any]:
-    """Return at most so many of the points, the last one included."""
+    """Return at most that number of points, the last one included."""
     if len(points) <= most:
         return points
     every = -(-len(points) // most)

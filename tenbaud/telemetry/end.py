@@ -143,7 +143,7 @@ def open_telemetry(
         endpoint = None
     if agreement.live and endpoint is not None and not endpoint.startswith((SOCKET, "tls/")):
         sys.stderr.write(
-            f"tenbaud: whoever reaches {endpoint} can steer this flight, every user of this machine "
+            f"tenbaud: anyone who reaches {endpoint} can steer this flight, every user of this machine "
             "included; leave --telemetry out, or use tls/, to decide who may\n"
         )
     tap = Tap(recorder) if endpoint is not None else None

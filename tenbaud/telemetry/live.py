@@ -5,7 +5,7 @@ took hold. Which of them were obeyed where:
 
     set_point      receiver
     pause, step, pace   transmitter, on the virtual clock, whose time is its own
-    impair         whoever holds the line: the transmitter both ways on the virtual clock, else each end
+    impair         the owner of the line: the transmitter both ways on the virtual clock, else each end
                    what it sends
     corrupt        the end named; the transmitter also notes that a difference is now expected
 """

@@ -96,5 +96,5 @@ class Publisher:
     def _guard(self, do: Callable[[], None]) -> None:
         try:
             do()
-        except Exception as error:  # telemetry must never be a flight's end
+        except Exception as error:  # telemetry must never end a flight
             self.error = f"telemetry ended: {type(error).__name__}: {error}"

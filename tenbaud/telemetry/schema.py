@@ -27,7 +27,7 @@ class Point(_Message):
     measured_rad: float = Field(description="angle as the encoder gives it")
     true_rad: float | None = Field(description="true angle, where the rig knows it")
     coded_rad: float = Field(description="the codec's estimate of that tick")
-    live_rad: float | None = Field(description="what the receiver believed of it in advance")
+    live_rad: float | None = Field(description="the receiver's predicted estimate of it")
     range_rad: float = Field(description="range M of the coder at that tick")
 
 
@@ -155,7 +155,7 @@ class Pause(_Message):
 
 
 class Step(_Message):
-    """Let so many samples pass on the virtual clock, then pause."""
+    """Let a number of samples pass on the virtual clock, then pause."""
 
     kind: Literal["step"]
     samples: Annotated[int, Field(ge=1, le=1000)] = 1

@@ -85,7 +85,7 @@ def test_when_old_epochs_were_obeyed_then_the_harness_would_find_out(
 
 @pytest.mark.parametrize("end", ["transmitter", "receiver"])
 @pytest.mark.parametrize("delay_periods", [0, 1, 5])
-def test_when_one_end_is_corrupted_then_it_is_found_and_mended_in_time(
+def test_when_one_end_is_corrupted_then_it_is_found_and_corrected_in_time(
     end: str, delay_periods: int
 ) -> None:
     delay_ns = delay_periods * 100_000_000 // 2

@@ -68,7 +68,7 @@ class WorldRig(Rig):
 
 
 class BlindSession(TransmitterSession):
-    """What must never be: it sees that the digests differ, and goes on."""
+    """A faulty transmitter: it sees that the digests differ, and continues."""
 
     def _on_desync(self, done: Confirmed) -> list[Frame]:
         return []

@@ -76,7 +76,7 @@ def test_when_one_end_is_corrupted_then_both_write_it_down_and_the_flight_goes_o
     assert "field 'coder[0]'" in named.out
 
 
-def test_when_it_is_told_to_stop_then_a_difference_ends_the_flight(tmp_path: Path) -> None:
+def test_when_it_is_set_to_stop_then_a_difference_ends_the_flight(tmp_path: Path) -> None:
     ended = demo(tmp_path, "--sabotage", "sample=100,field=angle", "--on-desync", "stop")
     assert ended.code == 5
     assert "after sample 100" in ended.err

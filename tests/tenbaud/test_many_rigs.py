@@ -74,7 +74,7 @@ def test_when_one_rig_floods_then_its_surplus_is_dropped_and_another_flies_on(tm
     assert corrupted["messages_dropped"] > surplus - 10 * BURST_MESSAGES
 
 
-def test_when_a_handshake_does_not_fit_then_it_is_refused_told_once_and_leaves_no_folder(
+def test_when_a_handshake_does_not_fit_then_it_is_refused_reported_once_and_leaves_no_folder(
     tmp_path: Path,
 ) -> None:
     with Room(tmp_path) as room:
@@ -92,7 +92,7 @@ def test_when_a_handshake_does_not_fit_then_it_is_refused_told_once_and_leaves_n
     assert [path.name for path in tmp_path.iterdir()] == ["rig-good"]
 
 
-def test_when_an_intruder_asks_under_ever_new_names_then_few_refusals_are_told_and_all_counted(
+def test_when_an_intruder_asks_under_ever_new_names_then_few_refusals_are_reported_and_all_counted(
     tmp_path: Path,
 ) -> None:
     asked = 10 * LINES_AT_ONCE
@@ -152,7 +152,7 @@ def test_when_a_rig_dies_then_its_flight_is_closed_and_the_name_is_free_again(tm
     assert good.session.counts["desyncs"] == 0
 
 
-def test_when_no_configuration_can_be_had_then_the_rig_is_told_why(tmp_path: Path) -> None:
+def test_when_no_configuration_can_be_had_then_the_rig_hears_why(tmp_path: Path) -> None:
     common = agreement()
 
     def agreement_of(name: str) -> Agreement:

@@ -56,7 +56,7 @@ def fly(
     overrides: dict[str, Any],
     meanwhile: Callable[[], None] = lambda: None,
 ) -> Flown:
-    """Fly both ends over a line on the real clock, the receiver on a thread of its own.
+    """Fly both ends over a line on the real clock, the receiver on a separate thread.
 
     `meanwhile` runs on another thread once the flight has begun.
     """

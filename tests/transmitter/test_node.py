@@ -24,7 +24,7 @@ TICKS = 200
 
 
 class ScriptedRig(Rig):
-    """Gives the readings that it was told to, and notes the voltages."""
+    """Returns given readings, and notes the voltages."""
 
     def __init__(
         self, faulty_tick: int | None = None, angle_rad: float = 0.1, ticks: int = TICKS
@@ -127,7 +127,7 @@ def test_when_the_session_ends_then_the_voltage_is_taken_down_with_its_reason() 
     ],
     ids=["fault", "soft limit"],
 )
-def test_when_the_sensor_or_the_angle_is_wrong_then_the_guard_trips_and_it_is_told(
+def test_when_the_sensor_or_the_angle_is_wrong_then_the_guard_trips_and_it_is_reported(
     rig: ScriptedRig, text: str
 ) -> None:
     recorder = MemoryRecorder()

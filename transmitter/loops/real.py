@@ -79,7 +79,7 @@ class RealFlight(Flight):
         self._asked_ns: int | None = None
         """when a session was asked for first"""
         self._peer_told = True
-        """what was last told about the receiver: it is there"""
+        """presence of the receiver as last reported"""
         terms = endpoint.node.session.terms
         self._tick_ns = terms.tick_ns
         self._ramp_down: RampDown | None = None
@@ -152,7 +152,7 @@ class RealFlight(Flight):
                 time.sleep(max(0.0, wake_ns - self._now_ns()) / 1e9)
 
     def _catch_up(self) -> None:
-        """Take in what has come, within bounds: whoever floods this end must not stop its ticks."""
+        """Take in what has come, within bounds: a flood of messages must not stop the ticks."""
         for _ in range(CATCH_UP_MESSAGES_MAX):
             if not self._take_in(0.0):
                 return

@@ -48,7 +48,7 @@ class Asking:
         self._next_tick = tick
 
     def is_refused(self) -> bool:
-        """Note a refusal of a flight that was admitted before; return whether it is to be believed."""
+        """Note a refusal of a flight that was admitted before; return whether it is to be accepted."""
         self._refusals += 1
         return self._refusals >= REFUSALS_ACCEPTED
 

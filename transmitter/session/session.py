@@ -95,7 +95,7 @@ class TransmitterSession:
         """the last one"""
         self._report_answered = False
         self.heard_tick = 0
-        """when the receiver last told something new in the present epoch"""
+        """when the receiver last sent something new in the present epoch"""
         self.epoch_tick = 0
         """first tick of the present epoch"""
         self.owing = Owing(terms)
@@ -132,7 +132,7 @@ class TransmitterSession:
         """Take the measurement of a tick; return the frames that leave with it.
 
         These are the symbols of the sample that begins with it, or the request for a new epoch. A word
-        has a slot for each of its symbols; whoever sends them holds each until its slot. A tick that
+        has a slot for each of its symbols; the sender holds each until its slot. A tick that
         was never seen, because the process was held up, sent no symbol: its sample's word counts as
         not sent, and the next sample starts afresh.
         """
@@ -337,7 +337,7 @@ class TransmitterSession:
         self.counts["erasures"] += word is ERASED
         if done.digest != echo.digest:
             return self._on_desync(done)
-        # Only now: whoever does not hold the same state moves no motor.
+        # Only now: a receiver with a different state must move no motor.
         self.owing.on_confirmed()
         first_tick = echo.sample * self.terms.ticks_per_sample + self.terms.lead_ticks
         self._due.extend(enumerate(commands, first_tick))

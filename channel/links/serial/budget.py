@@ -84,7 +84,7 @@ def serial_budget(terms: Terms, inputs: int) -> SerialBudget:
 
 
 def byte_ns(count: int, line_rate_baud: int) -> int:
-    """Return how long a line takes for so many bytes, rounded up."""
+    """Return how long a line takes for a number of bytes, rounded up."""
     return -(-count * LINE_BITS_PER_BYTE * 1_000_000_000 // line_rate_baud)
 
 

@@ -154,7 +154,7 @@ class EmulatedLine:
                 one.plug()
 
     def unplug(self) -> None:
-        """Pull both ends out: whoever has them open gets an error, and their names are gone."""
+        """Pull both ends out: processes that have them open get an error, and their names are gone."""
         with self._lock:
             for one in self._ends:
                 one.unplug()

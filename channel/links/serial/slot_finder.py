@@ -83,7 +83,7 @@ class SlotFinder:
             self._greeted_ns = now_ns
 
     def begin(self, first_slot: int, ahead_slots: int) -> None:
-        """Forget the schedule: another transmitter begins, so many slots after its hello."""
+        """Forget the schedule: another transmitter begins, `ahead_slots` after its hello."""
         self._zero_ns = None
         self._rival = None
         self._first_slot = first_slot

@@ -1,6 +1,6 @@
-"""Who knocks at a Zenoh node and is turned away: counted, and told once in a while.
+"""Counts the connections that a Zenoh node refuses, and reports some of them.
 
-Two kinds are turned away. A connection whose handshake fails (no certificate, another authority's, an
+Two kinds are refused. A connection whose handshake fails (no certificate, another authority's, an
 expired one, no TLS at all) never becomes a link; Zenoh says so in its log only, so the log is read. A
 node with a certificate of the authority but without an invitation does get a link, over which the
 access rules let nothing pass in either direction; it is seen by its link.
@@ -50,7 +50,7 @@ def reason_of(text: str) -> str:
 class Gate:
     """Counts the links of nodes that were not invited, for as long as the session is open.
 
-    They are told on a thread of its own: one of Zenoh's carries symbols, and a terminal may block.
+    A separate thread reports them: one of Zenoh's carries symbols, and a terminal may block.
     """
 
     def __init__(

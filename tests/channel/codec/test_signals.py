@@ -75,7 +75,7 @@ def test_a_model_with_other_numbers_than_it_names_is_refused() -> None:
         signals_of(model)
 
 
-def test_a_name_that_is_not_there_is_told_with_those_that_are() -> None:
+def test_an_unknown_name_is_refused_with_the_known_ones() -> None:
     signals = signals_of(Cart())
     assert signals.index("outputs", "output_1") == 0
     with pytest.raises(ValueError, match="'speed' is none of the states: state_1, state_2"):

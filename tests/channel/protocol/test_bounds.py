@@ -83,7 +83,7 @@ def test_when_frames_are_what_the_other_end_sends_then_they_are_within_bounds() 
         ({"state": b"\0" * 7}, "bytes"),
     ],
 )
-def test_when_an_answer_is_out_of_bounds_then_it_is_said_in_what(
+def test_when_an_answer_is_out_of_bounds_then_the_error_names_it(
     changes: dict[str, Any], text: str
 ) -> None:
     problem = bounds().of_welcome(welcome(**changes), SAMPLE)
@@ -117,7 +117,7 @@ def test_when_the_first_answer_comes_then_only_the_counters_bound_its_start() ->
         ((echo(101),), "has not been sent"),
     ],
 )
-def test_when_commands_are_out_of_bounds_then_it_is_said_in_what(
+def test_when_commands_are_out_of_bounds_then_the_error_names_it(
     echoes: tuple[Echo, ...], text: str
 ) -> None:
     problem = bounds().of_commands(Commands(7, 1, echoes), SAMPLE, 90, 101)
@@ -125,7 +125,7 @@ def test_when_commands_are_out_of_bounds_then_it_is_said_in_what(
     assert text in problem
 
 
-def test_when_symbols_requests_and_reports_are_out_of_bounds_then_it_is_said() -> None:
+def test_when_symbols_requests_and_reports_are_out_of_bounds_then_it_is_reported() -> None:
     ours = bounds()
     assert ours.of_symbol(Symbol(7, 1, SAMPLE, 2)) is not None
     assert ours.of_symbol(Symbol(7, 1, 2**32 - 1, 1)) is not None
@@ -140,7 +140,7 @@ def test_when_symbols_requests_and_reports_are_out_of_bounds_then_it_is_said() -
     assert ours.of_report(Desync(7, 1, 99, 1, 2, b""), 1, 100 + REACH) is not None
 
 
-def test_when_a_frame_is_dropped_then_it_is_counted_and_told() -> None:
+def test_when_a_frame_is_dropped_then_it_is_counted_and_reported() -> None:
     counts: Counter[str] = Counter()
     told: list[Event] = []
     ours = Bounds(CODEC, TERMS, counts, told.append)

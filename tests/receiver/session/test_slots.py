@@ -97,7 +97,7 @@ def test_when_a_symbol_is_of_another_flight_then_it_is_dropped_and_counted(stale
     assert session.counts["stale_frames"] == 1
 
 
-def test_when_a_symbol_is_of_an_epoch_that_was_never_begun_then_its_sender_is_told() -> None:
+def test_when_a_symbol_is_of_an_epoch_that_was_never_begun_then_its_sender_is_informed() -> None:
     session = flying()
     assert session.on_frame(symbol(0, epoch=1), 0) == [Unknown(SESSION, 1)]
     assert session.state == CODEC.initial()

@@ -49,7 +49,7 @@ def test_when_the_history_coder_flies_then_it_is_within_1_78_of_the_floor(rate: 
         assert ratio(squares, floor(pitch(2e-3), rate)).value < 1.78
 
 
-def test_when_a_coder_is_told_the_density_then_its_ratio_does_not_depend_on_it() -> None:
+def test_when_a_coder_knows_the_density_then_its_ratio_does_not_depend_on_it() -> None:
     known = next(one for one in CANDIDATES if one.key == "history-known-q")
     assert known.section(10.0, 8e-3)["initial_range_rad"] == pytest.approx(2.0 * unit_rad(0.1, 2e-3))
     blind = next(one for one in CANDIDATES if one.key == "history")
@@ -58,11 +58,11 @@ def test_when_a_coder_is_told_the_density_then_its_ratio_does_not_depend_on_it()
 
 def test_when_the_innovation_filter_settles_then_its_gains_are_a_fixed_point() -> None:
     """P+ = P - (2/pi) P c c' P / c'Pc,  P = F P+ F' + Q: checked from the gains alone."""
-    angle, rate_term = innovation_gains()
+    angle, rate = innovation_gains()
     variance = math.pi / 2.0 * angle * angle
-    cross = angle * rate_term * math.pi / 2.0
+    cross = angle * rate * math.pi / 2.0
     share = 2.0 / math.pi
-    # The rate_term's variance: what a sample adds is what a sign takes.
+    # The rate's variance: what a sample adds is what a sign takes.
     assert share * cross * cross / variance == pytest.approx(1.0)
 
 

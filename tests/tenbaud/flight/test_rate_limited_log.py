@@ -5,7 +5,7 @@ from __future__ import annotations
 from tenbaud.flight.rate_limited_log import CHARACTERS_MAX, LINES_AT_ONCE, PERIOD_S, RateLimitedLog
 
 
-def test_when_lines_come_in_a_flood_then_the_first_are_told_and_the_rest_counted() -> None:
+def test_when_lines_come_in_a_flood_then_the_first_are_reported_and_the_rest_counted() -> None:
     told: list[str] = []
     now_s = [0.0]
     log = RateLimitedLog(told.append, lambda: now_s[0])
@@ -22,7 +22,7 @@ def test_when_lines_come_in_a_flood_then_the_first_are_told_and_the_rest_counted
     assert len(told) == LINES_AT_ONCE + 2
 
 
-def test_when_it_was_quiet_then_as_many_as_at_first_are_told_again() -> None:
+def test_when_it_was_quiet_then_as_many_as_at_first_are_reported_again() -> None:
     told: list[str] = []
     now_s = [0.0]
     log = RateLimitedLog(told.append, lambda: now_s[0])
@@ -33,7 +33,7 @@ def test_when_it_was_quiet_then_as_many_as_at_first_are_told_again() -> None:
     assert told == ["refused"] * 2 * LINES_AT_ONCE
 
 
-def test_when_a_text_would_command_the_terminal_then_it_is_told_as_plain_text() -> None:
+def test_when_a_text_would_command_the_terminal_then_it_is_reported_as_plain_text() -> None:
     told: list[str] = []
     RateLimitedLog(told.append)("why:\n  \x1b[2J\a" + "x" * CHARACTERS_MAX)
     (line,) = told

@@ -48,7 +48,7 @@ def fly_virtual(**transmitter: Any) -> tuple[Outcome, ReceiverEndpoint]:
 
 
 def fly_real(endpoint: ReceiverEndpoint, should_stop: Callable[[TransmitterRun], bool]) -> Outcome:
-    """Fly over a memory link in real time, the receiver in a thread of its own."""
+    """Fly over a memory link in real time, the receiver in a separate thread."""
     agreement = agreement_on("real")
     near, far = memory_pair()
 
@@ -86,7 +86,7 @@ def test_when_the_last_echo_differs_on_the_real_clock_then_the_flight_is_a_desyn
 
 
 @pytest.mark.real_time
-def test_when_it_is_stopped_as_the_welcome_arrives_then_the_receiver_is_told() -> None:
+def test_when_it_is_stopped_as_the_welcome_arrives_then_the_receiver_is_informed() -> None:
     endpoint = build_receiver(agreement_on("real"), None, DATAGRAM)
     outcome = fly_real(endpoint, lambda run: run.node.session.phase is Phase.FLYING)
     assert outcome.code is ExitCode.INTERRUPTED

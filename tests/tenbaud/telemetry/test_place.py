@@ -1,4 +1,4 @@
-"""Where an end listens: a private socket, nothing beside an exposed link, or as told."""
+"""Where an end listens: a private socket, nothing beside an exposed link, or as set."""
 
 from __future__ import annotations
 

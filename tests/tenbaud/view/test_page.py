@@ -137,7 +137,7 @@ def test_the_clock_stands_still_steps_and_goes_on(page: Any) -> None:
     wait(page, f"(old) => {NUMBER.format('f-time')} > old + 0.5", stood)
 
 
-def test_a_bad_wire_is_seen_and_mended(page: Any) -> None:
+def test_a_bad_wire_is_seen_and_repaired(page: Any) -> None:
     erased = number(page, "#f-erasures")
     slider = page.get_by_role("slider", name="Bits lost")
     slider.focus()

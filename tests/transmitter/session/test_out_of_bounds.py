@@ -25,7 +25,7 @@ def rejoining() -> TransmitterSession:
 
 
 @pytest.mark.parametrize("value", [1e36, -1e300, 5e4, math.nan])
-def test_when_an_answer_brings_a_state_that_is_none_then_it_is_dropped_and_the_next_taken(
+def test_when_an_answer_brings_an_invalid_state_then_it_is_dropped_and_the_next_taken(
     value: float,
 ) -> None:
     session = rejoining()

@@ -32,7 +32,7 @@ def test_when_a_field_is_to_be_spoilt_that_the_codec_lacks_then_it_is_told_and_t
     for queue in queues:
         # The static coder has no state, hence no range.
         queue.offer(json.dumps({"kind": "spoil", "end": end, "field": "range"}).encode())
-    run.node.at_tick = LiveTransmitter(run, queues[0], lambda: False).at_tick
+    run.node.before_every_tick(LiveTransmitter(run, queues[0], lambda: False).at_tick)
     live = LiveReceiver(endpoint, queues[1], lambda: False, MemoryRecorder(), None, "")
     assert not live()
     outcome = transmit.fly_virtual(run, endpoint, lambda: False)

@@ -222,6 +222,10 @@ class ImpairedLine:
         held_ns = one.reorder_ns if one.reorder or one.duplicate else 0
         return self.line.longest_delay_ns + one.delay_ns + one.jitter_ns + held_ns
 
+    def suffer(self, impairments: Impairments) -> None:
+        """Change what goes wrong from now on."""
+        self.impairments = impairments
+
     def carry(self, data: bytes, now_ns: int) -> list[Delivery]:
         """Return the arrivals of a message put on the line at flight time `now_ns`."""
         one, chance = self.impairments, self._chance.random
@@ -274,5 +278,5 @@ def impair(line: Line, impairments: Impairments) -> bool:
     """Change what goes wrong on a line from now on; return whether it is one that can be impaired."""
     if not isinstance(line, ImpairedLine):
         return False
-    line.impairments = impairments
+    line.suffer(impairments)
     return True

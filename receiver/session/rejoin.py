@@ -89,6 +89,10 @@ class Greeter:
         """last request that contradicted what is known"""
         self._persisted = 0
 
+    def answer_with(self, welcome: Welcome) -> None:
+        """Remember what a request was answered with."""
+        self.welcome = welcome
+
     def judge(
         self, hello: Hello, identity: Identity, advanced: bool, silent_slots: int, in_reach: bool
     ) -> Verdict:

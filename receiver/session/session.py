@@ -240,7 +240,7 @@ class ReceiverSession:
         told = () if hold == self.terms.initial_command else to_millivolts(hold)
         asked = (hello.incarnation, hello.request)
         welcome = Welcome(self.session_number, self.epoch, first, *asked, told, state)
-        self._greeter.welcome = welcome
+        self._greeter.answer_with(welcome)
         self._commander.write_down()
         write_epoch(self._recorder, self.terms, self.epoch, self.state, hold)
         kind = EventKind.STARTED if last is None else EventKind.REJOIN

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reproduction.limits.candidates import BEST, CANDIDATES, PAPER
+from reproduction.limits.encoder import encoder_floor
 from reproduction.limits.flight import FINE_COUNTS, RIG_COUNTS
 from reproduction.limits.intervals import ratio
 from reproduction.limits.plan import DENSITIES, NOMINAL, RATES, Outcome
 from reproduction.limits.tables import estimation, floor_of
-from reproduction.limits.yardsticks import encoder_floor
 from tenbaud.recording.style import FAINT, LINE_A, LINE_B, LINE_C, save
 
 if TYPE_CHECKING:

@@ -8,18 +8,17 @@ from pathlib import Path
 
 from reproduction.limits import tables
 from reproduction.limits.candidates import AIM
+from reproduction.limits.encoder import (
+    double_integrator_rate_at_encoder_floor,
+    encoder_floor,
+    floor_behind_encoder,
+)
 from reproduction.limits.flight import FINE_COUNTS, PERIOD_S, RIG_COUNTS, SETTLE_S, tick_of
 from reproduction.limits.intervals import exponent, ratio
 from reproduction.limits.page_template import NOT_RECORDED, PAGE, RECORDED, SUMMARY
 from reproduction.limits.plan import DENSITIES, NOMINAL, RATES, Outcome
 from reproduction.limits.recorded import Row
-from reproduction.limits.yardsticks import (
-    WIENER,
-    double_integrator_rate_at_encoder_floor,
-    encoder_floor,
-    floor_behind_encoder,
-)
-from tenbaud.bounds.closed import DOUBLE_INTEGRATOR
+from tenbaud.bounds.closed import DOUBLE_INTEGRATOR, WIENER
 from tenbaud.bounds.linear import linear_model, rate_needed
 from tenbaud.files.whole import write_whole
 

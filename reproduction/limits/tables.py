@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 from reproduction.limits.candidates import CANDIDATES, PRESETS, TUNED, Candidate
+from reproduction.limits.encoder import floor_behind_encoder
 from reproduction.limits.flight import FINE_COUNTS, RIG_COUNTS, tick_of
 from reproduction.limits.intervals import exponent, paired, ratio
 from reproduction.limits.plan import DENSITIES, NOMINAL, RATES, Outcome
@@ -13,8 +14,7 @@ from reproduction.limits.recorded import Row
 from reproduction.limits.tracking import DISTURBANCES, USUAL
 from reproduction.limits.tracking import PRESETS as LOOPS
 from reproduction.limits.trials import TRIALS, fly_trial
-from reproduction.limits.yardsticks import floor_behind_encoder, word_floor
-from tenbaud.bounds.floor import floor
+from tenbaud.bounds.floor import floor, word_floor
 from tenbaud.bounds.linear import integrators, pitch
 
 

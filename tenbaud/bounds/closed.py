@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 
 LN2 = math.log(2.0)
+WIENER = 1.0 / (2.0 * LN2)
+"""0.721: mean square error of the Wiener process times R/q"""
 DOUBLE_INTEGRATOR = 8.0 / 27.0 / LN2**3
 """0.890: that of the double integrator times R^3/q"""
 

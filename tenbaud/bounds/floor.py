@@ -9,6 +9,10 @@ For a linear model under white noise, an estimate that rests on R bit/s without 
 The least `c' P c` under these is the floor; `closed.py` has the two cases with a closed form.
 A controller that hears no more than these bits cannot track better either: its error is the sum of the
 estimation error and something that does not correlate with it.
+
+With `b` bits at a time, one word per period T, the error is the mean over the period:
+
+    1/2 log det(F P F' + Q_T) - 1/2 log det P <= b ln 2,     P <= F P F' + Q_T
 """
 
 from __future__ import annotations
@@ -20,8 +24,10 @@ from scipy.linalg import solve_continuous_are
 from scipy.optimize import brentq
 
 from tenbaud.bounds.closed import LN2
-from tenbaud.bounds.convex import Value, minimise, traces
-from tenbaud.bounds.linear import LinearModel, Matrix, rate_needed
+from tenbaud.bounds.convex import Value, log_determinant, minimise, traces
+from tenbaud.bounds.linear import LinearModel, Matrix, rate_needed, sampled
+
+QUADRATURE_POINTS = 12
 
 
 class RateTooLow(ValueError):
@@ -34,15 +40,30 @@ def floor(model: LinearModel, rate_bit_s: float, erased: float = 0.0) -> float:
     `erased` is the fraction of the bits that are lost, and known by both ends to be lost: the floor is
     that of `(1 - erased) R`, the capacity of the erasure channel with feedback.
     """
-    rate = paid_rate(model, rate_bit_s, erased)
-    speed = pace_of(model, rate)
-    one, unit = in_units_of(speed, model)
+    rate = _paid(model, rate_bit_s, erased)
+    speed = _speed(model, rate)
+    one, unit = _in_units_of(speed, model)
     nats = rate / speed * LN2
     covariance = minimise(_Flow(one), _start(one, nats), nats)
     return unit * float(one.output @ covariance @ one.output)
 
 
-def paid_rate(model: LinearModel, rate_bit_s: float, erased: float) -> float:
+def word_floor(model: LinearModel, bits: float, period_s: float, erased: float = 0.0) -> float:
+    """Return the least mean square error, over time, with a word of `bits` bits every `period_s`.
+
+    The word is there at the instant of its sample. A word lost with probability `erased` counts for
+    `1 - erased` of its bits.
+    """
+    rate = _paid(model, bits / period_s, erased)
+    speed = _speed(model, rate)
+    one, unit = _in_units_of(speed, model)
+    problem = _Words(one, speed * period_s)
+    nats = rate * period_s * LN2
+    covariance = minimise(problem, problem.start(nats), nats)
+    return unit * (float(np.trace(problem.cost @ covariance)) + problem.between)
+
+
+def _paid(model: LinearModel, rate_bit_s: float, erased: float) -> float:
     """Return the rate that arrives; RateTooLow where it cannot hold the plant."""
     if not (math.isfinite(rate_bit_s) and rate_bit_s > 0.0):
         raise ValueError(f"the rate is {rate_bit_s} bit/s; it must be above 0")
@@ -59,12 +80,12 @@ def paid_rate(model: LinearModel, rate_bit_s: float, erased: float) -> float:
     return rate
 
 
-def pace_of(model: LinearModel, rate_bit_s: float) -> float:
+def _speed(model: LinearModel, rate_bit_s: float) -> float:
     """Return what sets the pace, bits or plant, in 1/s."""
     return max(rate_bit_s, float(np.abs(np.linalg.eigvals(model.dynamics)).max()))
 
 
-def in_units_of(speed: float, model: LinearModel) -> tuple[LinearModel, float]:
+def _in_units_of(speed: float, model: LinearModel) -> tuple[LinearModel, float]:
     """Return the model per `1 / speed` instead of per second, with noise of size one, and its unit.
 
     The unit is that of the squared error. State i is counted in units of speed^i, so that a chain of
@@ -125,3 +146,89 @@ class _Flow:
     def slack_basis(self, basis: Matrix) -> Matrix:
         products = self.model.dynamics @ basis
         return np.asarray(products + products.transpose(0, 2, 1))
+
+
+class _Words:
+    """A word per period; P is the covariance just after it."""
+
+    def __init__(self, model: LinearModel, period_s: float) -> None:
+        self.model = model
+        self.transition, self.noise = sampled(model, period_s)
+        cost = np.zeros_like(self.noise)
+        between = 0.0
+        nodes, weights = np.polynomial.legendre.leggauss(QUADRATURE_POINTS)
+        for node, weight in zip(nodes, weights, strict=True):
+            transition, noise = sampled(model, 0.5 * (node + 1.0) * period_s)
+            seen = transition.T @ model.output
+            cost += 0.5 * weight * np.outer(seen, seen)
+            between += 0.5 * weight * float(model.output @ noise @ model.output)
+        self.cost: Matrix = cost
+        self.between = between
+        """what grows within a period whatever the words say"""
+
+    def start(self, rate_nats: float) -> Matrix:
+        """Return a covariance strictly within: the limit of a filter that sees every state."""
+        ahead = self.noise
+        for _ in range(2):
+            ahead = self.transition @ ahead @ self.transition.T + self.noise
+
+        def settled(share: float) -> Matrix:
+            # P = share (F P F' + Q) is a fixed point for a share that contracts; its rate is
+            # -n/2 log share, all of the states' directions alike.
+            covariance = ahead
+            for _ in range(2000):
+                following = share * (self.transition @ covariance @ self.transition.T + self.noise)
+                if np.allclose(following, covariance, rtol=1e-12, atol=0.0):
+                    break
+                covariance = np.asarray(following)
+            return covariance
+
+        share = math.exp(-2.0 * 0.9 * rate_nats / self.model.states)
+        radius = float(np.abs(np.linalg.eigvals(self.transition)).max())
+        if share * radius**2 < 1.0 - 1e-6:
+            return settled(share)
+        return self._riccati_start(rate_nats)
+
+    def _riccati_start(self, rate_nats: float) -> Matrix:
+        """For plants that grow unevenly: bisect on how well every state is seen."""
+        size = float(np.trace(self.noise))
+
+        def after(gain: float) -> Matrix:
+            covariance = self.noise
+            for _ in range(5000):
+                ahead = self.transition @ covariance @ self.transition.T + self.noise
+                seen = np.linalg.inv(ahead) + gain / size * np.eye(len(ahead))
+                following = np.asarray(np.linalg.inv(seen), dtype=np.float64)
+                if np.allclose(following, covariance, rtol=1e-12, atol=0.0):
+                    break
+                covariance = following
+            return 0.5 * (covariance + covariance.T)
+
+        wanted = 0.5 * (rate_nats + max(0.0, _growth_nats(self.transition)))
+        basis = np.zeros((0, *self.noise.shape))
+
+        def excess(log_gain: float) -> float:
+            return self.rate(after(math.exp(log_gain)), basis).value - wanted
+
+        return after(math.exp(brentq(excess, -30.0, 30.0, xtol=1e-3)))
+
+    def rate(self, covariance: Matrix, basis: Matrix) -> Value:
+        images = self.transition @ basis @ self.transition.T
+        ahead = log_determinant(self.transition @ covariance @ self.transition.T + self.noise, images)
+        now = log_determinant(covariance, basis)
+        return Value(
+            0.5 * (ahead.value - now.value),
+            0.5 * (ahead.gradient - now.gradient),
+            0.5 * (ahead.hessian - now.hessian),
+        )
+
+    def slack(self, covariance: Matrix) -> Matrix:
+        return np.asarray(self.transition @ covariance @ self.transition.T + self.noise - covariance)
+
+    def slack_basis(self, basis: Matrix) -> Matrix:
+        return np.asarray(self.transition @ basis @ self.transition.T - basis)
+
+
+def _growth_nats(transition: Matrix) -> float:
+    sizes = np.abs(np.linalg.eigvals(transition))
+    return float(np.log(sizes[sizes > 1.0]).sum())

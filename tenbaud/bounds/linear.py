@@ -8,6 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import expm
 
 Matrix: TypeAlias = NDArray[np.float64]
 
@@ -119,3 +120,16 @@ def rate_needed(dynamics: ArrayLike) -> float:
     # eps^(1/n); it is no growth.
     slack = 1e-7 * max(1.0, float(np.abs(a).max()))
     return float(growth[growth > slack].sum()) / math.log(2.0)
+
+
+def sampled(model: LinearModel, period_s: float) -> tuple[Matrix, Matrix]:
+    """Return transition matrix and noise covariance over a period (Van Loan, IEEE TAC 23, 1978)."""
+    states = model.states
+    block = np.zeros((2 * states, 2 * states))
+    block[:states, :states] = -model.dynamics
+    block[:states, states:] = model.noise
+    block[states:, states:] = model.dynamics.T
+    exponential = expm(block * period_s)
+    transition = exponential[states:, states:].T
+    covariance = transition @ exponential[:states, states:]
+    return transition, 0.5 * (covariance + covariance.T)

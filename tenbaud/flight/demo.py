@@ -10,7 +10,7 @@ import signal
 import subprocess
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import IO
 
@@ -65,7 +65,7 @@ def fly_demo(
     else:
         with StopFlag() as stop, page_beside(view, stop) as viewing:
             if pace is not None:
-                viewing.transmitter += ["--pace", str(pace)]
+                viewing = replace(viewing, transmitter=[*viewing.transmitter, "--pace", str(pace)])
             result = _fly_processes(agreement, folder, on_status, viewing, stop)
     problems = write_up(folder, agreement.config, result.summary, draw)
     # What ended the flight is said last.

@@ -243,9 +243,9 @@ class McapRecorder:
     def _register(self, channel: RecordChannel) -> _ChannelWriter:
         schema_id = self._writer.register_schema(channel.topic, "jsonschema", channel_schema(channel))
         channel_id = self._writer.register_channel(channel.topic, "json", schema_id)
-        entry = _ChannelWriter(channel, channel_id)
-        if self._overview is not None and self._overview.wants(channel):
-            entry.gather = self._overview.add
+        overview = self._overview
+        gather = overview.add if overview is not None and overview.wants(channel) else None
+        entry = _ChannelWriter(channel, channel_id, gather)
         self._writers[id(channel)] = entry
         return entry
 
@@ -304,14 +304,17 @@ class McapRecorder:
             self._error = text
 
 
+_Gather = Callable[[str, int, Sequence[object]], None]
+
+
 class _ChannelWriter:
     """What the thread knows about one channel. It holds the channel so that its id stays taken."""
 
-    def __init__(self, channel: RecordChannel, channel_id: int) -> None:
+    def __init__(self, channel: RecordChannel, channel_id: int, gather: _Gather | None) -> None:
         self.channel = channel
         self.channel_id = channel_id
         self.encode = row_encoder(channel)
-        self.gather: Callable[[str, int, Sequence[object]], None] | None = None
+        self.gather = gather
 
 
 def _bad_row_text(path: Path, channel: RecordChannel, row: Sequence[object], error: Exception) -> str:

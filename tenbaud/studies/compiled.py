@@ -21,6 +21,7 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any
 
+from channel.codec.lead import fly_ticks
 from channel.codec.numerics import refuse
 from channel.errors import TenbaudError
 
@@ -76,7 +77,8 @@ def compiled(function: Callable[..., Any], parts: Parts = (), inline: bool = Fal
             names[name] = _jit(_refuse, inline="never")
         elif package in PACKAGES:
             ours = rest.startswith("studies")
-            names[name] = compiled(value, parts if ours else (), ours)
+            # Put into its caller: only so are the functions that it is given known by then.
+            names[name] = compiled(value, parts if ours else (), ours or value is fly_ticks)
     scope = {**function.__globals__, **names}
     copy = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
     copy.__module__ = function.__module__

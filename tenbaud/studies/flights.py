@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -56,6 +56,8 @@ class CompiledPoint:
     """
 
     config: FlightConfig
+    scored_from: int | None = None
+    """the tick from which errors count, where it is not the usual one"""
     agreement: Agreement = field(init=False)
     numbers: Numbers = field(init=False)
     constants: Any = field(init=False)
@@ -67,7 +69,7 @@ class CompiledPoint:
     def __post_init__(self) -> None:
         """Build all that does not depend on the seed."""
         config = self.config
-        self.agreement = shared_parts(config)
+        self.agreement = replace(shared_parts(config), scored_from=self.scored_from)
         _require_ordinary(config, self.agreement.codec)
         replay = config.transmitter.rig == "replay"
         ticks = self.agreement.flight_ticks

@@ -118,9 +118,7 @@ def _fly_part(config: FlightConfig, share: float, *, train: bool) -> FlightFigur
     config = config.model_copy(update={"duration_s": until * config.timing.tick_s})
     start = 0 if train else border
     try:
-        point = CompiledPoint(config)
-        point.numbers = point.numbers._replace(window_start=start)
-        return point.fly(config.seed)[0]
+        return CompiledPoint(config, start).fly(config.seed)[0]
     except Uncommon:
         return fly_plain(config, start)
 

@@ -58,6 +58,10 @@ class _Composer:
         self._measured = agreement.codec.model.measured
         self._stride = max(1, round(POINT_PERIOD_S / (agreement.terms.tick_ns / 1e9)))
 
+    def skip(self, messages: int) -> None:
+        """Note that so many messages were not sent."""
+        self.skipped += messages
+
     def watch(self, watched: bool) -> None:
         """Have rows kept only while anybody watches."""
         self.tap.watch(watched)

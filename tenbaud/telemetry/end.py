@@ -68,7 +68,7 @@ class TelemetryEnd:
         """Return what obeys commands for this transmitter, hung into its loop where it has work."""
         live = LiveTransmitter(run, self.queue, stop, self.pace, keep_alive or (lambda: None))
         if self.queue is not None or self.pace is not None:
-            run.node.at_tick = live.at_tick
+            run.node.before_every_tick(live.at_tick)
         return live
 
     def fly_receiver(self, endpoint: ReceiverEndpoint, stop: Stop) -> LiveReceiver:

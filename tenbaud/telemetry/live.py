@@ -108,14 +108,15 @@ class LiveTransmitter:
         impair(self._run.uplink.line, faults.up)
         impair(self._run.downlink, faults.down)
         if faults.up.raw or faults.down.raw:
-            self._run.desyncs_asked = math.inf
+            self._run.expect_desyncs(math.inf)
         return _by_hand(ByHand.IMPAIR, detail=text)
 
     def _corrupt(self, end: Role, field: str) -> Event | None:
         session = self._run.node.session
         # Both codecs are the same kind: what this one cannot do, the receiver's refuses too.
         event = corrupt(session, field, session.copies.confirmed.sample, end == "transmitter")
-        self._run.desyncs_asked += event.cause is ByHand.CORRUPT
+        if event.cause is ByHand.CORRUPT:
+            self._run.expect_desyncs(1)
         return event if end == "transmitter" else None
 
     def _next_sample_tick(self, tick: int) -> int:
@@ -180,7 +181,7 @@ class LiveReceiver:
             case SetPoint(angle_rad=angle_rad):
                 if self.steering is None:
                     return _ignored("this controller has no set-point")
-                self.steering.by_hand_rad = angle_rad
+                self.steering.steer(angle_rad)
                 cause = ByHand.FOLLOW if angle_rad is None else ByHand.SET_POINT
                 return _by_hand(cause, value=angle_rad)
             case Impair(text=text):

@@ -30,6 +30,9 @@ class Composer(Protocol):
 
     skipped: int
 
+    def skip(self, messages: int) -> None:
+        """Note that so many messages were not sent."""
+
     def watch(self, watched: bool) -> None:
         """Hear whether anybody watches; while nobody does, no message is asked for."""
 
@@ -75,7 +78,7 @@ class Publisher:
             late_s = time.monotonic() - due_s
             if late_s > self._period_s:
                 missed = int(late_s / self._period_s)
-                self._composer.skipped += missed
+                self._composer.skip(missed)
                 due_s += missed * self._period_s
             ending = self._ending.wait(max(0.0, due_s - time.monotonic()))
             self._guard(self._send)
@@ -89,7 +92,7 @@ class Publisher:
         try:
             self._port.publish(message)
         except LinkError:
-            self._composer.skipped += 1
+            self._composer.skip(1)
         else:
             self.sent += 1
 

@@ -30,9 +30,8 @@ def test_when_both_sessions_fly_it_in_memory_then_the_errors_are_the_same_to_the
     candidate: str,
 ) -> None:
     case = Case(candidate, 10.0, 2e-3, 4, 30.0, closed_loop=True, counts=4096)
-    agreement = configuration(case)
+    agreement = replace(configuration(case), scored_from=1000)
     run = transmit.prepare(agreement, None, DATAGRAM)
-    run.node.scores.window_start_tick = 1000
     outcome = transmit.fly_virtual(run, build_receiver(agreement, None, DATAGRAM), lambda: False)
     assert not outcome.code
     lean = fly_agreement(agreement, 10.0)

@@ -7,17 +7,18 @@ import math
 import numpy as np
 import pytest
 
-from reproduction.limits.yardsticks import WIENER, sampled, word_floor
 from tenbaud.bounds.closed import (
     DOUBLE_INTEGRATOR,
+    WIENER,
     double_integrator_floor,
     double_integrator_rate,
 )
 from tenbaud.bounds.floor import (
     RateTooLow,
     floor,
+    word_floor,
 )
-from tenbaud.bounds.linear import integrators, linear_model, pitch
+from tenbaud.bounds.linear import integrators, linear_model, pitch, sampled
 
 PENDULUM = linear_model([[0.0, 1.0], [7.3198**2, 0.0]], [[0.0, 0.0], [0.0, 1e-3]], [1.0, 0.0])
 

@@ -7,10 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from reproduction.limits.yardsticks import (
+from reproduction.limits.encoder import (
     double_integrator_rate_at_encoder_floor,
     encoder_floor,
-    sampled,
 )
 from tenbaud.bounds.floor import floor
 from tenbaud.bounds.linear import (
@@ -18,6 +17,7 @@ from tenbaud.bounds.linear import (
     linear_model,
     pitch,
     rate_needed,
+    sampled,
 )
 
 

@@ -32,7 +32,7 @@ def test_when_a_field_to_corrupt_is_missing_then_it_is_reported_and_the_flight_g
     for queue in queues:
         # The static coder has no state, hence no range.
         queue.offer(json.dumps({"kind": "corrupt", "end": end, "field": "range"}).encode())
-    run.node.at_tick = LiveTransmitter(run, queues[0], lambda: False).at_tick
+    run.node.before_every_tick(LiveTransmitter(run, queues[0], lambda: False).at_tick)
     live = LiveReceiver(endpoint, queues[1], lambda: False, MemoryRecorder(), None, "")
     assert not live()
     outcome = transmit.fly_virtual(run, endpoint, lambda: False)

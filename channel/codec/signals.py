@@ -136,13 +136,13 @@ class Signals:
 
     def groups(self, what: str) -> list[tuple[str, list[int]]]:
         """Return which of the `inputs` or `outputs` share a panel: its label, and their places."""
-        found: dict[tuple[str, str], list[int]] = {}
         signals: tuple[Signal, ...] = getattr(self, what)
-        for place, one in enumerate(signals):
-            found.setdefault((one.group, "" if one.group else one.unit), []).append(place)
+        keys = [(one.group, "" if one.group else one.unit) for one in signals]
         return [
-            (_group_label(group, [signals[place] for place in places]), places)
-            for (group, _), places in found.items()
+            (_group_label(key[0], [signals[place] for place in places]), places)
+            for first, key in enumerate(keys)
+            if key not in keys[:first]
+            for places in [[place for place, other in enumerate(keys) if other == key]]
         ]
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from channel.codec.signals import signals_of
 from tenbaud.audit.base import Claim, Evidence, Findings, Place
+from tenbaud.recording.encoding import SIGNALS_KEY, signals_text
 from tenbaud.recording.notes import hole_notes, stray_notes
 from tenbaud.recording.recover import RECOVERED_NOTE
 
@@ -15,6 +17,7 @@ def check_heads(evidence: Evidence, findings: Findings) -> None:
             "role": end,
             "config_digest": identity.config_digest.hex(),
             "tick_s": repr(evidence.agreement.config.timing.tick_s),
+            SIGNALS_KEY: signals_text(signals_of(evidence.agreement.codec.model)),
         }
         for name, value in wanted.items():
             said = tables.metadata.get(name)

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from channel.codec.signals import signals_of
 from channel.links.base import Link, Role
 from channel.links.kind import LinkEnd, NodePlace
 from channel.links.security import Security
@@ -26,6 +27,7 @@ from tenbaud.flight.status import Status, StatusMode
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, gap_part, link_part, receiver_part, transmitter_part
 from tenbaud.flight.trouble import Trouble
+from tenbaud.recording.encoding import SIGNALS_KEY, signals_text
 from tenbaud.recording.folder import RunFolder
 from tenbaud.recording.gather import OverviewRecorder
 from tenbaud.recording.shared import SharedWriter
@@ -167,6 +169,7 @@ def open_recorder(
 
     `writer`: a thread that it shares with others, instead of one of its own.
     """
+    plant = signals_of(agreement.codec.model)
     metadata = {
         "role": role,
         "preset": agreement.config.preset,
@@ -176,11 +179,12 @@ def open_recorder(
         "numerics_probe": agreement.identity.numerics_probe.hex(),
         "tick_s": repr(agreement.config.timing.tick_s),
         "shared_config": agreement.identity.config,
+        SIGNALS_KEY: signals_text(plant),
         "seed": str(agreement.config.seed),
         "impairments": agreement.config.link.impairments,
     }
     # Of many rigs no figures are drawn at the end.
-    overview = OverviewRecorder() if writer is None else None
+    overview = OverviewRecorder(plant) if writer is None else None
     # Virtual time can outrun the disk and is not disturbed by waiting for it.
     wait = agreement.clock == "virtual"
     return McapRecorder(path, metadata, wait_when_full=wait, shared=writer, overview=overview)

@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
+from channel.codec.models.pitch import PITCH_SIGNALS
 from channel.protocol.events import EVENT_CHANNEL
 from channel.protocol.recording import Field, RecordChannel
 
@@ -24,6 +25,9 @@ NEW_NAMES = {
     "command_volts": "command",
 }
 """Field of a tick -> its name today."""
+
+SIGNALS_WITHOUT = PITCH_SIGNALS
+"""Of a recording that does not describe its signals: all flights were of the pitch."""
 
 OLD_EVENT_CHANNEL = RecordChannel(
     "event",

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from channel.codec.models.pitch import PITCH_SIGNALS
 from tenbaud import Run
 from tenbaud.recording.errors import RecordingError
-from tenbaud.recording.signals import SIGNALS
+from tenbaud.recording.signals import definitions
 from tests.tenbaud.flown import SECONDS, flown
 from tests.tenbaud.processes import REPOSITORY
 
@@ -39,7 +40,7 @@ def test_every_signal_is_on_the_common_time_base_with_a_unit_and_a_meaning(lossy
 
 def test_every_signal_is_in_the_table_of_the_documentation() -> None:
     text = (REPOSITORY / "docs" / "recordings.md").read_text()
-    for name, _, _, _ in SIGNALS:
+    for name in definitions(PITCH_SIGNALS):
         assert f"`{name}`" in text, name
 
 
@@ -100,7 +101,7 @@ def test_summary_events_and_configuration_are_there(lossy: Run) -> None:
 
 def test_plot_is_a_figure_and_a_file(lossy: Run, tmp_path: Path) -> None:
     figure = lossy.plot(tmp_path / "flight.png")
-    assert len(figure.axes) == 4
+    assert len(figure.axes) == 5
     assert (tmp_path / "flight.png").read_bytes().startswith(b"\x89PNG")
 
 

@@ -276,7 +276,7 @@ class _Kind(NamedTuple):
 
     curve: str
     label: str
-    """empty: the name of the output or input, which is told of each"""
+    """empty: the name of the output or input"""
     colour: str
     width: float = 0.8
     style: Mapping[str, Any] = MappingProxyType({})

@@ -101,7 +101,7 @@ class Source:
         return self.ticks("transmitter", "estimate", "coded_state", state)
 
     def live(self, state: int | None) -> Series | None:
-        """Return what the receiver believed of a state in advance."""
+        """Return what the receiver predicted of a state."""
         live = self.ticks("transmitter", "estimate", "live_state", state)
         return self.ticks("receiver", "tick", "live_state", state) if live is None else live
 

@@ -59,7 +59,7 @@ class _Composer:
         self._stride = max(1, round(POINT_PERIOD_S / (agreement.terms.tick_ns / 1e9)))
 
     def skip(self, messages: int) -> None:
-        """Note that so many messages were not sent."""
+        """Count messages that were not sent."""
         self.skipped += messages
 
     def watch(self, watched: bool) -> None:

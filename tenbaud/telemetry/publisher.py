@@ -31,7 +31,7 @@ class Composer(Protocol):
     skipped: int
 
     def skip(self, messages: int) -> None:
-        """Note that so many messages were not sent."""
+        """Count messages that were not sent."""
 
     def watch(self, watched: bool) -> None:
         """Hear whether anybody watches; while nobody does, no message is asked for."""

@@ -1,4 +1,4 @@
-"""What a model or a coder from outside is given when it is built."""
+"""The context that a model or a coder from outside gets when it is built."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is written down so that a flight can be audited afterwards: symbols in slots, and starts.
+"""The records that an audit needs: symbols in slots, and the start of each epoch.
 
 The transmitter writes each symbol with the time at which it left, the receiver each symbol with the
 time at which it came. With the start of every epoch, the only states that ever travel (down the link,

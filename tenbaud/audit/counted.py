@@ -1,4 +1,4 @@
-"""What went through the slots of the uplink, counted in the recordings of both ends."""
+"""Counts of the uplink's slots, from the recordings of both ends."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tenbaud.audit.base import Evidence
 
 @dataclass(frozen=True, slots=True)
 class Counted:
-    """What was counted in the recordings, not what the ends said of themselves."""
+    """Counts of the recorded rows, independent of the summaries."""
 
     symbols_sent: int | None
     symbols_refused: int | None

@@ -195,7 +195,7 @@ UNCLAIMED: tuple[Unclaimed, ...] = (
         for end in ("transmitter", "receiver")
     ),
 )
-"""What an audit does not verify."""
+"""Fields that an audit does not verify."""
 
 
 def reason_for(end: str, topic: str, field: str, row: Any, evidence: Evidence) -> str | None:

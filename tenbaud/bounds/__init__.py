@@ -1,1 +1,1 @@
-"""What no code of R bit/s can do better than: `floor` first, then `linear`, `encoder`."""
+"""The smallest error of any code of R bit/s: read `floor` first, then `linear`, `encoder`."""

@@ -12,7 +12,7 @@ RunArgument = Annotated[Path, typer.Argument(help="Folder of a run, or one recor
 
 
 class Form(StrEnum):
-    """What a run can become."""
+    """The formats that a run converts to."""
 
     CSV = "csv"
     MAT = "mat"

@@ -20,7 +20,7 @@ RUN_METADATA = "run"
 END_METADATA = "recorder"
 """Written when a recording is finished only: how many rows were written and dropped, and why."""
 OVERVIEW_METADATA = "overview"
-"""What the figure of a long flight shows (`overview.py`)."""
+"""The data for the figure of a long flight (`overview.py`)."""
 KEY_PROPERTY = "key"
 """In a schema: the name of the field that counts the rows (tick or sample)."""
 

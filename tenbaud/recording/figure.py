@@ -39,7 +39,7 @@ REJOIN_COLOUR = "#2a8c4a"
 
 @dataclass(frozen=True, slots=True)
 class _Flight:
-    """What the figure shows."""
+    """The contents of the figure."""
 
     curves: dict[str, tuple[Series, Series]]
     marks: dict[str, Series]

@@ -1,4 +1,4 @@
-"""Where the reading of a damaged recording goes on."""
+"""Finds where the reading of a damaged recording can continue."""
 
 from __future__ import annotations
 

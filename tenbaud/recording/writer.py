@@ -123,7 +123,7 @@ class McapRecorder:
 
     @property
     def cause(self) -> Exception | None:
-        """What ended the recording before its end, None if nothing did."""
+        """The error that ended the recording early, None if there was none."""
         return self._cause
 
     def write(self, channel: RecordChannel, time_ns: int, row: Sequence[object]) -> None:
@@ -305,7 +305,7 @@ class McapRecorder:
 
 
 class _ChannelWriter:
-    """What the thread knows about one channel. It holds the channel so that its id stays taken."""
+    """The thread's data about one channel. It holds the channel so that its id stays in use."""
 
     def __init__(self, channel: RecordChannel, channel_id: int) -> None:
         self.channel = channel

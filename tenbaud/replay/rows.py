@@ -48,7 +48,7 @@ class ArrivedSymbol(NamedTuple):
 
 
 class EpochStart(NamedTuple):
-    """What an epoch starts from."""
+    """The initial state of an epoch."""
 
     sample: int
     epoch: int
@@ -142,7 +142,7 @@ class GaugeRow(NamedTuple):
 
 
 class DeviceRow(NamedTuple):
-    """What a real rig said with a reading."""
+    """A real rig's report beside a reading."""
 
     tick: int
     counts: tuple[int, ...]

@@ -1,4 +1,4 @@
-"""What can go wrong with a rig before a flight; in flight it is a fault in a reading instead."""
+"""Errors of a rig before a flight; in flight they are faults in a reading instead."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ Decide = Callable[[int, Vector], Vector]
 
 
 class FlownSample(NamedTuple):
-    """What came of one word."""
+    """The result of one word."""
 
     state: CodecState
     """Codec state after the sample."""

@@ -1,4 +1,4 @@
-"""What a kind of link says about itself: how an end is opened, and what a flight over it must know.
+"""Properties of a kind of link: how an end is opened, and how a flight over it differs.
 
 A kind is a class without arguments, named in `channel.links.registry` or by an entry point of the group
 `tenbaud.links`. It imports its transport inside `open`, so that a flight over another kind does
@@ -21,7 +21,7 @@ from channel.protocol.terms import Terms
 
 
 class NodePlace(TypedDict, total=False):
-    """Where a Zenoh node is and whom it lets in, for those that hand it on."""
+    """Address and access rules of a Zenoh node."""
 
     listen: tuple[str, ...]
     connect: tuple[str, ...]

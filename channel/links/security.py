@@ -1,4 +1,4 @@
-"""Who an end is and whom it lets in, as settings of Zenoh: TLS with client certificates, access rules.
+"""An end's identity and access rules as settings of Zenoh: TLS with client certificates.
 
 TLS proves who is at the other end of a connection: both sides show a certificate of the same private
 authority, and the side that connects checks that the listener's certificate names the address. That

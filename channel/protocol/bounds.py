@@ -1,4 +1,4 @@
-"""What a frame of a flight may hold. A frame out of bounds is dropped before anything is kept from it.
+"""Bounds for the fields of a frame. A frame out of bounds is dropped before any of it is kept.
 
 A good check says that a frame arrived as it was sent, not that it makes sense: the sender may have
 failed, may be of another flight, or may be somebody else. So both sessions ask here, for every frame

@@ -127,7 +127,7 @@ class LocatedSymbol:
 
 @dataclass(frozen=True, slots=True)
 class Echo:
-    """What the receiver consumed for one sample, and what it decided on it."""
+    """The word that the receiver consumed for one sample, and the commands that it computed."""
 
     sample: int
     word_number: int

@@ -29,7 +29,7 @@ UNWRITTEN_MAX = 32
 
 
 class Standing(NamedTuple):
-    """Where a flight stands: all that the next epoch follows from."""
+    """The state of a flight that determines the next epoch."""
 
     state: CodecState
     hold: Vector

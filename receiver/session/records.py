@@ -1,4 +1,4 @@
-"""What the receiver writes down."""
+"""The records of the receiver."""
 
 from __future__ import annotations
 

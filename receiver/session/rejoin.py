@@ -1,4 +1,4 @@
-"""Which request for a session gets which answer, and from which state the ends start again.
+"""The answers to requests for a session, and the state from which the ends start again.
 
 * An unanswered request is repeated by the transmitter, so equal requests get equal answers for as
   long as nothing was flown on them, unless the answer has grown too old to begin with.
@@ -64,7 +64,7 @@ VERSION_SHOWN = 40
 
 
 class Verdict(Enum):
-    """What to do about a request."""
+    """The decision about a request."""
 
     IGNORE = auto()
     REPEAT = auto()

@@ -52,7 +52,7 @@ EPOCH_MAX = 0xFFFF
 
 
 class Phase(Enum):
-    """Where the receiver's session stands."""
+    """Phase of the receiver's session."""
 
     WAITING = "waiting"  # for a transmitter
     FLYING = "flying"

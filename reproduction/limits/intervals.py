@@ -1,4 +1,4 @@
-"""What seeds are worth: means with their 95 % intervals."""
+"""Means over seeds with their 95 % intervals."""
 
 from __future__ import annotations
 

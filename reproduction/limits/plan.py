@@ -1,4 +1,4 @@
-"""Which flights the page needs, flown on two cores."""
+"""The flights of the page, flown on two cores."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the paper's text leaves open or has wrong in print, and what was chosen."""
+"""Ambiguities and misprints of the paper's text, and our choices."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ WORD_BITS = 10
 
 @dataclass(frozen=True, slots=True)
 class FirstHalf:
-    """What the first half of the recording says about the body."""
+    """The model identified from the first half of the recording."""
 
     regression: PitchIdentification
     fitted: CrossCheck

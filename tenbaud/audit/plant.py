@@ -139,7 +139,7 @@ def _check_told(evidence: Evidence, changes: list[int], findings: Findings) -> N
 
 
 class _Passed:
-    """What the guard lets pass, in the states that were recorded."""
+    """The voltages that the guard allows, in the recorded states."""
 
     def __init__(self, agreement: Agreement) -> None:
         settings = guard_settings(agreement)

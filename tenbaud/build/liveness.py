@@ -1,4 +1,4 @@
-"""Whether a flight comes back from every lost lockstep: its lead, delays and watchdog together.
+"""Checks that lead, delays and watchdog allow a flight to recover from every loss of lockstep.
 
 `agree` checks this for every configuration, so that what cannot fly is refused, with numbers, instead
 of asking for a new epoch for ever. `docs/RELIABILITY.md` has the reasoning.

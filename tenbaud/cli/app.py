@@ -9,7 +9,7 @@ import sys
 import warnings
 
 NOT_WRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO)
-"""What only happens to who writes."""
+"""Errors of writing alone."""
 
 
 def main() -> None:

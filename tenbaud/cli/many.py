@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Many:
-    """What `--sessions` and the options that go with it say."""
+    """`--sessions` and its options."""
 
     sessions: str
     configs: Path | None

@@ -74,7 +74,7 @@ class Timing(Section):
 
 
 class ChannelSection(Section):
-    """What the line carries, and when."""
+    """Symbol rate and timing of the line."""
 
     rate_baud: Annotated[float, Field(ge=0.001, le=100_000.0)] = 10.0
     """R: symbols per second that may go up the link"""
@@ -103,7 +103,7 @@ KINDS: dict[str, dict[str, type[KindSection]]] = {
 
 
 class Limits(Section):
-    """What a command may be; the receiver keeps to it and the guard beside the motors checks it."""
+    """Limits of a command; the receiver keeps them and the guard beside the motors checks them."""
 
     volts_max: Annotated[float, Field(ge=0.001, le=32.0)] = 5.0
     slew_volts_per_s: Positive = 1000.0
@@ -208,7 +208,7 @@ class FlightLogSection(Section):
 
 
 class LinkSection(Section):
-    """Where the other end is."""
+    """The link to the other end."""
 
     kind: Annotated[str, AfterValidator(PartName(LINKS))] = "zenoh"
     session: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+(/[A-Za-z0-9_.-]+)*$")] = "helicopter"

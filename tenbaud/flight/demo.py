@@ -35,7 +35,7 @@ ENDING_TIMEOUT_S = 15.0
 
 @dataclass(slots=True)
 class DemoResult:
-    """What both processes reported."""
+    """The reports of both processes."""
 
     summary: Summary
     code: ExitCode

@@ -44,7 +44,7 @@ WORDS_SHOWN = 48
 
 @dataclass(frozen=True, slots=True)
 class Endpoints:
-    """Where an end listens and connects."""
+    """Addresses where an end listens and connects."""
 
     listen: tuple[str, ...] = ()
     connect: tuple[str, ...] = ()

@@ -1,4 +1,4 @@
-"""What was seen of a flight in memory, as arrays over its ticks and tuples over its samples."""
+"""The result of a flight in memory: arrays over its ticks and tuples over its samples."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What can be wrong with an end's own line: a port that went, a certificate that expired in flight."""
+"""Faults of an end's own line: a lost port, a certificate that expired in flight."""
 
 from __future__ import annotations
 

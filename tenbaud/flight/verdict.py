@@ -1,4 +1,4 @@
-"""Whether a flight that went to its end has flown: from counts, and for people in words.
+"""Decides from counts whether a completed flight has really flown, and explains it.
 
 A process that came to the end of its flight has shown nothing by that. What counts is that samples were
 confirmed, that most of them brought a word, that the motors had commands, and that epochs lasted.
@@ -39,7 +39,7 @@ class NotFlown(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class FlightCounts:
-    """What the verdict rests on, as far as an end knows it."""
+    """The inputs of the verdict, as far as an end knows them."""
 
     samples: int
     """that the flight had time for"""
@@ -70,7 +70,7 @@ def faults_of(counts: FlightCounts) -> tuple[NotFlown, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What a person could change, as it was."""
+    """The settings that a person could change."""
 
     lead_s: float
     watchdog_s: float

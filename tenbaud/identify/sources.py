@@ -1,4 +1,4 @@
-"""Where a pitch record comes from: the configured rig, the folder of a run, or a CSV log."""
+"""Sources of a pitch record: the configured rig, the folder of a run, or a CSV log."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ AngleUnit = Literal["counts", "rad", "deg"]
 
 @dataclass(frozen=True, slots=True)
 class LogColumns:
-    """Which columns of a log hold what; a time column, where there is one, is in seconds."""
+    """The columns of a log; a time column, if there is one, is in seconds."""
 
     angle: str = "pitch_counts"
     front: str = "right_volts"

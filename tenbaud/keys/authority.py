@@ -26,7 +26,7 @@ LOCAL_HOSTS = ("localhost", "127.0.0.1", "::1")
 
 
 class NodeRole(StrEnum):
-    """What a certificate is for."""
+    """The purpose of a certificate."""
 
     TRANSMITTER = "transmitter"
     RECEIVER = "receiver"
@@ -36,7 +36,7 @@ class NodeRole(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Certified:
-    """What a node's certificate says."""
+    """The contents of a node's certificate."""
 
     name: str
     role: NodeRole

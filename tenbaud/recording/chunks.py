@@ -66,12 +66,12 @@ class Torn(ValueError):
 
 
 BROKEN = (Torn, McapError, struct.error, zstandard.ZstdError, UnicodeDecodeError)
-"""What the reading of a damaged record raises, depending on where the damage is."""
+"""The exceptions of reading a damaged record; they depend on the place of the damage."""
 
 
 @dataclass(slots=True)
 class Block:
-    """What one record of the file brought: messages in order, and what describes them."""
+    """The contents of one record of the file: messages in order, and their descriptions."""
 
     messages: list[RawMessage] = field(default_factory=list)
     described: list[Described] = field(default_factory=list)

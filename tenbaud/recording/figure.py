@@ -52,7 +52,7 @@ _Draw = Callable[["Axes", "_Flight"], None]
 
 @dataclass(frozen=True, slots=True)
 class _Flight:
-    """What the figure shows."""
+    """The contents of the figure."""
 
     plant: Signals
     curves: dict[str, list[Curve]]

@@ -1,4 +1,4 @@
-"""What the picture of a flight shows, in bounded memory: gathered while it flies, or from its rows.
+"""The data for a flight's figure, in bounded memory: gathered in flight, or from its rows.
 
 A recorder keeps an overview beside the rows that it writes and stores it at the end of a long recording
 so that ten million ticks are drawn at once when they have been flown. Everybody

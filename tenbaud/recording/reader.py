@@ -67,7 +67,7 @@ class MessageStream:
 
     @property
     def holes(self) -> list[Hole]:
-        """What is missing, also where an earlier recovery has found it."""
+        """The gaps, including those that an earlier recovery found."""
         found = self._finder.holes(self._topics, self.channels, self._ended)
         return unpacked_holes(self.metadata.get(HOLES_METADATA, {})) + found
 
@@ -174,7 +174,7 @@ class MessageStream:
 
 @dataclass(slots=True)
 class TopicSummary:
-    """What one topic of a recording holds."""
+    """The rows of one topic of a recording."""
 
     channel: RecordChannel
     rows: int = 0
@@ -207,7 +207,7 @@ class Recording:
 
     @property
     def holes(self) -> list[Hole]:
-        """What is missing between rows that are there."""
+        """The gaps between rows."""
         return self._survey.holes
 
     @property
@@ -217,7 +217,7 @@ class Recording:
 
     @property
     def metadata(self) -> dict[str, str]:
-        """What the run said about itself when it began."""
+        """The metadata that the run wrote when it began."""
         return self.metadata_record(RUN_METADATA)
 
     def metadata_record(self, name: str) -> dict[str, str]:

@@ -41,7 +41,7 @@ KNOWN = (
     *(ARRIVED_CHANNEL, EPOCH_CHANNEL, EVENT_CHANNEL, LOCKSTEP_CHANNEL, GAP_CHANNEL),
     OLD_EVENT_CHANNEL,
 )
-"""What the two ends of this version write, and of those before it what has changed."""
+"""The rows that this version's ends write, and the changed ones of earlier versions."""
 
 NEVER_NULL = {
     ("epoch", "epoch"),

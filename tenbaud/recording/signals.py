@@ -77,7 +77,7 @@ Maker = Callable[["Source"], Series | None]
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """What signals are made from. An end that was not recorded is None."""
+    """The sources of signals. An end that was not recorded is None."""
 
     base: TimeBase
     transmitter: Tables | None

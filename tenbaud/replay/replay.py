@@ -18,7 +18,7 @@ from tenbaud.replay.symbols import Packed, Unpacked, pack
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """What came of a replay."""
+    """The result of a replay."""
 
     samples: int
     digests_compared: int

@@ -49,7 +49,7 @@ class Packed:
 
 @dataclass(frozen=True, slots=True)
 class Unpacked:
-    """What a symbols file holds."""
+    """The contents of a symbols file."""
 
     agreement: Agreement
     epochs: list[Epoch]

@@ -24,7 +24,7 @@ class ChunkTask(NamedTuple):
 
 
 class ChunkResult(NamedTuple):
-    """What a worker returns."""
+    """The result of a worker."""
 
     chunk: int
     figures: list[FlightFigures]

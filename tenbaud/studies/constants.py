@@ -1,4 +1,4 @@
-"""Which constants of a coder and a model are fitted, and between which ends."""
+"""The constants of a coder and a model that are fitted, and their bounds."""
 
 from __future__ import annotations
 

@@ -26,11 +26,11 @@ from tenbaud.studies.study_file import Range
 Method = Literal["differential-evolution", "nelder-mead"]
 
 PENALTY_RAD = 100.0
-"""What a flight without figures counts as: worse than any error that an angle can have."""
+"""The error that counts for a flight without figures: larger than any error of an angle."""
 
 
 class Split(NamedTuple):
-    """Which flights are for the fit, and which for the judgement."""
+    """The split of flights into those for the fit and those for the validation."""
 
     train_seeds: tuple[int, ...]
     test_seeds: tuple[int, ...]
@@ -76,7 +76,7 @@ class Tuning:
 
 
 class Judged(NamedTuple):
-    """What came of the flights of one part of a split."""
+    """The result of the flights of one part of a split."""
 
     rms_rad: float
     """over all of them; one without figures counts as `PENALTY_RAD`"""

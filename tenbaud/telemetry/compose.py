@@ -47,7 +47,7 @@ R_SAMPLE, R_WORD, R_DIGEST = _at(TAKEN, "sample", "word", "digest")
 
 
 class _Composer:
-    """What both ends' messages have in common."""
+    """Common fields of both ends' messages."""
 
     def __init__(self, agreement: Agreement, tap: Tap) -> None:
         self.agreement = agreement

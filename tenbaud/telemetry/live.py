@@ -34,7 +34,7 @@ KEEP_ALIVE_S = 0.5
 
 
 class LiveTransmitter:
-    """What is asked of the sensor node; `at_tick` is called by its loop before every tick.
+    """Commands to the sensor node; its loop calls `at_tick` before every tick.
 
     `pace`: virtual seconds per second at most, None for no limit. `keep_alive` is called now and then
     while the flight is paused.
@@ -149,7 +149,7 @@ class LiveTransmitter:
 
 
 class LiveReceiver:
-    """What is asked of the controller node; called by its loop between messages (`should_stop`)."""
+    """Commands to the controller node; its loop calls `should_stop` between messages."""
 
     def __init__(
         self,

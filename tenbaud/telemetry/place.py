@@ -1,4 +1,4 @@
-"""Where telemetry is to be found.
+"""The addresses of telemetry.
 
 Without further word an end listens on a socket file in a folder that only its user may enter: nothing
 on this machine's network, no port that two flights could want, and a viewer finds every flight of its

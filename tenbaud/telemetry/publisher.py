@@ -13,7 +13,7 @@ from channel.errors import LinkError
 
 
 class Port(Protocol):
-    """Where messages go."""
+    """The destination of messages."""
 
     def is_watched(self) -> bool:
         """Return whether anybody would get a message."""
@@ -26,7 +26,7 @@ class Port(Protocol):
 
 
 class Composer(Protocol):
-    """What makes the messages."""
+    """The source of messages."""
 
     skipped: int
 

@@ -1,4 +1,4 @@
-"""What goes over the telemetry keys, described once: the ends keep to it and tests check each message.
+"""The messages of the telemetry keys, described once: tests check each message against it.
 
 `tenbaud view --schema` prints it as JSON schema; `docs/telemetry.schema.json` is that file.
 """
@@ -109,7 +109,7 @@ class _EndMessage(_Message):
 
 
 class TransmitterTelemetry(_EndMessage):
-    """What the sensor node tells."""
+    """The telemetry of the sensor node."""
 
     role: Literal["transmitter"]
     preset: str
@@ -130,7 +130,7 @@ class TransmitterTelemetry(_EndMessage):
 
 
 class ReceiverTelemetry(_EndMessage):
-    """What the controller node tells."""
+    """The telemetry of the controller node."""
 
     role: Literal["receiver"]
     baud_measured: float | None = Field(description="symbols per second on this end's clock")
@@ -169,7 +169,7 @@ class Pace(_Message):
 
 
 class Impair(_Message):
-    """What goes wrong on the line from now on, all of it; an empty text for a clean line."""
+    """All impairments of the line from now on; an empty text for a clean line."""
 
     kind: Literal["impair"]
     text: Annotated[str, Field(max_length=300)]

@@ -22,7 +22,7 @@ PATH_BYTES = 8
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """What the holder of one secret may do."""
+    """The rights of the holder of one secret."""
 
     steers: bool
     key: str = field(default_factory=lambda: secrets.token_hex(KEY_BYTES), repr=False)

@@ -40,7 +40,7 @@ class PageUnavailable(TenbaudError):
 
 @dataclass(frozen=True, slots=True)
 class Address:
-    """Where the page is served."""
+    """The address of the page."""
 
     host: str = "127.0.0.1"
     port: int = 8710

@@ -18,7 +18,7 @@ PRIVATE = re.compile(
     re.IGNORECASE,
 )
 """Say: corrupt, repair or correct, unknown, rate-limited, attempt, emulated, candidate, ramp down,
-anyone who, reported or known, predicted or accepted, visible, rate times T, a number of, separate ..."""
+anyone who, reported or known, predicted or accepted, visible, rate times T, a number of, separate."""
 PAGES = sorted(
     str(path.relative_to(TOP))
     for path in (*TOP.glob("*.md"), *(TOP / "docs").rglob("*.md"))

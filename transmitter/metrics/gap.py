@@ -53,7 +53,7 @@ GAP_EVERY_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """What an ideal code could do on this line, as `tenbaud.bounds` works it out.
+    """The error of an ideal code on this line, as `tenbaud.bounds` computes it.
 
     Both in terms of a mean square error for a disturbance of unit density.
     """

@@ -1,4 +1,4 @@
-"""What every real rig shares: the newest sample, what is wrong with it, and motors that end up off.
+"""Common parts of every real rig: the newest sample, its faults, and motors that end up off.
 
 A reader thread hands samples in (`_take`); the flight's thread asks for the newest one (`read`) and
 sends voltages (`write`). The motors are enabled by the first `write`, which only a flight makes, and
@@ -34,7 +34,7 @@ HOST_SLACK_S = 0.05
 
 @dataclass(frozen=True, slots=True)
 class DeviceSettings:
-    """What is too old, too fast, or too long to wait for."""
+    """Limits for the age and speed of samples, and for waiting."""
 
     stale_s: float = 0.1
     """age of the newest sample beyond which the sensor counts as lost"""

@@ -18,7 +18,7 @@ from channel.errors import CodecDiverged
 from channel.protocol.terms import Terms
 
 CANNOT_FLY = (CodecDiverged, ArithmeticError, LookupError, ValueError)
-"""What a copy raises in a state that it cannot go on from."""
+"""The exceptions of a copy in a state that it cannot continue from."""
 
 
 class Confirmed(NamedTuple):

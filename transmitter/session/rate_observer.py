@@ -1,4 +1,4 @@
-"""What the transmitter sees of the body beside the angle: its rate, from the full-rate encoder.
+"""The transmitter's rate observer: the rate of the body, from the full-rate encoder.
 
 A coder that uses rates forms its words from angle and rate. The encoder gives counts only, so the rate
 comes from a small observer at the transmitter: the codec's own model, the commands that are known here

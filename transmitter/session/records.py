@@ -1,4 +1,4 @@
-"""What the transmitter writes down."""
+"""The records of the transmitter."""
 
 from __future__ import annotations
 

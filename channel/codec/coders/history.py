@@ -68,7 +68,7 @@ class HistoryParameters:
 
 
 class HistoryConstants(NamedTuple):
-    """What the functions below need."""
+    """Constants of the functions below."""
 
     angle: Vector
     rate: Vector

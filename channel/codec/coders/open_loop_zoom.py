@@ -44,7 +44,7 @@ class OpenLoopZoomParameters:
 
 
 class OpenLoopZoomConstants(NamedTuple):
-    """What the functions below need."""
+    """Constants of the functions below."""
 
     decay: float
     floor: float

@@ -43,7 +43,7 @@ class PcmParameters:
 
 
 class PcmConstants(NamedTuple):
-    """What the functions below need."""
+    """Constants of the functions below."""
 
     half: int
     """number of the word for the angle zero"""

@@ -1,4 +1,4 @@
-"""What a serial line must carry, and how long it takes: the arithmetic behind a refusal.
+"""The load of a serial line and its transmission times: the arithmetic behind a refusal.
 
 Up the line goes one byte per symbol; down it one command frame per sample, which is
 `(head + CRC) + (1 + W) * echo` bytes before COBS. A line of 8N1 spends ten bits on a byte, and each

@@ -24,7 +24,7 @@ from channel.links.serial.pseudo_terminal import PseudoTerminal
 Way = Literal["up", "down"]
 
 QUEUE_BYTES_MAX = 4096
-"""What waits in a direction; more is left in the sender's own buffer, as with a real port."""
+"""Capacity of a direction; further bytes stay in the sender's buffer, as with a real port."""
 STEP_S = 0.0005
 """Bytes of a fast line are passed on in steps of this: late by at most so much, never early."""
 BLOCKED_S = 0.2

@@ -186,7 +186,7 @@ def test_who_may_only_look_sees_the_flight_and_has_nothing_to_press(own: Any, fl
     page.get_by_text("view-only").wait_for()
     assert page.locator(".controls button, .controls input").count() == 0
     assert own.locator(".controls button").count() > 5
-    # Nor does the one spoil the other's cookie, in one browser.
+    # Nor does the one overwrite the other's cookie, in one browser.
     second = own.context.new_page()
     second.goto(flight.look_url)
     state_is(second, "lockstep")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
@@ -27,9 +27,12 @@ def telemetry_end(options: TelemetryOptions) -> TelemetryEnd:
 
 
 def test_when_the_usual_place_is_taken_then_the_flight_goes_on_without(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], request: pytest.FixtureRequest
 ) -> None:
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    # Not tmp_path, which may be too long for a socket's name.
+    folder = TemporaryDirectory()
+    request.addfinalizer(folder.cleanup)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", folder.name)
     monkeypatch.setattr("secrets.token_hex", lambda _: "same")
     usual = endpoint_for("", "receiver")
     assert usual is not None

@@ -24,7 +24,7 @@ Sine = Callable[[float], float]
 """How a sine is taken; `math.sin` differs in its last bit between C libraries and processors."""
 
 PitchConstants = tuple[float, float, float, float, float, float, float, float]
-"""What `pitch_constants` precomputes for `pitch_step`."""
+"""Constants that `pitch_constants` precomputes for `pitch_step`."""
 
 
 @dataclass(frozen=True, slots=True)

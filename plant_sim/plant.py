@@ -1,4 +1,4 @@
-"""What every simulated plant offers, whatever it simulates."""
+"""The interface of every simulated plant."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class PlantContext:
-    """What a plant from outside is given when it is built."""
+    """The context that a plant from outside gets when it is built."""
 
     step_s: float
     """what one call of `advance` simulates"""

@@ -138,7 +138,7 @@ def test_when_a_note_stands_above_a_block_then_it_is_understood(
         "~~~sh\ntrue\n~~~",
     ],
 )
-def test_when_a_note_or_a_fence_is_wrong_then_it_is_told(text: str) -> None:
+def test_when_a_note_or_a_fence_is_wrong_then_it_is_reported(text: str) -> None:
     with pytest.raises(NoteError):
         parse(text, "a.md")
 
@@ -152,13 +152,13 @@ def test_when_a_note_or_a_fence_is_wrong_then_it_is_told(text: str) -> None:
         "```text\nmake test\n```",
     ],
 )
-def test_when_a_command_stands_where_nobody_runs_it_then_it_is_told(text: str) -> None:
+def test_when_a_command_stands_where_nobody_runs_it_then_it_is_reported(text: str) -> None:
     assert stray_commands(text, "a.md")
     assert COMMAND.match(text.splitlines()[1]) or "demo" in text
 
 
 @pytest.mark.parametrize("script", ["tenbaud fly", "tenbaud demo --fly", "tenbaud demo \\\n  --fly=1"])
-def test_when_a_command_that_is_not_run_has_an_unknown_word_then_it_is_told(script: str) -> None:
+def test_when_a_command_that_is_not_run_has_an_unknown_word_then_it_is_reported(script: str) -> None:
     assert unknown_words(block_of(f"```sh\n{script}\n```"))
 
 

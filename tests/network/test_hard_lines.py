@@ -98,7 +98,7 @@ def test_a_peer_that_vanishes_without_a_word_is_noticed_within_the_lease(
     ticks = [row for _, row in recording.rows("tick")]
     # Hold, ramp, safe: watchdog and ramp are 0.5 s and 1 s, and a status is up to 0.2 s old.
     safe_from = cut_s + 0.5 + 1.0 + 0.5
-    late = [row["applied_volts"] for row in ticks if row["tick"] * 0.01 > safe_from]
+    late = [row["applied"] for row in ticks if row["tick"] * 0.01 > safe_from]
     assert late
     assert all(volts == [0.0, 0.0] for volts in late)
 
@@ -131,4 +131,4 @@ def test_a_certificate_that_expires_in_flight_ends_it_and_is_named(
     said = {"rig": rig.said[-1], "desk": desk.said[-1]}
     assert f"the certificate of {expiring} expired in flight" in said[expiring]
     ticks = [row for _, row in Recording(tmp_path / "rig" / "transmitter.mcap").rows("tick")]
-    assert ticks[-1]["applied_volts"] == [0.0, 0.0]
+    assert ticks[-1]["applied"] == [0.0, 0.0]

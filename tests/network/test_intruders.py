@@ -1,4 +1,4 @@
-"""Whoever has no business in a flight is refused and counted, and the flight does not notice."""
+"""Nodes without an invitation are refused and counted, and the flight does not notice."""
 
 from __future__ import annotations
 

@@ -80,7 +80,7 @@ def test_a_flight_through_a_router_survives_its_restart_and_changes_hands(tmp_pa
 
 
 def _change_hands(flight: Flight, machine: Machine, link: list[str], folder: Path) -> None:
-    """A second receiver is refused, and the same one takes over when told to."""
+    """A second receiver is refused, and the same one takes over with `--take-over`."""
     second = End("receive", link, folder / "second", prefix=machine.prefix, draws=False)
     code, _ = second.ended()
     assert code == 4

@@ -88,7 +88,7 @@ def test_a_rig_that_goes_silent_ends_at_the_safe_voltage_on_both_sides(tmp_path:
     assert (device["volts"], device["enabled"]) == (OFF, False)
     last = _last_tick(tmp_path / "run")
     assert last["guard"] == "latched", "the transmitter's side: the end of the ramp"
-    assert last["applied_volts"] == OFF
+    assert last["applied"] == OFF
 
 
 def test_an_unplugged_rig_ends_the_flight_and_flies_again_when_it_is_back(tmp_path: Path) -> None:
@@ -114,7 +114,7 @@ def test_a_dry_run_reads_and_never_commands(tmp_path: Path) -> None:
     assert flown.summary["rig"]["dry_run"]
     assert flown.summary["rig"]["samples"] > 100
     assert flown.device.get("commands", 0) == 0
-    assert _last_tick(tmp_path / "run")["applied_volts"] == OFF
+    assert _last_tick(tmp_path / "run")["applied"] == OFF
 
 
 def test_a_real_rig_is_refused_on_the_virtual_clock(tmp_path: Path) -> None:

@@ -93,7 +93,7 @@ def flown(rig: type[SimulatedRig], controller: ConstantController) -> RealFlight
     [(SlowRig, ConstantController(1.0, -1.0)), (SimulatedRig, SlowController(1.0, -1.0))],
     ids=["transmitter", "receiver"],
 )
-def test_when_an_end_is_too_slow_then_it_is_said_and_the_flight_goes_on(
+def test_when_an_end_is_too_slow_then_it_is_reported_and_the_flight_goes_on(
     rig: type[SimulatedRig], controller: ConstantController
 ) -> None:
     flight = flown(rig, controller)

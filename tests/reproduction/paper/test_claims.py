@@ -76,7 +76,7 @@ def test_when_the_controller_is_ideal_then_it_follows_the_reference() -> None:
 
 
 def test_when_a_shove_comes_then_time_based_zooming_is_lost_and_the_adaptive_rule_is_not() -> None:
-    assert flown("zooming-timed-10baud-push").pitch_rad > 6.3
+    assert flown("zooming-open-loop-zoom-10baud-push").pitch_rad > 6.3
     assert flown("zooming-paper-10baud-push").largest < 0.25
 
 

@@ -10,13 +10,17 @@ from channel.codec.codec import Model, ModelContext, Vector
 from channel.codec.models.hold import HoldModel
 from channel.codec.models.pitch import PitchModel, PitchParameters
 from channel.codec.numerics import cos, exp, sin
+from channel.codec.signals import InputSignal, Signal, Signals
 
 __all__ = [
     "HoldModel",
+    "InputSignal",
     "Model",
     "ModelContext",
     "PitchModel",
     "PitchParameters",
+    "Signal",
+    "Signals",
     "Vector",
     "cos",
     "exp",

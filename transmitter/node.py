@@ -96,13 +96,13 @@ class TransmitterNode:
         """Hand an arrived frame to the session; return the answers. `rest` has what it confirmed."""
         answers = self.session.on_frame(frame)
         if len(self.session.confirmed) >= RESTLESS_SAMPLES_MAX:
-            self.rest()
+            self.flush_records()
         if self.guard.stopped and self._may_rearm and self.session.phase is Phase.FLYING:
             self.guard.rearm()
             self.rearmed += 1
         return answers
 
-    def rest(self) -> None:
+    def flush_records(self) -> None:
         """Score and record what was confirmed: work for when the next symbol is on its way."""
         if not self.session.confirmed:
             return

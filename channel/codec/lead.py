@@ -4,7 +4,7 @@ The command of tick `n + D` is decided when the codec stands at tick `n`. Its ba
 state carried `D` ticks ahead by the model under the commands already given, with no correction
 beyond the last known word. This *live* estimate is outside the codec state; at `D = 0` it is the
 codec state. Both ends compute it here: the receiver to decide commands, the transmitter to know
-afterwards what the receiver believed.
+afterwards what the receiver predicted.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ Decide = Callable[[int, Vector], Vector]
 
 
 class FlownSample(NamedTuple):
-    """What came of one word."""
+    """The result of one word."""
 
     state: CodecState
     """Codec state after the sample."""
     coded: list[Vector]
     """Codec's model state at ticks `kN ... (k+1)N - 1`."""
     live: list[Vector]
-    """Model state believed, in advance, of ticks `kN + D ... (k+1)N + D - 1`."""
+    """Predicted model state of ticks `kN + D ... (k+1)N + D - 1`."""
     commands: list[Vector]
     """Commands decided for those ticks."""
 

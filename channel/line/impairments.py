@@ -1,4 +1,4 @@
-"""What goes wrong on a line, on purpose: from a text, seeded, the same every time.
+"""Simulated impairments of a line: given by a text, seeded, reproducible.
 
     loss=0.2              every message is lost with this probability (also 20%)
     burst=0.02/0.25       Gilbert-Elliott: chance per message to enter and leave a state that loses all
@@ -38,7 +38,7 @@ _TIME = re.compile(r"(\d+(?:\.\d*)?)(us|ms|s)")
 
 @dataclass(frozen=True, slots=True)
 class Impairments:
-    """What one direction suffers. Probabilities are per message."""
+    """The impairments of one direction. Probabilities are per message."""
 
     loss: float = 0.0
     burst_enter: float = 0.0
@@ -189,7 +189,7 @@ def _time_ns(text: str) -> int:
 
 
 class SymbolWire(Protocol):
-    """What a line asks its wire, to invert symbols."""
+    """The part of a wire that inverts symbols."""
 
     def is_symbol(self, data: bytes) -> bool:
         """Return whether a message carries a symbol."""

@@ -1,6 +1,6 @@
 """The transmitter's way out onto a line, and what R baud means there, enforced and measured.
 
-Symbols leave on a fixed grid of slots, one per slot and none in advance or afterwards: whoever asks
+Symbols leave on a fixed grid of slots, one per slot and none in advance or afterwards: a request
 for more gets an erasure, not a burst. Both loops of the transmitter send through it, so that nobody can
 go around the baud rate.
 """

@@ -1,4 +1,4 @@
-"""What every link does: carry byte messages between the two ends, whole and in order if it can.
+"""The interface of a link: it carries whole byte messages between the two ends, in order if possible.
 
 A link promises little: a message may be lost in silence when the peer is not there. Index, epoch and
 acknowledgement belong to the sessions. A link is used by one thread.
@@ -18,7 +18,7 @@ Role = Literal["transmitter", "receiver"]
 
 @dataclass(slots=True)
 class LinkCounts:
-    """What went over a link and what did not."""
+    """Counts of the messages that a link carried and lost."""
 
     messages_out: int = 0
     bytes_out: int = 0

@@ -1,4 +1,4 @@
-"""What a node writes down, described once, so that a recording carries its own names and units.
+"""Descriptions of a node's records, so that a recording carries names and units.
 
 A node declares its channels as `RecordChannel`s and hands rows to a `Recorder`. It never learns
 where they go: the tool puts them into a file from another thread, a test into a list.

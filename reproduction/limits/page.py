@@ -69,13 +69,13 @@ def write_page(path: Path, outcome: Outcome, recorded: Sequence[Row], quick: boo
 def _summary(outcome: Outcome) -> str:
     found = {
         f"{key}{suffix}": ratio(
-            tables.estimation(outcome, entrant, rate, NOMINAL, FINE_COUNTS),
+            tables.estimation(outcome, candidate, rate, NOMINAL, FINE_COUNTS),
             tables.floor_of(rate, NOMINAL),
         ).value
-        for key, entrant in (
+        for key, candidate in (
             ("paper", "paper"),
             ("tuned", "tuned"),
-            ("told", "history-told"),
+            ("knows_q", "history-known-q"),
             ("found", "history"),
         )
         for suffix, rate in (("", 10.0), ("_20", 20.0))

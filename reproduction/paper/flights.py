@@ -22,7 +22,7 @@ from reproduction.paper.curves import Curves
 
 WORKERS = 2
 GRACE_S = 3.0
-"""What a worker gets to end its flight when the command is interrupted."""
+"""The signal that ends a worker's flight when the command is interrupted."""
 
 Overrides = dict[str, Any]
 
@@ -48,7 +48,7 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Flown:
-    """What came of a job."""
+    """The result of a job."""
 
     name: str
     summary: dict[str, Any]

@@ -1,4 +1,4 @@
-"""Whether a flight was flown on what it paid for, shown from its recordings.
+"""Checks from the recordings that a flight used only the symbols that it sent in slots.
 
 Did each slot carry at most one symbol, on the grid? Do the states of both ends follow from symbols and
 slots alone? Do the commands, the codec's other input, follow from the states, so that nothing came down
@@ -79,7 +79,7 @@ def _baud(taken: list[Any]) -> float | None:
 
 @dataclass(slots=True)
 class Audit:
-    """What an audit found. `passed` needs no leak and nothing that could not be shown."""
+    """The findings of an audit. `passed` needs no leak and no gap."""
 
     record: FlightRecord
     counted: Counted
@@ -95,7 +95,7 @@ class Audit:
 
     @property
     def passed(self) -> bool:
-        """Whether the flight was shown to rest on its paid symbols alone."""
+        """Whether the flight used its paid symbols alone."""
         return not self.leaks and not self.gaps
 
 

@@ -34,7 +34,7 @@ from transmitter.guard import Guard, GuardSettings
 from transmitter.metrics.gap import GapGauge, Limit, StrengthMeter
 from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode
-from transmitter.session.rate_observer import Sight
+from transmitter.session.rate_observer import RateObserver
 from transmitter.session.session import TransmitterSession
 
 
@@ -48,7 +48,7 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
         secrets.randbits(32),
         recorder,
         stop_on_desync=config.transmitter.on_desync == "stop",
-        sight=build_sight(agreement),
+        rate_observer=build_rate_observer(agreement),
         overtaking_ticks=overtaking_ticks(terms, agreement.faults),
     )
     gauge = build_gauge(agreement)
@@ -82,14 +82,15 @@ def _followed(agreement: Agreement) -> Callable[[int], float | None]:
     return build_reference(agreement.config).angle_rad
 
 
-def build_sight(agreement: Agreement) -> Sight | None:
+def build_rate_observer(agreement: Agreement) -> RateObserver | None:
     """Return what gives a coder its rates, None for one that does without."""
     codec = agreement.codec
     if not codec.uses_rates:
         return None
     tick_s = agreement.terms.tick_ns / 1e9
     try:
-        return Sight(codec.model, tick_s, agreement.config.transmitter.sight_bandwidth_rad_s)
+        bandwidth = agreement.config.transmitter.rate_observer_bandwidth_rad_s
+        return RateObserver(codec.model, tick_s, bandwidth)
     except ValueError as error:
         raise ConfigError(f"coder.kind = {agreement.config.coder.kind!r}: {error}") from error
 
@@ -110,7 +111,7 @@ def build_line(agreement: Agreement, direction: Direction, wire: SymbolWire) -> 
 
 
 def sabotaged(codec: Codec, text: str, live: bool = False) -> Codec:
-    """Return the codec, spoilt as the configuration asks; `live`: ready to be spoilt in flight."""
+    """Return the codec, corrupted as configured; `live`: it may be corrupted in flight."""
     if not text:
         return SabotagedCodec(codec) if live else codec
     try:

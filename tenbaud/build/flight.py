@@ -39,7 +39,7 @@ def software_version() -> str:
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """What both ends build alike from their configuration."""
+    """The parts that both ends build alike from their configuration."""
 
     config: FlightConfig
     clock: Clock

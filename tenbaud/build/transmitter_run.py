@@ -36,7 +36,7 @@ class TransmitterRun:
     """figures of the clock that was flown on"""
 
     def expect_desyncs(self, more: float) -> None:
-        """Note that so many more lockstep failures were asked for."""
+        """Add to the number of lockstep failures that were asked for."""
         self.desyncs_asked += more
 
     @property

@@ -24,7 +24,7 @@ RATE_SPAN_S = 0.05
 
 @dataclass(slots=True)
 class AxisCheck:
-    """What one axis did."""
+    """The measurements of one axis."""
 
     name: str
     channel: int
@@ -39,7 +39,7 @@ class AxisCheck:
 
 @dataclass(slots=True)
 class RigCheck:
-    """What the whole rig did."""
+    """The measurements of the whole rig."""
 
     rig: str
     seconds: float

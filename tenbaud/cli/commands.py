@@ -1,4 +1,4 @@
-"""The commands, gathered. Each lives in a module of its own beside this one."""
+"""The commands, gathered. Each lives in a separate module beside this one."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from tenbaud.cli.spread import spread
 if TYPE_CHECKING:
     from tenbaud.build.flight import Agreement
     from tenbaud.flight.demo import DemoResult
-    from tenbaud.flight.viewing import ViewWish
+    from tenbaud.flight.viewing import ViewOptions
     from tenbaud.recording.folder import RunFolder
 
 DEFAULT_MISMATCHES = (0.0, 0.1)
@@ -55,8 +55,8 @@ def demo(
     changes = [options.overrides(**options.fields_of(flight), mismatch=off) for off in flights]
     agreements = _agree_all(flight, changes)
     pace = _checked_pace(agreements[0], pace, view)
-    wish = _view_wish(agreements, view, view_port, open_browser)
-    raise typer.Exit(_fly_all(agreements, out, json, verbose, wish, pace))
+    view_options = _view_options(agreements, view, view_port, open_browser)
+    raise typer.Exit(_fly_all(agreements, out, json, verbose, view_options, pace))
 
 
 def _checked_pace(agreement: Agreement, pace: float | None, view: bool) -> float | None:
@@ -67,16 +67,16 @@ def _checked_pace(agreement: Agreement, pace: float | None, view: bool) -> float
     return pace or (1.0 if view and virtual else None)
 
 
-def _view_wish(
+def _view_options(
     agreements: list[Agreement], view: bool, port: int, open_browser: bool
-) -> ViewWish | None:
+) -> ViewOptions | None:
     """Return how the flight is to be looked at, if it is, checked before anything starts."""
     if not view:
         if open_browser:
             raise typer.BadParameter("--open opens the live page; it goes with --view")
         return None
     from channel.links.endpoints import loopback_host
-    from tenbaud.flight.viewing import ViewWish
+    from tenbaud.flight.viewing import ViewOptions
     from tenbaud.view.server import Address, free_port, require_nicegui
 
     if len(agreements) > 1 or agreements[0].link.in_process:
@@ -85,7 +85,7 @@ def _view_wish(
     host = loopback_host()
     address = Address(host, port or free_port(host))
     address.check()
-    return ViewWish(address.port, open_browser)
+    return ViewOptions(address.port, open_browser)
 
 
 def _agree_all(flight: options.FlightOptions, changes: list[dict[str, Any]]) -> list[Agreement]:
@@ -106,7 +106,7 @@ def _fly_all(
     out: options.Out,
     as_json: bool,
     verbose: bool,
-    wish: ViewWish | None,
+    view_options: ViewOptions | None,
     pace: float | None,
 ) -> int:
     from tenbaud.flight.ends import write_json
@@ -120,7 +120,7 @@ def _fly_all(
         if out is not None and index:
             explicit = out.with_name(f"{out.name}-{index + 1}")
         folder = RunFolder(create_run_folder(None, agreement.config.preset, explicit))
-        result = _fly_shown(agreement, folder, wish, pace)
+        result = _fly_shown(agreement, folder, view_options, pace)
         results.append(result)
         folders.append(folder)
         if as_json:
@@ -135,11 +135,11 @@ def _fly_all(
 
 
 def _fly_shown(
-    agreement: Agreement, folder: RunFolder, wish: ViewWish | None, pace: float | None
+    agreement: Agreement, folder: RunFolder, view_options: ViewOptions | None, pace: float | None
 ) -> DemoResult:
     """Fly once, and show how it goes."""
     from tenbaud.flight.demo import fly_demo
     from tenbaud.flight.display import StatusDisplay
 
     with StatusDisplay() as display:
-        return fly_demo(agreement, folder, display.show, view=wish, pace=pace)
+        return fly_demo(agreement, folder, display.show, view=view_options, pace=pace)

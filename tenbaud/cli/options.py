@@ -243,7 +243,7 @@ DryRun = Annotated[
 
 @dataclass(frozen=True, slots=True)
 class Addresses:
-    """Where the other end is, and who may be there."""
+    """Address and identity of the other end."""
 
     listen: Listen = None
     connect: Connect = None
@@ -280,7 +280,7 @@ class FlightOptions:
 
 @dataclass(frozen=True, slots=True)
 class NodeOptions:
-    """What `transmit` and `receive` have in common, addresses aside."""
+    """Common options of `transmit` and `receive`, except addresses."""
 
     preset: Preset = None
     config: ConfigFile = None

@@ -33,7 +33,7 @@ _OPCODES = range(Opcode.HEADER, Opcode.DATA_END + 1)
 
 
 class Resync:
-    """Finds the next record that can be believed, in one file and within a limited effort."""
+    """Finds the next valid record, in one file and within a limited effort."""
 
     def __init__(self, stream: BinaryIO, size: int) -> None:
         self._stream = stream

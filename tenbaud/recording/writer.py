@@ -1,4 +1,4 @@
-"""Writes a flight into an MCAP file from a thread of its own.
+"""Writes a flight into an MCAP file from a separate thread.
 
 The flight only appends to a queue. The thread takes the rows out ten times a second, encodes them
 and writes them in chunks; what a killed process loses is the chunk that was
@@ -123,7 +123,7 @@ class McapRecorder:
 
     @property
     def cause(self) -> Exception | None:
-        """What ended the recording before its end, None if nothing did."""
+        """The error that ended the recording early, None if there was none."""
         return self._cause
 
     def write(self, channel: RecordChannel, time_ns: int, row: Sequence[object]) -> None:
@@ -308,7 +308,7 @@ _Gather = Callable[[str, int, Sequence[object]], None]
 
 
 class _ChannelWriter:
-    """What the thread knows about one channel. It holds the channel so that its id stays taken."""
+    """The thread's data about one channel. It holds the channel so that its id stays in use."""
 
     def __init__(self, channel: RecordChannel, channel_id: int, gather: _Gather | None) -> None:
         self.channel = channel

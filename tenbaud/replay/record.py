@@ -1,4 +1,4 @@
-"""What was recorded of one flight, from one run folder or from one at each machine."""
+"""The recordings of one flight, from one run folder or from one at each machine."""
 
 from __future__ import annotations
 

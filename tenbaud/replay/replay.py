@@ -18,7 +18,7 @@ from tenbaud.replay.symbols import Packed, Unpacked, pack
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """What came of a replay."""
+    """The result of a replay."""
 
     samples: int
     digests_compared: int
@@ -143,9 +143,9 @@ def _compare_commands(rows: EndRows, flown: Sequence[Reflown]) -> list[str]:
             row = by_tick.get(tick)
             if row is None:
                 continue
-            if row.command_volts != command or row.live_state != live:
+            if row.command != command or row.live_state != live:
                 unlike += 1
-                first = first or f"tick {tick}: recorded {row.command_volts} V, computed {command} V"
+                first = first or f"tick {tick}: recorded {row.command}, computed {command}"
     if not unlike:
         return []
     return [f"receiver: {unlike} commands differ from what the states give, first at {first}"]

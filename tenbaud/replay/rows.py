@@ -1,7 +1,7 @@
 """The rows of a recording as typed records, checked one by one as they are read.
 
 A recording may come from anybody. So the types are those that the nodes write, not those that the file
-says it has, and a row that does not fit is told by topic, row and field instead of failing later.
+says it has, and an error names topic, row and field of a row that does not fit.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from transmitter.session import records as transmitter
 KEY_MAX = 2**48
 """No flight has a tick, sample or slot beyond this."""
 
-ANGLES = ("measured_rad", "true_rad")
-"""A rig may read an angle that is no number, which a recording holds as null."""
+WITH_HOLES = ("measured", "true", "reference")
+"""A rig may read what is no number, and an output may have no set-point: a recording holds null."""
 
 
 class Kind(NamedTuple):
@@ -57,7 +57,7 @@ KINDS: dict[str, dict[str, Kind]] = {
         "epoch": _EPOCH,
         "event": _EVENT,
         "lockstep_failure": _LOCKSTEP,
-        "tick": _kind(transmitter.TICK_CHANNEL, "true_rad", "commanded_volts"),
+        "tick": _kind(transmitter.TICK_CHANNEL, "true", "commanded"),
         "sample": _kind(transmitter.SAMPLE_CHANNEL, "word_sent", "word"),
         "estimate": _kind(transmitter.ESTIMATE_CHANNEL, "live_state"),
         "gap": _kind(GAP_CHANNEL, *(one.name for one in GAP_CHANNEL.fields[1:])),
@@ -68,7 +68,7 @@ KINDS: dict[str, dict[str, Kind]] = {
         "epoch": _EPOCH,
         "event": _EVENT,
         "lockstep_failure": _LOCKSTEP,
-        "tick": _kind(receiver.TICK_CHANNEL, "reference_rad"),
+        "tick": _kind(receiver.TICK_CHANNEL),
         "sample": _kind(receiver.SAMPLE_CHANNEL, "word"),
     },
 }
@@ -122,7 +122,7 @@ class EndRows:
 
 
 def read_rows(end: str, tables: Tables) -> EndRows:
-    """Return the rows of one end; those that do not fit are left out and told as misfits."""
+    """Return the rows of one end; those that do not fit are left out and listed as misfits."""
     misfits: list[Misfit] = []
     topics: dict[str, Topic] = {}
     for name, kind in KINDS[end].items():
@@ -177,7 +177,7 @@ def _fits(value: Any, one: Field, nullable: frozenset[str]) -> bool:
         case "integers":
             return type(value) is tuple and _all_of(value, int)
         case _:
-            holes = one.name in ANGLES
+            holes = one.name in WITH_HOLES
             return type(value) is tuple and all(
                 type(entry) in (int, float) or (holes and entry is None) for entry in value
             )

@@ -42,7 +42,7 @@ BESIDE = (
 """Modules of the studies that no figure of a flight depends on."""
 
 Parts = tuple[tuple[str, Any], ...]
-"""What stands for the placeholders of the flight: (name, compiled function)."""
+"""Replacements for the placeholders of the flight: (name, compiled function)."""
 
 
 class StudiesMissing(TenbaudError):

@@ -38,7 +38,7 @@ NO_PAIRS = np.zeros((0, 2))
 
 @dataclass(slots=True)
 class Trace:
-    """States of a compiled flight, for whoever wants to compare them."""
+    """States of a compiled flight, for comparisons."""
 
     models: Any
     coders: Any

@@ -2,7 +2,8 @@
 
 On simulated flights, one set of seeds is for the fit and another for the judgement. On a recorded
 flight, the first part is for the fit and the rest for the judgement; there the codec flies through the
-whole recording and only the rest counts. The measure is the rms error of what the receiver believed.
+whole recording and only the rest counts. The measure is the rms error of the receiver's predicted
+estimate.
 """
 
 from __future__ import annotations
@@ -25,11 +26,11 @@ from tenbaud.studies.study_file import Range
 Method = Literal["differential-evolution", "nelder-mead"]
 
 PENALTY_RAD = 100.0
-"""What a flight without figures counts as: worse than any error that an angle can have."""
+"""The error that counts for a flight without figures: larger than any error of an angle."""
 
 
 class Split(NamedTuple):
-    """Which flights are for the fit, and which for the judgement."""
+    """The split of flights into those for the fit and those for the validation."""
 
     train_seeds: tuple[int, ...]
     test_seeds: tuple[int, ...]
@@ -75,7 +76,7 @@ class Tuning:
 
 
 class Judged(NamedTuple):
-    """What came of the flights of one part of a split."""
+    """The result of the flights of one part of a split."""
 
     rms_rad: float
     """over all of them; one without figures counts as `PENALTY_RAD`"""

@@ -5,7 +5,7 @@ the order of cause and effect: the transmitter's word, what the receiver made of
 plant under them. All arithmetic is that of the nodes, imported, and so is the order of a sample's ticks
 (`fly_ticks`); tests compare with ordinary flights, bit by bit. A flight that leaves the ordinary
 course, by a guard that steps in or an estimate that diverges, is not followed: it comes back with the
-status `LEFT`, and whoever asked flies it with the nodes themselves.
+status `LEFT`, and the caller flies it with the nodes themselves.
 
 The functions that depend on the kinds of model and coder are placeholders here (`parts`) and given
 when the flight is compiled.

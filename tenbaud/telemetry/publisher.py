@@ -13,7 +13,7 @@ from channel.errors import LinkError
 
 
 class Port(Protocol):
-    """Where messages go."""
+    """The destination of messages."""
 
     def is_watched(self) -> bool:
         """Return whether anybody would get a message."""
@@ -26,12 +26,12 @@ class Port(Protocol):
 
 
 class Composer(Protocol):
-    """What makes the messages."""
+    """The source of messages."""
 
     skipped: int
 
     def skip(self, messages: int) -> None:
-        """Note that so many messages were not sent."""
+        """Count messages that were not sent."""
 
     def watch(self, watched: bool) -> None:
         """Hear whether anybody watches; while nobody does, no message is asked for."""
@@ -99,5 +99,5 @@ class Publisher:
     def _guard(self, do: Callable[[], None]) -> None:
         try:
             do()
-        except Exception as error:  # telemetry must never be a flight's end
+        except Exception as error:  # telemetry must never end a flight
             self.error = f"telemetry ended: {type(error).__name__}: {error}"

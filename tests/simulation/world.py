@@ -68,7 +68,7 @@ class WorldRig(Rig):
 
 
 class BlindSession(TransmitterSession):
-    """What must never be: it sees that the digests differ, and goes on."""
+    """A faulty transmitter: it sees that the digests differ, and continues."""
 
     def _on_desync(self, done: Confirmed) -> list[Frame]:
         return []
@@ -264,7 +264,7 @@ class World:
             self.faults["downlink frames dropped by their check"] += 1
             return
         answers = node.deliver(frame)
-        node.rest()
+        node.flush_records()
         self.watch.on_delivered(node)
         if not self._greeted and node.session.phase is Phase.FLYING:
             self._begin()
@@ -277,7 +277,7 @@ class World:
             return
         shown_ns = self.clock.shown(self.now_ns)
         messages = self.endpoint.step(shown_ns, data).frames
-        self.endpoint.session.rest()
+        self.endpoint.session.flush_records()
         for message in messages:
             for arrival_ns, out in self.down.carry(message, self.now_ns):
                 if out is not None:

@@ -16,7 +16,7 @@ class RigError(TenbaudError):
 
 @dataclass(frozen=True, slots=True)
 class DeviceNote:
-    """What a real device said with a reading, beside the measured axes."""
+    """A real device's report with a reading, beside the measured axes."""
 
     counts: tuple[int, ...]
     """of every encoder channel, those that are not measured axes too"""

@@ -28,7 +28,7 @@ OPTIONS_LENGTH_MAX = 255
 
 @dataclass(frozen=True, slots=True)
 class HilSettings:
-    """Which board, and how it is used."""
+    """The board, and its settings."""
 
     card_type: str = "q8_usb"
     card_identifier: str = "0"

@@ -110,7 +110,7 @@ class BytePort:
                 if self._handle is None:
                     return port.write(data) == len(data)
                 # pyserial would wait, after the write, until the port could take more: up to its
-                # time-out, in the middle of a tick. So it is asked beforehand and told not to wait.
+                # time-out, in the middle of a tick. So the call tests it in advance and does not wait.
                 _, ready, _ = select.select([], [self._handle], [], 0.0)
                 return bool(ready) and port.write(data) == len(data)
         except Exception as error:

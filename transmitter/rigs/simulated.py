@@ -10,7 +10,7 @@ from transmitter.rigs.base import Reading, Rig
 
 
 class SimulatedRig(Rig):
-    """A plant that goes on by itself: at tick `n` it has had `n` steps, whoever was held up."""
+    """A plant with its own time: at tick `n` it has made `n` steps, even if the loop was late."""
 
     name = "simulated"
 

@@ -41,7 +41,7 @@ QUIET_S = 5.0
 _ASK, _HERE, _GONE = b"\1", b"\2", b"\3"
 
 _PORT_ERRORS = (serial.SerialException, OSError, TypeError, ValueError)
-"""What pyserial raises on a port that went away or is closed by another thread."""
+"""Exceptions of pyserial on a port that disappeared or is closed by another thread."""
 
 
 class SerialLink(Link):

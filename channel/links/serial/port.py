@@ -16,7 +16,7 @@ WRITE_TIMEOUT_S = 1.0
 
 
 def check_port(url: str, insecure: bool) -> None:
-    """Refuse a port that is on another machine, unless told to allow it."""
+    """Refuse a port that is on another machine, unless it is allowed."""
     if not url:
         raise LinkError("a serial link needs a port, such as --port /dev/ttyUSB0 or --port COM3")
     parts = urlsplit(url)
@@ -42,13 +42,13 @@ def open_port(
         port = serial.serial_for_url(url, do_not_open=True)
         port.baudrate = line_rate_baud
         port.timeout = read_timeout_s
-        if not url.startswith("rfc2217://"):  # which knows neither
+        if not url.startswith("rfc2217://"):  # which supports neither
             port.write_timeout = write_timeout_s
             port.exclusive = True
         port.open()
     except (serial.SerialException, OSError, ValueError) as error:
         raise LinkError(_cannot_open(url, error)) from error
-    # Many USB adapters collect bytes for 16 ms unless told not to. Not every port knows this.
+    # Many USB adapters collect bytes for 16 ms by default. Not every port has this setting.
     with contextlib.suppress(Exception):
         port.set_low_latency_mode(True)
     return port

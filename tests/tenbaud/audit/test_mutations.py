@@ -132,7 +132,7 @@ def test_the_records_have_the_fields_that_the_nodes_write() -> None:
             assert (kind.channel.topic, kind.record._fields) == (topic, names)
 
 
-def test_a_row_that_no_node_writes_is_told_by_row_and_field(tmp_path: Path) -> None:
+def test_a_row_that_no_node_writes_is_reported_by_row_and_field(tmp_path: Path) -> None:
     original = Original(TWO_EPOCHS)
     wrong: list[tuple[str, str, object]] = [
         ("sample", "range", None),

@@ -73,13 +73,13 @@ UNCLAIMED: tuple[Unclaimed, ...] = (
     Unclaimed(
         "transmitter",
         "tick",
-        ("measured_rad", "true_rad"),
+        ("measured", "true"),
         "what a rig says of itself; on a simulated one they must be within an encoder's step",
     ),
     Unclaimed(
         "transmitter",
         "tick",
-        ("applied_volts",),
+        ("applied",),
         "what the rig says that was applied: a recorded flight, or a dry run",
         lambda _row, evidence: _is_told_by_rig(evidence),
     ),

@@ -28,7 +28,7 @@ from tenbaud.studies.plain import fly_plain
 from tenbaud.studies.schedule import Uncommon
 from transmitter.session.records import SAMPLE_CHANNEL
 
-PRESETS = ("paper-10baud", "tuned-20baud", "timed-10baud", "static-10baud", "usual-1000baud")
+PRESETS = ("paper-10baud", "tuned-20baud", "open-loop-zoom-10baud", "static-10baud", "usual-1000baud")
 
 CLEAN: dict[str, Any] = {}
 REAL_WIRE = {

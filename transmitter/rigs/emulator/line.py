@@ -190,7 +190,7 @@ class TcpLine:
 
 
 def parse_line(text: str, line_baud: int) -> PtyLine | SerialLine | TcpLine:
-    """Return the line that a command line names; ValueError for one that is none."""
+    """Return the line that a command line names; ValueError for an invalid one."""
     kind, _, rest = text.partition(":")
     if kind == "pty":
         return PtyLine(rest)

@@ -20,7 +20,7 @@ class NoisyLine(EmulatedLine):
             "down": random.Random(2 * seed + 1),
         }
 
-    def spoil(self, way: Way, share: float) -> None:
+    def corrupt(self, way: Way, share: float) -> None:
         """Change this share of the bytes from now on."""
         self._shares[way] = share
 

@@ -1,4 +1,4 @@
-"""The emulated line keeps to its rate, damages what it is told to, and comes back after unplugging."""
+"""The emulated line keeps to its rate, damages bytes as configured, and comes back after unplugging."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_when_bytes_are_sent_then_they_arrive_no_faster_than_the_rate(way: Way, 
         assert read(target, len(data)) == data
         took_s = time.monotonic() - started
         # A hundred bytes of ten bits at 4800 bit/s: a real line cannot be quicker. Slower is the
-        # machine's affair.
+        # machine's task.
         assert took_s >= 100 * 10 / 4800
         assert line.carried(way) == 100
         assert line.carried("down" if way == "up" else "up") == 0
@@ -62,7 +62,7 @@ def test_when_a_share_is_damaged_then_the_same_bytes_are_with_the_same_seed(tmp_
             NoisyLine(tmp_path, None, seed=4) as line,
             opened(line.transmitter_port, line.receiver_port) as (near, far),
         ):
-            line.spoil("up", 0.1)
+            line.corrupt("up", 0.1)
             os.write(near, bytes(1000))
             arrived.append(read(far, 1000))
             assert line.damaged["up"] == sum(byte != 0 for byte in arrived[-1])

@@ -82,6 +82,6 @@ def test_a_port_that_is_taken_is_a_clear_error() -> None:
 
 
 @pytest.mark.parametrize("text", ["", "tcp:18000", "tcp:host:http"])
-def test_a_port_that_is_none_says_what_there_is(text: str) -> None:
+def test_an_unknown_port_names_the_known_ones(text: str) -> None:
     with pytest.raises(ValueError, match="tcp:HOST:PORT"):
         parse_line(text, 0)

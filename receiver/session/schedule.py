@@ -1,7 +1,7 @@
-"""The next slot that is settled, and when slots are due by this end's clock.
+"""Which slot is settled next, and when slots are due by this end's clock.
 
 `SlotClock` settles a slot on its symbol, on a later one, or at its deadline; the schedule of studies
-uses it too. `Schedule` decides how far ahead of the clock a slot may be, and which symbols count.
+counts with it too. `Schedule` knows how far ahead of the clock a slot may be, and which symbols count.
 
 The transmitter sends one symbol a slot, so each symbol that is taken says where the schedule lies. A
 symbol long before its time is not the transmitter's, or the clock here was set; one after its deadline

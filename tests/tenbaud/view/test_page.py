@@ -67,14 +67,18 @@ NUMBER = "parseFloat(document.getElementById('{}').textContent.replace('\\u2212'
 def test_it_loads_and_goes_on_by_itself_without_any_request_beyond_loopback(
     page: Any, flight: Served
 ) -> None:
-    for element in ("f-time", "pitch", "digest-up"):
+    for element in ("f-time", "value", "digest-up"):
         old = page.locator(f"#{element}").inner_text()
         wait(page, TEXT_IS_NOT, [element, old])
-    picture = page.locator("#body").get_attribute("transform")
-    wait(page, "(old) => document.getElementById('body').getAttribute('transform') !== old", picture)
+    picture = page.locator("#helicopter .body").get_attribute("transform")
+    wait(
+        page,
+        "(old) => document.querySelector('#helicopter .body').getAttribute('transform') !== old",
+        picture,
+    )
     assert page.locator("#digest-up").inner_text() != "\u2013"
     assert number(page, "#f-baud") == pytest.approx(10.0, abs=0.5)
-    for canvas in ("#pitch-curve", "#error-curve", "#tape"):
+    for canvas in ("#value-0", "#error-0", "#tape"):
         drawn = page.locator(canvas).evaluate(
             "(c) => c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some((v) => v > 0)"
         )
@@ -98,7 +102,7 @@ def test_the_set_point_steers_the_flight_from_the_keyboard_alone(page: Any) -> N
         page.keyboard.press("ArrowRight")
     page.get_by_text("set-point 0.349").first.wait_for()
     page.get_by_role("button", name="25", exact=True).click()
-    wait(page, f"() => Math.abs({NUMBER.format('pitch')} - 20) < 4")
+    wait(page, f"() => Math.abs({NUMBER.format('value')} - 20) < 4")
     page.get_by_role("button", name="1", exact=True).click()
     page.get_by_role("button", name="Follow the programme").click()
     page.get_by_text("follow the reference").first.wait_for()
@@ -159,7 +163,7 @@ def test_a_narrow_screen_shows_everything_without_scrolling_sideways(
     state_is(page, "lockstep")
     page.get_by_role("button", name="Mend the wire").wait_for()
     assert page.evaluate("document.documentElement.scrollWidth") <= 360
-    for element in ("#helicopter", "#pitch-curve", "#tape", "#figures", ".panel >> nth=3"):
+    for element in ("#helicopter", "#value-0", "#tape", "#figures", ".panel >> nth=3"):
         box = page.locator(element).bounding_box()
         assert box["x"] >= 0
         assert box["x"] + box["width"] <= 360

@@ -104,7 +104,7 @@ class Evidence:
         """Return the rows of an end, None if it is not here."""
         return self.rows.get(name)
 
-    def topic(self, end: str, name: str) -> Topic[Any]:
+    def topic(self, end: str, name: str) -> Topic:
         """Return a topic; without rows where it or the end was not recorded."""
         rows = self.rows.get(end)
         return Topic() if rows is None else rows.topic(name)

@@ -9,7 +9,7 @@ from plant_sim.encoder import Encoder
 from tenbaud.audit.base import Claim, Evidence, Findings, Place, is_same
 from tenbaud.build.ends import guard_settings
 from tenbaud.build.flight import Agreement
-from tenbaud.replay.rows import PlantTick
+from tenbaud.replay.rows import Row
 
 TICK = ("transmitter", "tick")
 STOPPED = ("ramping", "latched")
@@ -154,7 +154,7 @@ class _Passed:
         self._state = "ready"
         self._from, self._ramped = self.volts, 0
 
-    def take(self, row: PlantTick) -> str:
+    def take(self, row: Row) -> str:
         """Take one tick; return why its state cannot be, if it cannot."""
         state, before, command = row.guard, self._state, row.commanded
         if state not in FOLLOWS.get(before, ()):

@@ -6,12 +6,11 @@ says it has, and a row that does not fit is told by topic, row and field instead
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import namedtuple
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
-from channel.codec.codec import Vector
-from channel.codec.words import Word
 from channel.protocol.audit_trail import ARRIVED_CHANNEL, EPOCH_CHANNEL, SENT_CHANNEL
 from channel.protocol.events import EVENT_CHANNEL
 from channel.protocol.lockstep import LOCKSTEP_CHANNEL
@@ -29,204 +28,58 @@ WITH_HOLES = ("measured", "true", "reference")
 """A rig may read what is no number, and an output may have no set-point: a recording holds null."""
 
 
-class SentSymbol(NamedTuple):
-    """A symbol that was offered to the uplink."""
-
-    slot: int
-    symbol: int
-    left_ns: int | None
-    wire_bytes: int
+_record: Callable[[str, list[str]], Any] = namedtuple
 
 
-class ArrivedSymbol(NamedTuple):
-    """A symbol that came."""
+class Kind:
+    """A topic of an end: the channel that the node writes it through, and what may be null."""
 
-    slot: int
-    symbol: int
-    arrived_ns: int
-    taken: bool
-
-
-class EpochStart(NamedTuple):
-    """What an epoch starts from."""
-
-    sample: int
-    epoch: int
-    state: Vector
-    coder: Vector
-    hold_volts: Vector
+    def __init__(self, channel: RecordChannel, *nullable: str) -> None:
+        self.channel = channel
+        self.nullable = frozenset(nullable)
+        names = [one.name for one in channel.fields]
+        self.record: Any = namedtuple(channel.topic, names)
+        """a row: what the channel calls its fields"""
 
 
-class EventRow(NamedTuple):
-    """Something that was reported."""
-
-    time_s: float
-    kind: str
-    sample: int | None
-    tick: int | None
-    slot: int | None
-    session: int | None
-    epoch: int | None
-    cause: str | None
-    state: str | None
-    by_peer: bool | None
-    axis: int | None
-    number: int | None
-    value: float | None
-    limit: float | None
-    missed_share: float | None
-    overdue_share: float | None
-    transmitter_digest: str | None
-    receiver_digest: str | None
-    detail: str | None
-
-
-class LockstepFailure(NamedTuple):
-    """Two copies that differ."""
-
-    sample: int
-    epoch: int
-    digest: str
-    peer_digest: str
-    state: Vector | None
-    coder: Vector | None
-    peer_state: Vector | None
-    peer_coder: Vector | None
-    input_samples: tuple[int, ...]
-    input_words: tuple[int, ...]
-
-
-class PlantTick(NamedTuple):
-    """A tick beside the plant."""
-
-    tick: int
-    time_s: float
-    measured: Vector
-    true: Vector | None
-    commanded: Vector | None
-    applied: Vector
-    late: bool
-    lateness_ms: float
-    guard: str
-
-
-class Estimate(NamedTuple):
-    """What was believed of a tick."""
-
-    tick: int
-    coded_state: Vector
-    live_state: Vector | None
-
-
-class ConfirmedSample(NamedTuple):
-    """A sample at the transmitter."""
-
-    sample: int
-    word_sent: Word
-    word: Word
-    range: Vector
-    state: Vector
-    coder: Vector
-    digest: str
-    peer_digest: str
-    lag_samples: int
-
-
-class GaugeRow(NamedTuple):
-    """The gap gauge at a sample."""
-
-    sample: int
-    strength_rad2_per_s3: float | None
-    rms_over_floor: float | None
-    ideal_bits: float | None
-
-
-class DeviceRow(NamedTuple):
-    """What a real rig said with a reading."""
-
-    tick: int
-    counts: tuple[int, ...]
-    device_s: float | None
-    age_ms: float
-    lost: int
-
-
-class CommandTick(NamedTuple):
-    """A command that the receiver decided."""
-
-    tick: int
-    reference: tuple[float | None, ...]
-    live_state: Vector
-    command: Vector
-
-
-class ConsumedSample(NamedTuple):
-    """A sample at the receiver."""
-
-    sample: int
-    word: Word
-    range: Vector
-    state: Vector
-    coder: Vector
-    digest: str
-    arrival_s: float
-
-
-class Kind(NamedTuple):
-    """A topic of an end: its record, the channel that the node writes it through, what may be null."""
-
-    record: type[Any]
-    channel: RecordChannel
-    nullable: frozenset[str] = frozenset()
-
-
-_EPOCH = Kind(EpochStart, EPOCH_CHANNEL)
-_EVENT = Kind(EventRow, EVENT_CHANNEL, frozenset(EventRow._fields[2:]))
-_LOCKSTEP = Kind(
-    LockstepFailure,
-    LOCKSTEP_CHANNEL,
-    frozenset({"state", "coder", "peer_state", "peer_coder"}),
-)
+_EPOCH = Kind(EPOCH_CHANNEL)
+_EVENT = Kind(EVENT_CHANNEL, *(one.name for one in EVENT_CHANNEL.fields[2:]))
+_LOCKSTEP = Kind(LOCKSTEP_CHANNEL, "state", "coder", "peer_state", "peer_coder")
 
 KINDS: dict[str, dict[str, Kind]] = {
     "transmitter": {
-        "symbol": Kind(SentSymbol, SENT_CHANNEL, frozenset({"left_ns"})),
+        "symbol": Kind(SENT_CHANNEL, "left_ns"),
         "epoch": _EPOCH,
         "event": _EVENT,
         "lockstep_failure": _LOCKSTEP,
-        "tick": Kind(
-            PlantTick,
-            transmitter_records.TICK_CHANNEL,
-            frozenset({"true", "commanded"}),
-        ),
-        "sample": Kind(
-            ConfirmedSample, transmitter_records.SAMPLE_CHANNEL, frozenset({"word_sent", "word"})
-        ),
-        "estimate": Kind(Estimate, transmitter_records.ESTIMATE_CHANNEL, frozenset({"live_state"})),
-        "gap": Kind(GaugeRow, GAP_CHANNEL, frozenset(GaugeRow._fields[1:])),
-        "device": Kind(DeviceRow, transmitter_records.DEVICE_CHANNEL, frozenset({"device_s"})),
+        "tick": Kind(transmitter_records.TICK_CHANNEL, "true", "commanded"),
+        "sample": Kind(transmitter_records.SAMPLE_CHANNEL, "word_sent", "word"),
+        "estimate": Kind(transmitter_records.ESTIMATE_CHANNEL, "live_state"),
+        "gap": Kind(GAP_CHANNEL, *(one.name for one in GAP_CHANNEL.fields[1:])),
+        "device": Kind(transmitter_records.DEVICE_CHANNEL, "device_s"),
     },
     "receiver": {
-        "symbol": Kind(ArrivedSymbol, ARRIVED_CHANNEL),
+        "symbol": Kind(ARRIVED_CHANNEL),
         "epoch": _EPOCH,
         "event": _EVENT,
         "lockstep_failure": _LOCKSTEP,
-        "tick": Kind(CommandTick, receiver_records.TICK_CHANNEL),
-        "sample": Kind(ConsumedSample, receiver_records.SAMPLE_CHANNEL, frozenset({"word"})),
+        "tick": Kind(receiver_records.TICK_CHANNEL),
+        "sample": Kind(receiver_records.SAMPLE_CHANNEL, "word"),
     },
 }
 """Every topic of each end. What is written elsewhere in a recording is no part of an audit."""
 
-Record = TypeVar("Record", bound=tuple[Any, ...])
+Row = Any
+"""A row by the names of its channel's fields."""
 
 
 @dataclass(slots=True)
-class Topic(Generic[Record]):
+class Topic:
     """The rows of one topic in the order of the file, with the flight time that each is filed under."""
 
     recorded: bool = False
     """whether the recording has the topic at all"""
-    rows: list[Record] = field(default_factory=list)
+    rows: list[Row] = field(default_factory=list)
     times_ns: list[int] = field(default_factory=list)
 
     def __iter__(self) -> Any:
@@ -235,7 +88,7 @@ class Topic(Generic[Record]):
     def __len__(self) -> int:
         return len(self.rows)
 
-    def by_key(self) -> dict[int, Record]:
+    def by_key(self) -> dict[int, Row]:
         """Return the rows by their first field; of doubled ones the last."""
         return {row[0]: row for row in self.rows}
 
@@ -256,12 +109,12 @@ class EndRows:
     end: str
     complete: bool
     """whether the recorder finished the file; else what there is ends at a cut"""
-    topics: dict[str, Topic[Any]]
+    topics: dict[str, Topic]
     misfits: list[Misfit]
     foreign: list[str]
     """topics that no node writes"""
 
-    def topic(self, name: str) -> Topic[Any]:
+    def topic(self, name: str) -> Topic:
         """Return a topic of this end, without rows where it was not recorded."""
         return self.topics[name]
 
@@ -269,7 +122,7 @@ class EndRows:
 def read_rows(end: str, tables: Tables) -> EndRows:
     """Return the rows of one end; those that do not fit are left out and told as misfits."""
     misfits: list[Misfit] = []
-    topics: dict[str, Topic[Any]] = {}
+    topics: dict[str, Topic] = {}
     for name, kind in KINDS[end].items():
         table = tables.topics.get(name)
         topics[name] = Topic() if table is None else _typed(name, kind, table, misfits)
@@ -278,8 +131,8 @@ def read_rows(end: str, tables: Tables) -> EndRows:
     return EndRows(end, complete, topics, misfits, foreign)
 
 
-def _typed(name: str, kind: Kind, table: Table, misfits: list[Misfit]) -> Topic[Any]:
-    topic: Topic[Any] = Topic(recorded=True)
+def _typed(name: str, kind: Kind, table: Table, misfits: list[Misfit]) -> Topic:
+    topic: Topic = Topic(recorded=True)
     lacking = [one.name for one in kind.channel.fields if one.name not in table.names]
     if lacking:
         misfits.append(Misfit(name, "every row", lacking[0], "this field is not recorded"))

@@ -7,7 +7,7 @@ says it has, and a row that does not fit is told by topic, row and field instead
 from __future__ import annotations
 
 from collections import namedtuple
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -28,7 +28,8 @@ WITH_HOLES = ("measured", "true", "reference")
 """A rig may read what is no number, and an output may have no set-point: a recording holds null."""
 
 
-_record: Callable[[str, list[str]], Any] = namedtuple
+def _record(channel: RecordChannel) -> Any:
+    return namedtuple(channel.topic, [one.name for one in channel.fields])  # type: ignore[misc]
 
 
 class Kind:

@@ -29,7 +29,7 @@ WITH_HOLES = ("measured", "true", "reference")
 
 
 def _record(channel: RecordChannel) -> Any:
-    return namedtuple(channel.topic, [one.name for one in channel.fields])  # type: ignore[misc]
+    return namedtuple(channel.topic, [one.name for one in channel.fields])
 
 
 class Kind:
@@ -38,8 +38,7 @@ class Kind:
     def __init__(self, channel: RecordChannel, *nullable: str) -> None:
         self.channel = channel
         self.nullable = frozenset(nullable)
-        names = [one.name for one in channel.fields]
-        self.record: Any = namedtuple(channel.topic, names)
+        self.record = _record(channel)
         """a row: what the channel calls its fields"""
 
 

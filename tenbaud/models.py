@@ -6,11 +6,10 @@ both the same bits: `+ - * /`, comparisons, `math.sqrt`, `math.floor`, and `sin`
 
 from __future__ import annotations
 
-from channel.codec.codec import Model, Vector
+from channel.codec.codec import Model, ModelContext, Vector
 from channel.codec.models.hold import HoldModel
 from channel.codec.models.pitch import PitchModel, PitchParameters
 from channel.codec.numerics import cos, exp, sin
-from channel.codec.plugin_context import ModelContext
 from channel.codec.signals import InputSignal, Signal, Signals
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""Which slot the receiver settles next, and when: on its symbol, on a later one, or at its deadline.
+"""The next slot that the receiver settles: on its symbol, on a later one, or at its deadline.
 
 The receiver's session and the schedule of the studies count their slots with it.
 """

@@ -1,4 +1,4 @@
-"""When slots are due by this end's clock: how far ahead of it a slot may be, and who is believed.
+"""When slots are due by this end's clock: how far ahead a slot may be, and which symbols count.
 
 The transmitter sends one symbol a slot, so each symbol that is taken says where the schedule lies. A
 symbol long before its time is not the transmitter's, or the clock here was set; one after its deadline
@@ -82,7 +82,7 @@ class Schedule:
         return Timing.NEW if self.is_replaced_by(slot, now_ns) else Timing.EARLY
 
     def is_replaced_by(self, slot: int, now_ns: int) -> bool:
-        """Note a symbol that does not fit; return whether it is the last of a row that is believed."""
+        """Note a symbol that does not fit; return whether it is the last of an accepted row."""
         rival = self._rival
         count = 1
         if rival is not None:

@@ -14,7 +14,7 @@ from tenbaud.recording.reader import Recording
 
 @dataclass(frozen=True, slots=True)
 class Curves:
-    """What a figure draws, on the transmitter's ticks; the reference on the receiver's."""
+    """The curves of a figure, on the transmitter's ticks; the reference is on the receiver's."""
 
     times_s: Series
     pitch_rad: Series

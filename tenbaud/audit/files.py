@@ -107,7 +107,7 @@ def _check_summary(evidence: Evidence, end: str, held: int, findings: Findings) 
 
 
 def _count(text: str) -> int:
-    """Return a number of the recorder's; -1 for a text that is none, which no file can hold."""
+    """Return a count as the recorder wrote it; -1 for any other text."""
     return int(text) if text.isdecimal() else -1
 
 

@@ -9,7 +9,6 @@ from plant_sim.encoder import Encoder
 from tenbaud.audit.base import Claim, Evidence, Findings, Place, is_same
 from tenbaud.build.ends import guard_settings
 from tenbaud.build.flight import Agreement
-from tenbaud.replay.rows import Row
 
 TICK = ("transmitter", "tick")
 STOPPED = ("ramping", "latched")
@@ -140,7 +139,7 @@ def _check_told(evidence: Evidence, changes: list[int], findings: Findings) -> N
 
 
 class _Passed:
-    """What the guard lets pass, in the states that were recorded."""
+    """The voltages that the guard allows, in the recorded states."""
 
     def __init__(self, agreement: Agreement) -> None:
         settings = guard_settings(agreement)
@@ -154,7 +153,7 @@ class _Passed:
         self._state = "ready"
         self._from, self._ramped = self.volts, 0
 
-    def take(self, row: Row) -> str:
+    def take(self, row: Any) -> str:
         """Take one tick; return why its state cannot be, if it cannot."""
         state, before, command = row.guard, self._state, row.commanded
         if state not in FOLLOWS.get(before, ()):

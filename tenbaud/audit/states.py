@@ -48,7 +48,7 @@ def check_estimates(evidence: Evidence, findings: Findings) -> None:
 
 
 def check_commands(evidence: Evidence, findings: Findings) -> None:
-    """The receiver's commands, what it believed and what it followed: all ticks of all samples."""
+    """The receiver's commands, its predicted states and its references: all ticks of all samples."""
     expected = evidence.expected
     if expected is None or evidence.end("receiver") is None:
         return
@@ -118,7 +118,7 @@ SAMPLES = Claim(
     ),
 )
 ESTIMATES = Claim(
-    "what was believed of each tick follows from the words",
+    "predicted states of each tick follow from the words",
     check_estimates,
     (("transmitter", "estimate", ESTIMATE_FIELDS),),
 )

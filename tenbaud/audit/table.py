@@ -1,7 +1,7 @@
 """Every claim of an audit.
 
-A field of a channel that a node writes is owned by a claim, or stands with the reason in
-`tests/tenbaud/audit/unclaimed.py`; a test holds that.
+A field of a channel that a node writes is owned by a claim, or carries none for a reason:
+`tests/tenbaud/audit/unclaimed.py` lists those, and a test holds that the list is complete.
 """
 
 from __future__ import annotations

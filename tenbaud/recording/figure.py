@@ -49,7 +49,7 @@ _Draw = Callable[["Axes", "_Flight"], None]
 
 @dataclass(frozen=True, slots=True)
 class _Flight:
-    """What the figure shows."""
+    """The contents of the figure."""
 
     plant: Signals
     curves: dict[str, list[Curve]]
@@ -86,7 +86,7 @@ def draw_flight(transmitter: Path, receiver: Path | None, output: Path, title: s
 def draw_run(transmitter: Path | None, receiver: Path | None, title: str, own: bool = False) -> Figure:
     """Return the same as a matplotlib figure. Raises RecordingError without a transmitter's file.
 
-    `own`: the recordings were made just now, and what they store for the figure is believed.
+    `own`: the recordings were made just now, and what they store for the figure is trusted.
     """
     if transmitter is None:
         raise RecordingError(
@@ -168,7 +168,7 @@ def _read_flight(transmitter: Path, receiver: Path | None, own: bool) -> _Flight
 def _read_overview(path: Path, own: bool = False) -> tuple[Overview, dict[str, str]]:
     """Return the overview of a recording and what the run said about itself, in one pass over its rows.
 
-    `own`: the recording was made just now, and the overview that it stores is believed, if it has one.
+    `own`: the recording was made just now, and the overview that it stores is trusted, if it has one.
     """
     stored = stored_metadata(path, (OVERVIEW_METADATA, RUN_METADATA)) if own else {}
     if OVERVIEW_METADATA in stored:
@@ -263,7 +263,7 @@ class _Kind(NamedTuple):
 
     curve: str
     label: str
-    """empty: the name of the output or input, which is told of each"""
+    """empty: the name of the output or input"""
     colour: str
     width: float = 0.8
     style: Mapping[str, Any] = MappingProxyType({})

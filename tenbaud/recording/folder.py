@@ -30,7 +30,7 @@ SMALL_BYTES_MAX = 4 << 20
 
 @dataclass(frozen=True, slots=True)
 class RunFolder:
-    """Where the files of a run are, whether they exist or not."""
+    """The paths of a run's files, whether they exist or not."""
 
     path: Path
 

@@ -1,8 +1,8 @@
-"""What the picture of a flight shows, in bounded memory: gathered while it flies, or from its rows.
+"""The data for a flight's figure, in bounded memory: gathered in flight, or from its rows.
 
 A recorder keeps an overview beside the rows that it writes and stores it at the end of a long recording
 so that ten million ticks are drawn at once when they have been flown. Everybody
-else reads the rows: what a file says of its own rows may not be so.
+else reads the rows: the statements of a file about its rows may be false.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Rows of a recording checked against what their channel declares, many at a time.
 
-Whoever gets a row from here may rely on every declared field being there with a value of its type, or
-null; on a whole number, not null, in the field that counts the rows; and on `NEVER_NULL`.
+Every row has all declared fields, each with a value of its type or null, and a whole number, not null,
+in the field that counts the rows; `NEVER_NULL` names further fields.
 """
 
 from __future__ import annotations
@@ -12,10 +12,15 @@ from typing import Any
 
 import orjson
 
-from channel.protocol.audit_trail import ARRIVED_CHANNEL, EPOCH_CHANNEL, SENT_CHANNEL
 from channel.protocol.events import EVENT_CHANNEL
 from channel.protocol.lockstep import LOCKSTEP_CHANNEL
-from channel.protocol.recording import Field, RecordChannel
+from channel.protocol.recording import (
+    ARRIVED_CHANNEL,
+    EPOCH_CHANNEL,
+    SENT_CHANNEL,
+    Field,
+    RecordChannel,
+)
 from receiver.session import records as receiver
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.old_rows import OLD_EVENT_CHANNEL, names_of_today, rows_of_today
@@ -36,7 +41,7 @@ KNOWN = (
     *(ARRIVED_CHANNEL, EPOCH_CHANNEL, EVENT_CHANNEL, LOCKSTEP_CHANNEL, GAP_CHANNEL),
     OLD_EVENT_CHANNEL,
 )
-"""What the two ends of this version write, and of those before it what has changed."""
+"""The rows that this version's ends write, and the changed ones of earlier versions."""
 
 NEVER_NULL = {
     ("epoch", "epoch"),

@@ -170,7 +170,7 @@ class Run:
 
     @property
     def events(self) -> list[dict[str, Any]]:
-        """What both ends reported, in order of flight time: the fields recorded, `end` and `text`.
+        """The events of both ends, in order of flight time: the recorded fields, `end` and `text`.
 
         The text is a sentence made from the fields, for people.
         """
@@ -183,7 +183,7 @@ class Run:
 
     @property
     def metadata(self) -> dict[str, str]:
-        """What the run said about itself when it began."""
+        """The metadata that the run wrote when it began."""
         return self.tables(self.ends[0]).metadata
 
     @property
@@ -193,7 +193,7 @@ class Run:
 
     @property
     def notes(self) -> list[str]:
-        """What to know before believing the recordings: another version, a cut, holes."""
+        """Notes to read before trusting the recordings: another version, a cut, holes."""
         return [note for end in self.ends for note in self.tables(end).notes]
 
     @cached_property
@@ -211,7 +211,7 @@ class Run:
 
         if not is_own_file(self.folder.config):
             raise RecordingError(f"{self.folder.path} holds no {self.folder.config.name}.")
-        return load_config(path=self.folder.config)
+        return load_config(path=self.folder.config, recorded=True)
 
     # Pictures
 

@@ -77,7 +77,7 @@ Maker = Callable[["Source"], Series | None]
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """What signals are made from. An end that was not recorded is None."""
+    """The sources of signals. An end that was not recorded is None."""
 
     base: TimeBase
     transmitter: Tables | None
@@ -101,7 +101,7 @@ class Source:
         return self.ticks("transmitter", "estimate", "coded_state", state)
 
     def live(self, state: int | None) -> Series | None:
-        """Return what the receiver believed of a state in advance."""
+        """Return what the receiver predicted of a state."""
         live = self.ticks("transmitter", "estimate", "live_state", state)
         return self.ticks("receiver", "tick", "live_state", state) if live is None else live
 
@@ -195,7 +195,7 @@ _OF_OUTPUT: tuple[tuple[str, str, _OfOutput], ...] = (
     ("", "{}, true where the rig knows it, else as measured", lambda one, at, _: one.output(at)),
     ("measured", "{} as the sensor gives it", _tick("transmitter", "measured")),
     ("estimate", "the codec's estimate of {}", lambda one, _, state: one.coded(state)),
-    ("estimate_live", "{} as the receiver believed in advance", lambda one, _, state: one.live(state)),
+    ("estimate_live", "{} as the receiver predicted it", lambda one, _, state: one.live(state)),
     ("error_coded", "{} less its estimate", lambda one, at, state: one.error(at, one.coded(state))),
     ("error_live", "{} less its live estimate", lambda one, at, state: one.error(at, one.live(state))),
     ("range", "range M for {} before the word", lambda one, at, _: one.samples("range", at)),

@@ -104,13 +104,13 @@ def _refly_epoch(
             _let_deadlines_pass(session, now_ns)
             frame = Symbol(welcome.session, welcome.epoch, slot, alphabet.symbol_number(symbol))
             session.on_frame(frame, now_ns)
-            session.rest()
+            session.flush_records()
             yield from _taken(rows, place)
     # Erasures after the last symbol: their deadlines pass one by one.
     deadline = session.next_deadline()
     while session.state.sample < last and deadline is not None:
         session.on_deadline(deadline)
-        session.rest()
+        session.flush_records()
         yield from _taken(rows, place)
         deadline = session.next_deadline()
 

@@ -1,7 +1,7 @@
 """The rows of a recording as typed records, checked one by one as they are read.
 
 A recording may come from anybody. So the types are those that the nodes write, not those that the file
-says it has, and a row that does not fit is told by topic, row and field instead of failing later.
+says it has, and an error names topic, row and field of a row that does not fit.
 """
 
 from __future__ import annotations
@@ -11,15 +11,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from channel.protocol.audit_trail import ARRIVED_CHANNEL, EPOCH_CHANNEL, SENT_CHANNEL
 from channel.protocol.events import EVENT_CHANNEL
 from channel.protocol.lockstep import LOCKSTEP_CHANNEL
-from channel.protocol.recording import Field, RecordChannel
-from receiver.session import records as receiver_records
+from channel.protocol.recording import (
+    ARRIVED_CHANNEL,
+    EPOCH_CHANNEL,
+    SENT_CHANNEL,
+    Field,
+    RecordChannel,
+)
+from receiver.session import records as receiver
 from tenbaud.recording.recover import RECOVERED_NOTE
 from tenbaud.recording.table import Table, Tables
 from transmitter.metrics.gap import GAP_CHANNEL
-from transmitter.session import records as transmitter_records
+from transmitter.session import records as transmitter
 
 KEY_MAX = 2**48
 """No flight has a tick, sample or slot beyond this."""
@@ -28,49 +33,46 @@ WITH_HOLES = ("measured", "true", "reference")
 """A rig may read what is no number, and an output may have no set-point: a recording holds null."""
 
 
-def _record(channel: RecordChannel) -> Any:
-    return namedtuple(channel.topic, [one.name for one in channel.fields])
+class Kind(NamedTuple):
+    """A topic of an end: the channel that the node writes it through, and what may be null in it."""
+
+    channel: RecordChannel
+    nullable: frozenset[str]
+    record: type[Any]
+    """a named tuple with the channel's fields"""
 
 
-class Kind:
-    """A topic of an end: the channel that the node writes it through, and what may be null."""
-
-    def __init__(self, channel: RecordChannel, *nullable: str) -> None:
-        self.channel = channel
-        self.nullable = frozenset(nullable)
-        self.record = _record(channel)
-        """a row: what the channel calls its fields"""
+def _kind(channel: RecordChannel, *nullable: str) -> Kind:
+    names = [one.name for one in channel.fields]
+    return Kind(channel, frozenset(nullable), namedtuple("Record", names))
 
 
-_EPOCH = Kind(EPOCH_CHANNEL)
-_EVENT = Kind(EVENT_CHANNEL, *(one.name for one in EVENT_CHANNEL.fields[2:]))
-_LOCKSTEP = Kind(LOCKSTEP_CHANNEL, "state", "coder", "peer_state", "peer_coder")
+_EPOCH = _kind(EPOCH_CHANNEL)
+_EVENT = _kind(EVENT_CHANNEL, *(one.name for one in EVENT_CHANNEL.fields[2:]))
+_LOCKSTEP = _kind(LOCKSTEP_CHANNEL, "state", "coder", "peer_state", "peer_coder")
 
 KINDS: dict[str, dict[str, Kind]] = {
     "transmitter": {
-        "symbol": Kind(SENT_CHANNEL, "left_ns"),
+        "symbol": _kind(SENT_CHANNEL, "left_ns"),
         "epoch": _EPOCH,
         "event": _EVENT,
         "lockstep_failure": _LOCKSTEP,
-        "tick": Kind(transmitter_records.TICK_CHANNEL, "true", "commanded"),
-        "sample": Kind(transmitter_records.SAMPLE_CHANNEL, "word_sent", "word"),
-        "estimate": Kind(transmitter_records.ESTIMATE_CHANNEL, "live_state"),
-        "gap": Kind(GAP_CHANNEL, *(one.name for one in GAP_CHANNEL.fields[1:])),
-        "device": Kind(transmitter_records.DEVICE_CHANNEL, "device_s"),
+        "tick": _kind(transmitter.TICK_CHANNEL, "true", "commanded"),
+        "sample": _kind(transmitter.SAMPLE_CHANNEL, "word_sent", "word"),
+        "estimate": _kind(transmitter.ESTIMATE_CHANNEL, "live_state"),
+        "gap": _kind(GAP_CHANNEL, *(one.name for one in GAP_CHANNEL.fields[1:])),
+        "device": _kind(transmitter.DEVICE_CHANNEL, "device_s"),
     },
     "receiver": {
-        "symbol": Kind(ARRIVED_CHANNEL),
+        "symbol": _kind(ARRIVED_CHANNEL),
         "epoch": _EPOCH,
         "event": _EVENT,
         "lockstep_failure": _LOCKSTEP,
-        "tick": Kind(receiver_records.TICK_CHANNEL),
-        "sample": Kind(receiver_records.SAMPLE_CHANNEL, "word"),
+        "tick": _kind(receiver.TICK_CHANNEL),
+        "sample": _kind(receiver.SAMPLE_CHANNEL, "word"),
     },
 }
 """Every topic of each end. What is written elsewhere in a recording is no part of an audit."""
-
-Row = Any
-"""A row by the names of its channel's fields."""
 
 
 @dataclass(slots=True)
@@ -79,7 +81,7 @@ class Topic:
 
     recorded: bool = False
     """whether the recording has the topic at all"""
-    rows: list[Row] = field(default_factory=list)
+    rows: list[Any] = field(default_factory=list)
     times_ns: list[int] = field(default_factory=list)
 
     def __iter__(self) -> Any:
@@ -88,7 +90,7 @@ class Topic:
     def __len__(self) -> int:
         return len(self.rows)
 
-    def by_key(self) -> dict[int, Row]:
+    def by_key(self) -> dict[int, Any]:
         """Return the rows by their first field; of doubled ones the last."""
         return {row[0]: row for row in self.rows}
 
@@ -120,7 +122,7 @@ class EndRows:
 
 
 def read_rows(end: str, tables: Tables) -> EndRows:
-    """Return the rows of one end; those that do not fit are left out and told as misfits."""
+    """Return the rows of one end; those that do not fit are left out and listed as misfits."""
     misfits: list[Misfit] = []
     topics: dict[str, Topic] = {}
     for name, kind in KINDS[end].items():
@@ -132,7 +134,7 @@ def read_rows(end: str, tables: Tables) -> EndRows:
 
 
 def _typed(name: str, kind: Kind, table: Table, misfits: list[Misfit]) -> Topic:
-    topic: Topic = Topic(recorded=True)
+    topic = Topic(recorded=True)
     lacking = [one.name for one in kind.channel.fields if one.name not in table.names]
     if lacking:
         misfits.append(Misfit(name, "every row", lacking[0], "this field is not recorded"))

@@ -1,4 +1,4 @@
-"""What becomes of every symbol and every echo of a flight, and when, before anything is computed.
+"""The course of every symbol and every echo of a flight, and when, before anything is computed.
 
 Loss, delay and erasure do not depend on what a symbol says. So the line is flown once on its own, in
 the order of events of the virtual clock (`transmitter.loops.virtual`) and with the receiver's own slot

@@ -49,7 +49,7 @@ R_SAMPLE, R_WORD, R_DIGEST = _at(TAKEN, "sample", "word", "digest")
 
 
 class _Composer:
-    """What both ends' messages have in common."""
+    """Common fields of both ends' messages."""
 
     def __init__(self, agreement: Agreement, tap: Tap) -> None:
         self.agreement = agreement
@@ -67,6 +67,10 @@ class _Composer:
             "inputs": [_named(one) for one in plant.inputs],
         }
         self._stride = max(1, round(POINT_PERIOD_S / (agreement.terms.tick_ns / 1e9)))
+
+    def skip(self, messages: int) -> None:
+        """Count messages that were not sent."""
+        self.skipped += messages
 
     def watch(self, watched: bool) -> None:
         """Have rows kept only while anybody watches."""
@@ -266,7 +270,7 @@ def _word(word: object) -> list[int] | None:
 
 
 def _thinned(points: list[Any], most: int) -> list[Any]:
-    """Return at most so many of the points, the last one included."""
+    """Return at most that number of points, the last one included."""
     if len(points) <= most:
         return points
     every = -(-len(points) // most)

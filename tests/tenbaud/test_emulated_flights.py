@@ -18,6 +18,8 @@ from tenbaud.flight.summary import transmitter_part
 from tenbaud.recording.reader import MessageStream
 from tests.tenbaud.emulated_flight import PATIENT, RigProcess, demo, fly_emulated
 
+pytestmark = pytest.mark.real_time
+
 SECONDS = 5.0
 SOAK_SECONDS = 60.0
 OFF = [0.0, 0.0]
@@ -55,6 +57,7 @@ def simulated_rms(seconds: float, lead_ticks: int) -> float:
     return rms
 
 
+@pytest.mark.both_cores
 @pytest.mark.parametrize("form", ["cobs", "ascii", "quarc"])
 def test_an_emulated_rig_flies_like_the_simulated_one(form: str, tmp_path: Path) -> None:
     rig, ends = PEERS[form]
@@ -65,7 +68,11 @@ def test_an_emulated_rig_flies_like_the_simulated_one(form: str, tmp_path: Path)
     assert summary["digest_checks"] == 10 * SECONDS
     assert summary["rig"].get("lost", 0) == 0
     expected = simulated_rms(SECONDS, summary["lead_ticks"])
-    assert summary["error_coded_rms_rad"] == pytest.approx(expected, rel=0.1)
+    # What a busy machine erased or missed makes it another flight, by so much at most.
+    held_up = (summary["erasures"] + summary["commands_late"] + summary["ticks_missed"]) / summary[
+        "samples"
+    ]
+    assert summary["error_coded_rms_rad"] == pytest.approx(expected, rel=0.1 + held_up)
     assert device.get("watchdog_trips", 0) == 0
     assert (device["volts"], device["enabled"]) == (OFF, False)
     # One command a tick at most, so more of them than ticks are those of the way down.

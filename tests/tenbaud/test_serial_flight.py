@@ -26,6 +26,8 @@ from tenbaud.recording.diff import compare_runs
 from tenbaud.recording.folder import RunFolder
 from tests.tenbaud.processes import run
 
+pytestmark = pytest.mark.real_time
+
 
 @dataclass
 class Flown:
@@ -54,7 +56,7 @@ def fly(
     overrides: dict[str, Any],
     meanwhile: Callable[[], None] = lambda: None,
 ) -> Flown:
-    """Fly both ends over a line on the real clock, the receiver on a thread of its own.
+    """Fly both ends over a line on the real clock, the receiver on a separate thread.
 
     `meanwhile` runs on another thread once the flight has begun.
     """
@@ -138,12 +140,12 @@ def test_when_the_line_damages_bytes_then_no_divergence_is_silent(tmp_path: Path
     # Up, one byte in five; down, as much as frames of this size stand for some seconds.
     with EmulatedLine(tmp_path, 460_800, seed=6) as line:
 
-        def spoil() -> None:
-            line.spoil("up", 0.2)
-            line.spoil("down", 0.001)
+        def corrupt() -> None:
+            line.corrupt("up", 0.2)
+            line.corrupt("down", 0.001)
 
         changed = settings(line_rate_baud=460_800)
-        flown = fly(line, {**changed, "channel": {"repeats": 6}}, spoil)
+        flown = fly(line, {**changed, "channel": {"repeats": 6}}, corrupt)
         assert line.damaged("up") > 0
         assert line.damaged("down") > 0
     assert flown.outcome.code in (ExitCode.OK, ExitCode.LINK_LOST), flown.outcome.text

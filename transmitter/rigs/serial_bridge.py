@@ -13,8 +13,8 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from transmitter.rigs.axes import Axis, Motors
+from transmitter.rigs.base import RigError
 from transmitter.rigs.device import DeviceRig, DeviceSettings
-from transmitter.rigs.errors import RigError
 from transmitter.rigs.formats.base import SerialFormat
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class BytePort:
             )
         except (serial.SerialException, OSError, ValueError) as error:
             raise RigError(_cannot_open(self.url, error)) from error
-        # FTDI adapters collect bytes for 16 ms unless told otherwise; others do not know the call.
+        # FTDI adapters collect bytes for 16 ms by default; others do not have the call.
         with contextlib.suppress(Exception):
             port.set_low_latency_mode(True)
         try:
@@ -124,7 +124,7 @@ class BytePort:
                 if self._handle is None:
                     return port.write(data) == len(data)
                 # pyserial would wait, after the write, until the port could take more: up to its
-                # time-out, in the middle of a tick. So it is asked beforehand and told not to wait.
+                # time-out, in the middle of a tick. So the call tests it in advance and does not wait.
                 _, ready, _ = select.select([], [self._handle], [], 0.0)
                 return bool(ready) and port.write(data) == len(data)
         except Exception as error:

@@ -18,7 +18,7 @@ from channel.errors import CodecDiverged
 from channel.protocol.terms import Terms
 
 CANNOT_FLY = (CodecDiverged, ArithmeticError, LookupError, ValueError)
-"""What a copy raises in a state that it cannot go on from."""
+"""The exceptions of a copy in a state that it cannot continue from."""
 
 
 class Confirmed(NamedTuple):
@@ -31,7 +31,7 @@ class Confirmed(NamedTuple):
     """as the receiver consumed it"""
     flown: FlownSample
     live: list[Vector | None]
-    """what the receiver had believed, in advance, of the sample's ticks; None for ticks below D"""
+    """predicted states of the sample's ticks, as the receiver had them; None for ticks below D"""
     digest: int
     """of our copy after the sample"""
     peer_digest: int

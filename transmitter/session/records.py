@@ -1,4 +1,4 @@
-"""What the transmitter writes down."""
+"""The records of the transmitter."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ ESTIMATE_CHANNEL = RecordChannel(
     (
         Field("tick", "integer", "", "index of the tick"),
         Field("coded_state", "numbers", "", "codec's model state at that tick"),
-        Field("live_state", "numbers", "", "model state that the receiver believed of that tick"),
+        Field("live_state", "numbers", "", "model state that the receiver predicted for that tick"),
     ),
 )
 

@@ -24,7 +24,7 @@ from channel.links.serial.pseudo_terminal import PseudoTerminal
 Way = Literal["up", "down"]
 
 QUEUE_BYTES_MAX = 4096
-"""What waits in a direction; more is left in the sender's own buffer, as with a real port."""
+"""Capacity of a direction; further bytes stay in the sender's buffer, as with a real port."""
 STEP_S = 0.0005
 """Bytes of a fast line are passed on in steps of this: late by at most so much, never early."""
 BLOCKED_S = 0.2
@@ -138,7 +138,7 @@ class EmulatedLine:
         with self._lock:
             return self._ways[way].damaged
 
-    def spoil(self, way: Way, share: float) -> None:
+    def corrupt(self, way: Way, share: float) -> None:
         """Change this share of the bytes from now on."""
         self._ways[way].damage = share
 
@@ -154,7 +154,7 @@ class EmulatedLine:
                 one.plug()
 
     def unplug(self) -> None:
-        """Pull both ends out: whoever has them open gets an error, and their names are gone."""
+        """Pull both ends out: processes that have them open get an error, and their names are gone."""
         with self._lock:
             for one in self._ends:
                 one.unplug()

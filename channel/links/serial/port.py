@@ -16,7 +16,7 @@ WRITE_TIMEOUT_S = 1.0
 
 
 def check_port(url: str, insecure: bool) -> None:
-    """Refuse a port that is on another machine, unless told to allow it."""
+    """Refuse a port that is on another machine, unless it is allowed."""
     if not url:
         raise LinkError("a serial link needs a port, such as --port /dev/ttyUSB0 or --port COM3")
     parts = urlsplit(url)
@@ -42,7 +42,7 @@ def open_port(url: str, line_rate_baud: int) -> serial.SerialBase:
         port.open()
     except (serial.SerialException, OSError, ValueError) as error:
         raise LinkError(f"cannot open the serial port {url}: {_explained(error)}") from error
-    # Many USB adapters collect bytes for 16 ms unless told not to. Not every port knows this.
+    # Many USB adapters collect bytes for 16 ms by default. Not every port has this setting.
     with contextlib.suppress(Exception):
         port.set_low_latency_mode(True)
     return port

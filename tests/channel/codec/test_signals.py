@@ -95,7 +95,7 @@ def test_signals_of_one_group_or_else_of_one_unit_share_a_panel() -> None:
     assert mixed.groups("outputs") == [("angle, rad; torque", [0, 1])]
 
 
-def test_a_name_that_is_not_there_is_told_with_those_that_are() -> None:
+def test_an_unknown_name_is_refused_with_the_known_ones() -> None:
     signals = signals_of(Cart())
     assert signals.index("outputs", "output_1") == 0
     with pytest.raises(ValueError, match="'speed' is none of the states: state_1, state_2"):

@@ -65,7 +65,7 @@ def test_a_rough_flight_with_a_rejoin_passes_too(rough: Run) -> None:
     [
         ("usual-1000baud", {"duration_s": 3.0}),
         ("static-10baud", {}),
-        ("timed-10baud", {"channel.delivery": "end"}),
+        ("open-loop-zoom-10baud", {"channel.delivery": "end"}),
     ],
 )
 def test_words_of_many_symbols_and_other_coders_pass(
@@ -81,7 +81,9 @@ def test_a_serial_line_in_real_time_passes_too(tmp_path: Path) -> None:
     assert run_command("demo", "--json", *flight, cwd=tmp_path).code == 0
     result = audit(tmp_path / "run")
     assert result.passed, result.leaks + result.gaps
-    assert result.counted.symbols_sent == result.counted.symbol_bytes == 30
+    counted = result.counted
+    # A busy machine may hold an end up past a slot, which then carries no symbol.
+    assert 30 - counted.erased <= counted.symbols_sent == counted.symbol_bytes <= 30
 
 
 # What was doctored, and what the audit must say

@@ -1,6 +1,6 @@
 """Every recorded field that no claim of an audit verifies, with the reason.
 
-Fields that are verified under some conditions only are claimed too.
+Fields that are verified under some conditions only are owned by a claim and stand here too.
 """
 
 from __future__ import annotations
@@ -8,8 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from tenbaud.audit.base import FILED, ORDER, Evidence
+from tenbaud.audit.base import FILED, Evidence
 from tenbaud.replay.rows import KINDS
+
+ORDER = "(order)"
+"""The place of a row among the others of its topic, as if it were a field."""
 
 Applies = Callable[[Any, Evidence], bool]
 

@@ -27,7 +27,7 @@ _CHUNK_HEAD = struct.Struct("<BQQQQII4sQ")
 
 
 def long_recording(path: Path, ticks: int, end: str = "transmitter") -> Path:
-    """Write the recording of a flight of so many ticks at 100 Hz over 10 bit/s."""
+    """Write the recording of a flight of that number of ticks at 100 Hz over 10 bit/s."""
     builder = RecordBuilder()
     Header("tenbaud", "tenbaud").write(builder)
     Metadata(RUN_METADATA, {"role": end, "tick_s": repr(TICK_S), "clock": "virtual"}).write(builder)

@@ -1,4 +1,4 @@
-"""Files made to harm whoever opens them: refused or read past, in words and within bounds."""
+"""Files made to harm their readers: refused or skipped, with a message and within bounds."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def huge() -> bytes:
 
 
 @pytest.mark.parametrize("name", BAD_CHUNKS)
-def test_a_bad_chunk_is_read_past_at_once_and_told(tmp_path: Path, name: str) -> None:
+def test_a_bad_chunk_is_read_past_at_once_and_reported(tmp_path: Path, name: str) -> None:
     path = tmp_path / "transmitter.mcap"
     path.write_bytes(mcap_file([good(0), BAD_CHUNKS[name](), good(40)], DESCRIBED, HEAD))
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

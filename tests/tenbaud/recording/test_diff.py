@@ -5,9 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from channel.protocol.audit_trail import EPOCH_CHANNEL
 from channel.protocol.lockstep import LOCKSTEP_CHANNEL
-from channel.protocol.recording import RecordChannel
+from channel.protocol.recording import EPOCH_CHANNEL, RecordChannel
 from tenbaud.recording.comparison import Verdict
 from tenbaud.recording.diff import compare_runs
 from tenbaud.recording.errors import RecordingError

@@ -107,7 +107,7 @@ def test_every_name_in_the_layouts_of_a_converted_run_is_in_it(run: Run, tmp_pat
 
 
 @pytest.mark.parametrize("which", [0, 1])
-def test_when_a_layout_exists_then_nothing_is_written_without_being_told_to(
+def test_when_a_layout_exists_then_nothing_is_written_without_an_order(
     run: Run, tmp_path: Path, which: int
 ) -> None:
     target = tmp_path / "flight.mcap"
@@ -121,7 +121,7 @@ def test_when_a_layout_exists_then_nothing_is_written_without_being_told_to(
     assert "flight" in own.read_text()
 
 
-def test_when_a_layout_cannot_be_written_then_it_is_said(run: Run, tmp_path: Path) -> None:
+def test_when_a_layout_cannot_be_written_then_it_is_reported(run: Run, tmp_path: Path) -> None:
     target = tmp_path / "flight.mcap"
     layout_paths(target)[0].mkdir()
     with pytest.raises(WriteError, match="cannot be written"):

@@ -1,4 +1,4 @@
-"""What a flight of a million ticks takes at its end, in memory."""
+"""What a long flight takes at its end, in memory."""
 
 from __future__ import annotations
 
@@ -36,7 +36,11 @@ print(json.dumps({"inspect": inspected - before, "figure": peak() - before, "pro
 """
 
 
-@pytest.mark.parametrize("ticks", [1_000_000, pytest.param(10_000_000, marks=pytest.mark.soak)])
+# As objects the rows of the shortest would take more than twice the memory that is allowed.
+@pytest.mark.parametrize(
+    "ticks",
+    [200_000, *(pytest.param(ticks, marks=pytest.mark.soak) for ticks in (1_000_000, 10_000_000))],
+)
 def test_a_long_recording_is_inspected_and_drawn_in_bounded_memory(tmp_path: Path, ticks: int) -> None:
     """From its rows, which takes more than what a recorder has stored for the figure."""
     long_recording(tmp_path / "transmitter.mcap", ticks)

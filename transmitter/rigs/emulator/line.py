@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Protocol
 
 from channel.links.serial.pseudo_terminal import PseudoTerminal
-from transmitter.rigs.errors import RigError
+from transmitter.rigs.base import RigError
 
 READ_BYTES = 4096
 
@@ -197,7 +197,7 @@ class TcpLine:
 
 
 def parse_line(text: str, line_baud: int) -> PtyLine | SerialLine | TcpLine:
-    """Return the line that a command line names; ValueError for one that is none."""
+    """Return the line that a command line names; ValueError for an invalid one."""
     kind, _, rest = text.partition(":")
     if kind == "pty":
         return PtyLine(rest)

@@ -1,7 +1,7 @@
 """Lines of text: what a lab's sketch prints already, or nearly.
 
 A sample is one line, ended by LF or CR LF, with decimal columns between commas, spaces or tabs; which
-column is what comes from the configuration. A line that begins with `E,` has a form of its own, with a
+column is what comes from the configuration. A line that begins with `E,` has a separate form, with a
 sequence and a checksum: `E,seq,t_us,c0,c1,c2*HH`, `HH` being the exclusive or of all characters
 before `*` in hexadecimal. Lines that begin with `#` are the device's log.
 

@@ -1,4 +1,4 @@
-"""What a serial format does: bytes to samples, commands to bytes."""
+"""The interface of a serial format: bytes to samples, commands to bytes."""
 
 from __future__ import annotations
 

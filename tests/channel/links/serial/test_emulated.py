@@ -1,4 +1,4 @@
-"""The emulated line keeps to its rate, damages what it is told to, and comes back after unplugging."""
+"""The emulated line keeps to its rate, damages bytes as configured, and comes back after unplugging."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_when_bytes_are_sent_then_they_arrive_no_faster_than_the_rate(way: Way, 
         assert read(target, len(data)) == data
         took_s = time.monotonic() - started
         # A hundred bytes of ten bits at 4800 bit/s: a real line cannot be quicker. Slower is the
-        # machine's affair.
+        # machine's task.
         assert took_s >= 100 * 10 / 4800
         assert line.carried(way) == 100
         assert line.carried("down" if way == "up" else "up") == 0

@@ -108,7 +108,7 @@ class TransmitterComposer(_Composer):
         self._live = live
         self._range: Vector = (0.0,) * len(self.outputs)
         self._read_of: dict[int, dict[str, Any]] = {}
-        self._believed_of: dict[int, dict[str, Any]] = {}
+        self._estimated_of: dict[int, dict[str, Any]] = {}
         self._lateness_ms: deque[float] = deque(maxlen=LATENESS_TICKS)
         self._applied: Vector | None = None
 
@@ -161,7 +161,7 @@ class TransmitterComposer(_Composer):
                     self._join(row[T_TICK], points)
             elif topic == "estimate":
                 if row[E_TICK] % stride == 0:
-                    self._believed_of[row[E_TICK]] = {
+                    self._estimated_of[row[E_TICK]] = {
                         "coded": self._measured(row[E_CODED]),
                         "live": self._outputs_of(row[E_LIVE]),
                         "range": self._range,
@@ -178,15 +178,15 @@ class TransmitterComposer(_Composer):
                         "peer_digest": row[S_PEER],
                     }
                 )
-        for waiting in (self._read_of, self._believed_of):
+        for waiting in (self._read_of, self._estimated_of):
             while len(waiting) > TICKS_WAITING_MAX:
                 del waiting[next(iter(waiting))]
         return points, samples
 
     def _join(self, tick: int, points: list[Any]) -> None:
-        """Make a point of a tick as soon as both what was read and what was believed are known."""
-        if tick in self._read_of and tick in self._believed_of:
-            points.append(self._read_of.pop(tick) | self._believed_of.pop(tick))
+        """Make a point of a tick as soon as both reading and estimate are known."""
+        if tick in self._read_of and tick in self._estimated_of:
+            points.append(self._read_of.pop(tick) | self._estimated_of.pop(tick))
 
     def _lateness(self) -> dict[str, float] | None:
         if not self._lateness_ms:

@@ -190,17 +190,26 @@ def test_without_a_flight_it_says_so(chromium: Any, tmp_path: Path) -> None:
         page.close()
 
 
-def test_the_gap_to_the_limit_is_shown_when_there_is_one(chromium: Any, tmp_path: Path) -> None:
+def test_a_plant_of_any_outputs_is_shown_with_its_names_and_units_and_the_gap_to_the_limit(
+    chromium: Any, tmp_path: Path
+) -> None:
     from channel.links.zenoh.telemetry import TelemetryPort
 
     place = f"unixsock-stream/{tmp_path}/t.sock"
+    signals = [
+        {"name": name, "unit": unit, "low": None, "high": None}
+        for name, unit in (("arm", "rad"), ("cart_place", "m"), ("torque", "N m"))
+    ]
+    point = {"time_s": 0.9, "measured": [0.5, 1.5], "true": None, "live": None}
     message = {
-        "role": "transmitter", "version": 2, "session": "lab", "flight": 5, "number": 1,
+        "role": "transmitter", "version": 3, "session": "lab",
+        "plant": {"model": "mine:Model", "outputs": signals[:2], "inputs": signals[2:]}, "flight": 5, "number": 1,
         "phase": "flying", "clock": "real", "takes_commands": False, "time_s": 1.0, "epoch": 0,
         "impairments": "", "counts": {"erasures": 0, "desyncs": 0, "rejoins": 0, "digest_checks": 1},
         "events": [], "dropped": 0, "preset": "x", "tick_s": 0.01, "symbol_period_s": 0.1,
-        "baud_configured": 10.0, "duration_s": 100.0, "points": [], "samples": [],
-        "guard": "running", "volts": None, "paused": False, "pace": None,
+        "baud_configured": 10.0, "duration_s": 100.0, "samples": [],
+        "points": [{**point, "coded": [0.25, 1.25], "range": [0.1, 0.5]}],
+        "guard": "running", "applied": [-0.25], "paused": False, "pace": None,
         "lateness": {"p50_ms": 0.1, "p99_ms": 0.25, "max_ms": 1.0}, "gap_to_floor": 1.42,
     }  # fmt: skip
     TELEMETRY.validate_python(message)
@@ -215,6 +224,15 @@ def test_the_gap_to_the_limit_is_shown_when_there_is_one(chromium: Any, tmp_path
                 break
         assert number(page, "#f-gap") == 1.42
         assert number(page, "#f-late") == 0.25
+        for canvas in ("#value-0", "#error-0", "#value-1", "#error-1"):
+            assert page.locator(canvas).is_visible()
+        assert "Cart place m, last 30 s of flight" in page.locator("#curves").inner_text()
+        assert page.locator("#outputs").inner_text().split("\n") == [
+            *("arm", "+28.6°", "cart place", "+1.50 m")
+        ]
+        assert page.locator("#inputs").inner_text().split("\n") == ["torque", "\u22120.250 N m"]
+        assert page.locator("#f-error").inner_text() == "+14.32°, +0.250 m"
+        assert page.locator("#helicopter").is_hidden()
         page.get_by_text("takes no commands").wait_for()
         page.close()
     port.close()

@@ -203,7 +203,8 @@ def test_a_plant_of_any_outputs_is_shown_with_its_names_and_units_and_the_gap_to
     point = {"time_s": 0.9, "measured": [0.5, 1.5], "true": None, "live": None}
     message = {
         "role": "transmitter", "version": 3, "session": "lab",
-        "plant": {"model": "mine:Model", "outputs": signals[:2], "inputs": signals[2:]}, "flight": 5, "number": 1,
+        "plant": {"model": "mine:Model", "outputs": signals[:2], "inputs": signals[2:]},
+        "flight": 5, "number": 1,
         "phase": "flying", "clock": "real", "takes_commands": False, "time_s": 1.0, "epoch": 0,
         "impairments": "", "counts": {"erasures": 0, "desyncs": 0, "rejoins": 0, "digest_checks": 1},
         "events": [], "dropped": 0, "preset": "x", "tick_s": 0.01, "symbol_period_s": 0.1,

@@ -69,4 +69,7 @@ def _the_machine(request: pytest.FixtureRequest) -> Iterator[None]:
     alone = request.node.get_closest_marker("both_cores") is not None
     with _MACHINE.open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX if alone else fcntl.LOCK_SH)
-        yield
+        try:
+            yield
+        finally:
+            fcntl.flock(lock, fcntl.LOCK_UN)  # a process that the test forked may still have it open

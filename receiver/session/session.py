@@ -38,14 +38,13 @@ from channel.protocol.identity import Identity
 from channel.protocol.limits import to_millivolts
 from channel.protocol.lockstep import History, difference_event
 from channel.protocol.recording import NullRecorder, Recorder
-from channel.protocol.slot_clock import SlotClock
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
 from receiver.controllers.base import Controller
 from receiver.session.commander import Commander
 from receiver.session.records import write_epoch, write_failure, write_symbol
 from receiver.session.rejoin import Greeter, Verdict, desync_answer, difference, first_sample
-from receiver.session.schedule import Proven, Schedule, Timing
+from receiver.session.schedule import Proven, Schedule, SlotClock, Timing
 from receiver.session.takeover import Takeover
 
 EPOCH_MAX = 0xFFFF

@@ -10,9 +10,8 @@ from collections.abc import Callable
 from channel.codec.codec import Codec
 from channel.codec.models.pitch import PitchModel
 from channel.line.clocks import SkewedClock
-from channel.line.downlink import Downlink
 from channel.line.impairments import Direction, ImpairedLine, SymbolWire
-from channel.line.line import CleanLine, Line
+from channel.line.line import CleanLine, Downlink, Line
 from channel.line.uplink import Uplink
 from channel.protocol.recording import Recorder
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage

@@ -23,14 +23,14 @@ from receiver.session.rejoin import difference
 from tenbaud.build.ends import build_receiver
 from tenbaud.build.flight import Agreement
 from tenbaud.config.load import dump_config
-from tenbaud.files.whole import WriteError, write_error, write_whole
+from tenbaud.files.whole import WriteError, write_whole
 from tenbaud.flight.ends import open_recorder
 from tenbaud.flight.outcome import ExitCode, Outcome, outcome_of
 from tenbaud.flight.rate_limited_log import RateLimitedLog
 from tenbaud.flight.receive import ended_outcome
 from tenbaud.flight.report import write_summary
 from tenbaud.flight.summary import Summary, receiver_part
-from tenbaud.recording.folder import RunFolder
+from tenbaud.recording.folder import RunFolder, make_numbered
 from tenbaud.recording.shared import SharedWriter
 from tenbaud.recording.writer import McapRecorder
 from tenbaud.sentences import endings
@@ -194,7 +194,7 @@ class ManyHost:
         return Refuse(hello.incarnation, refusal.ending, refusal.text, config)
 
     def _serve(self, name: str, agreement: Agreement, data: bytes) -> Served:
-        folder = RunFolder(_new_folder(self._root, name))
+        folder = RunFolder(make_numbered(self._root / name.replace("/", "-")))
         link = agreement.config.link.model_copy(update={"session": name})
         write_whole(folder.config, dump_config(agreement.config.model_copy(update={"link": link})))
         recorder = open_recorder(agreement, "receiver", folder.receiver, self._writer)
@@ -250,22 +250,6 @@ def _outcome(agreement: Agreement, served: Served, error: Exception | None) -> O
     if end is not None and end.ending is Ending.STOPPED and not end.by_peer:
         return Outcome(ExitCode.INTERRUPTED, endings.end_text(end, "transmitter"))
     return ended_outcome(agreement, session)
-
-
-def _new_folder(root: Path, name: str) -> Path:
-    """Make a folder for a flight: the session's name, and a number if it has flown before."""
-    plain = name.replace("/", "-")
-    number = 1
-    while True:
-        path = root / (plain if number == 1 else f"{plain}-{number}")
-        try:
-            path.mkdir(parents=True)
-        except FileExistsError:
-            number += 1
-        except OSError as error:
-            raise write_error(path, error) from error
-        else:
-            return path
 
 
 def _opened(data: bytes) -> tuple[Frame | None, int | None]:

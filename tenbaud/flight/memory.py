@@ -7,9 +7,8 @@ from dataclasses import asdict
 
 from channel.codec.codec import Codec, Vector
 from channel.errors import ConfigMismatch, LinkLost
-from channel.line.downlink import Downlink
 from channel.line.impairments import LineFaults
-from channel.line.line import CleanLine, Line
+from channel.line.line import CleanLine, Downlink, Line
 from channel.line.uplink import Uplink
 from channel.protocol.endings import End, Ending
 from channel.protocol.identity import Identity, numerics_probe

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from channel.line.line import Delivery
-from channel.protocol.slot_clock import SlotClock
 from receiver.session import schedule as receiver
+from receiver.session.schedule import SlotClock
 from tenbaud.build.ends import build_line
 from tenbaud.build.flight import Agreement
 from transmitter.loops.virtual import GREETINGS_MAX

@@ -38,8 +38,7 @@ from channel.protocol.lockstep import History, difference_event, is_answer
 from channel.protocol.recording import EPOCH_CHANNEL, NullRecorder, Recorder, epoch_row
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
-from transmitter.session.copies import CANNOT_FLY, Confirmed, Copies
-from transmitter.session.echo_order import EchoOrder
+from transmitter.session.copies import CANNOT_FLY, Confirmed, Copies, EchoOrder
 from transmitter.session.owing import Owing
 from transmitter.session.rate_observer import RateObserver
 from transmitter.session.records import write_failure, write_sample

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from channel.links.serial.emulated import EmulatedLine, Way
+from tests.channel.links.serial.noisy_line import NoisyLine
 from tests.contract.test_links import PATIENCE_S, until
 
 
@@ -58,19 +59,20 @@ def test_when_a_share_is_damaged_then_the_same_bytes_are_with_the_same_seed(tmp_
     arrived = []
     for _ in range(2):
         with (
-            EmulatedLine(tmp_path, None, damage=0.1, seed=4) as line,
+            NoisyLine(tmp_path, None, seed=4) as line,
             opened(line.transmitter_port, line.receiver_port) as (near, far),
         ):
+            line.corrupt("up", 0.1)
             os.write(near, bytes(1000))
             arrived.append(read(far, 1000))
-            assert line.damaged("up") == sum(byte != 0 for byte in arrived[-1])
+            assert line.damaged["up"] == sum(byte != 0 for byte in arrived[-1])
     assert arrived[0] == arrived[1]
     assert 60 < sum(byte != 0 for byte in arrived[0]) < 140
 
 
 def test_when_bytes_are_injected_then_they_arrive(tmp_path: Path) -> None:
     with (
-        EmulatedLine(tmp_path, None) as line,
+        NoisyLine(tmp_path, None) as line,
         opened(line.transmitter_port, line.receiver_port) as (_, far),
     ):
         line.inject("up", b"noise")

@@ -6,6 +6,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+from channel.codec.signals import signals_of
 from channel.links.base import Link
 from channel.protocol.bounds import COUNTER
 from channel.protocol.endings import End
@@ -57,6 +58,7 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         **_errors("error_coded", scores.coded, scores.angle_max_rad, scores.reference_max_rad),
         **_errors("error_live", scores.live, scores.angle_max_rad, scores.reference_max_rad),
         "tracking_rms_rad": scores.tracking.rms,
+        "outputs": _outputs(run),
         **gap_part(node.gauge.whole if node.gauge is not None else None),
         "commands_late": node.commands_late,
         "symbols_refused": run.uplink.shaper.refused,
@@ -199,6 +201,23 @@ def real_rig_name(section: TransmitterSection) -> str:
             return f"QUARC model at {section.quarc.host}:{section.quarc.port}"
         case _:
             return f"Quanser {section.hil.card_type} {section.hil.card_identifier}"
+
+
+def _outputs(run: TransmitterRun) -> Summary:
+    """Return the figures of every output that is scored, by its name, in its own unit."""
+    figures = {}
+    plant = signals_of(run.agreement.codec.model)
+    for output, scores in zip(plant.outputs, (run.node.scores,), strict=False):
+        figures[output.name] = {
+            "unit": output.unit,
+            "largest": scores.angle_max_rad,
+            "error_coded_max": scores.coded.largest if scores.coded.count else None,
+            "error_coded_rms": scores.coded.rms,
+            "error_live_max": scores.live.largest if scores.live.count else None,
+            "error_live_rms": scores.live.rms,
+            "tracking_rms": scores.tracking.rms,
+        }
+    return figures
 
 
 def _errors(name: str, meter: ErrorMeter, angle_max: float, reference_max: float) -> Summary:

@@ -165,7 +165,10 @@ def _control(one: Fields) -> str:
     tick = one["tick"]
     before = f"tick {tick}" if tick is not None else f"sample {one['sample']}"
     texts: dict[str, Callable[[], str]] = {
-        "set_point": lambda: f"set-point {one['value']!r} rad",
+        # Of a recording without the unit it was an angle.
+        "set_point": lambda: " ".join(
+            ("set-point", repr(one["value"]), "rad" if one["detail"] is None else one["detail"])
+        ).rstrip(),
         "follow": lambda: "follow the reference",
         "pause": lambda: f"pause before tick {one['number']}",
         "go_on": lambda: "go on",

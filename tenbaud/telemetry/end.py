@@ -54,7 +54,7 @@ class TelemetryEnd:
     """what the end records into: the tap, where there is one"""
     endpoint: str | None
     queue: CommandQueue | None
-    steering: SteeredReference | None
+    steering: tuple[SteeredReference | None, ...] | None
     pace: float | None
     tap: Tap | None
     security: Security | None
@@ -154,7 +154,7 @@ def open_telemetry(
         tap or recorder,
         endpoint,
         CommandQueue() if agreement.live and endpoint is not None else None,
-        SteeredReference(build_reference(agreement.config)) if steerable else None,
+        (SteeredReference(build_reference(agreement.config)),) if steerable else None,
         options.pace if agreement.clock == "virtual" else None,
         tap,
         None if security is None else _for_viewers(security, agreement.live),

@@ -21,7 +21,7 @@ import numpy as np
 
 from benchmarks.figures import Figure
 from channel.codec.numerics import sin
-from channel.protocol.limits import from_millivolts, to_millivolts
+from channel.protocol.limits import from_steps, to_steps
 from plant_sim.encoder import angle_of, counts_of
 from plant_sim.pitch import Sine, pitch_step
 from receiver.controllers.pid import motor_volts, pid_integral, pid_volts
@@ -85,7 +85,7 @@ def _python_control(point: CompiledPoint, sine: Sine) -> tuple[float, float]:
     """
     import control
 
-    numbers = point.numbers
+    numbers, signals = point.numbers, point.agreement.signals
     _, _, plant_c, pid_c = point.constants
     codec = point.agreement.codec
     tick_s = point.config.timing.tick_s
@@ -101,7 +101,7 @@ def _python_control(point: CompiledPoint, sine: Sine) -> tuple[float, float]:
         error = float(u[0]) - state[0]
         volts = pid_volts(pid_c, integral, error, state[1])
         integral = pid_integral(pid_c, integral, error, volts)
-        command = from_millivolts(to_millivolts(motor_volts(pid_c, volts)))
+        command = from_steps(to_steps(motor_volts(pid_c, volts), signals), signals)
         state = codec.model.tick(state, command, (e1, e2))
         body = pitch_step(body, command, 0.0, plant_c, sine)
         return [*body, *state, m, last, e1, e2, integral, tick + 1.0]

@@ -16,13 +16,18 @@ class PlantContext:
     """what one call of `advance` simulates"""
     seed: int
     """of everything random"""
-    volts_max: float
-    """where each motor's voltage is clamped"""
+    command_max: tuple[float, ...]
+    """where each input is clamped"""
     mismatch: float | tuple[float, ...]
     """fraction by which the plant is to be off the codec's model"""
     disturbance: Disturbance | None
     """configured torque: `disturbance.torque(step)`, rad/s^2"""
     initial_angle_rad: float
+
+    @property
+    def volts_max(self) -> float:
+        """Return where the first input is clamped, as it was called before inputs had names."""
+        return self.command_max[0]
 
 
 class Plant(Protocol):

@@ -64,7 +64,7 @@ class TransmitterNode:
         self._recorder = recorder or NullRecorder()
         self._reading: Reading | None = None
         self._watch = EncoderWatch(session.codec, session.terms.tick_ns / 1e9)
-        self._applied = guard.volts
+        self._applied = guard.command
         self._guard_told = guard.state
 
     def measure(self, tick: int) -> list[Frame] | None:
@@ -199,7 +199,7 @@ class TransmitterNode:
             self.sensor_fault = GuardReason(GuardCause.SENSOR, tick, detail=fault)
             self.tell(Event(EventKind.SENSOR, tick=tick, detail=fault))
             self.guard.trip(self.sensor_fault)
-        self.guard.check_angles(tick, reading.measured_rad)
+        self.guard.check_outputs(tick, reading.measured_rad)
 
     def _tell_guard(self) -> None:
         self._guard_told = self.guard.state

@@ -16,10 +16,15 @@ class ControllerContext:
     """time between two commands"""
     reference: Reference
     """the configured set-point: `reference.angle_rad(tick)`"""
-    volts_max: float
-    """where each motor's voltage is clamped"""
+    command_max: tuple[float, ...]
+    """where each input is clamped"""
     initial_command: tuple[float, ...]
-    """motor voltages before the first command; a command has as many"""
+    """before the first command; a command has as many values"""
+
+    @property
+    def volts_max(self) -> float:
+        """Return where the first input is clamped, as it was called before inputs had names."""
+        return self.command_max[0]
 
 
 class Controller(Protocol):

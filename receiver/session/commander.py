@@ -16,7 +16,7 @@ from channel.codec.words import Word
 from channel.errors import CodecDiverged
 from channel.protocol.events import Event, EventKind, Failing, Tell
 from channel.protocol.frames import Echo
-from channel.protocol.limits import are_plausible, from_millivolts, to_millivolts
+from channel.protocol.limits import are_plausible, from_steps, to_steps
 from channel.protocol.lockstep import History
 from channel.protocol.recording import Recorder
 from channel.protocol.terms import Terms
@@ -72,7 +72,7 @@ class Commander:
         self._commands: deque[Vector] = deque([self.hold] * terms.lead_ticks)
         """of the next `D` ticks"""
         self._echoes: deque[Echo] = deque(maxlen=terms.repeats + 1)
-        self._millivolts: list[int] = []
+        self._steps: list[int] = []
         """decided for the sample that is being flown"""
         self._unwritten: list[_Flown] = []
 
@@ -117,7 +117,7 @@ class Commander:
     def fly(self, word: Word, epoch: int, now_ns: int) -> tuple[Echo, ...]:
         """Consume the word of the next sample; return its echo after those that it repeats."""
         before = self.state
-        self._millivolts = []
+        self._steps = []
         try:
             flown = fly_sample(self.codec, before, word, tuple(self._commands), self._decide)
         except (ArithmeticError, ValueError) as error:
@@ -129,7 +129,7 @@ class Commander:
         self.history.add(epoch, word, self.state)
         digest = self.codec.digest(self.state)
         number = self.codec.coder.alphabet.word_number(word)
-        self._echoes.append(Echo(before.sample, number, digest, tuple(self._millivolts)))
+        self._echoes.append(Echo(before.sample, number, digest, tuple(self._steps)))
         self._unwritten.append(_Flown(before, word, flown, digest, now_ns))
         if len(self._unwritten) >= UNWRITTEN_MAX:
             self.write_down()
@@ -145,11 +145,10 @@ class Commander:
 
     def _decide(self, tick: int, state: Vector) -> Vector:
         """Ask the controller, limit what it wants, and return it as the wire will carry it."""
-        volts = self._ask(tick, state)
-        limited = self.terms.limits.apply(volts, self.hold)
-        millivolts = to_millivolts(limited)
-        self._millivolts += millivolts
-        self.hold = from_millivolts(millivolts)
+        limited = self.terms.limits.apply(self._ask(tick, state), self.hold)
+        steps = to_steps(limited, self.terms.signals)
+        self._steps += steps
+        self.hold = from_steps(steps, self.terms.signals)
         return self.hold
 
     def _reference_rad(self, tick: int) -> float | None:
@@ -167,10 +166,10 @@ class Commander:
     def _ask(self, tick: int, state: Vector) -> Vector:
         """Return what the controller wants; its last command where it fails or wants nonsense."""
         try:
-            volts = self._controller.command(tick, state)
-            if len(volts) == len(self.hold) and are_plausible(volts):
-                return volts
-            problem = f"wants {volts}"
+            command = self._controller.command(tick, state)
+            if len(command) == len(self.hold) and are_plausible(command):
+                return command
+            problem = f"wants {command}"
         except Exception as error:  # a controller is the user's code; the flight goes on without it
             problem = f"failed: {type(error).__name__}: {error}"
         self._counts["bad_commands"] += 1

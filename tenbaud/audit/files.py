@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from channel.protocol.identity import Identity
 from tenbaud.audit.base import Claim, Evidence, Findings, Place
 from tenbaud.recording.notes import hole_notes, stray_notes
 from tenbaud.recording.recover import RECOVERED_NOTE
+from tenbaud.recording.table import Tables
 
 
 def check_heads(evidence: Evidence, findings: Findings) -> None:
@@ -13,7 +17,7 @@ def check_heads(evidence: Evidence, findings: Findings) -> None:
     for end, tables in evidence.record.ends():
         wanted = {
             "role": end,
-            "config_digest": identity.config_digest.hex(),
+            "config_digest": _recorded(identity, tables).config_digest.hex(),
             "tick_s": repr(evidence.agreement.config.timing.tick_s),
         }
         for name, value in wanted.items():
@@ -23,6 +27,11 @@ def check_heads(evidence: Evidence, findings: Findings) -> None:
     clocks = {tables.metadata.get("clock") for _, tables in evidence.record.ends()}
     if len(clocks) > 1:
         findings.leak(Place("receiver", "head", "clock"), "the ends flew on different clocks")
+
+
+def _recorded(identity: Identity, tables: Tables) -> Identity:
+    """Return the identity whose settings are written as they were recorded, old names included."""
+    return replace(identity, config=tables.metadata.get("shared_config", identity.config))
 
 
 def check_rows(evidence: Evidence, findings: Findings) -> None:

@@ -27,6 +27,7 @@ from tenbaud.build.gauge import build_gauge
 from tenbaud.build.liveness import overtaking_ticks, watchdog_ticks
 from tenbaud.build.parts import Parts
 from tenbaud.build.rig import build_rig
+from tenbaud.build.signals import configured_signals, safe_command, soft_limits
 from tenbaud.config.kinds import CONTROLLERS
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
@@ -63,7 +64,7 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
     rearm_ticks = None if rearm_s is None else ticks_of(rearm_s, config)
     return TransmitterNode(
         session,
-        build_rig(config, agreement.parts.plant),
+        build_rig(config, agreement.parts.plant, agreement.signals),
         build_guard(agreement),
         scores,
         recorder,
@@ -152,7 +153,7 @@ def check_parts(config: FlightConfig, parts: Parts | None = None) -> None:
     `parts` are objects in place of what is configured; they are checked already.
     """
     parts = parts or Parts()
-    build_rig(config, parts.plant)
+    build_rig(config, parts.plant, configured_signals(config, parts))
     if parts.controller is None:
         controller = build_controller(config)
         if config.receiver.controller not in CONTROLLERS.built_in:
@@ -185,10 +186,10 @@ def guard_settings(agreement: Agreement) -> GuardSettings:
     """Return when the guard steps in, and how."""
     section = agreement.config.transmitter
     terms = agreement.terms
-    soft = () if section.soft_limit_rad is None else (section.soft_limit_rad,)
     return GuardSettings(
         timeout_ticks=watchdog_ticks(watchdog_wanted_s(agreement.config), terms, agreement.trip),
         ramp_ticks=ticks_of(section.ramp_s, agreement.config),
-        safe_volts=section.safe_volts,
-        soft_limits_rad=soft,
+        safe_command=safe_command(agreement.config, agreement.signals),
+        soft_limits=soft_limits(agreement.config, agreement.signals),
+        outputs=agreement.signals.outputs,
     )

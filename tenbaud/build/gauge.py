@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 
 from channel.codec.models.pitch import PitchModel
+from plant_sim.encoder import Encoder
 from tenbaud.bounds.closed import double_integrator_floor, double_integrator_rate
 from tenbaud.build.flight import Agreement
+from tenbaud.build.signals import build_encoders
 from transmitter.metrics.gap import GapGauge, Limit, StrengthMeter
 
 
@@ -27,6 +29,7 @@ def build_gauge(agreement: Agreement) -> GapGauge | None:
         double_integrator_floor(1.0, rate_bit_s),
         lambda per_density: double_integrator_rate(1.0, per_density),
     )
-    step_rad = math.tau / config.transmitter.encoder_counts_per_turn
+    encoder = build_encoders(config, agreement.signals)[0]
+    step_rad = encoder.turn / encoder.counts_per_turn if isinstance(encoder, Encoder) else 0.0
     strength = StrengthMeter(codec, tick_s, step_rad)
     return GapGauge(limit, strength, terms.ticks_per_sample, tick_s)

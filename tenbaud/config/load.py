@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from channel.errors import TenbaudError
+from tenbaud.config.deprecated import with_current_names
 from tenbaud.config.kinds import CODERS, MODELS
 from tenbaud.config.schema import KINDS, FlightConfig
 from tenbaud.config.section import OutsideSection, Section
@@ -36,24 +37,27 @@ def load_config(
     overrides: dict[str, Any] | None = None,
     *,
     allow_code: bool = False,
+    recorded: bool = False,
 ) -> FlightConfig:
     """Return the checked configuration.
 
     A file may name the preset that it builds on (`preset = "..."`); an explicit `preset` wins.
     `allow_code`: classes from outside that it names may be imported, as for a flight of one's own.
-    Raises ConfigError.
+    `recorded`: the file was written by a flight; old names in it cause no warning. Raises ConfigError.
     """
-    from_file = _read_toml(path) if path is not None else {}
+    source = str(path) if path is not None else f"preset {preset or DEFAULT_PRESET}"
+    from_file = (
+        with_current_names(_read_toml(path), source, warn=not recorded) if path is not None else {}
+    )
     base = preset or from_file.get("preset") or DEFAULT_PRESET
     if not isinstance(base, str):
         raise ConfigError(f"{path}: preset must be a name in quotes, got {base!r}")
     values = _merge(_read_preset(base), from_file)
-    values = _merge(values, overrides or {})
+    values = _merge(values, with_current_names(overrides or {}, "the settings"))
     values["preset"] = base
     try:
         config = FlightConfig.model_validate(values)
     except ValidationError as error:
-        source = str(path) if path is not None else f"preset {base}"
         raise ConfigError(_describe_all(source, error)) from error
     return config.allowing_code() if allow_code else config
 

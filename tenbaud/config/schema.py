@@ -28,10 +28,13 @@ from tenbaud.config.models import PitchModelSection
 from tenbaud.config.permission import CodePermission
 from tenbaud.config.rig_schema import BridgeSection, HilSection, QuarcSection, SerialSection
 from tenbaud.config.section import (
+    Command,
     Counts,
+    Factor,
     Gain,
     KindSection,
     Mismatch,
+    NamedSections,
     NotNegative,
     Options,
     Positive,
@@ -102,11 +105,16 @@ KINDS: dict[str, dict[str, type[KindSection]]] = {
 
 
 class Limits(Section):
-    """What a command may be; the receiver keeps to it and the guard beside the motors checks it."""
+    """What a command may be; the receiver keeps to it and the guard beside the motors checks it.
 
-    volts_max: Annotated[float, Field(ge=0.001, le=32.0)] = 5.0
-    slew_volts_per_s: Positive = 1000.0
-    initial_volts: tuple[Volts, Volts] = (0.0, 0.0)
+    Each field is a number for all inputs or a list with one for each, in the unit of the input.
+    """
+
+    command_max: Positive | tuple[Positive, ...] | None = None
+    """largest value of an input, either way; none: the input's own range, or 5 where it has none"""
+    command_slew_per_s: Positive | tuple[Positive, ...] = 1000.0
+    """fastest change of an input"""
+    initial_command: Command = 0.0
     """command of the ticks before the first one decided"""
 
 
@@ -128,6 +136,26 @@ class PlantSection(Section):
     initial_angle_rad: Annotated[float, Field(ge=-3.2, le=3.2)] = 0.0
 
 
+class EncoderSection(Section):
+    """How an output is read."""
+
+    counts_per_turn: Annotated[int, Field(ge=2, le=10_000_000)] | None = None
+    """of an angle; none: 4096"""
+    counts_per_unit: Positive | None = None
+    """of any other output: counts per metre, per rad/s; none: it is read exactly"""
+    sign: Literal[-1, 1] = 1
+    zero_counts: Counts = 0
+    """counts at 0"""
+    quantised: bool = True
+    """false: the output is read exactly"""
+
+
+class EncodersSection(EncoderSection, NamedSections):
+    """The encoders of a simulated rig or a replay: those of all outputs, and single ones by name."""
+
+    __pydantic_extra__: dict[str, EncoderSection]
+
+
 class TransmitterSection(Section):
     """The sensor node."""
 
@@ -136,18 +164,18 @@ class TransmitterSection(Section):
     """read the rig and never move it"""
     sight_bandwidth_rad_s: Annotated[float, Field(ge=0.001, le=10_000.0)] = 30.0
     """bandwidth of the rate observer, for coders that use rates"""
-    encoder_counts_per_turn: Annotated[int, Field(ge=2, le=10_000_000)] = 4096
-    encoder_sign: Literal[-1, 1] = 1
-    encoder_zero_counts: Counts = 0
+    encoders: EncodersSection = EncodersSection()
     plant: PlantSection = PlantSection()
     watchdog_s: Positive | Literal["auto"] = "auto"
     """age of the last command after which the watchdog trips; "auto": the largest of 5 T_s,
     0.1 s, command lead + 2 T_s and round trip + 2 T_s"""
     ramp_s: Positive = 1.0
-    """time from the held voltage to the safe one"""
-    safe_volts: tuple[Volts, Volts] = (0.0, 0.0)
-    soft_limit_rad: Positive | None = None
-    """largest measured angle before the guard ramps down; none: no limit"""
+    """time from the held command to the safe one"""
+    safe_command: Command = 0.0
+    """a number for all inputs, or a list with one for each"""
+    soft_limits: Positive | tuple[Positive, ...] | dict[str, Positive] | None = None
+    """largest measured value before the guard ramps down: a number for all outputs, a list with one for
+    each, or a table by name; none: no limit"""
     bridge: BridgeSection = BridgeSection()
     serial: SerialSection = SerialSection()
     quarc: QuarcSection = QuarcSection()
@@ -175,7 +203,8 @@ class ReferenceSection(Section):
     """The set-point of the controller."""
 
     kind: Literal["square", "step", "sine", "constant", "csv"] = "square"
-    amplitude_rad: Annotated[float, Field(ge=-6.3, le=6.3)] = 1.5707963267948966
+    amplitude: Factor = 1.5707963267948966
+    """in the unit of the output"""
     period_s: Positive = 25.0
     start_s: NotNegative = 1.0
     """time of the step"""

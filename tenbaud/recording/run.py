@@ -234,7 +234,7 @@ class Run:
 
         if not is_own_file(self.folder.config):
             raise RecordingError(f"{self.folder.path} holds no {self.folder.config.name}.")
-        return load_config(path=self.folder.config)
+        return load_config(path=self.folder.config, recorded=True)
 
     # Pictures
 

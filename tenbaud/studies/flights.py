@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from channel.codec.codec import Codec
+from channel.codec.codec import Codec, Vector
 from channel.codec.coders.base import FunctionCoder
 from channel.codec.numerics import sin
 from channel.flight_log import FlightLog
 from plant_sim.disturbance import parse_disturbance
+from plant_sim.encoder import Encoder
 from plant_sim.pitch import pitch_constants
 from receiver.controllers.pid import Pid, PidConstants
 from receiver.controllers.recorded import RecordedController
@@ -22,6 +23,7 @@ from tenbaud.build.controllers import build_controller, reference_of
 from tenbaud.build.ends import guard_settings
 from tenbaud.build.flight import Agreement, kind_of_link, read_flight_log
 from tenbaud.build.rig import nominal_plant
+from tenbaud.build.signals import build_encoders
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig, FlightLogSection, ReferenceSection
 from tenbaud.flight.verdict import FlightCounts, faults_of
@@ -202,6 +204,8 @@ def _require_ordinary(config: FlightConfig, codec: Codec) -> None:
     if kind_of_link(config).changes_terms:
         raise Uncommon("a link on which bytes take time, such as a serial line")
     model, coder = codec.model, codec.coder
+    if model.input_size != 2 or len(model.measured(model.initial())) != 1:
+        raise Uncommon("a plant that is not of one output and two inputs")
     if not (hasattr(model, "tick_function") and isinstance(coder, FunctionCoder)):
         raise Uncommon("a model or coder that is not written as functions")
     if codec.uses_rates:
@@ -210,8 +214,10 @@ def _require_ordinary(config: FlightConfig, codec: Codec) -> None:
 
 def _numbers(agreement: Agreement, ticks: int, replay: bool) -> Numbers:
     config, terms = agreement.config, agreement.terms
-    section = config.transmitter
-    soft = section.soft_limit_rad
+    settings = guard_settings(agreement)
+    encoder = build_encoders(config, agreement.signals)[0]
+    if not isinstance(encoder, Encoder):
+        raise Uncommon("an output that is read exactly")
     return Numbers(
         ticks=ticks,
         per_sample=terms.ticks_per_sample,
@@ -219,19 +225,24 @@ def _numbers(agreement: Agreement, ticks: int, replay: bool) -> Numbers:
         window_start=agreement.window_start_tick,
         impulse=agreement.codec.coder.impulse,
         replay=replay,
-        volts_max=float(terms.limits.volts_max),
-        slew=float(terms.limits.slew_volts_per_tick),
+        command_max=_pair(terms.limits.command_max),
+        slew=_pair(terms.limits.slew_per_tick),
+        steps_per_unit=_pair(terms.signals.steps_per_unit),
         initial_front=float(terms.initial_command[0]),
         initial_rear=float(terms.initial_command[1]),
-        safe_front=float(section.safe_volts[0]),
-        safe_rear=float(section.safe_volts[1]),
-        guard_timeout=guard_settings(agreement).timeout_ticks,
-        soft_limit=math.inf if soft is None else float(soft),
+        safe_front=float(settings.safe_command[0]),
+        safe_rear=float(settings.safe_command[1]),
+        guard_timeout=settings.timeout_ticks,
+        soft_limit=float(settings.soft_limits[0]) if settings.soft_limits else math.inf,
         watch=max(1, round(WINDOW_S * 1e9 / terms.tick_ns)),
-        counts_per_turn=section.encoder_counts_per_turn,
-        sign=section.encoder_sign,
-        zero_counts=section.encoder_zero_counts,
+        counts_per_turn=int(encoder.counts_per_turn),
+        sign=encoder.sign,
+        zero_counts=encoder.zero_counts,
     )
+
+
+def _pair(values: Vector) -> tuple[float, float]:
+    return values[0], values[1]
 
 
 def _no_pid() -> PidConstants:

@@ -185,6 +185,7 @@ def _decide(
         front, rear = motor_volts(pid_constants, volts)
     front_before = work.front[at - 1] if at > 0 else numbers.initial_front
     rear_before = work.rear[at - 1] if at > 0 else numbers.initial_rear
-    work.front[at] = as_carried(limited(front, front_before, numbers.volts_max, numbers.slew))
-    work.rear[at] = as_carried(limited(rear, rear_before, numbers.volts_max, numbers.slew))
+    largest, slew, steps = numbers.command_max, numbers.slew, numbers.steps_per_unit
+    work.front[at] = as_carried(limited(front, front_before, largest[0], slew[0]), steps[0])
+    work.rear[at] = as_carried(limited(rear, rear_before, largest[1], slew[1]), steps[1])
     return True, integral

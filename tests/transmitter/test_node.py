@@ -99,7 +99,7 @@ def test_when_the_guard_has_stopped_then_no_symbol_leaves_although_the_session_f
         node.actuate(tick)
         assert node.session.phase is Phase.FLYING
     assert node.latched
-    assert node.guard.volts == (0.0, 0.0)
+    assert node.guard.command == (0.0, 0.0)
     assert node.session.copies.next_sample == 1
 
 
@@ -123,7 +123,7 @@ def test_when_the_session_ends_then_the_voltage_is_taken_down_with_its_reason() 
     ("rig", "text"),
     [
         (ScriptedRig(faulty_tick=25), "tick 25: the cable is off"),
-        (ScriptedRig(angle_rad=1.5), "axis 0 is at 1.500 rad at tick 0"),
+        (ScriptedRig(angle_rad=1.5), "axis 0, rad: 1.500 at tick 0"),
     ],
     ids=["fault", "soft limit"],
 )

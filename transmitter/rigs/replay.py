@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from channel.codec.codec import Vector
 from channel.flight_log import FlightLog
-from plant_sim.encoder import Encoder, angles_rad
+from plant_sim.encoder import OutputReader, angles_rad
 from transmitter.rigs.base import Reading, RigBase
 
 
@@ -13,7 +13,7 @@ class ReplayRig(RigBase):
 
     name = "replay"
 
-    def __init__(self, log: FlightLog, encoders: tuple[Encoder, ...]) -> None:
+    def __init__(self, log: FlightLog, encoders: tuple[OutputReader, ...]) -> None:
         self._log = log
         self._encoders = encoders
 

@@ -211,7 +211,7 @@ def test_wrong_options_name_the_context_and_what_it_offers(outside: Path) -> Non
     settings = {"receiver.controller": "outside:Law", "receiver.controller_options.gain": 2.0}
     with pytest.raises(ConfigError, match=r"Law\(context, gain=2.0\) failed: TypeError") as told:
         build_controller(own(settings))
-    assert "ControllerContext: tick_s, reference, volts_max, initial_command" in str(told.value)
+    assert "ControllerContext: tick_s, reference, command_max, initial_command" in str(told.value)
 
 
 def test_the_command_line_says_it_in_one_message(outside: Path) -> None:

@@ -36,10 +36,9 @@ REAL_WIRE = {
     "timing": {"lead_ticks": 17},
     "transmitter": {
         "plant": {"mismatch": (0.1, -0.2, 0.15), "disturbance": "q=2e-3,step=0.5@3..5"},
-        "encoder_sign": -1,
-        "encoder_zero_counts": 77,
+        "encoders": {"sign": -1, "zero_counts": 77},
     },
-    "limits": {"slew_volts_per_s": 40.0, "initial_volts": (0.4, -0.2)},
+    "limits": {"command_slew_per_s": 40.0, "initial_command": (0.4, -0.2)},
     "receiver": {"pid": {"normal_force_volts": 1.0}, "reference": {"kind": "sine", "period_s": 4.0}},
 }
 BAD_LINE = {
@@ -126,7 +125,7 @@ def test_when_a_recorded_flight_is_compiled_then_no_figure_differs(tmp_path: Pat
 @pytest.mark.parametrize(
     "changes",
     [
-        {"transmitter": {"soft_limit_rad": 0.5}},
+        {"transmitter": {"soft_limits": 0.5}},
         {"coder": {"gains": (4000.0, 9e7)}},
         {"link": {"impairments": "up:dead=1s"}},
         {"link": {"impairments": "raw=0.01"}},

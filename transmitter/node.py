@@ -80,7 +80,7 @@ class TransmitterNode:
             time_ns = tick * self.session.terms.tick_ns
             self._recorder.write(DEVICE_CHANNEL, time_ns, device_row(tick, reading.device))
         self._check(tick, reading)
-        self.scores.on_angles(tick, reading.true_rad or reading.measured_rad)
+        self.scores.on_outputs(tick, reading.true_rad or reading.measured_rad)
         if self.gauge is not None:
             self.gauge.on_angle(tick, reading.measured_rad[0])
         asking: list[Frame] = []

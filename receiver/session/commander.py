@@ -20,7 +20,7 @@ from channel.protocol.limits import are_plausible, from_steps, to_steps
 from channel.protocol.lockstep import History
 from channel.protocol.recording import Recorder
 from channel.protocol.terms import Terms
-from receiver.controllers.base import Controller
+from receiver.controllers.base import Controller, with_references
 from receiver.session.records import write_commands, write_sample
 from receiver.session.rejoin import carried_to
 
@@ -65,7 +65,8 @@ class Commander:
         self.history = History(codec, 2 * terms.history_samples)
         self.hold = terms.initial_command
         """last command decided"""
-        self._controller = controller
+        self._controller: Controller = with_references(controller)
+        self._no_references: tuple[float | None, ...] = (None,) * len(terms.signals.outputs)
         self._recorder = recorder
         self._counts = counts
         self._tell = tell
@@ -141,7 +142,7 @@ class Commander:
         for before, word, flown, digest, now_ns in unwritten:
             ranges = self.codec.coder.ranges(before.coder)
             write_sample(self._recorder, self.terms, word, ranges, flown.state, digest, now_ns)
-            write_commands(self._recorder, self.terms, before.sample, flown, self._reference_rad)
+            write_commands(self._recorder, self.terms, before.sample, flown, self._references)
 
     def _decide(self, tick: int, state: Vector) -> Vector:
         """Ask the controller, limit what it wants, and return it as the wire will carry it."""
@@ -151,17 +152,18 @@ class Commander:
         self.hold = from_steps(steps, self.terms.signals)
         return self.hold
 
-    def _reference_rad(self, tick: int) -> float | None:
+    def _references(self, tick: int) -> tuple[float | None, ...]:
         try:
-            return self._controller.reference_rad(tick)
+            references = self._controller.references(tick)
+            if len(references) <= len(self._no_references):
+                return (*references, *self._no_references[len(references) :])
+            problem = f"{len(references)} set-points for {len(self._no_references)} output(s)"
         except Exception as error:  # the user's code too, and only a column of the recording
-            self._counts["bad_references"] += 1
-            if self._counts["bad_references"] == 1:
-                problem = f"{type(error).__name__}: {error}"
-                self._tell(
-                    Event(EventKind.CONTROLLER, tick=tick, cause=Failing.REFERENCE, detail=problem)
-                )
-            return None
+            problem = f"{type(error).__name__}: {error}"
+        self._counts["bad_references"] += 1
+        if self._counts["bad_references"] == 1:
+            self._tell(Event(EventKind.CONTROLLER, tick=tick, cause=Failing.REFERENCE, detail=problem))
+        return self._no_references
 
     def _ask(self, tick: int, state: Vector) -> Vector:
         """Return what the controller wants; its last command where it fails or wants nonsense."""

@@ -137,7 +137,7 @@ def fly_agreement(agreement: Agreement, start_s: float) -> Errors:
         if tick >= first:
             error = true - codec.model.measured(model)[0]
             estimation += error * error
-            distance = (controller.reference_rad(tick) or 0.0) - true
+            distance = ((*controller.references(tick), None)[0] or 0.0) - true
             tracking += distance * distance
             used += 1
         wanted = limits.apply(controller.command(tick, model), volts)

@@ -220,7 +220,7 @@ def errors_of(preset: str, overrides: Overrides) -> Errors:
     if outcome.code:
         raise TenbaudError(f"{preset} {overrides}: {outcome.text}")
     scores = run.node.scores
-    return Errors(scores.coded.rms or 0.0, scores.live.rms or 0.0)
+    return Errors(scores.first.coded.rms or 0.0, scores.first.live.rms or 0.0)
 
 
 def recorded(preset: str, overrides: Overrides) -> tuple[Curves, Series]:

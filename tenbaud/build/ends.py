@@ -17,15 +17,15 @@ from channel.protocol.recording import Recorder
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
 from channel.protocol.wire import Wire
 from receiver.controllers.base import Controller
-from receiver.controllers.references import Reference
 from receiver.endpoint import ReceiverEndpoint, SteppedEndpoint
 from receiver.session.session import ReceiverSession
 from tenbaud.build.codec import build_codec
-from tenbaud.build.controllers import build_controller, build_reference
+from tenbaud.build.controllers import build_controller
 from tenbaud.build.flight import Agreement, ticks_of, watchdog_wanted_s
 from tenbaud.build.gauge import build_gauge
 from tenbaud.build.liveness import overtaking_ticks, watchdog_ticks
 from tenbaud.build.parts import Parts
+from tenbaud.build.references import References, build_references, values_of
 from tenbaud.build.rig import build_rig
 from tenbaud.build.signals import configured_signals, safe_command, soft_limits
 from tenbaud.config.kinds import CONTROLLERS
@@ -73,13 +73,13 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
     )
 
 
-def _followed(agreement: Agreement) -> Callable[[int], float | None]:
-    """Return the set-point that the tracking error is against."""
+def _followed(agreement: Agreement) -> Callable[[int], tuple[float | None, ...]]:
+    """Return the set-points that the tracking errors are against."""
     if agreement.parts.controller is not None:
-        return agreement.parts.controller.reference_rad
+        return agreement.parts.controller.references
     if agreement.config.receiver.controller == "recorded":
-        return lambda _tick: None
-    return build_reference(agreement.config).angle_rad
+        return values_of((None,) * len(agreement.signals.outputs))
+    return values_of(build_references(agreement.config, agreement.signals))
 
 
 def build_sight(agreement: Agreement) -> Sight | None:
@@ -124,16 +124,17 @@ def build_receiver(
     recorder: Recorder | None,
     wire: Wire,
     take_over: bool = False,
-    reference: Reference | None = None,
+    references: References | None = None,
 ) -> ReceiverEndpoint:
     """Return the controller node of a configuration.
 
-    `take_over` from another one, on purpose; it follows `reference` if one is given.
+    `take_over` from another one, on purpose; it follows `references` if they are given.
     """
     session = ReceiverSession(
         sabotaged(agreement.codec, agreement.config.receiver.sabotage, agreement.live),
         agreement.terms,
-        agreement.parts.controller or build_controller(agreement.config, reference),
+        agreement.parts.controller
+        or build_controller(agreement.config, references, agreement.codec.model),
         agreement.identity,
         secrets.randbits(31) + 1,
         recorder,
@@ -155,7 +156,7 @@ def check_parts(config: FlightConfig, parts: Parts | None = None) -> None:
     parts = parts or Parts()
     build_rig(config, parts.plant, configured_signals(config, parts))
     if parts.controller is None:
-        controller = build_controller(config)
+        controller = build_controller(config, model=parts.model)
         if config.receiver.controller not in CONTROLLERS.built_in:
             _check_command(config, controller)
 
@@ -168,12 +169,12 @@ def _check_command(config: FlightConfig, controller: Controller) -> None:
     except Exception as error:
         raise ConfigError(
             f"receiver.controller {name}: command(0, {model.initial()}) must return "
-            f"{model.input_size} voltages; it raised {type(error).__name__}: {error}"
+            f"{model.input_size} value(s); it raised {type(error).__name__}: {error}"
         ) from error
     if len(volts) != model.input_size or not all(map(math.isfinite, volts)):
         raise ConfigError(
             f"receiver.controller {name}: command(0, {model.initial()}) must return "
-            f"{model.input_size} finite voltages, one for each motor of the model; it returned {volts}"
+            f"{model.input_size} finite value(s), one for each input of the model; it returned {volts}"
         )
 
 

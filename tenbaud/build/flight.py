@@ -21,6 +21,7 @@ from channel.registry import RegistryError
 from tenbaud.build.codec import build_codec
 from tenbaud.build.liveness import RoundTrip, check_liveness, round_trip
 from tenbaud.build.parts import Parts
+from tenbaud.build.references import longest_period_s
 from tenbaud.build.signals import build_limits, initial_command
 from tenbaud.config.load import ConfigError
 from tenbaud.config.outside_code import require_allowed
@@ -92,16 +93,13 @@ class Agreement:
 
     @property
     def window_start_tick(self) -> int:
-        """Return where errors begin to count: after the first period of the reference.
+        """Return where errors begin to count: after the first period of the slowest reference.
 
         A flight that is over by then, or that has no periodic reference, counts from its beginning.
         """
-        reference = self.config.receiver.reference
-        periodic = self.config.receiver.controller != "recorded" and reference.kind in (
-            "square",
-            "sine",
-        )
-        start = round(reference.period_s * 1e9) // self.terms.tick_ns if periodic else 0
+        recorded = self.config.receiver.controller == "recorded"
+        period_s = 0.0 if recorded else longest_period_s(self.config, self.signals)
+        start = round(period_s * 1e9) // self.terms.tick_ns
         return start if start < self.flight_ticks else 0
 
 

@@ -15,7 +15,7 @@ from channel.codec.codec import Codec, Coder, Model, Vector
 from channel.codec.signals import signals_of
 from channel.codec.words import ERASED
 from plant_sim.plant import Plant
-from receiver.controllers.base import Controller
+from receiver.controllers.base import Controller, with_references
 from tenbaud.config.load import ConfigError
 
 OPTIONAL = ("uses_rates",)
@@ -36,6 +36,10 @@ class Parts:
     coder: Coder | None = None
     plant: Plant | None = None
     controller: Controller | None = None
+
+    def __post_init__(self) -> None:
+        """Let a controller that only knows `reference_rad` be one that has `references`."""
+        object.__setattr__(self, "controller", with_references(self.controller))
 
     def check(self) -> None:
         """Raise PartError for an object that lacks what its part must have."""

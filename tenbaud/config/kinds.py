@@ -53,6 +53,7 @@ CONTROLLERS = Registry(
     {
         "pid": "tenbaud.build.controllers:pid",
         "recorded": "tenbaud.build.controllers:recorded",
+        "state_feedback": "tenbaud.build.state_feedback:state_feedback",
     },
 )
 

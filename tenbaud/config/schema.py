@@ -39,7 +39,6 @@ from tenbaud.config.section import (
     Options,
     Positive,
     Section,
-    Volts,
 )
 
 
@@ -186,21 +185,56 @@ class TransmitterSection(Section):
     """such as "sample=500,field=range": corrupt one bit of this end's codec on purpose"""
 
 
-class PidSection(Section):
-    """PID law (24)."""
+class PidLoopSection(Section):
+    """One loop of a PID law: which output, by which inputs."""
+
+    output: str = ""
+    """name of the output; empty: the first"""
+    rate: str = ""
+    """name of the state that is its rate; empty: OUTPUT_rate, or else the output's change"""
+    inputs: dict[str, Factor] = Field(default_factory=dict)
+    """share of the loop's sum that each input gets; empty: a single input has it all, and of two the
+    first has half of it and the second has minus half"""
+    proportional: Gain = 0.0
+    integral: Gain = 0.0
+    derivative: Gain = 0.0
+    unit: str = ""
+    """of the gains, such as V/rad or V/deg; empty: the input's unit per unit of the output"""
+
+
+class PidSection(PidLoopSection):
+    """PID law (24): one loop, or the list `loops` of several."""
 
     proportional: Gain = 0.1
     integral: Gain = 0.053
     derivative: Gain = 0.12
-    unit: Literal["V/rad", "V/deg"] = "V/deg"
+    unit: str = "V/deg"
     """the paper prints no unit; only V/deg follows its reference"""
     anti_windup: Literal["conditional", "none"] = "conditional"
-    normal_force_volts: Volts = 0.0
-    """w of (1), common to both motors"""
+    normal_force_volts: Factor = 0.0
+    """w of (1): a sum that all inputs share equally"""
+    loops: tuple[PidLoopSection, ...] = ()
+    """[[receiver.pid.loops]]: in place of the one loop that is described here"""
+
+
+class StateFeedbackSection(Section):
+    """Feedback of all states: gains as given, or designed (LQR) from weights."""
+
+    gains: tuple[tuple[Factor, ...], ...] = ()
+    """a row for each input, a column for each state; empty: designed"""
+    integral_gains: tuple[tuple[Factor, ...], ...] = ()
+    """beside given gains: a row for each input, a column for each output"""
+    state_weights: dict[str, NotNegative] = Field(default_factory=dict)
+    """cost of each state by name, 0 for those left out; empty: 1 for every output"""
+    input_weights: dict[str, Positive] = Field(default_factory=dict)
+    """cost of each input by name, 1 for those left out"""
+    integral_weights: dict[str, Positive] = Field(default_factory=dict)
+    """outputs with integral action, and the cost of the integral of their error"""
+    anti_windup: Literal["conditional", "none"] = "conditional"
 
 
 class ReferenceSection(Section):
-    """The set-point of the controller."""
+    """The set-point of an output."""
 
     kind: Literal["square", "step", "sine", "constant", "csv"] = "square"
     amplitude: Factor = 1.5707963267948966
@@ -209,18 +243,25 @@ class ReferenceSection(Section):
     start_s: NotNegative = 1.0
     """time of the step"""
     file: str = ""
-    """for csv: columns time_s, angle_rad"""
+    """for csv: columns time_s and NAME_UNIT of the output, such as pitch_rad"""
+
+
+class ReferencesSection(ReferenceSection, NamedSections):
+    """The set-point of the first output; those of the others, or of any, by name."""
+
+    __pydantic_extra__: dict[str, ReferenceSection]
 
 
 class ReceiverSection(Section):
     """The controller node."""
 
     controller: Annotated[str, AfterValidator(PartName(CONTROLLERS))] = "pid"
-    """the PID law, the voltages of a recorded flight, or a law from outside"""
+    """the PID law, feedback of all states, the commands of a recorded flight, or a law from outside"""
     controller_options: Options = Field(default_factory=dict)
     """options of an external class"""
     pid: PidSection = PidSection()
-    reference: ReferenceSection = ReferenceSection()
+    state_feedback: StateFeedbackSection = StateFeedbackSection()
+    reference: ReferencesSection = ReferencesSection()
     sabotage: SabotageText = ""
     """such as "sample=500,field=range": corrupt one bit of this end's codec on purpose"""
 

@@ -18,7 +18,7 @@ from channel.protocol.terms import Terms
 from channel.protocol.wire import DATAGRAM, Wire
 from plant_sim.encoder import Encoder
 from plant_sim.plant import Plant
-from receiver.controllers.base import Controller
+from receiver.controllers.base import Controller, with_references
 from receiver.endpoint import ReceiverEndpoint
 from receiver.session.session import ReceiverSession
 from tenbaud.build.flight import software_version
@@ -82,6 +82,7 @@ class MemoryFlight:
         receiver_recorder: Recorder | None = None,
         wire: Wire = DATAGRAM,
     ) -> None:
+        controller = with_references(controller)
         _check(codec, terms, plant, controller)
         self.codec = codec
         self.terms = terms
@@ -129,7 +130,7 @@ class MemoryFlight:
                 self.codec.model,
                 scored_from_ns // terms.tick_ns,
                 (terms.history_samples + SPAN_SAMPLES) * terms.ticks_per_sample,
-                self.controller.reference_rad,
+                self.controller.references,
             ),
             self.transmitter_rows,
             round(REARM_S * 1e9) // terms.tick_ns,

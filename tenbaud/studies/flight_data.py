@@ -23,6 +23,8 @@ class Numbers(NamedTuple):
     slew: tuple[float, float]
     """per tick"""
     steps_per_unit: tuple[float, float]
+    bias: tuple[float, float]
+    """of the inputs, without the controller's loop"""
     initial_front: float
     initial_rear: float
     safe_front: float

@@ -234,7 +234,7 @@ class ReceiverComposer(_Composer):
             "baud_measured": session.meter.baud,
             "points": _thinned(points, POINTS_MAX),
             "samples": samples[-SAMPLES_MAX:],
-            "set_point_rad": None if steering is None else steering.by_hand_rad,
+            "set_point_rad": steering[0].by_hand if steering and steering[0] else None,
             "steerable": steering is not None,
         }
 

@@ -22,7 +22,7 @@ from channel.links.base import Role
 from channel.protocol.events import ByHand, Event, EventKind, write_event
 from channel.protocol.recording import Recorder
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
-from receiver.controllers.steered import SteeredReference
+from receiver.controllers.references import SteeredReference
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.telemetry.commands import CommandQueue
@@ -156,7 +156,7 @@ class LiveReceiver:
         queue: CommandQueue | None,
         should_stop: Stop,
         recorder: Recorder,
-        steering: SteeredReference | None,
+        steering: tuple[SteeredReference | None, ...] | None,
         impairments: str,
     ) -> None:
         self.queue = queue
@@ -178,9 +178,10 @@ class LiveReceiver:
         session = self._endpoint.session
         match command:
             case SetPoint(angle_rad=angle_rad):
-                if self.steering is None:
+                steering = self.steering and self.steering[0]
+                if not steering:
                     return _ignored("this controller has no set-point")
-                self.steering.by_hand_rad = angle_rad
+                steering.by_hand = angle_rad
                 cause = ByHand.FOLLOW if angle_rad is None else ByHand.SET_POINT
                 return _by_hand(cause, value=angle_rad)
             case Impair(text=text):

@@ -203,6 +203,6 @@ class Watch:
         if world.plan.is_slow:
             return
         assert world.node is not None
-        error = world.node.scores.last_coded_error_rad
+        error = world.node.scores.first.last_coded_error
         if error is None or abs(error) > ERROR_BOUND_RAD:
             raise LivenessViolation(f"the error is {error} rad, not below {ERROR_BOUND_RAD}")

@@ -65,7 +65,7 @@ def flight_over(link: MemoryLink, kind: type[SimulatedRig]) -> RealFlight:
         TransmitterSession(CODEC, TERMS, IDENTITY, 5),
         kind(PitchPlant(PitchParameters(), TICK_S), (Encoder(4096),), (0.0, 0.0)),
         Guard(CommandLimits.of(PITCH_SIGNALS, 5.0), GuardSettings(100, 50, (0.0, 0.0))),
-        Scores(CODEC.model, 0, 1000, lambda _: None),
+        Scores(CODEC.model, 0, 1000, lambda _: ()),
         rearm_ticks=10_000,
     )
     return RealFlight(TransmitterEndpoint(node, Uplink(TERMS, CODEC.coder.alphabet)), link, 10.0)

@@ -61,5 +61,5 @@ class ConstantController:
         self.asked.append((tick, state))
         return self.volts
 
-    def reference_rad(self, tick: int) -> float | None:
-        return None
+    def references(self, tick: int) -> tuple[float | None, ...]:
+        return (None,)

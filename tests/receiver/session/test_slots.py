@@ -232,10 +232,10 @@ def test_when_the_controller_gives_no_number_then_the_last_command_is_held(bad: 
 def test_when_the_controller_has_no_reference_then_the_flight_goes_on_and_says_so_once() -> None:
     session = flying()
 
-    def fail(tick: int) -> float:
+    def fail(tick: int) -> tuple[float, ...]:
         raise LookupError("the table ends")
 
-    session._commander._controller.reference_rad = fail  # type: ignore[method-assign]
+    session._commander._controller.references = fail  # type: ignore[method-assign]
     for slot in range(2):
         session.on_frame(symbol(slot), 0)
         session.rest()

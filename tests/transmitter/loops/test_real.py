@@ -57,7 +57,7 @@ def flight_over(
         session,
         SimulatedRig(plant, (Encoder(4096),), (0.0, 0.0)),
         Guard(CommandLimits.of(PITCH_SIGNALS, 5.0), GuardSettings(400, 10, (0.0, 0.0))),
-        Scores(CODEC.model, 0, 1000, lambda _: None),
+        Scores(CODEC.model, 0, 1000, lambda _: ()),
     )
     endpoint = TransmitterEndpoint(node, Uplink(TERMS, CODEC.coder.alphabet))
     return RealFlight(endpoint, link, peer_timeout_s)

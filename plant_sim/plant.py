@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Protocol
 
 from plant_sim.disturbance import Disturbance
 
@@ -23,6 +25,10 @@ class PlantContext:
     disturbance: Disturbance | None
     """configured torque: `disturbance.torque(step)`, rad/s^2"""
     initial_angle_rad: float
+    model: Mapping[str, Any] = field(default_factory=dict)
+    """the settings of the codec's model, which the plant is to be near"""
+    sine: Callable[[float], float] = math.sin
+    """how a sine is taken: with the codec's own a simulated flight is the same on every machine"""
 
     @property
     def volts_max(self) -> float:

@@ -96,6 +96,8 @@ def build_plant(config: FlightConfig, step_s: float, signals: Signals | None = N
         section.mismatch,
         disturbance,
         section.initial_angle_rad,
+        config.model.model_dump(exclude={"kind"}),
+        sin,
     )
     plant: Plant = build_part(config, PLANTS, section.kind, context, section.options, Plant)
     measured, outputs = len(plant.measured_rad), len(signals.outputs)
@@ -114,8 +116,7 @@ def pitch_plant(config: FlightConfig, context: PlantContext) -> PitchPlant:
         context.step_s,
         context.disturbance,
         initial_angle_rad=context.initial_angle_rad,
-        # Not the C library's: a simulated flight is then the same on every machine.
-        sine=sin,
+        sine=context.sine,
     )
 
 

@@ -25,6 +25,7 @@ STEP = 1e-5
 """By which states and inputs are moved for the derivatives."""
 HELD_ERROR_MAX = 1e-6
 UNSTABLE = 1.0 - 1e-9
+REACH_MIN = 1e-9
 
 
 def state_feedback(config: FlightConfig, context: ControllerContext) -> StateFeedback:
@@ -143,14 +144,13 @@ def _designed(
 
 def _require_controllable(a: Matrix, b: Matrix, signals: Signals) -> None:
     """Raise ConfigError where a motion that does not die away is out of reach of the inputs."""
-    values, vectors = np.linalg.eig(a)
-    for value, vector in zip(values, vectors.T, strict=True):
+    names = [*(one.name for one in signals.states), *["an integral"] * len(a)]
+    for value in np.linalg.eigvals(a):
         if abs(value) < UNSTABLE:
             continue
-        reach = np.hstack([a - value * np.eye(len(a)), b])
-        if np.linalg.matrix_rank(reach, tol=1e-9) < len(a):
-            names = [*(one.name for one in signals.states), *["an integral"] * len(a)]
-            most = names[int(np.argmax(np.abs(vector)))]
+        left, sizes, _ = np.linalg.svd(np.hstack([a - value * np.eye(len(a)), b]))
+        if sizes[-1] < REACH_MIN:
+            most = names[int(np.argmax(np.abs(left[:, -1])))]
             raise ConfigError(
                 f"{FIELD}: the input(s) {', '.join(one.name for one in signals.inputs)} do not reach a "
                 f"motion with the eigenvalue {abs(value):.6g} per tick, mostly of {most}: the pair "

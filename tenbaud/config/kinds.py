@@ -26,6 +26,7 @@ MODELS = Registry(
     {
         "pitch": "tenbaud.config.models:PITCH",
         "hold": "tenbaud.config.models:HOLD",
+        "pendulum": "channel.codec.models.pendulum:PendulumModel",
     },
 )
 CODERS = Registry(
@@ -45,6 +46,7 @@ PLANTS = Registry(
     "tenbaud.plants",
     {
         "pitch": "tenbaud.build.rig:pitch_plant",
+        "pendulum": "plant_sim.pendulum:PendulumPlant",
     },
 )
 CONTROLLERS = Registry(

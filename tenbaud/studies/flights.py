@@ -35,7 +35,7 @@ from tenbaud.studies.figures import FlightFigures, shared_parts
 from tenbaud.studies.flight_data import DONE, Errors, Given, Motion, Numbers, Work
 from tenbaud.studies.kernel import fly
 from tenbaud.studies.schedule import Schedule, Uncommon, schedule_of
-from transmitter.encoder_watch import WINDOW_S
+from transmitter.encoder_watch import window_ticks
 
 NOTHING = np.zeros(0)
 NO_PAIRS = np.zeros((0, 2))
@@ -231,7 +231,7 @@ def _numbers(agreement: Agreement, ticks: int, replay: bool, bias: tuple[float, 
         safe_rear=float(settings.safe_command[1]),
         guard_timeout=settings.timeout_ticks,
         soft_limit=float(settings.soft_limits[0]) if settings.soft_limits else math.inf,
-        watch=max(1, round(WINDOW_S * 1e9 / terms.tick_ns)),
+        watch=window_ticks(agreement.codec.model, terms.tick_ns / 1e9),
         counts_per_turn=int(encoder.counts_per_turn),
         sign=encoder.sign,
         zero_counts=encoder.zero_counts,

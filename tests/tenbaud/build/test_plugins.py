@@ -191,7 +191,7 @@ def test_a_coder_that_uses_rates_is_given_them(outside: Path) -> None:
         ("receiver.controller", "outside:Picky", "Picky.context. failed: RuntimeError: not today"),
         ("receiver.controller", "needy:Law", "needs a_library_that_nobody_has"),
         ("receiver.controller", "broken:Law", "broken cannot be imported: SyntaxError"),
-        ("receiver.controller", "pidd", r"pid, recorded, state_feedback and module:Class; did you mean pid\?"),
+        ("receiver.controller", "pidd", r"state_feedback and module:Class; did you mean pid\?"),
         ("receiver.controller", "a b:C", "a class from outside is written module:Class"),
         (
             "transmitter.plant.kind",

@@ -26,7 +26,7 @@ demo: $(FLY) ## fly: both processes on this machine, the plant simulated
 # Flights in real time need the cores to themselves; everything else shares them, two by two.
 REAL_TIME := tests/network tests/transmitter/test_overload.py tests/transmitter/loops \
 	$(addprefix tests/tenbaud/,flight telemetry view test_demo.py test_fire.py \
-	test_emulated_flights.py test_many_rigs.py test_processes.py test_restarts.py \
+	test_emulated_flights.py test_many_rigs.py test_pendulum.py test_processes.py test_restarts.py \
 	test_serial_flight.py)
 
 test: chromium $(DEVELOP) ## run the tests: most on two cores at once, then the flights in real time

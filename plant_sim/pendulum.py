@@ -18,7 +18,7 @@ RUB_RATE_RAD_S = 0.05
 class PendulumPlant:
     """A `Plant` of one motor and one angle, 0 upright.
 
-    Its constants are those of the codec's model, off by the configured mismatch (growth, damping, gain).
+    Its constants are those of the codec's model, off by the mismatch (growth, damping, gain).
     """
 
     def __init__(
@@ -26,15 +26,15 @@ class PendulumPlant:
     ) -> None:
         if not motor_lag_s > 0.0 or not friction_rad_per_s2 >= 0.0:
             raise ValueError(
-                f"motor_lag_s is {motor_lag_s} and friction_rad_per_s2 {friction_rad_per_s2}; the first "
-                "must be above 0, the second at least 0"
+                f"motor_lag_s is {motor_lag_s} and friction_rad_per_s2 {friction_rad_per_s2}; the "
+                "first must be above 0, the second at least 0"
             )
         off = context.mismatch if isinstance(context.mismatch, tuple) else (context.mismatch,) * 3
         model = context.model
-        growth = model["growth_per_s"] * (1.0 + off[0])
+        growth: float = model["growth_per_s"] * (1.0 + off[0])
         self._growth = growth * growth
-        self._damping = model["damping_per_s"] * (1.0 + off[1])
-        self._gain = model["torque_gain_rad_per_v_s2"] * (1.0 + off[2])
+        self._damping: float = model["damping_per_s"] * (1.0 + off[1])
+        self._gain: float = model["torque_gain_rad_per_v_s2"] * (1.0 + off[2])
         self._friction = friction_rad_per_s2
         self._volts_max = context.command_max[0]
         self._step_s = context.step_s / SUBSTEPS

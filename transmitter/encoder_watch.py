@@ -18,7 +18,7 @@ plant errs by about 0.1 rad in the window, full voltage moves the body 1.75 rad.
 
 WINDOW_S = 1.0
 GROWTH_MAX = 5.0
-"""By how much an error of the estimate may grow in a window: an unstable plant is told by shorter ones."""
+"""By how much an error of the estimate may grow in a window: it is shorter for an unstable plant."""
 DISTURBED = 1e-6
 RANGE_SHARE = 0.25
 """Motion of an output that is no angle, as a share of its range; without a range it is not watched."""

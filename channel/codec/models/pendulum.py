@@ -22,7 +22,7 @@ PENDULUM_SIGNALS = Signals(
 
 
 def pendulum_tick(state: Vector, command: Vector, held: Vector, constants: Vector) -> Vector:
-    """Advance (theta, omega) by one tick, one classical Runge-Kutta step; `command` is (motor,) in V."""
+    """Advance (theta, omega) by one Runge-Kutta step; `command` is (motor,) in V."""
     theta, omega = state
     growth, damping, gain, h = constants
     push = held[1] + gain * command[0]

@@ -1,18 +1,19 @@
-"""What every simulated plant offers, whatever it simulates."""
+"""The interface of every simulated plant."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
-from plant_sim.disturbance import Disturbance
+if TYPE_CHECKING:
+    from plant_sim.disturbance import Disturbance
 
 
 @dataclass(frozen=True, slots=True)
 class PlantContext:
-    """What a plant from outside is given when it is built."""
+    """The context that a plant from outside gets when it is built."""
 
     step_s: float
     """what one call of `advance` simulates"""

@@ -1,4 +1,4 @@
-"""What every controller offers to the controller node."""
+"""The interface of every controller."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from receiver.controllers.references import Constant, Reference
 
 @dataclass(frozen=True, slots=True)
 class ControllerContext:
-    """What a controller from outside is given when it is built."""
+    """The context that a controller from outside gets when it is built."""
 
     tick_s: float
     """time between two commands"""

@@ -58,7 +58,7 @@ PAPER_GAINS: Final = PidGains(proportional=0.1, integral=0.053, derivative=0.12,
 
 
 class PidConstants(NamedTuple):
-    """What the functions below need of one loop."""
+    """Constants of one loop, for the functions below."""
 
     proportional: float
     integral_per_tick: float

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from channel.codec.signals import signals_of
 from channel.protocol.identity import Identity
 from tenbaud.audit.base import Claim, Evidence, Findings, Place
+from tenbaud.recording.encoding import SIGNALS_KEY, signals_text
 from tenbaud.recording.notes import hole_notes, stray_notes
 from tenbaud.recording.recover import RECOVERED_NOTE
 from tenbaud.recording.table import Tables
@@ -19,6 +21,7 @@ def check_heads(evidence: Evidence, findings: Findings) -> None:
             "role": end,
             "config_digest": _recorded(identity, tables).config_digest.hex(),
             "tick_s": repr(evidence.agreement.config.timing.tick_s),
+            SIGNALS_KEY: signals_text(signals_of(evidence.agreement.codec.model)),
         }
         for name, value in wanted.items():
             said = tables.metadata.get(name)
@@ -113,7 +116,7 @@ def _check_summary(evidence: Evidence, end: str, held: int, findings: Findings) 
 
 
 def _count(text: str) -> int:
-    """Return a number of the recorder's; -1 for a text that is none, which no file can hold."""
+    """Return a count as the recorder wrote it; -1 for any other text."""
     return int(text) if text.isdecimal() else -1
 
 

@@ -8,33 +8,35 @@ import time
 from collections.abc import Callable
 
 from channel.codec.codec import Codec
+from channel.codec.models.pitch import PitchModel
 from channel.line.clocks import SkewedClock
-from channel.line.downlink import Downlink
 from channel.line.impairments import Direction, ImpairedLine, SymbolWire
-from channel.line.line import CleanLine, Line
+from channel.line.line import CleanLine, Downlink, Line
 from channel.line.uplink import Uplink
 from channel.protocol.recording import Recorder
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
 from channel.protocol.wire import Wire
+from plant_sim.encoder import Encoder
 from receiver.controllers.base import Controller
 from receiver.endpoint import ReceiverEndpoint, SteppedEndpoint
 from receiver.session.session import ReceiverSession
+from tenbaud.bounds.closed import double_integrator_floor, double_integrator_rate
 from tenbaud.build.codec import build_codec
 from tenbaud.build.controllers import build_controller
 from tenbaud.build.flight import Agreement, ticks_of, watchdog_wanted_s
-from tenbaud.build.gauge import build_gauge
 from tenbaud.build.liveness import overtaking_ticks, watchdog_ticks
 from tenbaud.build.parts import Parts
 from tenbaud.build.references import References, build_references, values_of
 from tenbaud.build.rig import build_rig
-from tenbaud.build.signals import configured_signals, safe_command, soft_limits
+from tenbaud.build.signals import build_encoders, configured_signals, safe_command, soft_limits
 from tenbaud.config.kinds import CONTROLLERS
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
 from transmitter.guard import Guard, GuardSettings
+from transmitter.metrics.gap import GapGauge, Limit, StrengthMeter
 from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode
-from transmitter.session.rate_observer import Sight
+from transmitter.session.rate_observer import RateObserver
 from transmitter.session.session import TransmitterSession
 
 
@@ -48,7 +50,7 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
         secrets.randbits(32),
         recorder,
         stop_on_desync=config.transmitter.on_desync == "stop",
-        sight=build_sight(agreement),
+        rate_observer=build_rate_observer(agreement),
         overtaking_ticks=overtaking_ticks(terms, agreement.faults),
     )
     gauge = build_gauge(agreement)
@@ -82,14 +84,15 @@ def _followed(agreement: Agreement) -> Callable[[int], tuple[float | None, ...]]
     return values_of(build_references(agreement.config, agreement.signals))
 
 
-def build_sight(agreement: Agreement) -> Sight | None:
+def build_rate_observer(agreement: Agreement) -> RateObserver | None:
     """Return what gives a coder its rates, None for one that does without."""
     codec = agreement.codec
     if not codec.uses_rates:
         return None
     tick_s = agreement.terms.tick_ns / 1e9
     try:
-        return Sight(codec.model, tick_s, agreement.config.transmitter.sight_bandwidth_rad_s)
+        bandwidth = agreement.config.transmitter.rate_observer_bandwidth_rad_s
+        return RateObserver(codec.model, tick_s, bandwidth)
     except ValueError as error:
         raise ConfigError(f"coder.kind = {agreement.config.coder.kind!r}: {error}") from error
 
@@ -110,7 +113,7 @@ def build_line(agreement: Agreement, direction: Direction, wire: SymbolWire) -> 
 
 
 def sabotaged(codec: Codec, text: str, live: bool = False) -> Codec:
-    """Return the codec, spoilt as the configuration asks; `live`: ready to be spoilt in flight."""
+    """Return the codec, corrupted as configured; `live`: it may be corrupted in flight."""
     if not text:
         return SabotagedCodec(codec) if live else codec
     try:
@@ -194,3 +197,26 @@ def guard_settings(agreement: Agreement) -> GuardSettings:
         soft_limits=soft_limits(agreement.config, agreement.signals),
         outputs=agreement.signals.outputs,
     )
+
+
+def build_gauge(agreement: Agreement) -> GapGauge | None:
+    """Return the gauge; None for a model that does not predict what its commands do.
+
+    The floor is that of the double integrator (see `tenbaud.bounds.closed`) at the rate that is paid:
+    every slot of the grid, whether its symbol arrives or not.
+    """
+    codec, terms, config = agreement.codec, agreement.terms, agreement.config
+    if not isinstance(codec.model, PitchModel):
+        return None
+    tick_s = terms.tick_ns / 1e9
+    alphabet = codec.coder.alphabet
+    bits = alphabet.symbols_per_word * math.log2(len(alphabet.symbols))
+    rate_bit_s = bits / (terms.sample_ns / 1e9)
+    limit = Limit(
+        double_integrator_floor(1.0, rate_bit_s),
+        lambda per_density: double_integrator_rate(1.0, per_density),
+    )
+    encoder = build_encoders(config, agreement.signals)[0]
+    step_rad = encoder.turn / encoder.counts_per_turn if isinstance(encoder, Encoder) else 0.0
+    strength = StrengthMeter(codec, tick_s, step_rad)
+    return GapGauge(limit, strength, terms.ticks_per_sample, tick_s)

@@ -41,7 +41,7 @@ def software_version() -> str:
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """What both ends build alike from their configuration."""
+    """The parts that both ends build alike from their configuration."""
 
     config: FlightConfig
     clock: Clock
@@ -52,6 +52,8 @@ class Agreement:
     """whether line, codec and set-point may be changed in flight, by hand"""
     parts: Parts = field(default_factory=Parts)
     """objects in place of what is configured"""
+    scored_from: int | None = None
+    """the tick from which errors count, where it is not the usual one"""
 
     @property
     def signals(self) -> Signals:
@@ -97,6 +99,8 @@ class Agreement:
 
         A flight that is over by then, or that has no periodic reference, counts from its beginning.
         """
+        if self.scored_from is not None:
+            return self.scored_from
         recorded = self.config.receiver.controller == "recorded"
         period_s = 0.0 if recorded else longest_period_s(self.config, self.signals)
         start = round(period_s * 1e9) // self.terms.tick_ns

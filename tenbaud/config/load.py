@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from channel.errors import TenbaudError
-from tenbaud.config.deprecated import with_current_names
+from tenbaud.config.deprecated import current_name, with_current_names
 from tenbaud.config.kinds import CODERS, MODELS
 from tenbaud.config.schema import KINDS, FlightConfig
 from tenbaud.config.section import OutsideSection, Section
@@ -52,6 +52,7 @@ def load_config(
     base = preset or from_file.get("preset") or DEFAULT_PRESET
     if not isinstance(base, str):
         raise ConfigError(f"{path}: preset must be a name in quotes, got {base!r}")
+    base = current_name("preset", base, source, warn=not recorded)
     values = _merge(_read_preset(base), from_file)
     values = _merge(values, with_current_names(overrides or {}, "the settings"))
     values["preset"] = base

@@ -6,9 +6,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from channel.codec.codec import ModelContext
 from channel.codec.models.hold import HoldModel
 from channel.codec.models.pitch import PitchModel, PitchParameters
-from channel.codec.plugin_context import ModelContext
 from tenbaud.config.kinds import Kind
 from tenbaud.config.section import KindSection
 

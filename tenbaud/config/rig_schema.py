@@ -54,7 +54,7 @@ class MotorSection(Section):
 
 
 class MotorsSection(NamedSections):
-    """What a command becomes on its way to the device; single inputs by name, in place of the lists."""
+    """The conversion of a command for the device; single inputs by name, in place of the lists."""
 
     unit: Literal["motor_volts", "dac_volts"] = "motor_volts"
     """what the device takes: volts at the motor, or before its amplifier"""
@@ -71,7 +71,7 @@ class MotorsSection(NamedSections):
 
 
 class BridgeSection(NamedSections):
-    """What holds for every real rig; the encoders of other axes than these three by name."""
+    """Common settings of every real rig; encoders of other axes than these three by name."""
 
     travel: TravelSection = TravelSection()
     pitch: PitchSection = PitchSection()

@@ -7,9 +7,8 @@ from dataclasses import asdict
 
 from channel.codec.codec import Codec, Vector
 from channel.errors import ConfigMismatch, LinkLost
-from channel.line.downlink import Downlink
 from channel.line.impairments import LineFaults
-from channel.line.line import CleanLine, Line
+from channel.line.line import CleanLine, Downlink, Line
 from channel.line.uplink import Uplink
 from channel.protocol.endings import End, Ending
 from channel.protocol.identity import Identity, numerics_probe
@@ -37,7 +36,7 @@ from transmitter.rigs.simulated import SimulatedRig
 from transmitter.session.session import Phase, TransmitterSession
 
 INCARNATION, SESSION_NUMBER = 1, 1
-"""Fixed: a process of its own would draw them, and a flight in memory is the same every time."""
+"""Fixed: a separate process would draw them, and a flight in memory is the same every time."""
 RAMP_TICKS = 50
 REARM_S = 10.0
 """A guard that stopped for want of commands is armed again, by a rejoin, within this time: the plant is
@@ -54,7 +53,7 @@ class MemoryFlight:
     flies once. PartError, naming the member, for an object that lacks something; ValueError for terms
     that do not go with the codec.
 
-    `receiver_codec`: a codec of its own for the receiver, for studies of lost lockstep.
+    `receiver_codec`: a separate codec for the receiver, for studies of lost lockstep.
     `uplink_line`, `downlink_line`: lines that delay, lose or change messages; clean ones without.
     `encoder_counts_per_turn`: what each measured angle is rounded to.
     `scored_from_s`: flight time at which `node.scores` begins to count errors.
@@ -137,7 +136,7 @@ class MemoryFlight:
         )
 
     def fly(self, seconds: float) -> FlightResult:
-        """Fly so many seconds of flight time; return everything that was seen at both ends.
+        """Fly the given number of seconds of flight time; return everything that was seen at both ends.
 
         A flight that ends before its time (the guard, a lost lockstep with `stop_on_desync`) returns
         too: `ended_by` says why. Raises ConfigMismatch where the receiver refuses, and LinkLost where
@@ -160,7 +159,7 @@ class MemoryFlight:
         ended_by = "" if flown == ticks else self._ended_by()
         end = End(Ending.OVER) if flown == ticks else self.transmitter.end or End(Ending.SAFETY_STOP)
         self.loop.finish(lambda: end)
-        self.receiver.rest()
+        self.receiver.flush_records()
         rows = (self.transmitter_rows, self.receiver_rows)
         return result_of(
             self.codec.model, self.terms, self.transmitter, self.receiver, rows, flown, ended_by

@@ -1,4 +1,4 @@
-"""What was seen of a flight in memory, as arrays over its ticks and tuples over its samples."""
+"""The result of a flight in memory: arrays over its ticks and tuples over its samples."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ class FlightResult:
     """true angles, a column per measured axis"""
     measured_rad: Series
     """the same as the encoders give them"""
-    reference_rad: Series
-    """set-point of the controller"""
+    references: Series
+    """set-points of the controller, a column per output"""
     states: Series
     """the codec's estimate, a column per model state"""
     live_states: Series
-    """what the receiver believed of the tick when it decided the tick's command"""
+    """the receiver\'s predicted estimate of the tick when it decided the tick's command"""
     commands: Series
     """motor voltages applied, a column per input"""
     errors: Series
     """true angle less the codec's estimate, a column per measured axis"""
     live_errors: Series
-    """true angle less what the receiver believed of it"""
+    """true angle less the receiver\'s predicted estimate of it"""
     samples: tuple[int, ...]
     """the samples that were confirmed: both ends hold equal states after them"""
     words: tuple[Word, ...]
@@ -58,6 +58,11 @@ class FlightResult:
     """the last lost lockstep, with both digests; None: there was none"""
     ended_by: str
     """what ended the flight before its time; empty: it was flown to its end"""
+
+    @property
+    def reference_rad(self) -> Series:
+        """The set-point of the first output."""
+        return np.asarray(self.references[:, 0], dtype=np.float64)
 
     @property
     def largest_error_rad(self) -> float:
@@ -83,11 +88,11 @@ def result_of(
     ticks: int,
     ended_by: str,
 ) -> FlightResult:
-    """Return the result of a flight of so many ticks, from the `rows` of transmitter and receiver."""
+    """Return the result of a flight of `ticks` ticks, from the `rows` of transmitter and receiver."""
     up, down = rows
     first = model.measured(model.initial())
     axes, inputs = len(first), model.input_size
-    angles = _per_tick(up, "tick", "true_rad", ticks, axes)
+    angles = _per_tick(up, "tick", "true", ticks, axes)
     states = _per_tick(up, "estimate", "coded_state", ticks, model.state_size)
     live = _per_tick(up, "estimate", "live_state", ticks, model.state_size)
     events = sorted([*transmitter.events, *receiver.events], key=lambda event: event.time_ns)
@@ -95,11 +100,11 @@ def result_of(
         ticks=ticks,
         time_s=np.asarray(np.arange(ticks) * (terms.tick_ns / 1e9), dtype=np.float64),
         angles_rad=angles,
-        measured_rad=_per_tick(up, "tick", "measured_rad", ticks, axes),
-        reference_rad=_per_tick(down, "tick", "reference_rad", ticks, 1)[:, 0],
+        measured_rad=_per_tick(up, "tick", "measured", ticks, axes),
+        references=_per_tick(down, "tick", "reference", ticks, axes),
         states=states,
         live_states=live,
-        commands=_per_tick(up, "tick", "applied_volts", ticks, inputs),
+        commands=_per_tick(up, "tick", "applied", ticks, inputs),
         errors=angles - _measured(model, states, axes),
         live_errors=angles - _measured(model, live, axes),
         samples=tuple(up.column("sample", "sample")),

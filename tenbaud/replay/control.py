@@ -21,7 +21,7 @@ class RecordedCommands:
         self,
         commands: Mapping[int, tuple[float, ...]],
         initial: tuple[float, ...],
-        references: Mapping[int, float | None],
+        references: Mapping[int, tuple[float | None, ...]],
     ) -> None:
         self._commands = commands
         self._last = initial
@@ -33,8 +33,8 @@ class RecordedCommands:
         return self._last
 
     def references(self, tick: int) -> tuple[float | None, ...]:
-        """Return the set-point of the first output that was recorded for `tick`; None without one."""
-        return (self._references.get(tick),)
+        """Return the set-points that were recorded for `tick`."""
+        return self._references.get(tick, ())
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ def steps_by_hand(record: FlightRecord) -> tuple[tuple[int, float], ...]:
     if reference is None:
         return ()
     rows = record.rows["receiver"].topic("tick")
-    told = [(row.tick, row.reference_rad) for row in rows if row.reference_rad is not None]
+    told = [(row.tick, row.reference[0]) for row in rows if row.reference[0] is not None]
     first = next(
         (index for index, (tick, angle) in enumerate(told) if angle != reference.value(tick)), None
     )
@@ -91,12 +91,12 @@ def recorded_commands(record: FlightRecord) -> RecordedCommands | None:
     initial = record.agreement.terms.initial_command
     rows = record.rows.get("receiver")
     if rows is not None and rows.topic("tick").recorded:
-        commands = {row.tick: row.command_volts for row in rows.topic("tick")}
-        references = {row.tick: row.reference_rad for row in rows.topic("tick")}
+        commands = {row.tick: row.command for row in rows.topic("tick")}
+        references = {row.tick: row.reference for row in rows.topic("tick")}
         return RecordedCommands(commands, initial, references)
     beside = record.rows.get("transmitter")
     if beside is None or not beside.topic("tick").recorded:
         return None
     ticks = beside.topic("tick").rows
-    commands = {row.tick: row.commanded_volts for row in ticks if row.commanded_volts is not None}
+    commands = {row.tick: row.commanded for row in ticks if row.commanded is not None}
     return RecordedCommands(commands, initial, {}) if len(commands) == len(ticks) else None

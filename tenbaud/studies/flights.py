@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -43,7 +43,7 @@ NO_PAIRS = np.zeros((0, 2))
 
 @dataclass(slots=True)
 class Trace:
-    """States of a compiled flight, for whoever wants to compare them."""
+    """States of a compiled flight, for comparisons."""
 
     models: Any
     coders: Any
@@ -61,6 +61,8 @@ class CompiledPoint:
     """
 
     config: FlightConfig
+    scored_from: int | None = None
+    """the tick from which errors count, where it is not the usual one"""
     agreement: Agreement = field(init=False)
     numbers: Numbers = field(init=False)
     constants: Any = field(init=False)
@@ -72,7 +74,7 @@ class CompiledPoint:
     def __post_init__(self) -> None:
         """Build all that does not depend on the seed."""
         config = self.config
-        self.agreement = shared_parts(config)
+        self.agreement = replace(shared_parts(config), scored_from=self.scored_from)
         _require_ordinary(config, self.agreement.codec)
         replay = config.transmitter.rig == "replay"
         ticks = self.agreement.flight_ticks
@@ -92,10 +94,6 @@ class CompiledPoint:
         )
         self.reference = NOTHING if replay else _reference(self.agreement, self._ahead)
         self._work = _work(codec, self._samples, ticks, self._ahead)
-
-    def machine_code(self) -> list[str]:
-        """Return what the flight was compiled to, for whoever wants to read it."""
-        return list(_compiled_flight(self.agreement.codec).inspect_asm().values())
 
     @property
     def _samples(self) -> int:
@@ -121,7 +119,7 @@ class CompiledPoint:
         work = self._work
         torque = torque_of(agreement.config, agreement.config.seed, self.numbers.ticks)
         given = self.given(schedule, torque)
-        flight = _compiled_flight(agreement.codec)
+        flight = compiled_flight(agreement.codec)
         try:
             status, motion, errors = flight(self.numbers, self.constants, given, work)
         except ValueError as error:
@@ -174,7 +172,7 @@ class CompiledPoint:
         )
 
 
-def _compiled_flight(codec: Codec) -> Any:
+def compiled_flight(codec: Codec) -> Any:
     """Return the compiled flight for a codec's kinds of model and coder."""
     encode, decode = codec.coder.functions  # type: ignore[attr-defined]
     parts = (

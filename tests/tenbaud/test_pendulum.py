@@ -24,7 +24,7 @@ def flown(seconds: float, **settings: object) -> FlightResult:
     return flight.fly(seconds)
 
 
-@pytest.mark.parametrize("clock", ["virtual", "real"])
+@pytest.mark.parametrize("clock", ["virtual", pytest.param("real", marks=pytest.mark.real_time)])
 def test_it_stands_as_two_processes_on_either_clock(tmp_path: Path, clock: str) -> None:
     folder = tmp_path / "run"
     done = run_command(

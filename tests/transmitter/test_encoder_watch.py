@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 
-from channel.codec.codec import Codec, Vector
+from channel.codec.codec import Codec, ModelContext, Vector
 from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
 from channel.codec.models.pendulum import PendulumModel
-from channel.codec.plugin_context import ModelContext
 from plant_sim.encoder import QUANSER_PITCH
 from plant_sim.pitch import PitchParameters, PitchPlant
 from tests.channel.codec.parts import TICK_S, pitch_codec

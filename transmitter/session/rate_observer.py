@@ -1,4 +1,4 @@
-"""What the transmitter sees of the body beside the angle: its rate, from the full-rate encoder.
+"""The transmitter's rate observer: the rate of the body, from the full-rate encoder.
 
 A coder that uses rates forms its words from angle and rate. The encoder gives counts only, so the rate
 comes from a small observer at the transmitter: the codec's own model, the commands that are known here
@@ -22,7 +22,7 @@ RATE_MAX = 1e3
 """rad/s; a body that seems faster has a broken encoder, and the observer starts anew"""
 
 
-class Sight:
+class RateObserver:
     """Angle and rate at each tick, from angles and commands. Serves one measured axis.
 
     `bandwidth_rad_s`: how fast it follows; slow hides the encoder's steps, fast catches shoves.

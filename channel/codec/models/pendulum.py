@@ -9,9 +9,8 @@ lambda / ln 2 bits a second can hold it: 10.56 for the 7.32 1/s of Khojasteh et 
 
 from __future__ import annotations
 
-from channel.codec.codec import Vector
+from channel.codec.codec import ModelContext, Vector
 from channel.codec.numerics import sin
-from channel.codec.plugin_context import ModelContext
 from channel.codec.signals import InputSignal, Signal, Signals
 
 PENDULUM_SIGNALS = Signals(

@@ -24,13 +24,13 @@ from tenbaud.flight import transmit
 from tenbaud.studies import compiled as compiling
 from tenbaud.studies.chunk import fly_point
 from tenbaud.studies.compiled import compiled
-from tenbaud.studies.flights import CompiledPoint
+from tenbaud.studies.flights import CompiledPoint, compiled_flight
 from tenbaud.studies.plain import fly_plain
 from tenbaud.studies.schedule import Uncommon
 from tenbaud.studies.settings import StudyError
 from transmitter.session.records import SAMPLE_CHANNEL
 
-PRESETS = ("paper-10baud", "tuned-20baud", "timed-10baud", "static-10baud", "usual-1000baud")
+PRESETS = ("paper-10baud", "tuned-20baud", "open-loop-zoom-10baud", "static-10baud", "usual-1000baud")
 
 CLEAN: dict[str, Any] = {}
 REAL_WIRE = {
@@ -169,7 +169,7 @@ def uncached(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 def test_when_the_machine_code_is_read_then_nothing_is_fused() -> None:
     point = CompiledPoint(config_of("paper-10baud", CLEAN))
     point.fly(1)
-    code = "\n".join(point.machine_code())
+    code = "\n".join(compiled_flight(point.agreement.codec).inspect_asm().values())
     assert re.search(r"\bv?mul[sp]d\b", code), "this is not the machine code of the flight"
     assert re.search(r"\bv?f(n)?m(add|sub)", code) is None
 

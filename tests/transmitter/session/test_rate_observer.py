@@ -12,7 +12,7 @@ from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters as PlantParameters
 from plant_sim.pitch import PitchPlant
 from tests.channel.codec.two_axes import TwoAxes
-from transmitter.session.rate_observer import Sight
+from transmitter.session.rate_observer import RateObserver
 
 TICK_S = 0.01
 MODEL = PitchModel(PitchParameters(), TICK_S)
@@ -22,12 +22,14 @@ def fly(bandwidth_rad_s: float, ticks: int = 6000, missing: range = range(0)) ->
     """Return the rms error of the rate over the second half, behind an encoder of 4096 counts."""
     plant = PitchPlant(PlantParameters(), TICK_S, WhiteTorque(2e-3, TICK_S, 3))
     encoder = Encoder(4096)
-    sight = Sight(MODEL, TICK_S, bandwidth_rad_s)
+    rate_observer = RateObserver(MODEL, TICK_S, bandwidth_rad_s)
     volts = (0.0, 0.0)
     total = 0.0
     for tick in range(ticks):
         if tick not in missing:
-            seen = sight.look(tick, (encoder.angle_rad(encoder.counts(plant.angle_rad)),), volts)
+            seen = rate_observer.look(
+                tick, (encoder.angle_rad(encoder.counts(plant.angle_rad)),), volts
+            )
         if tick >= ticks // 2:
             total += (seen[1] - plant.rate_rad_s) ** 2
         volts = (2.0 * math.sin(0.01 * tick), -2.0 * math.sin(0.013 * tick))
@@ -47,16 +49,16 @@ def test_when_ticks_are_missed_then_the_rate_is_found_again() -> None:
 
 
 def test_when_the_encoder_jumps_wildly_then_the_rate_stays_a_rate() -> None:
-    sight = Sight(MODEL, TICK_S, 200.0)
-    sight.look(0, (0.0,), (0.0, 0.0))
+    rate_observer = RateObserver(MODEL, TICK_S, 200.0)
+    rate_observer.look(0, (0.0,), (0.0, 0.0))
     for tick in range(1, 20):
-        angle, rate = sight.look(tick, (1e4 * (-1) ** tick,), (0.0, 0.0))
+        angle, rate = rate_observer.look(tick, (1e4 * (-1) ** tick,), (0.0, 0.0))
         assert abs(rate) < 1e3
         assert math.isfinite(angle)
 
 
 def test_when_it_makes_no_sense_then_it_is_refused() -> None:
     with pytest.raises(ValueError, match="bandwidth"):
-        Sight(MODEL, TICK_S, 0.0)
+        RateObserver(MODEL, TICK_S, 0.0)
     with pytest.raises(ValueError, match="one measured angle"):
-        Sight(TwoAxes(TICK_S), TICK_S)
+        RateObserver(TwoAxes(TICK_S), TICK_S)

@@ -26,7 +26,7 @@ MODELS = Registry(
     {
         "pitch": "tenbaud.config.models:PITCH",
         "hold": "tenbaud.config.models:HOLD",
-        "pendulum": "channel.codec.models.pendulum:PendulumModel",
+        "pendulum": "tenbaud.config.models:PENDULUM",
     },
 )
 CODERS = Registry(

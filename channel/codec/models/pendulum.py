@@ -61,11 +61,6 @@ class PendulumModel:
         damping_per_s: float = 0.1,
         torque_gain_rad_per_v_s2: float = 4.0,
     ) -> None:
-        if not growth_per_s > 0.0 or not damping_per_s >= 0.0:
-            raise ValueError(
-                f"growth_per_s is {growth_per_s} and damping_per_s {damping_per_s}; the first must be "
-                "above 0, the second at least 0"
-            )
         growth = growth_per_s * growth_per_s
         self.constants: Vector = (growth, damping_per_s, torque_gain_rad_per_v_s2, context.tick_s)
 

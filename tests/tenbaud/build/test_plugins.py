@@ -145,7 +145,7 @@ def test_one_of_each_flies_as_two_processes(outside: Path) -> None:
     run = Run(outside / "run")
     assert run.config.coder.kind == "outside:Steps"
     assert abs(run.error_coded[1000:]).max() < 0.3
-    assert abs(run.pitch).max() > 1.0
+    assert abs(run.output_1).max() > 1.0
     assert set(run.range) == {0.03}
     # The recording knows enough to fly it all again, from outside classes too.
     assert audit(outside / "run", allow_code=True).passed

@@ -42,8 +42,8 @@ class Encoder:
     """An encoder that counts without bound: several turns are several times `counts_per_turn`.
 
     `counts_per_turn` is after quadrature and at least 1; `sign` is +1 or -1 and says which way the
-    counts grow; `zero_counts` is what it reads at 0. A `turn` is 2 pi for an angle in rad; with 1 there
-    are so many counts for each unit of any other output.
+    counts grow; `zero_counts` is what it reads at 0. `turn` is the value of
+    `counts_per_turn` counts: 2 pi for an angle in rad, 1 for counts per unit of any other output.
     """
 
     counts_per_turn: float

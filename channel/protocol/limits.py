@@ -119,7 +119,7 @@ def are_plausible(command: Sequence[float]) -> bool:
 
 
 def as_carried(value: float, steps_per_unit: float) -> float:
-    """Return what becomes of one input's value on the wire."""
+    """Return the value of one input as the wire rounds it."""
     return round(steps_per_unit * value) / steps_per_unit
 
 

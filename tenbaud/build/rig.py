@@ -177,7 +177,7 @@ def _axis(name: str, section: AxisSection, unit: str) -> Axis:
 
 
 def build_motors(config: FlightConfig, signals: Signals, outputs: int) -> Motors:
-    """Return the way of each input to a device of so many outputs; ConfigError for names of none."""
+    """Return how each input reaches a device of `outputs` outputs; ConfigError for unknown names."""
     section = config.transmitter.bridge.motors
     names = [one.name for one in signals.inputs]
     gain = section.amplifier_gain if section.unit == "dac_volts" else 1.0

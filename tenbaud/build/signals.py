@@ -72,7 +72,7 @@ def soft_limits(config: FlightConfig, signals: Signals) -> Vector:
 
 
 def check_outputs(field: str, named: Mapping[str, Any], signals: Signals) -> None:
-    """Raise ConfigError for a name that is none of the outputs."""
+    """Raise ConfigError for a name that is not an output."""
     for name in named:
         if name not in [one.name for one in signals.outputs]:
             raise ConfigError(f"{field}.{name}: the plant's output(s) are {_names(signals)}")

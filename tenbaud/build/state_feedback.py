@@ -1,7 +1,7 @@
 """State feedback for a model: its gains as given, or designed as a linear-quadratic regulator.
 
-The design is the receiver's own affair and no part of the codec, so it may use a library. Gains are
-rounded to ten digits, so that a flight is flown again alike on a machine with another library.
+The design runs at the receiver and is no part of the codec, so it may use a library. Gains are rounded
+to ten digits, so that a replay on a machine with another library computes the same commands.
 """
 
 from __future__ import annotations

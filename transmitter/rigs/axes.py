@@ -20,7 +20,7 @@ class Axis:
     zero_counts: int | None
     """counts at 0; None: those of the first sample"""
     turn: float = math.tau
-    """what so many counts are: see `Encoder`"""
+    """the value of `counts_per_turn` counts, see `Encoder`"""
 
     def encoder(self, first_counts: tuple[int, ...]) -> Encoder:
         """Return the encoder, its zero fixed by the device's first sample where it is not given."""

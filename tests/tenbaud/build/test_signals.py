@@ -1,4 +1,4 @@
-"""What a configuration gives for the inputs and outputs of its model, and what it is told otherwise."""
+"""What a configuration gives for the inputs and outputs of its model, and which errors it gets."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def test_encoders_that_contradict_the_output_name_it(section: dict[str, Any], te
         build_encoders(own(transmitter__encoders=section), CART)
 
 
-def test_an_unknown_field_of_a_table_by_name_is_told_from_a_name() -> None:
+def test_an_unknown_field_is_not_taken_for_a_name() -> None:
     with pytest.raises(ConfigError, match=r"encoders\.counts_per_trun: unknown field; did you mean"):
         own(transmitter__encoders__counts_per_trun=100)
 
@@ -245,7 +245,7 @@ def test_a_feedback_that_does_not_fit_names_the_signal(section: dict[str, Any], 
         next(feedback(**section))
 
 
-def test_a_motion_out_of_reach_is_told_with_its_state() -> None:
+def test_a_motion_out_of_reach_is_refused_with_its_state() -> None:
     class Loose(Cart):
         def tick(self, state: Vector, command: Vector, held: Vector) -> Vector:
             return super().tick(state, (command[0], 0.0), held)

@@ -196,4 +196,4 @@ def _is_word(word: tuple[int, ...], agreement: Agreement) -> bool:
 
 
 def _epoch(row: Any) -> Epoch:
-    return Epoch(row.epoch, CodecState(row.sample, row.state, row.coder), row.hold_volts)
+    return Epoch(row.epoch, CodecState(row.sample, row.state, row.coder), row.hold)

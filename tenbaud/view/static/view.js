@@ -101,7 +101,7 @@ function become(told) {
       });
   }));
   // Pictures of what is drawn as it is; everything else has bars.
-  const name = plant.outputs[0]?.name === "pitch" ? "helicopter" : plant.model === "pendulum" ? "pendulum" : "";
+  const name = several ? "" : plant.outputs[0]?.name === "pitch" ? "helicopter" : plant.model === "pendulum" ? "pendulum" : "";
   for (const id of ["helicopter", "pendulum"]) at(id).toggleAttribute("hidden", id !== name);
   picture = name && at(name);
   if (name === "helicopter") drawScale();

@@ -6,7 +6,9 @@ import pytest
 
 from channel.codec.codec import Codec
 from channel.codec.coders.zoom import ZoomCoder
+from channel.codec.signals import signals_of
 from channel.codec.words import WIRE_ERASED, Alphabet
+from channel.protocol.limits import CommandLimits
 from tenbaud import MemoryFlight
 from tests.channel.codec.chua import (
     CHUA_TICK_S,
@@ -25,7 +27,14 @@ MS = 1_000_000
 
 def test_when_chua_is_flown_through_both_sessions_then_no_command_is_needed() -> None:
     codec = Codec(ChuaModel(CHUA_TICK_S), ZoomCoder(CHUA_ZOOM), CHUA_TICKS_PER_SAMPLE)
-    flight_terms = terms(tick_ns=5 * MS, rate_baud=20.0, initial_command=(), lead_ticks=7)
+    flight_terms = terms(
+        tick_ns=5 * MS,
+        rate_baud=20.0,
+        initial_command=(),
+        limits=CommandLimits((), ()),
+        signals=signals_of(codec.model),
+        lead_ticks=7,
+    )
     flight_terms.check("real")
     flight = MemoryFlight(
         codec,

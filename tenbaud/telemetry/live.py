@@ -182,7 +182,7 @@ class LiveReceiver:
                 steering = self.steering and self.steering[0]
                 if not steering:
                     return _ignored("this controller has no set-point")
-                steering.by_hand = angle_rad
+                steering.steer(angle_rad)
                 cause = ByHand.FOLLOW if angle_rad is None else ByHand.SET_POINT
                 return _by_hand(cause, value=angle_rad)
             case Impair(text=text):

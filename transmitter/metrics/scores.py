@@ -53,15 +53,6 @@ class OutputScores:
         self.last_coded_error: float | None = None
         self.last: float | None = None
 
-    def on_value(self, value: float, reference: float | None) -> None:
-        """Take the output of a tick in the window."""
-        if value > self.largest or -value > self.largest:
-            self.largest = abs(value)
-        if reference is not None:
-            if reference > self.reference_largest or -reference > self.reference_largest:
-                self.reference_largest = abs(reference)
-            self.tracking.add(reference - value)
-
 
 class Scores:
     """Collects the errors of a flight from tick `window_start_tick` on, for each output.
@@ -103,8 +94,15 @@ class Scores:
         references = self._references(tick) if inside else ()
         for place, score in enumerate(self.outputs):
             score.last = value = values[place]
-            if inside:
-                score.on_value(value, references[place] if place < len(references) else None)
+            if not inside:
+                continue
+            if value > score.largest or -value > score.largest:
+                score.largest = abs(value)
+            reference = references[place] if place < len(references) else None
+            if reference is not None:
+                if reference > score.reference_largest or -reference > score.reference_largest:
+                    score.reference_largest = abs(reference)
+                score.tracking.add(reference - value)
         self._readings.append((tick, values))
         self._join()
 

@@ -113,9 +113,8 @@ def run_receiver(
         telemetry = _telemetry(agreement, "receiver", recorder, endpoints)
         with refusals(endpoints) as refused, open_link(agreement, "receiver", endpoints, stop) as link:
             trouble = Trouble(link, endpoints.security, refused, stop)
-            steering = telemetry.steering[0] if telemetry.steering else None
             endpoint = build_receiver(
-                agreement, telemetry.recorder, link.wire, endpoints.take_over, steering
+                agreement, telemetry.recorder, link.wire, endpoints.take_over, telemetry.steering
             )
             live = telemetry.fly_receiver(endpoint, trouble.should_stop)
             with (
@@ -203,10 +202,10 @@ def transmitter_status(run: TransmitterRun) -> Status:
         "of_ticks": run.agreement.flight_ticks,
         "time_s": node.tick * tick_s,
         "outputs": outputs_status(
-            signals_of(run.agreement.codec.model),
-            [node.scores.last_angle_rad],
+            run.agreement.signals,
+            [one.last for one in node.scores.outputs],
             coder.ranges(node.session.copies.confirmed.coder),
-            [node.scores.last_coded_error_rad],
+            [one.last_coded_error for one in node.scores.outputs],
         ),
         "erasures": node.session.counts["erasures"],
         "desyncs": node.session.counts["desyncs"],

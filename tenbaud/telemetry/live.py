@@ -23,7 +23,7 @@ from channel.links.base import Role
 from channel.protocol.events import ByHand, Event, EventKind, write_event
 from channel.protocol.recording import Recorder
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
-from receiver.controllers.steered import SteeredReference
+from receiver.controllers.references import SteeredReference
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.telemetry.commands import CommandQueue

@@ -54,7 +54,7 @@ class Watched:
         found = [message for message in self.messages() if message.role == role]
         return found[-1] if found else None
 
-    def wait(self, met: Callable[[], object], seconds: float = 20.0) -> None:
+    def wait(self, met: Callable[[], object], seconds: float = 60.0) -> None:
         until_s = time.monotonic() + seconds
         while not met():
             assert time.monotonic() < until_s, self.received[-1:]

@@ -115,9 +115,9 @@ class _Repeated:
         """Return the earlier command of `tick`."""
         return self._commands.get(tick, self._initial)
 
-    def reference_rad(self, tick: int) -> None:
-        """Return None: nothing is followed."""
-        return None
+    def references(self, tick: int) -> tuple[float | None, ...]:
+        """Return none: nothing is followed."""
+        return ()
 
 
 def _is_carried(evidence: Evidence, epoch: Epoch, state: CodecState, known: list[Vector]) -> bool:

@@ -16,7 +16,7 @@ def build_codec(config: FlightConfig, parts: Parts | None = None) -> Codec:
     """Return the codec of a configuration; ValueError where its parts do not fit each other."""
     parts = parts or Parts()
     ticks = round(config.timing.symbol_period_s / config.timing.tick_s)
-    model = parts.model or _build_model(config)
+    model = build_model(config, parts)
     coder = parts.coder or _build_coder(config, model)
     needs_hold = isinstance(coder, PcmCoder)
     if needs_hold != isinstance(model, HoldModel):
@@ -27,11 +27,14 @@ def build_codec(config: FlightConfig, parts: Parts | None = None) -> Codec:
     codec = Codec(model, coder, ticks)
     if isinstance(config.model, OutsideSection) or isinstance(config.coder, OutsideSection):
         where = f"model.kind = {config.model.kind!r} with coder.kind = {config.coder.kind!r}"
-        check_codec(where, codec, config.limits.initial_volts)
+        check_codec(where, codec)
     return codec
 
 
-def _build_model(config: FlightConfig) -> Model:
+def build_model(config: FlightConfig, parts: Parts | None = None) -> Model:
+    """Return the prediction model of a configuration."""
+    if parts is not None and parts.model is not None:
+        return parts.model
     section = config.model
     context = ModelContext(config.timing.tick_s, config.timing.symbol_period_s)
     model: Model

@@ -81,5 +81,5 @@ def _speech(config: FlightConfig, form: EmulatedFormat, line_form: str, polled: 
         quarc_fields(config),
         quarc_commands(config),
         section.byte_order,
-        scale_of(section.unit, pitch.counts_per_turn),
+        scale_of(section.unit, int(pitch.counts_per_turn)),
     )

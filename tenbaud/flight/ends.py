@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from channel.codec.signals import signals_of
 from channel.links.base import Link, Role
 from channel.links.kind import LinkEnd, NodePlace
 from channel.links.security import Security
@@ -113,9 +112,8 @@ def run_receiver(
         telemetry = _telemetry(agreement, "receiver", recorder, endpoints)
         with refusals(endpoints) as refused, open_link(agreement, "receiver", endpoints, stop) as link:
             trouble = Trouble(link, endpoints.security, refused, stop)
-            steering = telemetry.steering[0] if telemetry.steering else None
             endpoint = build_receiver(
-                agreement, telemetry.recorder, link.wire, endpoints.take_over, steering
+                agreement, telemetry.recorder, link.wire, endpoints.take_over, telemetry.steering
             )
             live = telemetry.fly_receiver(endpoint, trouble.should_stop)
             with (
@@ -170,7 +168,7 @@ def open_recorder(
 
     `writer`: a thread that it shares with others, instead of one of its own.
     """
-    plant = signals_of(agreement.codec.model)
+    plant = agreement.signals
     metadata = {
         "role": role,
         "preset": agreement.config.preset,
@@ -203,10 +201,10 @@ def transmitter_status(run: TransmitterRun) -> Status:
         "of_ticks": run.agreement.flight_ticks,
         "time_s": node.tick * tick_s,
         "outputs": outputs_status(
-            signals_of(run.agreement.codec.model),
-            [node.scores.last_angle_rad],
+            run.agreement.signals,
+            [one.last for one in node.scores.outputs],
             coder.ranges(node.session.copies.confirmed.coder),
-            [node.scores.last_coded_error_rad],
+            [one.last_coded_error for one in node.scores.outputs],
         ),
         "erasures": node.session.counts["erasures"],
         "desyncs": node.session.counts["desyncs"],
@@ -227,7 +225,7 @@ def receiver_status(agreement: Agreement, endpoint: ReceiverEndpoint) -> Status:
         "phase": session.phase.value,
         "time_s": session.state.sample * agreement.terms.sample_ns / 1e9,
         "outputs": outputs_status(
-            signals_of(model),
+            agreement.signals,
             model.measured(session.state.model),
             agreement.codec.coder.ranges(session.state.coder),
         ),

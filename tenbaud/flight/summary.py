@@ -6,7 +6,6 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from channel.codec.signals import signals_of
 from channel.links.base import Link
 from channel.protocol.bounds import COUNTER
 from channel.protocol.endings import End
@@ -25,7 +24,7 @@ Summary = dict[str, Any]
 def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
     """Return what the transmitter knows: plant, errors, bits sent, its loop."""
     node, terms, config = run.node, run.agreement.terms, run.agreement.config
-    session, scores, meter = node.session, node.scores, run.uplink.meter
+    session, scores, meter = node.session, node.scores.first, run.uplink.meter
     flown_s = run.ticks * terms.tick_ns / 1e9
     return {
         **_common(run.agreement, outcome, session.end),
@@ -53,10 +52,10 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         "impaired_up": dict(run.uplink.line.counts),
         "impaired_down": dict(run.downlink.counts),
         "window_start_s": run.agreement.window_start_tick * terms.tick_ns / 1e9,
-        "pitch_amplitude_rad": scores.angle_max_rad,
-        "reference_amplitude_rad": scores.reference_max_rad or None,
-        **_errors("error_coded", scores.coded, scores.angle_max_rad, scores.reference_max_rad),
-        **_errors("error_live", scores.live, scores.angle_max_rad, scores.reference_max_rad),
+        "pitch_amplitude_rad": scores.largest,
+        "reference_amplitude_rad": scores.reference_largest or None,
+        **_errors("error_coded", scores.coded, scores.largest, scores.reference_largest),
+        **_errors("error_live", scores.live, scores.largest, scores.reference_largest),
         "tracking_rms_rad": scores.tracking.rms,
         "outputs": _outputs(run),
         **gap_part(node.gauge.whole if node.gauge is not None else None),
@@ -204,13 +203,12 @@ def real_rig_name(section: TransmitterSection) -> str:
 
 
 def _outputs(run: TransmitterRun) -> Summary:
-    """Return the figures of every output that is scored, by its name, in its own unit."""
+    """Return the figures of every output, by its name, in its own unit."""
     figures = {}
-    plant = signals_of(run.agreement.codec.model)
-    for output, scores in zip(plant.outputs, (run.node.scores,), strict=False):
+    for output, scores in zip(run.agreement.signals.outputs, run.node.scores.outputs, strict=True):
         figures[output.name] = {
             "unit": output.unit,
-            "largest": scores.angle_max_rad,
+            "largest": scores.largest,
             "error_coded_max": scores.coded.largest if scores.coded.count else None,
             "error_coded_rms": scores.coded.rms,
             "error_live_max": scores.live.largest if scores.live.count else None,

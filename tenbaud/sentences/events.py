@@ -124,11 +124,11 @@ def _guard_cause(one: Fields) -> str:
             return f"tick {tick}: {one['detail']}"
         case "angle_limit":
             return (
-                f"axis {axis} is at {value:.3f} rad at tick {tick}, beyond its soft limit of "
-                f"{limit:g} rad"
+                f"{one['detail'] or f'axis {axis}, rad'}: {value:.3f} at tick {tick} is beyond the "
+                f"soft limit of {limit:g}"
             )
         case "no_angle":
-            return f"axis {axis} reads no number at tick {tick}"
+            return f"{one['detail'] or f'axis {axis}'} reads no number at tick {tick}"
         case "bad_command":
             return f"the command of tick {tick} is not a number"
     return str(one["cause"])

@@ -20,7 +20,7 @@ from channel.codec.codec import add_correction, is_estimate
 from channel.codec.lead import fly_ticks
 from channel.protocol.limits import as_carried, limited
 from plant_sim.pitch import pitch_step
-from receiver.controllers.pid import motor_volts, pid_integral, pid_volts
+from receiver.controllers.pid import clamped, is_stuck, pid_integral, pid_sum
 from tenbaud.studies.flight_data import DONE, LEFT, Errors, Given, Motion, Numbers, Work
 from tenbaud.studies.parts import decode, encode, held_of, sine, state_of, tick
 from tenbaud.studies.sensor_side import act, angle_at, count_at, guess, put, score
@@ -198,13 +198,20 @@ def _decide(
         front, rear = given.commands[at, 0], given.commands[at, 1]
     else:
         error = given.reference[at] - angle
-        volts = pid_volts(pid_constants, integral, error, rate)
-        if not math.isfinite(volts):
+        total = pid_sum(pid_constants, integral, error, rate)
+        if not math.isfinite(total):
             return False, integral
-        integral = pid_integral(pid_constants, integral, error, volts)
-        front, rear = motor_volts(pid_constants, volts)
+        first, second = pid_constants.mixing
+        front = numbers.bias[0] + first * total
+        rear = numbers.bias[1] + second * total
+        stuck = is_stuck(front, first * error, numbers.command_max[0])
+        stuck = is_stuck(rear, second * error, numbers.command_max[1]) and stuck
+        integral = pid_integral(pid_constants, integral, error, stuck)
+        front = clamped(front, numbers.command_max[0])
+        rear = clamped(rear, numbers.command_max[1])
     front_before = work.front[at - 1] if at > 0 else numbers.initial_front
     rear_before = work.rear[at - 1] if at > 0 else numbers.initial_rear
-    work.front[at] = as_carried(limited(front, front_before, numbers.volts_max, numbers.slew))
-    work.rear[at] = as_carried(limited(rear, rear_before, numbers.volts_max, numbers.slew))
+    largest, slew, steps = numbers.command_max, numbers.slew, numbers.steps_per_unit
+    work.front[at] = as_carried(limited(front, front_before, largest[0], slew[0]), steps[0])
+    work.rear[at] = as_carried(limited(rear, rear_before, largest[1], slew[1]), steps[1])
     return True, integral

@@ -92,8 +92,9 @@ def act(
         return False, motion
     front, rear, age, late = motion.front, motion.rear, motion.age, motion.late
     if not given.late[at]:
-        front = limited(work.front[at], front, numbers.volts_max, numbers.slew)
-        rear = limited(work.rear[at], rear, numbers.volts_max, numbers.slew)
+        largest, slew = numbers.command_max, numbers.slew
+        front = limited(work.front[at], front, largest[0], slew[0])
+        rear = limited(work.rear[at], rear, largest[1], slew[1])
         age = 0
     else:
         age += 1

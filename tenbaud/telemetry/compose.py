@@ -241,7 +241,7 @@ class ReceiverComposer(_Composer):
             "baud_measured": session.meter.baud,
             "points": _thinned(points, POINTS_MAX),
             "samples": samples[-SAMPLES_MAX:],
-            "set_points": [None if one is None else one.by_hand_rad for one in steering],
+            "set_points": [None if one is None else one.by_hand for one in steering],
             "steerable": [one is not None for one in steering],
         }
 

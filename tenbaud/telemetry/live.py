@@ -23,7 +23,7 @@ from channel.links.base import Role
 from channel.protocol.events import ByHand, Event, EventKind, write_event
 from channel.protocol.recording import Recorder
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
-from receiver.controllers.steered import SteeredReference
+from receiver.controllers.references import SteeredReference
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.telemetry.commands import CommandQueue
@@ -197,7 +197,7 @@ class LiveReceiver:
         output = outputs[place]
         if value is not None and not output.low <= value <= output.high:
             return _ignored(f"{output.name} is within {output.low:g} and {output.high:g} {output.unit}")
-        steering.steer(value)
+        steering.by_hand = value
         if value is None:
             return _by_hand(ByHand.FOLLOW)
         detail = f"{output.unit} of {output.name}" if len(outputs) > 1 else output.unit

@@ -103,7 +103,7 @@ function band(chart, rows, upper, lower, colour) {
 export function drawOutput(canvas, height, now, rows, decisions, place, look, ink) {
   const at = (index) => (row) => (row[index][place] === null || row[index][place] === undefined ? null : row[index][place] * look.factor);
   const value = at(1), estimate = at(2), range = at(3), reference = at(1);
-  let most = look.unit === "°" ? 30 : 1e-6;
+  let most = look.unit === "°" ? 2 : 1e-6;
   for (const row of rows) most = Math.max(most, Math.abs(value(row)) * 1.05);
   for (const row of decisions) most = Math.max(most, Math.abs(reference(row) || 0) * 1.05);
   const chart = frame(canvas, height, now, most, look, ink);
@@ -116,7 +116,7 @@ export function drawOutput(canvas, height, now, rows, decisions, place, look, in
 
 export function drawError(canvas, height, now, rows, place, look, ink) {
   const error = (row) => (row[1][place] - row[2][place]) * look.factor, range = (row) => (row[3][place] ?? 0) * look.factor;
-  let most = look.unit === "°" ? 4 : 1e-9;
+  let most = look.unit === "°" ? 0.5 : 1e-9;
   for (const row of rows) most = Math.max(most, range(row), Math.abs(error(row)));
   const chart = frame(canvas, height, now, most, look, ink);
   band(chart, rows, range, (row) => -range(row), ink.tube);

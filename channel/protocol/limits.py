@@ -125,11 +125,16 @@ def as_carried(value: float, steps_per_unit: float) -> float:
 
 def to_steps(command: Sequence[float], signals: Signals) -> tuple[int, ...]:
     """Round a command to the whole steps that a frame carries."""
-    pairs = zip(signals.steps_per_unit, command, strict=True)
+    per_unit = signals.steps_per_unit
+    if len(per_unit) == 2:
+        return round(per_unit[0] * command[0]), round(per_unit[1] * command[1])
+    pairs = zip(per_unit, command, strict=True)
     return tuple([round(steps * value) for steps, value in pairs])
 
 
 def from_steps(steps: Sequence[int], signals: Signals) -> Vector:
     """Return the command that both codecs use for the steps of a frame."""
-    pairs = zip(steps, signals.steps_per_unit, strict=True)
-    return tuple([value / per_unit for value, per_unit in pairs])
+    per_unit = signals.steps_per_unit
+    if len(per_unit) == 2:
+        return steps[0] / per_unit[0], steps[1] / per_unit[1]
+    return tuple([value / one for value, one in zip(steps, per_unit, strict=True)])

@@ -157,15 +157,20 @@ class PidLoops:
             for index, share in enumerate(loop.constants.mixing):
                 wanted[index] += share * total
         self._last_tick = tick
+        limits = self.command_max
+        # Most ticks have no input at its limit, and then no integral rests.
+        inside = True
+        for index, largest in enumerate(limits):
+            inside = inside and -largest < wanted[index] < largest
         for place, (loop, error) in enumerate(zip(self.loops, errors, strict=True)):
-            self.integrals[place] = self._integral(loop, self.integrals[place], error, wanted)
-        return tuple(map(clamped, wanted, self.command_max))
+            stuck = not inside and self._is_stuck(loop.constants.mixing, error, wanted)
+            integral = self.integrals[place]
+            self.integrals[place] = pid_integral(loop.constants, integral, error, stuck)
+        return tuple(wanted) if inside else tuple(map(clamped, wanted, limits))
 
-    def _integral(self, loop: Loop, integral: float, error: float, wanted: Sequence[float]) -> float:
-        stuck = True
-        for share, value, largest in zip(loop.constants.mixing, wanted, self.command_max, strict=True):
-            stuck = stuck and is_stuck(value, share * error, largest)
-        return pid_integral(loop.constants, integral, error, stuck)
+    def _is_stuck(self, mixing: Vector, error: float, wanted: Sequence[float]) -> bool:
+        inputs = zip(mixing, wanted, self.command_max, strict=True)
+        return all(is_stuck(value, share * error, largest) for share, value, largest in inputs)
 
 
 class Pid(PidLoops):

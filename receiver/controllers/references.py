@@ -155,6 +155,10 @@ class SteeredReference(AngleReference):
         self.by_hand: float | None = None
         """the set-point given by hand; None: the configured reference is followed"""
 
+    def steer(self, value: float | None) -> None:
+        """Take the set-point by hand; None follows the configured reference again."""
+        self.by_hand = value
+
     def value(self, tick: int) -> float:
         """Return the set-point at `tick`."""
         return self._programme.value(tick) if self.by_hand is None else self.by_hand

@@ -155,7 +155,9 @@ class Commander:
     def _references(self, tick: int) -> tuple[float | None, ...]:
         try:
             references = self._controller.references(tick)
-            if len(references) <= len(self._no_references):
+            if len(references) == len(self._no_references):
+                return references
+            if len(references) < len(self._no_references):
                 return (*references, *self._no_references[len(references) :])
             problem = f"{len(references)} set-points for {len(self._no_references)} output(s)"
         except Exception as error:  # the user's code too, and only a column of the recording

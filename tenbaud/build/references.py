@@ -39,6 +39,9 @@ def build_references(config: FlightConfig, signals: Signals) -> References:
 
 def values_of(references: References) -> Callable[[int], tuple[float | None, ...]]:
     """Return what gives the values of all set-points at a tick."""
+    if len(references) == 1 and references[0] is not None:
+        value = references[0].value
+        return lambda tick: (value(tick),)
     return lambda tick: tuple([None if one is None else one.value(tick) for one in references])
 
 

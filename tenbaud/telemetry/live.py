@@ -197,7 +197,7 @@ class LiveReceiver:
         output = outputs[place]
         if value is not None and not output.low <= value <= output.high:
             return _ignored(f"{output.name} is within {output.low:g} and {output.high:g} {output.unit}")
-        steering.by_hand = value
+        steering.steer(value)
         if value is None:
             return _by_hand(ByHand.FOLLOW)
         detail = f"{output.unit} of {output.name}" if len(outputs) > 1 else output.unit

@@ -101,8 +101,8 @@ class Scores:
         """Note the outputs of a tick; ticks come in order."""
         inside = tick >= self.window_start_tick
         references = self._references(tick) if inside else ()
-        for place, (score, value) in enumerate(zip(self.outputs, values, strict=True)):
-            score.last = value
+        for place, score in enumerate(self.outputs):
+            score.last = value = values[place]
             if inside:
                 score.on_value(value, references[place] if place < len(references) else None)
         self._readings.append((tick, values))
@@ -128,8 +128,7 @@ class Scores:
     def _score(self, values: Vector, tick: int, coded: Vector, live: Vector | None) -> None:
         inside = tick >= self.window_start_tick
         for place, score in enumerate(self.outputs):
-            error = values[place] - coded[place]
-            score.last_coded_error = error
+            score.last_coded_error = error = values[place] - coded[place]
             if inside:
                 score.coded.add(error)
                 if live is not None:

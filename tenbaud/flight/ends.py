@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from channel.codec.signals import signals_of
 from channel.links.base import Link, Role
 from channel.links.kind import LinkEnd, NodePlace
 from channel.links.security import Security
@@ -169,7 +168,7 @@ def open_recorder(
 
     `writer`: a thread that it shares with others, instead of one of its own.
     """
-    plant = signals_of(agreement.codec.model)
+    plant = agreement.signals
     metadata = {
         "role": role,
         "preset": agreement.config.preset,
@@ -226,7 +225,7 @@ def receiver_status(agreement: Agreement, endpoint: ReceiverEndpoint) -> Status:
         "phase": session.phase.value,
         "time_s": session.state.sample * agreement.terms.sample_ns / 1e9,
         "outputs": outputs_status(
-            signals_of(model),
+            agreement.signals,
             model.measured(session.state.model),
             agreement.codec.coder.ranges(session.state.coder),
         ),

@@ -79,8 +79,8 @@ class Law:
     def command(self, tick: int, state: Vector) -> Vector:
         return (max(-2.0, min(2.0, -state[0] - state[2])),)
 
-    def reference_rad(self, tick: int) -> float:
-        return 0.1
+    def references(self, tick: int) -> tuple[float | None, ...]:
+        return (0.1,)
 
 
 def fly_recorded(

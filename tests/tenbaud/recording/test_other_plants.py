@@ -10,16 +10,18 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
+from channel.codec.coders.zoom import ZoomCoder
 from channel.codec.models.pitch import PITCH_SIGNALS
 from channel.codec.signals import InputSignal, Signal, Signals
-from tenbaud import FlightResult, Run
+from tenbaud import FlightResult, Run, fly
+from tenbaud.flight.closing import closing_lines
 from tenbaud.recording.convert import convert
 from tenbaud.recording.encoding import SIGNALS_KEY, recorded_signals, signals_text
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.layouts import flight_plots
 from tenbaud.recording.reader import Recording
 from tenbaud.recording.signals import definitions
-from tests.tenbaud.arm_and_place import Model, fly_recorded
+from tests.tenbaud.arm_and_place import ZOOM, Law, Model, Plant, fly_recorded
 
 
 @pytest.fixture(scope="module")
@@ -54,6 +56,23 @@ def test_signals_are_what_was_flown(flown: tuple[FlightResult, Run]) -> None:
     np.testing.assert_array_equal(run.torque[: result.ticks], result.commands[:, 0])
     np.testing.assert_array_equal(run.estimate_arm_rate[: result.ticks], result.states[:, 2])
     assert run.reference_arm[20] == 0.1
+
+
+def test_a_flight_of_objects_has_figures_of_every_output(tmp_path: Path) -> None:
+    settings = {"duration_s": 5.0, "channel.rate_baud": 40.0}
+    parts = {"model": Model(), "coder": ZoomCoder(ZOOM), "plant": Plant(), "controller": Law()}
+    run = fly("paper-20baud", settings=settings, out=tmp_path / "run", **parts)
+    assert run.plant == Model.signals
+    outputs = run.summary["outputs"]
+    assert [(name, one["unit"]) for name, one in outputs.items()] == [("arm", "rad"), ("place", "m")]
+    window = round(run.summary["window_start_s"] * 100)
+    for name, one in outputs.items():
+        largest = np.nanmax(np.abs(getattr(run, f"error_live_{name}")[window:]))
+        assert one["error_live_max"] == pytest.approx(largest)
+    text = "\n".join(closing_lines(run.summary, run.folder))
+    assert "Estimate error  arm: " in text
+    assert "° rms" in text
+    assert " m rms, " in text
 
 
 def test_converted_files_have_its_names_and_units(run: Run, tmp_path: Path) -> None:

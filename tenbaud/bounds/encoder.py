@@ -46,6 +46,6 @@ def floor_behind_encoder(
     gain = np.array([math.sqrt(2.0) * bandwidth, bandwidth**2])
     own = math.sqrt(2.0) * bandwidth * noise
     driven = LinearModel(
-        np.array([[0.0, 1.0], [0.0, 0.0]]), noise * np.outer(gain, gain), np.array([1.0, 0.0])
+        np.array([[0.0, 1.0], [0.0, 0.0]]), noise * np.outer(gain, gain), np.diag([1.0, 0.0])
     )
     return own + floor(driven, rate_bit_s)

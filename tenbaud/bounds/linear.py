@@ -17,7 +17,7 @@ RANK_TOLERANCE = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class LinearModel:
-    """`dx = A x dt + dw`, `E dw dw' = Q dt`, of which `c' x` is to be known.
+    """`dx = A x dt + dw`, `E dw dw' = Q dt`, of which the outputs `C x` are to be known.
 
     States that no noise reaches do not belong in it: both ends know them from the commands.
     """
@@ -26,31 +26,37 @@ class LinearModel:
     """A, 1/s"""
     noise: Matrix
     """Q, two-sided spectral density"""
-    output: Matrix
-    """c"""
+    cost: Matrix
+    """W, the weight of an error: `C' diag(w) C` for outputs of weights w"""
 
     @property
     def states(self) -> int:
         """Return how many states there are."""
-        return len(self.output)
+        return len(self.cost)
 
 
-def linear_model(dynamics: ArrayLike, noise: ArrayLike, output: ArrayLike) -> LinearModel:
+def linear_model(
+    dynamics: ArrayLike, noise: ArrayLike, outputs: ArrayLike, weights: ArrayLike | None = None
+) -> LinearModel:
     """Return a checked model; ValueError says what is wrong with it.
 
-    Every state must be driven by the noise and seen in the output: otherwise the floor is that of a
-    smaller model, and which one is for the caller to say.
+    `outputs` is C, or the one row of it; `weights` are those of the squared output errors, 1 without.
+    Every state must be driven by the noise and seen in an output of some weight: otherwise the floor is
+    that of a smaller model, and which one is for the caller to say (`tenbaud.bounds.reduced`).
     """
     a = np.atleast_2d(np.asarray(dynamics, dtype=float))
     q = np.atleast_2d(np.asarray(noise, dtype=float))
-    c = np.atleast_1d(np.asarray(output, dtype=float))
-    states = len(c)
+    c = np.atleast_2d(np.asarray(outputs, dtype=float))
+    w = np.ones(len(c)) if weights is None else np.atleast_1d(np.asarray(weights, dtype=float))
+    states = c.shape[1]
     if a.shape != (states, states) or q.shape != (states, states):
         raise ValueError(
-            f"the output has {states} entries, so dynamics and noise must be {states} x {states}; "
+            f"an output has {states} entries, so dynamics and noise must be {states} x {states}; "
             f"they are {a.shape} and {q.shape}"
         )
-    if not (np.isfinite(a).all() and np.isfinite(q).all() and np.isfinite(c).all()):
+    if w.shape != (len(c),) or not (w >= 0.0).all():
+        raise ValueError(f"weights are one for each of the {len(c)} outputs, at least 0; got {w}")
+    if not all(np.isfinite(one).all() for one in (a, q, c, w)):
         raise ValueError("the model has an entry that is not finite")
     if not np.allclose(q, q.T) or np.linalg.eigvalsh(q).min() < -1e-12 * max(1.0, np.abs(q).max()):
         raise ValueError("the noise density must be symmetric and not negative")
@@ -58,12 +64,12 @@ def linear_model(dynamics: ArrayLike, noise: ArrayLike, output: ArrayLike) -> Li
         raise ValueError(
             "the noise does not reach every state: leave out those it does not, both ends know them"
         )
-    if _rank_of_powers(a.T, c[:, None]) < states:
+    if _rank_of_powers(a.T, c.T * w) < states:
         raise ValueError(
             "the output does not see every state (the pair is not observable): no rate bounds a state "
             "that never shows; leave it out, or choose an output that sees it"
         )
-    return LinearModel(a, q, c)
+    return LinearModel(a, q, c.T * w @ c)
 
 
 def _rank_of_powers(a: Matrix, columns: Matrix) -> int:

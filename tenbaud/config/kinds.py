@@ -26,6 +26,7 @@ MODELS = Registry(
     {
         "pitch": "tenbaud.config.models:PITCH",
         "hold": "tenbaud.config.models:HOLD",
+        "linear": "tenbaud.config.models:LINEAR",
     },
 )
 CODERS = Registry(
@@ -38,6 +39,7 @@ CODERS = Registry(
         "static": "tenbaud.config.coders:STATIC",
         "words": "tenbaud.config.coders:WORDS",
         "history": "tenbaud.config.coders:HISTORY",
+        "direction": "tenbaud.config.coders:DIRECTION",
     },
 )
 PLANTS = Registry(

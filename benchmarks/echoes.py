@@ -86,6 +86,7 @@ def receiver(address: str, _: bytes, settings: dict[str, Any]) -> None:
     """Be a receiver, recording or not; it is configured as a receiver is."""
     from channel.links.zenoh.link import ZenohLink
     from channel.protocol.recording import Recorder
+    from receiver.endpoint import ReceiverEndpoint
     from receiver.loops.single import serve
     from tenbaud.build.ends import build_receiver
     from tenbaud.build.flight import agree
@@ -99,8 +100,46 @@ def receiver(address: str, _: bytes, settings: dict[str, Any]) -> None:
         if settings["record"]:
             recorder = open_recorder(agreement, "receiver", Path(folder) / "receiver.mcap")
         with ZenohLink("receiver", "ping", listen=(address,)) as link:
+            built = build_receiver(agreement, recorder, link.wire)
+            clock = SymbolClock(agreement.terms.sample_ns)
+            endpoint = ReceiverEndpoint(built.session, built.downlink, clock)  # type: ignore[arg-type]
             _ready()
-            serve(build_receiver(agreement, recorder, link.wire), link, 3600.0)
+            serve(endpoint, CountedLink(link, clock), 3600.0)  # type: ignore[arg-type]
+
+
+class SymbolClock:
+    """A clock for a receiver that is asked faster than its slots are due: one sample for each message.
+
+    The receiver drops symbols far ahead of its schedule, and these come as fast as they are answered.
+    It does its own arithmetic of deadlines on this clock, as on any other.
+    """
+
+    def __init__(self, sample_ns: int) -> None:
+        self.messages = 0
+        self._sample_ns = sample_ns
+
+    def shown(self, now_ns: int) -> int:
+        """Return the time that this clock shows."""
+        return self.messages * self._sample_ns
+
+    def reached(self, shown_ns: int, now_ns: int) -> int:
+        """Return when it will show a time: with the messages, not by itself."""
+        return now_ns + 1_000_000_000
+
+
+class CountedLink:
+    """The part of a link that a receiver's loop uses, with its messages counted."""
+
+    def __init__(self, link: Any, clock: SymbolClock) -> None:
+        self.send = link.send
+        self._receive = link.receive
+        self._clock = clock
+
+    def receive(self, timeout_s: float) -> bytes | None:
+        """Return the next message, None when none comes in time."""
+        data: bytes | None = self._receive(timeout_s)
+        self._clock.messages += data is not None
+        return data
 
 
 KINDS = {"udp": udp, "tcp": tcp, "zenoh": bare, "receiver": receiver}

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from channel.codec.codec import Vector
+from channel.codec.models.pitch import PITCH_SIGNALS
+from channel.codec.signals import Signals
 
 
 def hold_tick(state: Vector, command: Vector, held: Vector, constants: Vector) -> Vector:
@@ -16,6 +18,7 @@ class HoldModel:
     state_size = 2
     correction_size = 2
     input_size = 2
+    signals = Signals(PITCH_SIGNALS.states[:2], PITCH_SIGNALS.inputs, PITCH_SIGNALS.outputs)
     tick_function = staticmethod(hold_tick)
 
     def __init__(self, tick_s: float) -> None:

@@ -14,6 +14,18 @@ from dataclasses import dataclass
 
 from channel.codec.codec import Vector
 from channel.codec.numerics import exp, sin
+from channel.codec.signals import InputSignal, Signal, Signals
+
+PITCH_SIGNALS = Signals(
+    states=(
+        Signal("pitch", "rad"),
+        Signal("pitch_rate", "rad/s"),
+        Signal("front_lagging", "V"),
+        Signal("rear_lagging", "V"),
+    ),
+    inputs=(InputSignal("front", "V", group="motors"), InputSignal("rear", "V", group="motors")),
+    outputs=(Signal("pitch", "rad"),),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +102,7 @@ class PitchModel:
     state_size = 4
     correction_size = 2
     input_size = 2
+    signals = PITCH_SIGNALS
     tick_function = staticmethod(pitch_tick)
 
     def __init__(self, parameters: PitchParameters, tick_s: float) -> None:

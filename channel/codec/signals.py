@@ -1,0 +1,168 @@
+"""The signals of a plant: names, units, ranges and groups of its states, inputs and outputs.
+
+A model says them once, and everything that shows, limits, records or steers a plant reads them here:
+how many there are, what they are called and in which unit they are given. Nothing else of the project
+knows what a plant is made of.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol, cast
+
+NAME = re.compile(r"[a-z][a-z0-9_]*")
+STEPS_MAX = 32_767
+"""Largest number of steps, either way, that a frame carries for an input."""
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """One state or output.
+
+    ValueError for a name that is no lower-case identifier, or an empty range.
+    """
+
+    name: str
+    """lower-case letters, digits and underscores; with the unit's suffix it names columns"""
+    unit: str = ""
+    """as a person writes it: "rad", "rad/s", "V", "N m"; empty: no dimension"""
+    low: float = -float("inf")
+    """smallest value that makes sense, for displays and checks"""
+    high: float = float("inf")
+    """largest value that makes sense"""
+    group: str = ""
+    """signals of one group share a panel; empty: those of one unit do"""
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be named or shown."""
+        if not NAME.fullmatch(self.name):
+            raise ValueError(
+                f"{self.name!r} is no name of a signal: use lower-case letters, digits and "
+                "underscores, a letter first"
+            )
+        if not self.low < self.high:
+            raise ValueError(f"signal {self.name}: its range is {self.low:g} to {self.high:g}")
+
+    @property
+    def column(self) -> str:
+        """The name with its unit, for files that have no other place for it: `pitch_rad`."""
+        suffix = unit_suffix(self.unit)
+        return f"{self.name}_{suffix}" if suffix else self.name
+
+    @property
+    def label(self) -> str:
+        """The name with its unit, for a person: `pitch, rad`."""
+        words = self.name.replace("_", " ")
+        return f"{words}, {self.unit}" if self.unit else words
+
+
+@dataclass(frozen=True, slots=True)
+class InputSignal(Signal):
+    """One input of the plant: what a command has a value for."""
+
+    steps_per_unit: float = 1000.0
+    """A command travels as a whole number of steps, at most `STEPS_MAX` either way: 1000 are mV."""
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be named, shown or carried."""
+        # Not super(): a dataclass with slots is a class made anew.
+        Signal.__post_init__(self)
+        if not 0.0 < self.steps_per_unit < float("inf"):
+            raise ValueError(f"input {self.name}: steps_per_unit is {self.steps_per_unit:g}")
+
+    @property
+    def largest(self) -> float:
+        """The largest value that a frame carries, either way."""
+        return STEPS_MAX / self.steps_per_unit
+
+
+_SUFFIXES = {"V": "volts", "A": "amperes", "%": "percent", "°": "deg"}
+
+
+def unit_suffix(unit: str) -> str:
+    """Return a unit as the end of a column's name: `rad_per_s` for rad/s, `volts` for V."""
+    words = []
+    for part in unit.replace("²", "2").replace("^", "").split("/"):
+        factors = [_SUFFIXES.get(factor, factor) for factor in re.split(r"[ ·*]+", part) if factor]
+        words.append("_".join(factors))
+    return "_per_".join(words)
+
+
+@dataclass(frozen=True, slots=True)
+class Signals:
+    """All signals of a plant, in the order in which vectors hold them."""
+
+    states: tuple[Signal, ...]
+    inputs: tuple[InputSignal, ...]
+    outputs: tuple[Signal, ...]
+    """what is measured, and steered to a set-point"""
+    output_states: tuple[int | None, ...] = field(default=())
+    """for each output the state that it is, None for another function of the states"""
+
+    def __post_init__(self) -> None:
+        """Refuse names that occur twice, and outputs that are states which are not there."""
+        for what in ("states", "inputs", "outputs"):
+            names = [one.name for one in getattr(self, what)]
+            doubled = sorted({name for name in names if names.count(name) > 1})
+            if doubled:
+                raise ValueError(f"{what}: {', '.join(doubled)} is named twice")
+        if not self.output_states:
+            states = [one.name for one in self.states]
+            found = [states.index(one.name) if one.name in states else None for one in self.outputs]
+            object.__setattr__(self, "output_states", tuple(found))
+        if len(self.output_states) != len(self.outputs):
+            raise ValueError(
+                f"{len(self.output_states)} output_states are given for {len(self.outputs)} outputs"
+            )
+
+    def index(self, what: str, name: str) -> int:
+        """Return the place of a signal among the `states`, `inputs` or `outputs`.
+
+        ValueError with the names there are.
+        """
+        names = [one.name for one in getattr(self, what)]
+        if name not in names:
+            raise ValueError(f"{name!r} is none of the {what}: {', '.join(names)}")
+        return names.index(name)
+
+
+def named(what: str, count: int) -> tuple[Signal, ...]:
+    """Return `count` signals without unit or range, called `what_1`, `what_2`, ..."""
+    return tuple(Signal(f"{what}_{number}") for number in range(1, count + 1))
+
+
+class Sized(Protocol):
+    """The sizes of a prediction model (`channel.codec.codec.Model`)."""
+
+    state_size: int
+    input_size: int
+
+    def initial(self) -> tuple[float, ...]:
+        """Return the common first state."""
+
+    def measured(self, state: tuple[float, ...]) -> tuple[float, ...]:
+        """Return the predicted outputs."""
+
+
+def signals_of(model: Sized) -> Signals:
+    """Return the signals of a model; numbered ones for a model that names none.
+
+    ValueError where their numbers are not those of the model's states, inputs and outputs.
+    """
+    outputs = len(model.measured(model.initial()))
+    found = getattr(model, "signals", None)
+    if found is None:
+        inputs = tuple(InputSignal(one.name) for one in named("input", model.input_size))
+        return Signals(named("state", model.state_size), inputs, named("output", outputs))
+    signals = cast(Signals, found)
+    _require("states", model.state_size, signals.states)
+    _require("inputs", model.input_size, signals.inputs)
+    _require("outputs", outputs, signals.outputs)
+    return signals
+
+
+def _require(what: str, size: int, given: Sequence[Signal]) -> None:
+    if len(given) != size:
+        raise ValueError(f"the model has {size} {what}, and {len(given)} are named")

@@ -42,7 +42,7 @@ def linear_model(
 
     `outputs` is C, or the one row of it; `weights` are those of the squared output errors, 1 without.
     Every state must be driven by the noise and seen in an output of some weight: otherwise the floor is
-    that of a smaller model, and which one is for the caller to say (`tenbaud.bounds.reduced`).
+    that of a smaller model, and which one is for the caller to say (`reached`).
     """
     a = np.atleast_2d(np.asarray(dynamics, dtype=float))
     q = np.atleast_2d(np.asarray(noise, dtype=float))
@@ -72,15 +72,34 @@ def linear_model(
     return LinearModel(a, q, c.T * w @ c)
 
 
+def reached(
+    dynamics: Matrix, noise: Matrix, outputs: Matrix, weights: Matrix
+) -> tuple[LinearModel, Matrix]:
+    """Return the part of a plant that the noise reaches, and its basis: x = basis z.
+
+    The rest is known to both ends from the commands. ValueError where the outputs do not show it all.
+    """
+    powers = _powers(dynamics, noise)
+    left, sizes, _ = np.linalg.svd(powers)
+    rank = int(np.count_nonzero(sizes > RANK_TOLERANCE * max(1.0, float(sizes[0]))))
+    basis = np.eye(len(dynamics)) if rank == len(dynamics) else left[:, :rank]
+    model = linear_model(basis.T @ dynamics @ basis, basis.T @ noise @ basis, outputs @ basis, weights)
+    return model, basis
+
+
 def _rank_of_powers(a: Matrix, columns: Matrix) -> int:
-    """Return the rank of [B, AB, A^2 B, ...], each block scaled so that a fast A does not hide it."""
+    return int(np.linalg.matrix_rank(_powers(a, columns), tol=RANK_TOLERANCE))
+
+
+def _powers(a: Matrix, columns: Matrix) -> Matrix:
+    """Return [B, AB, A^2 B, ...], each block scaled so that a fast A does not hide it."""
     block = columns / (np.abs(columns).max() or 1.0)
     blocks = [block]
     speed = np.abs(a).max() or 1.0
     for _ in range(len(a) - 1):
         block = a @ block / speed
         blocks.append(block)
-    return int(np.linalg.matrix_rank(np.hstack(blocks), tol=RANK_TOLERANCE))
+    return np.hstack(blocks)
 
 
 def integrators(count: int, density: float) -> LinearModel:
@@ -129,12 +148,17 @@ def rate_needed(dynamics: ArrayLike) -> float:
 
 
 def sampled(model: LinearModel, period_s: float) -> tuple[Matrix, Matrix]:
+    """Return transition matrix and noise covariance over a period."""
+    return van_loan(model.dynamics, model.noise, period_s)
+
+
+def van_loan(dynamics: Matrix, noise: Matrix, period_s: float) -> tuple[Matrix, Matrix]:
     """Return transition matrix and noise covariance over a period (Van Loan, IEEE TAC 23, 1978)."""
-    states = model.states
+    states = len(dynamics)
     block = np.zeros((2 * states, 2 * states))
-    block[:states, :states] = -model.dynamics
-    block[:states, states:] = model.noise
-    block[states:, states:] = model.dynamics.T
+    block[:states, :states] = -dynamics
+    block[:states, states:] = noise
+    block[states:, states:] = dynamics.T
     exponential = expm(block * period_s)
     transition = exponential[states:, states:].T
     covariance = transition @ exponential[:states, states:]

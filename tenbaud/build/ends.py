@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 
 from channel.codec.codec import Codec
+from channel.codec.models.linear import LinearModel
 from channel.line.clocks import SkewedClock
 from channel.line.downlink import Downlink
 from channel.line.impairments import Direction, ImpairedLine, SymbolWire
@@ -33,8 +34,8 @@ from tenbaud.config.schema import FlightConfig
 from transmitter.guard import Guard, GuardSettings
 from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode
-from transmitter.session.rate_observer import Sight
 from transmitter.session.session import TransmitterSession
+from transmitter.session.sight import Sight, rate_sight
 
 
 def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> TransmitterNode:
@@ -86,11 +87,15 @@ def build_sight(agreement: Agreement) -> Sight | None:
     codec = agreement.codec
     if not codec.uses_rates:
         return None
-    tick_s = agreement.terms.tick_ns / 1e9
+    config, tick_s = agreement.config, agreement.terms.tick_ns / 1e9
     try:
-        return Sight(codec.model, tick_s, agreement.config.transmitter.sight_bandwidth_rad_s)
+        if isinstance(codec.model, LinearModel):
+            from tenbaud.design.sight import configured_sight
+
+            return configured_sight(codec.model, config)
+        return rate_sight(codec.model, tick_s, config.transmitter.sight_bandwidth_rad_s)
     except ValueError as error:
-        raise ConfigError(f"coder.kind = {agreement.config.coder.kind!r}: {error}") from error
+        raise ConfigError(f"coder.kind = {config.coder.kind!r}: {error}") from error
 
 
 def build_uplink(agreement: Agreement, wire: Wire, recorder: Recorder | None = None) -> Uplink:

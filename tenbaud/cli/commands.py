@@ -9,6 +9,7 @@ import typer
 from tenbaud.cli import (
     bench,
     demo,
+    design,
     doctor,
     figures,
     files,
@@ -62,7 +63,10 @@ for panel, commands in (
         (runs.inspect, runs.diff, replays.replay, replays.audit, files.convert, files.recover),
     ),
     ("Rigs and machines", (doctor.doctor, rig.rig, rig.rig_check, router.router)),
-    ("Models, coders, studies", (identify.identify, figures.figures, sweep.sweep, tune.tune)),
+    (
+        "Models, coders, studies",
+        (design.floor, design.design, identify.identify, figures.figures, sweep.sweep, tune.tune),
+    ),
 ):
     for command in commands:
         app.command(rich_help_panel=panel)(command)

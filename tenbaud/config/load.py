@@ -43,19 +43,25 @@ def load_config(
     `allow_code`: classes from outside that it names may be imported, as for a flight of one's own.
     Raises ConfigError.
     """
-    from_file = _read_toml(path) if path is not None else {}
+    values = merged_values(preset, path, overrides)
+    try:
+        config = FlightConfig.model_validate(values)
+    except ValidationError as error:
+        source = str(path) if path is not None else f"preset {values['preset']}"
+        raise ConfigError(_describe_all(source, error)) from error
+    return config.allowing_code() if allow_code else config
+
+
+def merged_values(
+    preset: str | None = None, path: Path | None = None, overrides: dict[str, Any] | None = None
+) -> dict[str, Any]:
+    """Return what `load_config` checks: nested settings, as they were read."""
+    from_file = read_toml(path) if path is not None else {}
     base = preset or from_file.get("preset") or DEFAULT_PRESET
     if not isinstance(base, str):
         raise ConfigError(f"{path}: preset must be a name in quotes, got {base!r}")
     values = _merge(_read_preset(base), from_file)
-    values = _merge(values, overrides or {})
-    values["preset"] = base
-    try:
-        config = FlightConfig.model_validate(values)
-    except ValidationError as error:
-        source = str(path) if path is not None else f"preset {base}"
-        raise ConfigError(_describe_all(source, error)) from error
-    return config.allowing_code() if allow_code else config
+    return _merge(values, overrides or {}) | {"preset": base}
 
 
 def nested(settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -106,7 +112,8 @@ def _read_preset(name: str) -> dict[str, Any]:
     return tomllib.loads(resource.read_text())
 
 
-def _read_toml(path: Path) -> dict[str, Any]:
+def read_toml(path: Path) -> dict[str, Any]:
+    """Return a TOML file's settings; ConfigError where it cannot be read."""
     try:
         return tomllib.loads(path.read_text())
     except OSError as error:

@@ -10,8 +10,9 @@ from channel.codec.models.hold import HoldModel
 from channel.codec.models.linear import LinearModel
 from channel.codec.models.pitch import PitchModel, PitchParameters
 from channel.codec.plugin_context import ModelContext
+from channel.codec.signals import InputSignal, Signal, Signals, named
 from tenbaud.config.kinds import Kind
-from tenbaud.config.section import Factor, KindSection, NotNegative
+from tenbaud.config.section import Factor, KindSection, NotNegative, Positive
 
 
 class PitchModelSection(KindSection):
@@ -63,6 +64,26 @@ class LinearModelSection(KindSection):
     input_units: Names = ()
     outputs: Names = ()
     output_units: Names = ()
+    input_steps_per_unit: tuple[Positive, ...] = ()
+    """a command travels in whole steps: 1000 per volt are mV; empty: 1000"""
+
+    def signals(self, inputs: int) -> Signals:
+        """Return the names and units, numbered names where none are given."""
+
+        def given(what: str, count: int) -> list[tuple[str, str]]:
+            names = getattr(self, f"{what}s") or [one.name for one in named(what, count)]
+            return list(zip(names, getattr(self, f"{what}_units") or [""] * count, strict=True))
+
+        steps = self.input_steps_per_unit or (1000.0,) * inputs
+        return Signals(
+            tuple(Signal(*one) for one in given("state", len(self.C[0]))),
+            tuple(
+                InputSignal(*one, steps_per_unit=step)
+                for one, step in zip(given("input", inputs), steps, strict=True)
+            ),
+            tuple(Signal(*one) for one in given("output", len(self.C))),
+            tuple(_state_of(row) for row in self.C),
+        )
 
     @model_validator(mode="after")
     def _fitting(self) -> LinearModelSection:
@@ -88,13 +109,17 @@ class LinearModelSection(KindSection):
         if self.corrected > size:
             raise ValueError(f"corrected is {self.corrected}, and there are {size} states")
         for name, count in (("state", size), ("input", columns), ("output", len(self.C))):
-            names = getattr(self, f"{name}s")
-            _check_length(f"{name}s", names, count, 0)
+            _check_length(f"{name}s", getattr(self, f"{name}s"), count, 0)
             _check_length(f"{name}_units", getattr(self, f"{name}_units"), count, 0)
-            for one in names:
-                if names.count(one) > 1:
-                    raise ValueError(f"{name}s has the name {one!r} twice")
+        _check_length("input_steps_per_unit", self.input_steps_per_unit, columns, 0)
+        self.signals(columns)
         return self
+
+
+def _state_of(row: tuple[float, ...]) -> int | None:
+    """Return which state an output is, None for another function of them."""
+    one = [index for index, value in enumerate(row) if value]
+    return one[0] if len(one) == 1 and row[one[0]] == 1.0 else None
 
 
 def _check_length(name: str, values: tuple[object, ...], count: int, default: int) -> None:
@@ -117,10 +142,14 @@ def _linear(section: LinearModelSection, context: ModelContext) -> LinearModel:
             "model.F and model.E, the plant of one tick, are missing: `tenbaud design` finds them from "
             "A and B, once and for both ends"
         )
-    corrected = section.corrected or len(section.F)
-    start = section.start or None
     return LinearModel(
-        section.F, section.E, section.C, context.tick_s, corrected=corrected, start=start
+        section.F,
+        section.E,
+        section.C,
+        context.tick_s,
+        corrected=section.corrected or None,
+        start=section.start or None,
+        signals=section.signals(len(section.E[0])),
     )
 
 

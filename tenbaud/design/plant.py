@@ -1,6 +1,6 @@
 """A linear plant as designs and floors take it, and its discretisation.
 
-    dx/dt = A x + B u + G w,     y = C x,     E w(t) w(t')' = diag(q) delta(t - t')
+dx/dt = A x + B u + G w,     y = C x,     E w(t) w(t')' = diag(q) delta(t - t')
 """
 
 from __future__ import annotations

@@ -73,7 +73,7 @@ def compiled(
     names = dict(parts)
     for name in function.__code__.co_names:
         value = function.__globals__.get(name)
-        if name in names or not isinstance(value, FunctionType):
+        if name in names or not isinstance(value, FunctionType) or value is function:
             continue
         package, _, rest = value.__module__.partition(".")
         if value is refuse:
@@ -87,7 +87,11 @@ def compiled(
     # The cache knows a function by its name: with other parts it is another function.
     own = "_".join([function.__qualname__, *(part.__name__ for _, part in parts)])
     copy.__qualname__ = copy.__name__ = own
-    return _jit(copy, allocates, inline="always" if inline else "never", forceinline=True)
+    again = function.__name__ in function.__code__.co_names
+    made = _jit(copy, allocates, inline="always" if inline else "never", forceinline=not again)
+    if again:  # a function that calls itself
+        scope[function.__name__] = made
+    return made
 
 
 def arrays_of(constants: Any) -> Any:
@@ -95,9 +99,7 @@ def arrays_of(constants: Any) -> Any:
     if not hasattr(constants, "_replace"):
         return constants
     rows = {name: value for name, value in constants._asdict().items() if isinstance(value, tuple)}
-    numbers = {
-        name: np.array(value) for name, value in rows.items() if isinstance(value[0], float)
-    }
+    numbers = {name: np.array(value) for name, value in rows.items() if isinstance(value[0], float)}
     return constants._replace(**numbers)
 
 

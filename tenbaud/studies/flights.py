@@ -12,6 +12,7 @@ import numpy as np
 
 from channel.codec.codec import Codec
 from channel.codec.coders.base import FunctionCoder
+from channel.codec.models.linear import LinearModel
 from channel.codec.numerics import sin
 from channel.flight_log import FlightLog
 from plant_sim.disturbance import parse_disturbance
@@ -19,18 +20,19 @@ from plant_sim.pitch import pitch_constants
 from receiver.controllers.pid import Pid, PidConstants
 from receiver.controllers.recorded import RecordedController
 from tenbaud.build.controllers import build_controller, reference_of
-from tenbaud.build.ends import guard_settings
+from tenbaud.build.ends import build_sight, guard_settings
 from tenbaud.build.flight import Agreement, kind_of_link, read_flight_log
 from tenbaud.build.rig import nominal_plant
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig, FlightLogSection, ReferenceSection
 from tenbaud.flight.verdict import FlightCounts, faults_of
-from tenbaud.studies.compiled import compiled, reader
+from tenbaud.studies.compiled import arrays_of, compiled, reader, tick_of_rows
 from tenbaud.studies.figures import FlightFigures, shared_parts
 from tenbaud.studies.flight_data import DONE, Errors, Given, Motion, Numbers, Work
 from tenbaud.studies.kernel import fly
 from tenbaud.studies.schedule import Schedule, Uncommon, schedule_of
 from transmitter.encoder_watch import WINDOW_S
+from transmitter.session.sight import Sight
 
 NOTHING = np.zeros(0)
 NO_PAIRS = np.zeros((0, 2))
@@ -62,6 +64,7 @@ class CompiledPoint:
     _log: FlightLog | None = field(init=False, default=None)
     reference: Any = field(init=False)
     _clean: Any = field(init=False, default=None)
+    _sight: Sight | None = field(init=False)
     _work: Work = field(init=False)
 
     def __post_init__(self) -> None:
@@ -79,9 +82,10 @@ class CompiledPoint:
         pid = controller.constants if isinstance(controller, Pid) else _no_pid()
         plant = nominal_plant(config).mismatched(config.transmitter.plant.mismatch)
         codec = self.agreement.codec
+        self._sight = build_sight(self.agreement)
         self.constants = (
-            codec.model.constants,  # type: ignore[attr-defined]
-            codec.coder.constants,  # type: ignore[attr-defined]
+            arrays_of(codec.model.constants),  # type: ignore[attr-defined]
+            arrays_of(codec.coder.constants),  # type: ignore[attr-defined]
             pitch_constants(plant, config.timing.tick_s),
             pid,
         )
@@ -173,21 +177,35 @@ class CompiledPoint:
             self.reference,
             torque,
             *_recorded(self._log, self._ahead),
+            *_observer(self._sight),
         )
 
 
 def _compiled_flight(codec: Codec) -> Any:
     """Return the compiled flight for a codec's kinds of model and coder."""
-    encode, decode = codec.coder.functions  # type: ignore[attr-defined]
+    encode, decode, allocates = codec.coder.functions  # type: ignore[attr-defined]
     parts = (
-        ("tick", compiled(codec.model.tick_function)),  # type: ignore[attr-defined]
-        ("encode", compiled(encode)),
-        ("decode", compiled(decode)),
+        ("tick", _compiled_tick(codec.model)),
+        ("encode", compiled(encode, allocates=allocates)),
+        ("decode", compiled(decode, allocates=allocates)),
         ("state_of", reader(codec.model.state_size)),
         ("held_of", reader(codec.model.correction_size)),
         ("sine", compiled(sin)),
     )
     return compiled(fly, parts)
+
+
+def _compiled_tick(model: Any) -> Any:
+    if hasattr(model, "row_function"):
+        return tick_of_rows(model.row_function, model.state_size)
+    return compiled(model.tick_function)
+
+
+def _observer(sight: Sight | None) -> tuple[Any, Any, Any]:
+    """Return gains, gains after a gap and largest states of the transmitter's observer."""
+    if sight is None:
+        return NO_PAIRS, NO_PAIRS, NOTHING
+    return np.array(sight.gains), np.array(sight.anew), np.array(sight.largest)
 
 
 def _require_ordinary(config: FlightConfig, codec: Codec) -> None:
@@ -202,10 +220,11 @@ def _require_ordinary(config: FlightConfig, codec: Codec) -> None:
     if kind_of_link(config).changes_terms:
         raise Uncommon("a link on which bytes take time, such as a serial line")
     model, coder = codec.model, codec.coder
-    if not (hasattr(model, "tick_function") and isinstance(coder, FunctionCoder)):
+    functions = hasattr(model, "tick_function") or hasattr(model, "row_function")
+    if not (functions and isinstance(coder, FunctionCoder)):
         raise Uncommon("a model or coder that is not written as functions")
-    if codec.uses_rates:
-        raise Uncommon("a coder that is shown rates, which the transmitter's observer finds")
+    if isinstance(model, LinearModel) and model.outputs != ((1.0, *[0.0] * (model.state_size - 1)),):
+        raise Uncommon("a linear model whose output is not its first state")
 
 
 def _numbers(agreement: Agreement, ticks: int, replay: bool) -> Numbers:
@@ -229,6 +248,7 @@ def _numbers(agreement: Agreement, ticks: int, replay: bool) -> Numbers:
         soft_limit=math.inf if soft is None else float(soft),
         watch=max(1, round(WINDOW_S * 1e9 / terms.tick_ns)),
         counts_per_turn=section.encoder_counts_per_turn,
+        uses_rates=agreement.codec.uses_rates,
         sign=section.encoder_sign,
         zero_counts=section.encoder_zero_counts,
     )
@@ -255,6 +275,8 @@ def _work(codec: Codec, samples: int, ticks: int, ahead: int) -> Work:
         spare=np.empty(len(coder)),
         correction=np.empty(codec.model.correction_size),
         nothing=np.zeros(codec.model.correction_size),
+        seen=np.empty(states),
+        given_out=np.empty(2),
         coded=np.empty(ahead),
         live=np.empty(ahead),
         front=np.empty(ahead),

@@ -22,7 +22,7 @@ from plant_sim.pitch import pitch_step
 from receiver.controllers.pid import motor_volts, pid_integral, pid_volts
 from tenbaud.studies.flight_data import DONE, LEFT, Errors, Given, Motion, Numbers, Work
 from tenbaud.studies.parts import decode, encode, held_of, sine, state_of, tick
-from tenbaud.studies.sensor_side import act, angle_at, count_at, guess, put, score
+from tenbaud.studies.sensor_side import act, angle_at, count_at, guess, look, put, score
 
 
 def fly(
@@ -42,6 +42,9 @@ def fly(
     errors = Errors(0, 0.0, 0.0, 0, 0.0, 0.0, 0, 0.0, 0.0)
     work.front[: numbers.lead] = numbers.initial_front
     work.rear[: numbers.lead] = numbers.initial_rear
+    put(work.models[0], work.seen)
+    work.given_out[0] = numbers.initial_front
+    work.given_out[1] = numbers.initial_rear
     for sample in range(given.scored.shape[0]):
         well = _measure(sample, plant[0], numbers, model_constants, coder_constants, given, work)
         erased = _receive(sample, given, work)
@@ -66,6 +69,8 @@ def fly(
             volts = (work.front[at], work.rear[at])
             state = tick(state, volts, held, model_constants)
             if at < after and at < numbers.ticks:
+                if at > first and numbers.uses_rates:
+                    look(at, _read(at, plant[0], numbers, given), numbers, model_constants, given, work)
                 untripped, motion = act(at, plant[0], motion, numbers, model_constants, given, work)
                 well = well and untripped
                 if at >= numbers.window_start:
@@ -99,16 +104,16 @@ def _measure(
     well = True
     if known < sample:
         well = guess(sample, numbers, model_constants, coder_constants, given, work)
-    counts = given.counts[first] if numbers.replay else count_at(angle, numbers)
-    _send(sample, angle_at(counts, numbers), coder_constants, work)
+    look(first, _read(first, angle, numbers, given), numbers, model_constants, given, work)
+    size = work.word.shape[0]
+    word = work.sent[sample * size : (sample + 1) * size]
+    encode(coder_constants, work.coder, work.model, work.seen, word)
     return well
 
 
-def _send(sample: int, angle: float, coder_constants: Any, work: Work) -> None:
-    """Form the word of a sample on the transmitter's copy, which `work.model` and `coder` hold."""
-    size = work.word.shape[0]
-    word = work.sent[sample * size : (sample + 1) * size]
-    encode(coder_constants, work.coder, work.model, (angle,), word)
+def _read(at: int, angle: float, numbers: Numbers, given: Given) -> float:
+    """Return the angle that the encoder shows."""
+    return angle_at(given.counts[at] if numbers.replay else count_at(angle, numbers), numbers)
 
 
 def _receive(sample: int, given: Given, work: Work) -> bool:

@@ -44,9 +44,9 @@ from channel.protocol.wire import foreign_version_text
 from transmitter.session.copies import CANNOT_FLY, Confirmed, Copies
 from transmitter.session.echo_order import EchoOrder
 from transmitter.session.owing import Owing
-from transmitter.session.rate_observer import Sight
 from transmitter.session.records import write_failure, write_sample
 from transmitter.session.rejoin import Asking, commands_of, start_of
+from transmitter.session.sight import Sight, rate_sight
 from transmitter.session.takeover import Claims
 
 
@@ -64,7 +64,7 @@ class TransmitterSession:
 
     `incarnation` is drawn by the caller (32 bits), so that the session itself stays deterministic.
     `stop_on_desync`: end the flight at the first digest that differs, instead of rejoining.
-    `sight`: gives a coder that uses rates its measurements; None: one with the usual bandwidth.
+    `sight`: gives a coder that uses rates its measurements; None: that of an angle and its rate.
     `overtaking_ticks`: how long after a command frame one may come that was sent before it.
     """
 
@@ -113,7 +113,9 @@ class TransmitterSession:
         self._echoes = EchoOrder(overtaking_ticks, terms.history_samples)
         self._lag_samples_max = terms.history_samples
         """Echoes may be this many samples behind before a rejoin is asked for."""
-        self._sight = (sight or Sight(codec.model, terms.tick_ns / 1e9)) if codec.uses_rates else None
+        self._sight: Sight | None = None
+        if codec.uses_rates:
+            self._sight = sight or rate_sight(codec.model, terms.tick_ns / 1e9)
         self._recorder = recorder or NullRecorder()
         self._due: deque[tuple[int, Vector]] = deque(
             enumerate([terms.initial_command] * terms.lead_ticks)

@@ -163,7 +163,12 @@ def aim(constants: DirectionConstants, coder: Results, c: Results, v: Results) -
 
 
 def learn(
-    constants: DirectionConstants, coder: Results, c: Numbers, v: Numbers, sign: int, correction: Results
+    constants: DirectionConstants,
+    coder: Results,
+    c: Numbers,
+    v: Numbers,
+    sign: int,
+    correction: Results,
 ) -> None:
     """Steps 4 to 7: add the correction that a sign means, and write what is known after it."""
     n = size_of(constants)

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from channel.codec.codec import Vector
+from channel.codec.signals import Signals
 
 Rows = Sequence[Sequence[float]]
 
@@ -62,6 +63,7 @@ class LinearModel:
         *,
         corrected: int | None = None,
         start: Sequence[float] | None = None,
+        signals: Signals | None = None,
     ) -> None:
         self.state_size = len(transition)
         self.input_size = len(drive[0]) if drive else 0
@@ -74,6 +76,7 @@ class LinearModel:
         self._start = (0.0,) * self.state_size if start is None else tuple(start)
         if len(self._start) != self.state_size:
             raise ValueError(f"start has {len(self._start)} numbers, one for each state is needed")
+        self.signals = signals
         self.outputs = tuple(tuple(row) for row in outputs)
         self.constants = LinearConstants(flat(transition), flat(drive), tick_s)
 

@@ -12,7 +12,7 @@ from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters as PlantParameters
 from plant_sim.pitch import PitchPlant
 from tests.channel.codec.two_axes import TwoAxes
-from transmitter.session.rate_observer import Sight
+from transmitter.session.sight import rate_sight
 
 TICK_S = 0.01
 MODEL = PitchModel(PitchParameters(), TICK_S)
@@ -22,7 +22,7 @@ def fly(bandwidth_rad_s: float, ticks: int = 6000, missing: range = range(0)) ->
     """Return the rms error of the rate over the second half, behind an encoder of 4096 counts."""
     plant = PitchPlant(PlantParameters(), TICK_S, WhiteTorque(2e-3, TICK_S, 3))
     encoder = Encoder(4096)
-    sight = Sight(MODEL, TICK_S, bandwidth_rad_s)
+    sight = rate_sight(MODEL, TICK_S, bandwidth_rad_s)
     volts = (0.0, 0.0)
     total = 0.0
     for tick in range(ticks):
@@ -47,7 +47,7 @@ def test_when_ticks_are_missed_then_the_rate_is_found_again() -> None:
 
 
 def test_when_the_encoder_jumps_wildly_then_the_rate_stays_a_rate() -> None:
-    sight = Sight(MODEL, TICK_S, 200.0)
+    sight = rate_sight(MODEL, TICK_S, 200.0)
     sight.look(0, (0.0,), (0.0, 0.0))
     for tick in range(1, 20):
         angle, rate = sight.look(tick, (1e4 * (-1) ** tick,), (0.0, 0.0))
@@ -57,6 +57,6 @@ def test_when_the_encoder_jumps_wildly_then_the_rate_stays_a_rate() -> None:
 
 def test_when_it_makes_no_sense_then_it_is_refused() -> None:
     with pytest.raises(ValueError, match="bandwidth"):
-        Sight(MODEL, TICK_S, 0.0)
+        rate_sight(MODEL, TICK_S, 0.0)
     with pytest.raises(ValueError, match="one measured angle"):
-        Sight(TwoAxes(TICK_S), TICK_S)
+        rate_sight(TwoAxes(TICK_S), TICK_S)

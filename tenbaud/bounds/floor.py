@@ -51,6 +51,28 @@ def floor_covariance(model: LinearModel, rate_bit_s: float, erased: float = 0.0)
     return scaled.back(minimise(_Flow(scaled.model), _start(scaled.model, nats), nats))
 
 
+def ideal_worth(model: LinearModel, rate_bit_s: float) -> tuple[Matrix, Matrix]:
+    """Return (P, N): the floor's covariance, and what an error costs an ideal code, now and later.
+
+    With the multipliers lambda of the rate and Z of `K = A P + P A' + Q >= 0`, which fulfil
+    `W = lambda/2 P^-1 Q P^-1 + A' Z + Z A`, it is `N = lambda/2 P^-1 - Z`: bits go where the eigenvalue
+    of `N P` is largest, lambda/2, and no reduction of any other error is worth its bits.
+    """
+    scaled = _Scaled(model, rate_bit_s)
+    nats = scaled.rate_nats
+    one = scaled.model
+    covariance = minimise(_Flow(one), _start(one, nats), nats)
+    inverse = np.linalg.inv(covariance)
+    # The barrier's Z is a multiple of K^-1.
+    slack = np.linalg.inv(_Flow(one).slack(covariance))
+    paid = 0.5 * inverse @ one.noise @ inverse
+    spared = one.dynamics.T @ slack + slack @ one.dynamics
+    columns = np.stack([paid.ravel(), spared.ravel()], axis=1)
+    (price, share), *_ = np.linalg.lstsq(columns, one.cost.ravel(), rcond=None)
+    worth = 0.5 * price * inverse - share * slack
+    return scaled.back(covariance), worth / np.outer(scaled.sizes, scaled.sizes)
+
+
 def word_floor(model: LinearModel, bits: float, period_s: float, erased: float = 0.0) -> float:
     """Return the least mean square error, over time, with a word of `bits` bits every `period_s`.
 

@@ -2,8 +2,9 @@
 
 What an error costs is not what it costs now: an error of the rate is an error of the angle later. N is
 that cost-to-go under the coder itself, which asks for the direction that N calls the most expensive. So
-it is found by turns: fly the covariance forward under N, bring the cost of its errors back, take N
-between the two; of all N, the one under which the mean error is least is kept.
+it is found by turns, from an ideal code's (the floor's multipliers) or from that of a few samples
+without bits: fly the covariance forward under N, bring the cost of its errors back, take N between the
+two. Of all N, the one under which the mean error is least is kept.
 """
 
 from __future__ import annotations
@@ -14,15 +15,21 @@ from typing import NamedTuple
 import numpy as np
 
 from channel.codec.coders.direction import DirectionParameters
-from tenbaud.bounds.floor import RateTooLow, floor_covariance, period_cost
+from tenbaud.bounds.floor import RateTooLow, ideal_worth, period_cost
 from tenbaud.bounds.linear import Matrix, rate_needed, sampled
 from tenbaud.design.plant import LinearPlant
 
 ROUNDS = 25
 SAMPLES = 600
-AHEAD = 4
-"""samples that the first guess of N looks ahead, and that the first P has grown for"""
+AHEAD = 8
+"""samples that first guesses of N look ahead at most"""
+GROWN = 4
+"""samples that the first P has grown for"""
 SQUARINGS = 4
+GAIN_LEAST, PATIENCE = 1e-4, 3
+"""the search ends after so many rounds that gain less"""
+WORTH_MAX = 1e9
+"""of an error of the usual size, in units of the floor"""
 UNSTABLE_STEP = 1.15
 """kappa on a plant that grows by itself; with 1.0 one flight in twelve was lost"""
 
@@ -55,12 +62,15 @@ def design_direction(
             f"{needed:.4g} bit/s of this plant"
         )
     model = plant.model()
-    sizes = np.sqrt(np.diag(floor_covariance(model, rate_bit_s)))
+    covariance, ideal = ideal_worth(model, rate_bit_s)
+    sizes = np.sqrt(np.diag(covariance))
     transition, noise = sampled(model, symbol_period_s)
     cost, _ = period_cost(model, symbol_period_s)
     products = np.outer(sizes, sizes)
     alpha = max(0.67, 1.0 - 0.9 * 2.0 ** (-2.0 * needed / rate_bit_s))
-    best = _search(transition * sizes / sizes[:, None], noise / products, cost * products, alpha, bits)
+    scaled = (transition * sizes / sizes[:, None], noise / products, cost * products)
+    with np.errstate(all="ignore"):
+        best = _search(*scaled, ideal * products, alpha, bits)
     return DirectionParameters(
         transition=_rows(transition),
         noise=_rows(noise),
@@ -73,32 +83,44 @@ def design_direction(
     )
 
 
-def _search(F: Matrix, Q: Matrix, M: Matrix, alpha: float, bits: int) -> Turn:
-    worth = M.copy()
-    moved = F
+def _search(F: Matrix, Q: Matrix, M: Matrix, ideal: Matrix, alpha: float, bits: int) -> Turn:
     covariance = Q
+    for _ in range(GROWN):
+        covariance = _symmetric(F @ covariance @ F.T + Q)
+    guesses = [ideal, M]
+    moved = F
     for _ in range(AHEAD):
-        worth = worth + moved.T @ M @ moved
+        guesses.append(guesses[-1] + moved.T @ M @ moved)
         moved = moved @ F
-        covariance = F @ covariance @ F.T + Q
-    best = Turn(math.inf, worth, covariance)
-    for _ in range(ROUNDS):
-        turn = _turn(F, Q, M, worth, covariance, alpha, bits)
-        if not math.isfinite(turn.cost):
-            break
+    best = Turn(math.inf, M, covariance)
+    for guess in map(_symmetric, guesses):
+        turn = _turn(F, Q, M, guess, covariance, alpha, bits)
         if turn.cost < best.cost:
-            best = Turn(turn.cost, worth, turn.covariance)
-        worth = 0.5 * (worth + turn.worth)
-        covariance = turn.covariance
+            best = Turn(turn.cost, guess, turn.covariance)
     if not math.isfinite(best.cost):
         raise ValueError("no direction coder was found: the rate is too near to the smallest one")
+    worth, covariance = best.worth, best.covariance
+    idle = 0
+    for _ in range(ROUNDS):
+        turn = _turn(F, Q, M, worth, covariance, alpha, bits)
+        idle = idle + 1 if turn.cost > best.cost * (1.0 - GAIN_LEAST) else 0
+        if turn.cost < best.cost:
+            best = Turn(turn.cost, worth, turn.covariance)
+        # Where one mode is corrected too seldom, the cost of an error grows without bound.
+        if idle > PATIENCE or not float(np.abs(turn.worth).max()) < WORTH_MAX:
+            break
+        worth = _symmetric(0.5 * (worth + turn.worth))
+        covariance = turn.covariance
     return best
 
 
 def _turn(
     F: Matrix, Q: Matrix, M: Matrix, N: Matrix, covariance: Matrix, alpha: float, bits: int
 ) -> Turn:
-    """Fly `SAMPLES` bits forward from a covariance, and the cost of an error back from N."""
+    """Fly `SAMPLES` bits forward from a covariance, and the cost of an error back from N.
+
+    The cost is not finite where the covariance grew without bound.
+    """
     P = covariance
     flown = []
     cost = 0.0
@@ -109,8 +131,7 @@ def _turn(
         if (bit + 1) % bits == 0:
             if bit >= SAMPLES // 3:
                 cost += float(np.sum(M * P))
-            P = F @ P @ F.T + Q
-            P = 0.5 * (P + P.T)
+            P = _symmetric(F @ P @ F.T + Q)
     ahead = N
     total = np.zeros_like(N)
     for bit in range(SAMPLES - 1, -1, -1):
@@ -121,19 +142,22 @@ def _turn(
         known = now @ v
         both = np.outer(c, known)
         ahead = now - alpha * (both + both.T) + alpha * float(v @ known) * np.outer(c, c)
-    mean = total / (SAMPLES // 3)
-    return Turn(cost * bits / (SAMPLES - SAMPLES // 3), 0.5 * (mean + mean.T), P)
+    return Turn(cost * bits / (SAMPLES - SAMPLES // 3), total / (SAMPLES // 3), P)
 
 
 def _direction(N: Matrix, P: Matrix) -> tuple[Matrix, Matrix]:
-    """Return c and v as the coder finds them."""
+    """Return c and v as the coder finds them; without a number where P is no covariance any more."""
     power = N @ P
     for _ in range(SQUARINGS):
         power = power @ power / np.trace(power) ** 2
     c = power[:, np.argmax(np.diag(power))]
     v = P @ c
-    scale = 1.0 / math.sqrt(float(c @ v))
+    scale = 1.0 / np.sqrt(c @ v)
     return c * scale, v * scale
+
+
+def _symmetric(matrix: Matrix) -> Matrix:
+    return 0.5 * (matrix + matrix.T)
 
 
 def _rows(matrix: Matrix) -> tuple[tuple[float, ...], ...]:

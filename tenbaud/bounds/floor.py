@@ -69,7 +69,7 @@ def ideal_worth(model: LinearModel, rate_bit_s: float) -> tuple[Matrix, Matrix]:
     spared = one.dynamics.T @ slack + slack @ one.dynamics
     columns = np.stack([paid.ravel(), spared.ravel()], axis=1)
     (price, share), *_ = np.linalg.lstsq(columns, one.cost.ravel(), rcond=None)
-    worth = 0.5 * price * inverse - share * slack
+    worth = (0.5 * price * inverse - share * slack) * scaled.unit / scaled.speed
     return scaled.back(covariance), worth / np.outer(scaled.sizes, scaled.sizes)
 
 

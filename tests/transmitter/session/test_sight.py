@@ -4,17 +4,24 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
+from channel.codec.models.linear import LinearModel
 from channel.codec.models.pitch import PitchModel, PitchParameters
 from plant_sim.disturbance import WhiteTorque
 from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters as PlantParameters
 from plant_sim.pitch import PitchPlant
+from tenbaud.bounds.linear import van_loan
+from tenbaud.design.described import plant_of, plant_section
+from tenbaud.design.plant import discretised
+from tenbaud.design.sight import kalman_sight
 from tests.channel.codec.two_axes import TwoAxes
-from transmitter.session.sight import rate_sight
+from transmitter.session.sight import Sight, rate_sight
 
 TICK_S = 0.01
+STEP = math.tau / 4096
 MODEL = PitchModel(PitchParameters(), TICK_S)
 
 
@@ -53,6 +60,46 @@ def test_when_the_encoder_jumps_wildly_then_the_rate_stays_a_rate() -> None:
         angle, rate = sight.look(tick, (1e4 * (-1) ** tick,), (0.0, 0.0))
         assert abs(rate) < 1e3
         assert math.isfinite(angle)
+
+
+def fly_aero(sight: Sight, model: LinearModel, noise: np.ndarray, gap: range) -> np.ndarray:
+    """Return the rms error of each state over the second half, both axes behind encoders."""
+    rng = np.random.default_rng(5)
+    root = np.linalg.cholesky(noise + 1e-16 * np.eye(4))
+    state, errors = np.zeros(4), []
+    commands: tuple[float, ...] = (0.0, 0.0)
+    for tick in range(4000):
+        if tick not in gap:
+            outputs = tuple(round(state[axis] / STEP) * STEP for axis in (0, 2))
+            seen = sight.look(tick, outputs, commands)
+        errors.append(np.array(seen) - state)
+        commands = (2.0 * math.sin(0.01 * tick), -2.0 * math.sin(0.013 * tick))
+        moved = model.tick(tuple(state.tolist()), commands, (0.0,) * 4)
+        state = np.array(moved) + root @ rng.standard_normal(4)
+    return np.sqrt(np.mean(np.square(errors[2000:]), axis=0))
+
+
+def test_when_two_axes_are_seen_then_the_kalman_filter_finds_all_states() -> None:
+    plant = plant_of(plant_section("aero"), TICK_S)
+    assert plant is not None
+    transition, drive = discretised(plant.A, plant.B, TICK_S)
+    model = LinearModel(transition.tolist(), drive.tolist(), plant.C.tolist(), TICK_S)
+    _, noise = van_loan(plant.A, plant.noise, TICK_S)
+    found = fly_aero(kalman_sight(model, noise, np.array([STEP])), model, noise, range(0))
+    assert (found[[0, 2]] < STEP).all()
+    assert (found[[1, 3]] < 0.25 * STEP / TICK_S).all()
+    again = fly_aero(kalman_sight(model, noise, np.array([STEP])), model, noise, range(900, 1000))
+    assert np.allclose(again, found, rtol=0.05)
+    # Gains for ten times the disturbance, or a tenth, are worse.
+    for share in (0.01, 100.0):
+        other = fly_aero(kalman_sight(model, share * noise, np.array([STEP])), model, noise, range(0))
+        assert (other[[1, 3]] > found[[1, 3]]).all()
+
+
+def test_when_outputs_hide_a_state_then_no_observer_is_designed() -> None:
+    model = LinearModel(((1.0, 0.0), (0.0, 2.0)), ((1.0,), (1.0,)), ((1.0, 0.0),), TICK_S)
+    with pytest.raises(ValueError, match="do not show every state"):
+        kalman_sight(model, np.eye(2), np.array([STEP]))
 
 
 def test_when_it_makes_no_sense_then_it_is_refused() -> None:

@@ -7,6 +7,7 @@ import tomllib
 from importlib.resources import files
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from channel.codec.codec import Codec
 from tenbaud.bounds.floor import RateTooLow
@@ -42,8 +43,14 @@ def plant_of(section: KindSection, tick_s: float) -> LinearPlant | None:
         return linear_plant(a, b, [[1.0, 0.0]], densities=PITCH_DENSITY)
     if not isinstance(section, LinearModelSection):
         return None
-    a, b = (section.A, section.B) if section.A else continuous(section.F, section.E, tick_s)
-    return linear_plant(a, b, section.C, section.G or None, section.densities, section.weights)
+    dynamics: ArrayLike
+    drive: ArrayLike
+    dynamics, drive = section.A, section.B
+    if not section.A:
+        dynamics, drive = continuous(section.F, section.E, tick_s)
+    return linear_plant(
+        dynamics, drive, section.C, section.G or None, section.densities, section.weights
+    )
 
 
 def check_plant(config: FlightConfig, codec: Codec) -> None:

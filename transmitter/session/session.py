@@ -113,9 +113,7 @@ class TransmitterSession:
         self._echoes = EchoOrder(overtaking_ticks, terms.history_samples)
         self._lag_samples_max = terms.history_samples
         """Echoes may be this many samples behind before a rejoin is asked for."""
-        self._sight: Sight | None = None
-        if codec.uses_rates:
-            self._sight = sight or rate_sight(codec.model, terms.tick_ns / 1e9)
+        self._sight = (sight or rate_sight(codec.model, terms.tick_ns / 1e9)) if codec.uses_rates else None
         self._recorder = recorder or NullRecorder()
         self._due: deque[tuple[int, Vector]] = deque(
             enumerate([terms.initial_command] * terms.lead_ticks)

@@ -1,4 +1,4 @@
-"""Designing the direction coder: near the floor in a simulation, refusals, and every plant of the box."""
+"""Designing the direction coder: near the floor in a simulation, for every plant, and refusals."""
 
 from __future__ import annotations
 

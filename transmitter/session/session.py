@@ -46,7 +46,7 @@ from transmitter.session.echo_order import EchoOrder
 from transmitter.session.owing import Owing
 from transmitter.session.records import write_failure, write_sample
 from transmitter.session.rejoin import Asking, commands_of, start_of
-from transmitter.session.sight import Sight, rate_sight
+from transmitter.session.sight import Sight, usual_sight
 from transmitter.session.takeover import Claims
 
 
@@ -113,7 +113,7 @@ class TransmitterSession:
         self._echoes = EchoOrder(overtaking_ticks, terms.history_samples)
         self._lag_samples_max = terms.history_samples
         """Echoes may be this many samples behind before a rejoin is asked for."""
-        self._sight = (sight or rate_sight(codec.model, terms.tick_ns / 1e9)) if codec.uses_rates else None
+        self._sight = sight or usual_sight(codec, terms.tick_ns / 1e9)
         self._recorder = recorder or NullRecorder()
         self._due: deque[tuple[int, Vector]] = deque(
             enumerate([terms.initial_command] * terms.lead_ticks)

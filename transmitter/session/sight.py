@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from channel.codec.codec import Model, Vector
+from channel.codec.codec import Codec, Model, Vector
 
 BANDWIDTH_RAD_S = 30.0
 """About (q / r)^(1/4) for white torque of q = 2e-3 rad^2/s^3 and an encoder of 4096 counts at 10 ms."""
@@ -72,6 +72,11 @@ class Sight:
             [seen_row(state, errors, gains, self.largest, row) for row in range(len(state))]
         )
         return self._state[: self._model.correction_size]
+
+
+def usual_sight(codec: Codec, tick_s: float) -> Sight | None:
+    """Return the observer of a codec for which none was designed; None for one that needs none."""
+    return rate_sight(codec.model, tick_s) if codec.uses_rates else None
 
 
 def rate_sight(model: Model, tick_s: float, bandwidth_rad_s: float = BANDWIDTH_RAD_S) -> Sight:

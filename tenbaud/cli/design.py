@@ -26,7 +26,9 @@ def floor(
     ] = None,
     rate: Annotated[
         float | None,
-        typer.Option(help="In bit/s; the flight's if not given.", min=1e-6, show_default=False),
+        typer.Option(
+            help="In bit/s; the flight's if not given.", min=1e-6, max=1e9, show_default=False
+        ),
     ] = None,
     json: options.AsJson = False,
 ) -> None:

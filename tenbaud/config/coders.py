@@ -112,9 +112,9 @@ class DirectionCoderSection(KindSection):
     """N, what an error costs, now and later"""
     start: Square
     """P, covariance before the first word"""
-    removed: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.67
+    removed: Annotated[float, Field(ge=0.001, le=0.999)] = 0.67
     """alpha, of the variance along the direction, by a sign"""
-    step: Annotated[float, Field(gt=0.0, le=10.0)] = 1.0
+    step: Annotated[float, Field(ge=0.001, le=10.0)] = 1.0
     """kappa, correction in standard deviations"""
     initial_strength: Positive = 1.0
     """sigma, disturbance in units of the assumed one"""

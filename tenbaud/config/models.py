@@ -54,7 +54,7 @@ class LinearModelSection(KindSection):
     """q of the disturbance: one for each column of G, or one for all"""
     weights: tuple[NotNegative, ...] = (1.0,)
     """of the squared error of each output, or one for all"""
-    corrected: Annotated[int, Field(ge=0)] = 0
+    corrected: Annotated[int, Field(ge=0, le=64)] = 0
     """how many of the states, from the first, take corrections; 0: all"""
     start: tuple[Factor, ...] = ()
     """state that both ends begin with; empty: zero"""

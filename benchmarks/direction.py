@@ -1,6 +1,6 @@
 """The `direction` coder over its floor, plant by plant, with the coder's own functions, compiled.
 
-    python -m benchmarks.direction [NAME ...]
+    python -m benchmarks.direction [NAME | "NAME RATE" ...]
 
 The plant is the model, driven by white noise. *Told*: of the strength that the coder was designed
 for; *untold*: three times as strong (in amplitude), and the coder adapts. *Encoder*: untold, in closed
@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -67,7 +68,7 @@ class Ratios(NamedTuple):
     lost: int = 0
 
 
-@njit
+@njit(cache=True)
 def estimate(
     F: Any, root: Any, M: Any, constants: Any, start: Any, samples: int, settling: int, seed: int
 ) -> float:
@@ -89,7 +90,7 @@ def estimate(
     return total / (samples - settling)
 
 
-@njit
+@njit(cache=True)
 def closed_loop(
     F: Any, E: Any, C: Any, root: Any, law: Any, gains: Any, M: Any, constants: Any, start: Any,
     samples: int, settling: int, seed: int, step: float, ticks: int, lost: float,
@@ -189,10 +190,10 @@ def main(names: list[str]) -> int:
     """Print a table."""
     print(f"{'plant':20} bit/s  told             untold           encoder          lost")
     for name, plant, rate in plants():
-        if names and not any(name.startswith(one) for one in names):
+        if names and not any(f"{name} {rate:g}".startswith(one) for one in names):
             continue
-        told = DirectionCoder(design_direction(plant, rate, 1.0 / rate, adapts=False))
-        untold = DirectionCoder(design_direction(plant, rate, 1.0 / rate))
+        designed = design_direction(plant, rate, 1.0 / rate)
+        told, untold = DirectionCoder(replace(designed, adapts=False)), DirectionCoder(designed)
         columns = (
             exact(plant, rate, told, 1.0),
             exact(plant, rate, untold, UNTOLD),

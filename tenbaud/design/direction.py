@@ -30,8 +30,6 @@ GAIN_LEAST, PATIENCE = 1e-4, 3
 """the search ends after so many rounds that gain less"""
 WORTH_MAX = 1e9
 """of an error of the usual size, in units of the floor"""
-UNSTABLE_STEP = 1.15
-"""kappa on a plant that grows by itself; with 1.0 one flight in twelve was lost"""
 
 
 class Turn(NamedTuple):
@@ -67,7 +65,10 @@ def design_direction(
     transition, noise = sampled(model, symbol_period_s)
     cost, _ = period_cost(model, symbol_period_s)
     products = np.outer(sizes, sizes)
-    alpha = max(0.67, 1.0 - 0.9 * 2.0 ** (-2.0 * needed / rate_bit_s))
+    used = needed / rate_bit_s
+    alpha = max(0.67, 1.0 - 0.855 * 2.0 ** (-2.0 * used))
+    # On a plant that grows, steps are larger than the best ones: smaller ones lose it now and then.
+    kappa = max(1.15, 0.8 + 0.54 * used) if needed > 0.0 else 1.0
     scaled = (transition * sizes / sizes[:, None], noise / products, cost * products)
     with np.errstate(all="ignore"):
         best = _search(*scaled, ideal * products, alpha, bits)
@@ -79,7 +80,7 @@ def design_direction(
         bits=bits,
         adapts=adapts,
         removed=alpha,
-        step=1.0 if needed == 0.0 else UNSTABLE_STEP,
+        step=kappa,
     )
 
 

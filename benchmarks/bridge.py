@@ -1,7 +1,7 @@
 """How long a sensor frame takes to become a command frame, through every real part.
 
 A device on a pseudo-terminal sends a SAMPLE; the bridge reads it, the transmitter's session makes a
-symbol, Zenoh carries it to a receiver in a process of its own, whose commands come back, and the
+symbol, Zenoh carries it to a receiver in a separate process, whose commands come back, and the
 bridge writes a COMMAND. A flight waits for ticks in between; here each step follows the one before at
 once, so what is measured is the machinery and not the schedule.
 

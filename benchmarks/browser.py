@@ -86,7 +86,7 @@ class Served:
 
     @property
     def port(self) -> int:
-        """Where the page is served."""
+        """The address of the page."""
         return int(urlsplit(self.url).port or 0)
 
     def wait_until_up(self) -> None:

@@ -2,8 +2,8 @@
 
     python -m benchmarks.direction [NAME | "NAME RATE" ...]
 
-The plant is the model, driven by white noise. *Told*: of the strength that the coder was designed
-for; *untold*: three times as strong (in amplitude), and the coder adapts. *Encoder*: untold, in closed
+The plant is the model, driven by white noise. *Known*: of the strength that the coder was designed
+for; *unknown*: three times as strong (in amplitude), and the coder adapts. *Encoder*: unknown, in closed
 loop, the sender's state coming from its Kalman filter behind encoders of 4096 counts a turn; with the
 number of flights of ten minutes, of sixteen, that were lost. Scored is the root of the weighted mean
 square error over all time, over the continuous causal floor.
@@ -27,14 +27,14 @@ from tenbaud.bounds.floor import floor, period_cost
 from tenbaud.bounds.linear import sampled, van_loan
 from tenbaud.design.described import plant_of, plant_section
 from tenbaud.design.direction import design_direction
+from tenbaud.design.observer import kalman_observer
 from tenbaud.design.plant import LinearPlant, discretised
-from tenbaud.design.sight import kalman_sight
 from tenbaud.studies.compiled import arrays_of, compiled
 
 SAMPLES = 12_000
 SETTLING = 500
 SEEDS = range(8)
-UNTOLD = 3.0
+UNKNOWN = 3.0
 STEP = math.tau / 4096
 TICKS = 10
 """per sample, for observer and law"""
@@ -144,7 +144,7 @@ def root_of(covariance: Any) -> Any:
 
 
 def exact(plant: LinearPlant, rate: float, coder: DirectionCoder, strength: float) -> Ratios:
-    """Fly the error alone, which is all there is of an exact plant with an exact sight of it."""
+    """Fly the error alone, which is all there is of an exact plant with an exact view of it."""
     model = plant.model()
     F, Q = (np.ascontiguousarray(one) for one in sampled(model, 1.0 / rate))
     M, between = period_cost(model, 1.0 / rate)
@@ -161,13 +161,22 @@ def behind_encoders(plant: LinearPlant, rate: float, coder: DirectionCoder) -> R
     F, E = (np.ascontiguousarray(one) for one in discretised(plant.A, plant.B, tick_s))
     _, noise = van_loan(plant.A, plant.noise, tick_s)
     predicts = LinearModel(F.tolist(), E.tolist(), plant.C.tolist(), tick_s)
-    sight = kalman_sight(predicts, noise, np.array([STEP]))
+    observer = kalman_observer(predicts, noise, np.array([STEP]))
     states = plant.cost + 1e-6 * np.trace(plant.cost) * np.eye(len(F))
     inputs = 1e-2 * np.eye(E.shape[1])
     X = solve_discrete_are(F, E, states, inputs)
     law = np.linalg.solve(inputs + E.T @ X @ E, E.T @ X @ F)
     M, between = period_cost(model, 1.0 / rate)
-    fixed = (F, E, plant.C, root_of(noise), law, np.array(sight.gains), M, arrays_of(coder.constants))
+    fixed = (
+        F,
+        E,
+        plant.C,
+        root_of(noise),
+        law,
+        np.array(observer.gains),
+        M,
+        arrays_of(coder.constants),
+    )
     least = floor(model, rate)
     samples = round(MINUTES * 60.0 * rate)
     means = [
@@ -188,16 +197,16 @@ def ratios(found: list[float]) -> Ratios:
 
 def main(names: list[str]) -> int:
     """Print a table."""
-    print(f"{'plant':20} bit/s  told             untold           encoder          lost")
+    print(f"{'plant':20} bit/s  known            unknown          encoder          lost")
     for name, plant, rate in plants():
         if names and not any(f"{name} {rate:g}".startswith(one) for one in names):
             continue
         designed = design_direction(plant, rate, 1.0 / rate)
-        told, untold = DirectionCoder(replace(designed, adapts=False)), DirectionCoder(designed)
+        known, unknown = DirectionCoder(replace(designed, adapts=False)), DirectionCoder(designed)
         columns = (
-            exact(plant, rate, told, 1.0),
-            exact(plant, rate, untold, UNTOLD),
-            behind_encoders(plant, rate, untold),
+            exact(plant, rate, known, 1.0),
+            exact(plant, rate, unknown, UNKNOWN),
+            behind_encoders(plant, rate, unknown),
         )
         texts = "  ".join(f"{one.mean:6.3f} +- {one.half_width:5.3f}" for one in columns)
         print(f"{name:20} {rate:5g} {texts}  {columns[-1].lost}/{FLIGHTS}", flush=True)

@@ -1,4 +1,4 @@
-"""What answers at the far end of the round-trip benchmark, each in a process of its own.
+"""What answers at the far end of the round-trip benchmark, each in a separate process.
 
 `python -m benchmarks.echoes KIND ADDRESS REPLY_BYTES [SETTINGS]`, the last one as JSON. Prints one
 line when it is ready and ends when its standard input is closed.

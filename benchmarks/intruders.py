@@ -1,4 +1,4 @@
-"""Whether a flight notices who knocks: `python -m benchmarks.intruders` (as root, in namespaces).
+"""Effect of refused connections on a flight: `python -m benchmarks.intruders` (as root, in namespaces).
 
 Two flights over TLS, one left alone and one with connection attempts from a third machine, at the rate
 that Zenoh takes; prints the loop lateness of both.

@@ -1,9 +1,9 @@
 """Many transmitters in one process, without plants: what loads a receiver, at little cost of its own.
 
-Each has a session, a link and a Zenoh session of its own, and keeps its slots; only the measurement is
+Each has a session, a link and a separate Zenoh session, and keeps its slots; only the measurement is
 a sine wave, and nothing is recorded. `python -m benchmarks.light_rigs ENDPOINT RIGS SECONDS SHARDS`
 prints what they saw as JSON. With SHARDS above 0 the endpoint is a router's, and the names of the rigs
-spread them over so many receivers.
+spread them over the receivers.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class LightRig:
 
 
 def fly_all(endpoint: str, rigs: int, seconds: float, shards: int = 0) -> dict[str, float]:
-    """Fly so many rigs for so long, their slots spread over the symbol period."""
+    """Fly the given number of rigs for so long, their slots spread over the symbol period."""
     agreement = agree(load_config("tuned-10baud"), "real")
     with ExitStack() as stack:
         fleet = [_greeted(stack, agreement, endpoint, index, shards) for index in range(rigs)]

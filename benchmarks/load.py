@@ -85,7 +85,7 @@ def _shown(name: str, point: dict[str, float]) -> list[Figure]:
 
 
 def measure(rigs: int, seconds: float, shards: int = 0) -> dict[str, float]:
-    """Fly so many rigs against one receiver, or against shards behind a router; return what was seen.
+    """Fly `rigs` rigs against one receiver, or against shards behind a router; return what was seen.
 
     CPU and memory are those of all receivers together, lateness that of the latest.
     """

@@ -39,6 +39,7 @@ LONG_TICKS = 1_000_000
 LONG = """
 import math, resource, sys, time
 from pathlib import Path
+from channel.codec.models.pitch import PITCH_SIGNALS
 from receiver.session import records as receiver
 from tenbaud.flight.report import draw_figure
 from tenbaud.recording.folder import RunFolder
@@ -51,7 +52,7 @@ def peak_mib():
 
 folder, ticks = RunFolder(Path(sys.argv[1])), int(sys.argv[2])
 upper, lower = (
-    McapRecorder(path, {}, wait_when_full=True, overview=OverviewRecorder())
+    McapRecorder(path, {}, wait_when_full=True, overview=OverviewRecorder(PITCH_SIGNALS))
     for path in (folder.transmitter, folder.receiver)
 )
 begin_mib, digest = None, "0123456789abcdef"
@@ -63,7 +64,7 @@ for tick in range(ticks):
     upper.write(transmitter.TICK_CHANNEL, at, row)
     states = ((pitch + 0.01, 0.1, 0.2, 0.3), (pitch + 0.02, 0.1, 0.2, 0.3))
     upper.write(transmitter.ESTIMATE_CHANNEL, at, (tick, *states))
-    lower.write(receiver.TICK_CHANNEL, at, (tick, 0.3, states[0], (0.5, -0.5)))
+    lower.write(receiver.TICK_CHANNEL, at, (tick, (0.3,), states[0], (0.5, -0.5)))
     if tick % 10 == 0:
         word = (1 if tick % 3 else -1,)
         end = ((0.1,), states[0], (0.1, 1.0), digest)

@@ -17,7 +17,7 @@ from transmitter.session.session import Phase
 
 SAMPLE_NS = 100_000_000
 TICK_NS = 10_000_000
-SPOILT_SAMPLE = 60
+CORRUPTED_SAMPLE = 60
 CUT_NS = (6_005_000_000, 7_005_000_000)
 
 
@@ -69,11 +69,11 @@ def recoveries() -> list[Recovery]:
     for trip in (0, 1, 5, 10):
         line = Impairments(delay_ns=trip * SAMPLE_NS // 2)
         plan = _plan(line)
-        spoilt = replace(plan, sabotage=(("receiver", Sabotage(SPOILT_SAMPLE, "coder", 0)),))
-        world = _fly(spoilt)
+        corrupted = replace(plan, sabotage=(("receiver", Sabotage(CORRUPTED_SAMPLE, "coder", 0)),))
+        world = _fly(corrupted)
         # Tick 0 is a handshake and one tick after true time 0.
-        spoilt_ns = trip * SAMPLE_NS + TICK_NS + SPOILT_SAMPLE * SAMPLE_NS
-        found.append(_timed("a bit of one state differs", trip, world, spoilt_ns, True))
+        corrupted_ns = trip * SAMPLE_NS + TICK_NS + CORRUPTED_SAMPLE * SAMPLE_NS
+        found.append(_timed("a bit of one state differs", trip, world, corrupted_ns, True))
         cut = replace(plan, partitions=((*CUT_NS, "both"),))
         found.append(_timed("line cut for ten samples", trip, _fly(cut), CUT_NS[1], False))
         for end in ("receiver", "transmitter"):

@@ -44,10 +44,10 @@ def make(folder: Path) -> list[Path]:
         for _ in range(6):
             light.keyboard.press("ArrowRight")
         light.wait_for_timeout(4000.0)
-        light.get_by_role("button", name="Spoil the controller").click()
+        light.get_by_role("button", name="Corrupt the controller's codec").click()
         state_is(light, "broken")
         take(light, "broken")
-        light.get_by_role("button", name="Mend the wire").click()
+        light.get_by_role("button", name="Repair the line").click()
         state_is(light, "lockstep")
         light.wait_for_timeout(3000.0)
         take(light, "recovered")

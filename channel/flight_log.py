@@ -24,7 +24,7 @@ class FlightLogError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class FlightColumns:
-    """Which columns of the file hold what.
+    """The columns of the file.
 
     `index_column` counts the steps by ones from any start. `counts_columns` are encoder counts,
     one column per measured axis, at least one. `volts_columns` are motor voltages in the order

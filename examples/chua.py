@@ -53,7 +53,7 @@ if __name__ == "__main__":
     }
     coder = ZoomCoder(ZoomParameters(gains=((8.0,), (0.0,)), decay=0.9, window=3))
     run = fly("paper-20baud", settings=settings, model=Model(), coder=coder, plant=Plant())
-    share = abs(run.error_coded[run.time_s > 20.0]).max() / abs(run.pitch).max()
+    share = abs(run.error_coded[run.time_s > 20.0]).max() / abs(run.output_1).max()
     print(
         f"{run.summary['coder_bits_up']:g} bits; error after 20 s at most {share:.1%} of the largest x"
     )

@@ -12,8 +12,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
-from plant_sim.disturbance import Disturbance
+if TYPE_CHECKING:
+    from plant_sim.disturbance import Disturbance
 
 PitchState = tuple[float, float, float, float]
 """Angle (rad), rate (rad/s), lagged front voltage (V), lagged rear voltage (V)."""
@@ -22,7 +24,7 @@ Sine = Callable[[float], float]
 """How a sine is taken; `math.sin` differs in its last bit between C libraries and processors."""
 
 PitchConstants = tuple[float, float, float, float, float, float, float, float]
-"""What `pitch_constants` precomputes for `pitch_step`."""
+"""Constants that `pitch_constants` precomputes for `pitch_step`."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,16 +1,17 @@
-"""What every simulated plant offers, whatever it simulates."""
+"""The interface of every simulated plant."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
-from plant_sim.disturbance import Disturbance
+if TYPE_CHECKING:
+    from plant_sim.disturbance import Disturbance
 
 
 @dataclass(frozen=True, slots=True)
 class PlantContext:
-    """What a plant from outside is given when it is built."""
+    """The context that a plant from outside gets when it is built."""
 
     step_s: float
     """what one call of `advance` simulates"""

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from channel.errors import ConfigMismatch, FrameError, LinkLost
 from channel.line.clocks import SkewedClock
-from channel.line.downlink import Downlink
-from channel.line.line import Inlet
+from channel.line.line import Downlink, Inlet
 from channel.line.virtual import Reply, decode_step, encode_reply, is_envelope
 from channel.links.serial.slot_finder import SlotFinder
 from channel.protocol.endings import End

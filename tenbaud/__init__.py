@@ -95,7 +95,7 @@ _HOMES = {
     "load_preset": "tenbaud.build.preset",
     "preset_names": "tenbaud.config.load",
 }
-"""Where each name comes from; the others of `__all__` are modules of this package."""
+"""The module of each name; the others of `__all__` are modules of this package."""
 
 
 def __getattr__(name: str) -> object:

@@ -6,18 +6,21 @@ both the same bits: `+ - * /`, comparisons, `math.sqrt`, `math.floor`, and `sin`
 
 from __future__ import annotations
 
-from channel.codec.codec import Model, Vector
+from channel.codec.codec import Model, ModelContext, Vector
 from channel.codec.models.hold import HoldModel
 from channel.codec.models.pitch import PitchModel, PitchParameters
 from channel.codec.numerics import cos, exp, sin
-from channel.codec.plugin_context import ModelContext
+from channel.codec.signals import InputSignal, Signal, Signals
 
 __all__ = [
     "HoldModel",
+    "InputSignal",
     "Model",
     "ModelContext",
     "PitchModel",
     "PitchParameters",
+    "Signal",
+    "Signals",
     "Vector",
     "cos",
     "exp",

@@ -47,7 +47,7 @@ class TransmitterEndpoint:
         return self._offer([self.node.session.hello()], now_ns)
 
     def begin(self, ticks: int) -> None:
-        """Plan so many ticks.
+        """Plan the given number of ticks.
 
         The first one is that of the session's first sample, which is not 0 when the receiver has been
         flying before.

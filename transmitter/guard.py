@@ -20,7 +20,7 @@ from channel.protocol.limits import CommandLimits
 
 
 class GuardState(StrEnum):
-    """What the guard is doing."""
+    """The state of the guard."""
 
     READY = "ready"
     RUNNING = "running"

@@ -57,8 +57,7 @@ class TransmitterNode:
         self.sensor_fault: GuardReason | None = None
         self.tick = 0
         self.rearmed = 0
-        self.at_tick: Callable[[int], None] | None = None
-        """called before every tick: where a person's commands take hold"""
+        self._before_tick: Callable[[int], None] = lambda _: None
         self._rearm_ticks = rearm_ticks
         self._gauge_samples = max(1, round(GAP_EVERY_S * 1e9 / session.terms.sample_ns))
         self._recorder = recorder or NullRecorder()
@@ -67,11 +66,14 @@ class TransmitterNode:
         self._applied = guard.volts
         self._guard_told = guard.state
 
+    def before_every_tick(self, act: Callable[[int], None]) -> None:
+        """Have this called before every tick: where a person's commands take hold."""
+        self._before_tick = act
+
     def measure(self, tick: int) -> list[Frame] | None:
         """Read the rig; return the frames to send, or None when the rig has no more to read."""
         self.tick = tick
-        if self.at_tick is not None:
-            self.at_tick(tick)
+        self._before_tick(tick)
         reading = self.rig.read(tick)
         if reading is None:
             return None
@@ -94,13 +96,13 @@ class TransmitterNode:
         """Hand an arrived frame to the session; return the answers. `rest` has what it confirmed."""
         answers = self.session.on_frame(frame)
         if len(self.session.confirmed) >= RESTLESS_SAMPLES_MAX:
-            self.rest()
+            self.flush_records()
         if self.guard.stopped and self._may_rearm and self.session.phase is Phase.FLYING:
             self.guard.rearm()
             self.rearmed += 1
         return answers
 
-    def rest(self) -> None:
+    def flush_records(self) -> None:
         """Score and record what was confirmed: work for when the next symbol is on its way."""
         if not self.session.confirmed:
             return

@@ -33,6 +33,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import MutableSequence, Sequence
+from dataclasses import dataclass
 from hashlib import blake2b
 from typing import NamedTuple, Protocol
 
@@ -226,3 +227,24 @@ class Codec:
     def digest(self, state: CodecState) -> int:
         """Return the 64-bit digest of a state."""
         return int.from_bytes(blake2b(self.pack(state), digest_size=8).digest(), "little")
+
+
+@dataclass(frozen=True, slots=True)
+class ModelContext:
+    """For a prediction model."""
+
+    tick_s: float
+    """h: what one call of `tick` advances by"""
+    symbol_period_s: float
+    """T_s"""
+
+
+@dataclass(frozen=True, slots=True)
+class CoderContext:
+    """For a coder."""
+
+    tick_s: float
+    symbol_period_s: float
+    """T_s: one word per this time"""
+    model: Model
+    """the model that it corrects"""

@@ -4,15 +4,15 @@ The command of tick `n + D` is decided when the codec stands at tick `n`. Its ba
 state carried `D` ticks ahead by the model under the commands already given, with no correction
 beyond the last known word. This *live* estimate is outside the codec state; at `D = 0` it is the
 codec state. Both ends compute it here: the receiver to decide commands, the transmitter to know
-afterwards what the receiver believed.
+afterwards what the receiver predicted.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from channel.codec.codec import Codec, CodecState, Vector
+from channel.codec.codec import Codec, CodecState, OpenSample, Vector
 from channel.codec.words import Word
 
 Decide = Callable[[int, Vector], Vector]
@@ -20,16 +20,86 @@ Decide = Callable[[int, Vector], Vector]
 
 
 class FlownSample(NamedTuple):
-    """What came of one word."""
+    """The result of one word."""
 
     state: CodecState
     """Codec state after the sample."""
     coded: list[Vector]
     """Codec's model state at ticks `kN ... (k+1)N - 1`."""
     live: list[Vector]
-    """Model state believed, in advance, of ticks `kN + D ... (k+1)N + D - 1`."""
+    """Predicted model state of ticks `kN + D ... (k+1)N + D - 1`."""
     commands: list[Vector]
     """Commands decided for those ticks."""
+
+
+def fly_ticks(
+    step: Any,
+    close: Any,
+    tick: Any,
+    flight: Any,
+    carried: Any,
+    model: Any,
+    held: Any,
+    nothing: Any,
+    first: int,
+    count: int,
+    lead: int,
+) -> Any:
+    """Carry a model state over the `count` ticks of a sample and `lead` more; return what is carried.
+
+    This is the one text of the order of a sample's ticks: sessions run it as it stands, and studies
+    compile it with functions of their own. `flight` is handed to each of these:
+
+    `step(flight, carried, at, within, ahead, model)` returns (carried, command of tick `at`). `within`:
+    the tick is one of the sample's, `model` its coded state. `ahead`: `model` is the live state that
+    the tick's command is to be decided from; else that command is known.
+    `close(flight, carried, model)` gets the state after the sample's last tick, and returns `carried`.
+    `tick(flight, model, command, held)` returns the state one tick later.
+    """
+    for index in range(count + lead):
+        if index == count:
+            carried = close(flight, carried, model)
+            held = nothing
+        carried, command = step(flight, carried, first + index, index < count, index >= lead, model)
+        model = tick(flight, model, command, held)
+    if lead == 0:
+        carried = close(flight, carried, model)
+    return carried
+
+
+class _Sample(NamedTuple):
+    """A sample that is being flown; the lists are those of `FlownSample`."""
+
+    codec: Codec
+    state: CodecState
+    opened: OpenSample
+    known: Sequence[Vector]
+    decide: Decide
+    first_tick: int
+    coded: list[Vector]
+    live: list[Vector]
+    commands: list[Vector]
+
+
+def _step(
+    flight: _Sample, closed: CodecState, at: int, within: bool, ahead: bool, model: Vector
+) -> tuple[CodecState, Vector]:
+    if within:
+        flight.coded.append(model)
+    if not ahead:
+        return closed, flight.known[at - flight.first_tick]
+    flight.live.append(model)
+    command = flight.decide(at, model)
+    flight.commands.append(command)
+    return closed, command
+
+
+def _close(flight: _Sample, closed: CodecState, model: Vector) -> CodecState:
+    return flight.codec.close(flight.state, flight.opened, model)
+
+
+def _tick(flight: _Sample, model: Vector, command: Vector, held: Vector) -> Vector:
+    return flight.codec.model.tick(model, command, held)
 
 
 def fly_sample(
@@ -40,28 +110,19 @@ def fly_sample(
     `known` holds the `D` commands of ticks `kN ... kN + D - 1`, decided with earlier words.
     """
     count = codec.ticks_per_sample
-    lead = len(known)
-    first_tick = state.sample * count
-    tick = codec.model.tick
     opened = codec.open(state, word)
-    model, held = opened.model, opened.held
-    coded: list[Vector] = []
-    live: list[Vector] = []
-    commands: list[Vector] = []
-    closed: CodecState | None = None
-    for index in range(count + lead):
-        if index == count:
-            closed = codec.close(state, opened, model)
-            held = codec.nothing_held
-        if index < count:
-            coded.append(model)
-        if index < lead:
-            command = known[index]
-        else:
-            live.append(model)
-            command = decide(first_tick + index, model)
-            commands.append(command)
-        model = tick(model, command, held)
-    if closed is None:
-        closed = codec.close(state, opened, model)
-    return FlownSample(closed, coded, live, commands)
+    flight = _Sample(codec, state, opened, known, decide, state.sample * count, [], [], [])
+    closed = fly_ticks(
+        _step,
+        _close,
+        _tick,
+        flight,
+        state,
+        opened.model,
+        opened.held,
+        codec.nothing_held,
+        flight.first_tick,
+        count,
+        len(known),
+    )
+    return FlownSample(closed, flight.coded, flight.live, flight.commands)

@@ -54,8 +54,12 @@ class Signal:
     @property
     def label(self) -> str:
         """The name with its unit, for a person: `pitch, rad`."""
-        words = self.name.replace("_", " ")
-        return f"{words}, {self.unit}" if self.unit else words
+        return f"{self.words}, {self.unit}" if self.unit else self.words
+
+    @property
+    def words(self) -> str:
+        """The name alone, for a person."""
+        return self.name.replace("_", " ")
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +120,9 @@ class Signals:
             raise ValueError(
                 f"{len(self.output_states)} output_states are given for {len(self.outputs)} outputs"
             )
+        known = range(len(self.states))
+        if wrong := [one for one in self.output_states if one is not None and one not in known]:
+            raise ValueError(f"output_states: there is no state {wrong[0]}")
 
     def index(self, what: str, name: str) -> int:
         """Return the place of a signal among the `states`, `inputs` or `outputs`.
@@ -126,6 +133,25 @@ class Signals:
         if name not in names:
             raise ValueError(f"{name!r} is none of the {what}: {', '.join(names)}")
         return names.index(name)
+
+    def groups(self, what: str) -> list[tuple[str, list[int]]]:
+        """Return which of the `inputs` or `outputs` share a panel: its label, and their places."""
+        signals: tuple[Signal, ...] = getattr(self, what)
+        keys = [(one.group, "" if one.group else one.unit) for one in signals]
+        return [
+            (_group_label(key[0], [signals[place] for place in places]), places)
+            for first, key in enumerate(keys)
+            if key not in keys[:first]
+            for places in [[place for place, other in enumerate(keys) if other == key]]
+        ]
+
+
+def _group_label(group: str, signals: Sequence[Signal]) -> str:
+    """Return what stands beside a panel: `motors, V`, or `arm, pendulum, rad`."""
+    if any(one.unit != signals[0].unit for one in signals):
+        return "; ".join(one.label for one in signals)
+    names = group or ", ".join(one.words for one in signals)
+    return f"{names}, {signals[0].unit}" if signals[0].unit else names
 
 
 def named(what: str, count: int) -> tuple[Signal, ...]:
@@ -155,12 +181,26 @@ def signals_of(model: Sized) -> Signals:
     found = getattr(model, "signals", None)
     if found is None:
         inputs = tuple(InputSignal(one.name) for one in named("input", model.input_size))
-        return Signals(named("state", model.state_size), inputs, named("output", outputs))
+        states = named("state", model.state_size)
+        return Signals(states, inputs, named("output", outputs), _states_read(model, outputs))
     signals = cast(Signals, found)
     _require("states", model.state_size, signals.states)
     _require("inputs", model.input_size, signals.inputs)
     _require("outputs", outputs, signals.outputs)
     return signals
+
+
+def _states_read(model: Sized, outputs: int) -> tuple[int | None, ...]:
+    """Return which state each output is: what the model reads from two states, all values unlike."""
+    count = model.state_size
+    rising = tuple(0.125 * (place + 1) for place in range(count))
+    probes = (rising, tuple(-0.5 * value for value in reversed(rising)))
+    try:
+        read = [model.measured(state) for state in probes]
+    except (ArithmeticError, ValueError):
+        return (None,) * outputs
+    pairs = list(zip(*probes, strict=True))
+    return tuple(pairs.index(pair) if pair in pairs else None for pair in zip(*read, strict=True))
 
 
 def _require(what: str, size: int, given: Sequence[Signal]) -> None:

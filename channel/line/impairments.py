@@ -1,4 +1,4 @@
-"""What goes wrong on a line, on purpose: from a text, seeded, the same every time.
+"""Simulated impairments of a line: given by a text, seeded, reproducible.
 
     loss=0.2              every message is lost with this probability (also 20%)
     burst=0.02/0.25       Gilbert-Elliott: chance per message to enter and leave a state that loses all
@@ -38,7 +38,7 @@ _TIME = re.compile(r"(\d+(?:\.\d*)?)(us|ms|s)")
 
 @dataclass(frozen=True, slots=True)
 class Impairments:
-    """What one direction suffers. Probabilities are per message."""
+    """The impairments of one direction. Probabilities are per message."""
 
     loss: float = 0.0
     burst_enter: float = 0.0
@@ -189,7 +189,7 @@ def _time_ns(text: str) -> int:
 
 
 class SymbolWire(Protocol):
-    """What a line asks its wire, to invert symbols."""
+    """The part of a wire that inverts symbols."""
 
     def is_symbol(self, data: bytes) -> bool:
         """Return whether a message carries a symbol."""
@@ -221,6 +221,10 @@ class ImpairedLine:
         one = self.impairments
         held_ns = one.reorder_ns if one.reorder or one.duplicate else 0
         return self.line.longest_delay_ns + one.delay_ns + one.jitter_ns + held_ns
+
+    def suffer(self, impairments: Impairments) -> None:
+        """Change what goes wrong from now on."""
+        self.impairments = impairments
 
     def carry(self, data: bytes, now_ns: int) -> list[Delivery]:
         """Return the arrivals of a message put on the line at flight time `now_ns`."""
@@ -274,5 +278,5 @@ def impair(line: Line, impairments: Impairments) -> bool:
     """Change what goes wrong on a line from now on; return whether it is one that can be impaired."""
     if not isinstance(line, ImpairedLine):
         return False
-    line.impairments = impairments
+    line.suffer(impairments)
     return True

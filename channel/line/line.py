@@ -3,6 +3,7 @@
 On the virtual clock the transmitter's process asks the line of each direction; on a real clock each
 sender asks its own and holds the message back until it is due (`Outbox`). A line carries bytes: what a
 message is, its wire can tell. `Inlet` is the other end of a line: bytes counted, frames decoded.
+`Downlink` is the receiver's way onto it; the transmitter's is `channel/line/uplink.py`.
 """
 
 from __future__ import annotations
@@ -112,3 +113,42 @@ class Inlet:
         if not isinstance(frame, (Commands, Symbol, ShortSymbol)):
             self.control_bytes += size
         return frame
+
+
+class Downlink:
+    """Everything that goes down. `line` is that of a real clock; its flight time begins with the first
+    message.
+
+    On the virtual clock the transmitter's process holds both lines, and only `encoded` is used.
+    """
+
+    def __init__(self, wire: Wire = DATAGRAM, line: Line | None = None) -> None:
+        self.wire = wire
+        self.line: Line = line or CleanLine()
+        self.wire_bytes = 0
+        self._outbox = Outbox()
+        self._start_ns: int | None = None
+
+    @property
+    def next_due_ns(self) -> int | None:
+        """Return when the next message leaves, None when none waits."""
+        return self._outbox.next_due_ns
+
+    def encoded(self, frames: Iterable[Frame]) -> list[bytes]:
+        """Count frames; return their messages."""
+        messages = [self.wire.encode(frame) for frame in frames]
+        for message in messages:
+            self.wire_bytes += self.wire.size(message)
+        return messages
+
+    def offer(self, frames: Iterable[Frame], now_ns: int) -> list[bytes]:
+        """Put frames on the line; return the messages that it has delivered by now."""
+        for message in self.encoded(frames):
+            if self._start_ns is None:
+                self._start_ns = now_ns
+            start_ns = self._start_ns
+            self._outbox.put(
+                Delivery(arrival_ns + start_ns, data)
+                for arrival_ns, data in self.line.carry(message, now_ns - start_ns)
+            )
+        return self._outbox.take(now_ns)

@@ -1,4 +1,4 @@
-"""What a loop measures: how late it gets to what was due, and how many symbols a second arrive."""
+"""Meters of a loop: its lateness, and the symbols that arrive per second."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The transmitter's way out onto a line, and what R baud means there, enforced and measured.
 
-Symbols leave on a fixed grid of slots, one per slot and none in advance or afterwards: whoever asks
+Symbols leave on a fixed grid of slots, one per slot and none in advance or afterwards: a request
 for more gets an erasure, not a burst. Both loops of the transmitter send through it, so that nobody can
 go around the baud rate.
 """
@@ -11,9 +11,8 @@ from math import log2
 
 from channel.codec.words import Alphabet
 from channel.line.line import CleanLine, Delivery, Line
-from channel.protocol.audit_trail import SENT_CHANNEL
 from channel.protocol.frames import Frame, Symbol
-from channel.protocol.recording import NullRecorder, Recorder
+from channel.protocol.recording import SENT_CHANNEL, NullRecorder, Recorder
 from channel.protocol.terms import Terms
 from channel.protocol.wire import DATAGRAM, Wire
 

@@ -36,7 +36,7 @@ class Step(NamedTuple):
 
 
 class Reply(NamedTuple):
-    """What the receiver did about a step."""
+    """The receiver's answer to a step."""
 
     number: int
     deadline_ns: int | None

@@ -1,4 +1,4 @@
-"""What every link does: carry byte messages between the two ends, whole and in order if it can.
+"""The interface of a link: it carries whole byte messages between the two ends, in order if possible.
 
 A link promises little: a message may be lost in silence when the peer is not there. Index, epoch and
 acknowledgement belong to the sessions. A link is used by one thread.
@@ -6,9 +6,10 @@ acknowledgement belong to the sessions. A link is used by one thread.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections import Counter
 from dataclasses import dataclass, field
-from typing import Literal, Protocol, Self
+from typing import Literal, Self
 
 from channel.protocol.wire import DATAGRAM, Wire
 
@@ -17,7 +18,7 @@ Role = Literal["transmitter", "receiver"]
 
 @dataclass(slots=True)
 class LinkCounts:
-    """What went over a link and what did not."""
+    """Counts of the messages that a link carried and lost."""
 
     messages_out: int = 0
     bytes_out: int = 0
@@ -34,53 +35,41 @@ class LinkCounts:
     line_bytes_in: int = 0
 
 
-class Link(Protocol):
-    """One end of a link."""
+class Link(ABC):
+    """One end of a link; what is not abstract here is what an ordinary one does."""
 
-    name: str
+    name = ""
     """of the kind of link, for summaries"""
-    wire: Wire
+    wire: Wire = DATAGRAM
     """how frames look on this kind of line"""
+
+    def __init__(self) -> None:
+        self._counts = LinkCounts()
 
     @property
     def counts(self) -> LinkCounts:
         """Return what went over it until now."""
+        return self._counts
 
+    @abstractmethod
     def send(self, data: bytes) -> None:
         """Put one message on the line; which path it takes there, the wire can tell from its bytes."""
 
+    @abstractmethod
     def receive(self, timeout_s: float) -> bytes | None:
         """Return the next message, or None after `timeout_s` seconds (0: only what is there)."""
 
+    @abstractmethod
     def peer_present(self) -> bool:
         """Return whether the other end is known to be there now."""
 
     def trouble(self) -> str:
         """Return what is wrong with this end's line itself, such as a port that went; else nothing."""
-
-    def close(self) -> None:
-        """Give the line back; may be called more than once."""
-
-    def __enter__(self) -> Self: ...
-
-    def __exit__(self, *_: object) -> None: ...
-
-
-class LinkBase:
-    """What the links share: a name, counts, and closing at the end of a `with`."""
-
-    name = ""
-    wire: Wire = DATAGRAM
-
-    def __init__(self) -> None:
-        self.counts = LinkCounts()
-
-    def trouble(self) -> str:
-        """Return nothing: this kind of line does not know."""
         return ""
 
+    @abstractmethod
     def close(self) -> None:
-        """Give the line back."""
+        """Give the line back; may be called more than once."""
 
     def __enter__(self) -> Self:
         return self

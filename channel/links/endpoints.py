@@ -29,7 +29,7 @@ def is_loopback(endpoint: str) -> bool:
 def check_endpoints(
     endpoints: tuple[str, ...], insecure: bool, secured: bool = False, scouting: bool = False
 ) -> None:
-    """Refuse an endpoint that leaves this machine without protection, unless told to allow it.
+    """Refuse an endpoint that leaves this machine without protection, unless it is allowed.
 
     `secured`: the end has a certificate, so that every endpoint has to be TLS. `scouting` looks for the
     other end by multicast, which leaves this machine too.

@@ -1,4 +1,4 @@
-"""What a kind of link says about itself: how an end is opened, and what a flight over it must know.
+"""Properties of a kind of link: how an end is opened, and how a flight over it differs.
 
 A kind is a class without arguments, named in `channel.links.registry` or by an entry point of the group
 `tenbaud.links`. It imports its transport inside `open`, so that a flight over another kind does
@@ -21,7 +21,7 @@ from channel.protocol.terms import Terms
 
 
 class NodePlace(TypedDict, total=False):
-    """Where a Zenoh node is and whom it lets in, for those that hand it on."""
+    """Address and access rules of a Zenoh node."""
 
     listen: tuple[str, ...]
     connect: tuple[str, ...]
@@ -102,7 +102,7 @@ class LinkKind(ABC):
     """bytes take time on the line, so `terms` changes what a flight is"""
     carries_slots = True
     """a symbol arrives with the number of its slot, whole and checked; without it, a symbol that comes
-    after its deadline cannot be told from a later one's"""
+    after its deadline cannot be distinguished from a later one's"""
 
     def uses_addresses(self, settings: LinkSettings) -> bool:
         """Return whether ends meet at Zenoh endpoints, with its keys: `--listen`, `--connect` ..."""
@@ -131,3 +131,15 @@ class LinkKind(ABC):
             "`tenbaud transmit` with the same settings"
         )
         yield Meeting(), Meeting()
+
+
+class MemoryKind(LinkKind):
+    """No line at all; the flight is as fast as it computes."""
+
+    in_process = True
+
+    def open(self, end: LinkEnd) -> Link:
+        """Refuse: one end by itself has nobody to talk to."""
+        raise LinkError(
+            "link.kind = memory joins two ends in one process: `tenbaud demo --link memory`"
+        )

@@ -11,7 +11,7 @@ LINKS = Registry(
     {
         "zenoh": "channel.links.zenoh.kind:ZenohKind",
         "serial": "channel.links.serial.kind:SerialKind",
-        "memory": "channel.links.memory:MemoryKind",
+        "memory": "channel.links.kind:MemoryKind",
     },
     classes=False,
 )

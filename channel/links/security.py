@@ -1,4 +1,4 @@
-"""Who an end is and whom it lets in, as settings of Zenoh: TLS with client certificates, access rules.
+"""An end's identity and access rules as settings of Zenoh: TLS with client certificates.
 
 TLS proves who is at the other end of a connection: both sides show a certificate of the same private
 authority, and the side that connects checks that the listener's certificate names the address. That
@@ -163,6 +163,6 @@ def _rules_of(invited: Invited, prefix: str) -> list[Rule]:
 
 
 def _subscribed(keys: Sequence[str]) -> list[str]:
-    """Return what is subscribed to by whoever takes these keys: `up/*` for `up/symbol`."""
+    """Return the key expressions that a subscriber to these keys declares: `up/*` for `up/symbol`."""
     folders = (key.rpartition("/") for key in keys)
     return list(dict.fromkeys(f"{folder}{slash}*" if slash else key for folder, slash, key in folders))

@@ -1,4 +1,4 @@
-"""What a frame of a flight may hold. A frame out of bounds is dropped before anything is kept from it.
+"""Bounds for the fields of a frame. A frame out of bounds is dropped before any of it is kept.
 
 A good check says that a frame arrived as it was sent, not that it makes sense: the sender may have
 failed, may be of another flight, or may be somebody else. So both sessions ask here, for every frame
@@ -44,12 +44,12 @@ TEXT_CHARACTERS_MAX = 2000
 class Bounds:
     """The bounds of one flight. The methods `of_...` return what is wrong with a frame; None: nothing.
 
-    What is dropped is counted in `counts` and told by `tell`.
+    What is dropped is counted in `counts` and reported to `emit`.
     """
 
-    def __init__(self, codec: Codec, terms: Terms, counts: Counter[str], tell: Tell) -> None:
+    def __init__(self, codec: Codec, terms: Terms, counts: Counter[str], emit: Tell) -> None:
         self._counts = counts
-        self._tell = tell
+        self._emit = emit
         self._codec = codec
         self._terms = terms
         self._echoes_max = terms.repeats + 1
@@ -69,7 +69,7 @@ class Bounds:
         if problem is None:
             return False
         self._counts[COUNTER] += 1
-        self._tell(Event(EventKind.STALE, cause=Dropped.OUT_OF_BOUNDS, detail=problem))
+        self._emit(Event(EventKind.STALE, cause=Dropped.OUT_OF_BOUNDS, detail=problem))
         return True
 
     def of_symbol(self, symbol: Symbol) -> str | None:
@@ -161,7 +161,7 @@ class Bounds:
         if state.sample != welcome.first_sample:
             return f"a state of sample {state.sample} for sample {welcome.first_sample}"
         if not is_flyable(self._codec, state):
-            return f"a state that is none of this codec: {state}"
+            return f"not a state of this codec: {state}"
         return None
 
 

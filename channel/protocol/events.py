@@ -1,4 +1,4 @@
-"""What a session reports: records with named fields, for recordings, telemetry and the page.
+"""Events of a session: records with named fields, for recordings, telemetry and the page.
 
 Programs read the fields. Sentences are made where they are shown (`tenbaud.sentences`).
 """
@@ -47,7 +47,7 @@ class Dropped(Enum):
 
 
 class Presence(Enum):
-    """What is known of the other end: the causes of PEER."""
+    """The state of the other end: the causes of PEER."""
 
     GONE = "it is not there any more"
     BACK = "it is there again"
@@ -55,29 +55,29 @@ class Presence(Enum):
 
 
 class Rate(Enum):
-    """Whether the symbol rate is kept: the causes of RATE."""
+    """Changes of the symbol rate: the causes of RATE."""
 
     MISSED = "too few symbols arrive in time"
     KEPT = "they arrive again"
 
 
 class Failing(Enum):
-    """What of the controller failed: the causes of CONTROLLER."""
+    """Failures of the controller: the causes of CONTROLLER."""
 
     REFERENCE = "its set-point"
     COMMAND = "its command"
 
 
 class ByHand(Enum):
-    """What a person changed in flight: the causes of CONTROL."""
+    """Changes by a person in flight: the causes of CONTROL."""
 
     SET_POINT = "steer to an angle"
     FOLLOW = "follow the reference"
     PAUSE = "pause before a tick"
     GO_ON = "go on after a pause"
-    PACE = "so many times real time"
+    PACE = "a multiple of real time"
     IMPAIR = "what goes wrong on the line"
-    SPOIL = "one bit of a codec"
+    CORRUPT = "one bit of a codec"
     IGNORED = "something that cannot be done"
 
 

@@ -1,4 +1,4 @@
-"""The messages of the two sessions. How they look on a line is `channel.protocol.wire`'s affair.
+"""The messages of the two sessions. Their bytes are in `channel.protocol.wire`.
 
 Uplink: Hello, Symbol, Desync, Bye. Downlink: Welcome, Refuse, Commands, Desync, Unknown, Claim, Bye.
 """
@@ -127,11 +127,11 @@ class LocatedSymbol:
 
 @dataclass(frozen=True, slots=True)
 class Echo:
-    """What the receiver consumed for one sample, and what it decided on it."""
+    """The word that the receiver consumed for one sample, and the commands that it computed."""
 
     sample: int
     word_number: int
-    """as `Alphabet.word_number` counts; an erasure has a number of its own"""
+    """as `Alphabet.word_number` counts; an erasure has a separate number"""
     digest: int
     """of the codec state after the sample, 64 bits"""
     millivolts: tuple[int, ...]

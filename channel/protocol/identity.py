@@ -1,4 +1,4 @@
-"""Who an end is, for the handshake: software, configuration and arithmetic.
+"""An end's identity for the handshake: software, configuration and arithmetic.
 
 The two copies of the codec stay equal only if both ends run the same configuration with the same
 arithmetic. Both are compared before the first symbol. The numerics probe is a digest of our sine,
@@ -25,7 +25,7 @@ PROBE_POINTS = 200
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """What an end shows its peer."""
+    """The identity that an end sends to its peer."""
 
     version: str
     config: str

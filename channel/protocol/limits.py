@@ -66,7 +66,7 @@ def limited(wanted: float, before: float, largest: float, step: float) -> float:
 
 
 def as_carried(volts: float) -> float:
-    """Return what becomes of one voltage on the wire: `from_millivolts` of `to_millivolts`."""
+    """Return one voltage as the wire rounds it: `from_millivolts` of `to_millivolts`."""
     return round(1000.0 * volts) / 1000.0
 
 

@@ -1,4 +1,4 @@
-"""What is kept for the day on which the two copies differ, and how it is written down.
+"""The history for a difference between the two copies, and its records.
 
 Each end keeps its last states and inputs. A failure is found at the transmitter up to one lag after
 it happened, so the ring of states is longer than any lag that is allowed.

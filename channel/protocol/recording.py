@@ -1,4 +1,4 @@
-"""What a node writes down, described once, so that a recording carries its own names and units.
+"""Descriptions of a node's records, so that a recording carries names and units.
 
 A node declares its channels as `RecordChannel`s and hands rows to a `Recorder`. It never learns
 where they go: the tool puts them into a file from another thread, a test into a list.
@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
+
+from channel.codec.codec import CodecState, Vector
 
 FieldType = Literal["number", "integer", "string", "boolean", "numbers", "integers"]
 """JSON types; the plural ones are arrays. Any field may also be null (None)."""
@@ -50,3 +52,46 @@ class NullRecorder:
 
     def write(self, channel: RecordChannel, time_ns: int, row: Sequence[object]) -> None:
         """Forget the row."""
+
+
+SENT_CHANNEL = RecordChannel(
+    "symbol",
+    (
+        Field("slot", "integer", "", "slot of the symbol, counted from the first one of sample 0"),
+        Field("symbol", "integer", "", "number of the symbol in the coder's alphabet"),
+        Field("left_ns", "integer", "ns", "flight time at which it left; null: refused", timing=True),
+        Field(
+            "wire_bytes",
+            "integer",
+            "",
+            "of its frame on this kind of line, framing included",
+            timing=True,
+        ),
+    ),
+)
+
+ARRIVED_CHANNEL = RecordChannel(
+    "symbol",
+    (
+        Field("slot", "integer", "", "slot of the symbol, counted from the first one of sample 0"),
+        Field("symbol", "integer", "", "number of the symbol in the coder's alphabet"),
+        Field("arrived_ns", "integer", "ns", "when it came, on this clock", timing=True),
+        Field("taken", "boolean", "", "false: its slot was settled already", timing=True),
+    ),
+)
+
+EPOCH_CHANNEL = RecordChannel(
+    "epoch",
+    (
+        Field("sample", "integer", "", "first sample of the epoch"),
+        Field("epoch", "integer", "", "counted from 0"),
+        Field("state", "numbers", "", "model state that the epoch starts from"),
+        Field("coder", "numbers", "", "coder state that it starts from"),
+        Field("hold_volts", "numbers", "V", "command of its first ticks, until one is decided"),
+    ),
+)
+
+
+def epoch_row(epoch: int, start: CodecState, hold: Vector) -> tuple[object, ...]:
+    """Return the row of `EPOCH_CHANNEL` for the beginning of an epoch."""
+    return (start.sample, epoch, start.model, start.coder, hold)

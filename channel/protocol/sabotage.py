@@ -13,7 +13,7 @@ _FORM = re.compile(r"sample=(\d+),field=(range|angle|rate|(?:model|coder)\.\d+)"
 
 @dataclass(frozen=True, slots=True)
 class Sabotage:
-    """Which field of the state is moved by one unit in its last place, after which sample."""
+    """The field of the state that changes by one unit in the last place, and the sample."""
 
     sample: int
     part: str

@@ -1,4 +1,4 @@
-"""What both ends agree on about time: ticks, samples, slots, lead.
+"""The timing that both ends agree on: ticks, samples, slots, lead.
 
 A *tick* is one step of model and control (`h`). A *sample* is `N` ticks (`T_s = N h`) and has one
 word; each of its symbols takes one *slot* of the uplink. Flight time is in nanoseconds from tick 0,

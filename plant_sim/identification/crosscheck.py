@@ -21,7 +21,7 @@ from plant_sim.identification.pitch import PitchEstimates, PitchSettings
 from plant_sim.identification.record import PitchRecord
 
 BOUNDS = ((-5.0, -50.0, -50.0, -math.pi), (50.0, 500.0, 50.0, math.pi))
-"""What a_w, a_th, k_v and theta_0 can be: beyond these there is no helicopter, only a fit gone wild."""
+"""Bounds for a_w, a_th, k_v and theta_0; a fit beyond them has diverged."""
 
 SEGMENT_S = 5.0
 SMOOTHING_S = 0.3

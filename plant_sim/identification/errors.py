@@ -1,4 +1,4 @@
-"""What identification says when the data cannot carry an estimate."""
+"""Errors of the identification when the data do not allow an estimate."""
 
 from __future__ import annotations
 

@@ -2,15 +2,22 @@
 
 The paper's is a square wave with a frequency, a bias and a magnitude; a pseudo-random binary sequence
 excites a whole band evenly, and a chirp sweeps through one.
+
+An experiment rests first, with both motors at the normal force alone, which gives theta_0; then mu
+follows the signal. The rig is anything that gives an angle and takes voltages once per tick.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
 from plant_sim.identification.errors import IdentificationError
+from plant_sim.identification.record import PitchRecord
 
 GRAMMAR = (
     "square:FREQUENCY,BIAS,MAGNITUDE or prbs:BIT_S,BIAS,MAGNITUDE or "
@@ -19,6 +26,11 @@ GRAMMAR = (
 
 _TAPS = {7: 6, 9: 5, 11: 9, 15: 14}
 """Register length and the second tap that makes its sequence as long as possible."""
+
+Step = Callable[[int, float, float], float | None]
+"""(tick, front volts, rear volts) -> angle measured before they act, rad; None when the rig ends."""
+
+REST_S = 5.0
 
 
 class ExcitingSignal(Protocol):
@@ -107,3 +119,34 @@ def parse_excitation(text: str, step_s: float) -> ExcitingSignal:
     if kind == "prbs":
         return PseudoRandom(step_s, numbers[0], numbers[1], numbers[2])
     return Chirp(step_s, *numbers)
+
+
+def excite(
+    step: Step,
+    signal: ExcitingSignal,
+    step_s: float,
+    duration_s: float,
+    *,
+    rest_s: float = REST_S,
+    normal_force_volts: float = 0.0,
+) -> PitchRecord:
+    """Return the record of the whole experiment of `duration_s`, the rest at its beginning included.
+
+    The rest belongs to it: the state filters must have seen that the body was quiet before.
+    """
+    rest = round(rest_s / step_s)
+    total = round(duration_s / step_s)
+    if total <= rest:
+        raise IdentificationError(
+            f"an experiment of {duration_s:g} s is over before the rig is excited: it rests for "
+            f"{rest_s:g} s first; make it longer (--duration), best by a minute"
+        )
+    rows = np.empty((total, 3))
+    for tick in range(total):
+        mu = signal.volts(tick - rest) if tick >= rest else 0.0
+        front, rear = 0.5 * (normal_force_volts + mu), 0.5 * (normal_force_volts - mu)
+        angle = step(tick, front, rear)
+        if angle is None:
+            raise IdentificationError(f"the rig ended at tick {tick} of {total}")
+        rows[tick] = angle, front, rear
+    return PitchRecord(step_s, rows[:, 0], rows[:, 1], rows[:, 2])

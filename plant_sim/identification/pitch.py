@@ -46,7 +46,7 @@ class PitchSettings:
 
 
 class PitchEstimates(NamedTuple):
-    """What is known after a sample."""
+    """The estimate after a sample."""
 
     rate_damping_per_s: float
     """a_w"""

@@ -76,7 +76,7 @@ class PitchRecord:
 
 @dataclass(frozen=True, slots=True)
 class PitchIdentification:
-    """What a record says, and how it came to be."""
+    """The data of a record, and its origin."""
 
     estimates: PitchEstimates
     deviations: PitchEstimates
@@ -128,7 +128,7 @@ def identify(
 
 @dataclass(frozen=True, slots=True)
 class QuietStretch:
-    """Where the body rested with its motors off."""
+    """The angle of the body at rest with its motors off."""
 
     start_s: float
     end_s: float

@@ -1,4 +1,4 @@
-"""What every controller offers to the controller node."""
+"""The interface of every controller."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from receiver.controllers.references import Reference
 
 @dataclass(frozen=True, slots=True)
 class ControllerContext:
-    """What a controller from outside is given when it is built."""
+    """The context that a controller from outside gets when it is built."""
 
     tick_s: float
     """time between two commands"""

@@ -41,7 +41,7 @@ PAPER_GAINS: Final = PidGains(proportional=0.1, integral=0.053, derivative=0.12,
 
 
 class PidConstants(NamedTuple):
-    """What the functions below need; volts and radians."""
+    """Constants of the functions below; volts and radians."""
 
     proportional: float
     integral_per_tick: float

@@ -16,6 +16,10 @@ class SteeredReference:
         self.by_hand_rad: float | None = None
         """the angle given by hand; None: the configured reference is followed"""
 
+    def steer(self, angle_rad: float | None) -> None:
+        """Take the reference by hand; None gives it back to what is configured."""
+        self.by_hand_rad = angle_rad
+
     def angle_rad(self, tick: int) -> float:
         """Return the reference angle (rad) at `tick`."""
         return self._programme.angle_rad(tick) if self.by_hand_rad is None else self.by_hand_rad

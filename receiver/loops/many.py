@@ -1,6 +1,6 @@
 """The controller node of many rigs: one loop that serves each of them as if it were alone.
 
-Every session has an endpoint of its own; this loop takes in what comes for all of them and keeps their
+Every session has its own endpoint; this loop takes in what comes for all of them and keeps their
 deadlines. What goes wrong in one ends that one: an exception closes it, and a transmitter that sends
 more than its channel carries has the surplus dropped unread, so that it costs the others a few
 microseconds a message.
@@ -31,7 +31,7 @@ BATCH_MESSAGES_MAX = 64
 
 BURST_MESSAGES = 50
 SURPLUS = 4.0
-"""A session may send this many times its symbol rate, and so many messages at once, for control."""
+"""A session may send this many times its symbol rate, and this many messages at once, for control."""
 
 
 class Hub(Protocol):
@@ -47,7 +47,7 @@ class Hub(Protocol):
 class Host(Protocol):
     """Opens and closes services. Its methods return at once."""
 
-    def knock(self, name: str, data: bytes) -> list[bytes]:
+    def on_unserved(self, name: str, data: bytes) -> list[bytes]:
         """Take a message of a session that has no service; return what to answer."""
 
     def ready(self) -> Iterable[tuple[str, Served]]:
@@ -149,7 +149,7 @@ class ManyService:
         now_ns = time.monotonic_ns()
         served = self._served.get(name)
         if served is None:
-            for message in self._host.knock(name, data):
+            for message in self._host.on_unserved(name, data):
                 self._hub.send(name, message)
         elif served.may_send(now_ns):
             self._guarded(served, self._give, now_ns, data)
@@ -220,4 +220,4 @@ class ManyService:
 
 
 def _rest(served: Served) -> None:
-    served.endpoint.session.rest()
+    served.endpoint.session.flush_records()

@@ -32,5 +32,5 @@ def serve(
         now_ns = time.monotonic_ns()
         for message in endpoint.take(data, now_ns):
             link.send(message)
-        endpoint.session.rest()
+        endpoint.session.flush_records()
         meanwhile()

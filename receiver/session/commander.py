@@ -29,7 +29,7 @@ UNWRITTEN_MAX = 32
 
 
 class Standing(NamedTuple):
-    """Where a flight stands: all that the next epoch follows from."""
+    """The state of a flight that determines the next epoch."""
 
     state: CodecState
     hold: Vector
@@ -47,7 +47,7 @@ class _Flown(NamedTuple):
 class Commander:
     """Flies samples; see the module's text.
 
-    `counts` gets `bad_commands` and `bad_references`, and `tell` is told of the first of each.
+    `counts` gets `bad_commands` and `bad_references`, and `emit` gets an event for the first of each.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class Commander:
         controller: Controller,
         recorder: Recorder,
         counts: Counter[str],
-        tell: Tell,
+        emit: Tell,
     ) -> None:
         self.codec = codec
         self.terms = terms
@@ -68,7 +68,7 @@ class Commander:
         self._controller = controller
         self._recorder = recorder
         self._counts = counts
-        self._tell = tell
+        self._emit = emit
         self._commands: deque[Vector] = deque([self.hold] * terms.lead_ticks)
         """of the next `D` ticks"""
         self._echoes: deque[Echo] = deque(maxlen=terms.repeats + 1)
@@ -159,7 +159,7 @@ class Commander:
             self._counts["bad_references"] += 1
             if self._counts["bad_references"] == 1:
                 problem = f"{type(error).__name__}: {error}"
-                self._tell(
+                self._emit(
                     Event(EventKind.CONTROLLER, tick=tick, cause=Failing.REFERENCE, detail=problem)
                 )
             return None
@@ -175,5 +175,5 @@ class Commander:
             problem = f"failed: {type(error).__name__}: {error}"
         self._counts["bad_commands"] += 1
         if self._counts["bad_commands"] == 1:
-            self._tell(Event(EventKind.CONTROLLER, tick=tick, cause=Failing.COMMAND, detail=problem))
+            self._emit(Event(EventKind.CONTROLLER, tick=tick, cause=Failing.COMMAND, detail=problem))
         return self.hold

@@ -1,4 +1,4 @@
-"""What the receiver writes down."""
+"""The records of the receiver."""
 
 from __future__ import annotations
 
@@ -7,10 +7,16 @@ from collections.abc import Callable
 from channel.codec.codec import CodecState, Vector
 from channel.codec.lead import FlownSample
 from channel.codec.words import Word
-from channel.protocol.audit_trail import ARRIVED_CHANNEL, EPOCH_CHANNEL, epoch_row
 from channel.protocol.frames import Desync, Symbol
 from channel.protocol.lockstep import LOCKSTEP_CHANNEL, History
-from channel.protocol.recording import Field, RecordChannel, Recorder
+from channel.protocol.recording import (
+    ARRIVED_CHANNEL,
+    EPOCH_CHANNEL,
+    Field,
+    RecordChannel,
+    Recorder,
+    epoch_row,
+)
 from channel.protocol.terms import Terms
 
 ReferenceOf = Callable[[int], float | None]
@@ -20,9 +26,9 @@ TICK_CHANNEL = RecordChannel(
     "tick",
     (
         Field("tick", "integer", "", "tick that the command is for"),
-        Field("reference_rad", "number", "rad", "set-point of the controller at that tick"),
-        Field("live_state", "numbers", "", "model state believed, in advance, of that tick"),
-        Field("command_volts", "numbers", "V", "motor voltages commanded, as on the wire"),
+        Field("reference", "numbers", "", "set-point of each output; null: it has none"),
+        Field("live_state", "numbers", "", "predicted model state of that tick"),
+        Field("command", "numbers", "", "command for each input, as on the wire"),
     ),
 )
 
@@ -31,7 +37,7 @@ SAMPLE_CHANNEL = RecordChannel(
     (
         Field("sample", "integer", "", "index of the sample"),
         Field("word", "integers", "", "symbols consumed; null: erased"),
-        Field("range", "numbers", "rad", "range M of each axis before the word"),
+        Field("range", "numbers", "", "range M of each output before the word"),
         Field("state", "numbers", "", "codec's model state after the sample"),
         Field("coder", "numbers", "", "coder state after the sample"),
         Field("digest", "string", "", "64-bit digest of the codec state after the sample"),
@@ -60,8 +66,8 @@ def write_commands(
 ) -> None:
     """Write down the commands that were decided with one sample, and what they steered to."""
     tick = sample * terms.ticks_per_sample + terms.lead_ticks
-    for believed, command in zip(flown.live, flown.commands, strict=True):
-        row = (tick, reference_rad(tick), believed, command)
+    for predicted, command in zip(flown.live, flown.commands, strict=True):
+        row = (tick, (reference_rad(tick),), predicted, command)
         recorder.write(TICK_CHANNEL, tick * terms.tick_ns, row)
         tick += 1
 

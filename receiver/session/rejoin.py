@@ -1,11 +1,11 @@
-"""Which request for a session gets which answer, and from which state the ends start again.
+"""The answers to requests for a session, and the state from which the ends start again.
 
 * An unanswered request is repeated by the transmitter, so equal requests get equal answers for as
   long as nothing was flown on them, unless the answer has grown too old to begin with.
 * A second transmitter is refused while the first one is heard. When the first has fallen silent, the
   second is taken for the same rig started again.
 * A request that contradicts what is known, older than one that was answered or for a sample that the
-  clock cannot have reached, is believed when it persists: one forged or delayed request does nothing.
+  clock cannot have reached, is accepted when it persists: one forged or delayed request does nothing.
 * An answer on which no symbol has come is no more than an offer: the next request is answered from
   where the flight stood before it (`receiver.session.commander.Standing`).
 * The first sample is `max(own next sample, first sample that the transmitter can still send + m)`,
@@ -36,12 +36,12 @@ from channel.protocol.terms import Terms
 ANSWER_AGE_SAMPLES_MAX = 4
 ANSWER_AGE_NS = 50_000_000
 """A start that lies further back than both is not offered again: the motors would have no command for
-so long. In samples alone, every request of a fast flight would begin an epoch of its own before the
+so long. In samples alone, every request of a fast flight would begin a new epoch before the
 answer to the one before can have arrived."""
 
 PERSISTENT_REQUESTS = 3
 """Repetitions, each for a later sample, after which a request that contradicts what is known is
-believed, as long as the transmitter is not heard."""
+accepted, as long as the transmitter is not heard."""
 
 AHEAD_SAMPLES_MAX = 8
 """This end counts samples by its own clock, so it is hardly ahead of the transmitter. If it is by more,
@@ -64,7 +64,7 @@ VERSION_SHOWN = 40
 
 
 class Verdict(Enum):
-    """What to do about a request."""
+    """The decision about a request."""
 
     IGNORE = auto()
     REPEAT = auto()
@@ -81,13 +81,17 @@ class Greeter:
         self._ahead_max = AHEAD_SAMPLES_MAX + _lead_samples(terms)
         self.welcome: Welcome | None = None
         """last answer given"""
-        self._stranger: int | None = None
+        self._unknown_incarnation: int | None = None
         self._symbols_since = 0
         self._known: deque[int] = deque(maxlen=KNOWN_MAX)
         """incarnations that were admitted"""
         self._doubted: Hello | None = None
         """last request that contradicted what is known"""
         self._persisted = 0
+
+    def answer_with(self, welcome: Welcome) -> None:
+        """Remember what a request was answered with."""
+        self.welcome = welcome
 
     def judge(
         self, hello: Hello, identity: Identity, advanced: bool, silent_slots: int, in_reach: bool
@@ -104,7 +108,7 @@ class Greeter:
         if last is None:
             return self._admit(hello, identity)
         if hello.incarnation != last.incarnation:
-            return self._judge_stranger(hello, identity, advanced, silent_slots)
+            return self._judge_unknown_peer(hello, identity, advanced, silent_slots)
         if not in_reach or hello.request < last.request or (hello.request == last.request and advanced):
             heard = advanced and silent_slots < SILENT_SLOTS
             return Verdict.BEGIN if self._persists(hello) and not heard else Verdict.IGNORE
@@ -141,12 +145,12 @@ class Greeter:
         """Note that the present transmitter is heard."""
         self._symbols_since += 1
 
-    def _judge_stranger(
+    def _judge_unknown_peer(
         self, hello: Hello, identity: Identity, advanced: bool, silent_slots: int
     ) -> Verdict:
-        if hello.incarnation != self._stranger or silent_slots >= SILENT_SLOTS:
+        if hello.incarnation != self._unknown_incarnation or silent_slots >= SILENT_SLOTS:
             # What was on the line when the present one stopped proves nothing for long.
-            self._stranger, self._symbols_since = hello.incarnation, 0
+            self._unknown_incarnation, self._symbols_since = hello.incarnation, 0
         if self._symbols_since >= ALIVE_SYMBOLS:
             return Verdict.BUSY
         if advanced and silent_slots < SILENT_SLOTS:

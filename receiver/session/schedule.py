@@ -1,4 +1,7 @@
-"""When slots are due by this end's clock: how far ahead of it a slot may be, and who is believed.
+"""Which slot is settled next, and when slots are due by this end's clock.
+
+`SlotClock` settles a slot on its symbol, on a later one, or at its deadline; the schedule of studies
+counts with it too. `Schedule` knows how far ahead of the clock a slot may be, and which symbols count.
 
 The transmitter sends one symbol a slot, so each symbol that is taken says where the schedule lies. A
 symbol long before its time is not the transmitter's, or the clock here was set; one after its deadline
@@ -11,6 +14,7 @@ An early symbol does not move the schedule: a single forged one costs the slots 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from enum import Enum, auto
 from typing import NamedTuple
 
@@ -82,7 +86,7 @@ class Schedule:
         return Timing.NEW if self.is_replaced_by(slot, now_ns) else Timing.EARLY
 
     def is_replaced_by(self, slot: int, now_ns: int) -> bool:
-        """Note a symbol that does not fit; return whether it is the last of a row that is believed."""
+        """Note a symbol that does not fit; return whether it is the last of an accepted row."""
         rival = self._rival
         count = 1
         if rival is not None:
@@ -125,3 +129,55 @@ class Proven(NamedTuple):
     silent_slots: int
     incarnation: int | None
     """of the transmitter flown with; None: none yet"""
+
+
+class SlotClock:
+    """Counts the slots of an epoch. What it yields is settled: nothing that comes later changes it."""
+
+    def __init__(self, terms: Terms, slot: int = 0) -> None:
+        self.slot = slot
+        """the first one that is not settled"""
+        self.silent_slots = 0
+        """settled by their deadlines since the last symbol"""
+        self._terms = terms
+        self._gap_slots_max = terms.history_samples * terms.symbols_per_word
+        self._anchor: tuple[int, int] | None = None
+
+    @property
+    def deadline_ns(self) -> int | None:
+        """Return when the next slot is taken for erased; None: not by the clock."""
+        if self._anchor is None:
+            return None
+        slot, time_ns = self._anchor
+        due_ns = self._terms.slot_ns(self.slot) - self._terms.slot_ns(slot)
+        return time_ns + due_ns + self._terms.deadline_allowance_ns
+
+    @property
+    def is_silent(self) -> bool:
+        """Return whether nothing has come for so long that no slot is due by the clock any more."""
+        return self.silent_slots >= self._gap_slots_max
+
+    def bridges(self, slot: int) -> bool:
+        """Return whether a slot is so near that what lies between is a gap and no other flight."""
+        return abs(slot - self.slot) <= self._gap_slots_max
+
+    def anchor(self, at: tuple[int, int] | None) -> None:
+        """Count deadlines from this (slot, time), or from nothing any more."""
+        self._anchor = at
+
+    def take(self, slot: int) -> Iterator[int]:
+        """Settle the slots before that of a symbol, yielding each, and then its own, unyielded."""
+        self.silent_slots = 0
+        while self.slot < slot:
+            yield self._settle()
+        self._settle()
+
+    def expired(self, now_ns: int) -> Iterator[int]:
+        """Settle the slots whose deadline has passed by now, yielding each."""
+        while (deadline_ns := self.deadline_ns) is not None and deadline_ns <= now_ns:
+            self.silent_slots += 1
+            yield self._settle()
+
+    def _settle(self) -> int:
+        self.slot += 1
+        return self.slot - 1

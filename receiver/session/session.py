@@ -38,21 +38,20 @@ from channel.protocol.identity import Identity
 from channel.protocol.limits import to_millivolts
 from channel.protocol.lockstep import History, difference_event
 from channel.protocol.recording import NullRecorder, Recorder
-from channel.protocol.slot_clock import SlotClock
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
 from receiver.controllers.base import Controller
 from receiver.session.commander import Commander
 from receiver.session.records import write_epoch, write_failure, write_symbol
 from receiver.session.rejoin import Greeter, Verdict, desync_answer, difference, first_sample
-from receiver.session.schedule import Proven, Schedule, Timing
-from receiver.session.takeover import Stranger
+from receiver.session.schedule import Proven, Schedule, SlotClock, Timing
+from receiver.session.takeover import Takeover
 
 EPOCH_MAX = 0xFFFF
 
 
 class Phase(Enum):
-    """Where the receiver's session stands."""
+    """Phase of the receiver's session."""
 
     WAITING = "waiting"  # for a transmitter
     FLYING = "flying"
@@ -93,14 +92,14 @@ class ReceiverSession:
         self.desync: Desync | None = None
         self.events: deque[Event] = deque(maxlen=1000)
         self._greeter = Greeter(terms)
-        self._stranger = Stranger(session_number, take_over)
+        self._takeover = Takeover(session_number, take_over)
         self._recorder = recorder or NullRecorder()
-        self._commander = Commander(codec, terms, controller, self._recorder, self.counts, self._tell)
+        self._commander = Commander(codec, terms, controller, self._recorder, self.counts, self._emit)
         self._clock = SlotClock(terms)
         self._word: list[int | None] = []
         self._advanced = False
         """whether a symbol of this epoch has been received"""
-        self._bounds = Bounds(codec, terms, self.counts, self._tell)
+        self._bounds = Bounds(codec, terms, self.counts, self._emit)
         self._schedule = Schedule(terms)
         self._proven = Proven(self._commander.standing, self._schedule, 0, None)
 
@@ -135,7 +134,7 @@ class ReceiverSession:
                 return self._on_desync(frame)
             case Bye() if self._is_current(frame.session):
                 self._end(End(frame.ending, frame.text, by_peer=True))
-            case Bye() if frame.session == 0 and self._stranger.asked and self.phase is Phase.WAITING:
+            case Bye() if frame.session == 0 and self._takeover.asked and self.phase is Phase.WAITING:
                 self._end(End(frame.ending, frame.text, by_peer=True))
             case Bye() if self.refusal is not None and frame.session == 0:
                 self.refusal = replace(self.refusal, answer=frame.text)
@@ -161,7 +160,7 @@ class ReceiverSession:
             if self._clock.is_silent:
                 self._clock.anchor(None)
                 number = self.terms.history_samples
-                self._tell(Event(EventKind.PEER, cause=Presence.SILENT, number=number))
+                self._emit(Event(EventKind.PEER, cause=Presence.SILENT, number=number))
         return frames
 
     def bye(self, end: End) -> list[Frame]:
@@ -173,9 +172,9 @@ class ReceiverSession:
     def on_malformed(self, why: str) -> None:
         """Note that bytes came which are no frame."""
         self.counts["malformed"] += 1
-        self._tell(Event(EventKind.MALFORMED, detail=why))
+        self._emit(Event(EventKind.MALFORMED, detail=why))
 
-    def rest(self) -> None:
+    def flush_records(self) -> None:
         """Do what can wait until the frames are on their way: the recording."""
         self._commander.write_down()
 
@@ -240,11 +239,11 @@ class ReceiverSession:
         told = () if hold == self.terms.initial_command else to_millivolts(hold)
         asked = (hello.incarnation, hello.request)
         welcome = Welcome(self.session_number, self.epoch, first, *asked, told, state)
-        self._greeter.welcome = welcome
+        self._greeter.answer_with(welcome)
         self._commander.write_down()
         write_epoch(self._recorder, self.terms, self.epoch, self.state, hold)
         kind = EventKind.STARTED if last is None else EventKind.REJOIN
-        self._tell(Event(kind, first, session=self.session_number, epoch=self.epoch))
+        self._emit(Event(kind, first, session=self.session_number, epoch=self.epoch))
         return [welcome]
 
     def _stand_where_proven(self, last: Welcome | None) -> int:
@@ -258,7 +257,7 @@ class ReceiverSession:
 
     def _refuse(self, refusal: End) -> None:
         if self.refusal is None:
-            self._tell(Event(EventKind.REFUSED, cause=refusal.ending, detail=refusal.text))
+            self._emit(Event(EventKind.REFUSED, cause=refusal.ending, detail=refusal.text))
         if self.phase is Phase.WAITING:
             self.refusal = refusal
 
@@ -283,7 +282,7 @@ class ReceiverSession:
         if not self._clock.bridges(symbol.slot):
             ahead = symbol.slot - self._clock.slot
             self.counts["stale_frames"] += 1
-            self._tell(Event(EventKind.STALE, slot=symbol.slot, cause=Dropped.FAR_AHEAD, number=ahead))
+            self._emit(Event(EventKind.STALE, slot=symbol.slot, cause=Dropped.FAR_AHEAD, number=ahead))
             return [Unknown(symbol.session, symbol.epoch)]
         self._advanced = True
         self._greeter.on_symbol()
@@ -300,7 +299,7 @@ class ReceiverSession:
         """Drop a symbol of a slot that is settled; a row of them means that the schedule is wrong."""
         self.counts["symbols_late"] += 1
         write_symbol(self._recorder, self.terms, symbol, now_ns, taken=False)
-        self._tell(Event(EventKind.LATE_SYMBOL, slot=symbol.slot, cause=Dropped.SETTLED))
+        self._emit(Event(EventKind.LATE_SYMBOL, slot=symbol.slot, cause=Dropped.SETTLED))
         near = self._clock.bridges(symbol.slot)
         if near and self._schedule.is_replaced_by(symbol.slot, now_ns):
             self._clock.anchor(self._schedule.take(symbol.slot, now_ns, anew=True))
@@ -309,7 +308,7 @@ class ReceiverSession:
     def _on_foreign_symbol(self, symbol: Symbol) -> list[Frame]:
         """Answer a transmitter that flies in a session or an epoch that is not the present one."""
         if self.phase is Phase.WAITING and self.refusal is None:
-            return self._stranger.on_symbol(symbol)
+            return self._takeover.on_symbol(symbol)
         welcome = self._greeter.welcome
         current = self._is_current(symbol.session)
         if current and symbol.epoch > self.epoch:
@@ -326,14 +325,14 @@ class ReceiverSession:
         frames: list[Frame] = []
         if place.slot is None:
             self.counts["symbols_misplaced"] += 1
-            self._tell(Event(EventKind.STALE, slot=place.slot_low, cause=Dropped.NOT_DUE))
+            self._emit(Event(EventKind.STALE, slot=place.slot_low, cause=Dropped.NOT_DUE))
         elif place.in_time:
             symbol = Symbol(self.session_number, self.epoch, place.slot, place.number)
             if not self._bounds.drops(self._bounds.of_symbol(symbol)):
                 frames = self._take_symbol(symbol, now_ns, anew=True)
         else:
             self.counts["symbols_late"] += 1
-            self._tell(Event(EventKind.LATE_SYMBOL, slot=place.slot, cause=Dropped.PAST_DEADLINE))
+            self._emit(Event(EventKind.LATE_SYMBOL, slot=place.slot, cause=Dropped.PAST_DEADLINE))
         if place.anchor is not None:
             self._clock.anchor(place.anchor)
         return frames
@@ -342,7 +341,7 @@ class ReceiverSession:
         """Decide what this slot's symbol was; at the end of a word, fly its sample."""
         if symbol is None:
             self.counts["erasures"] += 1
-            self._tell(Event(EventKind.ERASED, slot=slot))
+            self._emit(Event(EventKind.ERASED, slot=slot))
         self._word.append(symbol)
         if len(self._word) < self.terms.symbols_per_word:
             return []
@@ -365,7 +364,7 @@ class ReceiverSession:
         if last is None or (theirs.epoch, theirs.sample) > (last.epoch, last.sample):
             self.desync = theirs
             self.counts["desyncs"] += 1
-            self._tell(difference_event(theirs))
+            self._emit(difference_event(theirs))
             write_failure(self._recorder, self.terms, self.history, theirs)
         return [answer]
 
@@ -376,10 +375,10 @@ class ReceiverSession:
         if self.phase is not Phase.ENDED:
             self.phase = Phase.ENDED
             self.end = end
-            self.rest()
-            self._tell(ended_event(end))
+            self.flush_records()
+            self._emit(ended_event(end))
 
-    def _tell(self, event: Event) -> None:
+    def _emit(self, event: Event) -> None:
         at = self.state.sample if event.sample is None else event.sample
         flight_ns = self.state.sample * self.terms.sample_ns
         event = replace(event, time_ns=flight_ns, sample=at)

@@ -1,1 +1,1 @@
-"""`tenbaud bench coders`: every coder against the floor. Read `entrants`, `flight`, then `page`."""
+"""`tenbaud bench coders`: every coder against the floor. Read `candidates`, `flight`, then `page`."""

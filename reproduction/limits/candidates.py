@@ -1,7 +1,7 @@
-"""Who takes part: coders as configurations, for a rate and a disturbance strength.
+"""The coders that are compared, as configurations for a rate and a disturbance strength.
 
-Ranges of *told* coders are in units of `u = sqrt(q T^3)`, the angle by which white torque of density q
-throws the body off within a sample: they know q, as the floor does. The others have to find out.
+Ranges of coders that *know q* are in units of `u = sqrt(q T^3)`, the angle by which white torque of
+density q moves the body within a sample. The floor knows q too. The other coders adapt their range.
 The numbers were found by a search over simulated double integrators in these units (T = q = 1), where
 a coder is the same at any rate.
 """
@@ -17,9 +17,9 @@ Section = dict[str, Any]
 Row = tuple[float, float, float]
 
 NOMINAL_DENSITY = 2e-3
-"""rad^2/s^3: what a coder that is not told takes for granted"""
+"""rad^2/s^3: the density that a coder without knowledge of q assumes"""
 
-AIMED_ANGLE, AIMED_SWING, AIM = 1.3811, 1.4703, 1.4626
+AIMED_ANGLE, AIMED_RATE, AIM = 1.3811, 1.4703, 1.4626
 
 STEADY_ROWS: tuple[Row, ...] = (
     (1.2590, 0.5005, 1.0),
@@ -52,19 +52,19 @@ RANGE_MAX_RAD = 3.0
 
 
 @dataclass(frozen=True, slots=True)
-class Entrant:
+class Candidate:
     """A coder of the table."""
 
     name: str
     key: str
-    told: bool
+    knows_q: bool
     """whether its constants know q"""
     coder: Callable[[float, float], Section]
     """(T in s, q in rad^2/s^3) -> section `coder` of a configuration"""
 
     def section(self, rate_bit_s: float, density: float) -> Section:
-        """Return the coder at a rate, told the density if it is one to be told."""
-        return self.coder(1.0 / rate_bit_s, density if self.told else NOMINAL_DENSITY)
+        """Return the coder at a rate, with the density if its constants depend on it."""
+        return self.coder(1.0 / rate_bit_s, density if self.knows_q else NOMINAL_DENSITY)
 
 
 def unit_rad(period_s: float, density: float) -> float:
@@ -112,7 +112,7 @@ def _history(
 
 
 def innovation_gains() -> tuple[float, float]:
-    """Return angle and swing gain of the sign-of-innovation Kalman filter in steady state.
+    """Return the steady-state gains (angle, rate times T) of the sign-of-innovation Kalman filter.
 
     T = q = 1. Ribeiro, Giannakis and Roumeliotis, IEEE Trans. Signal Processing 54, 2006: the sign of
     the innovation corrects by `sqrt(2/pi) P c / sqrt(c' P c)` and takes `2/pi` of what the innovation
@@ -131,31 +131,35 @@ def innovation_gains() -> tuple[float, float]:
     return size * aa, size * ar
 
 
-def aimed_weights(angle: float, swing: float, aim: float) -> tuple[float, float, float]:
-    """Return weights with which one row asks for the sign of `e + aim * swing error`."""
+def aimed_weights(angle: float, rate: float, aim: float) -> tuple[float, float, float]:
+    """Return weights with which one row asks for the sign of `e + aim r`, r the rate error times T."""
     if aim > 0.0:
-        return 1.0 / angle, 0.0, aim / swing
+        return 1.0 / angle, 0.0, aim / rate
     small = 0.1 / angle
-    return 1.0 / angle, -small * swing / angle, small
+    return 1.0 / angle, -small * rate / angle, small
 
 
-def _aimed(angle: float, swing: float, aim: float) -> Callable[[float, float], Section]:
-    return _history(((angle, swing, 1.0),), aimed_weights(angle, swing, aim), 0, 1.0)
+def _aimed(angle: float, rate: float, aim: float) -> Callable[[float, float], Section]:
+    return _history(((angle, rate, 1.0),), aimed_weights(angle, rate, aim), 0, 1.0)
 
 
-ENTRANTS = (
-    Entrant("paper, as printed", "paper", False, _paper),
-    Entrant("paper, window of three signs", "three-signs", False, _three_signs),
-    Entrant("paper's coder, tuned", "tuned", True, _tuned),
-    Entrant("sign of innovation, Kalman filter", "innovation", True, _aimed(*innovation_gains(), 0.0)),
-    Entrant("sign of angle and rate combined", "combined", True, _aimed(AIMED_ANGLE, AIMED_SWING, AIM)),
-    Entrant(
+CANDIDATES = (
+    Candidate("paper, as printed", "paper", False, _paper),
+    Candidate("paper, window of three signs", "three-signs", False, _three_signs),
+    Candidate("paper's coder, tuned", "tuned", True, _tuned),
+    Candidate(
+        "sign of innovation, Kalman filter", "innovation", True, _aimed(*innovation_gains(), 0.0)
+    ),
+    Candidate(
+        "sign of angle and rate combined", "combined", True, _aimed(AIMED_ANGLE, AIMED_RATE, AIM)
+    ),
+    Candidate(
         "history, steady range",
-        "history-told",
+        "history-known-q",
         True,
         _history(STEADY_ROWS, STEADY_WEIGHTS, STEADY_LOOKAHEAD, 1.0),
     ),
-    Entrant(
+    Candidate(
         "history, range finds itself",
         "history",
         False,
@@ -164,7 +168,7 @@ ENTRANTS = (
 )
 PAPER = "paper"
 TUNED = "tuned"
-BEST = "history-told"
+BEST = "history-known-q"
 
 PRESETS = {"tuned-10baud": 10.0, "history-10baud": 10.0, "tuned-20baud": 20.0, "history-20baud": 20.0}
-"""bit/s of the presets that are flown as they are, beside the entrants"""
+"""bit/s of the presets that are flown as they are, beside the candidates"""

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reproduction.limits.candidates import BEST, ENTRANTS, PAPER
+from reproduction.limits.candidates import BEST, CANDIDATES, PAPER
+from reproduction.limits.encoder import encoder_floor
 from reproduction.limits.flight import FINE_COUNTS, RIG_COUNTS
 from reproduction.limits.intervals import ratio
 from reproduction.limits.plan import DENSITIES, NOMINAL, RATES, Outcome
 from reproduction.limits.tables import estimation, floor_of
-from tenbaud.bounds.encoder import encoder_floor
 from tenbaud.recording.style import FAINT, LINE_A, LINE_B, LINE_C, save
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def draw_disturbances(path: Path, outcome: Outcome) -> None:
         found = [
             ratio(estimation(outcome, key, 10.0, q, FINE_COUNTS), floor_of(10.0, q)) for q in DENSITIES
         ]
-        told = next(one for one in ENTRANTS if one.key == key).told
+        knows_q = next(one for one in CANDIDATES if one.key == key).knows_q
         panel.errorbar(
             DENSITIES,
             [one.value for one in found],
@@ -84,9 +84,9 @@ def draw_disturbances(path: Path, outcome: Outcome) -> None:
             marker=marker,
             markersize=5,
             linewidth=1.2,
-            linestyle="--" if told else "-",
+            linestyle="--" if knows_q else "-",
             capsize=2,
-            label=label + (" (told)" if told else ""),
+            label=label + (" (knows q)" if knows_q else ""),
         )
     panel.axhline(1.0, color=LINE_A, linewidth=1.5)
     panel.set(xscale="log", yscale="log", ylim=(0.9, 400.0))

@@ -15,9 +15,9 @@ from channel.codec.codec import Vector
 from channel.errors import CodecDiverged
 from channel.protocol.limits import from_millivolts, to_millivolts
 from plant_sim.encoder import Encoder
-from reproduction.limits.candidates import ENTRANTS, PRESETS
+from reproduction.limits.candidates import CANDIDATES, PRESETS
 from tenbaud.build.controllers import build_controller
-from tenbaud.build.ends import build_sight
+from tenbaud.build.ends import build_observer
 from tenbaud.build.flight import Agreement, agree
 from tenbaud.build.rig import build_plant
 from tenbaud.config.load import load_config
@@ -33,8 +33,8 @@ PERIOD_S = 25.0
 class Case:
     """A flight of the page."""
 
-    entrant: str
-    """an entrant's key, or a preset's name"""
+    candidate: str
+    """a candidate's key, or a preset's name"""
     rate_bit_s: float
     density: float
     seed: int
@@ -45,7 +45,7 @@ class Case:
     @property
     def cell(self) -> tuple[str, float, float, bool, int]:
         """Return what is averaged over: everything but the seed."""
-        return (self.entrant, self.rate_bit_s, self.density, self.closed_loop, self.counts)
+        return (self.candidate, self.rate_bit_s, self.density, self.closed_loop, self.counts)
 
 
 class Errors(NamedTuple):
@@ -72,15 +72,17 @@ def configuration(case: Case) -> Agreement:
         "receiver": receiver,
         "link": {"kind": "memory"},
     }
-    if case.entrant in PRESETS:
-        return agree(load_config(case.entrant, None, overrides), "virtual")
-    entrant = next(one for one in ENTRANTS if one.key == case.entrant)
+    if case.candidate in PRESETS:
+        return agree(load_config(case.candidate, None, overrides), "virtual")
+    candidate = next(one for one in CANDIDATES if one.key == case.candidate)
     tick_s = tick_of(case.rate_bit_s)
-    told = case.density if entrant.told else None
+    density = case.density if candidate.knows_q else None
     overrides["timing"] |= {"tick_s": tick_s, "symbol_period_s": 1.0 / case.rate_bit_s}
     overrides["channel"]["rate_baud"] = case.rate_bit_s
-    overrides["coder"] = entrant.section(case.rate_bit_s, case.density)
-    overrides["transmitter"]["sight_bandwidth_rad_s"] = sight_bandwidth(told, case.counts, tick_s)
+    overrides["coder"] = candidate.section(case.rate_bit_s, case.density)
+    overrides["transmitter"]["rate_observer_bandwidth_rad_s"] = observer_bandwidth(
+        density, case.counts, tick_s
+    )
     return agree(load_config("paper-10baud", None, overrides), "virtual")
 
 
@@ -92,10 +94,10 @@ def tick_of(rate_bit_s: float) -> float:
 IDLE = {"proportional": 0.0, "integral": 0.0, "derivative": 0.0}
 
 
-def sight_bandwidth(density: float | None, counts: int, tick_s: float) -> float:
+def observer_bandwidth(density: float | None, counts: int, tick_s: float) -> float:
     """Return the bandwidth of the steady Kalman filter of the rate, (q / r)^(1/4), in rad/s.
 
-    r is the encoder's rounding as white noise, `width^2 / 12 * tick`. A coder that is not told q has
+    r is the encoder's rounding as white noise, `width^2 / 12 * tick`. A coder that does not know q has
     the configuration's default, unless the encoder is so fine that there is nothing to smooth.
     """
     if density is None and counts <= RIG_COUNTS:
@@ -118,7 +120,7 @@ def fly_agreement(agreement: Agreement, start_s: float) -> Errors:
     plant = build_plant(config, terms.tick_ns / 1e9)
     encoder = Encoder(config.transmitter.encoder_counts_per_turn)
     controller = build_controller(config)
-    sight = build_sight(agreement)
+    observer = build_observer(agreement)
     limits = terms.limits
     first = round(start_s * 1e9) // terms.tick_ns
     count = codec.ticks_per_sample
@@ -129,8 +131,8 @@ def fly_agreement(agreement: Agreement, start_s: float) -> Errors:
     for tick in range(agreement.flight_ticks):
         true = plant.measured_rad[0]
         seen: Vector = (encoder.angle_rad(encoder.counts(true)),)
-        if sight is not None:
-            seen = sight.look(tick, seen, volts)
+        if observer is not None:
+            seen = observer.look(tick, seen, volts)
         if tick % count == 0:
             opened = codec.open(state, codec.encode(state, seen))
             model = opened.model

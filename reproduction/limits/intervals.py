@@ -1,4 +1,4 @@
-"""What seeds are worth: means with their 95 % intervals."""
+"""Means over seeds with their 95 % intervals."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Ratio:
 
 
 def quantile_95(count: int) -> float:
-    """Return how many standard errors a 95 % interval of so many values' mean reaches (Student)."""
+    """Return the half width of the 95 % interval of a mean of `count` values, in standard errors."""
     return float(student.ppf(0.975, count - 1)) if count > 1 else math.inf
 
 

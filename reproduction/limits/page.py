@@ -8,17 +8,17 @@ from pathlib import Path
 
 from reproduction.limits import tables
 from reproduction.limits.candidates import AIM
+from reproduction.limits.encoder import (
+    double_integrator_rate_at_encoder_floor,
+    encoder_floor,
+    floor_behind_encoder,
+)
 from reproduction.limits.flight import FINE_COUNTS, PERIOD_S, RIG_COUNTS, SETTLE_S, tick_of
 from reproduction.limits.intervals import exponent, ratio
 from reproduction.limits.page_template import NOT_RECORDED, PAGE, RECORDED, SUMMARY
 from reproduction.limits.plan import DENSITIES, NOMINAL, RATES, Outcome
 from reproduction.limits.recorded import Row
 from tenbaud.bounds.closed import DOUBLE_INTEGRATOR, WIENER
-from tenbaud.bounds.encoder import (
-    double_integrator_rate_at_encoder_floor,
-    encoder_floor,
-    floor_behind_encoder,
-)
 from tenbaud.bounds.linear import linear_model, rate_needed
 from tenbaud.files.whole import write_whole
 
@@ -69,13 +69,13 @@ def write_page(path: Path, outcome: Outcome, recorded: Sequence[Row], quick: boo
 def _summary(outcome: Outcome) -> str:
     found = {
         f"{key}{suffix}": ratio(
-            tables.estimation(outcome, entrant, rate, NOMINAL, FINE_COUNTS),
+            tables.estimation(outcome, candidate, rate, NOMINAL, FINE_COUNTS),
             tables.floor_of(rate, NOMINAL),
         ).value
-        for key, entrant in (
+        for key, candidate in (
             ("paper", "paper"),
             ("tuned", "tuned"),
-            ("told", "history-told"),
+            ("knows_q", "history-known-q"),
             ("found", "history"),
         )
         for suffix, rate in (("", 10.0), ("_20", 20.0))

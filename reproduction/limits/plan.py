@@ -1,4 +1,4 @@
-"""Which flights the page needs, flown on two cores."""
+"""The flights of the page, flown on two cores."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field
 
-from reproduction.limits.candidates import ENTRANTS, PRESETS
+from reproduction.limits.candidates import CANDIDATES, PRESETS
 from reproduction.limits.flight import FINE_COUNTS, RIG_COUNTS, Case, Errors, fly
 from reproduction.limits.tracking import fly_tracking, tracking_cases
 
@@ -50,16 +50,16 @@ def cases(scale: Scale) -> list[Case]:
     found = []
     for rate in RATES:
         for density in DENSITIES:
-            for entrant in ENTRANTS:
+            for candidate in CANDIDATES:
                 for seed in range(1, scale.seeds + 1):
-                    one = Case(entrant.key, rate, density, seed, scale.seconds)
+                    one = Case(candidate.key, rate, density, seed, scale.seconds)
                     found.append(one)
                     if density == NOMINAL:
                         found.append(
-                            Case(entrant.key, rate, density, seed, scale.seconds, False, RIG_COUNTS)
+                            Case(candidate.key, rate, density, seed, scale.seconds, False, RIG_COUNTS)
                         )
                 found += [
-                    Case(entrant.key, rate, density, seed, scale.closed_seconds, True, FINE_COUNTS)
+                    Case(candidate.key, rate, density, seed, scale.closed_seconds, True, FINE_COUNTS)
                     for seed in range(1, scale.closed_seeds + 1)
                 ]
     return found + [

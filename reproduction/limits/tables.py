@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from reproduction.limits.candidates import ENTRANTS, PRESETS, TUNED, Entrant
+from reproduction.limits.candidates import CANDIDATES, PRESETS, TUNED, Candidate
+from reproduction.limits.encoder import floor_behind_encoder
 from reproduction.limits.flight import FINE_COUNTS, RIG_COUNTS, tick_of
 from reproduction.limits.intervals import exponent, paired, ratio
 from reproduction.limits.plan import DENSITIES, NOMINAL, RATES, Outcome
@@ -13,14 +14,15 @@ from reproduction.limits.recorded import Row
 from reproduction.limits.tracking import DISTURBANCES, USUAL
 from reproduction.limits.tracking import PRESETS as LOOPS
 from reproduction.limits.trials import TRIALS, fly_trial
-from tenbaud.bounds.encoder import floor_behind_encoder
 from tenbaud.bounds.floor import floor, word_floor
 from tenbaud.bounds.linear import integrators, pitch
 
 
-def estimation(outcome: Outcome, entrant: str, rate: float, density: float, counts: int) -> list[float]:
+def estimation(
+    outcome: Outcome, candidate: str, rate: float, density: float, counts: int
+) -> list[float]:
     """Return the mean squares of one cell, estimation only."""
-    return [one.estimation for one in outcome.flights[(entrant, rate, density, False, counts)]]
+    return [one.estimation for one in outcome.flights[(candidate, rate, density, False, counts)]]
 
 
 def floor_of(rate: float, density: float) -> float:
@@ -66,13 +68,13 @@ def floors_table() -> str:
 def estimation_table(outcome: Outcome, density: float) -> str:
     """Return every coder over the floor at one disturbance, with the exponent."""
     rows = []
-    for entrant in ENTRANTS:
-        squares = [estimation(outcome, entrant.key, rate, density, FINE_COUNTS) for rate in RATES]
+    for candidate in CANDIDATES:
+        squares = [estimation(outcome, candidate.key, rate, density, FINE_COUNTS) for rate in RATES]
         cells = [
             str(ratio(one, floor_of(rate, density))) for one, rate in zip(squares, RATES, strict=True)
         ]
         finite = all(math.isfinite(value) for one in squares for value in one)
-        rows.append((_name(entrant), *cells, str(exponent(list(RATES), squares)) if finite else "-"))
+        rows.append((_name(candidate), *cells, str(exponent(list(RATES), squares)) if finite else "-"))
     table = _table((*RATE_HEADER, "exponent"), rows)
     return f"q = {density:g} rad^2/s^3:\n\n{table}"
 
@@ -80,16 +82,16 @@ def estimation_table(outcome: Outcome, density: float) -> str:
 def pairs_table(outcome: Outcome) -> str:
     """Return every other coder over the paper's kind, seed by seed, at the nominal disturbance."""
     rows = []
-    for entrant in ENTRANTS:
-        if entrant.key == TUNED:
+    for candidate in CANDIDATES:
+        if candidate.key == TUNED:
             continue
         cells = []
         for rate in RATES:
             own, other = (
-                estimation(outcome, key, rate, NOMINAL, FINE_COUNTS) for key in (entrant.key, TUNED)
+                estimation(outcome, key, rate, NOMINAL, FINE_COUNTS) for key in (candidate.key, TUNED)
             )
             cells.append(str(paired(own, other)))
-        rows.append((_name(entrant), *cells))
+        rows.append((_name(candidate), *cells))
     return _table(RATE_HEADER, rows)
 
 
@@ -108,33 +110,33 @@ def presets_table(outcome: Outcome) -> str:
     return _table(("preset", *(f"q = {density:g}" for density in DENSITIES)), rows)
 
 
-def _name(entrant: Entrant) -> str:
-    return entrant.name + (", told" if entrant.told else "")
+def _name(candidate: Candidate) -> str:
+    return candidate.name + (", knows q" if candidate.knows_q else "")
 
 
 def encoder_table(outcome: Outcome) -> str:
     """Return every coder behind the rig's encoder: over the floor / over the yardstick."""
     rows = []
-    for entrant in ENTRANTS:
+    for candidate in CANDIDATES:
         cells = []
         for rate in RATES:
-            squares = estimation(outcome, entrant.key, rate, NOMINAL, RIG_COUNTS)
+            squares = estimation(outcome, candidate.key, rate, NOMINAL, RIG_COUNTS)
             behind = floor_behind_encoder(NOMINAL, rate, RIG_COUNTS, tick_of(rate))
             plain = ratio(squares, floor_of(rate, NOMINAL))
             cells.append(f"{plain} / {ratio(squares, behind).value:.2f}")
-        rows.append((_name(entrant), *cells))
+        rows.append((_name(candidate), *cells))
     return _table(RATE_HEADER, rows)
 
 
 def closed_table(outcome: Outcome, density: float) -> str:
     """Return every coder over the floor in the closed loop."""
     rows = []
-    for entrant in ENTRANTS:
+    for candidate in CANDIDATES:
         cells = []
         for rate in RATES:
-            flown = outcome.flights[(entrant.key, rate, density, True, FINE_COUNTS)]
+            flown = outcome.flights[(candidate.key, rate, density, True, FINE_COUNTS)]
             cells.append(str(ratio([one.estimation for one in flown], floor_of(rate, density))))
-        rows.append((_name(entrant), *cells))
+        rows.append((_name(candidate), *cells))
     return f"q = {density:g} rad^2/s^3:\n\n{_table(RATE_HEADER, rows)}"
 
 

@@ -31,7 +31,7 @@ class Trial:
     quantise: Quantise
     aim: float
     angle: float
-    swing: float
+    rate: float
 
 
 def _sign(value: Matrix) -> Matrix:
@@ -57,17 +57,17 @@ def fly_trial(trial: Trial, bodies: int = 2000, steps: int = 600, seed: int = 5)
     """Return the rms over the floor of the trial's own rate, mean over time."""
     rng = np.random.default_rng(seed)
     angle = np.zeros(bodies)
-    swing = np.zeros(bodies)
+    rate = np.zeros(bodies)
     total = 0.0
     for step in range(steps):
-        level = trial.quantise(angle + trial.aim * swing)
+        level = trial.quantise(angle + trial.aim * rate)
         angle = angle - trial.angle * level
-        swing = swing - trial.swing * level
+        rate = rate - trial.rate * level
         if step >= SETTLE_STEPS:
-            total += float(np.mean(angle**2 + angle * swing + swing**2 / 3.0)) + 1.0 / 12.0
+            total += float(np.mean(angle**2 + angle * rate + rate**2 / 3.0)) + 1.0 / 12.0
         first, second = rng.standard_normal((2, bodies))
-        angle = angle + swing + 0.5 * first + second / math.sqrt(12.0)
-        swing = swing + first
+        angle = angle + rate + 0.5 * first + second / math.sqrt(12.0)
+        rate = rate + first
     mean = total / (steps - SETTLE_STEPS)
     # T = 1 and q = 1, so the rate is the bits of a word.
     return math.sqrt(mean * trial.bits**3 / DOUBLE_INTEGRATOR)

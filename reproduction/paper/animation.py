@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from tenbaud.recording.reader import Recording
 
 DURATION_S = 26.0
-SPOILT_SAMPLE = 80
+CORRUPTED_SAMPLE = 80
 CUT = "cut=15s+2s"
 SHOWN_S = 7.0
 """of the past, on the tape and above it"""
@@ -66,7 +66,7 @@ def draw_animation(path: Path) -> int:
 
 
 def fly_story() -> Story:
-    """Fly with one codec spoilt in one bit, and later with the line cut for two seconds."""
+    """Fly with one codec corrupted in one bit, and later with the line cut for two seconds."""
     from tempfile import TemporaryDirectory
 
     from tenbaud.build.flight import agree
@@ -81,7 +81,7 @@ def fly_story() -> Story:
         "receiver": {"reference": {"period_s": 16.0, "amplitude_rad": 1.0, "kind": "sine"}},
         "transmitter": {
             "plant": {"mismatch": 0.1},
-            "sabotage": f"sample={SPOILT_SAMPLE},field=range",
+            "sabotage": f"sample={CORRUPTED_SAMPLE},field=range",
         },
     }
     agreement = agree(load_config("tuned-10baud", None, overrides), "virtual")

@@ -14,7 +14,7 @@ from tenbaud.recording.reader import Recording
 
 @dataclass(frozen=True, slots=True)
 class Curves:
-    """What a figure draws, on the transmitter's ticks; the reference on the receiver's."""
+    """The curves of a figure, on the transmitter's ticks; the reference is on the receiver's."""
 
     times_s: Series
     pitch_rad: Series
@@ -36,8 +36,8 @@ def read_curves(transmitter: Path, receiver: Path) -> Curves:
     for row in ticks:
         tick = row["tick"]
         columns["time"][tick] = row["time_s"]
-        columns["measured"][tick] = row["measured_rad"][0]
-        columns["pitch"][tick] = (row["true_rad"] or row["measured_rad"])[0]
+        columns["measured"][tick] = row["measured"][0]
+        columns["pitch"][tick] = (row["true"] or row["measured"])[0]
     coded, rate, live = (np.full(count, np.nan) for _ in range(3))
     for _, row in recording.rows("estimate"):
         tick = row["tick"]
@@ -46,8 +46,8 @@ def read_curves(transmitter: Path, receiver: Path) -> Curves:
             live[tick] = _first(row["live_state"])
     ranges = [(time_ns / 1e9, _first(row["range"])) for time_ns, row in recording.rows("sample")]
     for _, row in Recording(receiver).rows("tick"):
-        if row["tick"] < count and row["reference_rad"] is not None:
-            columns["reference"][row["tick"]] = row["reference_rad"]
+        if row["tick"] < count:
+            columns["reference"][row["tick"]] = _first(row["reference"])
     times = np.array(ranges, dtype=np.float64).reshape(-1, 2)
     return Curves(
         columns["time"],

@@ -11,7 +11,7 @@ import multiprocessing
 import signal
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,7 +22,7 @@ from reproduction.paper.curves import Curves
 
 WORKERS = 2
 GRACE_S = 3.0
-"""What a worker gets to end its flight when the command is interrupted."""
+"""The signal that ends a worker's flight when the command is interrupted."""
 
 Overrides = dict[str, Any]
 
@@ -48,7 +48,7 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Flown:
-    """What came of a job."""
+    """The result of a job."""
 
     name: str
     summary: dict[str, Any]
@@ -169,10 +169,11 @@ def _fly_in_memory(job: Job, agreement: Any) -> Flown:
     from tenbaud.flight import transmit
     from tenbaud.flight.summary import transmitter_part
 
+    if job.window_start_s is not None:
+        start = round(job.window_start_s / agreement.config.timing.tick_s)
+        agreement = replace(agreement, scored_from=start)
     run = transmit.prepare(agreement, None, DATAGRAM)
     scores = run.node.scores
-    if job.window_start_s is not None:
-        scores.window_start_tick = round(job.window_start_s / agreement.config.timing.tick_s)
     peer = build_receiver(agreement, None, DATAGRAM)
     outcome = transmit.fly_virtual(run, peer, lambda: False)
     if outcome.code:

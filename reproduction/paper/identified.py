@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from plant_sim.identification.excitation import parse_excitation
-from plant_sim.identification.experiment import REST_S, excite
+from plant_sim.identification.excitation import REST_S, excite, parse_excitation
 from plant_sim.identification.pitch import PitchSettings
 from plant_sim.identification.record import PitchRecord, identify
 from plant_sim.pitch import PitchPlant

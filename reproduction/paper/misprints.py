@@ -1,4 +1,4 @@
-"""What the paper's text leaves open or has wrong in print, and what was chosen."""
+"""Ambiguities and misprints of the paper's text, and our choices."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ MISPRINTS: tuple[tuple[str, str, str], ...] = (
         "(19), signals",
         "`lambda_k` is the mean of the *scaled* signals",
         "the mean of the **signs**: with the scaled ones `M` could never grow again once below 0.5, "
-        "against the text around it",
+        "against the surrounding text",
     ),
     (
         "(19), window",
         "two signs",
         "two in the paper presets; a setting (`coder.window_signs`), because with an exact model two "
-        "signs lock into the pattern `++--` and the range stays up (see the table)",
+        "signs enter the pattern `++--` and the range stays up (see the table)",
     ),
     (
         "(22)",
         "the held signal is `e_k` without its bar",
-        "`M_k sigma_k`: the receiver knows no other",
+        "`M_k sigma_k`: the receiver knows no other value",
     ),
     ("(23)", "the gain is `k_m^y`", "`k_v` of (11)"),
     (
@@ -50,8 +50,9 @@ MISPRINTS: tuple[tuple[str, str, str], ...] = (
     ),
     (
         "(24), saturation",
-        "nothing is said of the integral while the motors saturate",
-        "it rests while both motors stand at their limit and the error would push on",
+        "the paper does not say what the integral does while the motors saturate",
+        "the integral is held while both motors are at their limit and the error would drive them "
+        "further",
     ),
     (
         "Sec. IV",
@@ -60,13 +61,13 @@ MISPRINTS: tuple[tuple[str, str, str], ...] = (
     ),
     (
         "Sec. IV",
-        "when errors begin to count is not said",
+        "the paper does not say when errors begin to count",
         "after the first period, 25 s",
     ),
     (
         "Sec. IV",
         "`M_k decreases` near rapid changes of the pitch",
-        "it *increases* there, as (19) and the text before it have it",
+        "it *increases* there, as (19) and the text before it say",
     ),
     (
         "Fig. 3",
@@ -75,7 +76,7 @@ MISPRINTS: tuple[tuple[str, str, str], ...] = (
     ),
     (
         "channel",
-        "a bit is taken to arrive at the instant of its sample",
+        "the paper assumes that a bit arrives at the instant of its sample",
         'the same here, with `delivery = "start"`; a wire of 10 bit/s needs 0.1 s for a bit, which '
         '`delivery = "end"` is for',
     ),

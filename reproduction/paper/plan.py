@@ -1,4 +1,4 @@
-"""Which flights the figures and the table need."""
+"""The flights of the figures and the table."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ RATE_S = 25.0
 
 RATES = (10, 20)
 SIGNS = tuple(product((1.0, -1.0), repeat=3))
-"""Of the mismatch of damping, stiffness and torque gain."""
+"""Signs of the mismatch of damping, stiffness and torque gain."""
 
 CODERS = ("paper", "three", "tuned")
 """Paper preset; the same with a window of three signs; tuned preset."""
@@ -22,7 +22,14 @@ CODERS = ("paper", "three", "tuned")
 PUSH = "step=2@40..41"
 """A shove of 2 rad/s^2 for one second: as much as 2.9 V on each motor."""
 
-ZOOMINGS = ("paper-10baud", "three", "fixed-10baud", "timed-10baud", "static-10baud", "tuned-10baud")
+ZOOMINGS = (
+    "paper-10baud",
+    "three",
+    "fixed-10baud",
+    "open-loop-zoom-10baud",
+    "static-10baud",
+    "tuned-10baud",
+)
 
 
 def plant(

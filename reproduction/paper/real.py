@@ -41,7 +41,7 @@ WORD_BITS = 10
 
 @dataclass(frozen=True, slots=True)
 class FirstHalf:
-    """What the first half of the recording says about the body."""
+    """The model identified from the first half of the recording."""
 
     regression: PitchIdentification
     fitted: CrossCheck
@@ -95,14 +95,14 @@ def uiuc_jobs(data: Path, model: dict[str, Any]) -> list[Job]:
                 keep_series=rate == 10,
             ),
             Job(
-                f"uiuc-words-{rate}",
+                f"uiuc-pcm-{rate}",
                 "usual-1000baud",
                 _words(file, WORD_BITS * period_s),
                 window_start_s=HALF_S,
             ),
         ]
     every_tick = _words(file, TICK_S)
-    return [*jobs, Job("uiuc-words-500", "usual-1000baud", every_tick, window_start_s=HALF_S)]
+    return [*jobs, Job("uiuc-pcm-500", "usual-1000baud", every_tick, window_start_s=HALF_S)]
 
 
 def _words(file: Path, period_s: float) -> Overrides:

@@ -114,7 +114,7 @@ def claims_table(results: Results) -> str:
         (
             "the same, the plant exactly the model's",
             f"20 bit/s: {both(exact[0])}; 10 bit/s: {both(exact[1])}",
-            _holds(_largest(exact) <= CLAIM) + ": the window of two locks",
+            _holds(_largest(exact) <= CLAIM) + ": limit cycle of the window of two",
         ),
         (
             "Fig. 8: at 10 bit/s the observer's rate is as useful as differences at 1000 bit/s",
@@ -183,7 +183,7 @@ def zooming_table(results: Results) -> str:
         "three": "adaptive, window of three",
         "tuned-10baud": "adaptive, tuned",
         "fixed-10baud": "fixed range, 0.1 rad",
-        "timed-10baud": "time-based zooming",
+        "open-loop-zoom-10baud": "time-based zooming",
         "static-10baud": "static: the sign of the angle (16)",
     }
     rows = []
@@ -194,7 +194,7 @@ def zooming_table(results: Results) -> str:
             lost = one.pitch_rad > 6.3
             cells.append("the loop is lost" if lost else percent(one.largest))
         rows.append((label, *cells))
-    return table(("10 bit/s", "exact plant", "10 % off", "10 % off, and a shove at 40 s"), rows)
+    return table(("10 bit/s", "exact plant", "10 % off", "10 % off, and a push at 40 s"), rows)
 
 
 def recorded_table(results: Results) -> str:
@@ -202,11 +202,11 @@ def recorded_table(results: Results) -> str:
     rows = []
     for rate, period_s in real.RATES:
         cells = []
-        for kind in ("words", "paper", "tuned"):
+        for kind in ("pcm", "paper", "tuned"):
             one = results.flown[f"uiuc-{kind}-{rate}"]
             cells.append(f"{percent(one.rms)} / {percent(one.largest)}")
         rows.append((f"{1.0 / period_s:.3g} bit/s", *cells))
-    usual = results.flown["uiuc-words-500"]
+    usual = results.flown["uiuc-pcm-500"]
     rows.append(("500 bit/s", f"{percent(usual.rms)} / {percent(usual.largest)}", "", ""))
     head = (
         "second half, rms / largest error",

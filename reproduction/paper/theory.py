@@ -87,7 +87,7 @@ def draw_coding(path: Path) -> None:
 
 
 def draw_observer(path: Path) -> None:
-    """What a correction does within a sample, and what predicting over the lead costs."""
+    """The effect of a correction within a sample, and the cost of prediction over the lead."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(8.0, 3.4), layout="constrained")

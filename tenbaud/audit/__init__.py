@@ -1,1 +1,1 @@
-"""What an audit checks: a table of claims, each of which owns the recorded fields that it verifies."""
+"""The checks of an audit: a table of claims, each of which owns the fields that it verifies."""

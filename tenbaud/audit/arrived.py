@@ -93,7 +93,7 @@ def check_times(evidence: Evidence, findings: Findings) -> None:
 
 
 def check_origin(evidence: Evidence, findings: Findings) -> None:
-    """What came had left, and as what it had left; not before the line could have delivered it."""
+    """Every symbol that arrived was sent, unchanged, and did not arrive before the line allows."""
     agreement, terms = evidence.agreement, evidence.agreement.terms
     up = agreement.faults.up
     sent = evidence.topic("transmitter", "symbol")

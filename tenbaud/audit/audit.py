@@ -1,20 +1,21 @@
-"""Whether a flight was flown on what it paid for, shown from its recordings.
+"""Checks from the recordings that a flight used only the symbols that it sent in slots.
 
 Did each slot carry at most one symbol, on the grid? Do the states of both ends follow from symbols and
 slots alone? Do the commands, the codec's other input, follow from the states, so that nothing came down
-by them that had not gone up? Did both ends record the same flight, all of it? What is checked, field by
-field, is in the table in `claims/table.py`. What cannot be shown counts as not shown, and fails too.
+by them that had not gone up? Did both ends record the same flight, all of it? The table of claims
+(`tenbaud/audit/table.py`) says what is checked. What cannot be shown counts as not shown, and fails.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import log2
 from pathlib import Path
+from typing import Any
 
 from channel.errors import CodecDiverged, TenbaudError
 from receiver.controllers.base import Controller
 from tenbaud.audit.base import Evidence, Findings, Place
-from tenbaud.audit.counted import Counted, count
 from tenbaud.audit.table import CLAIMS
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.notes import version_notes
@@ -28,9 +29,57 @@ from tenbaud.replay.replay import compare
 WHOLE = Place("flight", "all topics", "all samples")
 
 
+@dataclass(frozen=True, slots=True)
+class Counted:
+    """What was counted in the recordings, not what the ends said of themselves."""
+
+    symbols_sent: int | None
+    symbols_refused: int | None
+    bits_per_symbol: float
+    slots: int | None
+    """from the first symbol sent to the last one"""
+    symbol_bytes: int | None
+    symbols_taken: int | None
+    symbols_late: int | None
+    baud: float | None
+    """symbols per second on the receiver's clock"""
+    samples: int
+    erased: int
+
+
+def count(evidence: Evidence) -> Counted:
+    """Count what went over the line."""
+    sent = evidence.topic("transmitter", "symbol")
+    arrived = evidence.topic("receiver", "symbol")
+    paid = [row for row in sent if row.left_ns is not None] if sent.recorded else None
+    taken = [row for row in arrived if row.taken] if arrived.recorded else None
+    samples = evidence.topic("receiver" if evidence.end("receiver") else "transmitter", "sample")
+    slots = None
+    if paid:
+        slots = max(row.slot for row in paid) - min(row.slot for row in paid) + 1
+    return Counted(
+        symbols_sent=None if paid is None else len(paid),
+        symbols_refused=None if paid is None else len(sent) - len(paid),
+        bits_per_symbol=log2(len(evidence.agreement.codec.coder.alphabet.symbols)),
+        slots=slots,
+        symbol_bytes=None if paid is None else sum(row.wire_bytes for row in paid),
+        symbols_taken=None if taken is None else len(taken),
+        symbols_late=None if taken is None else len(arrived) - len(taken),
+        baud=_baud(taken or []),
+        samples=len(samples),
+        erased=sum(row.word is None for row in samples),
+    )
+
+
+def _baud(taken: list[Any]) -> float | None:
+    times = [row.arrived_ns for row in taken]
+    span_ns = max(times) - min(times) if times else 0
+    return (len(times) - 1) * 1e9 / span_ns if span_ns else None
+
+
 @dataclass(slots=True)
 class Audit:
-    """What an audit found. `passed` needs no leak and nothing that could not be shown."""
+    """The findings of an audit. `passed` needs no leak and no gap."""
 
     record: FlightRecord
     counted: Counted
@@ -46,7 +95,7 @@ class Audit:
 
     @property
     def passed(self) -> bool:
-        """Whether the flight was shown to rest on its paid symbols alone."""
+        """Whether the flight used its paid symbols alone."""
         return not self.leaks and not self.gaps
 
 

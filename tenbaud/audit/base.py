@@ -1,4 +1,4 @@
-"""What a claim is given, and what it says."""
+"""The evidence of a claim, and its findings."""
 
 from __future__ import annotations
 
@@ -16,12 +16,9 @@ from tenbaud.replay.rows import EndRows, Topic
 FILED = "(time)"
 """The flight time that a row is filed under, as if it were a field of each topic."""
 
-ORDER = "(order)"
-"""The place of a row among the others of its topic, as if it were a field."""
-
 
 class Place(NamedTuple):
-    """Where in the recordings something was found."""
+    """A place in the recordings."""
 
     end: str
     topic: str
@@ -35,7 +32,7 @@ class Place(NamedTuple):
 
 
 class Findings:
-    """What was found, in words: one line for each kind of fault in a field, with its first place."""
+    """The findings as text: one line for each kind of fault in a field, with its first place."""
 
     def __init__(self) -> None:
         self._first: dict[tuple[bool, str, str, str, str], str] = {}
@@ -66,12 +63,12 @@ class Findings:
 
     @property
     def leaks(self) -> list[str]:
-        """What is wrong."""
+        """The faults."""
         return self._lines(False)
 
     @property
     def gaps(self) -> list[str]:
-        """What is not shown."""
+        """The claims that could not be checked."""
         return self._lines(True)
 
 
@@ -97,14 +94,14 @@ class Evidence:
 
     @property
     def agreement(self) -> Agreement:
-        """What both ends had agreed on."""
+        """The agreement of both ends."""
         return self.record.agreement
 
     def end(self, name: str) -> EndRows | None:
         """Return the rows of an end, None if it is not here."""
         return self.rows.get(name)
 
-    def topic(self, end: str, name: str) -> Topic[Any]:
+    def topic(self, end: str, name: str) -> Topic:
         """Return a topic; without rows where it or the end was not recorded."""
         rows = self.rows.get(end)
         return Topic() if rows is None else rows.topic(name)
@@ -120,7 +117,7 @@ class Evidence:
 
     @cached_property
     def is_steered(self) -> bool:
-        """Whether somebody changed something in flight, as the recordings say themselves."""
+        """Whether a person changed something in flight, according to the recordings."""
         return any(event.kind == "control" for end in self.rows for event in self.topic(end, "event"))
 
 

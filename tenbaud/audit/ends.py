@@ -6,7 +6,7 @@ from bisect import bisect_left
 from typing import Any
 
 from tenbaud.audit.base import Claim, Evidence, Findings, Place, is_same
-from tenbaud.replay.rows import KEY_MAX, EpochStart
+from tenbaud.replay.rows import KEY_MAX
 
 EPOCH_FIELDS = ("sample", "epoch", "state", "coder", "hold_volts")
 SAMPLE_FIELDS = ("word", "range", "state", "coder", "digest")
@@ -128,7 +128,7 @@ def _epochs_of_both(evidence: Evidence) -> list[tuple[int, int]]:
     return [(row.sample, end) for row, end in pairs if (row.epoch, row.sample) in ours]
 
 
-def _ends_of(epochs: list[EpochStart]) -> list[int]:
+def _ends_of(epochs: list[Any]) -> list[int]:
     """Return where each epoch ends: the last one nowhere."""
     return [*(row.sample for row in epochs[1:]), *[KEY_MAX + 1] * bool(epochs)]
 
@@ -137,12 +137,12 @@ def _covers(epochs: list[tuple[int, int]], evidence: Evidence, sample: int) -> b
     return any(first <= sample < end for first, end in epochs)
 
 
-def _of_this_receiver(evidence: Evidence) -> list[EpochStart]:
+def _of_this_receiver(evidence: Evidence) -> list[Any]:
     """Return the transmitter's epochs with the receiver whose recording is here.
 
     Each receiver, and one that was started again, counts its epochs from 0.
     """
-    flights: list[list[EpochStart]] = []
+    flights: list[list[Any]] = []
     for row in evidence.topic("transmitter", "epoch"):
         if not flights or row.epoch == 0:
             flights.append([])

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from channel.codec.signals import signals_of
 from tenbaud.audit.base import Claim, Evidence, Findings, Place
+from tenbaud.recording.encoding import SIGNALS_KEY, signals_text
 from tenbaud.recording.notes import hole_notes, stray_notes
 from tenbaud.recording.recover import RECOVERED_NOTE
 
@@ -15,6 +17,7 @@ def check_heads(evidence: Evidence, findings: Findings) -> None:
             "role": end,
             "config_digest": identity.config_digest.hex(),
             "tick_s": repr(evidence.agreement.config.timing.tick_s),
+            SIGNALS_KEY: signals_text(signals_of(evidence.agreement.codec.model)),
         }
         for name, value in wanted.items():
             said = tables.metadata.get(name)
@@ -104,7 +107,7 @@ def _check_summary(evidence: Evidence, end: str, held: int, findings: Findings) 
 
 
 def _count(text: str) -> int:
-    """Return a number of the recorder's; -1 for a text that is none, which no file can hold."""
+    """Return a count as the recorder wrote it; -1 for any other text."""
     return int(text) if text.isdecimal() else -1
 
 

@@ -1,4 +1,4 @@
-"""Where epochs start, and that arrival times within the deadlines do not matter."""
+"""The starts of epochs, and the independence from arrival times within the deadlines."""
 
 from __future__ import annotations
 

@@ -9,7 +9,6 @@ from plant_sim.encoder import Encoder
 from tenbaud.audit.base import Claim, Evidence, Findings, Place, is_same
 from tenbaud.build.ends import guard_settings
 from tenbaud.build.flight import Agreement
-from tenbaud.replay.rows import PlantTick
 
 TICK = ("transmitter", "tick")
 STOPPED = ("ramping", "latched")
@@ -74,20 +73,20 @@ def check_commanded(evidence: Evidence, findings: Findings) -> None:
         return
     decided = evidence.topic("receiver", "tick").by_key()
     for row in evidence.topic(*TICK):
-        if row.commanded_volts is None:
+        if row.commanded is None:
             continue
         given = [expected.held[row.tick]] if row.tick in expected.held else []
         if row.tick in expected.commands:
-            given.append(expected.commands[row.tick]["command_volts"])
+            given.append(expected.commands[row.tick]["command"])
         if row.tick in decided:
-            given.append(decided[row.tick].command_volts)
-        if not any(is_same(row.commanded_volts, one) for one in given) and (
+            given.append(decided[row.tick].command)
+        if not any(is_same(row.commanded, one) for one in given) and (
             given or _is_covered(evidence, row.tick)
         ):
             findings.leak(
-                _place(row, "commanded_volts"),
+                _place(row, "commanded"),
                 "the receiver commanded something else",
-                f"{row.commanded_volts}, not {' or '.join(map(str, given)) or 'any'}",
+                f"{row.commanded}, not {' or '.join(map(str, given)) or 'any'}",
             )
 
 
@@ -109,17 +108,17 @@ def check_guard(evidence: Evidence, findings: Findings) -> None:
         if fault:
             findings.leak(place, fault, row.guard)
             return
-        if by_guard and not is_same(passed.volts, row.applied_volts):
+        if by_guard and not is_same(passed.volts, row.applied):
             findings.leak(
-                place._replace(field="applied_volts"),
+                place._replace(field="applied"),
                 "it is not what the guard lets pass",
-                f"recorded {row.applied_volts}, computed {passed.volts}",
+                f"recorded {row.applied}, computed {passed.volts}",
             )
         if passed.changed and row.guard != "running":
             changes.append(now_ns)
         if passed.armed_again and not {now_ns, now_ns - tick_ns} & told:
             findings.gap(place, "no event tells that it was armed again", row.guard)
-        if row.late and (row.commanded_volts is not None or passed.stays_stopped):
+        if row.late and (row.commanded is not None or passed.stays_stopped):
             findings.leak(place._replace(field="late"), "no command was owed, or it had come")
     _check_told(evidence, changes, findings)
 
@@ -140,7 +139,7 @@ def _check_told(evidence: Evidence, changes: list[int], findings: Findings) -> N
 
 
 class _Passed:
-    """What the guard lets pass, in the states that were recorded."""
+    """The voltages that the guard allows, in the recorded states."""
 
     def __init__(self, agreement: Agreement) -> None:
         settings = guard_settings(agreement)
@@ -154,9 +153,9 @@ class _Passed:
         self._state = "ready"
         self._from, self._ramped = self.volts, 0
 
-    def take(self, row: PlantTick) -> str:
+    def take(self, row: Any) -> str:
         """Take one tick; return why its state cannot be, if it cannot."""
-        state, before, command = row.guard, self._state, row.commanded_volts
+        state, before, command = row.guard, self._state, row.commanded
         if state not in FOLLOWS.get(before, ()):
             return f"it cannot follow {before}"
         if (state == "running") != (command is not None) and state not in STOPPED:
@@ -196,15 +195,15 @@ def check_angles(evidence: Evidence, findings: Findings) -> None:
     zero = config.encoder_zero_counts
     encoder = Encoder(config.encoder_counts_per_turn, config.encoder_sign, zero)
     for row in evidence.topic(*TICK):
-        if row.true_rad is None:
-            findings.gap(_place(row, "true_rad"), "a simulated rig knows its angle")
+        if row.true is None:
+            findings.gap(_place(row, "true"), "a simulated rig knows its angle")
             continue
-        read = tuple(encoder.angle_rad(encoder.counts(_number(one))) for one in row.true_rad)
-        if not is_same(read, row.measured_rad):
+        read = tuple(encoder.angle_rad(encoder.counts(_number(one))) for one in row.true)
+        if not is_same(read, row.measured):
             findings.leak(
-                _place(row, "measured_rad"),
+                _place(row, "measured"),
                 "the encoder reads another angle there",
-                f"recorded {row.measured_rad}, computed {read}",
+                f"recorded {row.measured}, computed {read}",
             )
 
 
@@ -228,17 +227,13 @@ def _place(row: Any, field: str = "") -> Place:
 TICKS = Claim(
     "ticks at their times", check_ticks, ((*TICK, ("tick", "time_s", "lateness_ms", "late")),)
 )
-COMMANDED = Claim(
-    "commands as the receiver gave them", check_commanded, ((*TICK, ("commanded_volts",)),)
-)
+COMMANDED = Claim("commands as the receiver gave them", check_commanded, ((*TICK, ("commanded",)),))
 GUARD = Claim(
     "voltages as the guard let them pass",
     check_guard,
     (
-        (*TICK, ("commanded_volts", "applied_volts", "guard", "late")),
+        (*TICK, ("commanded", "applied", "guard", "late")),
         ("transmitter", "event", ("time_s", "kind")),
     ),
 )
-ANGLES = Claim(
-    "angles as the encoder reads them", check_angles, ((*TICK, ("measured_rad", "true_rad")),)
-)
+ANGLES = Claim("angles as the encoder reads them", check_angles, ((*TICK, ("measured", "true")),))

@@ -9,8 +9,6 @@ from channel.codec.words import Word
 from tenbaud.audit.base import Claim, Evidence, Findings, Place
 from tenbaud.build.flight import Agreement
 
-SYMBOL_FIELDS = ("slot", "symbol", "left_ns", "wire_bytes")
-
 
 def symbol_place(end: str, slot: int, field: str = "") -> Place:
     """Return where the symbol of a slot stands."""

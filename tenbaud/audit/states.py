@@ -14,7 +14,7 @@ ORPHAN = "no sample that was recorded brings it"
 
 SAMPLE_FIELDS = ("word", "range", "state", "coder", "digest")
 ESTIMATE_FIELDS = ("coded_state", "live_state")
-COMMAND_FIELDS = ("reference_rad", "live_state", "command_volts")
+COMMAND_FIELDS = ("reference", "live_state", "command")
 
 
 def check_samples(evidence: Evidence, findings: Findings) -> None:
@@ -48,7 +48,7 @@ def check_estimates(evidence: Evidence, findings: Findings) -> None:
 
 
 def check_commands(evidence: Evidence, findings: Findings) -> None:
-    """The receiver's commands, what it believed and what it followed: all ticks of all samples."""
+    """The receiver's commands, its predicted states and its references: all ticks of all samples."""
     expected = evidence.expected
     if expected is None or evidence.end("receiver") is None:
         return
@@ -74,7 +74,7 @@ def check_steering(evidence: Evidence, findings: Findings) -> None:
     """A set-point that is not the configuration's was given by hand, and that is an event."""
     if evidence.steps and not evidence.is_steered:
         tick, angle = evidence.steps[0]
-        place = Place("receiver", "tick", f"tick {tick}", "reference_rad")
+        place = Place("receiver", "tick", f"tick {tick}", "reference")
         findings.leak(place, "nobody was recorded to have moved the set-point", f"{angle!r} rad")
 
 
@@ -118,7 +118,7 @@ SAMPLES = Claim(
     ),
 )
 ESTIMATES = Claim(
-    "what was believed of each tick follows from the words",
+    "predicted states of each tick follow from the words",
     check_estimates,
     (("transmitter", "estimate", ESTIMATE_FIELDS),),
 )

@@ -1,1 +1,1 @@
-"""What no code of R bit/s can do better than: `floor` first, then `linear`, `encoder`."""
+"""What no code of R bit/s can do better than: `floor` first, then `linear`."""

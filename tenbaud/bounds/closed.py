@@ -2,7 +2,7 @@
 
 The Wiener process has `q / (2 R ln 2)` (Gorbunov and Pinsker 1974), the double integrator, which is an
 angle under white torque, `(8/27) q / (R ln 2)^3`. The restoring torque of the pitch changes little as
-long as bits come much faster than it swings, 10 a second against one swing in six.
+long as bits come much faster than it oscillates, 10 a second against one cycle in six.
 """
 
 from __future__ import annotations

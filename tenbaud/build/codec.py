@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from channel.codec.codec import Codec, Coder, Model
-from channel.codec.coders.words import WordsCoder
+from channel.codec.codec import Codec, Coder, CoderContext, Model, ModelContext
+from channel.codec.coders.pcm import PcmCoder
 from channel.codec.models.hold import HoldModel
-from channel.codec.plugin_context import CoderContext, ModelContext
 from tenbaud.build.parts import Parts, check_codec
 from tenbaud.build.plugins import build_plugin
 from tenbaud.config.kinds import CODERS, MODELS, kind_of
@@ -20,11 +19,11 @@ def build_codec(config: FlightConfig, parts: Parts | None = None) -> Codec:
     ticks = round(config.timing.symbol_period_s / config.timing.tick_s)
     model = parts.model or _build_model(config)
     coder = parts.coder or _build_coder(config, model)
-    needs_hold = isinstance(coder, WordsCoder)
+    needs_hold = isinstance(coder, PcmCoder)
     if needs_hold != isinstance(model, HoldModel):
         raise ValueError(
             f"coder.kind = {config.coder.kind!r} and model.kind = {config.model.kind!r} do not go "
-            "together: the coder 'words' sets angle and rate of the model 'hold', and no other"
+            "together: the coder 'pcm' sets angle and rate of the model 'hold', and no other"
         )
     codec = Codec(model, coder, ticks)
     if parts.model is None and may_grow(config.model):

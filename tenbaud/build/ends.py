@@ -9,10 +9,10 @@ from collections.abc import Callable
 
 from channel.codec.codec import Codec
 from channel.codec.models.linear import LinearModel
+from channel.codec.models.pitch import PitchModel
 from channel.line.clocks import SkewedClock
-from channel.line.downlink import Downlink
 from channel.line.impairments import Direction, ImpairedLine, SymbolWire
-from channel.line.line import CleanLine, Line
+from channel.line.line import CleanLine, Downlink, Line
 from channel.line.uplink import Uplink
 from channel.protocol.recording import Recorder
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
@@ -21,10 +21,10 @@ from receiver.controllers.base import Controller
 from receiver.controllers.references import Reference
 from receiver.endpoint import ReceiverEndpoint, SteppedEndpoint
 from receiver.session.session import ReceiverSession
+from tenbaud.bounds.closed import double_integrator_floor, double_integrator_rate
 from tenbaud.build.codec import build_codec
 from tenbaud.build.controllers import build_controller, build_reference
 from tenbaud.build.flight import Agreement, ticks_of, watchdog_wanted_s
-from tenbaud.build.gauge import build_gauge
 from tenbaud.build.liveness import overtaking_ticks, watchdog_ticks
 from tenbaud.build.parts import Parts
 from tenbaud.build.rig import build_rig
@@ -32,10 +32,11 @@ from tenbaud.config.kinds import CONTROLLERS
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
 from transmitter.guard import Guard, GuardSettings
+from transmitter.metrics.gap import GapGauge, Limit, StrengthMeter
 from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode
 from transmitter.session.session import TransmitterSession
-from transmitter.session.sight import Sight, rate_sight
+from transmitter.session.state_observer import StateObserver, rate_observer
 
 
 def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> TransmitterNode:
@@ -48,7 +49,7 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
         secrets.randbits(32),
         recorder,
         stop_on_desync=config.transmitter.on_desync == "stop",
-        sight=build_sight(agreement),
+        state_observer=build_observer(agreement),
         overtaking_ticks=overtaking_ticks(terms, agreement.faults),
     )
     gauge = build_gauge(agreement)
@@ -82,7 +83,7 @@ def _followed(agreement: Agreement) -> Callable[[int], float | None]:
     return build_reference(agreement.config).angle_rad
 
 
-def build_sight(agreement: Agreement) -> Sight | None:
+def build_observer(agreement: Agreement) -> StateObserver | None:
     """Return what gives a coder its rates, None for one that does without."""
     codec = agreement.codec
     if not codec.uses_rates:
@@ -90,10 +91,10 @@ def build_sight(agreement: Agreement) -> Sight | None:
     config, tick_s = agreement.config, agreement.terms.tick_ns / 1e9
     try:
         if isinstance(codec.model, LinearModel):
-            from tenbaud.design.sight import configured_sight
+            from tenbaud.design.observer import configured_observer
 
-            return configured_sight(codec.model, config)
-        return rate_sight(codec.model, tick_s, config.transmitter.sight_bandwidth_rad_s)
+            return configured_observer(codec.model, config)
+        return rate_observer(codec.model, tick_s, config.transmitter.rate_observer_bandwidth_rad_s)
     except ValueError as error:
         raise ConfigError(f"coder.kind = {config.coder.kind!r}: {error}") from error
 
@@ -114,7 +115,7 @@ def build_line(agreement: Agreement, direction: Direction, wire: SymbolWire) -> 
 
 
 def sabotaged(codec: Codec, text: str, live: bool = False) -> Codec:
-    """Return the codec, spoilt as the configuration asks; `live`: ready to be spoilt in flight."""
+    """Return the codec, corrupted as configured; `live`: it may be corrupted in flight."""
     if not text:
         return SabotagedCodec(codec) if live else codec
     try:
@@ -197,3 +198,25 @@ def guard_settings(agreement: Agreement) -> GuardSettings:
         safe_volts=section.safe_volts,
         soft_limits_rad=soft,
     )
+
+
+def build_gauge(agreement: Agreement) -> GapGauge | None:
+    """Return the gauge; None for a model that does not predict what its commands do.
+
+    The floor is that of the double integrator (see `tenbaud.bounds.closed`) at the rate that is paid:
+    every slot of the grid, whether its symbol arrives or not.
+    """
+    codec, terms, config = agreement.codec, agreement.terms, agreement.config
+    if not isinstance(codec.model, PitchModel):
+        return None
+    tick_s = terms.tick_ns / 1e9
+    alphabet = codec.coder.alphabet
+    bits = alphabet.symbols_per_word * math.log2(len(alphabet.symbols))
+    rate_bit_s = bits / (terms.sample_ns / 1e9)
+    limit = Limit(
+        double_integrator_floor(1.0, rate_bit_s),
+        lambda per_density: double_integrator_rate(1.0, per_density),
+    )
+    step_rad = math.tau / config.transmitter.encoder_counts_per_turn
+    strength = StrengthMeter(codec, tick_s, step_rad)
+    return GapGauge(limit, strength, terms.ticks_per_sample, tick_s)

@@ -39,7 +39,7 @@ def software_version() -> str:
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """What both ends build alike from their configuration."""
+    """The parts that both ends build alike from their configuration."""
 
     config: FlightConfig
     clock: Clock
@@ -50,6 +50,8 @@ class Agreement:
     """whether line, codec and set-point may be changed in flight, by hand"""
     parts: Parts = field(default_factory=Parts)
     """objects in place of what is configured"""
+    scored_from: int | None = None
+    """the tick from which errors count, where it is not the usual one"""
 
     @property
     def flight_ticks(self) -> int:
@@ -90,6 +92,8 @@ class Agreement:
 
         A flight that is over by then, or that has no periodic reference, counts from its beginning.
         """
+        if self.scored_from is not None:
+            return self.scored_from
         reference = self.config.receiver.reference
         periodic = self.config.receiver.controller != "recorded" and reference.kind in (
             "square",

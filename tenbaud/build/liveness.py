@@ -1,4 +1,4 @@
-"""Whether a flight comes back from every lost lockstep: its lead, delays and watchdog together.
+"""Checks that lead, delays and watchdog allow a flight to recover from every loss of lockstep.
 
 `agree` checks this for every configuration, so that what cannot fly is refused, with numbers, instead
 of asking for a new epoch for ever. `docs/RELIABILITY.md` has the reasoning.
@@ -15,8 +15,8 @@ from channel.protocol.terms import Clock, Terms
 AUTO_SAMPLES = 5
 AUTO_LEAST_S = 0.1
 AUTO_MARGIN_SAMPLES = 2
-"""The automatic watchdog: so many sample periods, but this long at least, and long enough for a request
-for a new epoch and its answer, one of which may be lost."""
+"""The automatic watchdog: this many sample periods, but at least this long, and long enough for a
+request for a new epoch and its answer, one of which may be lost."""
 
 
 @dataclass(frozen=True, slots=True)

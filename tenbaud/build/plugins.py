@@ -2,7 +2,7 @@
 
 A module is looked for in the folder that the command was started in, then where Python always looks.
 A class is called with one context object and the options of its section; what it builds must have
-what the part's protocol asks for. Every way in which that can go wrong is told in words here, so that
+what the part's protocol asks for. Every error of that kind gets a message here, so that
 nobody has to read a traceback from the middle of a flight.
 """
 

@@ -17,10 +17,8 @@ from tenbaud.config.schema import FlightConfig
 from transmitter.rigs.axes import Axis, Motors
 from transmitter.rigs.base import Rig
 from transmitter.rigs.device import DeviceRig, DeviceSettings
-from transmitter.rigs.dry import DryRig
 from transmitter.rigs.formats.base import SerialFormat
-from transmitter.rigs.replay import ReplayRig
-from transmitter.rigs.simulated import SimulatedRig
+from transmitter.rigs.simulated import DryRig, ReplayRig, SimulatedRig
 
 MEASURED = ("pitch",)
 

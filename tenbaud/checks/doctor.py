@@ -1,4 +1,4 @@
-"""What this machine can do for a flight: a report to read, and to paste into a question."""
+"""A report about this machine's fitness for a flight, to read and to paste into a question."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import sys
 import time
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from tenbaud.build.rig import build_device
@@ -24,7 +24,7 @@ RATE_SPAN_S = 0.05
 
 @dataclass(slots=True)
 class AxisCheck:
-    """What one axis did."""
+    """The measurements of one axis."""
 
     name: str
     channel: int
@@ -39,7 +39,7 @@ class AxisCheck:
 
 @dataclass(slots=True)
 class RigCheck:
-    """What the whole rig did."""
+    """The measurements of the whole rig."""
 
     rig: str
     seconds: float
@@ -112,16 +112,25 @@ def check_rig(config: FlightConfig, seconds: float, live: bool) -> RigCheck:
         figures = device.figures()
         samples = device.timeline.counts["samples"] - seen_before
     watcher.longest_gap_ns = max(watcher.longest_gap_ns, time.monotonic_ns() - last.host_ns)
-    result = RigCheck(real_rig_name(config.transmitter), seconds, samples, samples / seconds)
-    result.longest_gap_ms = watcher.longest_gap_ns / 1e6
-    result.axes, result.counts = watcher.axes, figures
-    result.flags = [str(flag.name).lower() for flag in DeviceFlag if flag & last.flags]
+    result = RigCheck(
+        real_rig_name(config.transmitter),
+        seconds,
+        samples,
+        samples_per_s=samples / seconds,
+        longest_gap_ms=watcher.longest_gap_ns / 1e6,
+        device_clock_ppm=_clock_ppm(first, last),
+        flags=[str(flag.name).lower() for flag in DeviceFlag if flag & last.flags],
+        axes=watcher.axes,
+        counts=figures,
+    )
+    return replace(result, problems=_problems(result, config))
+
+
+def _clock_ppm(first: DeviceSample, last: DeviceSample) -> float | None:
     host_s = (last.host_ns - first.host_ns) / 1e9
-    if last.device_us is not None and first.device_us is not None and host_s > 1.0:
-        device_s = (last.device_us - first.device_us) / 1e6
-        result.device_clock_ppm = (device_s / host_s - 1.0) * 1e6
-    result.problems = _problems(result, config)
-    return result
+    if last.device_us is None or first.device_us is None or host_s <= 1.0:
+        return None
+    return ((last.device_us - first.device_us) / 1e6 / host_s - 1.0) * 1e6
 
 
 def _problems(result: RigCheck, config: FlightConfig) -> list[str]:

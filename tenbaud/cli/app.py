@@ -6,9 +6,10 @@ import errno
 import os
 import signal
 import sys
+import warnings
 
 NOT_WRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EFBIG, errno.EIO)
-"""What only happens to who writes."""
+"""Errors of writing alone."""
 
 
 def main() -> None:
@@ -19,6 +20,7 @@ def main() -> None:
     from tenbaud.flight.lifeline import follow_parent
 
     prepare_streams()
+    warnings.formatwarning = lambda message, *_: f"tenbaud: {message}\n"  # no place in the code
     follow_parent()
     code = run(sys.argv[1:])
     error = lost_output()

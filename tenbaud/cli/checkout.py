@@ -1,17 +1,41 @@
-"""Commands that make the project's own pages work in a checkout only."""
+"""Commands that make the project's own pages: their code is in `reproduction`, which a checkout has."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib.util import find_spec
+
+import typer
 
 from tenbaud.config.load import ConfigError
 
+PANEL = "Models, coders, studies"
 
-def need_checkout(command: str) -> None:
-    """Raise ConfigError where the generators of the project's pages are not installed."""
-    if find_spec("reproduction") is None:
+
+def add_commands(app: typer.Typer) -> None:
+    """Add `figures` and `bench coders`; where there is no checkout, what says that they need one."""
+    bench = typer.Typer(no_args_is_help=True, help="Compare coders with the theoretical minimum.")
+    # Keeps `coders` a command of its own, however few there are.
+    bench.callback()(lambda: None)
+    app.add_typer(bench, name="bench", rich_help_panel=PANEL)
+    if find_spec("reproduction") is not None:
+        from reproduction.commands import coders, figures
+
+        app.command(rich_help_panel=PANEL)(figures)
+        bench.command()(coders)
+        return
+    anything = {"allow_extra_args": True, "ignore_unknown_options": True}
+    app.command("figures", rich_help_panel=PANEL, context_settings=anything)(_needs_checkout("figures"))
+    bench.command("coders", context_settings=anything)(_needs_checkout("bench coders"))
+
+
+def _needs_checkout(command: str) -> Callable[[], None]:
+    def refuse() -> None:
+        """Make pages of the project's own documentation; needs a checkout of the repository."""
         raise ConfigError(
             f"`tenbaud {command}` makes pages of the project's own documentation and works in a "
             "checkout of it only: clone the repository, run `pip install --editable .` in it, and "
             "call the command from there"
         )
+
+    return refuse

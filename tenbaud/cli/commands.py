@@ -1,4 +1,4 @@
-"""The commands, gathered. Each lives in a module of its own beside this one."""
+"""The commands, gathered. Each lives in a separate module beside this one."""
 
 from __future__ import annotations
 
@@ -7,16 +7,11 @@ from typing import Annotated
 import typer
 
 from tenbaud.cli import (
-    bench,
     demo,
     design,
-    doctor,
-    figures,
-    files,
     identify,
     keys,
     nodes,
-    replays,
     rig,
     router,
     runs,
@@ -24,6 +19,7 @@ from tenbaud.cli import (
     tune,
     view,
 )
+from tenbaud.cli.checkout import add_commands
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -60,15 +56,15 @@ for panel, commands in (
     ("Fly", (demo.demo, nodes.transmit, nodes.receive, view.view, runs.presets)),
     (
         "What was flown",
-        (runs.inspect, runs.diff, replays.replay, replays.audit, files.convert, files.recover),
+        (runs.inspect, runs.diff, runs.replay, runs.audit, runs.convert, runs.recover),
     ),
-    ("Rigs and machines", (doctor.doctor, rig.rig, rig.rig_check, router.router)),
+    ("Rigs and machines", (rig.doctor, rig.rig, rig.rig_check, router.router)),
     (
         "Models, coders, studies",
-        (design.floor, design.design, identify.identify, figures.figures, sweep.sweep, tune.tune),
+        (design.floor, design.design, identify.identify, sweep.sweep, tune.tune),
     ),
 ):
     for command in commands:
         app.command(rich_help_panel=panel)(command)
 app.add_typer(keys.app, name="keys", rich_help_panel="Rigs and machines")
-app.add_typer(bench.bench, name="bench", rich_help_panel="Models, coders, studies")
+add_commands(app)

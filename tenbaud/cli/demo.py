@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import typer
 
 from tenbaud.cli import options
+from tenbaud.cli.spread import spread
 
 if TYPE_CHECKING:
     from tenbaud.build.flight import Agreement
     from tenbaud.flight.demo import DemoResult
-    from tenbaud.flight.viewing import ViewWish
+    from tenbaud.flight.viewing import ViewOptions
     from tenbaud.recording.folder import RunFolder
 
 DEFAULT_MISMATCHES = (0.0, 0.1)
@@ -20,25 +21,10 @@ VIEW_DURATION_S = 3600.0
 """A flight that is looked at lasts until somebody stops it, or this long."""
 
 
+@spread
 def demo(
-    preset: options.Preset = None,
-    config: options.ConfigFile = None,
-    clock: options.Clock = options.ClockOption.VIRTUAL,
-    duration: options.Duration = None,
-    seed: options.Seed = None,
-    lead: options.Lead = None,
-    delivery: options.Delivery = None,
-    link: options.DemoLink = None,
-    line_rate: options.LineRate = None,
-    downlink: options.Downlink = None,
-    rig: options.Rig = None,
-    dry_run: options.DryRun = False,
+    flight: options.FlightOptions,
     mismatch: options.Mismatches = None,
-    disturbance: options.Disturbance = None,
-    impair: options.Impair = None,
-    on_desync: options.OnDesync = None,
-    sabotage: options.Sabotage = None,
-    settings: options.Settings = None,
     view: options.View = False,
     view_port: options.ViewPort = 8710,
     open_browser: options.OpenBrowser = False,
@@ -57,39 +43,20 @@ def demo(
 
     [dim]tenbaud demo --impair "loss=0.3,up:flip=0.02" --sabotage sample=700,field=range[/dim]
     """
-    if view and duration is None and config is None:
-        duration = VIEW_DURATION_S
-    replayed = rig is not None and rig.startswith("replay")
+    if view and flight.duration is None and flight.config is None:
+        flight = replace(flight, duration=VIEW_DURATION_S)
+    rig = flight.rig or "simulated"
     flights: list[float | None] = list(mismatch or ())
     if not flights:
-        single = json or view or config is not None or (rig or "simulated") != "simulated"
+        single = json or view or flight.config is not None or rig != "simulated"
         flights = [None] if single else list(DEFAULT_MISMATCHES)
-    if preset is None and config is None and replayed:
-        preset = "uiuc-10baud"
-    changes = [
-        options.overrides(
-            duration=duration,
-            seed=seed,
-            lead=lead,
-            delivery=delivery,
-            link=link,
-            line_rate=line_rate,
-            downlink=downlink,
-            rig=rig,
-            dry_run=dry_run,
-            mismatch=off,
-            disturbance=disturbance,
-            impair=impair,
-            on_desync=on_desync,
-            sabotage=sabotage,
-            settings=settings,
-        )
-        for off in flights
-    ]
-    agreements = _agree_all(preset, config, changes, clock)
+    if flight.preset is None and flight.config is None and rig.startswith("replay"):
+        flight = replace(flight, preset="uiuc-10baud")
+    changes = [options.overrides(**options.fields_of(flight), mismatch=off) for off in flights]
+    agreements = _agree_all(flight, changes)
     pace = _checked_pace(agreements[0], pace, view)
-    wish = _view_wish(agreements, view, view_port, open_browser)
-    raise typer.Exit(_fly_all(agreements, out, json, verbose, wish, pace))
+    view_options = _view_options(agreements, view, view_port, open_browser)
+    raise typer.Exit(_fly_all(agreements, out, json, verbose, view_options, pace))
 
 
 def _checked_pace(agreement: Agreement, pace: float | None, view: bool) -> float | None:
@@ -100,16 +67,16 @@ def _checked_pace(agreement: Agreement, pace: float | None, view: bool) -> float
     return pace or (1.0 if view and virtual else None)
 
 
-def _view_wish(
+def _view_options(
     agreements: list[Agreement], view: bool, port: int, open_browser: bool
-) -> ViewWish | None:
+) -> ViewOptions | None:
     """Return how the flight is to be looked at, if it is, checked before anything starts."""
     if not view:
         if open_browser:
             raise typer.BadParameter("--open opens the live page; it goes with --view")
         return None
     from channel.links.endpoints import loopback_host
-    from tenbaud.flight.viewing import ViewWish
+    from tenbaud.flight.viewing import ViewOptions
     from tenbaud.view.server import Address, free_port, require_nicegui
 
     if len(agreements) > 1 or agreements[0].link.in_process:
@@ -118,22 +85,17 @@ def _view_wish(
     host = loopback_host()
     address = Address(host, port or free_port(host))
     address.check()
-    return ViewWish(address.port, open_browser)
+    return ViewOptions(address.port, open_browser)
 
 
-def _agree_all(
-    preset: str | None,
-    config: Path | None,
-    changes: list[dict[str, Any]],
-    clock: options.ClockOption,
-) -> list[Agreement]:
+def _agree_all(flight: options.FlightOptions, changes: list[dict[str, Any]]) -> list[Agreement]:
     """Return the flights, each checked as far as it can be before anything starts."""
     from tenbaud.build.ends import check_parts
     from tenbaud.build.flight import agree
     from tenbaud.config.load import load_config
 
-    configs = [load_config(preset, config, change, allow_code=True) for change in changes]
-    agreements = [agree(one, clock.value) for one in configs]
+    configs = [load_config(flight.preset, flight.config, change, allow_code=True) for change in changes]
+    agreements = [agree(one, flight.clock.value) for one in configs]
     for agreement in agreements:
         check_parts(agreement.config)
     return agreements
@@ -144,7 +106,7 @@ def _fly_all(
     out: options.Out,
     as_json: bool,
     verbose: bool,
-    wish: ViewWish | None,
+    view_options: ViewOptions | None,
     pace: float | None,
 ) -> int:
     from tenbaud.flight.ends import write_json
@@ -158,7 +120,7 @@ def _fly_all(
         if out is not None and index:
             explicit = out.with_name(f"{out.name}-{index + 1}")
         folder = RunFolder(create_run_folder(None, agreement.config.preset, explicit))
-        result = _fly_shown(agreement, folder, wish, pace)
+        result = _fly_shown(agreement, folder, view_options, pace)
         results.append(result)
         folders.append(folder)
         if as_json:
@@ -173,11 +135,11 @@ def _fly_all(
 
 
 def _fly_shown(
-    agreement: Agreement, folder: RunFolder, wish: ViewWish | None, pace: float | None
+    agreement: Agreement, folder: RunFolder, view_options: ViewOptions | None, pace: float | None
 ) -> DemoResult:
     """Fly once, and show how it goes."""
     from tenbaud.flight.demo import fly_demo
     from tenbaud.flight.display import StatusDisplay
 
     with StatusDisplay() as display:
-        return fly_demo(agreement, folder, display.show, view=wish, pace=pace)
+        return fly_demo(agreement, folder, display.show, view=view_options, pace=pace)

@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from shlex import quote
+from typing import Annotated
 
 import typer
 
-if TYPE_CHECKING:
-    from tenbaud.keys.store import NodeKeys
+from channel.links.endpoints import DEFAULT_PORT
+from tenbaud.keys.authority import Certified, NodeRole
+from tenbaud.keys.store import (
+    KeysError,
+    NodeKeys,
+    add_node,
+    create_authority,
+    expiry_warning,
+    read_node,
+    read_nodes,
+    renew_node,
+)
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -36,9 +48,6 @@ DEFAULT_FOLDER = Path("keys")
 @app.command()
 def init(folder: Folder = DEFAULT_FOLDER) -> None:
     """Make the authority that signs the nodes' certificates; once, on one machine."""
-    from tenbaud.keys.hints import next_steps
-    from tenbaud.keys.store import create_authority
-
     made = create_authority(folder)
     typer.echo(f"{made}: the authority, valid for ten years. It never leaves this machine.")
     typer.echo(next_steps(()))
@@ -55,10 +64,6 @@ def add(
     folder: Folder = DEFAULT_FOLDER,
 ) -> None:
     """Make key and certificate of one node, and print the commands for the two machines."""
-    from tenbaud.keys.authority import NodeRole
-    from tenbaud.keys.hints import next_steps
-    from tenbaud.keys.store import add_node, read_nodes
-
     if role not in list(NodeRole):
         known = ", ".join(NodeRole)
         raise typer.BadParameter(f"--role says what {name} is for: {known}", param_hint="--role")
@@ -70,8 +75,6 @@ def add(
 @app.command()
 def renew(name: Name, host: Hosts = None, days: Days = 365.0, folder: Folder = DEFAULT_FOLDER) -> None:
     """Make a node's key and certificate anew, before or after it expires; copy its folder again."""
-    from tenbaud.keys.store import renew_node
-
     node = renew_node(folder, name, tuple(host or ()), days)
     typer.echo(_line(node))
     typer.echo(f"Copy {node.folder} to its machine again, and start its end again there.")
@@ -84,9 +87,6 @@ def show(
     ] = DEFAULT_FOLDER,
 ) -> None:
     """List the nodes, until when they are valid, and the commands for the two machines."""
-    from tenbaud.keys.hints import next_steps
-    from tenbaud.keys.store import KeysError, expiry_warning, read_node, read_nodes
-
     nodes = [read_node(folder)] if (folder / "node.pem").exists() else read_nodes(folder)
     if not nodes and not (folder / "authority").exists():
         raise KeysError(f"there are no keys in {folder}; `tenbaud keys init` makes an authority")
@@ -106,3 +106,48 @@ def _line(node: NodeKeys) -> str:
         f"{node.folder}: {certified.name}, {certified.role}, valid until "
         f"{certified.expires:%Y-%m-%d} ({certified.days_left():.0f} days){at}"
     )
+
+
+def endpoint_of(host: str) -> str:
+    """Return the TLS endpoint at a host name or address."""
+    return f"tls/[{host}]:{DEFAULT_PORT}" if ":" in host else f"tls/{host}:{DEFAULT_PORT}"
+
+
+def next_steps(nodes: Sequence[NodeKeys]) -> str:
+    """Return what is still to be added, or the commands for the machines of a whole set."""
+    transmitter = _first(nodes, NodeRole.TRANSMITTER)
+    receiver = _first(nodes, NodeRole.RECEIVER)
+    router = _first(nodes, NodeRole.ROUTER)
+    if transmitter is None:
+        return "Next: tenbaud keys add rig --role transmitter"
+    if receiver is None:
+        return "Next: tenbaud keys add desk --role receiver --host ADDRESS   (where the rig reaches it)"
+    rig, desk = transmitter.certified, receiver.certified
+    at = _place(desk)
+    at_rig, at_desk = (quote(str(node.folder)) for node in (transmitter, receiver))
+    lines = [
+        f"Copy {transmitter.folder} to the rig's machine and {receiver.folder} to the other, over ssh;",
+        "they hold private keys. Then:",
+        f"  on {desk.name}:  tenbaud receive --keys {at_desk} --peer {rig.name} --listen {at}",
+        f"  on {rig.name}:  tenbaud transmit --keys {at_rig} --peer {desk.name} --connect {at}",
+    ]
+    if router is not None:
+        hub = router.certified
+        at = _place(hub)
+        lines += [
+            f"Or, where the two cannot reach each other, through {hub.name}:",
+            f"  on {hub.name}:  tenbaud router --keys {quote(str(router.folder))} --listen {at} "
+            f"--flight helicopter={rig.name},{desk.name}",
+            f"  on {desk.name}:  tenbaud receive --keys {at_desk} --peer {hub.name} --router {at}",
+            f"  on {rig.name}:  tenbaud transmit --keys {at_rig} --peer {hub.name} --router {at}",
+        ]
+    return "\n".join(lines)
+
+
+def _place(node: Certified) -> str:
+    # Brackets around an address of IPv6 mean something to a shell.
+    return quote(endpoint_of(node.hosts[0])) if node.hosts else f"tls/ADDRESS:{DEFAULT_PORT}"
+
+
+def _first(nodes: Sequence[NodeKeys], role: NodeRole) -> NodeKeys | None:
+    return next((node for node in nodes if node.certified.role is role), None)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Many:
-    """What `--sessions` and the options that go with it say."""
+    """`--sessions` and its options."""
 
     sessions: str
     configs: Path | None
@@ -34,14 +34,14 @@ class Many:
 def serve(
     many: Many, node: options.NodeOptions, addresses: options.Addresses, changed: dict[str, Any]
 ) -> None:
-    """Serve until interrupted, or until so many flights have ended; see `docs/many-rigs.md`."""
+    """Serve until interrupted, or until enough flights have ended; see `docs/many-rigs.md`."""
     from channel.links.zenoh.config import SESSIONS_MAX
     from channel.links.zenoh.hub import ZenohHub
     from receiver.loops.many import ManyService
     from tenbaud.build.ends import check_parts
     from tenbaud.cli.addresses import endpoints_of
     from tenbaud.files.whole import write_whole
-    from tenbaud.flight.ends import SWITCH_INTERVAL_S, knocks
+    from tenbaud.flight.ends import SWITCH_INTERVAL_S, refusals
     from tenbaud.flight.many import ManyHost
     from tenbaud.flight.many_status import ManyStatus
     from tenbaud.flight.outcome import ExitCode
@@ -59,7 +59,7 @@ def serve(
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     with (
         StopFlag() as stop,
-        knocks(where) as refused,
+        refusals(where) as refused,
         ZenohHub(
             many.sessions,
             **where.node(),
@@ -106,7 +106,7 @@ def serve(
 def agreements(
     preset: str | None, path: Path | None, configs: Path | None, changed: dict[str, Any], clock: Clock
 ) -> Callable[[str], Agreement]:
-    """Return what gives the agreement for a session name; "" for that without a file of its own.
+    """Return what gives the agreement for a session name; "" for that without a separate file.
 
     A file is read anew when it has changed.
     """

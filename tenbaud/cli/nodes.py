@@ -121,15 +121,15 @@ def _run(
     from tenbaud.flight.outcome import ExitCode, first_code
     from tenbaud.flight.report import write_up
     from tenbaud.recording.folder import RunFolder, create_run_folder
-    from tenbaud.telemetry.station import Wish
+    from tenbaud.telemetry.end import TelemetryOptions
 
     config = load_config(node.preset, node.config, changed, allow_code=True)
     _check_link(config, addresses.insecure)
-    wish = Wish(node.telemetry, node.allow_control, pace)
-    agreement = replace(agree(config, node.clock.value), live=wish.control)
-    endpoints = replace(endpoints_of(role, addresses, config, take_over), telemetry=wish)
+    telemetry = TelemetryOptions(node.telemetry, node.allow_control, pace)
+    agreement = replace(agree(config, node.clock.value), live=telemetry.control)
+    endpoints = replace(endpoints_of(role, addresses, config, take_over), telemetry=telemetry)
     check_parts(config)
-    wish.check(role, endpoints.insecure, endpoints.security is not None)
+    telemetry.check(role, endpoints.insecure, endpoints.security is not None)
     whole = node.run_folder is None
     folder = RunFolder(node.run_folder or create_run_folder(None, f"{role}-{config.preset}", node.out))
     if whole:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -243,7 +243,7 @@ DryRun = Annotated[
 
 @dataclass(frozen=True, slots=True)
 class Addresses:
-    """Where the other end is, and who may be there."""
+    """Address and identity of the other end."""
 
     listen: Listen = None
     connect: Connect = None
@@ -256,8 +256,31 @@ class Addresses:
 
 
 @dataclass(frozen=True, slots=True)
+class FlightOptions:
+    """What `demo` flies."""
+
+    preset: Preset = None
+    config: ConfigFile = None
+    clock: Clock = ClockOption.VIRTUAL
+    duration: Duration = None
+    seed: Seed = None
+    lead: Lead = None
+    delivery: Delivery = None
+    link: DemoLink = None
+    line_rate: LineRate = None
+    downlink: Downlink = None
+    rig: Rig = None
+    dry_run: DryRun = False
+    disturbance: Disturbance = None
+    impair: Impair = None
+    on_desync: OnDesync = None
+    sabotage: Sabotage = None
+    settings: Settings = None
+
+
+@dataclass(frozen=True, slots=True)
 class NodeOptions:
-    """What `transmit` and `receive` have in common, addresses aside."""
+    """Common options of `transmit` and `receive`, except addresses."""
 
     preset: Preset = None
     config: ConfigFile = None
@@ -282,63 +305,52 @@ class NodeOptions:
 
     def changes(self, **own: Any) -> dict[str, Any]:
         """Return the configuration that these options, and the command's own, set."""
-        return overrides(
-            session=self.session,
-            link=self.link,
-            port=self.port,
-            line_rate=self.line_rate,
-            downlink=self.downlink,
-            lead=self.lead,
-            delivery=self.delivery,
-            impair=self.impair,
-            sabotage=self.sabotage,
-            settings=self.settings,
-            **own,
-        )
+        return overrides(**fields_of(self), **own)
+
+
+FIELDS = {
+    "duration": "duration_s",
+    "seed": "seed",
+    "lead": "timing.lead_ticks",
+    "delivery": "channel.delivery",
+    "session": "link.session",
+    "link": "link.kind",
+    "port": "link.port",
+    "line_rate": "link.line_rate_baud",
+    "downlink": "link.downlink",
+    "impair": "link.impairments",
+    "mismatch": "transmitter.plant.mismatch",
+    "disturbance": "transmitter.plant.disturbance",
+    "on_desync": "transmitter.on_desync",
+    "dry_run": "transmitter.dry_run",
+}
+"""Options that set one field of the configuration."""
+
+
+def fields_of(group: NodeOptions | FlightOptions) -> dict[str, Any]:
+    """Return those of a group of options that `overrides` takes."""
+    taken = (*FIELDS, "rig", "sabotage", "settings")
+    return {one.name: getattr(group, one.name) for one in fields(group) if one.name in taken}
 
 
 def overrides(
     *,
-    duration: float | None = None,
-    seed: int | None = None,
-    lead: int | None = None,
-    delivery: str | None = None,
-    session: str | None = None,
     rig: str | None = None,
-    mismatch: float | None = None,
-    disturbance: str | None = None,
-    link: str | None = None,
-    impair: str | None = None,
-    on_desync: str | None = None,
     sabotage: str | None = None,
     sabotaged_end: str = "transmitter",
-    port: str | None = None,
-    line_rate: int | None = None,
-    downlink: str | None = None,
-    dry_run: bool = False,
     settings: list[str] | None = None,
+    **options: Any,
 ) -> dict[str, Any]:
-    """Return the configuration that these options set, as nested sections."""
+    """Return the configuration that these options set, as nested sections; None and False set nothing.
+
+    `options` are those of `FIELDS`.
+    """
     from tenbaud.config.load import nested
 
-    named = {
-        "duration_s": duration,
-        "seed": seed,
-        "timing.lead_ticks": lead,
-        "channel.delivery": delivery,
-        "link.session": session,
-        "link.kind": link,
-        "link.port": port,
-        "link.line_rate_baud": line_rate,
-        "link.downlink": downlink,
-        "transmitter.plant.mismatch": mismatch,
-        "transmitter.plant.disturbance": disturbance,
-        "link.impairments": impair,
-        "transmitter.on_desync": on_desync,
-        f"{sabotaged_end}.sabotage": sabotage,
-        "transmitter.dry_run": dry_run or None,
-    }
-    values: dict[str, Any] = {name: value for name, value in named.items() if value is not None}
+    given = {name: value for name, value in options.items() if value is not None and value is not False}
+    values = {FIELDS[name]: value for name, value in given.items()}
+    if sabotage is not None:
+        values[f"{sabotaged_end}.sabotage"] = sabotage
     if rig is not None:
         values |= rigs.settings_of(rig)
     return nested(values | dict(_parse_setting(setting) for setting in settings or []))

@@ -18,7 +18,7 @@ from typing import TextIO
 
 BYTES_AS_THEY_ARE = "tenbaud-bytes-as-they-are"
 _FIRST, _LAST = "\udc80", "\udcff"
-"""What Python makes of bytes that are no text."""
+"""Python's replacements for bytes that are not text."""
 
 
 class KeptStream(io.TextIOWrapper):

@@ -6,11 +6,16 @@ import json
 import os
 from collections import Counter
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tenbaud.cli import options
+from tenbaud.studies.progress import progress_bar
+
+if TYPE_CHECKING:
+    from tenbaud.studies.study import Study
+    from tenbaud.studies.table import Results
 
 
 def sweep(
@@ -43,7 +48,6 @@ def sweep(
 
     After a stop or a kill the same command continues with the missing flights.
     """
-    from tenbaud.studies.run import run_study
     from tenbaud.studies.settings import StudyError
     from tenbaud.studies.study import read_study
     from tenbaud.studies.table import Results
@@ -51,11 +55,11 @@ def sweep(
     if scheduler is not None and workers is not None:
         raise StudyError("--workers is of this machine and --scheduler of a cluster: give one of them")
     what = read_study(study, seeds, allow_code=allow_code)
-    folder = out or Path("studies") / what.file.name
+    name = what.file.name
+    folder = out or Path("studies") / name
     results = Results(what, folder)
     try:
-        with _Bar(what.file.name) as bar:
-            table = run_study(what, results, bar.update, workers or os.cpu_count() or 1, scheduler)
+        table = _fly(what, results, workers or os.cpu_count() or 1, scheduler)
     except KeyboardInterrupt:
         typer.echo(
             f"stopped; finished flights are kept in {folder}. The same command continues", err=True
@@ -65,10 +69,10 @@ def sweep(
     if plots:
         from tenbaud.studies.plots import draw_study
 
-        drawn = draw_study(table, what.names, what.file.description or what.file.name, folder)
+        drawn = draw_study(table, what.names, what.file.description or name, folder)
     why = Counter(one for one in table["outcome"].to_pylist() if one != "ok")
     summary = {
-        "study": what.file.name,
+        "study": name,
         "points": len(what.points),
         "seeds": len(what.seeds),
         "flights": what.flights,
@@ -83,6 +87,16 @@ def sweep(
     _tell(summary, why)
 
 
+def _fly(what: Study, results: Results, workers: int, scheduler: str | None) -> Any:
+    from tenbaud.studies.run import run_study
+
+    name = what.file.name
+    with progress_bar(name, counted=True) as update:
+        return run_study(
+            what, results, lambda done, total: update(done, total, name), workers, scheduler
+        )
+
+
 def _tell(summary: dict[str, Any], why: Counter[str]) -> None:
     """Print the summary; `why` flights have no figures, and how often."""
     typer.echo(
@@ -94,32 +108,3 @@ def _tell(summary: dict[str, Any], why: Counter[str]) -> None:
         typer.echo(f"{why.total()} have no figures (column outcome). {count} of them: {most}")
     for path in summary["plots"]:
         typer.echo(f"  {path}")
-
-
-class _Bar:
-    """A progress bar on standard error."""
-
-    def __init__(self, name: str) -> None:
-        from rich.console import Console
-        from rich.progress import (
-            BarColumn,
-            MofNCompleteColumn,
-            Progress,
-            TextColumn,
-            TimeRemainingColumn,
-        )
-
-        columns = (TextColumn(name), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        self._progress = Progress(*columns, console=Console(stderr=True))
-        self._task = self._progress.add_task(name, total=None)
-
-    def __enter__(self) -> _Bar:
-        self._progress.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._progress.stop()
-
-    def update(self, done: int, total: int) -> None:
-        """Show how far it is."""
-        self._progress.update(self._task, completed=done, total=total)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tenbaud.cli import options
+from tenbaud.studies.progress import progress_bar
 
 if TYPE_CHECKING:
     from tenbaud.studies.tuning import Tuned
@@ -126,12 +127,12 @@ def tune(
     tuning = Tuning(preset, config, overrides, {}, split, method.value, evaluations, seed, allow_code)
     ranges = free_ranges(tuning.config({}), _named(free or []), model=model)
     tuning = replace(tuning, free=ranges)
-    with StopFlag() as stop, _bar(evaluations) as (progress, task):
-
-        def told(count: int, error: float) -> None:
-            progress.update(task, completed=count, description=f"best {math.degrees(error):.4g}°")
-
-        tuned = fit(tuning, told, stop)
+    with StopFlag() as stop, progress_bar("tune", counted=True) as update:
+        tuned = fit(
+            tuning,
+            lambda count, error: update(count, evaluations, f"best {math.degrees(error):.4g}°"),
+            stop,
+        )
     _leave(tuned, preset_text(tuning, tuned), out, as_json)
     if stop.raised:
         typer.echo(f"stopped after {tuned.evaluations} of {evaluations} evaluations", err=True)
@@ -202,23 +203,3 @@ def _parse_free(text: str) -> tuple[str, Any]:
         raise typer.BadParameter(f"--free {text}: {why}") from error
     except ValueError as error:
         raise typer.BadParameter(f"--free {text}: both ends are numbers") from error
-
-
-def _bar(total: int) -> Any:
-    from contextlib import contextmanager
-
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    @contextmanager
-    def shown() -> Any:
-        columns = (
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TimeRemainingColumn(),
-        )
-        with Progress(*columns, console=Console(stderr=True)) as progress:
-            yield progress, progress.add_task("tune", total=total)
-
-    return shown()

@@ -6,14 +6,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from channel.codec.codec import Coder
+from channel.codec.codec import Coder, CoderContext
 from channel.codec.coders.direction import DirectionCoder, DirectionParameters
 from channel.codec.coders.history import HistoryCoder, HistoryParameters
+from channel.codec.coders.open_loop_zoom import OpenLoopZoomCoder, OpenLoopZoomParameters
+from channel.codec.coders.pcm import PcmCoder, PcmParameters
 from channel.codec.coders.static import StaticCoder, StaticParameters
-from channel.codec.coders.timed import TimedCoder, TimedParameters
-from channel.codec.coders.words import WordsCoder, WordsParameters
 from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
-from channel.codec.plugin_context import CoderContext
 from tenbaud.config.kinds import Kind
 from tenbaud.config.section import AngleRange, Factor, KindSection, NotNegative, Positive
 
@@ -42,10 +41,10 @@ class FixedCoderSection(KindSection):
     gains: tuple[Factor, Factor] = (4.1, 8.6)
 
 
-class TimedCoderSection(KindSection):
+class OpenLoopZoomCoderSection(KindSection):
     """One sign per sample and a range that shrinks with time: time-based zooming."""
 
-    kind: Literal["timed"] = "timed"
+    kind: Literal["open-loop-zoom"] = "open-loop-zoom"
     initial_range_rad: AngleRange = 0.5
     minimum_range_rad: AngleRange = 0.05
     decay: Annotated[float, Field(ge=1e-6, le=1.0)] = 0.95
@@ -64,10 +63,10 @@ class StaticCoderSection(KindSection):
     gains: tuple[Factor, Factor] = (4.1, 8.6)
 
 
-class WordsCoderSection(KindSection):
+class PcmCoderSection(KindSection):
     """The usual loop: the angle as a word, the rate by differences. For the model `hold`."""
 
-    kind: Literal["words"] = "words"
+    kind: Literal["pcm"] = "pcm"
     bits: Annotated[int, Field(ge=1, le=15)] = 10
     range_rad: AngleRange = 3.141592653589793
     rate_filter_s: NotNegative = 0.0
@@ -88,7 +87,7 @@ class HistoryCoderSection(KindSection):
     minimum_range_rad: AngleRange = 0.001
     maximum_range_rad: AngleRange = 3.0
     weights: tuple[Factor, Factor, Factor] = (0.7, 0.45, 0.75)
-    """of the error that is left after the look-ahead: angle, angle times swing, swing"""
+    """of the error that is left after the look-ahead: angle, angle times T rate, T rate"""
     lookahead: Annotated[int, Field(ge=0, le=6)] = 1
     """samples that the transmitter looks ahead"""
 
@@ -143,9 +142,9 @@ def _zoom(section: ZoomCoderSection, context: CoderContext) -> Coder:
     )
 
 
-def _timed(section: TimedCoderSection, context: CoderContext) -> Coder:
-    return TimedCoder(
-        TimedParameters(
+def _open_loop_zoom(section: OpenLoopZoomCoderSection, context: CoderContext) -> Coder:
+    return OpenLoopZoomCoder(
+        OpenLoopZoomParameters(
             initial_range=section.initial_range_rad,
             minimum_range=section.minimum_range_rad,
             decay=section.decay,
@@ -157,8 +156,8 @@ def _timed(section: TimedCoderSection, context: CoderContext) -> Coder:
 def _fixed(section: FixedCoderSection, context: CoderContext) -> Coder:
     """A timed coder whose range has nowhere to go."""
     size = section.range_rad
-    return TimedCoder(
-        TimedParameters(initial_range=size, minimum_range=size, decay=1.0, **_common(section))
+    return OpenLoopZoomCoder(
+        OpenLoopZoomParameters(initial_range=size, minimum_range=size, decay=1.0, **_common(section))
     )
 
 
@@ -166,9 +165,9 @@ def _static(section: StaticCoderSection, context: CoderContext) -> Coder:
     return StaticCoder(StaticParameters(bits=section.bits, range=section.range_rad, **_common(section)))
 
 
-def _words(section: WordsCoderSection, context: CoderContext) -> Coder:
-    return WordsCoder(
-        WordsParameters(
+def _pcm(section: PcmCoderSection, context: CoderContext) -> Coder:
+    return PcmCoder(
+        PcmParameters(
             bits=section.bits,
             range=section.range_rad,
             period_s=context.symbol_period_s,
@@ -203,8 +202,8 @@ def _direction(section: DirectionCoderSection, context: CoderContext) -> Coder:
 
 ZOOM = Kind(ZoomCoderSection, _zoom)
 FIXED = Kind(FixedCoderSection, _fixed)
-TIMED = Kind(TimedCoderSection, _timed)
+OPEN_LOOP_ZOOM = Kind(OpenLoopZoomCoderSection, _open_loop_zoom)
 STATIC = Kind(StaticCoderSection, _static)
-WORDS = Kind(WordsCoderSection, _words)
+PCM = Kind(PcmCoderSection, _pcm)
 HISTORY = Kind(HistoryCoderSection, _history)
 DIRECTION = Kind(DirectionCoderSection, _direction)

@@ -35,9 +35,9 @@ CODERS = Registry(
     {
         "zoom": "tenbaud.config.coders:ZOOM",
         "fixed": "tenbaud.config.coders:FIXED",
-        "timed": "tenbaud.config.coders:TIMED",
+        "open-loop-zoom": "tenbaud.config.coders:OPEN_LOOP_ZOOM",
         "static": "tenbaud.config.coders:STATIC",
-        "words": "tenbaud.config.coders:WORDS",
+        "pcm": "tenbaud.config.coders:PCM",
         "history": "tenbaud.config.coders:HISTORY",
         "direction": "tenbaud.config.coders:DIRECTION",
     },

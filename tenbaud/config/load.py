@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from channel.errors import TenbaudError
+from tenbaud.config.deprecated import current_name, with_current_names
 from tenbaud.config.kinds import CODERS, MODELS
 from tenbaud.config.schema import KINDS, FlightConfig
 from tenbaud.config.section import OutsideSection, Section
@@ -36,14 +37,15 @@ def load_config(
     overrides: dict[str, Any] | None = None,
     *,
     allow_code: bool = False,
+    recorded: bool = False,
 ) -> FlightConfig:
     """Return the checked configuration.
 
     A file may name the preset that it builds on (`preset = "..."`); an explicit `preset` wins.
     `allow_code`: classes from outside that it names may be imported, as for a flight of one's own.
-    Raises ConfigError.
+    `recorded`: the file was written by a flight; old names in it cause no warning. Raises ConfigError.
     """
-    values = merged_values(preset, path, overrides)
+    values = merged_values(preset, path, overrides, recorded=recorded)
     try:
         config = FlightConfig.model_validate(values)
     except ValidationError as error:
@@ -53,15 +55,23 @@ def load_config(
 
 
 def merged_values(
-    preset: str | None = None, path: Path | None = None, overrides: dict[str, Any] | None = None
+    preset: str | None = None,
+    path: Path | None = None,
+    overrides: dict[str, Any] | None = None,
+    *,
+    recorded: bool = False,
 ) -> dict[str, Any]:
     """Return what `load_config` checks: nested settings, as they were read."""
-    from_file = read_toml(path) if path is not None else {}
+    source = str(path) if path is not None else f"preset {preset or DEFAULT_PRESET}"
+    from_file = (
+        with_current_names(read_toml(path), source, warn=not recorded) if path is not None else {}
+    )
     base = preset or from_file.get("preset") or DEFAULT_PRESET
     if not isinstance(base, str):
         raise ConfigError(f"{path}: preset must be a name in quotes, got {base!r}")
+    base = current_name("preset", base, source, warn=not recorded)
     values = _merge(_read_preset(base), from_file)
-    return _merge(values, overrides or {}) | {"preset": base}
+    return _merge(values, with_current_names(overrides or {}, "the settings")) | {"preset": base}
 
 
 def nested(settings: Mapping[str, Any]) -> dict[str, Any]:

@@ -6,10 +6,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from channel.codec.codec import ModelContext
 from channel.codec.models.hold import HoldModel
 from channel.codec.models.linear import LinearModel
 from channel.codec.models.pitch import PitchModel, PitchParameters
-from channel.codec.plugin_context import ModelContext
 from channel.codec.signals import InputSignal, Signal, Signals, named
 from tenbaud.config.kinds import Kind
 from tenbaud.config.section import Factor, KindSection, NotNegative, Positive

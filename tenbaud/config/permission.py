@@ -1,4 +1,4 @@
-"""Whether what a configuration names may be imported: a note beside it, which no file can set."""
+"""Permission to import the classes of a configuration: a mark beside it, which no file can set."""
 
 from __future__ import annotations
 

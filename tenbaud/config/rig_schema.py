@@ -42,7 +42,7 @@ class ElevationSection(AxisSection):
 
 
 class MotorsSection(Section):
-    """What a motor voltage becomes on its way to the device."""
+    """The conversion of a motor voltage for the device."""
 
     unit: Literal["motor_volts", "dac_volts"] = "motor_volts"
     """what the device takes: volts at the motor, or before its amplifier"""
@@ -56,7 +56,7 @@ class MotorsSection(Section):
 
 
 class BridgeSection(Section):
-    """What holds for every real rig."""
+    """Common settings of every real rig."""
 
     travel: TravelSection = TravelSection()
     pitch: PitchSection = PitchSection()

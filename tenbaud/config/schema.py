@@ -15,6 +15,7 @@ from channel.line.impairments import parse_impairments
 from channel.links.registry import LINKS
 from channel.protocol.sabotage import parse_sabotage
 from tenbaud.config.coders import ZoomCoderSection
+from tenbaud.config.deprecated import DIGEST_KINDS
 from tenbaud.config.kinds import (
     CODERS,
     CONTROLLERS,
@@ -73,7 +74,7 @@ class Timing(Section):
 
 
 class ChannelSection(Section):
-    """What the line carries, and when."""
+    """Symbol rate and timing of the line."""
 
     rate_baud: Annotated[float, Field(ge=0.001, le=100_000.0)] = 10.0
     """R: symbols per second that may go up the link"""
@@ -102,7 +103,7 @@ KINDS: dict[str, dict[str, type[KindSection]]] = {
 
 
 class Limits(Section):
-    """What a command may be; the receiver keeps to it and the guard beside the motors checks it."""
+    """Limits of a command; the receiver keeps them and the guard beside the motors checks them."""
 
     volts_max: Annotated[float, Field(ge=0.001, le=32.0)] = 5.0
     slew_volts_per_s: Positive = 1000.0
@@ -134,7 +135,7 @@ class TransmitterSection(Section):
     rig: Literal["simulated", "replay", "serial", "quarc", "hil"] = "simulated"
     dry_run: bool = False
     """read the rig and never move it"""
-    sight_bandwidth_rad_s: Annotated[float, Field(ge=0.001, le=10_000.0)] = 30.0
+    rate_observer_bandwidth_rad_s: Annotated[float, Field(ge=0.001, le=10_000.0)] = 30.0
     """bandwidth of the rate observer, for coders that use rates"""
     encoder_counts_per_turn: Annotated[int, Field(ge=2, le=10_000_000)] = 4096
     encoder_sign: Literal[-1, 1] = 1
@@ -207,7 +208,7 @@ class FlightLogSection(Section):
 
 
 class LinkSection(Section):
-    """Where the other end is."""
+    """The link to the other end."""
 
     kind: Annotated[str, AfterValidator(PartName(LINKS))] = "zenoh"
     session: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]+(/[A-Za-z0-9_.-]+)*$")] = "helicopter"
@@ -236,7 +237,7 @@ class LinkSection(Section):
 
 
 class TelemetrySection(Section):
-    """What viewers are told while the flight goes on."""
+    """Telemetry for viewers during the flight."""
 
     rate_hz: Annotated[float, Field(ge=0.01, le=100.0)] = 20.0
     """messages per second of each end"""
@@ -265,4 +266,5 @@ class FlightConfig(CodePermission):
         """Return the shared part as canonical JSON, with the command lead that was chosen."""
         shared = self.model_dump(mode="json", include=set(SHARED_SECTIONS))
         shared["timing"]["lead_ticks"] = lead_ticks
+        shared["coder"]["kind"] = DIGEST_KINDS.get(self.coder.kind, self.coder.kind)
         return json.dumps(shared, sort_keys=True, separators=(",", ":"))

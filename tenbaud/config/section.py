@@ -1,4 +1,4 @@
-"""What every section of the configuration is."""
+"""The base of every section of the configuration."""
 
 from __future__ import annotations
 
@@ -16,12 +16,10 @@ Mismatch = Annotated[float, Field(ge=-0.999, le=10.0)]
 Volts = Annotated[float, Field(ge=-32.0, le=32.0)]
 Counts = Annotated[int, Field(ge=-(2**31), lt=2**31)]
 
-PluginName = Annotated[str, Field(pattern=r"^[A-Za-z_][\w.]*:[A-Za-z_]\w*$")]
-"""A class from outside, `module:Class`."""
 OfferedName = Annotated[str, Field(pattern=r"^[A-Za-z_][\w.-]*(:[A-Za-z_]\w*)?$")]
-"""The same, or a name that an installed package offers."""
+"""A class from outside, `module:Class`, or a name that an installed package offers."""
 Options = dict[str, JsonValue]
-"""What it is built with, beside what it is told of the flight."""
+"""Constructor arguments, beside the context of the flight."""
 
 
 class Section(BaseModel):
@@ -37,7 +35,7 @@ class KindSection(Section):
 
 
 class OutsideSection(KindSection):
-    """A class from outside: named here, or offered by an installed package under a name of its own."""
+    """A class from outside: named here, or offered by an installed package under its name."""
 
     kind: OfferedName
     """module:Class, or the name that a package offers"""

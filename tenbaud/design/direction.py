@@ -27,7 +27,7 @@ GROWN = 4
 """samples that the first P has grown for"""
 SQUARINGS = 4
 GAIN_LEAST, PATIENCE = 1e-4, 3
-"""the search ends after so many rounds that gain less"""
+"""relative gain of a round; the search ends after more than this number of rounds that gain less"""
 WORTH_MAX = 1e9
 """of an error of the usual size, in units of the floor"""
 

@@ -1,8 +1,8 @@
-"""Files that are there whole or not at all: every file that a command leaves is written here.
+"""Writes every file of a command whole or not at all.
 
-A file is written beside its place under a temporary name, flushed to the disk and renamed. Whoever is
-stopped, killed or out of space leaves the old file or none, and never half of the new one. A recording
-is the exception: it is read as far as it goes (`tenbaud/recording/writer.py`).
+A file is written beside its place under a temporary name, flushed to the disk and renamed. A process
+that is stopped, killed or out of space leaves the old file or none, and never half of the new one.
+Recordings are the exception: they are read as far as they go (`tenbaud/recording/writer.py`).
 """
 
 from __future__ import annotations

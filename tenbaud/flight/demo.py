@@ -10,7 +10,7 @@ import signal
 import subprocess
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import IO
 
@@ -26,7 +26,7 @@ from tenbaud.flight.report import write_up
 from tenbaud.flight.status import Status
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, joined
-from tenbaud.flight.viewing import Viewing, ViewWish, page_beside
+from tenbaud.flight.viewing import Viewing, ViewOptions, page_beside
 from tenbaud.recording.folder import RunFolder
 
 OnStatus = Callable[[Status], None]
@@ -35,7 +35,7 @@ ENDING_TIMEOUT_S = 15.0
 
 @dataclass(slots=True)
 class DemoResult:
-    """What both processes reported."""
+    """The reports of both processes."""
 
     summary: Summary
     code: ExitCode
@@ -49,13 +49,13 @@ def fly_demo(
     on_status: OnStatus,
     *,
     draw: bool = True,
-    view: ViewWish | None = None,
+    view: ViewOptions | None = None,
     pace: float | None = None,
 ) -> DemoResult:
     """Fly once into an existing, empty run folder; write summary and, if wished, figure there.
 
     `view`: serve the live page beside the flight, which may then be steered from it. `pace`: on the
-    virtual clock, at most so many times real time; not for a link within one process.
+    virtual clock, at most this factor of real time; not for a link within one process.
     """
     write_whole(folder.config, dump_config(agreement.config))
     if agreement.link.in_process:
@@ -65,7 +65,7 @@ def fly_demo(
     else:
         with StopFlag() as stop, page_beside(view, stop) as viewing:
             if pace is not None:
-                viewing.transmitter += ["--pace", str(pace)]
+                viewing = replace(viewing, transmitter=[*viewing.transmitter, "--pace", str(pace)])
             result = _fly_processes(agreement, folder, on_status, viewing, stop)
     problems = write_up(folder, agreement.config, result.summary, draw)
     # What ended the flight is said last.
@@ -146,7 +146,7 @@ def _wait(ends: tuple[_Child, _Child], stop: StopFlag) -> None:
 
 @dataclass(slots=True)
 class _Child:
-    """One end as a process of its own; its two pipes are read by two threads."""
+    """One end as a separate process; its two pipes are read by two threads."""
 
     role: Role
     agreement: Agreement

@@ -1,4 +1,4 @@
-"""Shows the status of a running flight from a thread of its own, which only reads.
+"""Shows the status of a running flight from a separate thread, which only reads.
 
 A terminal gets a small view that is drawn in place (`screen.py`); anything else, a file or a pipe, one
 plain line every two seconds. With `lines` each status is a line of JSON on standard error, for the

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from channel.codec.signals import signals_of
 from channel.links.base import Link, Role
 from channel.links.kind import LinkEnd, NodePlace
 from channel.links.security import Security
@@ -26,12 +27,13 @@ from tenbaud.flight.status import Status, StatusMode
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, gap_part, link_part, receiver_part, transmitter_part
 from tenbaud.flight.trouble import Trouble
+from tenbaud.recording.encoding import SIGNALS_KEY, signals_text
 from tenbaud.recording.folder import RunFolder
 from tenbaud.recording.gather import OverviewRecorder
 from tenbaud.recording.shared import SharedWriter
 from tenbaud.recording.writer import McapRecorder
 from tenbaud.telemetry.compose import ReceiverComposer, TransmitterComposer
-from tenbaud.telemetry.station import NO_WISH, Station, Wish, open_station
+from tenbaud.telemetry.end import DEFAULT_OPTIONS, TelemetryEnd, TelemetryOptions, open_telemetry
 from transmitter.loops.virtual_peer import LinkPeer
 
 SWITCH_INTERVAL_S = 0.0002
@@ -42,7 +44,7 @@ WORDS_SHOWN = 48
 
 @dataclass(frozen=True, slots=True)
 class Endpoints:
-    """Where an end listens and connects."""
+    """Addresses where an end listens and connects."""
 
     listen: tuple[str, ...] = ()
     connect: tuple[str, ...] = ()
@@ -54,7 +56,7 @@ class Endpoints:
     """TLS, and who is let in; None: plain"""
     take_over: bool = False
     """receiver: take a flight over from the receiver that has it"""
-    telemetry: Wish = NO_WISH
+    telemetry: TelemetryOptions = DEFAULT_OPTIONS
 
     def node(self) -> NodePlace:
         """Return what opens this end's Zenoh session."""
@@ -82,21 +84,24 @@ def run_transmitter(
 ) -> tuple[Outcome, Summary]:
     """Fly one flight as the transmitter; the outcome says how it ended."""
     with _end(agreement, "transmitter", folder) as (recorder, stop):
-        station = _station(agreement, "transmitter", recorder, endpoints)
-        with knocks(endpoints) as refused, open_link(agreement, "transmitter", endpoints, stop) as link:
+        telemetry = _telemetry(agreement, "transmitter", recorder, endpoints)
+        with (
+            refusals(endpoints) as refused,
+            open_link(agreement, "transmitter", endpoints, stop) as link,
+        ):
             trouble = Trouble(link, endpoints.security, refused, stop)
-            run = transmit.prepare(agreement, station.recorder, link.wire)
+            run = transmit.prepare(agreement, telemetry.recorder, link.wire)
             peer = _peer(run, link, trouble.should_stop, recorder)
             keep_alive = peer.keep_alive if peer is not None else None
-            live = station.fly_transmitter(run, trouble.should_stop, keep_alive)
+            live = telemetry.fly_transmitter(run, trouble.should_stop, keep_alive)
             with (
-                station.publishing(lambda tap: TransmitterComposer(run, tap, live)),
+                telemetry.publishing(lambda tap: TransmitterComposer(run, tap, live)),
                 StatusReporter(lambda: transmitter_status(run), status),
             ):
                 outcome = _guarded(lambda: _fly(run, link, peer, trouble.should_stop))
                 outcome = trouble.first_cause(outcome, SAFE)
-            run.node.rest()
-        summary = transmitter_part(run, outcome) | link_part(link, refused) | station.summary()
+            run.node.flush_records()
+        summary = transmitter_part(run, outcome) | link_part(link, refused) | telemetry.summary()
         return outcome, _with_recording(summary, recorder)
 
 
@@ -105,29 +110,29 @@ def run_receiver(
 ) -> tuple[Outcome, Summary]:
     """Serve one flight as the receiver; the outcome says how it ended."""
     with _end(agreement, "receiver", folder) as (recorder, stop):
-        station = _station(agreement, "receiver", recorder, endpoints)
-        with knocks(endpoints) as refused, open_link(agreement, "receiver", endpoints, stop) as link:
+        telemetry = _telemetry(agreement, "receiver", recorder, endpoints)
+        with refusals(endpoints) as refused, open_link(agreement, "receiver", endpoints, stop) as link:
             trouble = Trouble(link, endpoints.security, refused, stop)
             endpoint = build_receiver(
-                agreement, station.recorder, link.wire, endpoints.take_over, station.steering
+                agreement, telemetry.recorder, link.wire, endpoints.take_over, telemetry.steering
             )
-            live = station.fly_receiver(endpoint, trouble.should_stop)
+            live = telemetry.fly_receiver(endpoint, trouble.should_stop)
             with (
-                station.publishing(lambda tap: ReceiverComposer(agreement, endpoint, tap, live)),
+                telemetry.publishing(lambda tap: ReceiverComposer(agreement, endpoint, tap, live)),
                 StatusReporter(lambda: receiver_status(agreement, endpoint), status),
             ):
                 outcome = _guarded(
                     lambda: receive.serve(agreement, endpoint, link, live, recorder.help_out)
                 )
                 outcome = trouble.first_cause(outcome)
-            endpoint.session.rest()
+            endpoint.session.flush_records()
         summary = receiver_part(agreement, endpoint, outcome) | link_part(link, refused)
-        summary |= station.summary()
+        summary |= telemetry.summary()
         return outcome, _with_recording(summary, recorder)
 
 
 @contextmanager
-def knocks(endpoints: Endpoints) -> Iterator[Counter[str]]:
+def refusals(endpoints: Endpoints) -> Iterator[Counter[str]]:
     """Within a `with`, connections that fail to prove who they are get counted by reason."""
     if endpoints.security is None or not endpoints.listen:
         yield Counter()
@@ -150,8 +155,8 @@ def run_in_memory(
         endpoint = build_receiver(agreement, receiver_recorder, DATAGRAM)
         with StatusReporter(lambda: transmitter_status(run), status):
             outcome = _guarded(lambda: transmit.fly_virtual(run, endpoint, stop))
-        run.node.rest()
-        endpoint.session.rest()
+        run.node.flush_records()
+        endpoint.session.flush_records()
         upper = transmitter_part(run, outcome)
         lower = receiver_part(agreement, endpoint, outcome)
         return outcome, _with_recording(upper, recorder), lower
@@ -164,6 +169,7 @@ def open_recorder(
 
     `writer`: a thread that it shares with others, instead of one of its own.
     """
+    plant = signals_of(agreement.codec.model)
     metadata = {
         "role": role,
         "preset": agreement.config.preset,
@@ -173,11 +179,12 @@ def open_recorder(
         "numerics_probe": agreement.identity.numerics_probe.hex(),
         "tick_s": repr(agreement.config.timing.tick_s),
         "shared_config": agreement.identity.config,
+        SIGNALS_KEY: signals_text(plant),
         "seed": str(agreement.config.seed),
         "impairments": agreement.config.link.impairments,
     }
     # Of many rigs no figures are drawn at the end.
-    overview = OverviewRecorder() if writer is None else None
+    overview = OverviewRecorder(plant) if writer is None else None
     # Virtual time can outrun the disk and is not disturbed by waiting for it.
     wait = agreement.clock == "virtual"
     return McapRecorder(path, metadata, wait_when_full=wait, shared=writer, overview=overview)
@@ -241,8 +248,10 @@ def _end(
         yield recorder, stop
 
 
-def _station(agreement: Agreement, role: Role, recorder: McapRecorder, endpoints: Endpoints) -> Station:
-    return open_station(
+def _telemetry(
+    agreement: Agreement, role: Role, recorder: McapRecorder, endpoints: Endpoints
+) -> TelemetryEnd:
+    return open_telemetry(
         agreement,
         role,
         recorder,
@@ -265,7 +274,7 @@ def _peer(run: TransmitterRun, link: Link, stop: Stop, recorder: McapRecorder) -
         return None
 
     def meanwhile() -> None:
-        run.node.rest()
+        run.node.flush_records()
         recorder.help_out()
 
     return transmit.link_peer(run, link, stop, meanwhile)

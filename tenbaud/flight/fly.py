@@ -21,7 +21,7 @@ FIELDS = {
     "plant": "transmitter.plant.kind",
     "controller": "receiver.controller",
 }
-"""Where the configuration names each part."""
+"""The setting that names each part."""
 
 
 class FlightFailed(TenbaudError):

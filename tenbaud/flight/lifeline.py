@@ -19,7 +19,7 @@ VARIABLE = "TENBAUD_ENDS_WITH_STDIN"
 def start_child(*arguments: str, **more: Any) -> subprocess.Popen[str]:
     """Start `tenbaud` with these arguments as a child that ends when this process does.
 
-    It has a group of its own: a Ctrl-C at the terminal reaches it through its parent only. `more` goes
+    It has a separate group: a Ctrl-C at the terminal reaches it through its parent only. `more` goes
     to `subprocess.Popen`.
     """
     return subprocess.Popen(

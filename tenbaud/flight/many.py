@@ -23,24 +23,24 @@ from receiver.session.rejoin import difference
 from tenbaud.build.ends import build_receiver
 from tenbaud.build.flight import Agreement
 from tenbaud.config.load import dump_config
-from tenbaud.files.whole import WriteError, write_error, write_whole
+from tenbaud.files.whole import WriteError, write_whole
 from tenbaud.flight.ends import open_recorder
 from tenbaud.flight.outcome import ExitCode, Outcome, outcome_of
-from tenbaud.flight.rate_limited_log import SparingTeller
+from tenbaud.flight.rate_limited_log import RateLimitedLog
 from tenbaud.flight.receive import ended_outcome
 from tenbaud.flight.report import write_summary
 from tenbaud.flight.summary import Summary, receiver_part
-from tenbaud.recording.folder import RunFolder
+from tenbaud.recording.folder import RunFolder, make_numbered
 from tenbaud.recording.shared import SharedWriter
 from tenbaud.recording.writer import McapRecorder
 from tenbaud.sentences import endings
 
-Tell = Callable[[str], None]
+Log = Callable[[str], None]
 AgreementOf = Callable[[str], Agreement]
 """Session name -> what its flights are agreed on; raises TenbaudError where there is no such."""
 
-TOLD_MAX = 1000
-"""Refusals remembered, so that a transmitter that keeps asking is told of once."""
+LOGGED_MAX = 1000
+"""Refusals remembered, so that repeated requests of a transmitter are logged once."""
 
 
 @dataclass(slots=True)
@@ -66,20 +66,20 @@ class ManyHost:
         agreement_of: AgreementOf,
         root: Path,
         rigs_max: int,
-        tell: Tell,
+        log: Log,
     ) -> None:
         self._hub = hub
         self._agreement_of = agreement_of
         self._root = root
         self._rigs_max = rigs_max
-        self._tell = tell
-        self._tell_stranger = SparingTeller(tell)
+        self._log = log
+        self._log_refusal = RateLimitedLog(log)
         self._writer = SharedWriter()
         self._worker = ThreadPoolExecutor(1, "files")
         self._ready: deque[tuple[str, Served]] = deque()
         self._opening: set[str] = set()
         self._open: dict[str, Flight] = {}
-        self._refused: deque[tuple[str, int]] = deque(maxlen=TOLD_MAX)
+        self._refused: deque[tuple[str, int]] = deque(maxlen=LOGGED_MAX)
         self._unexplained: set[str] = set()
         """names refused whose transmitters have not said yet how they see it"""
         self.summaries: list[Summary] = []
@@ -89,7 +89,7 @@ class ManyHost:
 
     # In the loop's thread
 
-    def knock(self, name: str, data: bytes) -> list[bytes]:
+    def on_unserved(self, name: str, data: bytes) -> list[bytes]:
         """Take a message of a session that has no service; return what to answer.
 
         A request for a session opens one. A symbol is answered as a restarted receiver does, so that
@@ -115,7 +115,7 @@ class ManyHost:
             case Bye() if frame.session == 0 and name in self._unexplained:
                 # Once per refusal: a line on a terminal takes the loop's time.
                 self._unexplained.discard(name)
-                self._tell_stranger(f"{name}: as its transmitter sees it: {frame.text}")
+                self._log_refusal(f"{name}: as its transmitter sees it: {frame.text}")
             case _:
                 self.counts["strays"] += 1
         if answer is None:
@@ -149,7 +149,7 @@ class ManyHost:
             ending = Ending.LINK_LOST
         for message in served.endpoint.bye(End(ending)):
             self._hub.send(served.name, message)
-        served.endpoint.session.rest()
+        served.endpoint.session.flush_records()
 
     def close(self) -> None:
         """Wait until all files are finished; for after the loop."""
@@ -159,7 +159,7 @@ class ManyHost:
             served.endpoint.bye(End(Ending.STOPPED))
             self._finish(self._open[name], served, None)
         self._writer.close()
-        self._tell_stranger.finish()
+        self._log_refusal.finish()
 
     # In the worker's thread
 
@@ -187,14 +187,14 @@ class ManyHost:
     def _refusal(self, name: str, hello: Hello, refusal: End, config: str) -> Refuse:
         if (name, hello.incarnation) not in self._refused:
             self._refused.append((name, hello.incarnation))
-            if len(self._unexplained) < TOLD_MAX:
+            if len(self._unexplained) < LOGGED_MAX:
                 self._unexplained.add(name)
             self.counts["refused"] += 1
-            self._tell_stranger(f"{name}: refused: {refusal.text}")
+            self._log_refusal(f"{name}: refused: {refusal.text}")
         return Refuse(hello.incarnation, refusal.ending, refusal.text, config)
 
     def _serve(self, name: str, agreement: Agreement, data: bytes) -> Served:
-        folder = RunFolder(_new_folder(self._root, name))
+        folder = RunFolder(make_numbered(self._root / name.replace("/", "-")))
         link = agreement.config.link.model_copy(update={"session": name})
         write_whole(folder.config, dump_config(agreement.config.model_copy(update={"link": link})))
         recorder = open_recorder(agreement, "receiver", folder.receiver, self._writer)
@@ -206,7 +206,7 @@ class ManyHost:
             raise
         self._open[name] = Flight(name, agreement, folder, recorder)
         self.counts["flights"] += 1
-        self._tell(f"{name}: a flight begins, recording into {folder.path}")
+        self._log(f"{name}: a flight begins, recording into {folder.path}")
         symbols_per_s = 1e9 * agreement.terms.symbols_per_word / agreement.terms.sample_ns
         allowed_per_s = SURPLUS * symbols_per_s if agreement.clock == "real" else None
         return Served(name, endpoint, link.peer_timeout_s, allowed_per_s, data)
@@ -227,14 +227,12 @@ class ManyHost:
             }
             if flight.recorder.error is not None:
                 self.counts["not_written"] += 1
-                self._tell(f"{flight.name}: {flight.recorder.error}")
+                self._log(f"{flight.name}: {flight.recorder.error}")
             write_summary(flight.folder, flight.summary)
-            self._tell(
-                f"{flight.name}: ended after {flight.summary['samples']} samples: {outcome.text}"
-            )
+            self._log(f"{flight.name}: ended after {flight.summary['samples']} samples: {outcome.text}")
         except WriteError as problem:
             self.counts["not_written"] += 1
-            self._tell(f"{flight.name}: {problem}")
+            self._log(f"{flight.name}: {problem}")
         finally:
             self._open.pop(flight.name, None)
             self._hub.leave(flight.name)
@@ -252,22 +250,6 @@ def _outcome(agreement: Agreement, served: Served, error: Exception | None) -> O
     if end is not None and end.ending is Ending.STOPPED and not end.by_peer:
         return Outcome(ExitCode.INTERRUPTED, endings.end_text(end, "transmitter"))
     return ended_outcome(agreement, session)
-
-
-def _new_folder(root: Path, name: str) -> Path:
-    """Make a folder for a flight: the session's name, and a number if it has flown before."""
-    plain = name.replace("/", "-")
-    number = 1
-    while True:
-        path = root / (plain if number == 1 else f"{plain}-{number}")
-        try:
-            path.mkdir(parents=True)
-        except FileExistsError:
-            number += 1
-        except OSError as error:
-            raise write_error(path, error) from error
-        else:
-            return path
 
 
 def _opened(data: bytes) -> tuple[Frame | None, int | None]:

@@ -1,6 +1,6 @@
-"""What a person wants to see of a receiver that serves many rigs: what needs attention, and a table.
+"""The terminal view of a receiver that serves many rigs: problems first, and a table.
 
-On a terminal the table is redrawn once a second; what begins, ends or is refused is a line of its own
+On a terminal the table is redrawn once a second; what begins, ends or is refused is a separate line
 everywhere.
 """
 

@@ -8,9 +8,8 @@ from dataclasses import asdict
 from channel.codec.codec import Codec, Vector
 from channel.codec.models.linear import LinearModel
 from channel.errors import ConfigMismatch, LinkLost
-from channel.line.downlink import Downlink
 from channel.line.impairments import LineFaults
-from channel.line.line import CleanLine, Line
+from channel.line.line import CleanLine, Downlink, Line
 from channel.line.uplink import Uplink
 from channel.protocol.endings import End, Ending
 from channel.protocol.identity import Identity, numerics_probe
@@ -36,10 +35,10 @@ from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode
 from transmitter.rigs.simulated import SimulatedRig
 from transmitter.session.session import Phase, TransmitterSession
-from transmitter.session.sight import Sight
+from transmitter.session.state_observer import StateObserver
 
 INCARNATION, SESSION_NUMBER = 1, 1
-"""Fixed: a process of its own would draw them, and a flight in memory is the same every time."""
+"""Fixed: a separate process would draw them, and a flight in memory is the same every time."""
 RAMP_TICKS = 50
 REARM_S = 10.0
 """A guard that stopped for want of commands is armed again, by a rejoin, within this time: the plant is
@@ -56,7 +55,7 @@ class MemoryFlight:
     flies once. PartError, naming the member, for an object that lacks something; ValueError for terms
     that do not go with the codec.
 
-    `receiver_codec`: a codec of its own for the receiver, for studies of lost lockstep.
+    `receiver_codec`: a separate codec for the receiver, for studies of lost lockstep.
     `uplink_line`, `downlink_line`: lines that delay, lose or change messages; clean ones without.
     `encoder_counts_per_turn`: what each measured angle is rounded to.
     `scored_from_s`: flight time at which `node.scores` begins to count errors.
@@ -101,7 +100,7 @@ class MemoryFlight:
             INCARNATION,
             self.transmitter_rows,
             stop_on_desync=stop_on_desync,
-            sight=_sight(codec, encoder_counts_per_turn),
+            state_observer=_observer(codec, encoder_counts_per_turn),
         )
         self.receiver = ReceiverSession(
             receiver_codec or codec, terms, controller, identity, SESSION_NUMBER, self.receiver_rows
@@ -145,7 +144,7 @@ class MemoryFlight:
         )
 
     def fly(self, seconds: float) -> FlightResult:
-        """Fly so many seconds of flight time; return everything that was seen at both ends.
+        """Fly the given number of seconds of flight time; return everything that was seen at both ends.
 
         A flight that ends before its time (the guard, a lost lockstep with `stop_on_desync`) returns
         too: `ended_by` says why. Raises ConfigMismatch where the receiver refuses, and LinkLost where
@@ -168,7 +167,7 @@ class MemoryFlight:
         ended_by = "" if flown == ticks else self._ended_by()
         end = End(Ending.OVER) if flown == ticks else self.transmitter.end or End(Ending.SAFETY_STOP)
         self.loop.finish(lambda: end)
-        self.receiver.rest()
+        self.receiver.flush_records()
         rows = (self.transmitter_rows, self.receiver_rows)
         return result_of(
             self.codec.model, self.terms, self.transmitter, self.receiver, rows, flown, ended_by
@@ -180,13 +179,13 @@ class MemoryFlight:
         return guard_text(self.node.guard.reason) if end is None else end_text(end, "receiver")
 
 
-def _sight(codec: Codec, counts_per_turn: int) -> Sight | None:
+def _observer(codec: Codec, counts_per_turn: int) -> StateObserver | None:
     """Return what shows a coder all states of a linear model; None: as the session has it."""
     if not (codec.uses_rates and isinstance(codec.model, LinearModel)):
         return None
-    from tenbaud.design.sight import sight_of_coder
+    from tenbaud.design.observer import observer_of_coder
 
-    return sight_of_coder(codec, counts_per_turn)
+    return observer_of_coder(codec, counts_per_turn)
 
 
 def _check(codec: Codec, terms: Terms, plant: Plant, controller: Controller) -> None:

@@ -1,4 +1,4 @@
-"""What was seen of a flight in memory, as arrays over its ticks and tuples over its samples."""
+"""The result of a flight in memory: arrays over its ticks and tuples over its samples."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ class FlightResult:
     states: Series
     """the codec's estimate, a column per model state"""
     live_states: Series
-    """what the receiver believed of the tick when it decided the tick's command"""
+    """the receiver\'s predicted estimate of the tick when it decided the tick's command"""
     commands: Series
     """motor voltages applied, a column per input"""
     errors: Series
     """true angle less the codec's estimate, a column per measured axis"""
     live_errors: Series
-    """true angle less what the receiver believed of it"""
+    """true angle less the receiver\'s predicted estimate of it"""
     samples: tuple[int, ...]
     """the samples that were confirmed: both ends hold equal states after them"""
     words: tuple[Word, ...]
@@ -83,11 +83,11 @@ def result_of(
     ticks: int,
     ended_by: str,
 ) -> FlightResult:
-    """Return the result of a flight of so many ticks, from the `rows` of transmitter and receiver."""
+    """Return the result of a flight of `ticks` ticks, from the `rows` of transmitter and receiver."""
     up, down = rows
     first = model.measured(model.initial())
     axes, inputs = len(first), model.input_size
-    angles = _per_tick(up, "tick", "true_rad", ticks, axes)
+    angles = _per_tick(up, "tick", "true", ticks, axes)
     states = _per_tick(up, "estimate", "coded_state", ticks, model.state_size)
     live = _per_tick(up, "estimate", "live_state", ticks, model.state_size)
     events = sorted([*transmitter.events, *receiver.events], key=lambda event: event.time_ns)
@@ -95,11 +95,11 @@ def result_of(
         ticks=ticks,
         time_s=np.asarray(np.arange(ticks) * (terms.tick_ns / 1e9), dtype=np.float64),
         angles_rad=angles,
-        measured_rad=_per_tick(up, "tick", "measured_rad", ticks, axes),
-        reference_rad=_per_tick(down, "tick", "reference_rad", ticks, 1)[:, 0],
+        measured_rad=_per_tick(up, "tick", "measured", ticks, axes),
+        reference_rad=_per_tick(down, "tick", "reference", ticks, 1)[:, 0],
         states=states,
         live_states=live,
-        commands=_per_tick(up, "tick", "applied_volts", ticks, inputs),
+        commands=_per_tick(up, "tick", "applied", ticks, inputs),
         errors=angles - _measured(model, states, axes),
         live_errors=angles - _measured(model, live, axes),
         samples=tuple(up.column("sample", "sample")),

@@ -54,13 +54,13 @@ _ENDINGS = {
 
 
 def farewell_of(outcome: Outcome) -> End:
-    """Return what the other end is told about an outcome."""
+    """Return the ending that an outcome sends to the other end."""
     ending = _ENDINGS.get(outcome.code, Ending.FAILED)
     return End(ending, "" if ending in (Ending.OVER, Ending.STOPPED) else outcome.text)
 
 
 def first_cause(outcome: Outcome, trouble: str, consequence: str = "") -> Outcome:
-    """Return the outcome, told by what was wrong with this end's own line if that was lost.
+    """Return the outcome, with the fault of this end's own line as its cause if that was lost.
 
     Seen from a lost line the other end is silent, which is what the outcome would blame.
     """
@@ -95,7 +95,7 @@ def outcome_of_status(name: str, status: int, last_words: str = "") -> Outcome:
     """Return the outcome that a child process' exit status stands for; `name` is what it was.
 
     `status` is as `subprocess` has it: negative for a signal. What the child said last is the text, but
-    not for a signal: whoever was killed could not say so.
+    not for a signal: a killed process reports nothing.
     """
     if status < 0:
         try:

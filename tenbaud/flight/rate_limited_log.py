@@ -1,7 +1,7 @@
-"""Lines on a terminal or in a log that somebody outside can cause: told sparingly.
+"""A rate limiter for log lines that other machines can cause.
 
-The first are told at once, then one every so often; what is left out is counted, and the count is
-told with the next one. So an intruder can neither fill a disk nor hold up the loop that tells.
+The first lines are written at once, later ones at a limited rate. The next line gives the number of
+omitted ones. So an intruder can neither fill a disk nor delay the loop that logs.
 """
 
 from __future__ import annotations
@@ -12,44 +12,44 @@ from collections.abc import Callable
 
 LINES_AT_ONCE = 20
 PERIOD_S = 10.0
-"""After so many lines at once, one line in this time."""
+"""After the first `LINES_AT_ONCE` lines, one line in this time."""
 CHARACTERS_MAX = 2000
 """Of a line, whose text may come from outside."""
 
 
-class SparingTeller:
-    """Hands lines on to `tell`, from any thread; `clock_s` gives a time that does not run back."""
+class RateLimitedLog:
+    """Passes lines to `write`, from any thread; `clock_s` is a monotonic clock."""
 
     def __init__(
-        self, tell: Callable[[str], None], clock_s: Callable[[], float] = time.monotonic
+        self, write: Callable[[str], None], clock_s: Callable[[], float] = time.monotonic
     ) -> None:
-        self._tell = tell
+        self._write = write
         self._clock_s = clock_s
         self._lock = threading.Lock()
         self._allowance = float(LINES_AT_ONCE)
         self._seen_s = clock_s()
-        self._untold = 0
+        self._omitted = 0
 
     def __call__(self, text: str) -> None:
-        """Tell a line, or count it."""
+        """Write a line, or count it."""
         with self._lock:
             now_s = self._clock_s()
             earned = (now_s - self._seen_s) / PERIOD_S
             self._seen_s = now_s
             self._allowance = min(float(LINES_AT_ONCE), self._allowance + earned)
             if self._allowance < 1.0:
-                self._untold += 1
+                self._omitted += 1
                 return
             self._allowance -= 1.0
-            untold, self._untold = self._untold, 0
-        self._tell(_plain(text) + _left_out(untold))
+            left_out, self._omitted = self._omitted, 0
+        self._write(_plain(text) + _left_out(left_out))
 
     def finish(self) -> None:
-        """Tell how many lines were left out since the last one, if any were."""
+        """Write how many lines were left out since the last one, if any were."""
         with self._lock:
-            untold, self._untold = self._untold, 0
-        if untold:
-            self._tell(_left_out(untold).strip())
+            left_out, self._omitted = self._omitted, 0
+        if left_out:
+            self._write(_left_out(left_out).strip())
 
 
 def _left_out(count: int) -> str:
@@ -57,6 +57,6 @@ def _left_out(count: int) -> str:
 
 
 def _plain(text: str) -> str:
-    """Return what a terminal shows as text, whatever somebody wrote into it."""
+    """Return what a terminal shows as text, without control characters."""
     shown = text[:CHARACTERS_MAX] + (" ..." if len(text) > CHARACTERS_MAX else "")
     return "".join(one if one.isprintable() or one == "\n" else "?" for one in shown)

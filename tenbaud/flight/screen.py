@@ -1,4 +1,4 @@
-"""What a terminal shows of a running flight: a small view that needs no more than SSH.
+"""A terminal view of a running flight: small enough for SSH.
 
 Colours are rich's to decide, and it keeps to NO_COLOR; what is red or green also says so in words. A
 terminal without Unicode gets the same in plain characters.

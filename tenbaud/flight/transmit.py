@@ -127,7 +127,7 @@ class _Ending:
         self._peer_present = peer_present
 
     def farewell(self) -> End:
-        """Settle the outcome, now that the last echoes are in; return what the receiver is told."""
+        """Settle the outcome, now that the last echoes are in; return the ending for the receiver."""
         if self.outcome.code is ExitCode.OK:
             self.outcome = _desync_outcome(self._run) or self.outcome
         # Where the other end is gone, that is the cause of everything that the counts show.

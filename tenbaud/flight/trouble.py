@@ -1,4 +1,4 @@
-"""What can be wrong with an end's own line: a port that went, a certificate that expired in flight."""
+"""Faults of an end's own line: a lost port, a certificate that expired in flight."""
 
 from __future__ import annotations
 
@@ -64,15 +64,15 @@ class Trouble:
         return self._asked_to_stop() or self._certificate.expired()
 
     def first_cause(self, outcome: Outcome, consequence: str = "") -> Outcome:
-        """Return the outcome, told by what was wrong with the line where that came first."""
+        """Return the outcome, with the fault of the line as its cause where that came first."""
         expired = self._certificate.expired()
         if expired and outcome.code is ExitCode.INTERRUPTED and not self._asked_to_stop():
             outcome = Outcome(ExitCode.LINK_LOST, outcome.text)
         return first_cause(outcome, self._text(expired), consequence)
 
     def _text(self, expired: bool) -> str:
-        if told := self._link.trouble():
-            return told
+        if trouble := self._link.trouble():
+            return trouble
         if expired:
             return self._certificate.text()
         if self._refused[PEER_EXPIRED]:

@@ -1,4 +1,4 @@
-"""Whether a flight that went to its end has flown: from counts, and for people in words.
+"""Decides from counts whether a completed flight has really flown, and explains it.
 
 A process that came to the end of its flight has shown nothing by that. What counts is that samples were
 confirmed, that most of them brought a word, that the motors had commands, and that epochs lasted.
@@ -20,10 +20,10 @@ WORDS_SHARE_MIN = 0.1
 DOWN_SHARE_MAX = 0.5
 """of the ticks, with the guard at the safe voltage or on its way there"""
 COMMANDED_SHARE_MIN = 0.1
-"""of the ticks, with a command of their own"""
+"""of the ticks, with their own command"""
 REJOINS_MIN = 10
 EPOCH_SAMPLES_MIN = 20
-"""So many rejoins, with fewer confirmed samples than this to each of them, are rejoins without end."""
+"""This many rejoins, with fewer confirmed samples than this for each, are rejoins without end."""
 
 
 class NotFlown(StrEnum):
@@ -39,7 +39,7 @@ class NotFlown(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class FlightCounts:
-    """What the verdict rests on, as far as an end knows it."""
+    """The inputs of the verdict, as far as an end knows them."""
 
     samples: int
     """that the flight had time for"""
@@ -70,7 +70,7 @@ def faults_of(counts: FlightCounts) -> tuple[NotFlown, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """What a person could change, as it was."""
+    """The settings that a person could change."""
 
     lead_s: float
     watchdog_s: float

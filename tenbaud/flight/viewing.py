@@ -1,4 +1,4 @@
-"""The live page beside a demonstration: a process of its own, and where the two ends meet it."""
+"""The live page beside a demonstration: a separate process, and where the two ends meet it."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SERVING = "tenbaud view: "
 
 
 @dataclass(frozen=True, slots=True)
-class ViewWish:
+class ViewOptions:
     """How a demonstration is to be looked at."""
 
     port: int
@@ -35,24 +35,24 @@ class ViewWish:
 
 @dataclass(slots=True)
 class Viewing:
-    """What the two ends have to be told, so that the page hears them."""
+    """Options of the two ends for the page to receive their telemetry."""
 
     transmitter: list[str] = field(default_factory=list)
     receiver: list[str] = field(default_factory=list)
 
 
 @contextmanager
-def page_beside(wish: ViewWish | None, should_stop: Callable[[], bool]) -> Iterator[Viewing]:
+def page_beside(options: ViewOptions | None, should_stop: Callable[[], bool]) -> Iterator[Viewing]:
     """Within the `with`, the page is served; yields options for both ends.
 
     Raises LinkLost when it cannot be served, and KeyboardInterrupt when it is asked to stop meanwhile.
     """
-    if wish is None:
+    if options is None:
         yield Viewing()
         return
     with TemporaryDirectory(prefix="tenbaud-view-") as folder:
         places = [f"{SOCKET}{Path(folder) / name}.sock" for name in ("transmitter", "receiver")]
-        process = _start(places, wish)
+        process = _start(places, options)
         try:
             _wait_until_served(process, should_stop)
             yield Viewing(
@@ -68,10 +68,10 @@ def page_beside(wish: ViewWish | None, should_stop: Callable[[], bool]) -> Itera
             _end(process)
 
 
-def _start(places: list[str], wish: ViewWish) -> subprocess.Popen[str]:
-    words = ["view", "--port", str(wish.port)]
+def _start(places: list[str], options: ViewOptions) -> subprocess.Popen[str]:
+    words = ["view", "--port", str(options.port)]
     words += [part for place in places for part in ("--connect", place)]
-    words += ["--open"] if wish.open_browser else []
+    words += ["--open"] if options.open_browser else []
     return start_child(*words, stderr=subprocess.PIPE)
 
 

@@ -28,7 +28,7 @@ FIELDS = (
 
 @dataclass(frozen=True, slots=True)
 class Identified:
-    """What was found in one record."""
+    """The result for one record."""
 
     name: str
     record: PitchRecord

@@ -1,4 +1,4 @@
-"""Where a pitch record comes from: the configured rig, the folder of a run, or a CSV log."""
+"""Sources of a pitch record: the configured rig, the folder of a run, or a CSV log."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ import numpy as np
 
 from channel.flight_log import parse_number, read_columns
 from plant_sim.identification.errors import IdentificationError
-from plant_sim.identification.excitation import parse_excitation
-from plant_sim.identification.experiment import excite
+from plant_sim.identification.excitation import excite, parse_excitation
 from plant_sim.identification.record import PitchRecord
 from tenbaud.build.rig import build_rig
 from tenbaud.config.schema import FlightConfig
@@ -25,7 +24,7 @@ AngleUnit = Literal["counts", "rad", "deg"]
 
 @dataclass(frozen=True, slots=True)
 class LogColumns:
-    """Which columns of a log hold what; a time column, where there is one, is in seconds."""
+    """The columns of a log; a time column, if there is one, is in seconds."""
 
     angle: str = "pitch_counts"
     front: str = "right_volts"
@@ -74,10 +73,10 @@ def from_run(folder: Path) -> PitchRecord:
     recording = Recording(find_recordings(folder)[0])
     ticks, rows = [], []
     for _, row in recording.rows("tick"):
-        if not row.get("measured_rad") or len(row.get("applied_volts") or ()) != 2:
-            continue  # a tick without a reading: a gap, told below
+        if not row.get("measured") or len(row.get("applied") or ()) != 2:
+            continue  # a tick without a reading: a gap, reported below
         ticks.append(row["tick"])
-        rows.append((row["measured_rad"][0], *row["applied_volts"]))
+        rows.append((row["measured"][0], *row["applied"]))
     if not ticks:
         raise IdentificationError(
             f"{recording.path} holds no measured angles; give the run's transmitter.mcap"
@@ -143,6 +142,6 @@ def _even_step(
         raise IdentificationError(
             f"{path}, line {lines[row + 1]}, column {name}: {clock[row + 1]:g} after {clock[row]:g}, "
             f"where the usual step is {usual:g}; a gap cannot be identified across: choose a stretch "
-            "with --from and --to before or after it, as a file of its own"
+            "with --from and --to before or after it, as a separate file"
         )
     return usual if timed else tick_s

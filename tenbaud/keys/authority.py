@@ -26,7 +26,7 @@ LOCAL_HOSTS = ("localhost", "127.0.0.1", "::1")
 
 
 class NodeRole(StrEnum):
-    """What a certificate is for."""
+    """The purpose of a certificate."""
 
     TRANSMITTER = "transmitter"
     RECEIVER = "receiver"
@@ -36,7 +36,7 @@ class NodeRole(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Certified:
-    """What a node's certificate says."""
+    """The contents of a node's certificate."""
 
     name: str
     role: NodeRole
@@ -59,7 +59,7 @@ class Pem:
 
 
 def new_authority(name: str, days: float = AUTHORITY_DAYS) -> Pem:
-    """Return a fresh authority of this name, valid for so many days."""
+    """Return a fresh authority of this name, valid for a number of days."""
     from cryptography import x509
     from cryptography.hazmat.primitives import hashes
 

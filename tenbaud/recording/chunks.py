@@ -34,7 +34,7 @@ EXPANSION_FREE_BYTES = 64 << 10
 """Content of a chunk that may be larger than that: a few rows, all alike."""
 
 RawMessage = tuple[int, int, bytes]
-"""(channel id, log time in ns, data): a plain tuple, as there are so many."""
+"""(channel id, log time in ns, data): a plain tuple, as there are very many."""
 
 Described = Schema | Channel | Metadata | Footer
 
@@ -66,12 +66,12 @@ class Torn(ValueError):
 
 
 BROKEN = (Torn, McapError, struct.error, zstandard.ZstdError, UnicodeDecodeError)
-"""What the reading of a damaged record raises, depending on where the damage is."""
+"""The exceptions of reading a damaged record; they depend on the place of the damage."""
 
 
 @dataclass(slots=True)
 class Block:
-    """What one record of the file brought: messages in order, and what describes them."""
+    """The contents of one record of the file: messages in order, and their descriptions."""
 
     messages: list[RawMessage] = field(default_factory=list)
     described: list[Described] = field(default_factory=list)

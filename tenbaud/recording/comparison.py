@@ -1,4 +1,4 @@
-"""What came of comparing recordings: one of three verdicts, the first difference, what is missing."""
+"""The result of comparing recordings: one of three verdicts, the first difference, missing data."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MISSING_SHOWN = 8
 
 
 class Verdict(StrEnum):
-    """What a comparison comes to."""
+    """The verdict of a comparison."""
 
     EQUAL = "equal"
     """everything that both must hold is there and the same"""
@@ -86,7 +86,7 @@ class Compared:
 
     @property
     def verdict(self) -> Verdict:
-        """What it comes to."""
+        """The verdict."""
         if self.differences:
             return Verdict.DIFFERENT
         if self.missing or self.faults or not self.rows:

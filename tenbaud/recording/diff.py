@@ -54,7 +54,7 @@ def compare_runs(first: Path, second: Path | None = None) -> Compared:
 
 
 def files_to_compare(first: Path, second: Path | None = None) -> list[Comparison]:
-    """Which files `compare_runs` would open. Ends recorded in one folder only are left out."""
+    """The files that `compare_runs` would open. Ends recorded in one folder only are left out."""
     if second is None:
         run = RunFolder(first)
         run.recordings()  # refuses links

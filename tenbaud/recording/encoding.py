@@ -8,12 +8,19 @@ at 30,000 rows a second beside a flight on the virtual clock.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
-from typing import get_args
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from typing import TYPE_CHECKING, get_args
 
 import orjson
 
+from channel.codec.signals import Signals
 from channel.protocol.recording import Field, FieldType, RecordChannel
+from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.old_rows import SIGNALS_WITHOUT
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
 
 RUN_METADATA = "run"
 """Metadata of a recording: what the run said about itself when it began."""
@@ -21,6 +28,10 @@ END_METADATA = "recorder"
 """Written when a recording is finished only: how many rows were written and dropped, and why."""
 OVERVIEW_METADATA = "overview"
 """What the figure of a long flight shows (`overview.py`)."""
+SIGNALS_KEY = "signals"
+"""In the metadata of a run: what the model calls its states, inputs and outputs."""
+SIGNALS_MAX = 128
+UNIT_LENGTH_MAX = 64
 KEY_PROPERTY = "key"
 """In a schema: the name of the field that counts the rows (tick or sample)."""
 
@@ -92,3 +103,33 @@ def _field_from_schema(name: str, schema: dict[str, object]) -> Field:
                 timing=bool(schema.get("timing", False)),
             )
     raise ValueError(f"field {name!r} has the type {kind!r}, which tenbaud does not write")
+
+
+def signals_text(plant: Signals) -> str:
+    """Return the description of a plant's signals as a recording holds it."""
+    return _signals_adapter().dump_json(plant, exclude_defaults=True).decode()
+
+
+def recorded_signals(metadata: Mapping[str, str]) -> Signals:
+    """Return the signals that a recording describes; RecordingError for what no node writes."""
+    text = metadata.get(SIGNALS_KEY)
+    if text is None:
+        return SIGNALS_WITHOUT
+    try:
+        plant = _signals_adapter().validate_json(text)
+    except ValueError as error:
+        raise RecordingError(f"The recording's description of the signals is none: {error}") from error
+    signals = (*plant.states, *plant.inputs, *plant.outputs)
+    texts = [one.unit + one.group for one in signals]
+    if len(signals) > SIGNALS_MAX or any(len(text) > UNIT_LENGTH_MAX for text in texts):
+        raise RecordingError("The recording describes more signals, or longer units, than a plant has.")
+    if not all(text.isprintable() for text in texts):
+        raise RecordingError("A unit or group in the recording's description is no plain text.")
+    return plant
+
+
+@cache
+def _signals_adapter() -> TypeAdapter[Signals]:
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(Signals)

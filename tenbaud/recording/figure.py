@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from channel.codec.signals import Signal, Signals
 from channel.line.impairments import parse_impairments
 from tenbaud.files.whole import whole_file
-from tenbaud.recording.encoding import OVERVIEW_METADATA, RUN_METADATA
+from tenbaud.recording.encoding import OVERVIEW_METADATA, RUN_METADATA, recorded_signals
 from tenbaud.recording.envelope import Series
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.overview import (
@@ -28,22 +31,34 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-PITCH_COLOUR = "#1b1b1b"
+VALUE_COLOUR = "#1b1b1b"
 REFERENCE_COLOUR = "#8a8a8a"
 CODED_COLOUR = "#0b6fb8"
 LIVE_COLOUR = "#d9730d"
 ERASURE_COLOUR = "#d01c1f"
 FLIP_COLOUR = "#8e3fb0"
 REJOIN_COLOUR = "#2a8c4a"
+COLOURS = ("#0b6fb8", "#d9730d", "#2a8c4a", "#8e3fb0", "#1b1b1b", "#b08a00")
+"""Of several outputs or inputs in one panel."""
+STEPS = {"drawstyle": "steps-post"}
+
+
+DRAWN_MAX = 8
+"""Groups of outputs or of inputs that have a panel."""
+
+Curve = tuple[Series, Series]
+_Draw = Callable[["Axes", "_Flight"], None]
 
 
 @dataclass(frozen=True, slots=True)
 class _Flight:
-    """What the figure shows."""
+    """The contents of the figure."""
 
-    curves: dict[str, tuple[Series, Series]]
+    plant: Signals
+    curves: dict[str, list[Curve]]
+    """name of a curve -> that of each output, or of each input"""
     marks: dict[str, Series]
-    symbols: tuple[Series, Series]
+    symbols: Curve
     symbols_are_means: bool
     cuts_s: list[tuple[float, float]]
     """times in which nothing was to pass, on purpose"""
@@ -51,13 +66,18 @@ class _Flight:
     @property
     def live_is_coded(self) -> bool:
         """Whether both estimates are one, as without a command lead: one curve hides the other."""
-        return np.array_equal(self.curves["live"][1], self.curves["coded"][1], equal_nan=True)
+        pairs = zip(self.curves["live"], self.curves["coded"], strict=True)
+        return all(np.array_equal(live[1], coded[1], equal_nan=True) for live, coded in pairs)
+
+    def knows(self, name: str, places: list[int]) -> bool:
+        """Whether there is any value of a curve."""
+        return any(not np.isnan(self.curves[name][place][1]).all() for place in places)
 
 
 def draw_flight(transmitter: Path, receiver: Path | None, output: Path, title: str) -> None:
-    """Draw the first measured axis of a flight that was just flown into the PNG file `output`.
+    """Draw a flight that was just flown into the PNG file `output`.
 
-    The pitch is the true one where the rig knows it, else the measured one; the errors are taken
+    An output is the true one where the rig knows it, else the measured one; the errors are taken
     from it. The receiver's recording adds the reference. Raises RecordingError if the
     transmitter's recording holds no flight.
     """
@@ -69,47 +89,83 @@ def draw_flight(transmitter: Path, receiver: Path | None, output: Path, title: s
 def draw_run(transmitter: Path | None, receiver: Path | None, title: str, own: bool = False) -> Figure:
     """Return the same as a matplotlib figure. Raises RecordingError without a transmitter's file.
 
-    `own`: the recordings were made just now, and what they store for the figure is believed.
+    `own`: the recordings were made just now, and what they store for the figure is trusted.
     """
     from matplotlib.figure import Figure  # takes half a second, which other commands need not pay
 
     if transmitter is None:
         raise RecordingError(
-            "There is no transmitter's recording here, and the pitch is recorded there. Give the "
-            "folder of the transmitter's run."
+            "There is no transmitter's recording here, and what was measured is recorded there. Give "
+            "the folder of the transmitter's run."
         )
     flight = _read_flight(transmitter, receiver, own)
-    figure = Figure(figsize=(9.0, 9.0), layout="constrained")
-    panels = figure.subplots(4, 1, sharex=True, height_ratios=[3.0, 2.0, 1.6, 1.0])
-    _draw_pitch(panels[0], flight)
-    _draw_errors(panels[1], flight)
-    _draw_range(panels[2], flight)
-    _draw_symbols(panels[3], flight)
-    for letter, panel in zip("abcd", panels, strict=True):
-        panel.set_title(f"({letter})", loc="left", fontsize=9)
+    drawn = _panels(flight)
+    ratios = [ratio for ratio, _, _ in drawn]
+    figure = Figure(figsize=(9.0, 1.4 + sum(ratios)), layout="constrained")
+    panels = figure.subplots(len(drawn), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
+    for number, (panel, (_, label, draw)) in enumerate(zip(panels, drawn, strict=True)):
+        draw(panel, flight)
+        panel.set_ylabel(label)
+        panel.set_title(f"({chr(ord('a') + number)})", loc="left", fontsize=9)
         panel.grid(visible=True, color="#e6e6e6", linewidth=0.6)
         panel.set_axisbelow(True)
         panel.spines[["top", "right"]].set_visible(False)
-    times_s, _ = flight.curves["pitch"]
+    times_s, _ = flight.curves["value"][0]
     panels[0].set_xlim(times_s[0], max(times_s[-1], 1e-3))
     panels[-1].set_xlabel("time, s")
     figure.suptitle(title, fontsize=11)
-    figure.align_ylabels(panels)
+    figure.align_ylabels(list(panels))
     return figure
+
+
+def _panels(flight: _Flight) -> list[tuple[float, str, _Draw]]:
+    """Return what is drawn below each other: height, label, and what draws it."""
+    plant = flight.plant
+    outputs = plant.groups("outputs")[:DRAWN_MAX]
+    inputs = plant.groups("inputs")[:DRAWN_MAX]
+    found: list[tuple[float, str, _Draw]] = [
+        (3.0, _plain(label), partial(_draw_values, places=places)) for label, places in outputs
+    ]
+    for name, height, curve, draw in (
+        ("error", 2.0, "error_coded", _draw_errors),
+        (r"range $M_k$", 1.6, "range", _draw_ranges),
+    ):
+        for label, places in outputs:
+            if flight.knows(curve, places):
+                units = {plant.outputs[place].unit for place in places}
+                of_what = f": {label}"
+                if len(outputs) == len(units) == 1:
+                    of_what = "".join(f", {unit}" for unit in units if unit)
+                found.append((height, name + _plain(of_what), partial(draw, places=places)))
+    found += [
+        (1.4, _plain(label), partial(_draw_inputs, places=places))
+        for label, places in inputs
+        if flight.knows("applied", places)
+    ]
+    return [*found, (1.0, "mean of bits" if flight.symbols_are_means else "bits", _draw_symbols)]
+
+
+def _plain(label: str) -> str:
+    """Return a label as matplotlib shows it: a dollar sign would begin an equation."""
+    return label.replace("$", r"\$")
 
 
 def _read_flight(transmitter: Path, receiver: Path | None, own: bool) -> _Flight:
     overview, metadata = _read_overview(transmitter, own)
-    times_s, _ = overview.curves["pitch"].curve()
+    plant = overview.plant
+    times_s = overview.curves["value"][0].curve()[0] if plant.outputs else np.zeros(0)
     if not len(times_s):
         raise RecordingError(
             f"The recording {transmitter} holds no ticks, so there is no flight to draw. "
             "Give a transmitter's recording."
         )
     if receiver is not None:
-        overview.curves["reference"] = _read_overview(receiver, own)[0].curves["reference"]
+        theirs, _ = _read_overview(receiver, own)
+        if theirs.plant == plant:
+            overview.curves["reference"] = theirs.curves["reference"]
     return _Flight(
-        {name: one.curve() for name, one in overview.curves.items()},
+        plant,
+        {name: [one.curve() for one in held] for name, held in overview.curves.items()},
         {name: marks_of(one) for name, one in overview.marks.items()},
         overview.symbols.curve(),
         overview.symbols.thinned,
@@ -120,21 +176,26 @@ def _read_flight(transmitter: Path, receiver: Path | None, own: bool) -> _Flight
 def _read_overview(path: Path, own: bool = False) -> tuple[Overview, dict[str, str]]:
     """Return the overview of a recording and what the run said about itself, in one pass over its rows.
 
-    `own`: the recording was made just now, and the overview that it stores is believed, if it has one.
+    `own`: the recording was made just now, and the overview that it stores is trusted, if it has one.
     """
     stored = stored_metadata(path, (OVERVIEW_METADATA, RUN_METADATA)) if own else {}
     if OVERVIEW_METADATA in stored:
-        found = unpacked(stored[OVERVIEW_METADATA])
+        metadata = stored.get(RUN_METADATA, {})
+        found = unpacked(stored[OVERVIEW_METADATA], recorded_signals(metadata))
         if found is not None:
-            return found, stored.get(RUN_METADATA, {})
-    overview = Overview()
+            return found, metadata
+    overview = None
     stream = MessageStream(path)
     for block in rows_in_blocks(stream, FIELDS):
+        # The head, which says what is recorded, comes before the rows.
+        overview = overview or Overview(recorded_signals(stream.metadata.get(RUN_METADATA, {})))
         for topic, (times, rows) in block.items():
             names = {one.name for one in stream.channels[topic].fields}
             overview.add(topic, times, _columns_of(rows, names))
+    metadata = stream.metadata.get(RUN_METADATA, {})
+    overview = overview or Overview(recorded_signals(metadata))
     overview.finish()
-    return overview, stream.metadata.get(RUN_METADATA, {})
+    return overview, metadata
 
 
 def _columns_of(rows: Sequence[Row], names: set[str]) -> Columns:
@@ -150,22 +211,19 @@ def _cuts(impairments: str, end_s: float) -> list[tuple[float, float]]:
     return [(start / 1e9, min(end / 1e9, end_s)) for start, end in cuts if start / 1e9 < end_s]
 
 
-def _draw_pitch(panel: Axes, flight: _Flight) -> None:
-    _plot(
-        panel,
-        flight.curves["reference"],
-        "reference",
-        color=REFERENCE_COLOUR,
-        linewidth=1.1,
-        linestyle="-.",
-    )
-    # Good estimates lie on the pitch: only thin lines over a thick one can all be seen.
-    _plot(panel, flight.curves["pitch"], r"pitch $\theta$", color=PITCH_COLOUR, linewidth=2.2)
+def _draw_values(panel: Axes, flight: _Flight, places: list[int]) -> None:
+    """Draw outputs with their set-points and estimates."""
+    # Good estimates lie on the value: only thin lines over a thick one can all be seen.
+    kinds = [
+        _Kind("reference", "reference", REFERENCE_COLOUR, 1.1, {"linestyle": "-."}),
+        _Kind("value", "", VALUE_COLOUR, 2.2, {"alpha": 0.5 if len(places) > 1 else 1.0}),
+    ]
     if flight.live_is_coded:
-        _plot(panel, flight.curves["coded"], "estimate", color=CODED_COLOUR, linewidth=0.8)
+        kinds.append(_Kind("coded", "estimate", CODED_COLOUR))
     else:
-        _plot(panel, flight.curves["live"], "live estimate", color=LIVE_COLOUR, linewidth=0.8)
-        _plot(panel, flight.curves["coded"], "coded estimate", color=CODED_COLOUR, linewidth=0.8)
+        kinds.append(_Kind("live", "live estimate", LIVE_COLOUR))
+        kinds.append(_Kind("coded", "coded estimate", CODED_COLOUR))
+    _draw_curves(panel, flight, flight.plant.outputs, places, kinds)
     for index, (start_s, end_s) in enumerate(flight.cuts_s):
         label = "line cut" if index == 0 else ""
         panel.axvspan(start_s, end_s, color=ERASURE_COLOUR, alpha=0.12, linewidth=0, label=label)
@@ -174,7 +232,7 @@ def _draw_pitch(panel: Axes, flight: _Flight) -> None:
         ("desync", flight.marks["desync"], ERASURE_COLOUR),
     ):
         if len(times_s):
-            places = [0.04] * len(times_s)
+            low = [0.04] * len(times_s)
             across = panel.get_xaxis_transform()
             style: dict[str, Any] = {
                 "color": colour,
@@ -182,38 +240,78 @@ def _draw_pitch(panel: Axes, flight: _Flight) -> None:
                 "linestyle": "none",
                 "markersize": 5,
             }
-            panel.plot(times_s, places, transform=across, clip_on=False, label=name, **style)
-    panel.set_ylabel("pitch, rad")
+            panel.plot(times_s, low, transform=across, clip_on=False, label=name, **style)
     _legend_above(panel)
 
 
-def _draw_errors(panel: Axes, flight: _Flight) -> None:
-    coded, live = flight.curves["error_coded"], flight.curves["error_live"]
-    if flight.live_is_coded:
-        _plot(panel, coded, "error of the estimate", color=CODED_COLOUR, linewidth=0.9)
-    else:
-        _plot(panel, live, "error of the live estimate", color=LIVE_COLOUR, linewidth=0.9)
-        _plot(panel, coded, "error of the coded estimate", color=CODED_COLOUR, linewidth=0.9)
+def _draw_errors(panel: Axes, flight: _Flight, places: list[int]) -> None:
+    kinds = [_Kind("error_coded", "", CODED_COLOUR, 0.9)]
+    if not flight.live_is_coded:
+        kinds.insert(0, _Kind("error_live", "live estimate", LIVE_COLOUR, 0.9))
+    if len(places) == 1:
+        name = "estimate" if flight.live_is_coded else "coded estimate"
+        kinds = [one._replace(label=f"error of the {one.label or name}") for one in kinds]
+    _draw_curves(panel, flight, flight.plant.outputs, places, kinds)
     panel.axhline(0.0, color="#999999", linewidth=0.6)
-    panel.set_ylabel("error, rad")
     _legend_above(panel)
 
 
-def _draw_range(panel: Axes, flight: _Flight) -> None:
-    _plot(panel, flight.curves["range"], "", color=CODED_COLOUR, linewidth=0.9, drawstyle="steps-post")
+def _draw_ranges(panel: Axes, flight: _Flight, places: list[int]) -> None:
+    kind = _Kind("range", "", CODED_COLOUR, 0.9, STEPS)
+    _draw_curves(panel, flight, flight.plant.outputs, places, [kind])
     panel.set_ylim(bottom=0.0)
-    panel.set_ylabel("range $M_k$, rad")
+    if len(places) > 1:
+        _legend_above(panel)
+
+
+def _draw_inputs(panel: Axes, flight: _Flight, places: list[int]) -> None:
+    kind = _Kind("applied", "", COLOURS[0], 0.9, STEPS)
+    _draw_curves(panel, flight, flight.plant.inputs, places, [kind])
+    if len(places) > 1:
+        _legend_above(panel)
+
+
+class _Kind(NamedTuple):
+    """Curves of one kind, and how they are drawn where only one output or input is."""
+
+    curve: str
+    label: str
+    """empty: the name of the output or input"""
+    colour: str
+    width: float = 0.8
+    style: Mapping[str, Any] = MappingProxyType({})
+
+
+def _draw_curves(
+    panel: Axes,
+    flight: _Flight,
+    signals: Sequence[Signal],
+    places: list[int],
+    kinds: Sequence[_Kind],
+) -> None:
+    """Draw curves of some outputs or inputs; of several, each in its own colour, live ones dashed."""
+    several = len(places) > 1
+    for number, place in enumerate(places):
+        for kind in kinds:
+            times_s, values = flight.curves[kind.curve][place]
+            if np.isnan(values).all():
+                continue
+            style = {"color": kind.colour, "linewidth": kind.width, **kind.style}
+            if several:
+                style["color"] = COLOURS[number % len(COLOURS)]
+                if "live" in kind.curve:
+                    style["linestyle"] = "--"
+            label = kind.label if number == 0 else ""
+            panel.plot(times_s, values, label=label if kind.label else signals[place].words, **style)
 
 
 def _draw_symbols(panel: Axes, flight: _Flight) -> None:
     times_s, symbols = flight.symbols
     if not flight.symbols_are_means:
-        label = "bits"
-        panel.vlines(times_s, 0.0, symbols, color=PITCH_COLOUR, linewidth=0.8)
+        panel.vlines(times_s, 0.0, symbols, color=VALUE_COLOUR, linewidth=0.8)
     else:
-        label = "mean of bits"
         means = np.nan_to_num(symbols)
-        panel.fill_between(times_s, means, step="post", color=PITCH_COLOUR, linewidth=0.0)
+        panel.fill_between(times_s, means, step="post", color=VALUE_COLOUR, linewidth=0.0)
     panel.axhline(0.0, color="#999999", linewidth=0.6)
     for name, colour in (("erased", ERASURE_COLOUR), ("flipped", FLIP_COLOUR)):
         if len(flight.marks[name]):
@@ -221,7 +319,6 @@ def _draw_symbols(panel: Axes, flight: _Flight) -> None:
     _legend_above(panel)
     panel.set_ylim(-1.35, 1.35)
     panel.set_yticks([-1.0, 0.0, 1.0])
-    panel.set_ylabel(label)
 
 
 def _legend_above(panel: Axes) -> None:
@@ -236,8 +333,3 @@ def _legend_above(panel: Axes) -> None:
             frameon=False,
             fontsize=8,
         )
-
-
-def _plot(panel: Axes, curve: tuple[Series, Series], label: str, **style: Any) -> None:
-    if not np.isnan(curve[1]).all():
-        panel.plot(*curve, label=label, **style)

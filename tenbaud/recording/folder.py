@@ -8,7 +8,6 @@ import re
 import stat
 from dataclasses import dataclass
 from datetime import datetime
-from itertools import count
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -30,7 +29,7 @@ SMALL_BYTES_MAX = 4 << 20
 
 @dataclass(frozen=True, slots=True)
 class RunFolder:
-    """Where the files of a run are, whether they exist or not."""
+    """The paths of a run's files, whether they exist or not."""
 
     path: Path
 
@@ -96,12 +95,17 @@ def create_run_folder(
     moment = (now or datetime.now()).strftime("%Y-%m-%dT%H-%M-%S")
     safe_name = re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-.") or "run"
     base = root if root is not None else DEFAULT_ROOT
-    for number in count(1):
-        suffix = "" if number == 1 else f"-{number}"
-        folder = base / f"{moment}_{safe_name}{suffix}"
-        if _make(folder):
-            return folder
-    raise AssertionError("unreachable: the numbers do not end")
+    return make_numbered(base / f"{moment}_{safe_name}")
+
+
+def make_numbered(wished: Path) -> Path:
+    """Make a folder of this name, with -2, -3 ... appended if it is taken. Raises WriteError."""
+    folder = wished
+    number = 1
+    while not _make(folder):
+        number += 1
+        folder = wished.with_name(f"{wished.name}-{number}")
+    return folder
 
 
 def _make(folder: Path) -> bool:

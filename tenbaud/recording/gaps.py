@@ -13,7 +13,7 @@ from tenbaud.recording.holes import HOLES_MAX, Hole, Missing
 from tenbaud.recording.rows import KEY_MAX, KEYS
 
 BLOCKS_BEHIND = 64
-"""In so many blocks behind the damage a topic must go on, or it is not said what it lacks."""
+"""Within this many blocks behind the damage a topic must continue, or its loss is not estimated."""
 
 Newest = dict[int, RawMessage]
 """channel id -> a message"""
@@ -30,7 +30,7 @@ class _Gap:
 
 
 class HoleFinder:
-    """Is told of damage and of messages in the order of the file."""
+    """Takes damage and messages in the order of the file."""
 
     def __init__(self) -> None:
         self._gaps: list[_Gap] = []

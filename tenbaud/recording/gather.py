@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from channel.codec.signals import Signals
 from channel.protocol.recording import RecordChannel
 from tenbaud.recording.overview import FIELDS, Overview, packed
 
@@ -17,8 +18,8 @@ BLOCK_ROWS = 512
 class OverviewRecorder:
     """Gathers an overview from rows as they are recorded, some at a time."""
 
-    def __init__(self) -> None:
-        self._overview = Overview()
+    def __init__(self, plant: Signals) -> None:
+        self._overview = Overview(plant)
         self._rows: dict[str, tuple[list[int], list[Sequence[object]]]] = {}
         self._places: dict[str, dict[str, int]] = {}
         self._count = 0

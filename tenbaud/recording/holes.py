@@ -1,4 +1,4 @@
-"""What is missing from a damaged recording: when, and which ticks, samples and symbols."""
+"""Gaps of a damaged recording: their times, and the missing ticks, samples and symbols."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Hole:
 
     @property
     def what(self) -> str:
-        """What is missing, in words."""
+        """The gap as a sentence."""
         parts = []
         for topic, (first, last) in self.missing.items():
             key = self.keys.get(topic, "row")

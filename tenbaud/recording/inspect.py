@@ -1,4 +1,4 @@
-"""What is in a recording, in numbers and in words."""
+"""The contents of a recording, in numbers and sentences."""
 
 from __future__ import annotations
 

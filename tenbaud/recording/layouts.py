@@ -12,7 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
+from channel.codec.signals import Signals
 from tenbaud.files.whole import write_whole
+from tenbaud.recording.signals import output_name
 
 if TYPE_CHECKING:
     from tenbaud.recording.run import Run
@@ -45,65 +47,69 @@ class Plot:
     curves: tuple[Curve, ...]
 
 
-PITCH, REFERENCE, CODED, LIVE = "#4a4a4a", "#9a9a9a", "#0b6fb8", "#d9730d"
-FRONT, REAR = "#2a8c4a", "#8e3fb0"
+VALUE, REFERENCE, CODED, LIVE = "#4a4a4a", "#9a9a9a", "#0b6fb8", "#d9730d"
+INPUTS = ("#2a8c4a", "#8e3fb0", "#d9730d", "#0b6fb8")
 
-RECORDING_PLOTS = (
-    Plot(
-        "pitch, rad",
-        (
-            Curve("tick", "measured_rad", 0, "measured", PITCH),
-            Curve("estimate", "coded_state", 0, "coded estimate", CODED),
-            Curve("estimate", "live_state", 0, "live estimate", LIVE),
-        ),
-    ),
-    Plot("range M, rad", (Curve("sample", "range", 0, "range", CODED),)),
-    Plot(
-        "symbols",
-        (
-            Curve("sample", "word", 0, "consumed", PITCH),
-            Curve("sample", "word_sent", 0, "sent", REFERENCE),
-        ),
-    ),
-    Plot(
-        "motors, V",
-        (
-            Curve("tick", "applied_volts", 0, "front", FRONT),
-            Curve("tick", "applied_volts", 1, "rear", REAR),
-        ),
-    ),
-    Plot("lateness of the loop, ms", (Curve("tick", "lateness_ms", None, "lateness", LIVE),)),
+_OF_OUTPUTS = (
+    ("{}", (("reference", REFERENCE), ("", VALUE), ("estimate_live", LIVE), ("estimate", CODED))),
+    ("error: {}", (("error_live", LIVE), ("error_coded", CODED))),
+    ("range M: {}", (("range", CODED),)),
 )
-"""For a transmitter's recording as it is."""
+"""Title of a panel of outputs -> what it shows of each, by the names of `Run.signals`."""
 
-_FLIGHT_PLOTS: tuple[tuple[str, tuple[tuple[str, str, str], ...]], ...] = (
-    (
-        "pitch, rad",
-        (
-            ("reference", "reference", REFERENCE),
-            ("pitch", "pitch", PITCH),
-            ("estimate_live", "live estimate", LIVE),
-            ("estimate", "coded estimate", CODED),
-        ),
-    ),
-    ("error, rad", (("error_live", "live", LIVE), ("error_coded", "coded", CODED))),
-    ("range M, rad", (("range", "range", CODED),)),
-    ("symbols", (("symbol", "symbol", PITCH),)),
-    ("motors, V", (("front", "front", FRONT), ("rear", "rear", REAR))),
-)
+
+def recording_plots(plant: Signals) -> tuple[Plot, ...]:
+    """Return the plots of a transmitter's recording as it is."""
+    plots = []
+    for label, places in plant.groups("outputs"):
+        curves = []
+        for place in places:
+            state = plant.output_states[place]
+            curves.append(Curve("tick", "measured", place, plant.outputs[place].words, VALUE))
+            if state is not None:
+                curves.append(Curve("estimate", "coded_state", state, "coded estimate", CODED))
+                curves.append(Curve("estimate", "live_state", state, "live estimate", LIVE))
+        plots.append(Plot(label, tuple(curves)))
+    ranges = [
+        Curve("sample", "range", place, f"range of {one.words}", CODED)
+        for place, one in enumerate(plant.outputs)
+    ]
+    words = (
+        Curve("sample", "word", 0, "consumed", VALUE),
+        Curve("sample", "word_sent", 0, "sent", REFERENCE),
+    )
+    plots += [Plot("range M", tuple(ranges)), Plot("symbols", words)]
+    for label, places in plant.groups("inputs"):
+        applied = [
+            Curve("tick", "applied", place, plant.inputs[place].words, INPUTS[number % len(INPUTS)])
+            for number, place in enumerate(places)
+        ]
+        plots.append(Plot(label, tuple(applied)))
+    late = Curve("tick", "lateness_ms", None, "lateness", LIVE)
+    return (*plots, Plot("lateness of the loop, ms", (late,)))
 
 
 def flight_plots(run: Run) -> tuple[Plot, ...]:
     """Return the plots of a run converted to one MCAP file, with the signals that it has."""
-    plots = []
-    for title, curves in _FLIGHT_PLOTS:
-        there = tuple(
-            Curve("flight", run.signals[name].column, None, label, colour)
-            for name, label, colour in curves
-            if name in run.signals
+    plant = run.plant
+    shown: list[tuple[str, list[tuple[str, str]]]] = [
+        (
+            title.format(label),
+            [(output_name(plant, what, place), colour) for place in places for what, colour in curves],
         )
-        if there:
-            plots.append(Plot(title, there))
+        for title, curves in _OF_OUTPUTS
+        for label, places in plant.groups("outputs")
+    ]
+    shown.append(("symbols", [("symbol", VALUE)]))
+    for label, places in plant.groups("inputs"):
+        names = [plant.inputs[place].name for place in places]
+        shown.append((label, list(zip(names, INPUTS * len(names), strict=False))))
+    plots = []
+    for title, curves in shown:
+        found = [(run.signals[name], colour) for name, colour in curves if name in run.signals]
+        if found:
+            there = [Curve("flight", one.column, None, one.name, colour) for one, colour in found]
+            plots.append(Plot(title, tuple(there)))
     return tuple(plots)
 
 

@@ -1,4 +1,4 @@
-"""Who has a recording open: a lock that the recorder holds, and that ends with its process.
+"""A lock that the recorder holds on its file, and that ends with its process.
 
 Where the system or the file system has no such locks, a recording that grew within the last seconds
 counts as in use; a recorder writes at least once a second while its flight goes on.
@@ -39,7 +39,7 @@ def try_lock(handle: int) -> bool | None:
 
 
 def in_use(handle: int, path: Path) -> bool:
-    """Whether somebody writes this open file; where nobody does, the lock is taken."""
+    """Whether another process writes this open file; if none does, take the lock."""
     locked = try_lock(handle)
     if locked is not None:
         return not locked

@@ -1,4 +1,4 @@
-"""What a person should know of a recording before believing what is computed from it."""
+"""Notes that a person should read before trusting results from a recording."""
 
 from __future__ import annotations
 

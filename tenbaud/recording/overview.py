@@ -1,8 +1,8 @@
-"""What the picture of a flight shows, in bounded memory: gathered while it flies, or from its rows.
+"""The data for a flight's figure, in bounded memory: gathered in flight, or from its rows.
 
 A recorder keeps an overview beside the rows that it writes and stores it at the end of a long recording
 so that ten million ticks are drawn at once when they have been flown. Everybody
-else reads the rows: what a file says of its own rows may not be so.
+else reads the rows: the statements of a file about its rows may be false.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import orjson
 
+from channel.codec.signals import Signals
 from tenbaud.recording.envelope import Envelope, Means, Series
 
 SYMBOLS_DRAWN_SINGLY = 1200
@@ -21,11 +22,12 @@ SYMBOLS_DRAWN_SINGLY = 1200
 PENDING_MAX = 50_000
 """Ticks that wait for their estimate, or the other way round."""
 
-CURVES = ("pitch", "reference", "coded", "live", "error_coded", "error_live", "range")
+CURVES = ("value", "reference", "coded", "live", "error_coded", "error_live", "range")
+"""Of every output."""
 MARKS = ("erased", "flipped", "desync", "rejoin")
 
 FIELDS: dict[str, tuple[str, ...]] = {
-    "tick": ("tick", "true_rad", "measured_rad", "reference_rad"),
+    "tick": ("tick", "true", "measured", "applied", "reference"),
     "estimate": ("tick", "coded_state", "live_state"),
     "sample": ("range", "word", "word_sent"),
     "event": ("kind",),
@@ -37,14 +39,16 @@ Columns = Callable[[str], list[Any] | None]
 
 
 class Overview:
-    """Curves and marks of a flight, of the first measured axis."""
+    """Curves of every output and input of a plant, and marks."""
 
-    def __init__(self) -> None:
-        self.curves = {name: Envelope() for name in CURVES}
+    def __init__(self, plant: Signals) -> None:
+        self.plant = plant
+        self.curves = {name: [Envelope() for _ in plant.outputs] for name in CURVES}
+        self.curves["applied"] = [Envelope() for _ in plant.inputs]
         self.marks = {name: Envelope() for name in MARKS}
         self.symbols = Means(SYMBOLS_DRAWN_SINGLY)
-        self._pitch: dict[int, float] = {}
-        self._waiting: dict[int, tuple[float, float, float]] = {}
+        self._values: dict[int, list[float]] = {}
+        self._waiting: dict[int, list[float]] = {}
         self._last_word: tuple[float, list[Any] | None] | None = None
 
     def add(self, topic: str, times_ns: Sequence[int], columns: Columns) -> None:
@@ -60,6 +64,15 @@ class Overview:
             case "event":
                 self._add_events(times, columns)
 
+    def held(self) -> dict[str, Envelope]:
+        """Return every curve and mark by a name of its own."""
+        curves = {
+            f"{name}_{place}": one
+            for name, held in self.curves.items()
+            for place, one in enumerate(held)
+        }
+        return curves | self.marks
+
     def finish(self) -> None:
         """Add what waited for a row that does not come."""
         if self._last_word is not None:
@@ -67,41 +80,55 @@ class Overview:
             self._last_word = None
             self.symbols.add(*_symbols([time_s, time_s], [word]))
 
+    def _add_curves(self, name: str, times: Series, table: Series) -> None:
+        for place, envelope in enumerate(self.curves[name]):
+            envelope.add(times, table[:, place])
+
     def _add_ticks(self, times: Series, columns: Columns) -> None:
-        reference = columns("reference_rad")
-        if reference is not None:
-            self.curves["reference"].add(times, np.array(reference, dtype=np.float64))
-        measured = columns("measured_rad")
+        outputs = len(self.plant.outputs)
+        for name, width in (("reference", outputs), ("applied", len(self.plant.inputs))):
+            found = columns(name)
+            if found is not None:
+                self._add_curves(name, times, _table(found, width))
+        measured = columns("measured")
         if measured is None:
             return
-        pitch = _first(measured)
-        true = columns("true_rad")
+        values = _table(measured, outputs)
+        true = columns("true")
         if true is not None:
-            known = _first(true)
-            pitch = np.where(np.isnan(known), pitch, known)
-        self.curves["pitch"].add(times, pitch)
-        self._pitch.update(zip(columns("tick") or (), pitch.tolist(), strict=False))
+            known = _table(true, outputs)
+            values = np.where(np.isnan(known), values, known)
+        self._add_curves("value", times, values)
+        self._values.update(zip(columns("tick") or (), values.tolist(), strict=False))
         self._join()
 
     def _add_estimates(self, times: Series, columns: Columns) -> None:
-        coded, live = _first(columns("coded_state") or ()), _first(columns("live_state") or ())
+        coded, live = (self._outputs(columns(name) or ()) for name in ("coded_state", "live_state"))
         if not len(times) == len(coded) == len(live):
             return
-        self.curves["coded"].add(times, coded)
-        self.curves["live"].add(times, live)
-        rows = zip(times.tolist(), coded.tolist(), live.tolist(), strict=True)
+        self._add_curves("coded", times, coded)
+        self._add_curves("live", times, live)
+        rows = np.column_stack((times, coded, live)).tolist()
         self._waiting.update(zip(columns("tick") or (), rows, strict=False))
         self._join()
 
+    def _outputs(self, states: Sequence[Any]) -> Series:
+        """Return the outputs of model states; NaN for one that is not itself a state."""
+        count = len(self.plant.states)
+        nowhere = np.full((len(states), 1), np.nan)
+        table = np.column_stack((_table(states, count), nowhere))
+        return table[:, [count if one is None else one for one in self.plant.output_states]]
+
     def _join(self) -> None:
-        """Take the errors of the ticks of which both pitch and estimate are there."""
-        ready = sorted(self._waiting.keys() & self._pitch.keys())
+        """Take the errors of the ticks of which both values and estimates are there."""
+        ready = sorted(self._waiting.keys() & self._values.keys())
         if ready:
-            pitch = np.array([self._pitch.pop(tick) for tick in ready])
+            count = len(self.plant.outputs)
+            values = np.array([self._values.pop(tick) for tick in ready])
             rows = np.array([self._waiting.pop(tick) for tick in ready])
-            self.curves["error_coded"].add(rows[:, 0], pitch - rows[:, 1])
-            self.curves["error_live"].add(rows[:, 0], pitch - rows[:, 2])
-        for waiting in (self._pitch, self._waiting):
+            self._add_curves("error_coded", rows[:, 0], values - rows[:, 1 : 1 + count])
+            self._add_curves("error_live", rows[:, 0], values - rows[:, 1 + count :])
+        for waiting in (self._values, self._waiting):
             if len(waiting) > PENDING_MAX:
                 for tick in list(islice(waiting, len(waiting) - PENDING_MAX // 2)):
                     del waiting[tick]
@@ -113,7 +140,7 @@ class Overview:
         sent = columns("word_sent") or [None] * len(words)
         ranges = columns("range")
         if ranges is not None:
-            self.curves["range"].add(times, _first(ranges))
+            self._add_curves("range", times, _table(ranges, len(self.plant.outputs)))
         erased = np.array([word is None for word in words])
         flipped = np.array(
             [
@@ -146,12 +173,11 @@ def marks_of(envelope: Envelope) -> Series:
     return times[~np.isnan(values)]
 
 
-def _first(values: Sequence[Any]) -> Series:
-    """The first axis of recorded numbers or lists of numbers; NaN for null."""
-    first = [
-        (value[0] if value else None) if isinstance(value, list | tuple) else value for value in values
-    ]
-    return np.array(first, dtype=np.float64)
+def _table(values: Sequence[Any], width: int) -> Series:
+    """Return recorded lists of numbers as rows of one width; NaN for null and for what is not there."""
+    nothing = (None,) * width
+    rows = [(*(value or ()), *nothing)[:width] for value in values]
+    return np.array(rows, dtype=np.float64).reshape(len(rows), width)
 
 
 def _symbols(times_s: list[float], words: Sequence[Sequence[Any] | None]) -> tuple[Series, Series]:
@@ -169,8 +195,7 @@ def _symbols(times_s: list[float], words: Sequence[Sequence[Any] | None]) -> tup
 def packed(overview: Overview) -> dict[str, str]:
     """Return an overview as metadata."""
     overview.finish()
-    parts: dict[str, Any] = {name: one.curve() for name, one in overview.curves.items()}
-    parts |= {name: one.curve() for name, one in overview.marks.items()}
+    parts: dict[str, Any] = {name: one.curve() for name, one in overview.held().items()}
     parts["symbols"] = (*overview.symbols.curve(), overview.symbols.thinned)
     return {
         name: orjson.dumps(part, option=orjson.OPT_SERIALIZE_NUMPY).decode()
@@ -178,11 +203,11 @@ def packed(overview: Overview) -> dict[str, str]:
     }
 
 
-def unpacked(metadata: Mapping[str, str]) -> Overview | None:
+def unpacked(metadata: Mapping[str, str], plant: Signals) -> Overview | None:
     """Return the overview in a file's metadata; None where it is not all there."""
-    overview = Overview()
+    overview = Overview(plant)
     try:
-        for name, held in (overview.curves | overview.marks).items():
+        for name, held in overview.held().items():
             times, values = orjson.loads(metadata[name])
             held.restore(np.array(times, dtype=np.float64), np.array(values, dtype=np.float64))
         times, values, thinned = orjson.loads(metadata["symbols"])

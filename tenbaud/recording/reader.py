@@ -1,7 +1,7 @@
 """Reads recordings: whole ones, those cut by a crash, and those that somebody else gave you.
 
 Every file is read from its beginning: of one without an end, a reader that starts from the index at
-the end gets nothing. What is damaged is left out and told of (`MessageStream.holes`); what was never
+the end gets nothing. Damaged parts are left out and listed in `MessageStream.holes`; what was never
 written by tenbaud is a RecordingError. Every command that reads a recording does it through here.
 """
 
@@ -19,7 +19,6 @@ from mcap.records import Channel, Footer, Metadata, MetadataIndex, Schema
 from mcap.writer import MCAP0_MAGIC
 
 from channel.protocol.recording import RecordChannel
-from tenbaud.recording.blocks import blocks_of_file
 from tenbaud.recording.chunks import (
     Damage,
     Described,
@@ -31,7 +30,8 @@ from tenbaud.recording.encoding import END_METADATA, RUN_METADATA, channel_from_
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.gaps import HoleFinder
 from tenbaud.recording.holes import HOLES_METADATA, Hole, unpacked_holes
-from tenbaud.recording.old_events import of_today
+from tenbaud.recording.old_rows import of_today
+from tenbaud.recording.resync import blocks_of_file
 from tenbaud.recording.rows import Row, RowDecoder, channel_of_names, check_channel
 
 METADATA_RECORDS_MAX = 100
@@ -46,7 +46,7 @@ class MessageStream:
     """
 
     def __init__(self, path: Path, topic: str | None = None, size: int | None = None) -> None:
-        """`topic` restricts the stream to one topic, `size` to so many bytes of a file that grows.
+        """`topic` restricts the stream to one topic, `size` to the first bytes of a file that grows.
 
         Raises RecordingError for a wrong file.
         """
@@ -67,7 +67,7 @@ class MessageStream:
 
     @property
     def holes(self) -> list[Hole]:
-        """What is missing, also where an earlier recovery has found it."""
+        """The gaps, including those that an earlier recovery found."""
         found = self._finder.holes(self._topics, self.channels, self._ended)
         return unpacked_holes(self.metadata.get(HOLES_METADATA, {})) + found
 
@@ -161,7 +161,7 @@ class MessageStream:
 
     def _channel(self, record: Channel) -> RecordChannel:
         try:
-            channel = channel_from_schema(record.topic, self._schemas[record.schema_id].data)
+            channel = of_today(channel_from_schema(record.topic, self._schemas[record.schema_id].data))
             check_channel(channel)
         except (ValueError, KeyError, AttributeError, TypeError) as error:
             raise RecordingError(
@@ -169,12 +169,12 @@ class MessageStream:
                 f"{record.topic!r} is not described as tenbaud does ({error}). "
                 "Open it with the program that wrote it."
             ) from error
-        return of_today(channel)
+        return channel
 
 
 @dataclass(slots=True)
 class TopicSummary:
-    """What one topic of a recording holds."""
+    """The rows of one topic of a recording."""
 
     channel: RecordChannel
     rows: int = 0
@@ -207,7 +207,7 @@ class Recording:
 
     @property
     def holes(self) -> list[Hole]:
-        """What is missing between rows that are there."""
+        """The gaps between rows."""
         return self._survey.holes
 
     @property
@@ -217,7 +217,7 @@ class Recording:
 
     @property
     def metadata(self) -> dict[str, str]:
-        """What the run said about itself when it began."""
+        """The metadata that the run wrote when it began."""
         return self.metadata_record(RUN_METADATA)
 
     def metadata_record(self, name: str) -> dict[str, str]:

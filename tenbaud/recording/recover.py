@@ -31,7 +31,7 @@ HOLES_SHOWN = 20
 
 @dataclass(frozen=True, slots=True)
 class Recovered:
-    """What became of one recording."""
+    """The result for one recording."""
 
     path: Path
     """the whole file"""

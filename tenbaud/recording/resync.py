@@ -1,13 +1,26 @@
-"""Where the reading of a damaged recording goes on."""
+"""Reads a recording from its beginning to its end, and finds where to go on after what is damaged."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from typing import BinaryIO
 
 from mcap.opcode import Opcode
+from mcap.writer import MCAP0_MAGIC
 
-from tenbaud.recording.chunks import BROKEN, HEAD, RECORD_BYTES_MAX, block_of_chunk, read_head
+from tenbaud.recording.chunks import (
+    BROKEN,
+    HEAD,
+    RECORD_BYTES_MAX,
+    SKIPPED,
+    SUMMARY,
+    Block,
+    Damage,
+    block_of_chunk,
+    read_head,
+    read_record,
+)
 
 WINDOW_BYTES = 1 << 20
 MISSES_MAX = 200
@@ -20,7 +33,7 @@ _OPCODES = range(Opcode.HEADER, Opcode.DATA_END + 1)
 
 
 class Resync:
-    """Finds the next record that can be believed, in one file and within a limited effort."""
+    """Finds the next valid record, in one file and within a limited effort."""
 
     def __init__(self, stream: BinaryIO, size: int) -> None:
         self._stream = stream
@@ -73,3 +86,29 @@ class Resync:
             self._misses += 1
             return False
         return True
+
+
+def blocks_of_file(stream: BinaryIO, size: int) -> Iterator[Block | Damage]:
+    """Yield the blocks of a file of `size` bytes; after damage from the next whole chunk on."""
+    resync = Resync(stream, size)
+    at = len(MCAP0_MAGIC)
+    # Up to here every length was confirmed by a checksum or by a second length.
+    certain = at
+    kinds: tuple[Opcode, ...] = SKIPPED
+    while at < size:
+        try:
+            head = read_head(stream, at, size)
+            if head is None:
+                return
+            kinds = kinds + SUMMARY if head[0] == Opcode.DATA_END else kinds
+            block, confirmed = read_record(stream, *head, kinds)
+        except BROKEN as error:
+            found = resync.after(at, certain)
+            yield Damage(at, found, str(error) or "a record is not what was written")
+            at = certain = found
+            continue
+        if block is not None:
+            yield block
+        at = stream.tell()
+        certain = at if confirmed else certain
+    yield Damage(size, size, "the file has no end")

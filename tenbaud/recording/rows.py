@@ -1,7 +1,7 @@
 """Rows of a recording checked against what their channel declares, many at a time.
 
-Whoever gets a row from here may rely on every declared field being there with a value of its type, or
-null; on a whole number, not null, in the field that counts the rows; and on `NEVER_NULL`.
+Every row has all declared fields, each with a value of its type or null, and a whole number, not null,
+in the field that counts the rows; `NEVER_NULL` names further fields.
 """
 
 from __future__ import annotations
@@ -12,13 +12,18 @@ from typing import Any
 
 import orjson
 
-from channel.protocol.audit_trail import ARRIVED_CHANNEL, EPOCH_CHANNEL, SENT_CHANNEL
 from channel.protocol.events import EVENT_CHANNEL
 from channel.protocol.lockstep import LOCKSTEP_CHANNEL
-from channel.protocol.recording import Field, RecordChannel
+from channel.protocol.recording import (
+    ARRIVED_CHANNEL,
+    EPOCH_CHANNEL,
+    SENT_CHANNEL,
+    Field,
+    RecordChannel,
+)
 from receiver.session import records as receiver
 from tenbaud.recording.errors import RecordingError
-from tenbaud.recording.old_events import OLD_EVENT_CHANNEL, filled
+from tenbaud.recording.old_rows import OLD_EVENT_CHANNEL, names_of_today, rows_of_today
 from transmitter.metrics.gap import GAP_CHANNEL
 from transmitter.session import records as transmitter
 
@@ -36,13 +41,13 @@ KNOWN = (
     *(ARRIVED_CHANNEL, EPOCH_CHANNEL, EVENT_CHANNEL, LOCKSTEP_CHANNEL, GAP_CHANNEL),
     OLD_EVENT_CHANNEL,
 )
-"""What the two ends of this version write, and of those before it what has changed."""
+"""The rows that this version's ends write, and the changed ones of earlier versions."""
 
 NEVER_NULL = {
     ("epoch", "epoch"),
     *(("epoch", name) for name in ("state", "coder", "hold_volts")),
     *(("sample", name) for name in ("state", "coder", "digest")),
-    *(("tick", name) for name in ("live_state", "command_volts", "applied_volts")),
+    *(("tick", name) for name in ("live_state", "command", "applied")),
     *(("symbol", name) for name in ("symbol", "arrived_ns", "taken", "wire_bytes")),
 }
 """(topic, field) that no end ever leaves out; those that read them need not ask."""
@@ -79,7 +84,7 @@ def channel_of_names(data: bytes) -> RecordChannel | None:
         row = orjson.loads(data)
     except ValueError:
         return None
-    names = list(row) if isinstance(row, dict) else []
+    names = names_of_today(row) if isinstance(row, dict) else []
     for channel in KNOWN:
         if names == [one.name for one in channel.fields]:
             return channel
@@ -133,11 +138,10 @@ class RowDecoder:
         if set(map(type, rows)) - {dict}:
             bad = next(index for index, row in enumerate(rows) if type(row) is not dict)
             raise self._error(bad, "is no JSON object")
-        if self._channel.topic == OLD_EVENT_CHANNEL.topic:
-            rows = [filled(row) for row in rows]
+        rows = rows_of_today(self._channel.topic, rows)
         for one in self._fields:
             self._check(one, rows)
-        return rows  # type: ignore[no-any-return]
+        return rows
 
     def _parsed(self, index: int, text: bytes) -> Any:
         try:

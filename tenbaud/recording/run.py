@@ -14,12 +14,14 @@ import tomllib
 from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import orjson
 
+from channel.codec.signals import Signals
 from tenbaud.files.whole import whole_file
+from tenbaud.recording.encoding import recorded_signals
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import (
     RECEIVER_NAME,
@@ -30,7 +32,7 @@ from tenbaud.recording.folder import (
     read_small,
     read_summary,
 )
-from tenbaud.recording.signals import SIGNALS, Signal, Source, TimeBase
+from tenbaud.recording.signals import Definition, Signal, Source, TimeBase, definitions
 from tenbaud.recording.table import Series, Table, Tables, read_tables
 from tenbaud.sentences import events
 
@@ -47,50 +49,13 @@ TICK_S_MIN = 1e-6
 TICKS_PER_SAMPLE_MAX = 1_000_000
 
 
-class RecordedSignal:
-    """A signal as an attribute of a `Run`: its values. AttributeError where it was not recorded."""
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self._name = name
-        unit, meaning = next(row[1:3] for row in SIGNALS if row[0] == name)
-        self.__doc__ = f"{meaning}, {unit}" if unit else meaning
-
-    @overload
-    def __get__(self, run: None, owner: type) -> RecordedSignal: ...
-    @overload
-    def __get__(self, run: Run, owner: type) -> Series: ...
-    def __get__(self, run: Run | None, owner: type) -> Series | RecordedSignal:
-        return self if run is None else run.values_of(self._name)
-
-
 class Run:
     """One flight: its signals as numpy arrays on a common time base, and everything beside them.
 
-    Every name in `signals` is an attribute: `run.pitch`, `run.reference`, `run.symbol`. A file is
-    read when something in it is first asked for. A recording that was cut by a crash is read up to
-    the cut (`run.complete` is then False).
+    Every name in `signals` is an attribute: `run.reference`, `run.symbol`, and what the plant calls its
+    outputs and inputs, as `run.pitch` and `run.front`. A file is read when something in it is first
+    asked for. A recording that was cut by a crash is read up to the cut (`run.complete` is then False).
     """
-
-    # One attribute for each of `SIGNALS`, so that editors and type checkers know them.
-    reference = RecordedSignal()
-    pitch = RecordedSignal()
-    measured = RecordedSignal()
-    estimate = RecordedSignal()
-    estimate_live = RecordedSignal()
-    estimate_rate = RecordedSignal()
-    error_coded = RecordedSignal()
-    error_live = RecordedSignal()
-    range = RecordedSignal()
-    symbol = RecordedSignal()
-    symbol_sent = RecordedSignal()
-    erased = RecordedSignal()
-    front_command = RecordedSignal()
-    rear_command = RecordedSignal()
-    front = RecordedSignal()
-    rear = RecordedSignal()
-    late = RecordedSignal()
-    lateness = RecordedSignal()
-    gap_to_floor = RecordedSignal()
 
     def __init__(self, path: str | Path) -> None:
         """`path` is the folder of a run, or one recording; RecordingError if there is none."""
@@ -134,9 +99,18 @@ class Run:
         return list(self.signals)
 
     @cached_property
+    def plant(self) -> Signals:
+        """What the plant's states, inputs and outputs are called, their units and groups."""
+        return recorded_signals(self.metadata)
+
+    @cached_property
+    def _definitions(self) -> dict[str, Definition]:
+        return definitions(self.plant)
+
+    @cached_property
     def signals(self) -> dict[str, Signal]:
         """All signals of this run, with units and meanings."""
-        found = {name: self.signal(name) for name, _, _, _ in SIGNALS}
+        found = {name: self.signal(name) for name in self._definitions}
         return {name: signal for name, signal in found.items() if signal is not None}
 
     @property
@@ -147,7 +121,7 @@ class Run:
     def signal(self, name: str) -> Signal | None:
         """Return one signal; None if this run did not record it. KeyError for an unknown name."""
         if name not in self._made:
-            unit, meaning, make = {row[0]: row[1:] for row in SIGNALS}[name]
+            unit, meaning, make = self._definitions[name]
             values = make(Source(self.base, self._end("transmitter"), self._end("receiver")))
             if values is not None and np.isnan(values).all():
                 values = None
@@ -156,9 +130,9 @@ class Run:
 
     def values_of(self, name: str) -> Series:
         """Return the values of one signal; AttributeError, with the reason, if it is not there."""
-        known = [row[0] for row in SIGNALS]
-        if name not in known:
-            raise AttributeError(f"a run has no {name!r}; its signals are {', '.join(known)}")
+        if name not in self._definitions:
+            known = ", ".join(self._definitions)
+            raise AttributeError(f"a run has no {name!r}; its signals are {known}")
         signal = self.signal(name)
         if signal is None:
             raise AttributeError(
@@ -166,10 +140,13 @@ class Run:
             )
         return signal.values
 
-    if not TYPE_CHECKING:  # else every name would be taken for a signal
+    def __getattr__(self, name: str) -> Series:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return self.values_of(name)
 
-        def __getattr__(self, name: str) -> Series:
-            return self.values_of(name)
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._definitions]
 
     def _why_missing(self) -> str:
         absent = [end for end in ENDS if end not in self._files]
@@ -193,7 +170,7 @@ class Run:
 
     @property
     def events(self) -> list[dict[str, Any]]:
-        """What both ends reported, in order of flight time: the fields recorded, `end` and `text`.
+        """The events of both ends, in order of flight time: the recorded fields, `end` and `text`.
 
         The text is a sentence made from the fields, for people.
         """
@@ -206,7 +183,7 @@ class Run:
 
     @property
     def metadata(self) -> dict[str, str]:
-        """What the run said about itself when it began."""
+        """The metadata that the run wrote when it began."""
         return self.tables(self.ends[0]).metadata
 
     @property
@@ -216,7 +193,7 @@ class Run:
 
     @property
     def notes(self) -> list[str]:
-        """What to know before believing the recordings: another version, a cut, holes."""
+        """Notes to read before trusting the recordings: another version, a cut, holes."""
         return [note for end in self.ends for note in self.tables(end).notes]
 
     @cached_property
@@ -234,7 +211,7 @@ class Run:
 
         if not is_own_file(self.folder.config):
             raise RecordingError(f"{self.folder.path} holds no {self.folder.config.name}.")
-        return load_config(path=self.folder.config)
+        return load_config(path=self.folder.config, recorded=True)
 
     # Pictures
 

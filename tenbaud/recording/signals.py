@@ -1,18 +1,20 @@
 """The signals of a flight by name, on one time base: the ticks.
 
 What was recorded per tick stands at its tick; what was recorded per sample is held over the sample's
-ticks. Where nothing was recorded there is NaN. Of several measured axes it is the first; the others
-are in the tables (`Run.table`).
+ticks. Where nothing was recorded there is NaN. Names and units are those of the plant.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from channel.codec.signals import Signals, unit_suffix
 from tenbaud.recording.table import Series, Table, Tables
 
 
@@ -28,7 +30,7 @@ class Signal:
     @property
     def column(self) -> str:
         """The name with its unit, for a file that has no other place for it: `pitch_rad`."""
-        unit = {"": "", "V": "volts", "rad/s": "rad_per_s"}.get(self.unit, self.unit)
+        unit = unit_suffix(self.unit)
         return f"{self.name}_{unit}" if unit and not self.name.endswith(f"_{unit}") else self.name
 
 
@@ -75,7 +77,7 @@ Maker = Callable[["Source"], Series | None]
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """What signals are made from. An end that was not recorded is None."""
+    """The sources of signals. An end that was not recorded is None."""
 
     base: TimeBase
     transmitter: Tables | None
@@ -85,6 +87,41 @@ class Source:
         """Return a per-tick field on the time base; None where it was not recorded."""
         found = self._column(end, topic, name, axis)
         return None if found is None else self.base.place(*found)
+
+    def output(self, place: int) -> Series | None:
+        """Return the true value of an output where the rig knows it, else the measured one."""
+        true = self.ticks("transmitter", "tick", "true", place)
+        measured = self.ticks("transmitter", "tick", "measured", place)
+        if true is None or measured is None:
+            return measured if true is None else true
+        return np.where(np.isnan(true), measured, true)
+
+    def coded(self, state: int | None) -> Series | None:
+        """Return the codec's estimate of a state; None for an output that is no state."""
+        return self.ticks("transmitter", "estimate", "coded_state", state)
+
+    def live(self, state: int | None) -> Series | None:
+        """Return what the receiver predicted of a state."""
+        live = self.ticks("transmitter", "estimate", "live_state", state)
+        return self.ticks("receiver", "tick", "live_state", state) if live is None else live
+
+    def error(self, place: int, estimate: Series | None) -> Series | None:
+        """Return an output less an estimate of it."""
+        value = self.output(place)
+        return None if value is None or estimate is None else value - estimate
+
+    def loop(self, name: str) -> Series | None:
+        """Return what the transmitter's loop recorded once a tick."""
+        return self.ticks("transmitter", "tick", name, None)
+
+    def applied(self, place: int) -> Series | None:
+        """Return what an input was given."""
+        return self.ticks("transmitter", "tick", "applied", place)
+
+    def command(self, place: int) -> Series | None:
+        """Return what was commanded of an input, as the receiver sent it if that was recorded."""
+        sent = self.ticks("receiver", "tick", "command", place)
+        return self.ticks("transmitter", "tick", "commanded", place) if sent is None else sent
 
     def samples(self, name: str, axis: int | None) -> Series | None:
         """Return a per-sample field, from the transmitter if it was recorded there."""
@@ -102,6 +139,26 @@ class Source:
                 return self.base.symbols(table, table[name])
         return None
 
+    def erased(self) -> Series | None:
+        """Return 1 where a word was erased, else 0."""
+        for end in ("transmitter", "receiver"):
+            table = self._table(end, "sample")
+            if table is not None:
+                words = table["word"] if "word" in table.names else np.zeros((len(table), 0))
+                known = np.count_nonzero(~np.isnan(words), axis=1)
+                return self.base.hold(table, np.where(known == 0, 1.0, 0.0))
+        return None
+
+    def gap(self) -> Series | None:
+        """Return the gap gauge, each value held until the next one."""
+        table = self._table("transmitter", "gap")
+        if table is None or not len(table):
+            return None
+        samples = self.base.ticks // self.base.ticks_per_sample
+        last = np.searchsorted(table.keys, samples, side="right") - 1
+        held: Series = np.where(last < 0, np.nan, table["rms_over_floor"][np.maximum(last, 0)])
+        return held
+
     def _table(self, end: str, topic: str) -> Table | None:
         tables = self.transmitter if end == "transmitter" else self.receiver
         return tables.topics.get(topic) if tables is not None else None
@@ -118,109 +175,85 @@ class Source:
         return table, values
 
 
-def _ticks(end: str, topic: str, name: str, axis: int | None = 0) -> Maker:
-    return lambda source: source.ticks(end, topic, name, axis)
+class Definition(NamedTuple):
+    """A signal that a run may have: its unit, its meaning, and what it is made from."""
+
+    unit: str
+    meaning: str
+    make: Maker
 
 
-def _samples(name: str, axis: int | None = 0) -> Maker:
-    return lambda source: source.samples(name, axis)
+_OfOutput = Callable[[Source, int, int | None], Series | None]
 
 
-def _pitch(source: Source) -> Series | None:
-    true = source.ticks("transmitter", "tick", "true_rad", 0)
-    measured = source.ticks("transmitter", "tick", "measured_rad", 0)
-    if true is None or measured is None:
-        return measured if true is None else true
-    return np.where(np.isnan(true), measured, true)
+def _tick(end: str, name: str) -> _OfOutput:
+    return lambda source, place, _: source.ticks(end, "tick", name, place)
 
 
-def _estimate(source: Source, axis: int) -> Series | None:
-    return source.ticks("transmitter", "estimate", "coded_state", axis)
-
-
-def _live(source: Source) -> Series | None:
-    live = source.ticks("transmitter", "estimate", "live_state", 0)
-    return source.ticks("receiver", "tick", "live_state", 0) if live is None else live
-
-
-def _less(one: Series | None, other: Series | None) -> Series | None:
-    return None if one is None or other is None else one - other
-
-
-def _volts(axis: int) -> Maker:
-    def make(source: Source) -> Series | None:
-        sent = source.ticks("receiver", "tick", "command_volts", axis)
-        known = source.ticks("transmitter", "tick", "commanded_volts", axis)
-        return known if sent is None else sent
-
-    return make
-
-
-def _gap(source: Source) -> Series | None:
-    """Return the gap gauge, each value held until the next one."""
-    table = None if source.transmitter is None else source.transmitter.topics.get("gap")
-    if table is None or not len(table):
-        return None
-    samples = source.base.ticks // source.base.ticks_per_sample
-    last = np.searchsorted(table.keys, samples, side="right") - 1
-    held: Series = np.where(last < 0, np.nan, table["rms_over_floor"][np.maximum(last, 0)])
-    return held
-
-
-def _erased(source: Source) -> Series | None:
-    for end in (source.transmitter, source.receiver):
-        table = None if end is None else end.topics.get("sample")
-        if table is not None:
-            words = table["word"] if "word" in table.names else np.zeros((len(table), 0))
-            known = np.count_nonzero(~np.isnan(words), axis=1)
-            return source.base.hold(table, np.where(known == 0, 1.0, 0.0))
-    return None
-
-
-SIGNALS: tuple[tuple[str, str, str, Maker], ...] = (
-    (
-        "reference",
-        "rad",
-        "set-point of the controller",
-        _ticks("receiver", "tick", "reference_rad", None),
-    ),
-    ("pitch", "rad", "true angle where the rig knows it, else as measured", _pitch),
-    ("measured", "rad", "angle as the encoder gives it", _ticks("transmitter", "tick", "measured_rad")),
-    ("estimate", "rad", "the codec's estimate of the angle", lambda source: _estimate(source, 0)),
-    ("estimate_live", "rad", "what the receiver believed of the tick, in advance", _live),
-    ("estimate_rate", "rad/s", "the codec's estimate of the rate", lambda source: _estimate(source, 1)),
-    (
-        "error_coded",
-        "rad",
-        "pitch less estimate",
-        lambda source: _less(_pitch(source), _estimate(source, 0)),
-    ),
-    (
-        "error_live",
-        "rad",
-        "pitch less live estimate",
-        lambda source: _less(_pitch(source), _live(source)),
-    ),
-    ("range", "rad", "range M of the coder before the word", _samples("range")),
-    (
-        "symbol",
-        "",
-        "symbol consumed in the tick's slot; NaN: erased",
-        lambda source: source.word("word"),
-    ),
-    ("symbol_sent", "", "symbol sent in the tick's slot", lambda source: source.word("word_sent")),
-    ("erased", "", "1 where the sample's word was erased", _erased),
-    ("front_command", "V", "voltage commanded, front motor", _volts(0)),
-    ("rear_command", "V", "voltage commanded, rear motor", _volts(1)),
-    ("front", "V", "voltage applied, front motor", _ticks("transmitter", "tick", "applied_volts", 0)),
-    ("rear", "V", "voltage applied, rear motor", _ticks("transmitter", "tick", "applied_volts", 1)),
-    (
-        "late",
-        "",
-        "1 where the tick's command had not come",
-        _ticks("transmitter", "tick", "late", None),
-    ),
-    ("lateness", "ms", "how late the tick began", _ticks("transmitter", "tick", "lateness_ms", None)),
-    ("gap_to_floor", "", "running rms of the live error over the least possible", _gap),
+_OF_OUTPUT: tuple[tuple[str, str, _OfOutput], ...] = (
+    ("reference", "set-point of {}", _tick("receiver", "reference")),
+    ("", "{}, true where the rig knows it, else as measured", lambda one, at, _: one.output(at)),
+    ("measured", "{} as the sensor gives it", _tick("transmitter", "measured")),
+    ("estimate", "the codec's estimate of {}", lambda one, _, state: one.coded(state)),
+    ("estimate_live", "{} as the receiver predicted it", lambda one, _, state: one.live(state)),
+    ("error_coded", "{} less its estimate", lambda one, at, state: one.error(at, one.coded(state))),
+    ("error_live", "{} less its live estimate", lambda one, at, state: one.error(at, one.live(state))),
+    ("range", "range M for {} before the word", lambda one, at, _: one.samples("range", at)),
 )
-"""Name, unit, meaning and where it comes from. The order is that of the converted files."""
+"""What belongs to an output, its meaning, and what makes it of the output's place and state."""
+
+_OF_ALL = {
+    "symbol": Definition(
+        "", "symbol consumed in the tick's slot; NaN: erased", lambda one: one.word("word")
+    ),
+    "symbol_sent": Definition("", "symbol sent in the tick's slot", lambda one: one.word("word_sent")),
+    "erased": Definition("", "1 where the sample's word was erased", Source.erased),
+    "late": Definition("", "1 where the tick's command had not come", lambda one: one.loop("late")),
+    "lateness": Definition("ms", "how late the tick began", lambda one: one.loop("lateness_ms")),
+    "gap_to_floor": Definition("", "running rms of the live error over the least possible", Source.gap),
+}
+
+
+def definitions(plant: Signals) -> dict[str, Definition]:
+    """Return what a run of this plant may have, by name, in the order of the converted files.
+
+    What belongs to the only output has no more in its name than what it is: `estimate`; of several
+    outputs it is `estimate_arm`. A name that the plant gives twice, or that is one of ours, gets an
+    underscore.
+    """
+    found: dict[str, Definition] = {}
+
+    def add(name: str, unit: str, meaning: str, make: Maker) -> None:
+        while name in found or name in _OF_ALL:
+            name += "_"
+        found[name] = Definition(unit, meaning, make)
+
+    for what, meaning, make in _OF_OUTPUT:
+        for place, (one, state) in enumerate(zip(plant.outputs, plant.output_states, strict=True)):
+            name = output_name(plant, what, place)
+            add(name, one.unit, meaning.format(one.words), _made(make, place, state))
+    only = f"{plant.outputs[0].name}_" if len(plant.outputs) == 1 else ""
+    for state, one in enumerate(plant.states):
+        if state not in plant.output_states:
+            name, meaning = one.name.removeprefix(only), f"the codec's estimate of {one.words}"
+            add(f"estimate_{name}", one.unit, meaning, partial(Source.coded, state=state))
+    for suffix, meaning, of_input in (
+        ("_command", "as commanded", Source.command),
+        ("", "as applied", Source.applied),
+    ):
+        for place, one in enumerate(plant.inputs):
+            made = partial(of_input, place=place)
+            add(f"{one.name}{suffix}", one.unit, f"{one.words}, {meaning}", made)
+    return found | _OF_ALL
+
+
+def _made(make: _OfOutput, place: int, state: int | None) -> Maker:
+    return lambda source: make(source, place, state)
+
+
+def output_name(plant: Signals, what: str, place: int) -> str:
+    """Return the name of what belongs to an output; `what` empty: of the output itself."""
+    name = plant.outputs[place].name
+    if not what or len(plant.outputs) == 1:
+        return what or name
+    return f"{what}_{name}"

@@ -175,7 +175,7 @@ class Tables:
 
     @property
     def notes(self) -> list[str]:
-        """What a person should know before believing what is computed from this recording."""
+        """Notes to read before trusting results from this recording."""
         return recording_notes(self.path, self.metadata, self.complete, self.holes, self.strays)
 
     def topic(self, name: str) -> Table:

@@ -1,4 +1,4 @@
-"""Writes a flight into an MCAP file from a thread of its own.
+"""Writes a flight into an MCAP file from a separate thread.
 
 The flight only appends to a queue. The thread takes the rows out ten times a second, encodes them
 and writes them in chunks; what a killed process loses is the chunk that was
@@ -123,7 +123,7 @@ class McapRecorder:
 
     @property
     def cause(self) -> Exception | None:
-        """What ended the recording before its end, None if nothing did."""
+        """The error that ended the recording early, None if there was none."""
         return self._cause
 
     def write(self, channel: RecordChannel, time_ns: int, row: Sequence[object]) -> None:
@@ -243,9 +243,9 @@ class McapRecorder:
     def _register(self, channel: RecordChannel) -> _ChannelWriter:
         schema_id = self._writer.register_schema(channel.topic, "jsonschema", channel_schema(channel))
         channel_id = self._writer.register_channel(channel.topic, "json", schema_id)
-        entry = _ChannelWriter(channel, channel_id)
-        if self._overview is not None and self._overview.wants(channel):
-            entry.gather = self._overview.add
+        overview = self._overview
+        gather = overview.add if overview is not None and overview.wants(channel) else None
+        entry = _ChannelWriter(channel, channel_id, gather)
         self._writers[id(channel)] = entry
         return entry
 
@@ -304,14 +304,17 @@ class McapRecorder:
             self._error = text
 
 
-class _ChannelWriter:
-    """What the thread knows about one channel. It holds the channel so that its id stays taken."""
+_Gather = Callable[[str, int, Sequence[object]], None]
 
-    def __init__(self, channel: RecordChannel, channel_id: int) -> None:
+
+class _ChannelWriter:
+    """The thread's data about one channel. It holds the channel so that its id stays in use."""
+
+    def __init__(self, channel: RecordChannel, channel_id: int, gather: _Gather | None) -> None:
         self.channel = channel
         self.channel_id = channel_id
         self.encode = row_encoder(channel)
-        self.gather: Callable[[str, int, Sequence[object]], None] | None = None
+        self.gather = gather
 
 
 def _bad_row_text(path: Path, channel: RecordChannel, row: Sequence[object], error: Exception) -> str:

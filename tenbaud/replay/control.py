@@ -61,7 +61,7 @@ def steps_by_hand(record: FlightRecord) -> tuple[tuple[int, float], ...]:
         return ()
     reference = build_reference(record.agreement.config)
     rows = record.rows["receiver"].topic("tick")
-    told = [(row.tick, row.reference_rad) for row in rows if row.reference_rad is not None]
+    told = [(row.tick, row.reference[0]) for row in rows if row.reference != (None,)]
     first = next(
         (index for index, (tick, angle) in enumerate(told) if angle != reference.angle_rad(tick)), None
     )
@@ -86,12 +86,12 @@ def recorded_commands(record: FlightRecord) -> RecordedCommands | None:
     initial = record.agreement.terms.initial_command
     rows = record.rows.get("receiver")
     if rows is not None and rows.topic("tick").recorded:
-        commands = {row.tick: row.command_volts for row in rows.topic("tick")}
-        references = {row.tick: row.reference_rad for row in rows.topic("tick")}
+        commands = {row.tick: row.command for row in rows.topic("tick")}
+        references = {row.tick: row.reference[0] for row in rows.topic("tick")}
         return RecordedCommands(commands, initial, references)
     beside = record.rows.get("transmitter")
     if beside is None or not beside.topic("tick").recorded:
         return None
     ticks = beside.topic("tick").rows
-    commands = {row.tick: row.commanded_volts for row in ticks if row.commanded_volts is not None}
+    commands = {row.tick: row.commanded for row in ticks if row.commanded is not None}
     return RecordedCommands(commands, initial, {}) if len(commands) == len(ticks) else None

@@ -1,4 +1,4 @@
-"""What both recordings must hold, row by row, given the words that were consumed and nothing else.
+"""The expected rows of both recordings, computed from the consumed words alone.
 
 The receiver's half is its own session flown again (`refly`), the transmitter's half its own confirmed
 copy fed with the echoes that come of it. So a row is expected to be what the node itself would write.
@@ -73,9 +73,9 @@ def _add(agreement: Agreement, copies: Copies, one: Reflown, expected: Expected)
     for tick, reference, live, command in one.ticks:
         expected.commands[tick] = {
             "tick": tick,
-            "reference_rad": reference,
+            "reference": reference,
             "live_state": live,
-            "command_volts": command,
+            "command": command,
         }
 
 

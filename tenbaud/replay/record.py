@@ -1,4 +1,4 @@
-"""What was recorded of one flight, from one run folder or from one at each machine."""
+"""The recordings of one flight, from one run folder or from one at each machine."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tenbaud.config.outside_code import require_allowed, require_regular_files
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.run import Run
 from tenbaud.recording.table import Tables
-from tenbaud.replay.rows import EndRows, EpochStart, read_rows
+from tenbaud.replay.rows import EndRows, read_rows
 
 NUMBER_MAX = 1e9
 """Of a state or a command, in rad, rad/s or V."""
@@ -183,5 +183,5 @@ def _is_word(word: tuple[int, ...], agreement: Agreement) -> bool:
     return len(word) == alphabet.symbols_per_word and all(one in alphabet.symbols for one in word)
 
 
-def _epoch(row: EpochStart) -> Epoch:
+def _epoch(row: Any) -> Epoch:
     return Epoch(row.epoch, CodecState(row.sample, row.state, row.coder), row.hold_volts)

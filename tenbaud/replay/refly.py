@@ -35,7 +35,7 @@ class Reflown(NamedTuple):
     model: Vector
     coder: Vector
     digest: str
-    ticks: list[tuple[int, float | None, Vector, Vector]]
+    ticks: list[tuple[int, tuple[float | None, ...], Vector, Vector]]
     """(tick, reference, live state, command) of the ticks decided with it"""
 
 
@@ -67,7 +67,7 @@ class _Rows:
 
     def __init__(self) -> None:
         self.samples: list[Sequence[object]] = []
-        self.ticks: list[tuple[int, float | None, Vector, Vector]] = []
+        self.ticks: list[tuple[int, tuple[float | None, ...], Vector, Vector]] = []
 
     def write(self, channel: RecordChannel, time_ns: int, row: Sequence[object]) -> None:
         """Keep samples and ticks."""
@@ -104,13 +104,13 @@ def _refly_epoch(
             _let_deadlines_pass(session, now_ns)
             frame = Symbol(welcome.session, welcome.epoch, slot, alphabet.symbol_number(symbol))
             session.on_frame(frame, now_ns)
-            session.rest()
+            session.flush_records()
             yield from _taken(rows, place)
     # Erasures after the last symbol: their deadlines pass one by one.
     deadline = session.next_deadline()
     while session.state.sample < last and deadline is not None:
         session.on_deadline(deadline)
-        session.rest()
+        session.flush_records()
         yield from _taken(rows, place)
         deadline = session.next_deadline()
 

@@ -18,7 +18,7 @@ from tenbaud.replay.symbols import Packed, Unpacked, pack
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """What came of a replay."""
+    """The result of a replay."""
 
     samples: int
     digests_compared: int
@@ -143,9 +143,9 @@ def _compare_commands(rows: EndRows, flown: Sequence[Reflown]) -> list[str]:
             row = by_tick.get(tick)
             if row is None:
                 continue
-            if row.command_volts != command or row.live_state != live:
+            if row.command != command or row.live_state != live:
                 unlike += 1
-                first = first or f"tick {tick}: recorded {row.command_volts} V, computed {command} V"
+                first = first or f"tick {tick}: recorded {row.command}, computed {command}"
     if not unlike:
         return []
     return [f"receiver: {unlike} commands differ from what the states give, first at {first}"]
@@ -159,3 +159,32 @@ def save_symbols(replayed: Replayed, path: Path) -> None:
         )
     make_folder(path.parent)
     write_whole(path, replayed.packed.data)
+
+
+def replay_text(replayed: Replayed) -> str:
+    """Return the outcome of a replay."""
+    packed = replayed.packed
+    size = f"{len(packed.symbols)} bytes of symbols"
+    if packed.erasures:
+        size += f" and {len(packed.erasures)} that mark {replayed.erased} erasures"
+    lines = [
+        f"{replayed.samples} samples, {replayed.bits_sent:g} bits: the whole flight is {size}",
+        f"beside it, known beforehand: {len(packed.head)} bytes of configuration, packed",
+    ]
+    if replayed.epochs > 1:
+        lines.append(
+            f"{replayed.epochs} epochs; rejoins sent {packed.start_bytes} bytes of states down the link"
+        )
+    if replayed.steps:
+        lines.append(f"the set-point was moved by hand; {len(replayed.steps)} steps were recorded")
+    if replayed.equal:
+        lines.append(
+            f"flown again: all {replayed.digests_compared} digests of both recordings are equal, and "
+            "so are the commands"
+        )
+    elif replayed.differences:
+        lines += ["flown again, it is not the flight that was recorded:"]
+        lines += [f"  {difference}" for difference in replayed.differences]
+    else:
+        lines.append("no state could be compared")
+    return "\n".join(lines)

@@ -1,232 +1,87 @@
 """The rows of a recording as typed records, checked one by one as they are read.
 
 A recording may come from anybody. So the types are those that the nodes write, not those that the file
-says it has, and a row that does not fit is told by topic, row and field instead of failing later.
+says it has, and an error names topic, row and field of a row that does not fit.
 """
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
-from channel.codec.codec import Vector
-from channel.codec.words import Word
-from channel.protocol.audit_trail import ARRIVED_CHANNEL, EPOCH_CHANNEL, SENT_CHANNEL
 from channel.protocol.events import EVENT_CHANNEL
 from channel.protocol.lockstep import LOCKSTEP_CHANNEL
-from channel.protocol.recording import Field, RecordChannel
-from receiver.session import records as receiver_records
+from channel.protocol.recording import (
+    ARRIVED_CHANNEL,
+    EPOCH_CHANNEL,
+    SENT_CHANNEL,
+    Field,
+    RecordChannel,
+)
+from receiver.session import records as receiver
 from tenbaud.recording.recover import RECOVERED_NOTE
 from tenbaud.recording.table import Table, Tables
 from transmitter.metrics.gap import GAP_CHANNEL
-from transmitter.session import records as transmitter_records
+from transmitter.session import records as transmitter
 
 KEY_MAX = 2**48
 """No flight has a tick, sample or slot beyond this."""
 
-ANGLES = ("measured_rad", "true_rad")
-"""A rig may read an angle that is no number, which a recording holds as null."""
-
-
-class SentSymbol(NamedTuple):
-    """A symbol that was offered to the uplink."""
-
-    slot: int
-    symbol: int
-    left_ns: int | None
-    wire_bytes: int
-
-
-class ArrivedSymbol(NamedTuple):
-    """A symbol that came."""
-
-    slot: int
-    symbol: int
-    arrived_ns: int
-    taken: bool
-
-
-class EpochStart(NamedTuple):
-    """What an epoch starts from."""
-
-    sample: int
-    epoch: int
-    state: Vector
-    coder: Vector
-    hold_volts: Vector
-
-
-class EventRow(NamedTuple):
-    """Something that was reported."""
-
-    time_s: float
-    kind: str
-    sample: int | None
-    tick: int | None
-    slot: int | None
-    session: int | None
-    epoch: int | None
-    cause: str | None
-    state: str | None
-    by_peer: bool | None
-    axis: int | None
-    number: int | None
-    value: float | None
-    limit: float | None
-    missed_share: float | None
-    overdue_share: float | None
-    transmitter_digest: str | None
-    receiver_digest: str | None
-    detail: str | None
-
-
-class LockstepFailure(NamedTuple):
-    """Two copies that differ."""
-
-    sample: int
-    epoch: int
-    digest: str
-    peer_digest: str
-    state: Vector | None
-    coder: Vector | None
-    peer_state: Vector | None
-    peer_coder: Vector | None
-    input_samples: tuple[int, ...]
-    input_words: tuple[int, ...]
-
-
-class PlantTick(NamedTuple):
-    """A tick beside the plant."""
-
-    tick: int
-    time_s: float
-    measured_rad: Vector
-    true_rad: Vector | None
-    commanded_volts: Vector | None
-    applied_volts: Vector
-    late: bool
-    lateness_ms: float
-    guard: str
-
-
-class Estimate(NamedTuple):
-    """What was believed of a tick."""
-
-    tick: int
-    coded_state: Vector
-    live_state: Vector | None
-
-
-class ConfirmedSample(NamedTuple):
-    """A sample at the transmitter."""
-
-    sample: int
-    word_sent: Word
-    word: Word
-    range: Vector
-    state: Vector
-    coder: Vector
-    digest: str
-    peer_digest: str
-    lag_samples: int
-
-
-class GaugeRow(NamedTuple):
-    """The gap gauge at a sample."""
-
-    sample: int
-    strength_rad2_per_s3: float | None
-    rms_over_floor: float | None
-    ideal_bits: float | None
-
-
-class DeviceRow(NamedTuple):
-    """What a real rig said with a reading."""
-
-    tick: int
-    counts: tuple[int, ...]
-    device_s: float | None
-    age_ms: float
-    lost: int
-
-
-class CommandTick(NamedTuple):
-    """A command that the receiver decided."""
-
-    tick: int
-    reference_rad: float | None
-    live_state: Vector
-    command_volts: Vector
-
-
-class ConsumedSample(NamedTuple):
-    """A sample at the receiver."""
-
-    sample: int
-    word: Word
-    range: Vector
-    state: Vector
-    coder: Vector
-    digest: str
-    arrival_s: float
+WITH_HOLES = ("measured", "true", "reference")
+"""A rig may read what is no number, and an output may have no set-point: a recording holds null."""
 
 
 class Kind(NamedTuple):
-    """A topic of an end: its record, the channel that the node writes it through, what may be null."""
+    """A topic of an end: the channel that the node writes it through, and what may be null in it."""
 
-    record: type[Any]
     channel: RecordChannel
-    nullable: frozenset[str] = frozenset()
+    nullable: frozenset[str]
+    record: type[Any]
+    """a named tuple with the channel's fields"""
 
 
-_EPOCH = Kind(EpochStart, EPOCH_CHANNEL)
-_EVENT = Kind(EventRow, EVENT_CHANNEL, frozenset(EventRow._fields[2:]))
-_LOCKSTEP = Kind(
-    LockstepFailure,
-    LOCKSTEP_CHANNEL,
-    frozenset({"state", "coder", "peer_state", "peer_coder"}),
-)
+def _kind(channel: RecordChannel, *nullable: str) -> Kind:
+    names = [one.name for one in channel.fields]
+    return Kind(channel, frozenset(nullable), namedtuple("Record", names))
+
+
+_EPOCH = _kind(EPOCH_CHANNEL)
+_EVENT = _kind(EVENT_CHANNEL, *(one.name for one in EVENT_CHANNEL.fields[2:]))
+_LOCKSTEP = _kind(LOCKSTEP_CHANNEL, "state", "coder", "peer_state", "peer_coder")
 
 KINDS: dict[str, dict[str, Kind]] = {
     "transmitter": {
-        "symbol": Kind(SentSymbol, SENT_CHANNEL, frozenset({"left_ns"})),
+        "symbol": _kind(SENT_CHANNEL, "left_ns"),
         "epoch": _EPOCH,
         "event": _EVENT,
         "lockstep_failure": _LOCKSTEP,
-        "tick": Kind(
-            PlantTick,
-            transmitter_records.TICK_CHANNEL,
-            frozenset({"true_rad", "commanded_volts"}),
-        ),
-        "sample": Kind(
-            ConfirmedSample, transmitter_records.SAMPLE_CHANNEL, frozenset({"word_sent", "word"})
-        ),
-        "estimate": Kind(Estimate, transmitter_records.ESTIMATE_CHANNEL, frozenset({"live_state"})),
-        "gap": Kind(GaugeRow, GAP_CHANNEL, frozenset(GaugeRow._fields[1:])),
-        "device": Kind(DeviceRow, transmitter_records.DEVICE_CHANNEL, frozenset({"device_s"})),
+        "tick": _kind(transmitter.TICK_CHANNEL, "true", "commanded"),
+        "sample": _kind(transmitter.SAMPLE_CHANNEL, "word_sent", "word"),
+        "estimate": _kind(transmitter.ESTIMATE_CHANNEL, "live_state"),
+        "gap": _kind(GAP_CHANNEL, *(one.name for one in GAP_CHANNEL.fields[1:])),
+        "device": _kind(transmitter.DEVICE_CHANNEL, "device_s"),
     },
     "receiver": {
-        "symbol": Kind(ArrivedSymbol, ARRIVED_CHANNEL),
+        "symbol": _kind(ARRIVED_CHANNEL),
         "epoch": _EPOCH,
         "event": _EVENT,
         "lockstep_failure": _LOCKSTEP,
-        "tick": Kind(CommandTick, receiver_records.TICK_CHANNEL, frozenset({"reference_rad"})),
-        "sample": Kind(ConsumedSample, receiver_records.SAMPLE_CHANNEL, frozenset({"word"})),
+        "tick": _kind(receiver.TICK_CHANNEL),
+        "sample": _kind(receiver.SAMPLE_CHANNEL, "word"),
     },
 }
 """Every topic of each end. What is written elsewhere in a recording is no part of an audit."""
 
-Record = TypeVar("Record", bound=tuple[Any, ...])
-
 
 @dataclass(slots=True)
-class Topic(Generic[Record]):
+class Topic:
     """The rows of one topic in the order of the file, with the flight time that each is filed under."""
 
     recorded: bool = False
     """whether the recording has the topic at all"""
-    rows: list[Record] = field(default_factory=list)
+    rows: list[Any] = field(default_factory=list)
     times_ns: list[int] = field(default_factory=list)
 
     def __iter__(self) -> Any:
@@ -235,7 +90,7 @@ class Topic(Generic[Record]):
     def __len__(self) -> int:
         return len(self.rows)
 
-    def by_key(self) -> dict[int, Record]:
+    def by_key(self) -> dict[int, Any]:
         """Return the rows by their first field; of doubled ones the last."""
         return {row[0]: row for row in self.rows}
 
@@ -256,20 +111,20 @@ class EndRows:
     end: str
     complete: bool
     """whether the recorder finished the file; else what there is ends at a cut"""
-    topics: dict[str, Topic[Any]]
+    topics: dict[str, Topic]
     misfits: list[Misfit]
     foreign: list[str]
     """topics that no node writes"""
 
-    def topic(self, name: str) -> Topic[Any]:
+    def topic(self, name: str) -> Topic:
         """Return a topic of this end, without rows where it was not recorded."""
         return self.topics[name]
 
 
 def read_rows(end: str, tables: Tables) -> EndRows:
-    """Return the rows of one end; those that do not fit are left out and told as misfits."""
+    """Return the rows of one end; those that do not fit are left out and listed as misfits."""
     misfits: list[Misfit] = []
-    topics: dict[str, Topic[Any]] = {}
+    topics: dict[str, Topic] = {}
     for name, kind in KINDS[end].items():
         table = tables.topics.get(name)
         topics[name] = Topic() if table is None else _typed(name, kind, table, misfits)
@@ -278,8 +133,8 @@ def read_rows(end: str, tables: Tables) -> EndRows:
     return EndRows(end, complete, topics, misfits, foreign)
 
 
-def _typed(name: str, kind: Kind, table: Table, misfits: list[Misfit]) -> Topic[Any]:
-    topic: Topic[Any] = Topic(recorded=True)
+def _typed(name: str, kind: Kind, table: Table, misfits: list[Misfit]) -> Topic:
+    topic = Topic(recorded=True)
     lacking = [one.name for one in kind.channel.fields if one.name not in table.names]
     if lacking:
         misfits.append(Misfit(name, "every row", lacking[0], "this field is not recorded"))
@@ -322,7 +177,7 @@ def _fits(value: Any, one: Field, nullable: frozenset[str]) -> bool:
         case "integers":
             return type(value) is tuple and _all_of(value, int)
         case _:
-            holes = one.name in ANGLES
+            holes = one.name in WITH_HOLES
             return type(value) is tuple and all(
                 type(entry) in (int, float) or (holes and entry is None) for entry in value
             )

@@ -49,7 +49,7 @@ class Packed:
 
 @dataclass(frozen=True, slots=True)
 class Unpacked:
-    """What a symbols file holds."""
+    """The contents of a symbols file."""
 
     agreement: Agreement
     epochs: list[Epoch]
@@ -98,7 +98,7 @@ NUMBER_MAX = 1 << 53
 
 
 def unpack(path: Path, *, allow_code: bool = False) -> Unpacked:
-    """Read a symbols file; RecordingError for a file that is none, or not a whole one.
+    """Read a symbols file; RecordingError for an invalid or incomplete file.
 
     CodeNotAllowed if its configuration names classes from outside, unless `allow_code` permits them.
     """

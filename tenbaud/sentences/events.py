@@ -171,7 +171,7 @@ def _control(one: Fields) -> str:
         "go_on": lambda: "go on",
         "pace": lambda: f"{one['value']!r} times real time",
         "impair": lambda: line_text(one["detail"] or ""),
-        "spoil": lambda: (
+        "corrupt": lambda: (
             f"one bit of this codec's {one['detail']} changed after sample {one['sample']}"
         ),
         "ignored": lambda: f"{one['detail']}: ignored",

@@ -13,7 +13,7 @@ from tenbaud.studies.study import Study
 
 
 class ChunkTask(NamedTuple):
-    """What a worker is told; it needs no file of the study."""
+    """The job of a worker, which needs no file of the study."""
 
     chunk: int
     engine: str
@@ -24,7 +24,7 @@ class ChunkTask(NamedTuple):
 
 
 class ChunkResult(NamedTuple):
-    """What a worker returns."""
+    """The result of a worker."""
 
     chunk: int
     figures: list[FlightFigures]

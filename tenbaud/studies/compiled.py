@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from channel.codec.lead import fly_ticks
 from channel.codec.numerics import refuse
 from channel.errors import TenbaudError
 
@@ -38,11 +39,12 @@ SOURCES = (*PACKAGES[:-1], "tenbaud.build", "tenbaud.config", "tenbaud.flight", 
 BESIDE = (
     *("constants.py", "judging.py", "tuning.py"),
     *("plots.py", "run.py", "table.py", "study.py", "study_file.py", "points.py", "settings.py"),
+    "progress.py",
 )
 """Modules of the studies that no figure of a flight depends on."""
 
 Parts = tuple[tuple[str, Any], ...]
-"""What stands for the placeholders of the flight: (name, compiled function)."""
+"""Replacements for the placeholders of the flight: (name, compiled function)."""
 
 
 class StudiesMissing(TenbaudError):
@@ -80,7 +82,9 @@ def compiled(
             names[name] = _jit(_refuse, inline="never")
         elif package in PACKAGES:
             ours = rest.startswith("studies")
-            names[name] = compiled(value, parts if ours else (), ours, allocates)
+            # Put into its caller: only so are the functions that it is given known by then.
+            inlined = ours or value is fly_ticks
+            names[name] = compiled(value, parts if ours else (), inlined, allocates)
     scope = {**function.__globals__, **names}
     copy = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
     copy.__module__ = function.__module__

@@ -1,4 +1,4 @@
-"""Which constants of a coder and a model are fitted, and between which ends."""
+"""The constants of a coder and a model that are fitted, and their bounds."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CODER_RANGES = {
         "coder.range_rad": (0.1, 10.0, "log"),
         **GAINS,
     },
-    "timed": {
+    "open-loop-zoom": {
         "coder.minimum_range_rad": (0.1, 10.0, "log"),
         **GAINS,
     },

@@ -1,4 +1,4 @@
-"""What a study keeps of a flight, and what it checks of one before flying it."""
+"""The figures that a study keeps of a flight, and its checks before the flight."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tenbaud.config.schema import FlightConfig
 
 
 class FlightFigures(NamedTuple):
-    """What a study keeps of one flight. Errors in rad; not a number where there is none."""
+    """The figures that a study keeps of one flight. Errors in rad; NaN where there is none."""
 
     outcome: str
     """ok, or why the flight has no figures"""

@@ -1,4 +1,4 @@
-"""What a compiled flight reads, writes and returns: flat numbers and arrays."""
+"""The inputs and outputs of a compiled flight: flat numbers and arrays."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ DONE, LEFT = 0, 1
 
 
 class Numbers(NamedTuple):
-    """What a flight is made of, beside the constants of model, coder, plant and PID."""
+    """The inputs of a flight, beside the constants of model, coder, plant and PID."""
 
     ticks: int
     per_sample: int
@@ -67,7 +67,7 @@ class Given(NamedTuple):
     gains: Any
     anew: Any
     largest: Any
-    """of the transmitter's observer (`transmitter.session.sight`); a row per state"""
+    """of the transmitter's observer (`transmitter.session.state_observer`); a row per state"""
 
 
 class Work(NamedTuple):
@@ -95,7 +95,7 @@ class Work(NamedTuple):
     coded: Any
     """per tick: the codec's angle"""
     live: Any
-    """per tick: the angle believed in advance"""
+    """per tick: the predicted angle"""
     front: Any
     rear: Any
     """per tick: commanded"""
@@ -104,7 +104,7 @@ class Work(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """What the sensor node's side carries from tick to tick."""
+    """The sensor node's state between ticks."""
 
     front: float
     rear: float

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from plant_sim.pitch import pitch_constants
 from receiver.controllers.pid import Pid, PidConstants
 from receiver.controllers.recorded import RecordedController
 from tenbaud.build.controllers import build_controller, reference_of
-from tenbaud.build.ends import build_sight, guard_settings
+from tenbaud.build.ends import build_observer, guard_settings
 from tenbaud.build.flight import Agreement, kind_of_link, read_flight_log
 from tenbaud.build.rig import nominal_plant
 from tenbaud.config.load import ConfigError
@@ -32,7 +32,7 @@ from tenbaud.studies.flight_data import DONE, Errors, Given, Motion, Numbers, Wo
 from tenbaud.studies.kernel import fly
 from tenbaud.studies.schedule import Schedule, Uncommon, schedule_of
 from transmitter.encoder_watch import WINDOW_S
-from transmitter.session.sight import Sight
+from transmitter.session.state_observer import StateObserver
 
 NOTHING = np.zeros(0)
 NO_PAIRS = np.zeros((0, 2))
@@ -40,7 +40,7 @@ NO_PAIRS = np.zeros((0, 2))
 
 @dataclass(slots=True)
 class Trace:
-    """States of a compiled flight, for whoever wants to compare them."""
+    """States of a compiled flight, for comparisons."""
 
     models: Any
     coders: Any
@@ -58,19 +58,21 @@ class CompiledPoint:
     """
 
     config: FlightConfig
+    scored_from: int | None = None
+    """the tick from which errors count, where it is not the usual one"""
     agreement: Agreement = field(init=False)
     numbers: Numbers = field(init=False)
     constants: Any = field(init=False)
     _log: FlightLog | None = field(init=False, default=None)
     reference: Any = field(init=False)
     _clean: Any = field(init=False, default=None)
-    _sight: Sight | None = field(init=False)
+    _observer: StateObserver | None = field(init=False)
     _work: Work = field(init=False)
 
     def __post_init__(self) -> None:
         """Build all that does not depend on the seed."""
         config = self.config
-        self.agreement = shared_parts(config)
+        self.agreement = replace(shared_parts(config), scored_from=self.scored_from)
         _require_ordinary(config, self.agreement.codec)
         replay = config.transmitter.rig == "replay"
         ticks = self.agreement.flight_ticks
@@ -82,7 +84,7 @@ class CompiledPoint:
         pid = controller.constants if isinstance(controller, Pid) else _no_pid()
         plant = nominal_plant(config).mismatched(config.transmitter.plant.mismatch)
         codec = self.agreement.codec
-        self._sight = build_sight(self.agreement)
+        self._observer = build_observer(self.agreement)
         self.constants = (
             arrays_of(codec.model.constants),  # type: ignore[attr-defined]
             arrays_of(codec.coder.constants),  # type: ignore[attr-defined]
@@ -98,10 +100,6 @@ class CompiledPoint:
         )
 
         self._work = _work(codec, self._samples, ticks, self._ahead)
-
-    def machine_code(self) -> list[str]:
-        """Return what the flight was compiled to, for whoever wants to read it."""
-        return list(_compiled_flight(self.agreement.codec).inspect_asm().values())
 
     @property
     def _samples(self) -> int:
@@ -127,7 +125,7 @@ class CompiledPoint:
         work = self._work
         torque = torque_of(agreement.config, agreement.config.seed, self.numbers.ticks)
         given = self.given(schedule, torque)
-        flight = _compiled_flight(agreement.codec)
+        flight = compiled_flight(agreement.codec)
         try:
             status, motion, errors = flight(self.numbers, self.constants, given, work)
         except ValueError as error:
@@ -177,11 +175,11 @@ class CompiledPoint:
             self.reference,
             torque,
             *_recorded(self._log, self._ahead),
-            *_observer(self._sight),
+            *_observer(self._observer),
         )
 
 
-def _compiled_flight(codec: Codec) -> Any:
+def compiled_flight(codec: Codec) -> Any:
     """Return the compiled flight for a codec's kinds of model and coder."""
     encode, decode, allocates = codec.coder.functions  # type: ignore[attr-defined]
     parts = (
@@ -201,11 +199,11 @@ def _compiled_tick(model: Any) -> Any:
     return compiled(model.tick_function)
 
 
-def _observer(sight: Sight | None) -> tuple[Any, Any, Any]:
+def _observer(observer: StateObserver | None) -> tuple[Any, Any, Any]:
     """Return gains, gains after a gap and largest states of the transmitter's observer."""
-    if sight is None:
+    if observer is None:
         return NO_PAIRS, NO_PAIRS, NOTHING
-    return np.array(sight.gains), np.array(sight.anew), np.array(sight.largest)
+    return np.array(observer.gains), np.array(observer.anew), np.array(observer.largest)
 
 
 def _require_ordinary(config: FlightConfig, codec: Codec) -> None:

@@ -2,7 +2,8 @@
 
 On simulated flights, one set of seeds is for the fit and another for the judgement. On a recorded
 flight, the first part is for the fit and the rest for the judgement; there the codec flies through the
-whole recording and only the rest counts. The measure is the rms error of what the receiver believed.
+whole recording and only the rest counts. The measure is the rms error of the receiver's predicted
+estimate.
 """
 
 from __future__ import annotations
@@ -25,11 +26,11 @@ from tenbaud.studies.study_file import Range
 Method = Literal["differential-evolution", "nelder-mead"]
 
 PENALTY_RAD = 100.0
-"""What a flight without figures counts as: worse than any error that an angle can have."""
+"""The error that counts for a flight without figures: larger than any error of an angle."""
 
 
 class Split(NamedTuple):
-    """Which flights are for the fit, and which for the judgement."""
+    """The split of flights into those for the fit and those for the validation."""
 
     train_seeds: tuple[int, ...]
     test_seeds: tuple[int, ...]
@@ -75,7 +76,7 @@ class Tuning:
 
 
 class Judged(NamedTuple):
-    """What came of the flights of one part of a split."""
+    """The result of the flights of one part of a split."""
 
     rms_rad: float
     """over all of them; one without figures counts as `PENALTY_RAD`"""
@@ -117,9 +118,7 @@ def _fly_part(config: FlightConfig, share: float, *, train: bool) -> FlightFigur
     config = config.model_copy(update={"duration_s": until * config.timing.tick_s})
     start = 0 if train else border
     try:
-        point = CompiledPoint(config)
-        point.numbers = point.numbers._replace(window_start=start)
-        return point.fly(config.seed)[0]
+        return CompiledPoint(config, start).fly(config.seed)[0]
     except Uncommon:
         return fly_plain(config, start)
 

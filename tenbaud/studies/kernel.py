@@ -2,10 +2,10 @@
 
 What the two sessions, the guard and the rig do one message at a time is done here sample by sample, in
 the order of cause and effect: the transmitter's word, what the receiver made of it, its commands, the
-plant under them. All arithmetic is that of the nodes, imported; only the sequence is written anew, and
-tests compare it with ordinary flights, bit by bit. A flight that leaves the ordinary course, by a guard
-that steps in or an estimate that diverges, is not followed: it comes back with the status `LEFT`, and
-whoever asked flies it with the nodes themselves.
+plant under them. All arithmetic is that of the nodes, imported, and so is the order of a sample's ticks
+(`fly_ticks`); tests compare with ordinary flights, bit by bit. A flight that leaves the ordinary
+course, by a guard that steps in or an estimate that diverges, is not followed: it comes back with the
+status `LEFT`, and the caller flies it with the nodes themselves.
 
 The functions that depend on the kinds of model and coder are placeholders here (`parts`) and given
 when the flight is compiled.
@@ -17,12 +17,16 @@ import math
 from typing import Any
 
 from channel.codec.codec import add_correction, is_estimate
+from channel.codec.lead import fly_ticks
 from channel.protocol.limits import as_carried, limited
 from plant_sim.pitch import pitch_step
 from receiver.controllers.pid import motor_volts, pid_integral, pid_volts
 from tenbaud.studies.flight_data import DONE, LEFT, Errors, Given, Motion, Numbers, Work
 from tenbaud.studies.parts import decode, encode, held_of, sine, state_of, tick
 from tenbaud.studies.sensor_side import act, angle_at, count_at, guess, look, put, score
+
+Carried = tuple[bool, float, tuple[float, float, float, float], Motion, Errors]
+"""Whether all is well, the PID's integral, the plant's state, the sensor node's side, the errors."""
 
 
 def fly(
@@ -35,8 +39,7 @@ def fly(
 
     `constants` are those of (model, coder, plant, PID).
     """
-    model_constants, coder_constants, plant_constants, pid_constants = constants
-    integral = 0.0
+    model_constants, coder_constants = constants[0], constants[1]
     plant = (given.start[0], given.start[1], 0.0, 0.0)
     motion = Motion(numbers.safe_front, numbers.safe_rear, 0, 0, 0, 0)
     errors = Errors(0, 0.0, 0.0, 0, 0.0, 0.0, 0, 0.0, 0.0)
@@ -45,46 +48,71 @@ def fly(
     put(work.models[0], work.seen)
     work.given_out[0] = numbers.initial_front
     work.given_out[1] = numbers.initial_rear
+    carried = (True, 0.0, plant, motion, errors)
     for sample in range(given.scored.shape[0]):
-        well = _measure(sample, plant[0], numbers, model_constants, coder_constants, given, work)
+        well = _measure(sample, carried[2][0], numbers, model_constants, coder_constants, given, work)
         erased = _receive(sample, given, work)
         held = _open(sample, erased, numbers, coder_constants, work)
-        state = state_of(work.model)
-        first = sample * numbers.per_sample
-        after = first + numbers.per_sample
-        # Codec and plant in one loop: neither waits for the other within a tick, so that the processor
-        # works on both at once.
-        for at in range(first, after + numbers.lead):
-            if at == after:
-                well = _close(sample, state, work) and well
-                held = held_of(work.nothing)
-            if at < after:
-                work.coded[at] = state[0]
-            if at >= first + numbers.lead:
-                work.live[at] = state[0]
-                decided, integral = _decide(
-                    at, state[0], state[1], integral, numbers, pid_constants, given, work
-                )
-                well = well and decided
-            volts = (work.front[at], work.rear[at])
-            state = tick(state, volts, held, model_constants)
-            if at < after and at < numbers.ticks:
-                if at > first and numbers.uses_rates:
-                    look(at, _read(at, plant[0], numbers, given), numbers, model_constants, given, work)
-                untripped, motion = act(at, plant[0], motion, numbers, model_constants, given, work)
-                well = well and untripped
-                if at >= numbers.window_start:
-                    angle = angle_at(motion.counts, numbers) if numbers.replay else plant[0]
-                    errors = score(at, sample, angle, errors, numbers, given, work)
-                if not numbers.replay:
-                    torque = given.torque[at] if given.torque.shape[0] > 0 else 0.0
-                    volts = (motion.front, motion.rear)
-                    plant = pitch_step(plant, volts, torque, plant_constants, sine)
-        if numbers.lead == 0:
-            well = _close(sample, state, work) and well
-        if not well:
-            return LEFT, motion, errors
-    return DONE, motion, errors
+        carried = fly_ticks(
+            _step,
+            _close,
+            _tick,
+            (sample, numbers, constants, given, work),
+            (well, carried[1], carried[2], carried[3], carried[4]),
+            state_of(work.model),
+            held,
+            held_of(work.nothing),
+            sample * numbers.per_sample,
+            numbers.per_sample,
+            numbers.lead,
+        )
+        if not carried[0]:
+            return LEFT, carried[3], carried[4]
+    return DONE, carried[3], carried[4]
+
+
+def _step(flight: Any, carried: Carried, at: int, within: bool, ahead: bool, state: Any) -> Any:
+    """Do what belongs to a tick beside the model: decide its command, and let the plant move under it.
+
+    Codec and plant in one loop: neither waits for the other within a tick, so that the processor works
+    on both at once.
+    """
+    sample, numbers, constants, given, work = flight
+    plant_constants, pid_constants = constants[2], constants[3]
+    well, integral, plant, motion, errors = carried
+    if within:
+        work.coded[at] = state[0]
+    if ahead:
+        work.live[at] = state[0]
+        decided, integral = _decide(
+            at, state[0], state[1], integral, numbers, pid_constants, given, work
+        )
+        well = well and decided
+    if within and at < numbers.ticks:
+        if at > sample * numbers.per_sample and numbers.uses_rates:
+            look(at, _read(at, plant[0], numbers, given), numbers, constants[0], given, work)
+        untripped, motion = act(at, plant[0], motion, numbers, constants[0], given, work)
+        well = well and untripped
+        if at >= numbers.window_start:
+            angle = angle_at(motion.counts, numbers) if numbers.replay else plant[0]
+            errors = score(at, sample, angle, errors, numbers, given, work)
+        if not numbers.replay:
+            torque = given.torque[at] if given.torque.shape[0] > 0 else 0.0
+            volts = (motion.front, motion.rear)
+            plant = pitch_step(plant, volts, torque, plant_constants, sine)
+    return (well, integral, plant, motion, errors), (work.front[at], work.rear[at])
+
+
+def _close(flight: Any, carried: Carried, state: Any) -> Carried:
+    """Keep the state after a sample; what is carried says whether it is an estimate (`Codec.close`)."""
+    row = flight[4].models[flight[0] + 1]
+    for index in range(len(state)):
+        row[index] = state[index]
+    return (carried[0] and is_estimate(state), carried[1], carried[2], carried[3], carried[4])
+
+
+def _tick(flight: Any, state: Any, volts: Any, held: Any) -> Any:
+    return tick(state, volts, held, flight[2][0])
 
 
 def _measure(
@@ -158,14 +186,6 @@ def _open(
         add_correction(work.model, work.correction)
         return held_of(work.nothing)
     return held_of(work.correction)
-
-
-def _close(sample: int, state: Any, work: Work) -> bool:
-    """Keep the state after a sample; return whether it is an estimate (`Codec.close`)."""
-    row = work.models[sample + 1]
-    for index in range(len(state)):
-        row[index] = state[index]
-    return is_estimate(state)
 
 
 def _decide(

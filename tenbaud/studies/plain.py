@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from channel.errors import TenbaudError
 from channel.protocol.wire import DATAGRAM
@@ -22,7 +23,7 @@ def fly_plain(config: FlightConfig, window_start: int | None = None) -> FlightFi
     Errors count from tick `window_start` on; where a flight's usually do, if not given.
     """
     try:
-        agreement = agree(config, "virtual")
+        agreement = replace(agree(config, "virtual"), scored_from=window_start)
     except (TenbaudError, ValueError) as error:
         nothing = math.nan
         return FlightFigures(
@@ -31,8 +32,6 @@ def fly_plain(config: FlightConfig, window_start: int | None = None) -> FlightFi
     run = transmit.prepare(agreement, None, DATAGRAM)
     endpoint = build_receiver(agreement, None, DATAGRAM)
     scores = run.node.scores
-    if window_start is not None:
-        scores.window_start_tick = window_start
     try:
         outcome = transmit.fly_virtual(run, endpoint, lambda: False)
     except (TenbaudError, ValueError) as error:

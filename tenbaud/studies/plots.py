@@ -19,7 +19,7 @@ LABELS = {
     "density": "torque density q in rad²/s³",
 }
 QUANTITIES = {
-    "error_live_rms": "rms error of what the receiver believed",
+    "error_live_rms": "rms error of the receiver's predicted estimate",
     "error_coded_rms": "rms error of the codec",
     "tracking_rms": "rms distance from the reference",
 }
@@ -27,9 +27,9 @@ COLOURS = {"error_coded_rms": "C0", "error_live_rms": "C1", "tracking_rms": "C2"
 LEVELS_MAX = 40
 """A setting with more values than these was sampled, and is drawn as dots."""
 CHARACTERS_MAX = 60
-"""So many characters of labels have room side by side."""
+"""This many characters of labels have room side by side."""
 LABELLED_MAX = 12
-"""So many levels of a setting have room for a label each."""
+"""This many levels of a setting have room for a label each."""
 MAPS_MAX = 12
 """Pairs beyond these are left out: nobody reads fifty maps."""
 

@@ -1,6 +1,6 @@
 """Running a study: in this process, in a pool of processes, or on a Dask cluster.
 
-Whoever flies, the figures of a chunk come back here and are kept at once. What is kept stays kept:
+With any of them, the figures of a chunk come back here and are kept at once. What is kept stays kept:
 after a kill, or when workers vanish for good, the same command goes on with what is missing.
 """
 
@@ -25,7 +25,7 @@ from tenbaud.studies.study import Study
 from tenbaud.studies.table import Results
 
 POOLS_MAX = 5
-"""So many times a pool is made anew after one of its processes was killed."""
+"""This many times a pool is made anew after one of its processes was killed."""
 
 WORKERS_AWAITED_S = 60.0
 """How long a cluster may be without any worker."""

@@ -1,4 +1,4 @@
-"""What becomes of every symbol and every echo of a flight, and when, before anything is computed.
+"""The course of every symbol and every echo of a flight, and when, before anything is computed.
 
 Loss, delay and erasure do not depend on what a symbol says. So the line is flown once on its own, in
 the order of events of the virtual clock (`transmitter.loops.virtual`) and with the receiver's own slot
@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from channel.line.line import Delivery
-from channel.protocol.slot_clock import SlotClock
 from receiver.session import schedule as receiver
+from receiver.session.schedule import SlotClock
 from tenbaud.build.ends import build_line
 from tenbaud.build.flight import Agreement
 from transmitter.loops.virtual import GREETINGS_MAX

@@ -11,7 +11,7 @@ from plant_sim.encoder import angle_of, counts_of
 from tenbaud.studies.flight_data import Errors, Given, Motion, Numbers, Work
 from tenbaud.studies.parts import decode, held_of, state_of, tick
 from transmitter.encoder_watch import MOTION_RAD
-from transmitter.session.sight import seen_row
+from transmitter.session.state_observer import seen_row
 
 
 def put(values: Any, target: Any) -> None:
@@ -33,7 +33,7 @@ def angle_at(counts: int, numbers: Numbers) -> float:
 def look(
     at: int, angle: float, numbers: Numbers, model_constants: Any, given: Given, work: Work
 ) -> None:
-    """Let the transmitter's observer look at a tick, as `Sight.look` does."""
+    """Let the transmitter's observer look at a tick, as `StateObserver.look` does."""
     if not numbers.uses_rates:
         work.seen[0] = angle
         return

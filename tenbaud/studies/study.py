@@ -118,7 +118,7 @@ def _check_parts(parts: str) -> None:
 def read_study(path: Path, seeds: int | None = None, *, allow_code: bool = False) -> Study:
     """Return the study in a file; StudyError, naming the field, where it is none.
 
-    `seeds`: so many of each point, instead of what the file says. `allow_code`: as for `Study`.
+    `seeds`: number for each point, instead of the one in the file. `allow_code`: as for `Study`.
     """
     try:
         values = tomllib.loads(path.read_text(encoding="utf-8"))

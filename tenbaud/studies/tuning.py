@@ -34,7 +34,7 @@ OnEvaluation = Callable[[int, float], None]
 
 
 class Tuned(NamedTuple):
-    """What came of it. Errors are rms of the live estimate, in rad."""
+    """The result. Errors are rms of the live estimate, in rad."""
 
     values: dict[str, float]
     train_before: float
@@ -95,12 +95,12 @@ def tune(
 
 
 class _Spent(Exception):
-    """As many sets of constants were flown as were asked for, or the search was told to stop."""
+    """The search has flown the requested number of sets of constants, or was stopped."""
 
 
 @dataclass(slots=True)
 class _Trials:
-    """What the search has tried, and the best of it."""
+    """The trials of the search, and the best one."""
 
     tuning: Tuning
     on_evaluation: OnEvaluation

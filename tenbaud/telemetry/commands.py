@@ -1,4 +1,4 @@
-"""What a person asks of a running flight: read on the network's thread, taken by the loop's.
+"""A person's commands to a running flight: read on the network's thread, taken by the loop's.
 
 The loop takes commands at its own boundaries, so that each has an exact place in the flight, and
 writes every one down as an event. A flight that nobody steers is the same as one that allows none.

@@ -36,18 +36,18 @@ def _at(channel: RecordChannel, *names: str) -> list[int]:
 
 
 T_TICK, T_TIME, T_MEASURED, T_TRUE, T_APPLIED, T_LATE_MS = _at(
-    TICK_CHANNEL, "tick", "time_s", "measured_rad", "true_rad", "applied_volts", "lateness_ms"
+    TICK_CHANNEL, "tick", "time_s", "measured", "true", "applied", "lateness_ms"
 )
 E_TICK, E_CODED, E_LIVE = _at(ESTIMATE_CHANNEL, "tick", "coded_state", "live_state")
 S_SAMPLE, S_SENT, S_WORD, S_RANGE, S_DIGEST, S_PEER = _at(
     SAMPLE_CHANNEL, "sample", "word_sent", "word", "range", "digest", "peer_digest"
 )
-D_TICK, D_REFERENCE, D_LIVE = _at(DECIDED, "tick", "reference_rad", "live_state")
+D_TICK, D_REFERENCE, D_LIVE = _at(DECIDED, "tick", "reference", "live_state")
 R_SAMPLE, R_WORD, R_DIGEST = _at(TAKEN, "sample", "word", "digest")
 
 
 class _Composer:
-    """What both ends' messages have in common."""
+    """Common fields of both ends' messages."""
 
     def __init__(self, agreement: Agreement, tap: Tap) -> None:
         self.agreement = agreement
@@ -57,6 +57,10 @@ class _Composer:
         self._number = 0
         self._measured = agreement.codec.model.measured
         self._stride = max(1, round(POINT_PERIOD_S / (agreement.terms.tick_ns / 1e9)))
+
+    def skip(self, messages: int) -> None:
+        """Count messages that were not sent."""
+        self.skipped += messages
 
     def watch(self, watched: bool) -> None:
         """Have rows kept only while anybody watches."""
@@ -211,7 +215,7 @@ class ReceiverComposer(_Composer):
         points = [
             {
                 "time_s": row[D_TICK] * terms.tick_ns / 1e9,
-                "reference_rad": row[D_REFERENCE],
+                "reference_rad": row[D_REFERENCE][0],
                 "live_rad": self._measured(row[D_LIVE])[0],
             }
             for topic, row in rows
@@ -258,7 +262,7 @@ def _word(word: object) -> list[int] | None:
 
 
 def _thinned(points: list[Any], most: int) -> list[Any]:
-    """Return at most so many of the points, the last one included."""
+    """Return at most that number of points, the last one included."""
     if len(points) <= most:
         return points
     every = -(-len(points) // most)

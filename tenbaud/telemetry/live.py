@@ -5,9 +5,9 @@ took hold. Which of them were obeyed where:
 
     set_point      receiver
     pause, step, pace   transmitter, on the virtual clock, whose time is its own
-    impair         whoever holds the line: the transmitter both ways on the virtual clock, else each end
+    impair         the owner of the line: the transmitter both ways on the virtual clock, else each end
                    what it sends
-    spoil          the end named; the transmitter also notes that a difference is now expected
+    corrupt        the end named; the transmitter also notes that a difference is now expected
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from receiver.controllers.steered import SteeredReference
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.telemetry.commands import CommandQueue
-from tenbaud.telemetry.schema import Command, Impair, Pace, Pause, SetPoint, Spoil, Step
+from tenbaud.telemetry.schema import Command, Corrupt, Impair, Pace, Pause, SetPoint, Step
 
 PAUSE_POLL_S = 0.02
 KEEP_ALIVE_S = 0.5
@@ -34,7 +34,7 @@ KEEP_ALIVE_S = 0.5
 
 
 class LiveTransmitter:
-    """What is asked of the sensor node; `at_tick` is called by its loop before every tick.
+    """Commands to the sensor node; its loop calls `at_tick` before every tick.
 
     `pace`: virtual seconds per second at most, None for no limit. `keep_alive` is called now and then
     while the flight is paused.
@@ -96,8 +96,8 @@ class LiveTransmitter:
                 return _by_hand(ByHand.PACE, value=factor)
             case Impair(text=text):
                 return self._impair(text)
-            case Spoil(end=end, field=field):
-                return self._spoil(end, field)
+            case Corrupt(end=end, field=field):
+                return self._corrupt(end, field)
             case SetPoint():
                 self._run.node.scores.forget_reference()
         return None
@@ -108,14 +108,15 @@ class LiveTransmitter:
         impair(self._run.uplink.line, faults.up)
         impair(self._run.downlink, faults.down)
         if faults.up.raw or faults.down.raw:
-            self._run.desyncs_asked = math.inf
+            self._run.expect_desyncs(math.inf)
         return _by_hand(ByHand.IMPAIR, detail=text)
 
-    def _spoil(self, end: Role, field: str) -> Event | None:
+    def _corrupt(self, end: Role, field: str) -> Event | None:
         session = self._run.node.session
         # Both codecs are the same kind: what this one cannot do, the receiver's refuses too.
-        event = spoil(session, field, session.copies.confirmed.sample, end == "transmitter")
-        self._run.desyncs_asked += event.cause is ByHand.SPOIL
+        event = corrupt(session, field, session.copies.confirmed.sample, end == "transmitter")
+        if event.cause is ByHand.CORRUPT:
+            self._run.expect_desyncs(1)
         return event if end == "transmitter" else None
 
     def _next_sample_tick(self, tick: int) -> int:
@@ -148,7 +149,7 @@ class LiveTransmitter:
 
 
 class LiveReceiver:
-    """What is asked of the controller node; called by its loop between messages (`should_stop`)."""
+    """Commands to the controller node; its loop calls `should_stop` between messages."""
 
     def __init__(
         self,
@@ -180,15 +181,15 @@ class LiveReceiver:
             case SetPoint(angle_rad=angle_rad):
                 if self.steering is None:
                     return _ignored("this controller has no set-point")
-                self.steering.by_hand_rad = angle_rad
+                self.steering.steer(angle_rad)
                 cause = ByHand.FOLLOW if angle_rad is None else ByHand.SET_POINT
                 return _by_hand(cause, value=angle_rad)
             case Impair(text=text):
                 self.impairments = text
                 if impair(self._endpoint.downlink.line, parse_impairments(text).down):
                     return _by_hand(ByHand.IMPAIR, detail=text)
-            case Spoil(end="receiver", field=field):
-                return spoil(session, field, session.state.sample)
+            case Corrupt(end="receiver", field=field):
+                return corrupt(session, field, session.state.sample)
         return None
 
     def _tell(self, event: Event) -> None:
@@ -200,7 +201,7 @@ class LiveReceiver:
         write_event(self._recorder, event)
 
 
-def spoil(session: object, field: str, sample: int, arm: bool = True) -> Event:
+def corrupt(session: object, field: str, sample: int, arm: bool = True) -> Event:
     """Change one field of a session's codec in one bit after a sample; `arm` False: only look.
 
     Return the event; its cause is IGNORED for a codec without such a field: a person's command must not
@@ -215,7 +216,7 @@ def spoil(session: object, field: str, sample: int, arm: bool = True) -> Event:
         (codec.arm if arm else codec.check)(sabotage)
     except ValueError as error:
         return _ignored(str(error))
-    return _by_hand(ByHand.SPOIL, detail=field)
+    return _by_hand(ByHand.CORRUPT, detail=field)
 
 
 def _by_hand(

@@ -1,4 +1,4 @@
-"""Where telemetry is to be found.
+"""The addresses of telemetry.
 
 Without further word an end listens on a socket file in a folder that only its user may enter: nothing
 on this machine's network, no port that two flights could want, and a viewer finds every flight of its
@@ -26,7 +26,7 @@ PATH_BYTES_MAX = 100
 
 
 def endpoint_for(
-    wish: str,
+    requested: str,
     role: Role,
     addresses: Sequence[str] = (),
     insecure: bool = False,
@@ -34,23 +34,23 @@ def endpoint_for(
 ) -> str | None:
     """Return where an end shall listen for viewers; None: nowhere.
 
-    `wish` is "" (as usual: on, but off beside an insecure link that leaves this machine), "on", "off"
-    or a Zenoh endpoint. `secured`: there is a certificate for it. Raises LinkError.
+    `requested` is "" (default: on, but off beside an insecure link that leaves this machine), "on",
+    "off" or a Zenoh endpoint. `secured`: there is a certificate for it. Raises LinkError.
     """
-    if wish == "off":
+    if requested == "off":
         return None
-    if wish in ("", "on"):
+    if requested in ("", "on"):
         exposed = insecure and not all(is_loopback(address) for address in addresses)
-        if not wish and (exposed or not hasattr(socket, "AF_UNIX")):
+        if not requested and (exposed or not hasattr(socket, "AF_UNIX")):
             return None
         # By chance, since processes of two containers that share the folder may have one number.
         path = private_folder() / f"{role}-{secrets.token_hex(4)}.sock"
         clear_stale()
         return f"{SOCKET}{path}"
-    protocol = wish.partition("/")[0]
-    if not is_loopback(wish) or protocol == "tls":
-        check_endpoints((wish,), insecure, secured)
-    return wish
+    protocol = requested.partition("/")[0]
+    if not is_loopback(requested) or protocol == "tls":
+        check_endpoints((requested,), insecure, secured)
+    return requested
 
 
 def private_folder() -> Path:

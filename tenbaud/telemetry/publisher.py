@@ -13,7 +13,7 @@ from channel.errors import LinkError
 
 
 class Port(Protocol):
-    """Where messages go."""
+    """The destination of messages."""
 
     def is_watched(self) -> bool:
         """Return whether anybody would get a message."""
@@ -26,9 +26,12 @@ class Port(Protocol):
 
 
 class Composer(Protocol):
-    """What makes the messages."""
+    """The source of messages."""
 
     skipped: int
+
+    def skip(self, messages: int) -> None:
+        """Count messages that were not sent."""
 
     def watch(self, watched: bool) -> None:
         """Hear whether anybody watches; while nobody does, no message is asked for."""
@@ -75,7 +78,7 @@ class Publisher:
             late_s = time.monotonic() - due_s
             if late_s > self._period_s:
                 missed = int(late_s / self._period_s)
-                self._composer.skipped += missed
+                self._composer.skip(missed)
                 due_s += missed * self._period_s
             ending = self._ending.wait(max(0.0, due_s - time.monotonic()))
             self._guard(self._send)
@@ -89,12 +92,12 @@ class Publisher:
         try:
             self._port.publish(message)
         except LinkError:
-            self._composer.skipped += 1
+            self._composer.skip(1)
         else:
             self.sent += 1
 
     def _guard(self, do: Callable[[], None]) -> None:
         try:
             do()
-        except Exception as error:  # telemetry must never be a flight's end
+        except Exception as error:  # telemetry must never end a flight
             self.error = f"telemetry ended: {type(error).__name__}: {error}"

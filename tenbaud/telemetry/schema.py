@@ -1,4 +1,4 @@
-"""What goes over the telemetry keys, described once: the ends keep to it and tests check each message.
+"""The messages of the telemetry keys, described once: tests check each message against it.
 
 `tenbaud view --schema` prints it as JSON schema; `docs/telemetry.schema.json` is that file.
 """
@@ -27,7 +27,7 @@ class Point(_Message):
     measured_rad: float = Field(description="angle as the encoder gives it")
     true_rad: float | None = Field(description="true angle, where the rig knows it")
     coded_rad: float = Field(description="the codec's estimate of that tick")
-    live_rad: float | None = Field(description="what the receiver believed of it in advance")
+    live_rad: float | None = Field(description="the receiver's predicted estimate of it")
     range_rad: float = Field(description="range M of the coder at that tick")
 
 
@@ -109,7 +109,7 @@ class _EndMessage(_Message):
 
 
 class TransmitterTelemetry(_EndMessage):
-    """What the sensor node tells."""
+    """The telemetry of the sensor node."""
 
     role: Literal["transmitter"]
     preset: str
@@ -130,7 +130,7 @@ class TransmitterTelemetry(_EndMessage):
 
 
 class ReceiverTelemetry(_EndMessage):
-    """What the controller node tells."""
+    """The telemetry of the controller node."""
 
     role: Literal["receiver"]
     baud_measured: float | None = Field(description="symbols per second on this end's clock")
@@ -155,7 +155,7 @@ class Pause(_Message):
 
 
 class Step(_Message):
-    """Let so many samples pass on the virtual clock, then pause."""
+    """Let a number of samples pass on the virtual clock, then pause."""
 
     kind: Literal["step"]
     samples: Annotated[int, Field(ge=1, le=1000)] = 1
@@ -169,7 +169,7 @@ class Pace(_Message):
 
 
 class Impair(_Message):
-    """What goes wrong on the line from now on, all of it; an empty text for a clean line."""
+    """All impairments of the line from now on; an empty text for a clean line."""
 
     kind: Literal["impair"]
     text: Annotated[str, Field(max_length=300)]
@@ -183,16 +183,16 @@ class Impair(_Message):
         return value
 
 
-class Spoil(_Message):
-    """Spoil the codec of one end in one bit, at its next sample."""
+class Corrupt(_Message):
+    """Corrupt the codec of one end in one bit, at its next sample."""
 
-    kind: Literal["spoil"]
+    kind: Literal["corrupt"]
     end: Literal["transmitter", "receiver"]
     field: Annotated[str, Field(pattern=r"^(range|angle|rate)$")] = "range"
 
 
 Telemetry = TransmitterTelemetry | ReceiverTelemetry
-Command = SetPoint | Pause | Step | Pace | Impair | Spoil
+Command = SetPoint | Pause | Step | Pace | Impair | Corrupt
 
 TELEMETRY: TypeAdapter[Telemetry] = TypeAdapter(Annotated[Telemetry, Field(discriminator="role")])
 COMMAND: TypeAdapter[Command] = TypeAdapter(Annotated[Command, Field(discriminator="kind")])

@@ -1,4 +1,4 @@
-"""Where telemetry leaves the loop: a recorder that also keeps the newest rows, in a bounded queue.
+"""A recorder that also keeps the newest rows for telemetry, in a bounded queue.
 
 Everything worth telling passes through the recorder already. The loop appends one reference to a
 deque and goes on; when nobody empties it in time the oldest rows fall out and are counted. While nobody

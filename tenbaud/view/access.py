@@ -1,9 +1,9 @@
-"""Who may open the page: two secrets, one that lets its holder steer and one only look.
+"""Access to the page: two secrets, one with control and one view-only.
 
-A secret is drawn for each run of the server and printed as part of an address. Whoever opens that
-address gets a cookie with the secret in it, for a path of its own. Cookies know no ports: a browser
-sends them to every server of the same host name, another user's included. It sends this one only below
-a path that nobody else can name.
+A secret is drawn for each run of the server and printed as part of an address. The browser that
+opens this address gets a cookie with the secret, for a separate random path. Cookies ignore ports: a
+browser sends them to every server of the same host name, another user's included. It sends this one
+only below a path that nobody else can name.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ PATH_BYTES = 8
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """What the holder of one secret may do."""
+    """The rights of the holder of one secret."""
 
     steers: bool
     key: str = field(default_factory=lambda: secrets.token_hex(KEY_BYTES), repr=False)

@@ -1,4 +1,4 @@
-"""What the page shows: the two streams of one flight, joined, and a short memory of them.
+"""The data of the page: the two streams of one flight, joined, and their recent past.
 
 Browsers come late and lag. Each gets the whole memory first and then what is new, as the same ready
 bytes for all of them.
@@ -25,7 +25,7 @@ HEAD_WITHOUT = ("points", "samples", "events")
 
 
 class News(NamedTuple):
-    """What changed at one moment, as the browsers get it."""
+    """The changes at one moment, as the browsers get them."""
 
     number: int
     data: bytes

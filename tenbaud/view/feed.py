@@ -19,7 +19,7 @@ MESSAGES_MAX = 2000
 
 
 class Feed:
-    """Within a `with`, `take` returns what the ends have told since the last call.
+    """Within a `with`, `take` returns the messages of the ends since the last call.
 
     `endpoints` are where the ends listen; none: wherever a flight of this user is found. Ends may come
     and go. `session_name` may be `**`, any. `credentials`: over TLS.

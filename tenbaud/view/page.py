@@ -1,4 +1,4 @@
-"""The page: instruments drawn by its own script, and controls that ask something of the flight."""
+"""The page: instruments drawn by its own script, and controls that send commands to the flight."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ REFRESH_S = 0.25
 SET_POINT_STEP_DEG = 5
 PACES = {0.25: "¼", 1.0: "1", 5.0: "5", 25.0: "25"}
 
-LOOK_ONLY = "This address is for looking only: whoever opens it cannot steer."
+LOOK_ONLY = "This address is view-only: it has no controls."
 
 Send = Callable[..., None]
 
 
 def build_page(board: Board, feed: Feed, *, steers: bool) -> None:
-    """Build the page for one browser; `steers`: whether its visitor may ask anything of the flight."""
-    # Relative: the page is served below a path of its visitor's own.
+    """Build the page for one browser; `steers`: whether its visitor may send commands."""
+    # Relative: the page is served below a path of its visitor.
     ui.add_head_html('<link rel="stylesheet" href="view/view.css">')
     ui.add_body_html((STATIC / "instruments.html").read_text(encoding="utf-8"))
     ui.dark_mode(value=None)
@@ -60,7 +60,7 @@ def _add_controls(board: Board, feed: Feed) -> None:
 
 def _why_not(head: dict[str, Any] | None) -> str:
     if head is None:
-        return "The controls wait for a flight."
+        return "Waiting for a flight."
     if head["phase"] == "ended":
         return "The flight is over."
     if not head["takes_commands"]:
@@ -82,7 +82,7 @@ class _Panel:
     def enable(self, enabled: bool) -> None:
         if enabled is not self._enabled:
             self._enabled = enabled
-            # The browser disables its own sliders with their group; NiceGUI's buttons are told.
+            # The browser disables its own sliders with their group, NiceGUI's buttons it does not.
             self.box.props(remove="disabled") if enabled else self.box.props("disabled")
             for control in self.controls:
                 control.set_enabled(enabled)
@@ -107,8 +107,8 @@ class _Panel:
 class _Slider:
     """The browser's own slider, which every keyboard and screen reader knows how to use.
 
-    It is plain HTML whose value nobody but the visitor and `reset` changes: one that the server renders
-    again would jump back under a quick hand. `moved` is called when it is let go, or at each key.
+    It is plain HTML whose value only the visitor and `reset` change: one that the server renders again
+    would jump back during a quick movement. `moved` is called on release, or at each key.
     """
 
     def __init__(
@@ -146,7 +146,7 @@ class _Slider:
 
 class _SetPoint(_Panel):
     def __init__(self, send: Send) -> None:
-        super().__init__("Set-point", "Where the controller steers the pitch.")
+        super().__init__("Set-point", "The pitch that the controller aims for.")
         with self.box:
             self.angle = self.slider(
                 "Set-point",
@@ -156,7 +156,7 @@ class _SetPoint(_Panel):
                 "°",
                 lambda: send(kind="set_point", angle_rad=math.radians(self.angle.value)),
             )
-            self.button("Follow the programme", lambda: send(kind="set_point", angle_rad=None))
+            self.button("Follow the reference", lambda: send(kind="set_point", angle_rad=None))
 
     def refresh(self, allowed: bool, upper: dict[str, Any], lower: dict[str, Any]) -> None:
         self.enable(allowed and bool(lower.get("steerable")))
@@ -164,7 +164,7 @@ class _SetPoint(_Panel):
 
 class _Clock(_Panel):
     def __init__(self, send: Send) -> None:
-        super().__init__("Clock", "The virtual clock can stand still, step, or run faster.")
+        super().__init__("Clock", "The virtual clock can pause, step, or run faster.")
         self._paused = False
         with self.box:
             with ui.element("div").classes("row-of-buttons"):
@@ -179,33 +179,33 @@ class _Clock(_Panel):
             self.controls.append(self.pace)
 
     def _asked(self, send: Send, pace: float | None) -> None:
-        if pace is not None and pace != self._told:
-            self._told = pace
+        if pace is not None and pace != self._sent:
+            self._sent = pace
             send(kind="pace", factor=pace)
 
-    _told: float | None = None
+    _sent: float | None = None
 
     def refresh(self, allowed: bool, upper: dict[str, Any], lower: dict[str, Any]) -> None:
         self.enable(allowed and upper.get("clock") == "virtual")
         paused = bool(upper.get("paused"))
         if paused is not self._paused:
             self._paused = paused
-            self.pause.set_text("Go on" if paused else "Pause")
-        told = upper.get("pace")
-        if told in PACES and told != self._told:
-            self._told = told
-            self.pace.set_value(told)
+            self.pause.set_text("Resume" if paused else "Pause")
+        pace = upper.get("pace")
+        if pace in PACES and pace != self._sent:
+            self._sent = pace
+            self.pace.set_value(pace)
 
 
 class _Line(_Panel):
     def __init__(self, send: Send) -> None:
-        super().__init__("The wire", "What goes wrong between the two ends.")
+        super().__init__("The line", "Simulated impairments between the two ends.")
         self._send = send
         with self.box:
             self.loss = self.slider("Bits lost", 0, 90, 5, " %", self._changed)
             self.flips = self.slider("Bits flipped", 0, 50, 1, " %", self._changed)
             self.delay = self.slider("Delay each way", 0, 300, 10, " ms", self._changed)
-            self.button("Mend the wire", self._mend)
+            self.button("Repair the line", self._repair)
 
     def _changed(self) -> None:
         parts = []
@@ -217,7 +217,7 @@ class _Line(_Panel):
             parts.append(f"delay={self.delay.value:g}ms")
         self._send(kind="impair", text=",".join(parts))
 
-    def _mend(self) -> None:
+    def _repair(self) -> None:
         for slider in (self.loss, self.flips, self.delay):
             slider.reset()
         self._changed()
@@ -225,12 +225,12 @@ class _Line(_Panel):
 
 class _Break(_Panel):
     def __init__(self, send: Send) -> None:
-        super().__init__("Break it", "Change one bit in one end's codec, and watch it be found out.")
+        super().__init__("Break it", "Flip one bit in one end's codec; the next digest detects it.")
         with self.box, ui.element("div").classes("row-of-buttons"):
             for end, name in (("transmitter", "sensor"), ("receiver", "controller")):
                 self.button(
-                    f"Spoil the {name}",
-                    lambda end=end: send(kind="spoil", end=end, field="range"),  # type: ignore[misc]
+                    f"Corrupt the {name}'s codec",
+                    lambda end=end: send(kind="corrupt", end=end, field="range"),  # type: ignore[misc]
                 ).classes("danger")
 
     def refresh(self, allowed: bool, upper: dict[str, Any], lower: dict[str, Any]) -> None:

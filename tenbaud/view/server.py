@@ -1,6 +1,6 @@
 """The page's server: NiceGUI for the page and its controls, one stream of telemetry beside it.
 
-It listens on this machine unless told otherwise, answers nobody without a secret of its printed
+It listens on this machine by default, and answers only requests with a secret of its printed
 addresses (`gate.py`), and asks nothing of the internet: every script, style and font comes from the
 installed packages.
 """
@@ -40,7 +40,7 @@ class PageUnavailable(TenbaudError):
 
 @dataclass(frozen=True, slots=True)
 class Address:
-    """Where the page is served."""
+    """The address of the page."""
 
     host: str = "127.0.0.1"
     port: int = 8710
@@ -63,7 +63,7 @@ class Address:
         return f"[{host}]" if ":" in host else host
 
     def check(self) -> None:
-        """Refuse an address that is taken, or that others can reach unless told to allow it."""
+        """Refuse an address that is taken, or that others can reach unless that is allowed."""
         if not self.is_local and not self.insecure:
             raise PageUnavailable(
                 f"{self.host} is reachable from other machines, and the page is not encrypted: whoever "

@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 
 from channel.errors import LinkError
-from channel.links.serial.emulated import EmulatedLine
 from channel.links.serial.link import SerialLink
 from channel.links.serial.wire import SerialWire, stuff, stuff_notice
 from channel.protocol.endings import Ending
 from channel.protocol.frames import Bye, Symbol
 from channel.protocol.wire import encode
+from tests.channel.links.serial.noisy_line import NoisyLine
 from tests.contract.test_links import PATIENCE_S, SILENCE_S, until
 
 WIRE = SerialWire(2)
@@ -31,13 +31,13 @@ def symbol(slot: int) -> bytes:
 
 
 @pytest.fixture
-def line(tmp_path: Path) -> Iterator[EmulatedLine]:
-    with EmulatedLine(tmp_path, None) as emulated:
+def line(tmp_path: Path) -> Iterator[NoisyLine]:
+    with NoisyLine(tmp_path, None) as emulated:
         yield emulated
 
 
 @pytest.fixture
-def ends(line: EmulatedLine) -> Iterator[tuple[SerialLink, SerialLink]]:
+def ends(line: NoisyLine) -> Iterator[tuple[SerialLink, SerialLink]]:
     with (
         SerialLink("transmitter", str(line.transmitter_port), WIRE) as transmitter,
         SerialLink("receiver", str(line.receiver_port), WIRE) as receiver,
@@ -48,7 +48,7 @@ def ends(line: EmulatedLine) -> Iterator[tuple[SerialLink, SerialLink]]:
 
 
 def test_when_a_symbol_is_sent_then_it_is_one_byte_on_the_line(
-    line: EmulatedLine, ends: tuple[SerialLink, SerialLink]
+    line: NoisyLine, ends: tuple[SerialLink, SerialLink]
 ) -> None:
     transmitter, receiver = ends
     for slot in range(20):
@@ -60,7 +60,7 @@ def test_when_a_symbol_is_sent_then_it_is_one_byte_on_the_line(
 
 
 def test_when_a_frame_is_sent_then_its_size_is_what_the_wire_says(
-    line: EmulatedLine, ends: tuple[SerialLink, SerialLink]
+    line: NoisyLine, ends: tuple[SerialLink, SerialLink]
 ) -> None:
     ends[1].send(FRAME)
     assert ends[0].receive(PATIENCE_S) == FRAME
@@ -81,7 +81,7 @@ def test_when_a_frame_is_sent_then_its_size_is_what_the_wire_says(
     ids=["garbage", "check bits", "break", "half frame", "changed frame"],
 )
 def test_when_noise_is_on_the_line_then_it_is_counted_and_the_next_messages_come(
-    line: EmulatedLine, ends: tuple[SerialLink, SerialLink], noise: bytes, kind: str
+    line: NoisyLine, ends: tuple[SerialLink, SerialLink], noise: bytes, kind: str
 ) -> None:
     transmitter, receiver = ends
     line.inject("up", noise)
@@ -95,7 +95,7 @@ def test_when_noise_is_on_the_line_then_it_is_counted_and_the_next_messages_come
 
 
 def test_when_it_is_unplugged_and_plugged_in_again_then_both_ends_come_back(
-    line: EmulatedLine, ends: tuple[SerialLink, SerialLink]
+    line: NoisyLine, ends: tuple[SerialLink, SerialLink]
 ) -> None:
     line.unplug()
     for end in ends:
@@ -114,7 +114,7 @@ def test_when_it_is_unplugged_and_plugged_in_again_then_both_ends_come_back(
 
 
 def test_when_it_is_closed_while_unplugged_then_it_closes(
-    line: EmulatedLine, ends: tuple[SerialLink, SerialLink]
+    line: NoisyLine, ends: tuple[SerialLink, SerialLink]
 ) -> None:
     line.unplug()
     for end in ends:
@@ -123,7 +123,7 @@ def test_when_it_is_closed_while_unplugged_then_it_closes(
 
 
 def test_when_the_other_end_is_a_plain_program_then_presence_is_only_what_was_heard(
-    line: EmulatedLine,
+    line: NoisyLine,
 ) -> None:
     with ExitStack() as stack:
         plain = os.open(line.receiver_port, os.O_RDWR | os.O_NOCTTY)
@@ -137,7 +137,7 @@ def test_when_the_other_end_is_a_plain_program_then_presence_is_only_what_was_he
         assert until(lambda: not link.peer_present())
 
 
-def test_when_a_symbol_has_waited_too_long_then_it_is_dropped(line: EmulatedLine) -> None:
+def test_when_a_symbol_has_waited_too_long_then_it_is_dropped(line: NoisyLine) -> None:
     with (
         SerialLink("transmitter", str(line.transmitter_port), WIRE) as transmitter,
         SerialLink("receiver", str(line.receiver_port), WIRE, symbol_age_max_s=0.0) as receiver,
@@ -150,7 +150,7 @@ def test_when_a_symbol_has_waited_too_long_then_it_is_dropped(line: EmulatedLine
 
 
 def test_when_the_line_is_slow_then_a_long_message_is_not_repeated_at_once(
-    line: EmulatedLine,
+    line: NoisyLine,
 ) -> None:
     with (
         SerialLink("transmitter", str(line.transmitter_port), WIRE, line_rate_baud=300) as transmitter,
@@ -166,7 +166,7 @@ def test_when_the_line_is_slow_then_a_long_message_is_not_repeated_at_once(
         assert line.carried("down") == 0
 
 
-def test_when_the_line_falls_far_behind_then_more_is_dropped_and_counted(line: EmulatedLine) -> None:
+def test_when_the_line_falls_far_behind_then_more_is_dropped_and_counted(line: NoisyLine) -> None:
     with SerialLink("transmitter", str(line.transmitter_port), WIRE, line_rate_baud=300) as link:
         for number in range(20):
             link.send(encode(Bye(number, Ending.OVER, "thirty bytes a second, no more")))
@@ -180,7 +180,7 @@ def test_when_there_is_no_port_then_it_is_a_link_error_that_names_it(port: str, 
         SerialLink("receiver", path, WIRE)
 
 
-def test_when_another_has_the_port_then_it_is_a_link_error(line: EmulatedLine) -> None:
+def test_when_another_has_the_port_then_it_is_a_link_error(line: NoisyLine) -> None:
     with (
         SerialLink("receiver", str(line.receiver_port), WIRE),
         pytest.raises(LinkError, match="another program"),
@@ -189,7 +189,7 @@ def test_when_another_has_the_port_then_it_is_a_link_error(line: EmulatedLine) -
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="nothing is forbidden to the superuser")
-def test_when_the_port_is_not_allowed_then_the_group_is_named(line: EmulatedLine) -> None:
+def test_when_the_port_is_not_allowed_then_the_group_is_named(line: NoisyLine) -> None:
     os.chmod(line.receiver_port, 0)
     try:
         with pytest.raises(LinkError, match="dialout"):
@@ -233,7 +233,7 @@ def test_when_the_port_is_a_loop_then_the_link_hears_itself() -> None:
         assert link.receive(PATIENCE_S) == FRAME
 
 
-def test_when_nothing_comes_then_closing_does_not_wait_for_it(line: EmulatedLine) -> None:
+def test_when_nothing_comes_then_closing_does_not_wait_for_it(line: NoisyLine) -> None:
     link = SerialLink("receiver", str(line.receiver_port), WIRE)
     time.sleep(SILENCE_S)
     link.close()

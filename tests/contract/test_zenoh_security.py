@@ -43,7 +43,7 @@ def pair(endpoint: str) -> Iterator[Pair]:
 
 
 def symbol(slot: int) -> bytes:
-    """Return a message for the paid path of the uplink, which has a key of its own."""
+    """Return a message for the paid path of the uplink, which has a separate key."""
     return encode(Symbol(1, 0, slot, 1))
 
 
@@ -199,7 +199,7 @@ def rig_of(name: str, session: str) -> Security:
     return security(name, ("desk", "receiver"), session=session)
 
 
-def test_when_the_address_is_not_in_the_certificate_then_the_listener_is_not_believed(
+def test_when_the_address_is_not_in_the_certificate_then_the_listener_is_not_accepted(
     endpoint: str,
 ) -> None:
     foreign = endpoint.replace("127.0.0.1", "127.0.0.2")

@@ -155,12 +155,12 @@ def test_when_a_viewer_is_closed_while_it_sends_then_sending_is_a_link_error(tmp
         port.close()
 
 
-def test_when_nobody_listens_then_the_viewer_is_told(tmp_path: Path) -> None:
+def test_when_nobody_listens_then_the_viewer_is_informed(tmp_path: Path) -> None:
     with pytest.raises(LinkError, match=r"cannot use .* for telemetry"):
         TelemetryFeed(endpoint_in(tmp_path), "lab", lambda data: None)
 
 
-def test_when_the_place_is_taken_then_the_end_is_told(tmp_path: Path) -> None:
+def test_when_the_place_is_taken_then_the_end_is_informed(tmp_path: Path) -> None:
     port = TelemetryPort("transmitter", "lab", endpoint_in(tmp_path))
     try:
         with pytest.raises(LinkError, match=r"cannot use .* for telemetry"):
@@ -191,7 +191,9 @@ def test_over_tls_only_the_invited_see_and_only_operators_steer(part: Part) -> N
             commands.get(timeout=SILENCE_S)
 
 
-def test_when_a_name_is_no_key_then_it_is_said_and_the_endpoint_is_free_again(tmp_path: Path) -> None:
+def test_when_a_name_is_no_key_then_it_is_refused_and_the_endpoint_is_free(
+    tmp_path: Path,
+) -> None:
     with pytest.raises(LinkError, match="a//b"):
         TelemetryPort("receiver", "a//b", endpoint_in(tmp_path))
     port = TelemetryPort("receiver", "lab", endpoint_in(tmp_path))

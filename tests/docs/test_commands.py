@@ -14,9 +14,6 @@ from docs.tools.commands_page import commands_page
 from tests.docs.blocks import COMMAND, Block, NoteError, blocks_of, needed, pages, parse, stray_commands
 from tests.docs.sandbox import BlockFailed, Sandbox
 
-# The pages' commands meet at the default port, so one worker runs them all.
-pytestmark = pytest.mark.xdist_group("default port")
-
 ELSEWHERE = ("README.md",)
 """Walked by `test_newcomer.py`, which looks at what comes of it as well."""
 ON_MACHINES = ("docs/two-machines.md", "docs/router.md")
@@ -24,7 +21,7 @@ ON_MACHINES = ("docs/two-machines.md", "docs/router.md")
 RUN = {page: [block for block in blocks_of(page) if block.runs] for page in pages()}
 NORMAL = [
     page
-    for page, blocks in RUN.items()
+    for page, blocks in sorted(RUN.items(), key=lambda item: -len(item[1]))  # the longest first
     if page not in (*ELSEWHERE, *ON_MACHINES) and any(not (one.skip or one.soak) for one in blocks)
 ]
 LONG = [
@@ -141,7 +138,7 @@ def test_when_a_note_stands_above_a_block_then_it_is_understood(
         "~~~sh\ntrue\n~~~",
     ],
 )
-def test_when_a_note_or_a_fence_is_wrong_then_it_is_told(text: str) -> None:
+def test_when_a_note_or_a_fence_is_wrong_then_it_is_reported(text: str) -> None:
     with pytest.raises(NoteError):
         parse(text, "a.md")
 
@@ -155,13 +152,13 @@ def test_when_a_note_or_a_fence_is_wrong_then_it_is_told(text: str) -> None:
         "```text\nmake test\n```",
     ],
 )
-def test_when_a_command_stands_where_nobody_runs_it_then_it_is_told(text: str) -> None:
+def test_when_a_command_stands_where_nobody_runs_it_then_it_is_reported(text: str) -> None:
     assert stray_commands(text, "a.md")
     assert COMMAND.match(text.splitlines()[1]) or "demo" in text
 
 
 @pytest.mark.parametrize("script", ["tenbaud fly", "tenbaud demo --fly", "tenbaud demo \\\n  --fly=1"])
-def test_when_a_command_that_is_not_run_has_an_unknown_word_then_it_is_told(script: str) -> None:
+def test_when_a_command_that_is_not_run_has_an_unknown_word_then_it_is_reported(script: str) -> None:
     assert unknown_words(block_of(f"```sh\n{script}\n```"))
 
 

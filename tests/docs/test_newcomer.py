@@ -18,9 +18,6 @@ from tests.docs.blocks import Block, blocks_of
 from tests.docs.sandbox import Sandbox
 from tests.rules.sources import TOP
 
-# The pages' commands meet at the default port, so one worker runs them all.
-pytestmark = pytest.mark.xdist_group("default port")
-
 README = (TOP / "README.md").read_text(encoding="utf-8")
 BLOCKS = [block for block in blocks_of("README.md") if block.runs]
 FIRST_SCREEN_LINES = 30

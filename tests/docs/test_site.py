@@ -124,15 +124,15 @@ def test_when_a_page_links_to_a_file_beside_the_docs_then_the_site_has_it(site: 
 
 
 @pytest.mark.parametrize(
-    "spoilt", ["[there](nowhere.md)", "[there](faq.md#nowhere)", "[there](../NOWHERE.md)"]
+    "corrupted", ["[there](nowhere.md)", "[there](faq.md#nowhere)", "[there](../NOWHERE.md)"]
 )
 @pytest.mark.soak
-def test_when_a_link_is_broken_then_the_build_fails(spoilt: str, tmp_path: Path) -> None:
+def test_when_a_link_is_broken_then_the_build_fails(corrupted: str, tmp_path: Path) -> None:
     ignored = shutil.ignore_patterns(".git", ".venv", "runs", "site", "__pycache__", ".*_cache")
     copy = tmp_path / "copy"
     shutil.copytree(TOP, copy, ignore=ignored)
     with (copy / "docs" / "index.md").open("a", encoding="utf-8") as page:
-        page.write(f"\n{spoilt}\n")
+        page.write(f"\n{corrupted}\n")
     result = build(tmp_path / "site", copy / "mkdocs.yml")
     assert result.returncode != 0
     assert "there" in result.stderr or "nowhere" in result.stderr.lower()

@@ -1,6 +1,6 @@
 """The wire format's page is decoded byte by byte, from its own tables and nothing else.
 
-Each table is read as a stranger would: the bytes are taken from the page, the field's value is worked
+Each table is read as an outsider would: the bytes are taken from the page, the field's value is worked
 out by the type that the page gives, and the frame that the code makes of them must have that value.
 Then each field is changed alone, with a new checksum: that field of the frame changes and no other.
 """

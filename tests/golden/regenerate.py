@@ -19,9 +19,9 @@ from channel.codec import numerics
 from channel.codec.codec import Codec
 from channel.codec.coders.direction import DirectionCoder, DirectionParameters
 from channel.codec.coders.history import HistoryCoder, HistoryParameters
+from channel.codec.coders.open_loop_zoom import OpenLoopZoomCoder, OpenLoopZoomParameters
+from channel.codec.coders.pcm import PcmCoder, PcmParameters
 from channel.codec.coders.static import StaticCoder, StaticParameters
-from channel.codec.coders.timed import TimedCoder, TimedParameters
-from channel.codec.coders.words import WordsCoder, WordsParameters
 from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
 from channel.codec.models.hold import HoldModel
 from channel.codec.models.linear import LinearModel
@@ -146,11 +146,13 @@ GOLDEN_CODECS: dict[str, Codec] = {
         ZoomCoder(ZoomParameters(window=3, gains=((0.4,), (0.6,)), impulse=True)),
         5,
     ),
-    "time-based zooming": Codec(PitchModel(PitchParameters(), 0.01), TimedCoder(TimedParameters()), 10),
+    "time-based zooming": Codec(
+        PitchModel(PitchParameters(), 0.01), OpenLoopZoomCoder(OpenLoopZoomParameters()), 10
+    ),
     "memoryless, three bits": Codec(
         PitchModel(PitchParameters(), 0.01), StaticCoder(StaticParameters(bits=3)), 5
     ),
-    "words of ten bits": Codec(HoldModel(0.01), WordsCoder(WordsParameters(rate_filter_s=0.03)), 1),
+    "words of ten bits": Codec(HoldModel(0.01), PcmCoder(PcmParameters(rate_filter_s=0.03)), 1),
     "history of three signs": Codec(
         PitchModel(PitchParameters(), 0.01),
         HistoryCoder(

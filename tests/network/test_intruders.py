@@ -1,4 +1,4 @@
-"""Whoever has no business in a flight is refused and counted, and the flight does not notice."""
+"""Nodes without an invitation are refused and counted, and the flight does not notice."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ from tenbaud.keys.store import read_authority, read_node
 from tests.network.flights import DESK_AT, RIG_AT, Flight, environment, make_keys, tls_links
 from tests.network.namespaces import Lab, Machine
 from tests.tenbaud.processes import REPOSITORY
+
+pytestmark = pytest.mark.real_time
 
 OUTSIDE, DESK_OUTSIDE = "10.77.2.1", "10.77.2.2"
 ATTEMPTS = 20

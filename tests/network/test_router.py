@@ -10,11 +10,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
+
 from tenbaud.keys.authority import NodeRole
 from tenbaud.keys.store import add_node
 from tests.network.flights import Flight, at, environment, make_keys
 from tests.network.namespaces import Lab, Machine
 from tests.tenbaud.ends import End, wait_for
+
+pytestmark = pytest.mark.real_time
 
 RIG_SIDE, DESK_SIDE, SPARE_SIDE = "10.77.1.9", "10.77.2.9", "10.77.3.9"
 
@@ -76,7 +80,7 @@ def test_a_flight_through_a_router_survives_its_restart_and_changes_hands(tmp_pa
 
 
 def _change_hands(flight: Flight, machine: Machine, link: list[str], folder: Path) -> None:
-    """A second receiver is refused, and the same one takes over when told to."""
+    """A second receiver is refused, and the same one takes over with `--take-over`."""
     second = End("receive", link, folder / "second", prefix=machine.prefix, draws=False)
     code, _ = second.ended()
     assert code == 4

@@ -11,6 +11,8 @@ import pytest
 from tests.network.flights import DESK_AT, RIG_AT, Flight, at, make_keys, tls_links, two_machines
 from tests.network.namespaces import Lab
 
+pytestmark = pytest.mark.real_time
+
 OTHER_RIG_AT, OTHER_DESK_AT = "10.77.1.31", "10.77.1.32"
 PULLED_S = 5.0
 

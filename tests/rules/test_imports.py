@@ -33,8 +33,8 @@ LAZY = ("zenoh", "channel.links.zenoh.link")
 """Imported inside functions only, except by the adapter: a memory or serial flight needs no Zenoh,
 and loading it takes time and starts threads."""
 
-COMMANDS_OF_A_CHECKOUT = ("tenbaud/cli/figures.py", "tenbaud/cli/bench.py")
-"""They draw the project's own pages with `reproduction`, which an installed tenbaud lacks."""
+COMMANDS_OF_A_CHECKOUT = ("tenbaud/cli/checkout.py",)
+"""It adds the commands of `reproduction`, which an installed tenbaud lacks."""
 
 WITHOUT_ARRAYS = ("channel/*", "receiver/*")
 """What must agree to the last bit, or run every tick, does without numpy and scipy."""
@@ -115,10 +115,10 @@ def test_every_package_is_there() -> None:
         ("channel/codec/codec.py", "from plant_sim import pitch"),
         ("channel/codec/codec.py", "def f():\n    import tenbaud"),
         ("channel/codec/codec.py", "import numpy as np"),
-        ("channel/links/memory.py", "from scipy.linalg import expm"),
-        ("channel/links/memory.py", "def f():\n    import zenoh"),
-        ("channel/links/memory.py", "from .zenoh import link"),
-        ("channel/links/memory.py", "import serial.tools"),
+        ("channel/links/kind.py", "from scipy.linalg import expm"),
+        ("channel/links/kind.py", "def f():\n    import zenoh"),
+        ("channel/links/kind.py", "from .zenoh import link"),
+        ("channel/links/kind.py", "import serial.tools"),
         ("plant_sim/pitch.py", "from channel.codec.numerics import sin"),
         ("plant_sim/pitch.py", "import tests.golden"),
         ("transmitter/session/session.py", "from receiver import session"),
@@ -155,7 +155,7 @@ def test_a_bad_import_is_caught(name: str, source: str) -> None:
         ("tenbaud/cli.py", "def f():\n    from channel.links.zenoh.link import ZenohLink"),
         ("tenbaud/a.py", "if TYPE_CHECKING:\n    from channel.links.zenoh.link import ZenohLink"),
         ("tenbaud/cli.py", "import transmitter, receiver, plant_sim, numpy"),
-        ("tenbaud/cli/figures.py", "def f():\n    from reproduction.paper import make"),
+        ("tenbaud/cli/checkout.py", "def f():\n    from reproduction.paper import make"),
         ("reproduction/paper/make.py", "import tenbaud, reproduction.paper.plan, plant_sim"),
     ],
 )

@@ -14,7 +14,7 @@ SAMPLE_S = 0.02
 
 
 def fly_clean(symbols: int) -> dict[str, Any]:
-    """Fly so many symbols over Zenoh on the virtual clock, one tick per sample; return the figures.
+    """Fly `symbols` symbols over Zenoh on the virtual clock, one tick per sample; return the figures.
 
     Both processes take part with a recording, as in any other flight.
     """

@@ -22,7 +22,7 @@ FLOOD_HZ = 2000.0
 
 
 def forgeries(messages: int, seed: int, flood: bool = False) -> dict[str, int]:
-    """Feed so many forged messages to flights; return how many there were of which kind.
+    """Feed the given number of forged messages to flights; return how many there were of which kind.
 
     Raises what an end raises, and `SafetyViolation` or `LivenessViolation` with the seed to repeat.
     """

@@ -2,7 +2,7 @@
 
 Every receiver hears all that goes up, and the transmitter all that comes down, as on one Zenoh key. A
 receiver that has ended (a second one is refused) is a process that has gone; the flight's own is
-started again after a second, by whoever looks after it.
+started again after a second, by its operator.
 """
 
 from __future__ import annotations
@@ -161,7 +161,7 @@ class IntrudedWorld(World):
         if second is None:
             return
         messages = second.step(self.now_ns, data).frames
-        second.session.rest()
+        second.session.flush_records()
         if second.session.phase is Phase.ENDED:
             self._second = None
         for message in messages:

@@ -1,8 +1,9 @@
 """Somebody on the line: hears both ways, plays recordings back, forges frames with a good check.
 
 A forged frame is made from what was heard: session, epoch, incarnation, request and sample as they are,
-nearly as they are, extreme or random. What is left out is what the protocol allows to whoever knows the
-session: a farewell in its name, and a refusal of the transmitter's request, end the flight.
+nearly as they are, extreme or random. Two frames are left out, since the protocol allows them to anyone
+who knows the session: a farewell in its name, and a refusal of the transmitter's request, end the
+flight.
 """
 
 from __future__ import annotations
@@ -197,7 +198,7 @@ class Intruder:
 
     def _welcome(self) -> Welcome:
         session, epoch = self._flight()
-        # One that is believed makes a session of this number.
+        # One that is accepted makes a session of this number.
         self._sessions.add(session)
         sample = self._number(self._sample, U32)
         inputs = self._codec.model.input_size

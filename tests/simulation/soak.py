@@ -81,7 +81,7 @@ def _fly(world: World, option: str) -> SeedResult:
     watch = world.watch
     recovered = world.recovered_ns
     expected_ns = plan.round_trip_ns + plan.terms.lead_ticks * plan.terms.tick_ns
-    world.faults["spoilt codecs"] += len(plan.sabotage)
+    world.faults["corrupted codecs"] += len(plan.sabotage)
     world.faults["clock jumps"] += len(plan.faults.clock_steps)
     return SeedResult(
         seed,

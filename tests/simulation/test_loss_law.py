@@ -43,5 +43,5 @@ def test_when_the_round_trip_has_ten_periods_then_the_flight_is_locked(faults: s
     assert flown.ended_well
     assert flown.desyncs == 0
     assert flown.coded_max < 1.0
-    # What is believed in advance, over a second of prediction, is the worse of the two.
+    # The predicted estimate, over a second of prediction, is the worse of the two.
     assert flown.live_rms > flown.coded_rms

@@ -222,7 +222,7 @@ def test_when_one_end_computes_a_sine_one_ulp_off_then_it_is_reported_and_ends_s
     assert flight.node.latched
     assert flight.node.guard.volts == (0.0, 0.0)
     assert result.ticks <= report.sample * 10 + 60
-    applied = flight.transmitter_rows.column("tick", "applied_volts")
+    applied = flight.transmitter_rows.column("tick", "applied")
     assert applied[-1] == (0.0, 0.0)
 
 

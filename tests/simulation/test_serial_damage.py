@@ -26,7 +26,7 @@ def damaged_flight(seed: int, damage_down: float, **changes: Any) -> tuple[Memor
 
 
 def fly_on(flight: MemoryFlight, samples: int) -> int:
-    """Fly so many samples or to the end of the session; return how many were confirmed."""
+    """Fly the given number of samples or to the end of the session; return how many were confirmed."""
     flight.fly(samples * flight.terms.sample_ns / 1e9)
     return flight.transmitter.copies.confirmed.sample
 

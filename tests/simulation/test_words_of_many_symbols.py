@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from channel.codec.codec import Codec
-from channel.codec.coders.words import WordsCoder, WordsParameters
+from channel.codec.coders.pcm import PcmCoder, PcmParameters
 from channel.codec.models.hold import HoldModel
 from plant_sim.pitch import PitchParameters, PitchPlant
 from receiver.controllers.pid import PAPER_GAINS, Pid
@@ -13,7 +13,7 @@ from tests.simulation.flight import REFERENCE
 
 
 def test_when_a_word_of_ten_symbols_goes_up_per_tick_then_every_word_arrives_on_the_grid() -> None:
-    codec = Codec(HoldModel(TICK_S), WordsCoder(WordsParameters()), 1)
+    codec = Codec(HoldModel(TICK_S), PcmCoder(PcmParameters()), 1)
     agreed = terms(ticks_per_sample=1, symbols_per_word=10, rate_baud=1000.0, lead_ticks=4)
     agreed.check("virtual")
     flight = MemoryFlight(

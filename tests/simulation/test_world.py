@@ -85,7 +85,7 @@ def test_when_old_epochs_were_obeyed_then_the_harness_would_find_out(
 
 @pytest.mark.parametrize("end", ["transmitter", "receiver"])
 @pytest.mark.parametrize("delay_periods", [0, 1, 5])
-def test_when_one_end_is_spoilt_then_it_is_found_and_mended_in_time(
+def test_when_one_end_is_corrupted_then_it_is_found_and_corrected_in_time(
     end: str, delay_periods: int
 ) -> None:
     delay_ns = delay_periods * 100_000_000 // 2
@@ -105,7 +105,7 @@ def test_when_one_end_is_spoilt_then_it_is_found_and_mended_in_time(
     world.watch.on_delivered = on_delivered  # type: ignore[method-assign]
     world.fly()
     sample_ns, round_trip_ns = plan.terms.sample_ns, 2 * delay_ns
-    # The spoilt state is the one after sample 60, whose word leaves at its first tick; the clock
+    # The corrupted state is the one after sample 60, whose word leaves at its first tick; the clock
     # of the flight begins a handshake after true time 0.
     begun_ns = round_trip_ns + 10_000_000 + 60 * sample_ns
     assert 0 <= times["found"] - begun_ns <= sample_ns + round_trip_ns

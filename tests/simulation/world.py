@@ -32,7 +32,7 @@ from tests.simulation.watch import Watch
 from transmitter.guard import Guard, GuardSettings
 from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode
-from transmitter.rigs.base import Reading, RigBase
+from transmitter.rigs.base import Reading, Rig
 from transmitter.session.copies import Confirmed
 from transmitter.session.session import Phase, TransmitterSession
 
@@ -46,7 +46,7 @@ CALM_REJOINS_MAX = 4
 """After the last fault."""
 
 
-class WorldRig(RigBase):
+class WorldRig(Rig):
     """A plant that outlives the transmitter's process: its ticks are counted from true time 0."""
 
     name = "world"
@@ -68,7 +68,7 @@ class WorldRig(RigBase):
 
 
 class BlindSession(TransmitterSession):
-    """What must never be: it sees that the digests differ, and goes on."""
+    """A faulty transmitter: it sees that the digests differ, and continues."""
 
     def _on_desync(self, done: Confirmed) -> list[Frame]:
         return []
@@ -264,7 +264,7 @@ class World:
             self.faults["downlink frames dropped by their check"] += 1
             return
         answers = node.deliver(frame)
-        node.rest()
+        node.flush_records()
         self.watch.on_delivered(node)
         if not self._greeted and node.session.phase is Phase.FLYING:
             self._begin()
@@ -277,7 +277,7 @@ class World:
             return
         shown_ns = self.clock.shown(self.now_ns)
         messages = self.endpoint.step(shown_ns, data).frames
-        self.endpoint.session.rest()
+        self.endpoint.session.flush_records()
         for message in messages:
             for arrival_ns, out in self.down.carry(message, self.now_ns):
                 if out is not None:

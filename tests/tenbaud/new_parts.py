@@ -104,11 +104,11 @@ LINK = '''
 import socket
 from contextlib import contextmanager
 
-from channel.links.base import LinkBase
+from channel.links.base import Link
 from channel.links.kind import LinkKind, Meeting
 
 
-class Datagrams(LinkBase):
+class Datagrams(Link):
     """One end: a UDP socket on the loopback interface."""
 
     name = "datagrams"

@@ -132,7 +132,7 @@ class Rig:
         return self
 
     def fly(self, samples: int) -> Self:
-        """Fly so many samples more, each confirmed before the next; rejoins on the way are made."""
+        """Fly `samples` more samples, each confirmed before the next; rejoins on the way are made."""
         wanted = self.session.counts["digest_checks"] + samples
         give_up_s = time.monotonic() + PATIENCE_S
         while self.session.counts["digest_checks"] < wanted:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from importlib.util import find_spec
 
 import pytest
+import typer
 from typer.testing import CliRunner
 
-from tenbaud.cli.commands import app
+from tenbaud.cli.checkout import add_commands
 from tenbaud.config.load import ConfigError
 
 
@@ -19,6 +20,8 @@ def test_when_the_generators_are_not_installed_then_the_command_says_what_to_do(
         return None if name == "reproduction" else find_spec(name)
 
     monkeypatch.setattr("tenbaud.cli.checkout.find_spec", found)
+    app = typer.Typer()
+    add_commands(app)
     result = CliRunner().invoke(app, command)
     assert isinstance(result.exception, ConfigError)
     assert "clone the repository" in str(result.exception)

@@ -107,6 +107,7 @@ def test_when_the_wire_delivers_at_the_end_of_a_slot_then_it_flies_on_the_provis
     assert summary["error_live_max_fraction"] < 0.05
 
 
+@pytest.mark.real_time
 def test_when_flown_on_every_clock_and_link_then_the_states_are_identical(tmp_path: Path) -> None:
     flown = ["--lead", "25", "--duration", "3", "--mismatch", "0.1", "--disturbance", "q=2e-3"]
     for name, how in (
@@ -122,11 +123,14 @@ def test_when_flown_on_every_clock_and_link_then_the_states_are_identical(tmp_pa
         assert compared.verdict is Verdict.EQUAL, f"real and {other}: {compared}"
 
 
+@pytest.mark.real_time
+@pytest.mark.both_cores
 def test_when_the_real_clock_flies_then_the_receiver_measures_the_baud_rate(tmp_path: Path) -> None:
     ended = run("demo", "--json", "--clock", "real", "--duration", "10", cwd=tmp_path)
     assert ended.code == 0, ended.err
     summary = ended.summary
-    assert summary["baud_measured"] == pytest.approx(10.0, abs=0.1)
+    # A busy machine may hold an end up past a slot, which then carries no symbol.
+    assert summary["baud_measured"] == pytest.approx(10.0, abs=0.1 + 0.11 * summary["erasures"])
     assert summary["digest_checks"] == 100
     assert summary["desyncs"] == 0
     assert summary["loop_late_ms_p99"] is not None

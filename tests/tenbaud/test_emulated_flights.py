@@ -18,6 +18,8 @@ from tenbaud.flight.summary import transmitter_part
 from tenbaud.recording.reader import MessageStream
 from tests.tenbaud.emulated_flight import PATIENT, RigProcess, demo, fly_emulated
 
+pytestmark = pytest.mark.real_time
+
 SECONDS = 5.0
 SOAK_SECONDS = 60.0
 OFF = [0.0, 0.0]
@@ -55,6 +57,7 @@ def simulated_rms(seconds: float, lead_ticks: int) -> float:
     return rms
 
 
+@pytest.mark.both_cores
 @pytest.mark.parametrize("form", ["cobs", "ascii", "quarc"])
 def test_an_emulated_rig_flies_like_the_simulated_one(form: str, tmp_path: Path) -> None:
     rig, ends = PEERS[form]
@@ -65,7 +68,11 @@ def test_an_emulated_rig_flies_like_the_simulated_one(form: str, tmp_path: Path)
     assert summary["digest_checks"] == 10 * SECONDS
     assert summary["rig"].get("lost", 0) == 0
     expected = simulated_rms(SECONDS, summary["lead_ticks"])
-    assert summary["error_coded_rms_rad"] == pytest.approx(expected, rel=0.1)
+    # What a busy machine erased or missed makes it another flight, by so much at most.
+    held_up = (summary["erasures"] + summary["commands_late"] + summary["ticks_missed"]) / summary[
+        "samples"
+    ]
+    assert summary["error_coded_rms_rad"] == pytest.approx(expected, rel=0.1 + held_up)
     assert device.get("watchdog_trips", 0) == 0
     assert (device["volts"], device["enabled"]) == (OFF, False)
     # One command a tick at most, so more of them than ticks are those of the way down.
@@ -81,7 +88,7 @@ def test_a_rig_that_goes_silent_ends_at_the_safe_voltage_on_both_sides(tmp_path:
     assert (device["volts"], device["enabled"]) == (OFF, False)
     last = _last_tick(tmp_path / "run")
     assert last["guard"] == "latched", "the transmitter's side: the end of the ramp"
-    assert last["applied_volts"] == OFF
+    assert last["applied"] == OFF
 
 
 def test_an_unplugged_rig_ends_the_flight_and_flies_again_when_it_is_back(tmp_path: Path) -> None:
@@ -107,7 +114,7 @@ def test_a_dry_run_reads_and_never_commands(tmp_path: Path) -> None:
     assert flown.summary["rig"]["dry_run"]
     assert flown.summary["rig"]["samples"] > 100
     assert flown.device.get("commands", 0) == 0
-    assert _last_tick(tmp_path / "run")["applied_volts"] == OFF
+    assert _last_tick(tmp_path / "run")["applied"] == OFF
 
 
 def test_a_real_rig_is_refused_on_the_virtual_clock(tmp_path: Path) -> None:

@@ -51,7 +51,7 @@ def test_when_the_line_is_impaired_twice_alike_then_the_flights_are_equal(tmp_pa
 
 
 @pytest.mark.parametrize("link", ["memory", "zenoh"])
-def test_when_one_end_is_spoilt_then_both_write_it_down_and_the_flight_goes_on(
+def test_when_one_end_is_corrupted_then_both_write_it_down_and_the_flight_goes_on(
     tmp_path: Path, link: str
 ) -> None:
     ended = demo(tmp_path, "--sabotage", "sample=150,field=range", "--set", f"link.kind={link}")
@@ -76,7 +76,7 @@ def test_when_one_end_is_spoilt_then_both_write_it_down_and_the_flight_goes_on(
     assert "field 'coder[0]'" in named.out
 
 
-def test_when_it_is_told_to_stop_then_a_difference_ends_the_flight(tmp_path: Path) -> None:
+def test_when_it_is_set_to_stop_then_a_difference_ends_the_flight(tmp_path: Path) -> None:
     ended = demo(tmp_path, "--sabotage", "sample=100,field=angle", "--on-desync", "stop")
     assert ended.code == 5
     assert "after sample 100" in ended.err

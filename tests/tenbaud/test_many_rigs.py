@@ -69,12 +69,12 @@ def test_when_one_rig_floods_then_its_surplus_is_dropped_and_another_flies_on(tm
         room.until_ended(1)
     assert room.summary("rig/good")["messages_dropped"] == 0
     assert good.session.counts["desyncs"] == good.session.counts["erasures"] == 0
-    spoilt = room.summary("rig/bad")
-    assert spoilt["messages_dropped"] + spoilt["malformed"] == surplus
-    assert spoilt["messages_dropped"] > surplus - 10 * BURST_MESSAGES
+    corrupted = room.summary("rig/bad")
+    assert corrupted["messages_dropped"] + corrupted["malformed"] == surplus
+    assert corrupted["messages_dropped"] > surplus - 10 * BURST_MESSAGES
 
 
-def test_when_a_handshake_does_not_fit_then_it_is_refused_told_once_and_leaves_no_folder(
+def test_when_a_handshake_does_not_fit_then_it_is_refused_reported_once_and_leaves_no_folder(
     tmp_path: Path,
 ) -> None:
     with Room(tmp_path) as room:
@@ -92,7 +92,7 @@ def test_when_a_handshake_does_not_fit_then_it_is_refused_told_once_and_leaves_n
     assert [path.name for path in tmp_path.iterdir()] == ["rig-good"]
 
 
-def test_when_an_intruder_asks_under_ever_new_names_then_few_refusals_are_told_and_all_counted(
+def test_when_an_intruder_asks_under_ever_new_names_then_few_refusals_are_reported_and_all_counted(
     tmp_path: Path,
 ) -> None:
     asked = 10 * LINES_AT_ONCE
@@ -124,11 +124,11 @@ def test_when_one_rig_breaks_its_service_then_only_its_flight_ends(tmp_path: Pat
 def test_when_one_rig_loses_lockstep_then_it_rejoins_and_another_does_not_notice(
     tmp_path: Path,
 ) -> None:
-    spoilt = agreement(receiver={"sabotage": "sample=4,field=range"})
+    corrupted = agreement(receiver={"sabotage": "sample=4,field=range"})
     common = agreement()
 
     def agreement_of(name: str) -> Agreement:
-        return spoilt if name == "rig/bad" else common
+        return corrupted if name == "rig/bad" else common
 
     with Room(tmp_path, agreement_of) as room:
         good, bad = Rig(room, "rig/good").greet(), Rig(room, "rig/bad").greet()
@@ -152,7 +152,7 @@ def test_when_a_rig_dies_then_its_flight_is_closed_and_the_name_is_free_again(tm
     assert good.session.counts["desyncs"] == 0
 
 
-def test_when_no_configuration_can_be_had_then_the_rig_is_told_why(tmp_path: Path) -> None:
+def test_when_no_configuration_can_be_had_then_the_rig_hears_why(tmp_path: Path) -> None:
     common = agreement()
 
     def agreement_of(name: str) -> Agreement:
@@ -191,7 +191,7 @@ def test_when_a_symbol_of_an_unknown_session_comes_then_its_rig_is_asked_to_gree
 def test_when_a_rig_asks_as_the_receiver_stops_then_its_recording_is_finished(tmp_path: Path) -> None:
     room = Room(tmp_path)
     late = Rig(room, "rig/late")
-    assert room.host.knock("rig/late", encode(late.session.hello())) == []
+    assert room.host.on_unserved("rig/late", encode(late.session.hello())) == []
     room.host.close()
     assert room.summary("rig/late")["samples"] == 0
     assert room.summary("rig/late")["recording_error"] is None
@@ -234,7 +234,7 @@ def test_when_recording_one_rig_fails_then_only_its_flight_ends(tmp_path: Path) 
     assert room.summary("rig/good")["samples"] == 5
 
 
-@pytest.mark.parametrize("clock", ["virtual", "real"])
+@pytest.mark.parametrize("clock", ["virtual", pytest.param("real", marks=pytest.mark.real_time)])
 def test_when_processes_meet_over_zenoh_then_each_flies_with_its_own_file(
     tmp_path: Path, clock: str
 ) -> None:

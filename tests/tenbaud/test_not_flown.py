@@ -1,4 +1,4 @@
-"""A flight that went to its end without flying: exit code, summary, and what a person is told."""
+"""A flight that went to its end without flying: exit code, summary, and the message for a person."""
 
 from __future__ import annotations
 

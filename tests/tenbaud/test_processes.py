@@ -1,4 +1,4 @@
-"""Two processes that disagree, die or are stopped: told clearly, motors safe, recordings closed."""
+"""Two processes that disagree, die or are stopped: clear messages, motors safe, recordings closed."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_when_one_ends_sine_differs_then_the_probe_refuses(tmp_path: Path) -> No
         assert "numerics probe differs" in ended.err
 
 
-@pytest.mark.parametrize("clock", ["virtual", "real"])
+@pytest.mark.parametrize("clock", ["virtual", pytest.param("real", marks=pytest.mark.real_time)])
 def test_when_one_ends_sine_changes_in_flight_then_the_first_sample_is_named(
     tmp_path: Path, clock: str
 ) -> None:
@@ -59,7 +59,7 @@ def test_when_one_ends_sine_changes_in_flight_then_the_first_sample_is_named(
         assert f"after sample {last['sample']}: transmitter {last['digest']}" in ended.err
         assert f"receiver {last['peer_digest']}" in ended.err
     ticks = [row for _, row in recording.rows("tick")]
-    assert ticks[-1]["applied_volts"] == [0.0, 0.0]
+    assert ticks[-1]["applied"] == [0.0, 0.0]
     assert ticks[-1]["guard"] == "latched"
 
 
@@ -94,7 +94,7 @@ def test_when_the_clocks_differ_then_both_say_so(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("verb", ["transmit", "receive"])
-def test_when_the_peer_is_absent_then_it_is_told_in_time(tmp_path: Path, verb: str) -> None:
+def test_when_the_peer_is_absent_then_it_is_reported_in_time(tmp_path: Path, verb: str) -> None:
     flag = "--connect" if verb == "transmit" else "--listen"
     process = start(
         verb, flag, free_endpoint(), "--set", "link.peer_timeout_s=1", "--json", cwd=tmp_path
@@ -124,6 +124,7 @@ def _pair_in_flight(tmp_path: Path) -> dict[str, object]:
     raise AssertionError("the pair did not get into flight")
 
 
+@pytest.mark.real_time
 @pytest.mark.parametrize(
     ("verb", "number", "codes"),
     [
@@ -147,4 +148,4 @@ def test_when_one_end_is_stopped_or_killed_then_the_other_ends_safely(
     assert upper.topics["tick"].rows > 100
     if codes["transmit"] != -9:
         last = list(upper.rows("tick"))[-1][1]
-        assert last["applied_volts"] == [0.0, 0.0]
+        assert last["applied"] == [0.0, 0.0]

@@ -16,6 +16,8 @@ from channel.links.serial.emulated import EmulatedLine
 from tenbaud.recording.reader import Recording
 from tests.tenbaud.ends import Pair, Relay, over_serial, over_zenoh
 
+pytestmark = pytest.mark.real_time
+
 SEED = 20240619
 SAFE_VOLTS = [0.0, 0.0]
 WATCHDOG_S = 0.5
@@ -36,10 +38,10 @@ def check_plant(folder: Path) -> None:
     """Whatever happened, the motors had finite voltages within limits, and none when silent."""
     silent_s = 0.0
     for row in ticks_of(folder):
-        assert all(-5.0 <= value <= 5.0 for value in row["applied_volts"]), row
-        silent_s = 0.0 if row["commanded_volts"] is not None else silent_s + 0.01
+        assert all(-5.0 <= value <= 5.0 for value in row["applied"]), row
+        silent_s = 0.0 if row["commanded"] is not None else silent_s + 0.01
         if silent_s > WATCHDOG_S + 1.0 + 0.05:
-            assert row["applied_volts"] == SAFE_VOLTS, row
+            assert row["applied"] == SAFE_VOLTS, row
             assert row["guard"] in ("latched", "ready")
 
 
@@ -119,8 +121,8 @@ def test_when_the_line_is_muted_or_cut_then_the_flight_goes_on(tmp_path: Path) -
     pair = Pair(tmp_path, over_zenoh(endpoint, f"tcp/127.0.0.1:{relay.port}"))
     try:
         pair.wait_until_both_fly()
-        for spoil, seconds in ((relay.mute, 1.0), (relay.cut, 3.0)):
-            spoil(seconds)
+        for corrupt, seconds in ((relay.mute, 1.0), (relay.cut, 3.0)):
+            corrupt(seconds)
             time.sleep(0.3)
             pair.wait_until_both_fly()
         code, summary = pair.transmitter.stop_politely()

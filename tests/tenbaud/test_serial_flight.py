@@ -24,7 +24,10 @@ from tenbaud.flight.outcome import ExitCode, Outcome
 from tenbaud.recording.comparison import Verdict
 from tenbaud.recording.diff import compare_runs
 from tenbaud.recording.folder import RunFolder
+from tests.channel.links.serial.noisy_line import NoisyLine
 from tests.tenbaud.processes import run
+
+pytestmark = pytest.mark.real_time
 
 
 @dataclass
@@ -54,7 +57,7 @@ def fly(
     overrides: dict[str, Any],
     meanwhile: Callable[[], None] = lambda: None,
 ) -> Flown:
-    """Fly both ends over a line on the real clock, the receiver on a thread of its own.
+    """Fly both ends over a line on the real clock, the receiver on a separate thread.
 
     `meanwhile` runs on another thread once the flight has begun.
     """
@@ -136,16 +139,16 @@ def test_when_it_flies_at_ten_baud_then_ten_bytes_a_second_go_up_and_ten_baud_ar
 
 def test_when_the_line_damages_bytes_then_no_divergence_is_silent(tmp_path: Path) -> None:
     # Up, one byte in five; down, as much as frames of this size stand for some seconds.
-    with EmulatedLine(tmp_path, 460_800, seed=6) as line:
+    with NoisyLine(tmp_path, 460_800, seed=6) as line:
 
-        def spoil() -> None:
-            line.spoil("up", 0.2)
-            line.spoil("down", 0.001)
+        def corrupt() -> None:
+            line.corrupt("up", 0.2)
+            line.corrupt("down", 0.001)
 
         changed = settings(line_rate_baud=460_800)
-        flown = fly(line, {**changed, "channel": {"repeats": 6}}, spoil)
-        assert line.damaged("up") > 0
-        assert line.damaged("down") > 0
+        flown = fly(line, {**changed, "channel": {"repeats": 6}}, corrupt)
+        assert line.damaged["up"] > 0
+        assert line.damaged["down"] > 0
     assert flown.outcome.code in (ExitCode.OK, ExitCode.LINK_LOST), flown.outcome.text
     flown.assert_nothing_silent()
     assert flown.dropped
@@ -156,7 +159,7 @@ def test_when_garbage_storms_over_the_uplink_then_the_flight_goes_on(tmp_path: P
     import time
 
     chooser = random.Random(9)
-    with EmulatedLine(tmp_path, 115_200) as line:
+    with NoisyLine(tmp_path, 115_200) as line:
 
         def storm() -> None:
             for _ in range(40):

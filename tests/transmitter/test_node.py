@@ -16,15 +16,15 @@ from tests.channel.codec.parts import identity_of, pitch_codec, terms
 from transmitter.guard import Guard, GuardCause, GuardReason, GuardSettings, GuardState
 from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode
-from transmitter.rigs.base import Reading, RigBase
+from transmitter.rigs.base import Reading, Rig
 from transmitter.session.session import Phase, TransmitterSession
 
 CODEC = pitch_codec()
 TICKS = 200
 
 
-class ScriptedRig(RigBase):
-    """Gives the readings that it was told to, and notes the voltages."""
+class ScriptedRig(Rig):
+    """Returns given readings, and notes the voltages."""
 
     def __init__(
         self, faulty_tick: int | None = None, angle_rad: float = 0.1, ticks: int = TICKS
@@ -75,7 +75,7 @@ def test_when_commands_come_then_they_are_on_the_motors_at_their_ticks() -> None
     assert [fly_sample(node, sample) for sample in range(5)] == [1] * 5
     assert rig.written == [(tick, (2.0, -2.0)) for tick in range(50)]
     assert node.commands_late == 0
-    node.rest()
+    node.flush_records()
     assert node.scores.coded.count == node.scores.live.count == 50
 
 
@@ -127,7 +127,7 @@ def test_when_the_session_ends_then_the_voltage_is_taken_down_with_its_reason() 
     ],
     ids=["fault", "soft limit"],
 )
-def test_when_the_sensor_or_the_angle_is_wrong_then_the_guard_trips_and_it_is_told(
+def test_when_the_sensor_or_the_angle_is_wrong_then_the_guard_trips_and_it_is_reported(
     rig: ScriptedRig, text: str
 ) -> None:
     recorder = MemoryRecorder()
@@ -163,7 +163,7 @@ def test_when_a_row_is_recorded_then_commanded_and_applied_voltages_stand_side_b
     node.actuate(10)
     rows = recorder.topic("tick")
     assert [row["tick"] for row in rows] == list(range(11))
-    assert rows[3]["commanded_volts"] == rows[3]["applied_volts"] == (2.0, -2.0)
-    assert rows[10]["commanded_volts"] is None
-    assert rows[10]["applied_volts"] == (2.0, -2.0)
+    assert rows[3]["commanded"] == rows[3]["applied"] == (2.0, -2.0)
+    assert rows[10]["commanded"] is None
+    assert rows[10]["applied"] == (2.0, -2.0)
     assert [row["late"] for row in rows] == [False] * 10 + [True]

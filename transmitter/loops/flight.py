@@ -27,7 +27,7 @@ class Flight(ABC):
             self._await_answer()
 
     def run(self, ticks: int) -> int:
-        """Fly so many ticks, or to the end of the rig or the safe voltage; return the tick reached."""
+        """Fly `ticks` ticks, or to the end of the rig or the safe voltage; return the tick reached."""
         endpoint = self.endpoint
         endpoint.begin(ticks)
         self._begin()
@@ -46,10 +46,10 @@ class Flight(ABC):
     def finish(self, farewell: Callable[[], End]) -> None:
         """Let the last echoes come in, end the session on both sides, take a real rig's motors down.
 
-        `farewell` is asked for what the receiver is told once the echoes are in.
+        `farewell` gives the ending for the receiver once the echoes are in.
         """
         self._linger()
-        self.endpoint.node.rest()
+        self.endpoint.node.flush_records()
         self.leave(farewell())
         self._land()
 

@@ -8,6 +8,7 @@ ticks still takes in what has come before it goes on: without the echoes it coul
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable
 
@@ -17,8 +18,9 @@ from channel.line.virtual import is_envelope
 from channel.links.base import Link
 from channel.protocol.events import Event, EventKind, Presence
 from transmitter.endpoint import TransmitterEndpoint
+from transmitter.guard import GuardCause, GuardReason
 from transmitter.loops.flight import Flight
-from transmitter.loops.ramp_down import Landing
+from transmitter.node import TransmitterNode
 from transmitter.session.rejoin import ASK_AGAIN_NS
 from transmitter.session.session import Phase
 
@@ -28,6 +30,35 @@ LEAD_IN_NS = 20_000_000
 """Between the handshake and tick 0."""
 CATCH_UP_MESSAGES_MAX = 64
 """Messages taken in a row by a loop that is behind its ticks."""
+
+
+class RampDown:
+    """Takes a node's motors to their safe voltage; for a rig that does not ask for it, nothing.
+
+    A body that hovers and loses its lift at once drops by as much as its stand allows, so the voltages
+    go down along the guard's ramp. `tick` is the first one that was not flown.
+    """
+
+    def __init__(self, node: TransmitterNode, tick: int) -> None:
+        self._node = node
+        self._tick = tick
+        self._tick_ns = node.session.terms.tick_ns
+        self.over = not node.rig.ramps_down or node.latched
+        if not self.over:
+            node.guard.trip(GuardReason(GuardCause.FLIGHT_OVER))
+
+    @property
+    def next_ns(self) -> int:
+        """Return the flight time at which `step` has something to do."""
+        return sys.maxsize if self.over else self._tick * self._tick_ns
+
+    def step(self, now_ns: int) -> None:
+        """Write the voltages of a tick that is due."""
+        if self.over or now_ns < self.next_ns:
+            return
+        self._node.rig.write(self._tick, self._node.guard.apply(self._tick, None))
+        self._tick = max(self._tick, now_ns // self._tick_ns) + 1
+        self.over = self._node.latched
 
 
 class RealFlight(Flight):
@@ -48,10 +79,10 @@ class RealFlight(Flight):
         self._asked_ns: int | None = None
         """when a session was asked for first"""
         self._peer_told = True
-        """what was last told about the receiver: it is there"""
+        """presence of the receiver as last reported"""
         terms = endpoint.node.session.terms
         self._tick_ns = terms.tick_ns
-        self._landing: Landing | None = None
+        self._ramp_down: RampDown | None = None
         self._ask_again_ns = min(max(terms.sample_ns, ASK_AGAIN_NS), HELLO_PERIOD_NS)
 
     def _now_ns(self) -> int:
@@ -80,29 +111,29 @@ class RealFlight(Flight):
 
     def _rest(self) -> None:
         endpoint = self.endpoint
-        endpoint.node.rest()
+        endpoint.node.flush_records()
         self._watch_peer()
         self._watch_rate(endpoint.tick - 1)
 
     def _linger(self) -> None:
         session = self.endpoint.node.session
-        landing = self._landing = Landing(self.endpoint.node, self.endpoint.tick)
+        ramp_down = self._ramp_down = RampDown(self.endpoint.node, self.endpoint.tick)
         until_ns = self._now_ns() + session.terms.linger_ns(self.endpoint.uplink.line.longest_delay_ns)
         while (now_ns := self._now_ns()) < until_ns:
             if session.phase is not Phase.FLYING or (
                 session.copies.lag_samples == 0 and not self._outbox
             ):
                 break
-            landing.step(now_ns)
-            self._take_in((min(until_ns, landing.next_ns) - self._now_ns()) / 1e9)
+            ramp_down.step(now_ns)
+            self._take_in((min(until_ns, ramp_down.next_ns) - self._now_ns()) / 1e9)
         # What the last echo was answered with: the report of a difference.
         self._send_due()
 
     def _land(self) -> None:
-        landing = self._landing
-        while landing is not None and not landing.over:
-            landing.step(self._now_ns())
-            self._take_in_until(min(landing.next_ns, self._now_ns() + self._tick_ns))
+        ramp_down = self._ramp_down
+        while ramp_down is not None and not ramp_down.over:
+            ramp_down.step(self._now_ns())
+            self._take_in_until(min(ramp_down.next_ns, self._now_ns() + self._tick_ns))
 
     def _wait_until(self, due_ns: int) -> None:
         self._take_in_until(due_ns)
@@ -121,7 +152,7 @@ class RealFlight(Flight):
                 time.sleep(max(0.0, wake_ns - self._now_ns()) / 1e9)
 
     def _catch_up(self) -> None:
-        """Take in what has come, within bounds: whoever floods this end must not stop its ticks."""
+        """Take in what has come, within bounds: a flood of messages must not stop the ticks."""
         for _ in range(CATCH_UP_MESSAGES_MAX):
             if not self._take_in(0.0):
                 return

@@ -114,7 +114,7 @@ class VirtualFlight(Flight):
     def _step(self, time_ns: int, data: bytes | None) -> None:
         reply = self._peer.step(time_ns, data)
         # A peer in another process had it done while it was waited for.
-        self.endpoint.node.rest()
+        self.endpoint.node.flush_records()
         self._deadline_ns = reply.deadline_ns
         for message in reply.frames:
             self._push(self._downlink.carry(message, time_ns), upward=False)

@@ -53,7 +53,7 @@ GAP_EVERY_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """What an ideal code could do on this line, as `tenbaud.bounds` works it out.
+    """The error of an ideal code on this line, as `tenbaud.bounds` computes it.
 
     Both in terms of a mean square error for a disturbance of unit density.
     """
@@ -135,7 +135,7 @@ class StrengthMeter:
         else:
             self._position += jump * period + 0.5 * kick * period * period
             self._rate += kick * period
-        # The restoring torque differs between the angle that is and the one believed.
+        # The restoring torque differs between the true angle and the estimated one.
         at = (angle_rad, *before.model[1:])
         push = (self._rate_after(at) - self._rate_after(before.model)) / self._tick_s
         self._position -= 0.5 * push * period * period

@@ -1,7 +1,7 @@
 """How well the far end knew the plant: errors kept as running figures, never as lists.
 
 Two errors are kept for every tick of the window. *Coded* is the codec's own error at that tick, as in
-the paper; *live* is the error of what the receiver believed about the tick when it had to decide the
+the paper; *live* is the error of the receiver's predicted estimate when it had to decide the
 tick's command, prediction included. Both are against the true angle where the rig knows it, else
 against the encoder.
 """
@@ -44,7 +44,7 @@ class Scores:
     """Collects the errors of a flight from tick `window_start_tick` on.
 
     `span_ticks` bounds how long an angle waits for its estimate; older ones are forgotten.
-    `on_live_error` is told every live error of the window, rad.
+    `on_live_error` gets every live error of the window, rad.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Which encoder is which axis, and what a motor voltage becomes on its way to a device."""
+"""The mapping of encoders to axes, and the conversion of motor voltages for a device."""
 
 from __future__ import annotations
 

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol, Self
+from typing import NamedTuple, Self
 
 from channel.codec.codec import Vector
+from channel.errors import TenbaudError
+
+
+class RigError(TenbaudError):
+    """A rig that cannot be opened or used; the text says what to do next."""
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceNote:
-    """What a real device said with a reading, beside the measured axes."""
+    """A real device's report with a reading, beside the measured axes."""
 
     counts: tuple[int, ...]
     """of every encoder channel, those that are not measured axes too"""
@@ -39,58 +45,39 @@ class Reading(NamedTuple):
     """of a real rig"""
 
 
-class Rig(Protocol):
-    """A plant with encoders and motors. `read` and `write` alternate, one pair per tick."""
+class Rig(ABC):
+    """A plant with encoders and motors. `read` and `write` alternate, one pair per tick.
 
-    name: str
-    is_real: bool
+    What is not abstract here is what a rig without a device does.
+    """
+
+    name = ""
+    is_real = False
     """a body that moves in real time: it cannot be flown on the virtual clock"""
-    ramps_down: bool
+    ramps_down = False
     """after a flight the voltages are taken down along the guard's ramp, not dropped"""
 
-    def open(self) -> None:
+    def open(self) -> None:  # noqa: B027, most need nothing
         """Get ready; the motors stay off."""
 
+    @abstractmethod
     def read(self, tick: int) -> Reading | None:
         """Return the reading of a tick; None when the rig has no more (a recording has ended)."""
 
+    @abstractmethod
     def write(self, tick: int, volts: Vector) -> None:
         """Put these voltages on the motors until the next tick."""
 
-    def safe_stop(self) -> None:
+    def safe_stop(self) -> None:  # noqa: B027, most have nothing that turns
         """Put the safe voltage on the motors at once."""
 
     def close(self) -> None:
         """Leave the rig at its safe voltage and give it back."""
+        self.safe_stop()
 
     def figures(self) -> dict[str, object]:
         """Return what the rig counted, for the summary; empty where there is nothing to count."""
-
-    def __enter__(self) -> Self: ...
-
-    def __exit__(self, *_: object) -> None: ...
-
-
-class RigBase:
-    """Opening and closing for a `with`, the same for every rig."""
-
-    name = ""
-    is_real = False
-    ramps_down = False
-
-    def open(self) -> None:
-        """Nothing to get ready."""
-
-    def figures(self) -> dict[str, object]:
-        """Nothing is counted."""
         return {}
-
-    def safe_stop(self) -> None:
-        """Nothing turns."""
-
-    def close(self) -> None:
-        """Leave the rig safe."""
-        self.safe_stop()
 
     def __enter__(self) -> Self:
         self.open()

@@ -1,8 +1,8 @@
-"""What every real rig shares: the newest sample, what is wrong with it, and motors that end up off.
+"""Common parts of every real rig: the newest sample, its faults, and motors that end up off.
 
 A reader thread hands samples in (`_take`); the flight's thread asks for the newest one (`read`) and
 sends voltages (`write`). The motors are enabled by the first `write`, which only a flight makes, and
-two kinds of trouble are told apart:
+it distinguishes two kinds of faults:
 
 * A *hard* fault (emergency stop, encoder error, a jump, a device that began anew or whose own watchdog
   fired, a voltage that is no number) turns the outputs off at once, and they stay off.
@@ -22,12 +22,11 @@ from dataclasses import dataclass
 
 from channel.codec.codec import Vector
 from transmitter.rigs.axes import Axis, Motors
-from transmitter.rigs.base import DeviceNote, Reading, RigBase
-from transmitter.rigs.errors import RigError
+from transmitter.rigs.base import DeviceNote, Reading, Rig, RigError
 from transmitter.rigs.formats.samples import DeviceFlag, DeviceSample, RawSample, Timeline, Wraps
 
 REARM_TIMEOUT_S = 1.0
-"""A device has this long to clear its watchdog's flag when it is told that the motors are off."""
+"""A device has this long to clear its watchdog's flag after the message that the motors are off."""
 
 HOST_SLACK_S = 0.05
 """Arrival times tell the time between two samples only this well."""
@@ -35,7 +34,7 @@ HOST_SLACK_S = 0.05
 
 @dataclass(frozen=True, slots=True)
 class DeviceSettings:
-    """What is too old, too fast, or too long to wait for."""
+    """Limits for the age and speed of samples, and for waiting."""
 
     stale_s: float = 0.1
     """age of the newest sample beyond which the sensor counts as lost"""
@@ -47,7 +46,7 @@ class DeviceSettings:
     """False: never send a command, not even a zero"""
 
 
-class DeviceRig(RigBase):
+class DeviceRig(Rig):
     """Base of the rigs that talk to a device.
 
     `axes` are all encoders; `measured` are the names of those that the codec measures, in its order.

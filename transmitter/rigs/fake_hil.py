@@ -17,7 +17,7 @@ ANALOG_OUTPUTS = 8
 
 
 class FakeHILError(Exception):
-    """What the vendor's package raises."""
+    """The error of the vendor's package."""
 
     def get_error_message(self) -> str:
         """Return the text."""

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from transmitter.rigs.axes import Axis, Motors
+from transmitter.rigs.base import RigError
 from transmitter.rigs.device import DeviceRig, DeviceSettings
-from transmitter.rigs.errors import RigError
 from transmitter.rigs.formats.samples import RawSample, Wraps
 from transmitter.rigs.hil_library import HilLibrary
 
@@ -28,7 +28,7 @@ OPTIONS_LENGTH_MAX = 255
 
 @dataclass(frozen=True, slots=True)
 class HilSettings:
-    """Which board, and how it is used."""
+    """The board, and its settings."""
 
     card_type: str = "q8_usb"
     card_identifier: str = "0"

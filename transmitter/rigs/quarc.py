@@ -18,8 +18,8 @@ import time
 from typing import Literal
 
 from transmitter.rigs.axes import Axis, Motors
+from transmitter.rigs.base import RigError
 from transmitter.rigs.device import DeviceRig, DeviceSettings
-from transmitter.rigs.errors import RigError
 from transmitter.rigs.formats.doubles import ByteOrder, DoublesLayout, UnitError
 
 Role = Literal["client", "server"]

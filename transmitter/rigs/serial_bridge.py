@@ -10,11 +10,13 @@ import contextlib
 import select
 import threading
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from channel.errors import LinkError
+from channel.links.serial.port import open_port
 from transmitter.rigs.axes import Axis, Motors
+from transmitter.rigs.base import RigError
 from transmitter.rigs.device import DeviceRig, DeviceSettings
-from transmitter.rigs.errors import RigError
 from transmitter.rigs.formats.base import SerialFormat
 
 if TYPE_CHECKING:
@@ -47,20 +49,10 @@ class BytePort:
 
     def open(self) -> None:
         """Open for this process alone; RigError, with what to do, when that is impossible."""
-        import serial
-
         try:
-            port = serial.serial_for_url(
-                self.url,
-                baudrate=self._line_baud,
-                timeout=READ_TIMEOUT_S,
-                **self._local_options(),
-            )
-        except (serial.SerialException, OSError, ValueError) as error:
-            raise RigError(_cannot_open(self.url, error)) from error
-        # FTDI adapters collect bytes for 16 ms unless told otherwise; others do not know the call.
-        with contextlib.suppress(Exception):
-            port.set_low_latency_mode(True)
+            port = open_port(self.url, self._line_baud, READ_TIMEOUT_S, WRITE_TIMEOUT_S)
+        except LinkError as error:
+            raise RigError(str(error)) from error
         try:
             self._handle = port.fileno()
             port.write_timeout = 0
@@ -69,12 +61,6 @@ class BytePort:
             self._handle = None
         self._port = port
         self.problem = ""
-
-    def _local_options(self) -> dict[str, Any]:
-        """Return what a serial server over RFC 2217 does not know."""
-        if self.url.startswith("rfc2217://"):
-            return {}
-        return {"write_timeout": WRITE_TIMEOUT_S, "exclusive": True}
 
     @property
     def is_open(self) -> bool:
@@ -124,7 +110,7 @@ class BytePort:
                 if self._handle is None:
                     return port.write(data) == len(data)
                 # pyserial would wait, after the write, until the port could take more: up to its
-                # time-out, in the middle of a tick. So it is asked beforehand and told not to wait.
+                # time-out, in the middle of a tick. So the call tests it in advance and does not wait.
                 _, ready, _ = select.select([], [self._handle], [], 0.0)
                 return bool(ready) and port.write(data) == len(data)
         except Exception as error:
@@ -247,18 +233,3 @@ class SerialBridge(DeviceRig):
             **self._format.counts,
             "reconnects": self._port.reconnects,
         }
-
-
-def _cannot_open(url: str, error: Exception) -> str:
-    # pyserial puts the port's name and the system's error in twice; the error beneath has it once.
-    beneath = error.__context__
-    plain = beneath.strerror if isinstance(beneath, OSError) and beneath.strerror else str(error)
-    text = f"{url} cannot be opened: {plain}"
-    number = getattr(error, "errno", None)
-    if number == 13 or "Permission" in str(error):
-        return f"{text}; on Linux your user must be in the group that owns it (often dialout)"
-    if number == 2 or "No such file" in str(error):
-        return f"{text}; `tenbaud doctor` lists the ports that are there"
-    if number in (11, 16) or "lock" in str(error):
-        return f"{text}; another program has it open"
-    return text

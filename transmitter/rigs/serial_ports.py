@@ -1,4 +1,4 @@
-"""Which serial ports this machine has, and whether we may use them."""
+"""Lists this machine's serial ports, and whether this user may open them."""
 
 from __future__ import annotations
 

@@ -1,15 +1,16 @@
-"""A simulated rig: a plant, and encoders that round its angles to counts."""
+"""Rigs without a device: a simulated plant, a recorded flight; and any rig, its motors left alone."""
 
 from __future__ import annotations
 
 from channel.codec.codec import Vector
+from channel.flight_log import FlightLog
 from plant_sim.encoder import Encoder, angles_rad
 from plant_sim.plant import Plant
-from transmitter.rigs.base import Reading, RigBase
+from transmitter.rigs.base import Reading, Rig
 
 
-class SimulatedRig(RigBase):
-    """A plant that goes on by itself: at tick `n` it has had `n` steps, whoever was held up."""
+class SimulatedRig(Rig):
+    """A plant with its own time: at tick `n` it has made `n` steps, even if the loop was late."""
 
     name = "simulated"
 
@@ -41,3 +42,56 @@ class SimulatedRig(RigBase):
     def safe_stop(self) -> None:
         """Put the safe voltage on the motors."""
         self._volts = self._safe_volts
+
+
+class DryRig(Rig):
+    """Reads another rig. A real one must have been built without its output as well."""
+
+    def __init__(self, rig: Rig, motors: int = 2) -> None:
+        self.name = f"{rig.name} (dry run)"
+        self.is_real = rig.is_real
+        self._rig = rig
+        self._nothing = (0.0,) * motors
+
+    def open(self) -> None:
+        """Open the rig."""
+        self._rig.open()
+
+    def read(self, tick: int) -> Reading | None:
+        """Return its reading; what turned the body was not us."""
+        reading = self._rig.read(tick)
+        if reading is None or reading.applied_volts is not None:
+            return reading
+        return reading._replace(applied_volts=self._nothing)
+
+    def write(self, tick: int, volts: Vector) -> None:
+        """Do nothing."""
+
+    def close(self) -> None:
+        """Give the rig back."""
+        self._rig.close()
+
+    def figures(self) -> dict[str, object]:
+        """Return what the rig counted."""
+        return {**self._rig.figures(), "dry_run": True}
+
+
+class ReplayRig(Rig):
+    """Reads one row per tick; what is written to it changes nothing."""
+
+    name = "replay"
+
+    def __init__(self, log: FlightLog, encoders: tuple[Encoder, ...]) -> None:
+        self._log = log
+        self._encoders = encoders
+
+    def read(self, tick: int) -> Reading | None:
+        """Return the row of a tick, None past the last."""
+        if tick >= len(self._log):
+            return None
+        counts = self._log.counts[tick]
+        volts = self._log.volts[tick] if self._log.volts else None
+        return Reading(counts, angles_rad(self._encoders, counts), applied_volts=volts)
+
+    def write(self, tick: int, volts: Vector) -> None:
+        """Do nothing: this flight is over."""

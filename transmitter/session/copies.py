@@ -1,24 +1,30 @@
-"""The transmitter's two copies of the codec.
+"""The transmitter's two copies of the codec, and the order in which echoes reach them.
 
 The *confirmed* copy advances on echoes only: what the receiver consumed, not what was sent. It alone
 is digested. While echoes are on their way the next symbol is formed on the *provisional* copy: the
 confirmed one carried on with the words sent and the commands known, a missing one taken to be like
 the last. A wrong guess there costs one poor bit and never lockstep, because the next echo replaces it.
+
+Every command frame repeats the echoes of earlier samples, so a lost frame is made good by the next
+ones. On a line that delays frames unevenly a later frame may overtake an earlier one by more than it
+repeats: its echoes wait in `EchoOrder` until the earlier frame has come, or can no longer come.
 """
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from channel.codec.codec import Codec, CodecState, Vector
 from channel.codec.lead import FlownSample, fly_sample
 from channel.codec.words import ERASED, Word
 from channel.errors import CodecDiverged
+from channel.protocol.frames import Echo
 from channel.protocol.terms import Terms
 
 CANNOT_FLY = (CodecDiverged, ArithmeticError, LookupError, ValueError)
-"""What a copy raises in a state that it cannot go on from."""
+"""The exceptions of a copy in a state that it cannot continue from."""
 
 
 class Confirmed(NamedTuple):
@@ -31,7 +37,7 @@ class Confirmed(NamedTuple):
     """as the receiver consumed it"""
     flown: FlownSample
     live: list[Vector | None]
-    """what the receiver had believed, in advance, of the sample's ticks; None for ticks below D"""
+    """predicted states of the sample's ticks, as the receiver had them; None for ticks below D"""
     digest: int
     """of our copy after the sample"""
     peer_digest: int
@@ -133,3 +139,48 @@ class Copies:
             self._commands[index] for index in range(start, min(start + count, len(self._commands)))
         ]
         return known + [self._last_command] * (count - len(known))
+
+
+class EchoOrder:
+    """Holds the echoes that came early; times are ticks.
+
+    `overtaking_ticks`: how long after a frame one may come that was sent before it. `ahead_samples`:
+    an echo that is further ahead of the expected one is not kept.
+    """
+
+    def __init__(self, overtaking_ticks: int, ahead_samples: int) -> None:
+        self._overtaking_ticks = overtaking_ticks
+        self._ahead_samples = ahead_samples
+        self._early: dict[int, Echo] = {}
+        self._missing: int | None = None
+        """sample whose echo a later frame has shown to be lost or overtaken"""
+        self._until_tick = 0
+        """when it can no longer come"""
+
+    def add(self, echoes: Sequence[Echo], expected: int, tick: int, sample: int) -> None:
+        """Take the echoes of a frame; `expected` is the sample whose echo is next.
+
+        `sample` is the one that the clock stands in: no later one waits here for its turn, or a forged
+        echo would lie in wait for long.
+        """
+        latest = expected + self._ahead_samples
+        if echoes[0].sample > expected:
+            latest = min(latest, sample)
+        for echo in echoes:
+            if expected <= echo.sample <= latest:
+                self._early[echo.sample] = echo
+        if echoes[0].sample > expected and self._missing != expected:
+            self._missing, self._until_tick = expected, tick + self._overtaking_ticks
+
+    def take(self, expected: int) -> Echo | None:
+        """Return the echo of this sample, which is then held no longer."""
+        return self._early.pop(expected, None)
+
+    def is_lost(self, expected: int, tick: int) -> bool:
+        """Return whether the echo of this sample can no longer come."""
+        return self._missing == expected and tick >= self._until_tick
+
+    def clear(self) -> None:
+        """Forget everything: a new epoch begins."""
+        self._early.clear()
+        self._missing = None

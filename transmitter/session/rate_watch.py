@@ -1,7 +1,7 @@
-"""Whether a flight keeps the symbol rate that it was asked for, looked at every second.
+"""Checks every second whether a flight keeps its configured symbol rate.
 
-A flight whose processes are too slow goes on: the slots that it misses are erasures. Here it is said
-how many are kept. Symbols that the line alone has lost are not the processes' fault and raise no event.
+A flight whose processes are too slow continues: the slots that it misses are erasures, and this module
+reports how many are kept. Symbols that the line alone has lost cause no event.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the transmitter writes down."""
+"""The records of the transmitter."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ TICK_CHANNEL = RecordChannel(
     (
         Field("tick", "integer", "", "index of the tick"),
         Field("time_s", "number", "s", "flight time"),
-        Field("measured_rad", "numbers", "rad", "angles as the encoders give them"),
-        Field("true_rad", "numbers", "rad", "true angles, where the rig knows them"),
-        Field("commanded_volts", "numbers", "V", "command of this tick; null: it had not come"),
-        Field("applied_volts", "numbers", "V", "voltages put on the motors"),
+        Field("measured", "numbers", "", "outputs as the sensors give them"),
+        Field("true", "numbers", "", "true outputs, where the rig knows them"),
+        Field("commanded", "numbers", "", "command of this tick; null: it had not come"),
+        Field("applied", "numbers", "", "inputs that the plant was given"),
         Field("late", "boolean", "", "the command of this tick had not come"),
         Field("lateness_ms", "number", "ms", "how late the tick began", timing=True),
-        Field("guard", "string", "", "state of the guard beside the motors"),
+        Field("guard", "string", "", "state of the guard"),
     ),
 )
 
@@ -47,7 +47,7 @@ ESTIMATE_CHANNEL = RecordChannel(
     (
         Field("tick", "integer", "", "index of the tick"),
         Field("coded_state", "numbers", "", "codec's model state at that tick"),
-        Field("live_state", "numbers", "", "model state that the receiver believed of that tick"),
+        Field("live_state", "numbers", "", "model state that the receiver predicted for that tick"),
     ),
 )
 
@@ -57,7 +57,7 @@ SAMPLE_CHANNEL = RecordChannel(
         Field("sample", "integer", "", "index of the sample"),
         Field("word_sent", "integers", "", "symbols sent; null: none"),
         Field("word", "integers", "", "symbols as the receiver consumed them; null: erased"),
-        Field("range", "numbers", "rad", "range M of each axis before the word"),
+        Field("range", "numbers", "", "range M of each output before the word"),
         Field("state", "numbers", "", "codec's model state after the sample"),
         Field("coder", "numbers", "", "coder state after the sample"),
         Field("digest", "string", "", "64-bit digest of the codec state after the sample"),

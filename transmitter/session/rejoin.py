@@ -17,7 +17,7 @@ ASK_AGAIN_NS = 10_000_000
 """Shortest time between two requests: a sample period may be shorter than the way to the receiver."""
 
 
-REFUSALS_BELIEVED = 3
+REFUSALS_ACCEPTED = 3
 """Refusals of one request that end a flight. A receiver that means it refuses every repetition; one
 forged request in this flight's name gets one refusal."""
 
@@ -48,9 +48,9 @@ class Asking:
         self._next_tick = tick
 
     def is_refused(self) -> bool:
-        """Note a refusal of a flight that was admitted before; return whether it is to be believed."""
+        """Note a refusal of a flight that was admitted before; return whether it is to be accepted."""
         self._refusals += 1
-        return self._refusals >= REFUSALS_BELIEVED
+        return self._refusals >= REFUSALS_ACCEPTED
 
     def due(self, tick: int) -> bool:
         """Return whether the request is to be sent at this tick, and count it as sent."""

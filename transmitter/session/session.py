@@ -1,12 +1,10 @@
 """The sensor node's half of the protocol, without a socket, a clock or a thread.
 
-Three things drive it: a measurement (`on_measurement`, every tick), a frame that arrived
-(`on_frame`) and the question which command a tick has (`command`). The symbol of a slot depends on
-the measurement at its sample's first tick and on the provisional copy of the codec; the confirmed
-copy moves by echoes alone, and its digest is compared with the receiver's for every sample.
-
-When lockstep is gone (digests that differ, echoes lost or too old, a receiver that was restarted) no
-symbol leaves any more; the session asks for a new epoch, and goes on from the state in the answer.
+Inputs: a measurement at every tick (`on_measurement`), a frame that arrived (`on_frame`), and requests
+for a tick's command (`command`). A slot's symbol depends on the measurement at its sample's first tick
+and on the provisional copy of the codec. Only echoes advance the confirmed copy; its digest is compared
+with the receiver's after every sample. After a loss of lockstep (digests differ, echoes are lost or too
+old, the receiver was restarted) the session sends no symbols until the answer has a common state.
 """
 
 from __future__ import annotations
@@ -17,7 +15,6 @@ from enum import Enum
 
 from channel.codec.codec import Codec, Vector
 from channel.codec.words import ERASED
-from channel.protocol.audit_trail import EPOCH_CHANNEL, epoch_row
 from channel.protocol.bounds import Bounds, shown, within_text_bounds
 from channel.protocol.endings import End, Ending
 from channel.protocol.events import ASKED, Event, EventKind, ended_event, write_event
@@ -38,20 +35,19 @@ from channel.protocol.frames import (
 )
 from channel.protocol.identity import Identity, differing_fields
 from channel.protocol.lockstep import History, difference_event, is_answer
-from channel.protocol.recording import NullRecorder, Recorder
+from channel.protocol.recording import EPOCH_CHANNEL, NullRecorder, Recorder, epoch_row
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
-from transmitter.session.copies import CANNOT_FLY, Confirmed, Copies
-from transmitter.session.echo_order import EchoOrder
+from transmitter.session.copies import CANNOT_FLY, Confirmed, Copies, EchoOrder
 from transmitter.session.owing import Owing
 from transmitter.session.records import write_failure, write_sample
 from transmitter.session.rejoin import Asking, commands_of, start_of
-from transmitter.session.sight import Sight, usual_sight
-from transmitter.session.takeover import Claims
+from transmitter.session.state_observer import StateObserver, default_observer
+from transmitter.session.takeover import Takeover
 
 
 class Phase(Enum):
-    """Where the transmitter's session stands."""
+    """Phase of the transmitter's session."""
 
     GREETING = "greeting"  # waiting for a receiver
     FLYING = "flying"
@@ -64,7 +60,7 @@ class TransmitterSession:
 
     `incarnation` is drawn by the caller (32 bits), so that the session itself stays deterministic.
     `stop_on_desync`: end the flight at the first digest that differs, instead of rejoining.
-    `sight`: gives a coder that uses rates its measurements; None: that of an angle and its rate.
+    `state_observer`: finds the states for a coder that uses rates; None: that of angle and rate.
     `overtaking_ticks`: how long after a command frame one may come that was sent before it.
     """
 
@@ -77,7 +73,7 @@ class TransmitterSession:
         recorder: Recorder | None = None,
         *,
         stop_on_desync: bool = False,
-        sight: Sight | None = None,
+        state_observer: StateObserver | None = None,
         overtaking_ticks: int = 0,
     ) -> None:
         self.codec = codec
@@ -98,7 +94,7 @@ class TransmitterSession:
         """the last one"""
         self._report_answered = False
         self.heard_tick = 0
-        """when the receiver last told something new in the present epoch"""
+        """when the receiver last sent something new in the present epoch"""
         self.epoch_tick = 0
         """first tick of the present epoch"""
         self.owing = Owing(terms)
@@ -107,13 +103,13 @@ class TransmitterSession:
         self.events: deque[Event] = deque(maxlen=1000)
         self.history = History(codec, 2 * terms.history_samples)
         self._asking = Asking(identity, incarnation, terms)
-        self._claims = Claims(terms)
-        self._bounds = Bounds(codec, terms, self.counts, self._tell)
+        self._takeover = Takeover(terms)
+        self._bounds = Bounds(codec, terms, self.counts, self._emit)
         self._stop_on_desync = stop_on_desync
         self._echoes = EchoOrder(overtaking_ticks, terms.history_samples)
         self._lag_samples_max = terms.history_samples
         """Echoes may be this many samples behind before a rejoin is asked for."""
-        self._sight = sight or usual_sight(codec, terms.tick_ns / 1e9)
+        self._observer = state_observer or default_observer(codec, terms.tick_ns / 1e9)
         self._recorder = recorder or NullRecorder()
         self._due: deque[tuple[int, Vector]] = deque(
             enumerate([terms.initial_command] * terms.lead_ticks)
@@ -133,13 +129,13 @@ class TransmitterSession:
         """Take the measurement of a tick; return the frames that leave with it.
 
         These are the symbols of the sample that begins with it, or the request for a new epoch. A word
-        has a slot for each of its symbols; whoever sends them holds each until its slot. A tick that
+        has a slot for each of its symbols; the sender holds each until its slot. A tick that
         was never seen, because the process was held up, sent no symbol: its sample's word counts as
         not sent, and the next sample starts afresh.
         """
         self._tick = tick
-        if self._sight is not None:
-            measurement = self._sight.look(tick, measurement, self._command)
+        if self._observer is not None:
+            measurement = self._observer.look(tick, measurement, self._command)
         if self.phase is Phase.REJOINING:
             return self._ask()
         if self.phase is not Phase.FLYING:
@@ -171,7 +167,7 @@ class TransmitterSession:
         self.phase = Phase.REJOINING
         self.rejoins_asked[why] += 1
         self._asking.begin(why, self._tick)
-        self._tell(replace(details, epoch=self.epoch, cause=why))
+        self._emit(replace(details, epoch=self.epoch, cause=why))
         return self._ask()
 
     def _ask(self) -> list[Frame]:
@@ -236,21 +232,21 @@ class TransmitterSession:
 
     def _on_unknown(self) -> list[Frame]:
         """Believe it of a receiver that has stopped commanding; refuse it of a second one."""
-        if self._claims.is_lost(self._tick, self.heard_tick):
+        if self._takeover.is_lost(self._tick, self.heard_tick):
             return self.rejoin(Why.UNKNOWN)
-        if not self._claims.is_second():
+        if not self._takeover.is_second():
             return []
         self.counts["claims_refused"] += 1
-        self._tell(Event(EventKind.REFUSED, cause=Ending.SECOND_RECEIVER))
+        self._emit(Event(EventKind.REFUSED, cause=Ending.SECOND_RECEIVER))
         return [Bye(0, Ending.SECOND_RECEIVER)]
 
     def _on_claim(self, claim: Claim) -> list[Frame]:
-        self._claims.name_successor(claim.by, self._tick)
+        self._takeover.name_successor(claim.by, self._tick)
         return self.rejoin(Why.TAKEN_OVER, replace(ASKED, session=claim.by))
 
     def _on_welcome(self, welcome: Welcome) -> list[Frame]:
         newer = welcome.session == self.session_number and welcome.epoch > self.epoch
-        successor = self._claims.successor(self._tick)
+        successor = self._takeover.successor(self._tick)
         foreign = successor is not None and welcome.session != successor
         if foreign or self.phase is Phase.ENDED or (self.phase is Phase.FLYING and not newer):
             self.counts["stale_frames"] += 1
@@ -263,7 +259,7 @@ class TransmitterSession:
         if successor is not None and welcome.session != self.session_number:
             self.counts["take_overs"] += 1
             farewell = [Bye(self.session_number, Ending.TAKEN_OVER)]
-        self._claims.settle()
+        self._takeover.settle()
         self.session_number = welcome.session
         self.epoch = welcome.epoch
         self.heard_tick = self._tick
@@ -277,18 +273,18 @@ class TransmitterSession:
         self._recorder.write(EPOCH_CHANNEL, begins_ns, epoch_row(self.epoch, state, hold))
         self.counts["rejoins"] += again
         kind = EventKind.REJOIN if again else EventKind.STARTED
-        self._tell(Event(kind, state.sample, session=welcome.session, epoch=welcome.epoch))
+        self._emit(Event(kind, state.sample, session=welcome.session, epoch=welcome.epoch))
         return farewell
 
     def _on_refuse(self, refuse: Refuse) -> list[Frame]:
         if self.phase not in (Phase.GREETING, Phase.REJOINING):
             return []
         refused = Event(EventKind.REFUSED, cause=refuse.ending, by_peer=True)
-        successor = self._claims.successor(self._tick)
+        successor = self._takeover.successor(self._tick)
         if successor is not None:
             # The present receiver has been asked too, and goes on instead.
-            self._claims.settle()
-            self._tell(replace(refused, session=successor, detail=refuse.text))
+            self._takeover.settle()
+            self._emit(replace(refused, session=successor, detail=refuse.text))
             return []
         if self.phase is Phase.REJOINING and not self._asking.is_refused():
             return []
@@ -297,7 +293,7 @@ class TransmitterSession:
             lines += differing_fields(self.identity.config, refuse.config)
         refusal = End(refuse.ending, shown("\n  ".join(lines)), by_peer=True)
         self.refusal = refusal
-        self._tell(replace(refused, detail=refusal.text))
+        self._emit(replace(refused, detail=refusal.text))
         if self.phase is Phase.REJOINING:
             self._end(refusal)
         return [Bye(0, refusal.ending, refusal.text)]
@@ -312,7 +308,7 @@ class TransmitterSession:
         if self._bounds.drops(problem):
             return []
         self.heard_tick = self._tick
-        self._claims.on_command()
+        self._takeover.on_command()
         self._echoes.add(frame.echoes, self.copies.confirmed.sample, self._tick, self._sample)
         while (echo := self._echoes.take(self.copies.confirmed.sample)) is not None:
             if frames := self._confirm(echo):
@@ -338,7 +334,7 @@ class TransmitterSession:
         self.counts["erasures"] += word is ERASED
         if done.digest != echo.digest:
             return self._on_desync(done)
-        # Only now: whoever does not hold the same state moves no motor.
+        # Only now: a receiver with a different state must move no motor.
         self.owing.on_confirmed()
         first_tick = echo.sample * self.terms.ticks_per_sample + self.terms.lead_ticks
         self._due.extend(enumerate(commands, first_tick))
@@ -350,7 +346,7 @@ class TransmitterSession:
         state = self.codec.pack(done.flown.state)
         digests = (done.digest, done.peer_digest)
         self.desync = Desync(self.session_number, self.epoch, done.sample, *digests, state)
-        self._tell(difference_event(self.desync))
+        self._emit(difference_event(self.desync))
         write_failure(self._recorder, self.terms, self.history, self.desync, b"")
         if self._stop_on_desync:
             return [self.desync, *self.bye(End(Ending.DESYNC))]
@@ -371,7 +367,7 @@ class TransmitterSession:
     def _is_left_behind(self, welcome: Welcome) -> bool:
         """Return whether somebody else was answered in our name, and commands stay away."""
         later = welcome.incarnation == self.incarnation and welcome.epoch > self.epoch
-        return later and self._claims.is_lost(self._tick, self.heard_tick)
+        return later and self._takeover.is_lost(self._tick, self.heard_tick)
 
     def _is_current(self, session: int) -> bool:
         return self.phase is Phase.FLYING and session == self.session_number
@@ -390,9 +386,9 @@ class TransmitterSession:
         if self.phase is not Phase.ENDED:
             self.phase = Phase.ENDED
             self.end = end
-            self._tell(ended_event(end))
+            self._emit(ended_event(end))
 
-    def _tell(self, event: Event) -> None:
+    def _emit(self, event: Event) -> None:
         now_ns = self._tick * self.terms.tick_ns
         at = self.copies.confirmed.sample if event.sample is None else event.sample
         event = replace(event, time_ns=now_ns, sample=at)

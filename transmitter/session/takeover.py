@@ -1,10 +1,10 @@
-"""What a transmitter does when a receiver that it does not fly with asks for its flight.
+"""How a transmitter treats another receiver that asks for its flight.
 
-A receiver that hears symbols of a session which it does not know says so (`Unknown`). That is the
-receiver of this flight, started again, or a second one that has no business here. The first has lost
-the session, so its commands have stopped coming; while they do come, whoever asks is a second one and
-is refused. To take over on purpose takes a `Claim`, and the new receiver's session: answers of any
-other are left alone until the new one has answered, refused or let the time pass.
+A receiver that hears symbols of an unknown session answers `Unknown`. It is this flight's receiver
+after a restart, or a second one. A restarted receiver has lost the session and sends no commands; while
+commands arrive, another receiver is a second one and is refused. A deliberate takeover needs a `Claim`
+with the new receiver's session: the transmitter ignores all other answers until the new receiver has
+answered, refused or let the time pass.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ from __future__ import annotations
 from channel.protocol.terms import Terms
 
 SILENT_SAMPLES = 2
-"""No command for so long: the receiver has lost the session, and whoever says so is believed."""
+"""After this time without a command, an `Unknown` means that the receiver has lost the session."""
 ALIVE_COMMANDS = 3
-"""So many commands since somebody else asked prove that the receiver still flies."""
+"""This many commands since another receiver asked prove that the present one still flies."""
 SUCCESSOR_SAMPLES = 3
 """How long a receiver that takes over has for its answer, beside the command lead, which is as long as
-a round trip: short enough that the present one can go on before the watchdog has had enough."""
+a round trip: short enough that the present one can continue before the watchdog trips."""
 
 
-class Claims:
+class Takeover:
     """Judges receivers that are not the present one; times are ticks."""
 
     def __init__(self, terms: Terms) -> None:
@@ -39,7 +39,7 @@ class Claims:
         return tick - heard_tick >= SILENT_SAMPLES * self._terms.ticks_per_sample
 
     def is_second(self) -> bool:
-        """Note that somebody does not know our session; return whether that is a second receiver."""
+        """Note an `Unknown` for our session; return whether a second receiver sent it."""
         if not self._asked:
             self._asked, self._commands_since = True, 0
             return False

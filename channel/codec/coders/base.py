@@ -1,4 +1,4 @@
-"""What every coder of this folder is: two functions over numbers, and constants for them.
+"""The structure of every coder here: two functions over numbers, and constants for them.
 
 The nodes run these functions as they stand; a study compiles the very same ones (numba), so that each
 formula has one text. They therefore keep to what both understand: they read sequences of numbers by

@@ -46,7 +46,7 @@ GROWTH_MAX = 1e12
 
 @dataclass(frozen=True, slots=True)
 class DirectionParameters:
-    """What the coder is told; matrices are those of the corrected states, for one sample."""
+    """Parameters; the matrices are those of the corrected states, for one sample."""
 
     transition: Rows
     """F"""

@@ -51,7 +51,7 @@ THIRD = 1.0 / 3.0
 
 @dataclass(frozen=True, slots=True)
 class HistoryParameters:
-    """What the coder is told; angles in rad."""
+    """Constants of the coder; angles in rad."""
 
     rows: tuple[Row, ...]
     """(a, b, g) of each pattern. Bit j of a row's number is 1 when the sign j + 1 samples ago was the
@@ -68,11 +68,11 @@ class HistoryParameters:
 
 
 class HistoryConstants(NamedTuple):
-    """What the functions below need."""
+    """Constants of the functions below."""
 
     angle: Vector
     rate: Vector
-    """of a swing, the rate error times T"""
+    """of the rate error times T"""
     growth: Vector
     smallest: float
     largest: float
@@ -82,22 +82,20 @@ class HistoryConstants(NamedTuple):
 
 
 def least_cost(
-    constants: HistoryConstants, angle: float, swing: float, reach: float, history: int, samples: int
+    constants: HistoryConstants, angle: float, rate: float, reach: float, history: int, samples: int
 ) -> float:
-    """Return the least cost of an error over so many samples, the best signs being sent.
+    """Return the least cost of an error over `samples` samples, when the best signs are sent.
 
-    `angle` is the angle error before the first sign (rad), `swing` the rate error times T, `reach` the
-    range and `history` the signs before.
+    `angle` is the angle error before the first sign (rad), `rate` the rate error times T,
+    `reach` the range and `history` the signs before.
     """
     if samples == 0:
         weights = constants.weights
-        return (
-            weights[0] * angle * angle + 2.0 * weights[1] * angle * swing + weights[2] * swing * swing
-        )
+        return weights[0] * angle * angle + 2.0 * weights[1] * angle * rate + weights[2] * rate * rate
     last = len(constants.angle) - 1
     # +1
     a = angle - reach * constants.angle[history]
-    s = swing - reach * constants.rate[history]
+    s = rate - reach * constants.rate[history]
     r = reach * constants.growth[history]
     r = constants.smallest if r < constants.smallest else r
     r = constants.largest if r > constants.largest else r
@@ -106,7 +104,7 @@ def least_cost(
     # -1
     row = last - history
     a = angle + reach * constants.angle[row]
-    s = swing + reach * constants.rate[row]
+    s = rate + reach * constants.rate[row]
     here = a * a + a * s + THIRD * s * s
     if here < cost:
         r = reach * constants.growth[row]
@@ -129,12 +127,12 @@ def history_encode(
     reach = coder[0]
     history = int(coder[1])
     angle = measurement[0] - predicted[0]
-    swing = (measurement[1] - predicted[1]) * constants.period_s
+    rate = (measurement[1] - predicted[1]) * constants.period_s
     best = 0.0
     for sign in (1, -1):
         row = history if sign > 0 else len(constants.angle) - 1 - history
         a = angle - sign * reach * constants.angle[row]
-        s = swing - sign * reach * constants.rate[row]
+        s = rate - sign * reach * constants.rate[row]
         cost = least_cost(constants, a, s, reach, history, 0)
         if constants.lookahead > 0:
             next_reach, next_history = history_after(constants, reach, history, sign)

@@ -1,4 +1,4 @@
-"""What the one-bit coders share: a sign per measured axis, and gains that spread it over the state."""
+"""Common parts of the one-bit coders: a sign per measured axis, and gains for the states."""
 
 from __future__ import annotations
 

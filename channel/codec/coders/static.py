@@ -39,7 +39,7 @@ class StaticParameters:
 
 
 class StaticConstants(NamedTuple):
-    """What the functions below need."""
+    """Constants of the functions below."""
 
     range: float
     width: float

@@ -46,7 +46,7 @@ class ZoomParameters:
 
 
 class ZoomConstants(NamedTuple):
-    """What the functions below need."""
+    """Constants of the functions below."""
 
     window: int
     decay: float

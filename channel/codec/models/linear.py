@@ -3,8 +3,8 @@
     x <- F x + E u + h e,     y = C x
 
 F and E are those of a tick of h seconds under a held command, e is a correction that is held over the
-tick. The matrices come by value: whoever writes the configuration discretises once
-(`tenbaud.design`), so that no two libraries ever have to agree on a last bit.
+tick. The matrices come by value: `tenbaud design` discretises once and writes them into the
+configuration, so that no two libraries ever have to agree on a last bit.
 """
 
 from __future__ import annotations

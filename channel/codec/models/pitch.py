@@ -30,7 +30,7 @@ PITCH_SIGNALS = Signals(
 
 @dataclass(frozen=True, slots=True)
 class PitchParameters:
-    """What the paper's identification yields. Defaults are the paper's."""
+    """The parameters of the paper's identification. Defaults are the paper's."""
 
     rate_damping_per_s: float = 0.1
     """a_w"""

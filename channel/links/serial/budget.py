@@ -1,4 +1,4 @@
-"""What a serial line must carry, and how long it takes: the arithmetic behind a refusal.
+"""The load of a serial line and its transmission times: the arithmetic behind a refusal.
 
 Up the line goes one byte per symbol; down it one command frame per sample, which is
 `(head + CRC) + (1 + W) * echo` bytes before COBS. A line of 8N1 spends ten bits on a byte, and each
@@ -84,7 +84,7 @@ def serial_budget(terms: Terms, inputs: int) -> SerialBudget:
 
 
 def byte_ns(count: int, line_rate_baud: int) -> int:
-    """Return how long a line takes for so many bytes, rounded up."""
+    """Return how long a line takes for a number of bytes, rounded up."""
     return -(-count * LINE_BITS_PER_BYTE * 1_000_000_000 // line_rate_baud)
 
 

@@ -20,7 +20,7 @@ def cobs_encode(data: bytes) -> bytes:
         while len(rest) >= _RUN_MAX:
             encoded += b"\xff" + rest[:_RUN_MAX]
             rest, full = rest[_RUN_MAX:], True
-        # A full run stands for no zero of its own; at the very end nothing need follow it.
+        # A full run encodes no zero; at the very end nothing need follow it.
         if rest or not full or index + 1 < len(runs):
             encoded.append(len(rest) + 1)
             encoded += rest

@@ -2,15 +2,14 @@
 
 A pseudo-terminal stores a baud rate and does not keep to it. Here a thread stands between two of them
 and passes bytes on no faster than a real line of that rate would, each direction by itself, and it can
-do what real lines do: change bytes, add some, be pulled out and plugged in again. The two ports have
-fixed names in a folder, links to the pseudo-terminals of the moment.
+be pulled out and plugged in again. The two ports have fixed names in a folder, links to the
+pseudo-terminals of the moment.
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
-import random
 import select
 import threading
 import time
@@ -24,7 +23,7 @@ from channel.links.serial.pseudo_terminal import PseudoTerminal
 Way = Literal["up", "down"]
 
 QUEUE_BYTES_MAX = 4096
-"""What waits in a direction; more is left in the sender's own buffer, as with a real port."""
+"""Capacity of a direction; further bytes stay in the sender's buffer, as with a real port."""
 STEP_S = 0.0005
 """Bytes of a fast line are passed on in steps of this: late by at most so much, never early."""
 BLOCKED_S = 0.2
@@ -34,11 +33,7 @@ IDLE_S = 0.1
 @dataclass(slots=True)
 class _Direction:
     rate_baud: float | None
-    damage: float
-    chooser: random.Random
     carried: int = 0
-    damaged: int = 0
-    overflowed: int = 0
     _queue: bytearray = field(default_factory=bytearray)
     _due: float = 0.0
     """when the first byte of the queue has arrived"""
@@ -49,14 +44,10 @@ class _Direction:
         return QUEUE_BYTES_MAX - len(self._queue)
 
     def put(self, data: bytes, now: float) -> None:
-        """Put bytes on the line, some of them changed."""
+        """Put bytes on the line."""
         if not self._queue:
             self._due = now + self._byte_s
-        for byte in data:
-            if self.damage and self.chooser.random() < self.damage:
-                byte ^= self.chooser.randrange(1, 256)
-                self.damaged += 1
-            self._queue.append(byte)
+        self._queue += data
 
     def deliver(self, target: int, now: float) -> None:
         """Write the bytes that have arrived by now to a pseudo-terminal.
@@ -75,7 +66,6 @@ class _Direction:
             written = 0
             self._blocked_since = self._blocked_since or now
             if now - self._blocked_since > BLOCKED_S:
-                self.overflowed += count
                 written = count
         del self._queue[:written]
         self._due += written * self._byte_s
@@ -93,25 +83,15 @@ class _Direction:
 class EmulatedLine:
     """Within a `with`, a serial line between `transmitter_port` and `receiver_port`.
 
-    `rate_baud` None: as fast as it goes. `damage` is the share of bytes that arrive changed, in either
-    direction, drawn from `seed`. `folder` must exist.
+    `rate_baud` None: as fast as it goes. `folder` must exist.
     """
 
-    def __init__(
-        self,
-        folder: Path,
-        rate_baud: float | None = 115_200,
-        *,
-        damage: float = 0.0,
-        damage_down: float | None = None,
-        seed: int = 0,
-    ) -> None:
+    def __init__(self, folder: Path, rate_baud: float | None = 115_200) -> None:
         self.transmitter_port = folder / "transmitter"
         self.receiver_port = folder / "receiver"
-        down = damage if damage_down is None else damage_down
         self._ways: dict[Way, _Direction] = {
-            "up": _Direction(rate_baud, damage, random.Random(2 * seed)),
-            "down": _Direction(rate_baud, down, random.Random(2 * seed + 1)),
+            "up": _Direction(rate_baud),
+            "down": _Direction(rate_baud),
         }
         self._ends = (PseudoTerminal(self.transmitter_port), PseudoTerminal(self.receiver_port))
         self._lock = threading.Lock()
@@ -133,19 +113,9 @@ class EmulatedLine:
         with self._lock:  # else a byte may be read at its end before it is counted
             return self._ways[way].carried
 
-    def damaged(self, way: Way) -> int:
-        """Return how many of them were changed on the way."""
-        with self._lock:
-            return self._ways[way].damaged
-
-    def spoil(self, way: Way, share: float) -> None:
-        """Change this share of the bytes from now on."""
-        self._ways[way].damage = share
-
-    def inject(self, way: Way, data: bytes) -> None:
-        """Put bytes on the line that nobody sent."""
-        with self._lock:
-            self._ways[way].put(data, time.monotonic())
+    def put(self, way: Way, data: bytes) -> None:
+        """Put bytes on the line, with its lock held."""
+        self._ways[way].put(data, time.monotonic())
 
     def plug(self) -> None:
         """Plug both ends in: two new pseudo-terminals under the same names."""
@@ -154,7 +124,7 @@ class EmulatedLine:
                 one.plug()
 
     def unplug(self) -> None:
-        """Pull both ends out: whoever has them open gets an error, and their names are gone."""
+        """Pull both ends out: processes that have them open get an error, and their names are gone."""
         with self._lock:
             for one in self._ends:
                 one.unplug()
@@ -179,12 +149,11 @@ class EmulatedLine:
         if near < 0 or far < 0:
             return STEP_S * 10
         now = time.monotonic()
-        for way, source, target in (
-            (self._ways["up"], near, far),
-            (self._ways["down"], far, near),
+        for (name, way), source, target in zip(
+            self._ways.items(), (near, far), (far, near), strict=True
         ):
             if way.room > 0:
                 with contextlib.suppress(BlockingIOError):
-                    way.put(os.read(source, way.room), now)
+                    self.put(name, os.read(source, way.room))
             way.deliver(target, now)
         return min(way.wait_s(now) for way in self._ways.values())

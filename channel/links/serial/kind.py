@@ -36,7 +36,7 @@ class SerialKind(LinkKind):
         return tuple(filter(None, (settings.port, settings.downlink)))
 
     def check(self, settings: LinkSettings, insecure: bool) -> None:
-        """Refuse a port that is none, or one on another machine without `insecure`."""
+        """Refuse an invalid port, or one on another machine without `insecure`."""
         from channel.links.serial.port import check_port
 
         check_port(settings.port, insecure)
@@ -60,7 +60,7 @@ class SerialKind(LinkKind):
         return replace(terms, uplink_line_ns=up_ns, downlink_line_ns=down_ns)
 
     def open(self, end: LinkEnd) -> Link:
-        """Return the open link of one end, the downlink on a line of its own if so configured."""
+        """Return the open link of one end, the downlink on a separate line if so configured."""
         from channel.links.serial.link import SerialLink
         from channel.links.serial.split import SplitLink
 

@@ -20,7 +20,7 @@ from queue import Empty, SimpleQueue
 import serial
 
 from channel.errors import LinkError
-from channel.links.base import LinkBase, Role
+from channel.links.base import Link, Role
 from channel.links.serial.budget import LINE_BITS_PER_BYTE
 from channel.links.serial.port import check_port, open_port, reason_of
 from channel.links.serial.stream import Deframer, Received
@@ -41,10 +41,10 @@ QUIET_S = 5.0
 _ASK, _HERE, _GONE = b"\1", b"\2", b"\3"
 
 _PORT_ERRORS = (serial.SerialException, OSError, TypeError, ValueError)
-"""What pyserial raises on a port that went away or is closed by another thread."""
+"""Exceptions of pyserial on a port that disappeared or is closed by another thread."""
 
 
-class SerialLink(LinkBase):
+class SerialLink(Link):
     """One end of a session over a serial line; LinkError when the port cannot be opened.
 
     `symbol_age_max_s`: a symbol that waited longer in this process is dropped, because its counter

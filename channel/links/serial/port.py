@@ -16,7 +16,7 @@ WRITE_TIMEOUT_S = 1.0
 
 
 def check_port(url: str, insecure: bool) -> None:
-    """Refuse a port that is on another machine, unless told to allow it."""
+    """Refuse a port that is on another machine, unless it is allowed."""
     if not url:
         raise LinkError("a serial link needs a port, such as --port /dev/ttyUSB0 or --port COM3")
     parts = urlsplit(url)
@@ -30,19 +30,25 @@ def check_port(url: str, insecure: bool) -> None:
         )
 
 
-def open_port(url: str, line_rate_baud: int) -> serial.SerialBase:
+def open_port(
+    url: str,
+    line_rate_baud: int,
+    read_timeout_s: float = READ_TIMEOUT_S,
+    write_timeout_s: float = WRITE_TIMEOUT_S,
+) -> serial.SerialBase:
     """Return the open port, 8N1 and for us alone where the system can do that; LinkError if not."""
     port: serial.SerialBase | None = None
     try:
         port = serial.serial_for_url(url, do_not_open=True)
         port.baudrate = line_rate_baud
-        port.timeout = READ_TIMEOUT_S
-        port.write_timeout = WRITE_TIMEOUT_S
-        port.exclusive = True
+        port.timeout = read_timeout_s
+        if not url.startswith("rfc2217://"):  # which knows neither
+            port.write_timeout = write_timeout_s
+            port.exclusive = True
         port.open()
     except (serial.SerialException, OSError, ValueError) as error:
-        raise LinkError(f"cannot open the serial port {url}: {_explained(error)}") from error
-    # Many USB adapters collect bytes for 16 ms unless told not to. Not every port knows this.
+        raise LinkError(_cannot_open(url, error)) from error
+    # Many USB adapters collect bytes for 16 ms by default. Not every port has this setting.
     with contextlib.suppress(Exception):
         port.set_low_latency_mode(True)
     return port
@@ -54,10 +60,16 @@ def reason_of(error: Exception) -> str:
     return os.strerror(number) if number else str(error) or "it is gone"
 
 
-def _explained(error: Exception) -> str:
-    text = str(error)
-    if "ermission" in text:
-        return f"{text}; on Linux the group is often dialout: sudo usermod -aG dialout $USER"
-    if "exclusively lock" in text:
-        return "another program is using it"
+def _cannot_open(url: str, error: Exception) -> str:
+    # pyserial puts the port's name and the system's error in twice; the error beneath has it once.
+    beneath = error.__context__
+    plain = beneath.strerror if isinstance(beneath, OSError) and beneath.strerror else str(error)
+    text = f"{url} cannot be opened: {plain}"
+    number = getattr(error, "errno", None)
+    if number == 13 or "Permission" in str(error):
+        return f"{text}; on Linux your user must be in the group that owns it (often dialout)"
+    if number == 2 or "No such file" in str(error):
+        return f"{text}; `tenbaud doctor` lists the ports that are there"
+    if number in (11, 16) or "lock" in str(error):
+        return f"{text}; another program has it open"
     return text

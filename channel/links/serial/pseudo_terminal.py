@@ -1,4 +1,4 @@
-"""A pseudo-terminal with a name of its own, for whatever stands in for a serial port."""
+"""A pseudo-terminal with a separate name, for whatever stands in for a serial port."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class PseudoTerminal:
             raise OSError(error.errno, error.strerror, str(self._link)) from error
 
     def unplug(self) -> None:
-        """Let it vanish: whoever has it open gets an error, and its name is gone."""
+        """Let it vanish: a process that has it open gets an error, and its name is gone."""
         for handle in (self.handle, self._other):
             if handle >= 0:
                 os.close(handle)

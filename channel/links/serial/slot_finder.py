@@ -1,4 +1,4 @@
-"""Which slot a symbol byte belongs to: its few counter bits, and the time at which it came.
+"""Finds the slot of a symbol byte from its few counter bits and its time of arrival.
 
 A byte of a serial line carries its slot modulo 8 or 4. The line's schedule says which slot is due now,
 and of the slots with the right remainder the nearest one is meant. A byte that fits the schedule is
@@ -31,7 +31,7 @@ GAIN_MIN = 1.0 / 16.0
 
 
 class Place(NamedTuple):
-    """What became of a symbol byte; as in `LocatedSymbol`."""
+    """The location of a symbol byte; as in `LocatedSymbol`."""
 
     slot: int | None
     in_time: bool
@@ -83,7 +83,7 @@ class SlotFinder:
             self._greeted_ns = now_ns
 
     def begin(self, first_slot: int, ahead_slots: int) -> None:
-        """Forget the schedule: another transmitter begins, so many slots after its hello."""
+        """Forget the schedule: another transmitter begins, `ahead_slots` after its hello."""
         self._zero_ns = None
         self._rival = None
         self._first_slot = first_slot

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Self
-
 from channel.links.base import Link, LinkCounts, Role
 from channel.protocol.frames import Frame
 from channel.protocol.wire import Wire
@@ -41,7 +39,7 @@ class SplitWire:
         return self._up.renumbered(data, shift, kinds)
 
 
-class SplitLink:
+class SplitLink(Link):
     """Sends on one link and hears on the other, as the role asks; owns and closes both."""
 
     def __init__(self, role: Role, up: Link, down: Link) -> None:
@@ -85,9 +83,3 @@ class SplitLink:
         """Give both lines back."""
         self._out.close()
         self._in.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()

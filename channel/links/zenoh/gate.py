@@ -1,6 +1,6 @@
-"""Who knocks at a Zenoh node and is turned away: counted, and told once in a while.
+"""Counts the connections that a Zenoh node refuses, and reports some of them.
 
-Two kinds are turned away. A connection whose handshake fails (no certificate, another authority's, an
+Two kinds are refused. A connection whose handshake fails (no certificate, another authority's, an
 expired one, no TLS at all) never becomes a link; Zenoh says so in its log only, so the log is read. A
 node with a certificate of the authority but without an invitation does get a link, over which the
 access rules let nothing pass in either direction; it is seen by its link.
@@ -50,7 +50,7 @@ def reason_of(text: str) -> str:
 class Gate:
     """Counts the links of nodes that were not invited, for as long as the session is open.
 
-    They are told on a thread of its own: one of Zenoh's carries symbols, and a terminal may block.
+    A separate thread reports them: one of Zenoh's carries symbols, and a terminal may block.
     """
 
     def __init__(
@@ -59,8 +59,8 @@ class Gate:
         self._invited = {one.name for one in security.invited} if security is not None else set()
         self._refused = refused
         self._listener = None
-        self._untold: SimpleQueue[tuple[str, int] | None] = SimpleQueue()
-        self._thread = threading.Thread(target=self._tell_on, name="zenoh gate", daemon=True)
+        self._unreported: SimpleQueue[tuple[str, int] | None] = SimpleQueue()
+        self._thread = threading.Thread(target=self._report_all, name="zenoh gate", daemon=True)
         if security is not None:
             # Runs on a thread of Zenoh and calls nothing of Zenoh.
             handler = zenoh.handlers.Callback(self._on_link, indirect=False)
@@ -72,7 +72,7 @@ class Gate:
         if self._listener is not None:
             self._listener.undeclare()
             self._listener = None
-            self._untold.put(None)
+            self._unreported.put(None)
             self._thread.join(LAST_WORD_S)
 
     def _on_link(self, event: zenoh.LinkEvent) -> None:
@@ -80,11 +80,11 @@ class Gate:
         if event.kind == zenoh.SampleKind.PUT and name not in self._invited:
             reason = f"{UNINVITED} {name}"
             self._refused[reason] += 1
-            if _is_told(self._refused[reason]):
-                self._untold.put((reason, self._refused[reason]))
+            if _is_reported(self._refused[reason]):
+                self._unreported.put((reason, self._refused[reason]))
 
-    def _tell_on(self) -> None:
-        while (item := self._untold.get()) is not None:
+    def _report_all(self) -> None:
+        while (item := self._unreported.get()) is not None:
             # A terminal that has gone is no reason to stop.
             with suppress(OSError):
                 _say(*item)
@@ -100,7 +100,7 @@ class HandshakeLog:
 
     def __init__(self, on_refused: Callable[[str, int], None] | None = None) -> None:
         self.refused: Counter[str] = Counter()
-        self._on_refused = on_refused or _tell
+        self._on_refused = on_refused or _report
 
     def __enter__(self) -> Self:
         sys.stdout.flush()
@@ -144,13 +144,13 @@ class HandshakeLog:
         self._on_refused(reason, self.refused[reason])
 
 
-def _is_told(count: int) -> bool:
+def _is_reported(count: int) -> bool:
     """Return whether it is the first time, or the count has another digit."""
     return str(count).rstrip("0") == "1"
 
 
-def _tell(reason: str, count: int) -> None:
-    if _is_told(count):
+def _report(reason: str, count: int) -> None:
+    if _is_reported(count):
         _say(reason, count)
 
 

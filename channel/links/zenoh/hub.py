@@ -1,6 +1,6 @@
 """One end of many sessions over one Zenoh session: the receiver of a whole room of rigs.
 
-The sessions are told apart by their names, which are part of the keys (`channel.links.zenoh.link`). One
+Sessions differ by their names, which are part of the keys (`channel.links.zenoh.link`). One
 channel takes in what comes for all of them, in order of arrival; it is short, so that a sender that
 floods it is held up in its own line before the others have to wait long.
 """

@@ -6,8 +6,8 @@ deadline, so a second thread sleeps until the deadline and then puts a message o
 channel. It is left alone for as long as messages come in time: a deadline that moves on is noticed
 when the old one is reached, and only one that moves forward wakes the thread up.
 
-That message is told by a secret, so that nobody outside can send one: a flood of them would be passed
-over without end. A full channel holds up the thread of Zenoh that fills it, and with it whoever sends.
+That message contains a secret, so that nobody outside can send one: a flood of them would be passed
+over without end. A full channel holds up the thread of Zenoh that fills it, and with it the sender.
 """
 
 from __future__ import annotations

@@ -20,14 +20,14 @@ from typing import Unpack
 import zenoh
 
 from channel.errors import LinkError
-from channel.links.base import LinkBase, Role
+from channel.links.base import Link, Role
 from channel.links.security import KEY_ROOT
 from channel.links.zenoh.gate import Gate
 from channel.links.zenoh.inbox import ChannelInbox
 from channel.links.zenoh.node import NodeOptions, is_session_name, open_node
 
 
-class ZenohLink(LinkBase):
+class ZenohLink(Link):
     """One end of a session over Zenoh.
 
     Where it listens and connects, and who is let in: see `open_node`. One end listens, the other

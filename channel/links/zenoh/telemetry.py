@@ -1,11 +1,11 @@
-"""Telemetry over Zenoh: a session of its own beside the link, so that no viewer can touch the flight.
+"""Telemetry over Zenoh: a separate session beside the link, so that no viewer can touch the flight.
 
 Keys, `NAME` being the session's name and `ROLE` the end's:
 
     tenbaud/NAME/telemetry/ROLE   what an end tells about itself
     tenbaud/NAME/control          what a person asks of a flight that allows it
 
-An end listens and whoever wants to look connects. What a viewer does not take is dropped: the
+An end listens and viewers connect. What a viewer does not take is dropped: the
 publisher's thread waits a millisecond at most, and the loop never waits for that thread.
 """
 
@@ -63,7 +63,7 @@ class TelemetryPort:
             raise LinkError(f"telemetry could not be sent: {error}") from error
 
     def publish(self, data: bytes) -> None:
-        """Send one message to whoever listens. Raises LinkError."""
+        """Send one message to all subscribers. Raises LinkError."""
         try:
             self._publisher.put(data)
         except zenoh.ZError as error:

@@ -10,7 +10,7 @@ const SIGNS = { waiting: "M12 7v6M12 16.5v.5", silent: "M7 12h10", lockstep: "M7
 const at = (id) => document.getElementById(id);
 const memory = { heads: {}, points: [], decisions: [], samples: new Map(), events: [] };
 let ink = colours();
-let connected = false, heardAt = 0, everHeard = false, brokenAt = -1e9, broken = null, mended = "", asked = false, dirty = true, tapeDirty = true;
+let connected = false, heardAt = 0, everHeard = false, brokenAt = -1e9, broken = null, repaired = "", asked = false, dirty = true, tapeDirty = true;
 
 // ---- the stream
 
@@ -29,7 +29,7 @@ function take(news) {
   if (news.reset) {
     Object.assign(memory, { heads: {}, points: [], decisions: [], events: [] });
     memory.samples.clear();
-    mended = ""; brokenAt = -1e9; broken = null;
+    repaired = ""; brokenAt = -1e9; broken = null;
   }
   Object.assign(memory.heads, news.heads);
   memory.points.push(...news.points);
@@ -48,12 +48,12 @@ function happened(event, old) {
   if (role === "transmitter" && kind === "desync") {
     if (!old) brokenAt = performance.now();
     broken = event;
-    mended = "";
+    repaired = "";
   }
   if (role === "transmitter" && kind === "rejoin" && broken) {
-    mended = `broken after sample ${broken.sample}, at ${broken.time_s.toFixed(1)} s; equal again from sample ${event.sample}`;
+    repaired = `broken after sample ${broken.sample}, at ${broken.time_s.toFixed(1)} s; equal again from sample ${event.sample}`;
   }
-  // Left out: what the tape shows, what passes by itself, and what the other end has told already.
+  // Left out: what the tape shows, what passes by itself, and what the other end has reported already.
   if (kind === "erased" || kind === "late_symbol" || event.state === "holding") return;
   if (role === "receiver" && ["desync", "rejoin", "ended"].includes(kind)) return;
   const last = memory.events[0];
@@ -112,14 +112,14 @@ function state(now) {
   const head = memory.heads.transmitter;
   if (!head) return ["waiting", "Waiting", "for a sensor node"];
   const silent = now - heardAt > STALE_MS;
-  if (silent && head.phase !== "ended") return ["silent", "Not known", "nothing is heard of this flight"];
+  if (silent && head.phase !== "ended") return ["silent", "Unknown", "no data from this flight"];
   if (now - brokenAt < BROKEN_SHOWN_MS) return ["broken", "Lockstep broken", brokenText()];
-  if (head.phase === "rejoining") return ["rejoining", "Finding a common state", `epoch ${head.epoch} is over; no bit counts until both ends have started anew`];
+  if (head.phase === "rejoining") return ["rejoining", "Resynchronising", `epoch ${head.epoch} is over; bits count again once both ends have a common state`];
   if (head.phase === "ended") return ["waiting", "The flight is over", `${head.counts.digest_checks} digests compared, ${head.counts.desyncs} differed`];
   const sample = lastCompared();
   if (!sample) return ["waiting", "Waiting", "for the first digests"];
   if (sample[3] !== sample[4]) return ["broken", "Lockstep broken", brokenText()];
-  const text = mended || `${head.counts.digest_checks} digests compared, ${head.counts.desyncs} differed`;
+  const text = repaired || `${head.counts.digest_checks} digests compared, ${head.counts.desyncs} differed`;
   return ["lockstep", "In lockstep", text];
 }
 
@@ -155,12 +155,12 @@ function showText(now) {
   showLight(now);
   showBanner(now);
   if (up) {
-    set("flight", `${up.preset}, ${up.clock} clock${up.paused ? ", paused" : up.pace ? `, ${up.pace} × real time` : ""}${up.impairments ? `, wire impaired: ${up.impairments}` : ""}`);
+    set("flight", `${up.preset}, ${up.clock} clock${up.paused ? ", paused" : up.pace ? `, ${up.pace} × real time` : ""}${up.impairments ? `, line impaired: ${up.impairments}` : ""}`);
     set("f-time", `${up.time_s.toFixed(1)} s`);
     set("f-late", up.lateness ? `${up.lateness.p99_ms.toFixed(2)} ms` : "virtual");
     set("f-guard", up.guard);
     set("f-rejoins", `${up.counts.desyncs}, ${up.counts.rejoins}`);
-    set("tape-text", `one every ${up.symbol_period_s.toFixed(3).replace(/0+$/, "").replace(/\.$/, "")} s of flight, as the controller takes them`);
+    set("tape-text", `one every ${up.symbol_period_s.toFixed(3).replace(/0+$/, "").replace(/\.$/, "")} s of flight, as the controller consumes them`);
     at("gap-box").hidden = up.gap_to_floor === undefined || up.gap_to_floor === null;
     if (!at("gap-box").hidden) set("f-gap", `${up.gap_to_floor.toFixed(2)} ×`);
     const baud = down && down.baud_measured !== null ? down.baud_measured.toFixed(2) : "–";
@@ -179,10 +179,10 @@ function showText(now) {
   if (rows.length && at("events").dataset.key !== key) {
     at("events").dataset.key = key;
     at("events").replaceChildren(...rows.map(([who, time, bad, text]) => {
-      const [item, when, teller] = ["li", "time", "span"].map((name) => document.createElement(name));
+      const [item, when, source] = ["li", "time", "span"].map((name) => document.createElement(name));
       when.textContent = `${time.toFixed(1)} s`;
-      teller.textContent = who;
-      item.append(when, teller, text);
+      source.textContent = who;
+      item.append(when, source, text);
       if (bad) item.className = "bad";
       return item;
     }));
@@ -192,11 +192,11 @@ function showText(now) {
 function showBanner(now) {
   const ended = Object.values(memory.heads).some((head) => head.phase === "ended");
   let text = "";
-  if (!connected && everHeard) text = ended ? "The flight is over, and its page's server has gone." : "The page's server does not answer. Trying again every second. If it was started anew, open the address that it has printed.";
+  if (!connected && everHeard) text = ended ? "The flight is over, and the page's server has stopped." : "The page's server does not answer. Retrying every second. If it was restarted, open the address that it printed.";
   else if (!connected) text = "Connecting to the page's server.";
-  else if (!everHeard) text = "No flight is heard. Start one with <code>tenbaud demo --view</code>, or with <code>tenbaud receive</code> and <code>tenbaud transmit</code>.";
-  else if (ended) text = "The flight is over. What is shown is its end.";
-  else if (now - heardAt > STALE_MS) text = `Nothing heard for ${((now - heardAt) / 1000).toFixed(0)} s: what is shown is old.`;
+  else if (!everHeard) text = "No flight found. Start one with <code>tenbaud demo --view</code>, or with <code>tenbaud receive</code> and <code>tenbaud transmit</code>.";
+  else if (ended) text = "The flight is over. The page shows its last state.";
+  else if (now - heardAt > STALE_MS) text = `No data for ${((now - heardAt) / 1000).toFixed(0)} s: the page shows old values.`;
   const banner = at("banner");
   if (banner.innerHTML !== text) banner.innerHTML = text;
   banner.hidden = !text;
@@ -262,7 +262,7 @@ new MutationObserver(() => {
 drawScale();
 paint();
 listen();
-// Figures five times a second: what changes faster cannot be read. It also draws what no news asked for.
+// Figures five times a second: what changes faster cannot be read. It also draws without new data.
 setInterval(() => { showText(performance.now()); draw(); }, TEXT_MS);
 showText(0);
 draw();

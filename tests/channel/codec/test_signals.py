@@ -37,7 +37,8 @@ def test_a_model_that_names_nothing_has_numbered_signals() -> None:
     signals = signals_of(Cart())
     assert [one.name for one in signals.states] == ["state_1", "state_2"]
     assert [one.name for one in signals.inputs] == ["input_1"]
-    assert signals.output_states == (None,)
+    # What it measures is found by asking it: here its first state.
+    assert signals.output_states == (0,)
     assert signals.inputs[0].largest == pytest.approx(32.767)
 
 
@@ -75,7 +76,26 @@ def test_a_model_with_other_numbers_than_it_names_is_refused() -> None:
         signals_of(model)
 
 
-def test_a_name_that_is_not_there_is_told_with_those_that_are() -> None:
+def test_an_output_that_is_no_state_is_none_and_one_of_a_state_that_is_not_there_is_refused() -> None:
+    cart = Cart()
+    cart.measured = lambda state: (state[0] + state[1], state[1])  # type: ignore[method-assign, assignment]
+    assert signals_of(cart).output_states == (None, 1)
+    angle = Signal("angle")
+    with pytest.raises(ValueError, match="there is no state 1"):
+        Signals((angle,), (), (angle,), (1,))
+
+
+def test_signals_of_one_group_or_else_of_one_unit_share_a_panel() -> None:
+    motors = (InputSignal("front", "V", group="motors"), InputSignal("rear", "V", group="motors"))
+    outputs = (Signal("arm", "rad"), Signal("speed", "rad/s"), Signal("pole_angle", "rad"))
+    signals = Signals((), motors, outputs)
+    assert signals.groups("inputs") == [("motors, V", [0, 1])]
+    assert signals.groups("outputs") == [("arm, pole angle, rad", [0, 2]), ("speed, rad/s", [1])]
+    mixed = Signals((), (), (Signal("angle", "rad", group="axis"), Signal("torque", group="axis")))
+    assert mixed.groups("outputs") == [("angle, rad; torque", [0, 1])]
+
+
+def test_an_unknown_name_is_refused_with_the_known_ones() -> None:
     signals = signals_of(Cart())
     assert signals.index("outputs", "output_1") == 0
     with pytest.raises(ValueError, match="'speed' is none of the states: state_1, state_2"):

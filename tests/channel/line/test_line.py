@@ -41,7 +41,7 @@ def test_when_a_farewell_comes_then_its_bytes_are_control_bytes() -> None:
     assert inlet.control_bytes == len(BYE)
 
 
-def test_when_garbage_comes_then_it_is_counted_told_and_no_frame() -> None:
+def test_when_garbage_comes_then_it_is_counted_reported_and_no_frame() -> None:
     told: list[str] = []
     inlet = Inlet(on_malformed=told.append)
     assert inlet.take(SYMBOL[:-1] + b"?") is None

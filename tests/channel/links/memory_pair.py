@@ -9,12 +9,12 @@ from __future__ import annotations
 from queue import Empty, SimpleQueue
 
 from channel.errors import LinkError
-from channel.links.base import LinkBase
+from channel.links.base import Link
 
 QUEUE_MESSAGES_MAX = 100_000
 
 
-class MemoryLink(LinkBase):
+class MemoryLink(Link):
     """One end of a pair made by `memory_pair`."""
 
     name = "memory"

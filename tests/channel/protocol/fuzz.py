@@ -67,7 +67,7 @@ def feed(data: bytes) -> bool:
 
 
 def fuzz_all(inputs: int, seed: int) -> dict[str, int]:
-    """Feed so many inputs, whole and in growing pieces; return how many there were of which kind."""
+    """Feed `inputs` inputs, whole and in growing pieces; return how many there were of which kind."""
     chance = random.Random(seed)
     accepted = pieces = 0
     while pieces < inputs:

@@ -72,18 +72,18 @@ def test_when_frames_are_what_the_other_end_sends_then_they_are_within_bounds() 
         ({"hold_millivolts": (5001, 0)}, "beyond"),
         ({"first_sample": SAMPLE + REACH + 1}, "a start at sample"),
         ({"first_sample": 2**31}, "a start at sample"),
-        ({"state": packed(a0=1e36)}, "none of this codec"),
-        ({"state": packed(a1=STATE_MAX)}, "none of this codec"),
+        ({"state": packed(a0=1e36)}, "not a state of this codec"),
+        ({"state": packed(a1=STATE_MAX)}, "not a state of this codec"),
         ({"state": packed(a2=float("nan"))}, "not finite"),
-        ({"state": packed(a4=-0.1)}, "none of this codec"),
-        ({"state": packed(a4=1e9)}, "none of this codec"),
-        ({"state": packed(a5=0.5)}, "none of this codec"),
+        ({"state": packed(a4=-0.1)}, "not a state of this codec"),
+        ({"state": packed(a4=1e9)}, "not a state of this codec"),
+        ({"state": packed(a5=0.5)}, "not a state of this codec"),
         ({"state": packed(sample=SAMPLE + 1)}, "a state of sample 101"),
         ({"state": packed(sample=-1)}, "negative"),
         ({"state": b"\0" * 7}, "bytes"),
     ],
 )
-def test_when_an_answer_is_out_of_bounds_then_it_is_said_in_what(
+def test_when_an_answer_is_out_of_bounds_then_the_error_names_it(
     changes: dict[str, Any], text: str
 ) -> None:
     problem = bounds().of_welcome(welcome(**changes), SAMPLE)
@@ -117,7 +117,7 @@ def test_when_the_first_answer_comes_then_only_the_counters_bound_its_start() ->
         ((echo(101),), "has not been sent"),
     ],
 )
-def test_when_commands_are_out_of_bounds_then_it_is_said_in_what(
+def test_when_commands_are_out_of_bounds_then_the_error_names_it(
     echoes: tuple[Echo, ...], text: str
 ) -> None:
     problem = bounds().of_commands(Commands(7, 1, echoes), SAMPLE, 90, 101)
@@ -125,7 +125,7 @@ def test_when_commands_are_out_of_bounds_then_it_is_said_in_what(
     assert text in problem
 
 
-def test_when_symbols_requests_and_reports_are_out_of_bounds_then_it_is_said() -> None:
+def test_when_symbols_requests_and_reports_are_out_of_bounds_then_it_is_reported() -> None:
     ours = bounds()
     assert ours.of_symbol(Symbol(7, 1, SAMPLE, 2)) is not None
     assert ours.of_symbol(Symbol(7, 1, 2**32 - 1, 1)) is not None
@@ -140,7 +140,7 @@ def test_when_symbols_requests_and_reports_are_out_of_bounds_then_it_is_said() -
     assert ours.of_report(Desync(7, 1, 99, 1, 2, b""), 1, 100 + REACH) is not None
 
 
-def test_when_a_frame_is_dropped_then_it_is_counted_and_told() -> None:
+def test_when_a_frame_is_dropped_then_it_is_counted_and_reported() -> None:
     counts: Counter[str] = Counter()
     told: list[Event] = []
     ours = Bounds(CODEC, TERMS, counts, told.append)

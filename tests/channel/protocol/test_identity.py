@@ -108,7 +108,7 @@ def test_when_configurations_are_equal_then_no_field_is_named() -> None:
 
 
 @pytest.mark.parametrize("theirs", ["", "{", "not json", '{"a": 1} and more'])
-def test_when_the_peers_configuration_is_garbage_then_it_is_said(theirs: str) -> None:
+def test_when_the_peers_configuration_is_garbage_then_it_is_reported(theirs: str) -> None:
     assert differing_fields('{"a": 1}', theirs) == ["the peer's configuration cannot be read"]
 
 

@@ -1,4 +1,4 @@
-"""One copy spoilt in one bit, and what is written down about it."""
+"""One copy corrupted in one bit, and what is written down about it."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ COMMANDS = [(1.0, -1.0)] * 10
 
 
 def test_when_a_sample_comes_then_one_bit_of_one_field_differs() -> None:
-    spoilt = SabotagedCodec(CODEC, parse_sabotage("sample=3, field=range"))
+    corrupted = SabotagedCodec(CODEC, parse_sabotage("sample=3, field=range"))
     right = wrong = CODEC.initial()
     for sample in range(4):
         assert right == wrong
         right = CODEC.step(right, (1,), COMMANDS)
-        wrong = spoilt.step(wrong, (1,), COMMANDS)
+        wrong = corrupted.step(wrong, (1,), COMMANDS)
         assert wrong.sample == sample + 1
     assert wrong.model == right.model
     assert wrong.coder[0] == math.nextafter(right.coder[0], math.inf)
@@ -28,10 +28,10 @@ def test_when_a_sample_comes_then_one_bit_of_one_field_differs() -> None:
 
 
 @pytest.mark.parametrize("field", ["angle", "rate", "model.3", "coder.0"])
-def test_when_a_field_exists_then_it_can_be_spoilt(field: str) -> None:
-    spoilt = SabotagedCodec(CODEC, parse_sabotage(f"sample=0,field={field}"))
+def test_when_a_field_exists_then_it_can_be_corrupted(field: str) -> None:
+    corrupted = SabotagedCodec(CODEC, parse_sabotage(f"sample=0,field={field}"))
     state = CODEC.initial()
-    assert spoilt.step(state, (1,), COMMANDS) != CODEC.step(state, (1,), COMMANDS)
+    assert corrupted.step(state, (1,), COMMANDS) != CODEC.step(state, (1,), COMMANDS)
 
 
 @pytest.mark.parametrize(

@@ -106,7 +106,9 @@ def test_when_the_checksum_is_computed_then_it_is_ccitt_false() -> None:
 
 
 @pytest.mark.parametrize("version", [0, 1, 0xF5, 255])
-def test_when_a_whole_frame_is_of_another_version_then_it_is_told_and_not_read(version: int) -> None:
+def test_when_a_frame_is_of_another_version_then_it_is_reported_and_not_read(
+    version: int,
+) -> None:
     message = bytes((version,)) + b"whatever follows, 20 bytes or so"
     data = message + crc_hqx(message, 0xFFFF).to_bytes(2, "little")
     assert wire.decode(data) == ForeignVersion(version)

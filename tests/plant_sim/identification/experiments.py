@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from plant_sim.disturbance import WhiteTorque
 from plant_sim.encoder import TEN_BITS
-from plant_sim.identification.excitation import parse_excitation
-from plant_sim.identification.experiment import REST_S, excite
+from plant_sim.identification.excitation import REST_S, excite, parse_excitation
 from plant_sim.identification.record import PitchRecord, quiescent_angle
 from plant_sim.pitch import PitchParameters, PitchPlant
 

@@ -9,8 +9,7 @@ import pytest
 
 from plant_sim.identification.crosscheck import fit
 from plant_sim.identification.errors import IdentificationError
-from plant_sim.identification.excitation import PseudoRandom, parse_excitation
-from plant_sim.identification.experiment import REST_S, excite
+from plant_sim.identification.excitation import REST_S, PseudoRandom, excite, parse_excitation
 from plant_sim.identification.pitch import PitchIdentifier, PitchSettings
 from plant_sim.identification.record import PitchRecord, identify, quiescent_angle
 from tests.plant_sim.identification.experiments import (
@@ -155,7 +154,7 @@ def test_when_the_log_is_in_degrees_of_small_motion_then_a_warning_names_the_dou
     assert found.warnings
 
 
-def test_when_motors_saturate_then_the_voltage_is_clamped_and_it_is_said() -> None:
+def test_when_motors_saturate_then_the_voltage_is_clamped_and_it_is_reported() -> None:
     record = experiment(EXCITATION_A, 20.0)
     found = identify(record, -0.115, PitchSettings(volts_max=1.0))
     assert any("commanded beyond" in text for text in found.warnings)

@@ -208,7 +208,7 @@ def test_when_an_answer_is_never_used_then_the_next_one_follows_from_the_flight_
     assert CODEC.unpack(welcome.state) == expected
 
 
-def test_when_requests_go_on_against_what_is_known_then_they_are_believed_if_nobody_is_heard() -> None:
+def test_when_requests_go_on_against_what_is_known_then_they_are_accepted_if_nobody_is_heard() -> None:
     session = flown(10)
     only_welcome(session.on_frame(request(2**32 - 1, 12), 950 * MS))
     # The transmitter's own requests have lower numbers.

@@ -1,4 +1,4 @@
-"""When slots are due by the receiver's clock, and who is believed when that is not so."""
+"""When slots are due by the receiver's clock, and which symbols count when that is not so."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_when_many_forged_symbols_come_at_once_then_they_do_not_drag_the_schedul
     assert schedule.timing(50 + EARLY_SAMPLES + 2, now_ns) is Timing.EARLY
 
 
-def test_when_the_clock_was_set_back_then_a_row_that_fits_itself_is_believed() -> None:
+def test_when_the_clock_was_set_back_then_a_row_that_fits_itself_is_accepted() -> None:
     schedule = running()
     back_ns = 10 * PERIOD_NS
     timings = [schedule.timing(slot, slot * PERIOD_NS - back_ns) for slot in range(50, 50 + RIVALS)]

@@ -147,7 +147,7 @@ def test_when_the_session_has_ended_then_a_greeting_is_refused_with_the_reason()
 # Ends
 
 
-def test_when_the_transmitter_reports_a_desync_then_both_digests_are_told_and_its_state_sent() -> None:
+def test_when_the_transmitter_reports_a_desync_then_both_digests_and_its_state_are_reported() -> None:
     session = flying()
     session.on_frame(symbol(0), 0)
     assert session.on_frame(Desync(SESSION + 1, 0, 0, 1, 2, b""), 0) == []
@@ -169,7 +169,7 @@ def test_when_the_transmitter_says_bye_then_the_flight_ends_with_its_reason() ->
     assert session.end == End(Ending.OVER, "landed", by_peer=True)
 
 
-def test_when_bytes_are_no_frame_then_it_is_counted_and_told() -> None:
+def test_when_bytes_are_no_frame_then_it_is_counted_and_reported() -> None:
     session = flying()
     session.on_malformed("checksum")
     assert session.counts["malformed"] == 1

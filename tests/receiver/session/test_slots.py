@@ -97,7 +97,7 @@ def test_when_a_symbol_is_of_another_flight_then_it_is_dropped_and_counted(stale
     assert session.counts["stale_frames"] == 1
 
 
-def test_when_a_symbol_is_of_an_epoch_that_was_never_begun_then_its_sender_is_told() -> None:
+def test_when_a_symbol_is_of_an_epoch_that_was_never_begun_then_its_sender_is_informed() -> None:
     session = flying()
     assert session.on_frame(symbol(0, epoch=1), 0) == [Unknown(SESSION, 1)]
     assert session.state == CODEC.initial()
@@ -237,7 +237,7 @@ def test_when_the_controller_has_no_reference_then_the_flight_goes_on_and_says_s
     session._commander._controller.reference_rad = fail  # type: ignore[method-assign]
     for slot in range(2):
         session.on_frame(symbol(slot), 0)
-        session.rest()
+        session.flush_records()
     assert session.counts["bad_references"] == 20
     assert kinds(session).count(EventKind.CONTROLLER) == 1
 

@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from reproduction.limits import plan
-from reproduction.limits.candidates import ENTRANTS, TUNED
+from reproduction.limits.candidates import CANDIDATES, TUNED
 from reproduction.limits.plan import DENSITIES, Scale
 from tenbaud.cli.commands import app
 
@@ -23,9 +23,9 @@ def test_when_the_bench_has_flown_then_page_and_pictures_are_there(
     done = CliRunner().invoke(app, ["bench", "coders", "--quick", "--docs", str(tmp_path)])
     assert done.exit_code == 0, done.output
     page = (tmp_path / "LIMITS.md").read_text()
-    for entrant in ENTRANTS:
+    for candidate in CANDIDATES:
         # One row per density in two tables, one behind the encoder, one seed by seed with the tuned.
-        assert page.count(f"| {entrant.name}") == 2 * len(DENSITIES) + 1 + (entrant.key != TUNED)
+        assert page.count(f"| {candidate.name}") == 2 * len(DENSITIES) + 1 + (candidate.key != TUNED)
     assert "tenbaud bench coders --quick" in page
     assert f"{SMALL.seeds} seeds of {SMALL.seconds:g} s" in page
     for name in ("limits.png", "limits-disturbance.png"):

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from reproduction.commands import DATA_VARIABLE
 from reproduction.paper.real import UIUC_FILE
-from tenbaud.cli.figures import DATA_VARIABLE
 from tests.rules.sources import TOP
 
 FOLDER = Path(os.environ.get(DATA_VARIABLE, TOP.parent / "shared" / "data"))

@@ -20,7 +20,7 @@ def flights() -> dict[str, Flown]:
             Job(job.name, job.preset, job.overrides, window_start_s=job.window_start_s), Path()
         )
         for job in jobs
-        if job.name != "uiuc-words-500"
+        if job.name != "uiuc-pcm-500"
     }
 
 
@@ -41,7 +41,7 @@ def test_when_tuned_on_the_first_half_then_the_second_half_is_estimated_this_wel
     assert tuned.summary["desyncs"] == 0
     assert tuned.summary["samples"] * tuned.summary["lead_ticks"] == 0
     assert tuned.rms <= rms
-    assert tuned.rms < 0.5 * flights[f"uiuc-words-{rate}"].rms
+    assert tuned.rms < 0.5 * flights[f"uiuc-pcm-{rate}"].rms
     assert tuned.rms < 0.5 * flights[f"uiuc-paper-{rate}"].rms
 
 

@@ -73,12 +73,10 @@ def test_when_the_lead_grows_then_the_coded_error_stays_and_the_live_one_does_no
     assert far.live_rad > 3.0 * far.coded_rad
 
 
-def test_when_the_animation_is_told_then_a_codec_was_spoilt_and_the_line_was_cut_and_both_mended() -> (
-    None
-):
+def test_when_the_animation_is_drawn_then_a_corrupted_codec_and_a_cut_line_are_both_repaired() -> None:
     story = animation.fly_story()
     assert [index for index, equal in enumerate(story.digests) if not equal] == [
-        animation.SPOILT_SAMPLE
+        animation.CORRUPTED_SAMPLE
     ]
     silent = [index for index, word in enumerate(story.words) if word is None]
     assert 20 <= len(silent) <= 25

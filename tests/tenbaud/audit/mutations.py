@@ -58,7 +58,7 @@ class Original:
         return self.messages[mutation.end][at][2]
 
     def mutations(self, rows_per_topic: int, noise: random.Random) -> Iterator[Mutation]:
-        """Yield every kind of change, on so many rows of each topic and field."""
+        """Yield every kind of change, on some rows of each topic and field."""
         for end, topics in KINDS.items():
             for topic, kind in topics.items():
                 count = len(self.rows(end, topic))

@@ -65,7 +65,7 @@ def test_a_rough_flight_with_a_rejoin_passes_too(rough: Run) -> None:
     [
         ("usual-1000baud", {"duration_s": 3.0}),
         ("static-10baud", {}),
-        ("timed-10baud", {"channel.delivery": "end"}),
+        ("open-loop-zoom-10baud", {"channel.delivery": "end"}),
     ],
 )
 def test_words_of_many_symbols_and_other_coders_pass(
@@ -81,7 +81,9 @@ def test_a_serial_line_in_real_time_passes_too(tmp_path: Path) -> None:
     assert run_command("demo", "--json", *flight, cwd=tmp_path).code == 0
     result = audit(tmp_path / "run")
     assert result.passed, result.leaks + result.gaps
-    assert result.counted.symbols_sent == result.counted.symbol_bytes == 30
+    counted = result.counted
+    # A busy machine may hold an end up past a slot, which then carries no symbol.
+    assert 30 - counted.erased <= counted.symbols_sent == counted.symbol_bytes <= 30
 
 
 # What was doctored, and what the audit must say
@@ -170,11 +172,9 @@ def test_a_state_that_depends_on_something_else_is_found(
 
 
 def test_a_command_that_does_not_follow_from_the_state_is_found(clean: Run, tmp_path: Path) -> None:
-    nudged = at("tick", 500, lambda row: {**row, "command_volts": [0.001, 0.0]})
+    nudged = at("tick", 500, lambda row: {**row, "command": [0.001, 0.0]})
     result = leaks_of(clean, tmp_path, "receiver", "tick", nudged)
-    assert "receiver: tick, tick 500, field command_volts: it is not what the symbols give" in told(
-        result
-    )
+    assert "receiver: tick, tick 500, field command: it is not what the symbols give" in told(result)
 
 
 def test_an_epoch_that_starts_from_an_unearned_state_is_found(rough: Run, tmp_path: Path) -> None:

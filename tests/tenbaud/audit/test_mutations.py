@@ -11,14 +11,15 @@ import pytest
 
 from channel.errors import TenbaudError
 from tenbaud.audit.audit import Audit, audit, audit_record
-from tenbaud.audit.base import FILED, ORDER, Evidence
-from tenbaud.audit.table import CLAIMS, UNCLAIMED, reason_for
+from tenbaud.audit.base import FILED, Evidence
+from tenbaud.audit.table import CLAIMS
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.table import read_tables
 from tenbaud.replay.record import FlightRecord, load_record
 from tenbaud.replay.replay import replay
 from tenbaud.replay.rows import KINDS, read_rows
 from tests.tenbaud.audit.mutations import Mutation, Original, write_recording
+from tests.tenbaud.audit.unclaimed import ORDER, UNCLAIMED, reason_for
 from tests.tenbaud.flown import flown
 from tests.tenbaud.replay.test_old_recordings import TWO_EPOCHS
 
@@ -131,7 +132,7 @@ def test_the_records_have_the_fields_that_the_nodes_write() -> None:
             assert (kind.channel.topic, kind.record._fields) == (topic, names)
 
 
-def test_a_row_that_no_node_writes_is_told_by_row_and_field(tmp_path: Path) -> None:
+def test_a_row_that_no_node_writes_is_reported_by_row_and_field(tmp_path: Path) -> None:
     original = Original(TWO_EPOCHS)
     wrong: list[tuple[str, str, object]] = [
         ("sample", "range", None),

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from tenbaud.bounds.encoder import (
+from reproduction.limits.encoder import (
     double_integrator_rate_at_encoder_floor,
     encoder_floor,
 )

@@ -47,7 +47,7 @@ def fly(preset: str = "paper-10baud", **changes: Any) -> Flown:
         while len(rejoins) < run.node.session.counts["rejoins"]:
             rejoins.append(tick)
 
-    run.node.at_tick = at_tick
+    run.node.before_every_tick(at_tick)
     outcome = transmit.fly_virtual(run, build_receiver(agreement, None, DATAGRAM), lambda: False)
     return Flown(run, outcome, max(rejoins, default=0) * agreement.terms.tick_ns / 1e9)
 

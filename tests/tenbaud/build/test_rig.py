@@ -9,10 +9,9 @@ from tenbaud.build.flight import agree
 from tenbaud.build.rig import build_axes, build_rig, quarc_commands, quarc_fields
 from tenbaud.cli import options
 from tenbaud.config.load import ConfigError, dump_config, load_config
-from transmitter.rigs.dry import DryRig
 from transmitter.rigs.quarc import QuarcBridge
 from transmitter.rigs.serial_bridge import SerialBridge
-from transmitter.rigs.simulated import SimulatedRig
+from transmitter.rigs.simulated import DryRig, SimulatedRig
 
 
 def configured(rig: str, **changes: Any) -> Any:

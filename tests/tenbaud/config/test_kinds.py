@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from channel.codec.coders.timed import TimedCoder
-from channel.codec.coders.words import WordsCoder
+from channel.codec.coders.open_loop_zoom import OpenLoopZoomCoder
+from channel.codec.coders.pcm import PcmCoder
 from channel.codec.coders.zoom import ZoomCoder
 from tenbaud.build.flight import agree
 from tenbaud.config.load import ConfigError, dump_config, load_config, preset_names
@@ -30,9 +30,9 @@ def test_when_a_preset_is_dumped_and_loaded_then_it_makes_the_same_flight(
     ("preset", "coder"),
     [
         ("paper-10baud", ZoomCoder),
-        ("fixed-10baud", TimedCoder),
-        ("timed-10baud", TimedCoder),
-        ("usual-1000baud", WordsCoder),
+        ("fixed-10baud", OpenLoopZoomCoder),
+        ("open-loop-zoom-10baud", OpenLoopZoomCoder),
+        ("usual-1000baud", PcmCoder),
     ],
 )
 def test_when_a_preset_names_no_kind_or_another_then_that_coder_is_built(
@@ -69,5 +69,5 @@ def test_when_a_field_is_wrong_then_its_name_has_no_kind_in_it(
 
 
 def test_when_coder_and_model_do_not_go_together_then_both_are_named() -> None:
-    with pytest.raises(ConfigError, match=r"coder\.kind = 'words' and model\.kind = 'pitch'"):
-        agree(load_config("paper-10baud", None, {"coder": {"kind": "words"}}), "virtual")
+    with pytest.raises(ConfigError, match=r"coder\.kind = 'pcm' and model\.kind = 'pitch'"):
+        agree(load_config("paper-10baud", None, {"coder": {"kind": "pcm"}}), "virtual")

@@ -53,7 +53,7 @@ def test_when_a_configuration_is_completed_then_both_ends_read_the_same_bits() -
     assert "direction" in dump_config(config)
 
 
-def test_when_the_bits_are_too_few_for_a_plant_then_both_numbers_are_told() -> None:
+def test_when_the_bits_are_too_few_for_a_plant_then_the_error_has_both_numbers() -> None:
     for model in (PENDULUM, {"kind": "pitch", "stiffness_per_s2": -53.6, "rate_damping_per_s": 0.0}):
         values = completed({"model": model})
         config = load_config("paper-10baud", None, values)
@@ -108,7 +108,7 @@ def test_when_a_section_does_not_fit_then_the_error_names_the_field(
         load_config("paper-10baud", None, {"model": {**PENDULUM, **changes}})
 
 
-def test_when_nothing_can_be_designed_then_the_reason_is_told() -> None:
+def test_when_nothing_can_be_designed_then_the_error_says_why() -> None:
     for model, text in (
         ({**PENDULUM, "C": [[0.0, 0.0]]}, "not observable"),
         ({**PENDULUM, "G": [[0.0], [0.0]]}, "does not reach every state"),

@@ -51,8 +51,8 @@ def test_when_a_plant_is_its_model_then_the_error_is_near_the_floor(
     name: str, rate: float, most: float
 ) -> None:
     plant = plant_named(name)
-    told = DirectionCoder(design_direction(plant, rate, 1.0 / rate, adapts=False))
-    assert 1.3 < over_floor(plant, told, rate, 4000) < most
+    known = DirectionCoder(design_direction(plant, rate, 1.0 / rate, adapts=False))
+    assert 1.3 < over_floor(plant, known, rate, 4000) < most
 
 
 def test_when_a_sample_has_several_bits_then_they_share_its_directions() -> None:
@@ -90,7 +90,7 @@ def test_when_states_are_counted_in_other_units_then_the_coder_is_the_same() -> 
     )
 
 
-def test_when_the_rate_is_too_low_then_both_numbers_are_told() -> None:
+def test_when_the_rate_is_too_low_then_the_error_has_both_numbers() -> None:
     with pytest.raises(RateTooLow, match=r"10 bit/s are too few.*more than 10\.56 bit/s"):
         design_direction(plant_named("pendulum"), 10.0, 0.1)
 

@@ -43,7 +43,7 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Inputs:
 
 @pytest.fixture
 def said(capfd: pytest.CaptureFixture[str]) -> Iterator[Callable[[], str]]:
-    """The streams of a process of its own; called, returns what was written to standard error."""
+    """The streams of a separate process; called, returns what was written to standard error."""
     before = sys.stdout, sys.stderr
     prepare_streams()
 
@@ -69,7 +69,7 @@ def test_every_command_is_walked_through() -> None:
 
 
 @pytest.mark.parametrize("form", ALL_WRITERS)
-def test_on_a_full_disk_it_is_said_and_no_half_file_is_left(
+def test_on_a_full_disk_it_is_reported_and_no_half_file_is_left(
     form: Arguments, inputs: Inputs, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with small_disk(tmp_path / "disk", room_bytes=0) as disk:
@@ -82,7 +82,7 @@ def test_on_a_full_disk_it_is_said_and_no_half_file_is_left(
 
 
 @pytest.mark.parametrize("form", ALL_WRITERS)
-def test_on_a_read_only_disk_it_is_said(
+def test_on_a_read_only_disk_it_is_reported(
     form: Arguments, inputs: Inputs, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with read_only_disk(tmp_path / "disk") as disk:

@@ -31,7 +31,7 @@ from tenbaud.view.board import Board
 from tests.tenbaud.endings import nonsense
 from tests.tenbaud.processes import REPOSITORY, fly_pair
 
-SPOILT = {"receiver": {"sabotage": "sample=20,field=range"}}
+CORRUPTED = {"receiver": {"sabotage": "sample=20,field=range"}}
 SCENARIOS: dict[str, tuple[ExitCode, dict[str, Any]]] = {
     "over": (ExitCode.OK, {}),
     "stopped": (ExitCode.INTERRUPTED, {}),
@@ -63,7 +63,7 @@ def fly(scenario: str) -> dict[str, Any]:
     """Fly; return all that programs go by, without what is for people."""
     _, changes = SCENARIOS[scenario]
     agreement = agreement_of(changes)
-    theirs = agreement_of(SPOILT if scenario == "desync" else {})
+    theirs = agreement_of(CORRUPTED if scenario == "desync" else {})
     if scenario == "refused":
         theirs = agreement_of({"coder": {"window_signs": 3}})
     tap = Tap(Nothing())

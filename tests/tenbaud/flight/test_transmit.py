@@ -33,7 +33,7 @@ def agreement_on(clock: Any, **ends: Any) -> Agreement:
     return agree(load_config("paper-10baud", None, changed), clock)
 
 
-def spoilt_receiver(clock: Any) -> ReceiverEndpoint:
+def corrupted_receiver(clock: Any) -> ReceiverEndpoint:
     """Return a receiver whose codec goes wrong after the flight's last sample."""
     sabotage = {"sabotage": f"sample={LAST_SAMPLE},field=range"}
     return build_receiver(agreement_on(clock, receiver=sabotage), None, DATAGRAM)
@@ -41,14 +41,14 @@ def spoilt_receiver(clock: Any) -> ReceiverEndpoint:
 
 def fly_virtual(**transmitter: Any) -> tuple[Outcome, ReceiverEndpoint]:
     run = transmit.prepare(agreement_on("virtual", transmitter=transmitter), None, DATAGRAM)
-    endpoint = spoilt_receiver("virtual")
+    endpoint = corrupted_receiver("virtual")
     outcome = transmit.fly_virtual(run, endpoint, lambda: False)
     assert run.node.session.copies.confirmed.sample == LAST_SAMPLE + 1
     return outcome, endpoint
 
 
 def fly_real(endpoint: ReceiverEndpoint, should_stop: Callable[[TransmitterRun], bool]) -> Outcome:
-    """Fly over a memory link in real time, the receiver in a thread of its own."""
+    """Fly over a memory link in real time, the receiver in a separate thread."""
     agreement = agreement_on("real")
     near, far = memory_pair()
 
@@ -74,8 +74,9 @@ def test_when_the_last_echo_differs_then_the_flight_is_a_desync(on_desync: str) 
     assert on_desync == "stop" or endpoint.session.end == told
 
 
+@pytest.mark.real_time
 def test_when_the_last_echo_differs_on_the_real_clock_then_the_flight_is_a_desync() -> None:
-    endpoint = spoilt_receiver("real")
+    endpoint = corrupted_receiver("real")
     outcome = fly_real(endpoint, lambda _: False)
     assert outcome.code is ExitCode.DESYNC
     end = endpoint.session.end
@@ -84,7 +85,8 @@ def test_when_the_last_echo_differs_on_the_real_clock_then_the_flight_is_a_desyn
     assert f"differ after sample {LAST_SAMPLE}" in end.text
 
 
-def test_when_it_is_stopped_as_the_welcome_arrives_then_the_receiver_is_told() -> None:
+@pytest.mark.real_time
+def test_when_it_is_stopped_as_the_welcome_arrives_then_the_receiver_is_informed() -> None:
     endpoint = build_receiver(agreement_on("real"), None, DATAGRAM)
     outcome = fly_real(endpoint, lambda run: run.node.session.phase is Phase.FLYING)
     assert outcome.code is ExitCode.INTERRUPTED

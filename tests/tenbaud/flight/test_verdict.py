@@ -54,7 +54,7 @@ def test_when_an_end_does_not_see_the_motors_then_it_does_not_judge_them() -> No
     assert faults_of(replace(GOOD, ticks=0, ticks_down=0, ticks_commanded=0)) == ()
 
 
-def test_when_it_is_said_then_with_its_numbers_and_what_to_change() -> None:
+def test_when_it_is_reported_then_with_its_numbers_and_what_to_change() -> None:
     endless = replace(GOOD, confirmed=101, erased=0, rejoins=99, ticks_down=4860, ticks_commanded=1010)
     faults = faults_of(endless)
     text = verdict_text(faults, endless, SETTINGS, {"desync": 1, "guard": 98})

@@ -72,7 +72,7 @@ def write_log(path: Path, change: Callable[[Cells], None] = lambda rows: None) -
 COLUMNS = ("--columns", "time=t,angle=pitch,front=uf,rear=ur")
 
 
-def test_when_a_log_is_identified_then_time_unit_and_columns_are_as_told(tmp_path: Path) -> None:
+def test_when_a_log_is_identified_then_time_unit_and_columns_are_as_given(tmp_path: Path) -> None:
     def degrees(rows: Cells) -> None:
         for row in rows:
             row[1] = math.degrees(row[1])

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tenbaud.cli.keys import next_steps
 from tenbaud.keys.authority import NodeRole
-from tenbaud.keys.hints import next_steps
 from tenbaud.keys.store import KeysError, add_node, create_authority, read_node, read_nodes
 
 NODES = {"desk": NodeRole.RECEIVER, "hub": NodeRole.ROUTER, "rig": NodeRole.TRANSMITTER}

@@ -92,7 +92,7 @@ def test_when_a_node_is_renewed_then_key_and_end_are_new_and_the_addresses_stay(
     assert renew_node(keys, "desk", ("10.0.0.3",)).certified.hosts == ("10.0.0.3",)
 
 
-def test_when_a_certificate_ends_soon_then_it_is_said_and_when_it_has_then_it_is_refused(
+def test_when_a_certificate_ends_soon_then_it_is_reported_and_when_it_has_then_it_is_refused(
     keys: Path,
 ) -> None:
     assert expiry_warning(add_node(keys, "rig", NodeRole.TRANSMITTER, ())) is None

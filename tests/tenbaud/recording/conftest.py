@@ -54,7 +54,7 @@ def fly(record: Callable[[Path, Rows], Path]) -> Callable[..., Path]:
             transmitter.append((TICK, time_ns, tick_row(tick, pitch_rad)))
             states = ([coded_rad, 0.0], [live_rad, 0.0])
             transmitter.append((ESTIMATE, time_ns, (tick, *states)))
-            receiver.append((RECEIVER_TICK, time_ns, (tick, reference_rad)))
+            receiver.append((RECEIVER_TICK, time_ns, (tick, [reference_rad])))
             if tick % 10 == 0:
                 sample = tick // 10
                 word = None if sample in erased else [1 if coded_rad < pitch_rad else -1]

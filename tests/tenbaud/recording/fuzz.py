@@ -256,7 +256,7 @@ def _symbols(path: Path) -> None:
 
 
 def fuzz(run: Path, inputs: int, seed: int) -> dict[str, Any]:
-    """Feed so many run folders to the readers; return counts, the slowest one, memory and faults."""
+    """Feed `inputs` run folders to the readers; return counts, the slowest one, memory and faults."""
     chance = random.Random(seed)
     original = Original(run)
     whole_flight = replay(load_record(run)).packed.data

@@ -27,7 +27,7 @@ _CHUNK_HEAD = struct.Struct("<BQQQQII4sQ")
 
 
 def long_recording(path: Path, ticks: int, end: str = "transmitter") -> Path:
-    """Write the recording of a flight of so many ticks at 100 Hz over 10 bit/s."""
+    """Write the recording of a flight of that number of ticks at 100 Hz over 10 bit/s."""
     builder = RecordBuilder()
     Header("tenbaud", "tenbaud").write(builder)
     Metadata(RUN_METADATA, {"role": end, "tick_s": repr(TICK_S), "clock": "virtual"}).write(builder)
@@ -76,9 +76,9 @@ def _transmitter_rows(ticks: range) -> list[bytes]:
             _message(
                 1,
                 tick,
-                f'{{"tick":{tick},"time_s":{tick * TICK_S},"measured_rad":[{pitch}],'
-                f'"true_rad":[{pitch}],'
-                '"commanded_volts":[0.5,-0.5],"applied_volts":[0.5,-0.5],"late":false,'
+                f'{{"tick":{tick},"time_s":{tick * TICK_S},"measured":[{pitch}],'
+                f'"true":[{pitch}],'
+                '"commanded":[0.5,-0.5],"applied":[0.5,-0.5],"late":false,'
                 '"lateness_ms":0.1,"guard":"running"}',
             )
         )
@@ -102,8 +102,8 @@ def _transmitter_rows(ticks: range) -> list[bytes]:
 def _receiver_rows(ticks: range) -> list[bytes]:
     rows = []
     for tick in ticks:
-        text = f'{{"tick":{tick},"reference_rad":{0.3 * math.sin(tick * 0.003)},'
-        rows.append(_message(1, tick, text + '"live_state":[0.1,0.2],"command_volts":[0.5,-0.5]}'))
+        text = f'{{"tick":{tick},"reference":[{0.3 * math.sin(tick * 0.003)}],'
+        rows.append(_message(1, tick, text + '"live_state":[0.1,0.2],"command":[0.5,-0.5]}'))
         if tick % PER_SAMPLE == 0:
             text = f'{{"sample":{tick // PER_SAMPLE},"word":[1],"range":[0.1],"state":[0.1,0.2],'
             text += f'"coder":[0.1,1.0],"digest":"{tick:016x}","arrival_s":{tick * TICK_S}}}'

@@ -10,8 +10,8 @@ TICK = RecordChannel(
     "tick",
     (
         Field("tick", "integer", "", "index of the tick"),
-        Field("measured_rad", "numbers", "rad", "what the encoder read"),
-        Field("true_rad", "numbers", "rad"),
+        Field("measured", "numbers", "rad", "what the encoder read"),
+        Field("true", "numbers", "rad"),
         Field("late", "boolean"),
         Field("lateness_ms", "number", "ms", "after the due time", timing=True),
         Field("guard", "string"),
@@ -35,9 +35,7 @@ SAMPLE = RecordChannel(
         Field("digest", "string"),
     ),
 )
-RECEIVER_TICK = RecordChannel(
-    "tick", (Field("tick", "integer"), Field("reference_rad", "number", "rad"))
-)
+RECEIVER_TICK = RecordChannel("tick", (Field("tick", "integer"), Field("reference", "numbers")))
 RECEIVER_SAMPLE = RecordChannel(
     "sample",
     (*SAMPLE.fields, Field("arrival_s", "number", "s", "on the receiver's clock", timing=True)),

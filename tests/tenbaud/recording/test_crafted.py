@@ -1,4 +1,4 @@
-"""Files made to harm whoever opens them: refused or read past, in words and within bounds."""
+"""Files made to harm their readers: refused or skipped, with a message and within bounds."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def huge() -> bytes:
 
 
 @pytest.mark.parametrize("name", BAD_CHUNKS)
-def test_a_bad_chunk_is_read_past_at_once_and_told(tmp_path: Path, name: str) -> None:
+def test_a_bad_chunk_is_read_past_at_once_and_reported(tmp_path: Path, name: str) -> None:
     path = tmp_path / "transmitter.mcap"
     path.write_bytes(mcap_file([good(0), BAD_CHUNKS[name](), good(40)], DESCRIBED, HEAD))
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -88,7 +88,7 @@ BAD_ROWS: dict[str, tuple[bytes, str]] = {
     "two rows": (tick(3) + b"," + tick(4), "row 3 of the topic 'tick' is no JSON"),
     "no fields": (b"{}", "row 3 of the topic 'tick' lacks the field 'tick'"),
     "text for a number": (tick(3, lateness_ms="1"), "has '1' for 'lateness_ms': not a number"),
-    "text in a list": (tick(3, measured_rad=["1"]), r"has \['1'\] for 'measured_rad'"),
+    "text in a list": (tick(3, measured=["1"]), r"has \['1'\] for 'measured'"),
     "no tick": (tick(3, tick=None), "has None for 'tick': not a whole number"),
     "half a tick": (tick(3, tick=0.5), "has 0.5 for 'tick'"),
     "a tick beyond all flights": (tick(3, tick=1 << 62), "which no flight reaches"),
@@ -123,7 +123,7 @@ def test_a_field_of_another_type_than_ours_is_refused(tmp_path: Path) -> None:
     schema = channel_schema(TICK_CHANNEL).replace(b'"array"', b'"string"', 1)
     path = tmp_path / "transmitter.mcap"
     path.write_bytes(mcap_file([], [(1, "tick", schema)], HEAD))
-    with pytest.raises(RecordingError, match="its field 'measured_rad' is a text, here it is a list"):
+    with pytest.raises(RecordingError, match="its field 'measured' is a text, here it is a list"):
         list(MessageStream(path))
 
 
@@ -139,7 +139,7 @@ def test_ticks_far_apart_ask_for_no_time_base(tmp_path: Path) -> None:
 
 def test_lists_of_unlike_lengths_ask_for_no_memory(tmp_path: Path) -> None:
     path = tmp_path / "transmitter.mcap"
-    rows = [(1, 0, tick(0, measured_rad=[0.5] * 1000))]
+    rows = [(1, 0, tick(0, measured=[0.5] * 1000))]
     rows += [(1, number, tick(number)) for number in range(1, 20_000)]
     path.write_bytes(mcap_file([chunk(messages_of(rows))], DESCRIBED, HEAD))
     with pytest.raises(RecordingError, match="up to 1000 values, and most far fewer"):

@@ -5,9 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from channel.protocol.audit_trail import EPOCH_CHANNEL
 from channel.protocol.lockstep import LOCKSTEP_CHANNEL
-from channel.protocol.recording import RecordChannel
+from channel.protocol.recording import EPOCH_CHANNEL, RecordChannel
 from tenbaud.recording.comparison import Verdict
 from tenbaud.recording.diff import compare_runs
 from tenbaud.recording.errors import RecordingError
@@ -45,10 +44,10 @@ def test_equal_runs_have_no_difference(tmp_path: Path, fly: Callable[..., Path])
 @pytest.mark.parametrize(
     ("values", "field", "seen"),
     [
-        ({"measured_rad": [0.1 + 0.2]}, "measured_rad[0]", 0.1 + 0.2),
-        ({"measured_rad": [1.0, 2.0]}, "measured_rad", [1.0, 2.0]),
-        ({"measured_rad": [float("nan")]}, "measured_rad[0]", None),
-        ({"true_rad": [0.0]}, "true_rad", [0.0]),
+        ({"measured": [0.1 + 0.2]}, "measured[0]", 0.1 + 0.2),
+        ({"measured": [1.0, 2.0]}, "measured", [1.0, 2.0]),
+        ({"measured": [float("nan")]}, "measured[0]", None),
+        ({"true": [0.0]}, "true", [0.0]),
         ({"guard": "latched"}, "guard", "latched"),
         ({"late": True}, "late", True),
     ],
@@ -69,10 +68,10 @@ def test_changed_value_is_found(
 
 
 def test_sign_of_zero_is_a_difference_and_two_nans_are_none(tmp_path: Path, record: Record) -> None:
-    plus = record(tmp_path / "a.mcap", changed(5, measured_rad=[0.0]))
-    minus = record(tmp_path / "b.mcap", changed(5, measured_rad=[-0.0]))
+    plus = record(tmp_path / "a.mcap", changed(5, measured=[0.0]))
+    minus = record(tmp_path / "b.mcap", changed(5, measured=[-0.0]))
     assert compare_runs(plus, minus).verdict is Verdict.DIFFERENT
-    nans = [record(tmp_path / name, changed(5, measured_rad=[float("nan")])) for name in ("c", "d")]
+    nans = [record(tmp_path / name, changed(5, measured=[float("nan")])) for name in ("c", "d")]
     assert compare_runs(*nans).verdict is Verdict.EQUAL
 
 

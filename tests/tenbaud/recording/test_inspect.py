@@ -19,8 +19,8 @@ def test_run_folder_is_described_file_by_file(tmp_path: Path, fly: Callable[...,
     for words in (
         "complete",
         "tick: 100 rows, 0.000 s to 0.990 s",
-        "measured_rad  [rad]  what the encoder read",
-        "lateness_ms   [ms]  after the due time  (wall clock)",
+        "measured     [rad]  what the encoder read",
+        "lateness_ms  [ms]  after the due time  (wall clock)",
         "seed = 7",
         "start: the first symbol",
     ):
@@ -36,7 +36,7 @@ def test_a_real_run_is_headed_by_its_figures_and_its_configuration_is_readable(t
     described = json.loads(json.dumps(describe_json(run.path)))
     assert [one["complete"] for one in described] == [True, True]
     fields = described[0]["topics"]["tick"]["fields"]
-    assert {"measured_rad", "applied_volts"} <= {field["name"] for field in fields}
+    assert {"measured", "applied"} <= {field["name"] for field in fields}
     assert described[0]["topics"]["tick"]["rows"] == 300
 
 

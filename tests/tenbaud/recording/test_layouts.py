@@ -13,15 +13,16 @@ from xml.etree import ElementTree
 
 import pytest
 
+from channel.codec.models.pitch import PITCH_SIGNALS
 from tenbaud import Run
 from tenbaud.files.whole import WriteError
 from tenbaud.recording.convert import convert
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.layouts import (
-    RECORDING_PLOTS,
     foxglove_layout,
     layout_paths,
     plotjuggler_layout,
+    recording_plots,
 )
 from tenbaud.recording.reader import Recording
 from tests.tenbaud.flown import flown
@@ -84,7 +85,7 @@ def test_every_name_in_the_layouts_of_a_recording_is_in_a_real_one(run: Run) -> 
     recording = run.folder.transmitter
     values = foxglove_values((LAYOUTS / "transmitter.foxglove.json").read_text())
     names = plotjuggler_names((LAYOUTS / "transmitter.plotjuggler.xml").read_text(), "transmitter.mcap")
-    assert len(values) == len(names) == sum(len(plot.curves) for plot in RECORDING_PLOTS)
+    assert len(values) == len(names) == sum(len(plot.curves) for plot in recording_plots(run.plant))
     for pattern, texts in ((FOXGLOVE_PATH, values), (PLOTJUGGLER_NAME, names)):
         for text in texts:
             match = pattern.fullmatch(text)
@@ -106,7 +107,7 @@ def test_every_name_in_the_layouts_of_a_converted_run_is_in_it(run: Run, tmp_pat
 
 
 @pytest.mark.parametrize("which", [0, 1])
-def test_when_a_layout_exists_then_nothing_is_written_without_being_told_to(
+def test_when_a_layout_exists_then_nothing_is_written_without_an_order(
     run: Run, tmp_path: Path, which: int
 ) -> None:
     target = tmp_path / "flight.mcap"
@@ -120,7 +121,7 @@ def test_when_a_layout_exists_then_nothing_is_written_without_being_told_to(
     assert "flight" in own.read_text()
 
 
-def test_when_a_layout_cannot_be_written_then_it_is_said(run: Run, tmp_path: Path) -> None:
+def test_when_a_layout_cannot_be_written_then_it_is_reported(run: Run, tmp_path: Path) -> None:
     target = tmp_path / "flight.mcap"
     layout_paths(target)[0].mkdir()
     with pytest.raises(WriteError, match="cannot be written"):
@@ -128,7 +129,8 @@ def test_when_a_layout_cannot_be_written_then_it_is_said(run: Run, tmp_path: Pat
 
 
 def test_the_committed_layouts_are_those_that_the_code_makes() -> None:
-    made = foxglove_layout(RECORDING_PLOTS) + "\n"
+    plots = recording_plots(PITCH_SIGNALS)
+    made = foxglove_layout(plots) + "\n"
     assert (LAYOUTS / "transmitter.foxglove.json").read_text() == made
-    made = plotjuggler_layout(RECORDING_PLOTS, "transmitter.mcap")
+    made = plotjuggler_layout(plots, "transmitter.mcap")
     assert (LAYOUTS / "transmitter.plotjuggler.xml").read_text() == made

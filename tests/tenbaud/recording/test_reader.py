@@ -63,7 +63,7 @@ def test_blocks_that_were_never_filled_count_as_a_cut(chunked: tuple[Path, list[
     assert not stream.complete
 
 
-def test_damaged_chunk_is_left_out_and_the_hole_is_told(chunked: tuple[Path, list[int]]) -> None:
+def test_damaged_chunk_is_left_out_and_the_hole_is_reported(chunked: tuple[Path, list[int]]) -> None:
     path, ends = chunked
     damaged = bytearray(path.read_bytes())
     damaged[ends[1] + 200] ^= 1

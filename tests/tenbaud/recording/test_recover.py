@@ -95,7 +95,7 @@ def damaged(flight: Run, folder: Path, share: float) -> Path:
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.5, 0.7])
-def test_a_changed_bit_costs_the_chunk_it_is_in_and_the_hole_is_told(
+def test_a_changed_bit_costs_the_chunk_it_is_in_and_the_hole_is_reported(
     flight: Run, tmp_path: Path, share: float
 ) -> None:
     path = damaged(flight, tmp_path, share)

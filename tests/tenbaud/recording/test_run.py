@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from channel.codec.models.pitch import PITCH_SIGNALS
 from tenbaud import Run
 from tenbaud.recording.errors import RecordingError
-from tenbaud.recording.signals import SIGNALS
+from tenbaud.recording.signals import definitions
 from tests.tenbaud.flown import SECONDS, flown
 from tests.tenbaud.processes import REPOSITORY
 
@@ -39,7 +40,7 @@ def test_every_signal_is_on_the_common_time_base_with_a_unit_and_a_meaning(lossy
 
 def test_every_signal_is_in_the_table_of_the_documentation() -> None:
     text = (REPOSITORY / "docs" / "recordings.md").read_text()
-    for name, _, _, _ in SIGNALS:
+    for name in definitions(PITCH_SIGNALS):
         assert f"`{name}`" in text, name
 
 
@@ -56,13 +57,13 @@ def test_the_gap_gauge_holds_its_last_value(lossy: Run) -> None:
 def test_signals_are_what_the_rows_say(lossy: Run) -> None:
     ticks = lossy.table("transmitter", "tick")
     for row in ticks.rows[::97]:
-        assert lossy.pitch[row["tick"]] == row["true_rad"][0]
-        assert lossy.front[row["tick"]] == row["applied_volts"][0]
+        assert lossy.pitch[row["tick"]] == row["true"][0]
+        assert lossy.front[row["tick"]] == row["applied"][0]
     for row in lossy.table("transmitter", "estimate").rows[::97]:
         assert lossy.estimate[row["tick"]] == row["coded_state"][0]
     for row in lossy.table("receiver", "tick").rows[::97]:
         if row["tick"] < TICKS:
-            assert lossy.reference[row["tick"]] == row["reference_rad"]
+            assert lossy.reference[row["tick"]] == row["reference"][0]
     np.testing.assert_array_equal(lossy.error_coded, lossy.pitch - lossy.estimate)
 
 
@@ -100,7 +101,7 @@ def test_summary_events_and_configuration_are_there(lossy: Run) -> None:
 
 def test_plot_is_a_figure_and_a_file(lossy: Run, tmp_path: Path) -> None:
     figure = lossy.plot(tmp_path / "flight.png")
-    assert len(figure.axes) == 4
+    assert len(figure.axes) == 5
     assert (tmp_path / "flight.png").read_bytes().startswith(b"\x89PNG")
 
 

@@ -64,8 +64,8 @@ def test_floats_come_back_with_every_bit(tmp_path: Path) -> None:
     rows = [row for _, row in Recording(path).rows("tick")]
     assert [row["lateness_ms"].hex() for row in rows] == [value.hex() for value in AWKWARD_FLOATS]
     for row in rows:
-        assert [value.hex() for value in row["measured_rad"]] == [v.hex() for v in AWKWARD_FLOATS]
-        assert (row["true_rad"], row["late"], row["guard"]) == (None, True, 'odd "text" \n é')
+        assert [value.hex() for value in row["measured"]] == [v.hex() for v in AWKWARD_FLOATS]
+        assert (row["true"], row["late"], row["guard"]) == (None, True, 'odd "text" \n é')
 
 
 def test_what_is_not_finite_becomes_null(tmp_path: Path) -> None:
@@ -74,7 +74,7 @@ def test_what_is_not_finite_becomes_null(tmp_path: Path) -> None:
     with McapRecorder(path, {}) as recorder:
         recorder.write(TICK, 0, (0, [nan, 1.0, -infinity], [], False, infinity, ""))
     [(_, row)] = Recording(path).rows("tick")
-    assert (row["measured_rad"], row["true_rad"]) == ([None, 1.0, None], [])
+    assert (row["measured"], row["true"]) == ([None, 1.0, None], [])
     assert row["lateness_ms"] is None
 
 

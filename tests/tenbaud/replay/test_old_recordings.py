@@ -25,6 +25,10 @@ def test_it_opens() -> None:
     assert run.metadata["version"] == "0.1.0"
     assert len(run.table("transmitter", "tick")) == 400
     assert run.pitch[-1] == 1.717297062678292
+    # Its rows are read with the names of today.
+    assert run.table("transmitter", "tick")["measured"].shape == (400, 1)
+    assert run.table("receiver", "tick")["reference"][0].tolist() == [run.reference[5]]
+    assert run.table("receiver", "tick")["command"].shape[1] == 2
     assert run.config.timing.lead_ticks == 5
     assert run.summary["rejoins"] == 1
 

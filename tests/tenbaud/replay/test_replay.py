@@ -96,7 +96,7 @@ def test_the_command_shows_the_size_and_flies_the_file_again(tmp_path: Path) -> 
     assert run_command("replay", "run", "--save", "flight.symbols", cwd=tmp_path).code == 2
 
 
-def test_a_spoilt_symbols_file_is_refused_or_found_out(tmp_path: Path) -> None:
+def test_a_corrupted_symbols_file_is_refused_or_found_out(tmp_path: Path) -> None:
     run = flown(tmp_path / "run")
     replayed = replay(load_record(run.path))
     data = replayed.packed.data

@@ -25,13 +25,13 @@ from tenbaud.design.complete import completed
 from tenbaud.flight import transmit
 from tenbaud.studies import compiled as compiling
 from tenbaud.studies.compiled import compiled
-from tenbaud.studies.flights import CompiledPoint
+from tenbaud.studies.flights import CompiledPoint, compiled_flight
 from tenbaud.studies.plain import fly_plain
 from tenbaud.studies.schedule import Uncommon
 from transmitter.session.records import SAMPLE_CHANNEL
 
 PRESETS = (
-    *("paper-10baud", "tuned-20baud", "timed-10baud", "static-10baud", "usual-1000baud"),
+    *("paper-10baud", "tuned-20baud", "open-loop-zoom-10baud", "static-10baud", "usual-1000baud"),
     *("history-10baud", "direction", "linear"),
 )
 LINEAR = {
@@ -179,7 +179,7 @@ def uncached(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 def test_when_the_machine_code_is_read_then_nothing_is_fused() -> None:
     point = CompiledPoint(config_of("paper-10baud", CLEAN))
     point.fly(1)
-    code = "\n".join(point.machine_code())
+    code = "\n".join(compiled_flight(point.agreement.codec).inspect_asm().values())
     assert re.search(r"\bv?mul[sp]d\b", code), "this is not the machine code of the flight"
     assert re.search(r"\bv?f(n)?m(add|sub)", code) is None
 

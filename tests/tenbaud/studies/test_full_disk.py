@@ -18,7 +18,7 @@ from tests.tenbaud.studies.test_run import cluster, flown, ignore
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_when_the_disk_fills_up_then_it_is_said_and_the_same_command_goes_on(
+def test_when_the_disk_fills_up_then_it_is_reported_and_the_same_command_goes_on(
     tmp_path: Path, workers: int
 ) -> None:
     study = study_of()

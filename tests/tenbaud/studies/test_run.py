@@ -1,4 +1,4 @@
-"""Running studies: the same figures whoever flies, and nothing lost when somebody dies."""
+"""Running studies: the same figures from every runner, and nothing lost when somebody dies."""
 
 from __future__ import annotations
 
@@ -186,7 +186,7 @@ def test_when_a_cluster_loses_a_worker_in_flight_then_nothing_is_lost(tmp_path: 
 
 @contextmanager
 def cluster(address: str, folder: Path) -> Iterator[list[subprocess.Popen[bytes]]]:
-    """Within the `with` there are a real scheduler and two workers, each a process of its own."""
+    """Within the `with` there are a real scheduler and two workers, each a separate process."""
     host, _, port = address.removeprefix("tcp://").rpartition(":")
     dask = [sys.executable, "-m", "distributed.cli.dask_scheduler"]
     started: list[subprocess.Popen[bytes]] = []

@@ -40,7 +40,7 @@ def test_when_short_names_are_swept_then_the_texts_are_put_together() -> None:
 
 
 def test_when_words_have_many_symbols_then_the_rate_is_that_of_the_symbols() -> None:
-    changes = {"coder": {"kind": "words", "bits": 4}}
+    changes = {"coder": {"kind": "pcm", "bits": 4}}
     study = study_of(set=changes, grid={"rate": [10, 100]}, preset="usual-1000baud")
     settings = [(one.channel.rate_baud, one.timing.symbol_period_s) for one in study.configs]
     assert settings == [(10.0, 0.4), (100.0, 0.04)]

@@ -20,6 +20,8 @@ from tenbaud.sentences.events import event_text
 from tenbaud.telemetry.schema import TELEMETRY, ReceiverTelemetry, TransmitterTelemetry
 from tests.tenbaud.processes import Ended, finish, run, start
 
+pytestmark = pytest.mark.real_time
+
 
 class Watched:
     """Two ends and a viewer of both."""
@@ -160,10 +162,10 @@ def test_when_a_flight_is_steered_then_every_command_takes_hold_and_is_written_d
             lambda: pair.newest("transmitter").time_s > stood and pair.newest("transmitter").paused
         )
         assert pair.newest("transmitter").time_s == pytest.approx(stood + 0.3)
-        pair.send(kind="spoil", end="receiver")
+        pair.send(kind="corrupt", end="receiver")
         pair.send(kind="pause", paused=False)
         pair.wait(lambda: pair.newest("transmitter").counts["desyncs"] == 1)
-        pair.send(kind="spoil", end="transmitter", field="angle")
+        pair.send(kind="corrupt", end="transmitter", field="angle")
         pair.wait(lambda: pair.newest("transmitter").counts["rejoins"] == 2)
         pair.send(kind="impair", text="up:loss=0.5")
         pair.wait(lambda: pair.newest("transmitter").counts["erasures"] > 5)
@@ -182,9 +184,9 @@ def test_when_a_flight_is_steered_then_every_command_takes_hold_and_is_written_d
     down = controls(tmp_path / "lower" / "receiver.mcap")
     assert [text.split(": ")[1].split()[0] for text in down] == ["set-point", "one"]
     ticks = [row for _, row in Recording(tmp_path / "lower" / "receiver.mcap").rows("tick")]
-    steered = next(row["tick"] for row in ticks if row["reference_rad"] == 0.25)
+    steered = next(row["tick"] for row in ticks if row["reference"] == [0.25])
     assert f"before sample {steered // 10}:" in down[0]
-    assert all(row["reference_rad"] == 0.25 for row in ticks if row["tick"] >= steered)
+    assert all(row["reference"] == [0.25] for row in ticks if row["tick"] >= steered)
 
 
 def test_when_control_is_not_allowed_then_commands_do_nothing(tmp_path: Path) -> None:
@@ -193,7 +195,7 @@ def test_when_control_is_not_allowed_then_commands_do_nothing(tmp_path: Path) ->
         pair.wait(lambda: pair.newest("transmitter") and pair.newest("transmitter").time_s > 0.5)
         for command in ({"kind": "set_point", "angle_rad": 0.1}, {"kind": "pause", "paused": True}):
             pair.send(**command)
-        pair.send(kind="spoil", end="receiver", field="range")
+        pair.send(kind="corrupt", end="receiver", field="range")
         upper, lower = pair.ended()
     assert (upper.code, lower.code) == (0, 0)
     assert upper.summary["desyncs"] == 0

@@ -1,4 +1,4 @@
-"""Commands to a running flight that it cannot obey: told, and nothing else."""
+"""Commands to a running flight that it cannot obey: reported, without effect."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
 
 
 @pytest.mark.parametrize("end", ["transmitter", "receiver"])
-def test_when_a_field_is_to_be_spoilt_that_the_codec_lacks_then_it_is_told_and_the_flight_goes_on(
+def test_when_a_field_to_corrupt_is_missing_then_it_is_reported_and_the_flight_goes_on(
     end: str,
 ) -> None:
     config = load_config("static-10baud", None, {"duration_s": 2.0})
@@ -31,8 +31,8 @@ def test_when_a_field_is_to_be_spoilt_that_the_codec_lacks_then_it_is_told_and_t
     queues = (CommandQueue(), CommandQueue())
     for queue in queues:
         # The static coder has no state, hence no range.
-        queue.offer(json.dumps({"kind": "spoil", "end": end, "field": "range"}).encode())
-    run.node.at_tick = LiveTransmitter(run, queues[0], lambda: False).at_tick
+        queue.offer(json.dumps({"kind": "corrupt", "end": end, "field": "range"}).encode())
+    run.node.before_every_tick(LiveTransmitter(run, queues[0], lambda: False).at_tick)
     live = LiveReceiver(endpoint, queues[1], lambda: False, MemoryRecorder(), None, "")
     assert not live()
     outcome = transmit.fly_virtual(run, endpoint, lambda: False)

@@ -1,4 +1,4 @@
-"""Where an end listens: a private socket, nothing beside an exposed link, or as told."""
+"""Where an end listens: a private socket, nothing beside an exposed link, or as set."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_by_itself_an_end_listens_where_only_its_user_may_enter() -> None:
 
 
 @pytest.mark.parametrize(
-    ("wish", "addresses", "insecure", "listens"),
+    ("requested", "addresses", "insecure", "listens"),
     [
         ("", ("tcp/192.0.2.1:7447",), True, False),
         ("", ("tls/192.0.2.1:7447",), False, True),
@@ -51,9 +51,9 @@ def test_by_itself_an_end_listens_where_only_its_user_may_enter() -> None:
     ],
 )
 def test_beside_an_insecure_link_that_leaves_the_machine_it_is_off_unless_asked_for(
-    wish: str, addresses: tuple[str, ...], insecure: bool, listens: bool
+    requested: str, addresses: tuple[str, ...], insecure: bool, listens: bool
 ) -> None:
-    endpoint = place.endpoint_for(wish, "transmitter", addresses, insecure)
+    endpoint = place.endpoint_for(requested, "transmitter", addresses, insecure)
     assert (endpoint is not None) is listens
 
 

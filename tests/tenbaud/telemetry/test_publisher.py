@@ -12,11 +12,13 @@ from tenbaud.telemetry.publisher import Publisher
 
 
 class Counting:
-    skipped = 0
-
     def __init__(self) -> None:
+        self.skipped = 0
         self.number = 0
         self.watched = False
+
+    def skip(self, messages: int) -> None:
+        self.skipped += messages
 
     def watch(self, watched: bool) -> None:
         self.watched = watched

@@ -39,7 +39,7 @@ def test_commands_are_taken_in_order() -> None:
         b'{"kind":"set_point","angle_rad":0.1,"more":1}',
         b'{"kind":"impair","text":"loss=2"}',
         b'{"kind":"impair","text":"skew=200ppm"}',
-        b'{"kind":"spoil","end":"transmitter","field":"model.0"}',
+        b'{"kind":"corrupt","end":"transmitter","field":"model.0"}',
         b'{"kind":"pace","factor":0}',
     ],
 )

@@ -46,8 +46,8 @@ def test_each_printed_address_opens_the_page_and_one_of_them_has_no_controls(pag
     assert everything(page.port, look_path, look_cookie) == OPEN
     whole = ask(page.port, path, Cookie=cookie).text
     look = ask(page.port, look_path, Cookie=look_cookie).text
-    assert "for looking only" in look
-    for part in ("Spoil the sensor", "Bits lost", '"type":"click"', '"type":"change"'):
+    assert "view-only" in look
+    for part in ("Corrupt the sensor's codec", "Bits lost", '"type":"click"', '"type":"change"'):
         assert part in whole, part
         assert part not in look, part
     # The secret for looking opens nothing at the path of the one that steers.
@@ -180,7 +180,7 @@ def test_with_view_only_no_address_steers(tmp_path: Path) -> None:
     with served(tmp_path, "view", "--port", "0", "--view-only", "--connect", nowhere) as one:
         assert one.look_url == ""
         path, cookie = enter(one.port, key_of(one.url))
-        assert "for looking only" in ask(one.port, path, Cookie=cookie).text
+        assert "view-only" in ask(one.port, path, Cookie=cookie).text
 
 
 @pytest.mark.skipif(NOT_ROOT, reason="only root can become another user")

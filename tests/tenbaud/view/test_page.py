@@ -15,7 +15,10 @@ import pytest
 from benchmarks.browser import Served, browser, served, state_is, why_no_browser
 from tenbaud.telemetry.schema import TELEMETRY
 
-pytestmark = pytest.mark.skipif(why_no_browser() is not None, reason=str(why_no_browser()))
+pytestmark = [
+    pytest.mark.real_time,
+    pytest.mark.skipif(why_no_browser() is not None, reason=str(why_no_browser())),
+]
 
 FLIGHT = ("--preset", "tuned-10baud", "--mismatch", "0.1")
 
@@ -45,7 +48,7 @@ def page(chromium: Any, flight: Served) -> Iterator[Any]:
     page.on("websocket", lambda socket: page.asked.append(socket.url))
     page.goto(flight.url)
     state_is(page, "lockstep")
-    page.get_by_role("button", name="Spoil the sensor").wait_for()
+    page.get_by_role("button", name="Corrupt the sensor's codec").wait_for()
     yield page
     assert page.told == []
     context.close()
@@ -100,13 +103,13 @@ def test_the_set_point_steers_the_flight_from_the_keyboard_alone(page: Any) -> N
     page.get_by_role("button", name="25", exact=True).click()
     wait(page, f"() => Math.abs({NUMBER.format('pitch')} - 20) < 4")
     page.get_by_role("button", name="1", exact=True).click()
-    page.get_by_role("button", name="Follow the programme").click()
+    page.get_by_role("button", name="Follow the reference").click()
     page.get_by_text("follow the reference").first.wait_for()
 
 
-def test_a_spoilt_end_turns_the_light_and_the_flight_recovers(page: Any) -> None:
+def test_a_corrupted_end_turns_the_light_and_the_flight_recovers(page: Any) -> None:
     before = page.locator("#f-rejoins").inner_text()
-    for name in ("Spoil the sensor", "Spoil the controller"):
+    for name in ("Corrupt the sensor's codec", "Corrupt the controller's codec"):
         page.get_by_role("button", name=name).click()
         state_is(page, "broken")
         up, down = (page.locator(f"#digest-{way}").inner_text() for way in ("up", "down"))
@@ -121,7 +124,7 @@ def test_a_spoilt_end_turns_the_light_and_the_flight_recovers(page: Any) -> None
 
 def test_the_clock_stands_still_steps_and_goes_on(page: Any) -> None:
     page.get_by_role("button", name="Pause").click()
-    page.get_by_role("button", name="Go on").wait_for()
+    page.get_by_role("button", name="Resume").wait_for()
     page.wait_for_timeout(500.0)
     stood = number(page, "#f-time")
     page.wait_for_timeout(1200.0)
@@ -130,11 +133,11 @@ def test_the_clock_stands_still_steps_and_goes_on(page: Any) -> None:
     page.get_by_role("button", name="Step: let one bit pass").click()
     wait(page, f"(old) => {NUMBER.format('f-time')} > old", stood)
     assert number(page, "#f-time") == pytest.approx(stood + 0.1)
-    page.get_by_role("button", name="Go on").click()
+    page.get_by_role("button", name="Resume").click()
     wait(page, f"(old) => {NUMBER.format('f-time')} > old + 0.5", stood)
 
 
-def test_a_bad_wire_is_seen_and_mended(page: Any) -> None:
+def test_a_bad_wire_is_seen_and_repaired(page: Any) -> None:
     erased = number(page, "#f-erasures")
     slider = page.get_by_role("slider", name="Bits lost")
     slider.focus()
@@ -142,7 +145,7 @@ def test_a_bad_wire_is_seen_and_mended(page: Any) -> None:
         page.keyboard.press("ArrowRight")
     wait(page, "() => document.getElementById('flight').textContent.includes('up:loss=0.5')")
     wait(page, f"(old) => {NUMBER.format('f-erasures')} > old + 2", erased)
-    page.get_by_role("button", name="Mend the wire").click()
+    page.get_by_role("button", name="Repair the line").click()
     wait(page, "() => !document.getElementById('flight').textContent.includes('impaired')")
     assert slider.input_value() == "0"
 
@@ -157,7 +160,7 @@ def test_a_narrow_screen_shows_everything_without_scrolling_sideways(
     page = context.new_page()
     page.goto(flight.url)
     state_is(page, "lockstep")
-    page.get_by_role("button", name="Mend the wire").wait_for()
+    page.get_by_role("button", name="Repair the line").wait_for()
     assert page.evaluate("document.documentElement.scrollWidth") <= 360
     for element in ("#helicopter", "#pitch-curve", "#tape", "#figures", ".panel >> nth=3"):
         box = page.locator(element).bounding_box()
@@ -177,8 +180,8 @@ def test_without_a_flight_it_says_so(chromium: Any, tmp_path: Path) -> None:
     with served(tmp_path, "view", "--port", "0", "--connect", nowhere) as one:
         page = chromium.new_page()
         page.goto(one.url)
-        page.get_by_text("No flight is heard").wait_for()
-        assert page.get_by_role("button", name="Spoil the sensor").is_disabled()
+        page.get_by_text("No flight found").wait_for()
+        assert page.get_by_role("button", name="Corrupt the sensor's codec").is_disabled()
         state_is(page, "waiting")
         page.close()
 
@@ -222,7 +225,7 @@ def test_when_the_flight_falls_silent_or_ends_then_it_says_so(chromium: Any, tmp
         ends = _children(one.process.pid, "transmit", "receive")
         for pid in ends:
             _signal(pid, signal.SIGSTOP)
-        page.get_by_text("what is shown is old").wait_for()
+        page.get_by_text("the page shows old values").wait_for()
         state_is(page, "silent")
         for pid in ends:
             _signal(pid, signal.SIGCONT)

@@ -18,7 +18,10 @@ from tests.tenbaud.processes import finish, start
 from tests.tenbaud.view.viewers import beside, is_free
 
 pytest.importorskip("nicegui")
-pytestmark = pytest.mark.skipif(not Path("/proc").is_dir(), reason="finds processes in /proc")
+pytestmark = [
+    pytest.mark.real_time,
+    pytest.mark.skipif(not Path("/proc").is_dir(), reason="finds processes in /proc"),
+]
 
 DURATION_S = 5
 STOPPED_S, RUNNING_S = 0.4, 0.1

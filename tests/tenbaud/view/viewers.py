@@ -1,4 +1,4 @@
-"""Finds the processes and ports of viewers, for the tests of what becomes of them."""
+"""Finds the processes and ports of viewers, for the tests of their end."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ import pytest
 from channel.codec.codec import Vector
 from channel.protocol.limits import CommandLimits
 from transmitter.guard import Guard, GuardSettings
-from transmitter.loops.ramp_down import Landing
+from transmitter.loops.real import RampDown
 
 TICK_NS = 10_000_000
 RAMP_TICKS = 50
@@ -33,12 +33,12 @@ def node(ramps_down: bool, volts: Vector = (4.0, -2.0)) -> Any:
 
 def test_a_real_rig_goes_down_along_the_ramp_one_step_a_tick() -> None:
     one = node(ramps_down=True)
-    landing = Landing(one, 100)
+    ramp_down = RampDown(one, 100)
     now_ns = 100 * TICK_NS
-    while not landing.over:
-        assert landing.next_ns == now_ns
-        landing.step(now_ns - 1)
-        landing.step(now_ns)
+    while not ramp_down.over:
+        assert ramp_down.next_ns == now_ns
+        ramp_down.step(now_ns - 1)
+        ramp_down.step(now_ns)
         now_ns += TICK_NS
     assert len(one.written) == RAMP_TICKS
     fronts = [front for front, _ in one.written]
@@ -49,17 +49,17 @@ def test_a_real_rig_goes_down_along_the_ramp_one_step_a_tick() -> None:
 
 def test_a_simulated_rig_is_left_as_it_is() -> None:
     one = node(ramps_down=False)
-    landing = Landing(one, 100)
-    landing.step(10**12)
-    assert landing.over
+    ramp_down = RampDown(one, 100)
+    ramp_down.step(10**12)
+    assert ramp_down.over
     assert one.written == []
     assert not one.guard.stopped
 
 
 def test_ticks_that_were_missed_are_not_made_up_for() -> None:
     one = node(ramps_down=True)
-    landing = Landing(one, 100)
-    landing.step(150 * TICK_NS)
-    landing.step(150 * TICK_NS)
+    ramp_down = RampDown(one, 100)
+    ramp_down.step(150 * TICK_NS)
+    ramp_down.step(150 * TICK_NS)
     assert len(one.written) == 1
-    assert landing.next_ns == 151 * TICK_NS
+    assert ramp_down.next_ns == 151 * TICK_NS

@@ -68,7 +68,7 @@ def endpoint() -> ReceiverEndpoint:
 
 
 class Service:
-    """The receiver's driver in a thread of its own; what it raised is kept."""
+    """The receiver's driver in a separate thread; what it raised is kept."""
 
     def __init__(self, end: ReceiverEndpoint, link: MemoryLink, **options: Any) -> None:
         self.error: Exception | None = None
@@ -153,7 +153,7 @@ def test_when_no_transmitter_comes_then_the_service_ends_with_link_lost() -> Non
         serve(endpoint(), far, peer_timeout_s=0.01)
 
 
-def test_when_a_service_is_told_to_stop_then_it_returns() -> None:
+def test_when_a_service_is_stopped_then_it_returns() -> None:
     _, far = memory_pair()
     serve(endpoint(), far, peer_timeout_s=5.0, should_stop=lambda: True)
 

@@ -119,7 +119,7 @@ def test_the_board_keeps_to_its_own_limit(board: Board) -> None:
     assert board.pwm == (106, 106)
 
 
-def test_the_watchdog_cuts_and_stays_cut_until_told_that_the_motors_are_off(board: Board) -> None:
+def test_the_watchdog_cuts_and_stays_cut_until_it_hears_that_the_motors_are_off(board: Board) -> None:
     on = CobsFormat().command(1, (3.0, 3.0), True)
     board.hear(on)
     board.pass_time(WATCHDOG_US - 5_000)
@@ -155,7 +155,7 @@ def test_damaged_commands_neither_turn_motors_nor_feed_the_watchdog(board: Board
     assert board.pwm == (64, 64), "and it is in step again at the next whole frame"
 
 
-def test_an_open_emergency_stop_cuts_and_is_told(board: Board) -> None:
+def test_an_open_emergency_stop_cuts_and_is_reported(board: Board) -> None:
     board.hear(CobsFormat().command(1, (3.0, 3.0), True))
     board.ask(f"P {ESTOP_PIN} 1")
     sample = board.pass_time(5_000)[-1]

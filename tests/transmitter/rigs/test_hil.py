@@ -10,8 +10,8 @@ import pytest
 
 from tenbaud.build.rig import build_device
 from tests.transmitter.rigs.emulated import PATIENCE_S, fly, rig_config, wait_until
+from transmitter.rigs.base import RigError
 from transmitter.rigs.device import DeviceRig
-from transmitter.rigs.errors import RigError
 from transmitter.rigs.fake_hil import FakeHIL
 
 

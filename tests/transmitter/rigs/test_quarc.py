@@ -13,8 +13,8 @@ import pytest
 
 from tenbaud.build.rig import build_device
 from tests.transmitter.rigs.emulated import PATIENCE_S, emulated, fly, rig_config, wait_until
+from transmitter.rigs.base import RigError
 from transmitter.rigs.device import DeviceRig
-from transmitter.rigs.errors import RigError
 
 FIELDS = ["seq", "travel", "pitch", "elevation"]
 

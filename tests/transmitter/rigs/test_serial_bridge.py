@@ -14,8 +14,8 @@ import serial
 import serial.rfc2217
 
 from tests.transmitter.rigs.emulated import emulated, fly, serial_rig, wait_until
+from transmitter.rigs.base import RigError
 from transmitter.rigs.emulator.loop import RigEmulator
-from transmitter.rigs.errors import RigError
 
 OFF = [0.0, 0.0]
 
@@ -87,7 +87,7 @@ def test_without_output_not_one_byte_is_sent() -> None:
 
 def test_bytes_that_are_lost_cost_samples_and_nothing_else() -> None:
     with (
-        emulated("cobs", faults=("drop=0.005",)) as emulator,
+        emulated("cobs", faults=("drop=0.005",), watchdog_s=3.0) as emulator,
         serial_rig(emulator.line.address) as rig,
     ):
         assert fly(rig, 2.0) is None
@@ -113,7 +113,7 @@ def test_a_hard_fault_turns_the_outputs_off_at_once_for_good(fault: str, text: s
         assert emulator.device.counts["watchdog_trips"] == 0
 
 
-def test_silence_is_told_and_is_no_hard_fault() -> None:
+def test_silence_is_reported_and_is_no_hard_fault() -> None:
     with (
         emulated("cobs", faults=("mute@0.3",)) as emulator,
         serial_rig(emulator.line.address) as rig,
@@ -138,7 +138,7 @@ def test_a_device_that_hears_nothing_trips_its_watchdog_and_says_so() -> None:
             assert fly(again, 0.2) is None, "opening it anew clears the latch"
 
 
-def test_unplugging_is_told_and_plugging_in_again_is_noticed(tmp_path: Path) -> None:
+def test_unplugging_is_reported_and_plugging_in_again_is_noticed(tmp_path: Path) -> None:
     link = str(tmp_path / "rig")
     with (
         emulated("cobs", f"pty:{link}", faults=("unplug@0.3..1.0",)) as emulator,
@@ -233,7 +233,7 @@ def test_a_port_that_is_not_there_says_what_to_do() -> None:
         serial_rig("/dev/ttyNOTHING").open()
 
 
-def test_the_wrong_format_is_told_with_what_came() -> None:
+def test_the_wrong_format_is_reported_with_what_came() -> None:
     with emulated("ascii") as emulator:
         rig = serial_rig(emulator.line.address, "cobs", bridge={"first_sample_timeout_s": 0.5})
         with pytest.raises(RigError, match="no valid sample"):
@@ -241,7 +241,7 @@ def test_the_wrong_format_is_told_with_what_came() -> None:
         assert emulator.device.counts["commands"] == 0
 
 
-def test_fewer_channels_than_axes_are_told() -> None:
+def test_fewer_channels_than_axes_are_reported() -> None:
     bridge = {"first_sample_timeout_s": 0.5, "elevation": {"channel": 3}}
     with emulated("cobs") as emulator:
         with pytest.raises(RigError, match=r"bridge\.axes"):

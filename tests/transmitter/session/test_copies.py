@@ -152,14 +152,14 @@ def test_when_an_erasure_is_heard_of_before_its_sample_was_sent_then_the_sample_
 @pytest.mark.parametrize("lead", [0, 3, 5, 13])
 def test_when_samples_are_confirmed_then_live_states_belong_to_their_own_ticks(lead: int) -> None:
     pair, sent, echoed = copies(lead), words(), commands()
-    believed: list[Vector | None] = [None] * lead
+    predicted: list[Vector | None] = [None] * lead
     given: list[Vector | None] = []
     for sample in range(SAMPLES):
         pair.sent(sent[sample])
         done = pair.confirm(sent[sample], echoed[sample], 0)
-        believed += done.flown.live
+        predicted += done.flown.live
         given += done.live
         assert len(done.live) == 5
         if lead == 0:
             assert done.live == done.flown.coded
-    assert given == believed[: len(given)]
+    assert given == predicted[: len(given)]

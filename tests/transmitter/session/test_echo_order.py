@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 
 from channel.protocol.frames import Echo
-from transmitter.session.echo_order import EchoOrder
+from transmitter.session.copies import EchoOrder
 
 REPEATS = 2
 

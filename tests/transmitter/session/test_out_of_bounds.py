@@ -13,7 +13,7 @@ from channel.protocol.events import ASKED
 from channel.protocol.frames import Echo, Hello, Refuse, Welcome, Why
 from channel.protocol.wire import encode
 from tests.transmitter.session.test_session import INCARNATION, SESSION, Far, flying, frame, transmitter
-from transmitter.session.rejoin import REFUSALS_BELIEVED
+from transmitter.session.rejoin import REFUSALS_ACCEPTED
 from transmitter.session.session import Phase, TransmitterSession
 
 
@@ -25,7 +25,7 @@ def rejoining() -> TransmitterSession:
 
 
 @pytest.mark.parametrize("value", [1e36, -1e300, 5e4, math.nan])
-def test_when_an_answer_brings_a_state_that_is_none_then_it_is_dropped_and_the_next_taken(
+def test_when_an_answer_brings_an_invalid_state_then_it_is_dropped_and_the_next_taken(
     value: float,
 ) -> None:
     session = rejoining()
@@ -68,12 +68,12 @@ def test_when_the_digest_does_not_agree_then_the_commands_move_no_motor() -> Non
 
 def test_when_a_flight_is_refused_then_it_ends_at_the_third_refusal_of_a_request() -> None:
     session = rejoining()
-    for _ in range(REFUSALS_BELIEVED - 1):
+    for _ in range(REFUSALS_ACCEPTED - 1):
         assert session.on_frame(Refuse(INCARNATION, Ending.MISMATCH, "no", "")) == []
     assert session.phase is Phase.REJOINING
     session.on_frame(Welcome(SESSION, 4, 101, INCARNATION, 1))
     session.rejoin(Why.GUARD, ASKED)
-    for _ in range(REFUSALS_BELIEVED - 1):
+    for _ in range(REFUSALS_ACCEPTED - 1):
         session.on_frame(Refuse(INCARNATION, Ending.MISMATCH, "no", ""))
     assert session.phase is Phase.REJOINING
     session.on_frame(Refuse(INCARNATION, Ending.MISMATCH, "no", ""))

@@ -8,7 +8,7 @@ from transmitter.session.owing import PAUSES_MAX, Owing
 
 LEAD, PER_SAMPLE = 60, 10
 LATEST = LEAD + PER_SAMPLE
-"""A healthy epoch begins at most so many ticks after the sample that follows its answer."""
+"""A healthy epoch begins at most this many ticks after the sample that follows its answer."""
 
 
 def owing() -> Owing:

@@ -51,7 +51,7 @@ def flying(**changes: Any) -> TransmitterSession:
 
 
 class Far:
-    """A receiver that takes what it is told, to make echoes with right digests."""
+    """A receiver that consumes given words, to make echoes with right digests."""
 
     def __init__(self) -> None:
         self.state: CodecState = CODEC.initial()
@@ -326,7 +326,7 @@ def test_when_a_word_is_echoed_that_was_never_sent_then_it_is_dropped() -> None:
     assert session.copies.confirmed == CODEC.initial()
 
 
-def test_when_the_digests_differ_and_it_is_told_to_stop_then_it_reports_and_ends() -> None:
+def test_when_the_digests_differ_and_it_is_set_to_stop_then_it_reports_and_ends() -> None:
     session, far = flying(stop_on_desync=True), Far()
     session.on_measurement(0, (1.0,))
     echo = far.echo()
@@ -369,7 +369,7 @@ def test_when_either_side_says_bye_then_the_session_ends_once() -> None:
     assert session.end == end
 
 
-def test_when_it_says_bye_in_flight_then_the_receiver_is_told() -> None:
+def test_when_it_says_bye_in_flight_then_the_receiver_is_informed() -> None:
     assert flying().bye(End(Ending.OVER, "landed")) == [Bye(SESSION, Ending.OVER, "landed")]
     assert transmitter().bye(End(Ending.OVER, "never flew")) == []
 

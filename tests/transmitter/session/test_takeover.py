@@ -64,7 +64,7 @@ def test_when_a_second_receiver_welcomes_then_its_answer_is_nobodys() -> None:
     assert node.session.session_number == SESSION
 
 
-def test_when_commands_have_stopped_then_a_receiver_that_was_started_again_is_believed() -> None:
+def test_when_commands_have_stopped_then_a_receiver_that_was_started_again_is_accepted() -> None:
     node = flying()
     for tick in range(50, 70):
         node.measure(tick)
@@ -88,7 +88,7 @@ def test_when_the_session_or_epoch_is_another_then_nothing_happens(frame: Frame)
 # Taking over on purpose
 
 
-def test_when_a_receiver_takes_over_then_only_its_answer_counts_and_the_old_one_is_told() -> None:
+def test_when_a_receiver_takes_over_then_only_its_answer_counts_and_the_old_one_is_informed() -> None:
     node = flying()
     hello = request_of(node.deliver(Claim(SESSION, 0, OTHER)))
     assert hello.why is Why.TAKEN_OVER

@@ -1,8 +1,8 @@
 """An emulated device without its line: body, encoders, outputs, watchdog.
 
 It behaves like a board beside a real body. The body rests until the motors are first enabled, then
-moves in real time whoever listens. The outputs are cut when no command comes for the watchdog's time,
-and stay cut until a command says that the motors are off: arming again is on purpose.
+moves in real time, with or without a listener. The outputs are cut when no command comes for the
+watchdog's time, and stay cut until a command says that the motors are off: arming again is on purpose.
 """
 
 from __future__ import annotations

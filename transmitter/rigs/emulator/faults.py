@@ -34,7 +34,7 @@ class Fault:
 
 
 class Faults:
-    """What was asked for; ValueError, with the grammar, for what cannot be."""
+    """The faults of a text; ValueError, with the grammar, for an impossible one."""
 
     def __init__(self, texts: tuple[str, ...] = (), seed: int = 1) -> None:
         self.drop_share = 0.0

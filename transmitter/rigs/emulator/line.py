@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Protocol
 
 from channel.links.serial.pseudo_terminal import PseudoTerminal
-from transmitter.rigs.errors import RigError
+from transmitter.rigs.base import RigError
 
 READ_BYTES = 4096
 
@@ -37,11 +37,10 @@ class DeviceLine(Protocol):
         """Send; return whether it went out whole."""
 
 
-class PtyLine(PseudoTerminal):
-    """A pseudo-terminal; `link` names it all the same after every plugging in."""
+class _Handled:
+    """What a file handle of the system's carries; -1 while the line is unplugged."""
 
-    def __init__(self, link: str = "") -> None:
-        super().__init__(Path(link) if link else None)
+    handle = -1
 
     def wait(self, timeout_s: float) -> None:
         """Wait for bytes."""
@@ -49,23 +48,32 @@ class PtyLine(PseudoTerminal):
 
     def read(self) -> bytes:
         """Return what the other side wrote."""
-        return _read_fd(self.handle)
+        try:
+            return os.read(self.handle, READ_BYTES) if self.handle >= 0 else b""
+        except OSError:
+            return b""
 
     def write(self, data: bytes) -> bool:
-        """Write as much as its buffer holds."""
+        """Write as much as the buffer holds."""
         try:
             return self.handle >= 0 and os.write(self.handle, data) == len(data)
         except OSError:
             return False
 
 
-class SerialLine:
+class PtyLine(PseudoTerminal, _Handled):
+    """A pseudo-terminal; `link` names it all the same after every plugging in."""
+
+    def __init__(self, link: str = "") -> None:
+        super().__init__(Path(link) if link else None)
+
+
+class SerialLine(_Handled):
     """A real serial port: the other computer is at the end of a crossed cable."""
 
     def __init__(self, device: str, line_baud: int) -> None:
         self.address = device
         self._line_baud = line_baud
-        self._handle = -1
 
     def plug(self) -> None:
         """Open the port."""
@@ -75,28 +83,13 @@ class SerialLine:
             self._port = serial.Serial(self.address, self._line_baud, timeout=0, exclusive=True)
         except (serial.SerialException, OSError) as error:
             raise RigError(f"{self.address} cannot be opened: {error}") from error
-        self._handle = self._port.fileno()
-        os.set_blocking(self._handle, False)
+        self.handle = self._port.fileno()
+        os.set_blocking(self.handle, False)
 
     def unplug(self) -> None:
         """Close it."""
-        self._handle = -1
+        self.handle = -1
         self._port.close()
-
-    def wait(self, timeout_s: float) -> None:
-        """Wait for bytes."""
-        _wait(self._handle, timeout_s)
-
-    def read(self) -> bytes:
-        """Return what has come."""
-        return _read_fd(self._handle)
-
-    def write(self, data: bytes) -> bool:
-        """Write as much as the driver takes."""
-        try:
-            return self._handle >= 0 and os.write(self._handle, data) == len(data)
-        except OSError:
-            return False
 
 
 class TcpLine:
@@ -197,7 +190,7 @@ class TcpLine:
 
 
 def parse_line(text: str, line_baud: int) -> PtyLine | SerialLine | TcpLine:
-    """Return the line that a command line names; ValueError for one that is none."""
+    """Return the line that a command line names; ValueError for an invalid one."""
     kind, _, rest = text.partition(":")
     if kind == "pty":
         return PtyLine(rest)
@@ -214,10 +207,3 @@ def parse_line(text: str, line_baud: int) -> PtyLine | SerialLine | TcpLine:
 def _wait(handle: int, timeout_s: float) -> None:
     handles = [handle] if handle >= 0 else []
     select.select(handles, [], [], max(0.0, timeout_s))
-
-
-def _read_fd(handle: int) -> bytes:
-    try:
-        return os.read(handle, READ_BYTES) if handle >= 0 else b""
-    except OSError:
-        return b""

@@ -1,4 +1,4 @@
-"""The emulated device in real time: samples on a grid of its own, commands as they come."""
+"""The emulated device in real time: samples on a separate grid, commands as they come."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class RigEmulator:
         self._plugged = True
 
     def run(self, should_stop: Callable[[], bool]) -> None:
-        """Behave like the device until told to stop; the line is plugged in by the caller."""
+        """Behave like the device until stopped; the line is plugged in by the caller."""
         due_ns = time.monotonic_ns()
         while not should_stop():
             now_ns = time.monotonic_ns()

@@ -55,7 +55,7 @@ class CobsSpeech:
 
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
-        self._cutter = Cutter(0, COMMAND_BYTES_MAX)
+        self._cutter = Cutter(b"\0", COMMAND_BYTES_MAX)
 
     def encode(self, sample: RawSample) -> bytes:
         """Return a SAMPLE frame."""

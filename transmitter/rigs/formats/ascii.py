@@ -1,7 +1,7 @@
 """Lines of text: what a lab's sketch prints already, or nearly.
 
 A sample is one line, ended by LF or CR LF, with decimal columns between commas, spaces or tabs; which
-column is what comes from the configuration. A line that begins with `E,` has a form of its own, with a
+column is what comes from the configuration. A line that begins with `E,` has a separate form, with a
 sequence and a checksum: `E,seq,t_us,c0,c1,c2*HH`, `HH` being the exclusive or of all characters
 before `*` in hexadecimal. Lines that begin with `#` are the device's log.
 
@@ -12,11 +12,11 @@ asked with `e` and a carriage return and takes raw pulse widths, commands are `o
 from __future__ import annotations
 
 import re
-from collections import Counter
 from typing import Literal
 
-from transmitter.rigs.formats.framing import Cutter, xor_checksum
-from transmitter.rigs.formats.samples import RawSample, Wraps
+from transmitter.rigs.formats.base import SerialFormat
+from transmitter.rigs.formats.framing import xor_checksum
+from transmitter.rigs.formats.samples import RawSample
 
 LINE_BYTES_MAX = 200
 COLUMN = re.compile(r"c\d|t_us|seq|-")
@@ -29,7 +29,7 @@ _SEPARATOR = re.compile(rb"[,\s]+")
 CommandStyle = Literal["checked", "pulse"]
 
 
-class AsciiFormat:
+class AsciiFormat(SerialFormat):
     """This end of the text format.
 
     `columns` name what a plain line holds: `t_us`, `seq`, `c0` ... `c9` (or `travel`, `pitch`,
@@ -38,9 +38,6 @@ class AsciiFormat:
     """
 
     name = "ascii"
-    wraps = Wraps()
-    greeting = b""
-    has_output = True
 
     def __init__(
         self,
@@ -49,32 +46,11 @@ class AsciiFormat:
         command_style: CommandStyle = "checked",
         pulse_full_volts: float = 12.0,
     ) -> None:
-        self.counts: Counter[str] = Counter()
+        super().__init__(b"\n", LINE_BYTES_MAX)
         self.poll = poll.encode()
         self._columns = _channels(columns)
         self._command_style = command_style
         self._pulse_full_volts = pulse_full_volts
-        self._cutter = Cutter(ord("\n"), LINE_BYTES_MAX)
-
-    def reset(self) -> None:
-        """Wait for the next end of a line."""
-        self._cutter.reset()
-
-    def feed(self, data: bytes) -> list[RawSample]:
-        """Return the samples in these bytes."""
-        samples = []
-        for line in self._cutter.feed(data):
-            text = line.strip()
-            if not text or text == b"OK":
-                continue
-            if text.startswith(b"#"):
-                self.counts["log_lines"] += 1
-                continue
-            try:
-                samples.append(self._parse(text))
-            except ValueError:
-                self.counts["bad_frames"] += 1
-        return samples
 
     def command(self, sequence: int, volts: tuple[float, ...], enable: bool) -> bytes:
         """Return a command line."""
@@ -88,7 +64,13 @@ class AsciiFormat:
         fields = ["U", str(sequence & 0xFFFF), *(f"{value:.4f}" for value in volts)]
         return checked(",".join(fields).encode())
 
-    def _parse(self, text: bytes) -> RawSample:
+    def _sample(self, piece: bytes) -> RawSample | None:
+        text = piece.strip()
+        if not text or text == b"OK":
+            return None
+        if text.startswith(b"#"):
+            self.counts["log_lines"] += 1
+            return None
         columns = self._columns
         if text.startswith(b"E,"):
             text, columns = unchecked(text)[2:], CHECKED_COLUMNS

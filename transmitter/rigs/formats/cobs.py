@@ -9,11 +9,11 @@ Little-endian; the CRC-16/CCITT-FALSE of the payload follows it, low byte first;
 from __future__ import annotations
 
 import struct
-from collections import Counter
 
 from channel.links.serial.cobs import cobs_decode, cobs_encode
-from transmitter.rigs.formats.framing import Cutter, crc16
-from transmitter.rigs.formats.samples import DeviceFlag, RawSample, Wraps
+from transmitter.rigs.formats.base import SerialFormat
+from transmitter.rigs.formats.framing import crc16
+from transmitter.rigs.formats.samples import DeviceFlag, RawSample
 
 SAMPLE_TYPE = 0x01
 COMMAND_TYPE = 0x81
@@ -40,43 +40,26 @@ def unseal(piece: bytes) -> bytes:
     return payload
 
 
-class CobsFormat:
+class CobsFormat(SerialFormat):
     """This end of the binary format."""
 
     name = "cobs"
-    wraps = Wraps()
-    greeting = b""
-    poll = b""
-    has_output = True
 
     def __init__(self) -> None:
-        self.counts: Counter[str] = Counter()
-        self._cutter = Cutter(0, FRAME_BYTES_MAX)
-
-    def reset(self) -> None:
-        """Wait for the next zero."""
-        self._cutter.reset()
-
-    def feed(self, data: bytes) -> list[RawSample]:
-        """Return the samples in these bytes."""
-        samples = []
-        for piece in self._cutter.feed(data):
-            if not piece:
-                continue
-            try:
-                payload = unseal(piece)
-            except ValueError:
-                self.counts["bad_frames"] += 1
-                continue
-            if payload[0] != SAMPLE_TYPE or len(payload) != SAMPLE.size:
-                self.counts["foreign"] += 1
-                continue
-            _, flags, sequence, time_us, *counts = SAMPLE.unpack(payload)
-            # Bits that a later firmware may use are not ours to judge.
-            samples.append(RawSample(tuple(counts), sequence, time_us, DeviceFlag(flags & 0x0F)))
-        return samples
+        super().__init__(b"\0", FRAME_BYTES_MAX)
 
     def command(self, sequence: int, volts: tuple[float, ...], enable: bool) -> bytes:
         """Return a COMMAND frame."""
         flags = ENABLE if enable else 0
         return seal(COMMAND.pack(COMMAND_TYPE, flags, sequence & 0xFFFF, *volts))
+
+    def _sample(self, piece: bytes) -> RawSample | None:
+        if not piece:
+            return None
+        payload = unseal(piece)
+        if payload[0] != SAMPLE_TYPE or len(payload) != SAMPLE.size:
+            self.counts["foreign"] += 1
+            return None
+        _, flags, sequence, time_us, *counts = SAMPLE.unpack(payload)
+        # Bits that a later firmware may use are not ours to judge.
+        return RawSample(tuple(counts), sequence, time_us, DeviceFlag(flags & 0x0F))

@@ -27,8 +27,8 @@ class Cutter:
     memory; `overlong` counts them.
     """
 
-    def __init__(self, delimiter: int, bytes_max: int) -> None:
-        self._delimiter = bytes([delimiter])
+    def __init__(self, delimiter: bytes, bytes_max: int) -> None:
+        self._delimiter = delimiter
         self._bytes_max = bytes_max
         self._rest = bytearray()
         self._synchronised = False

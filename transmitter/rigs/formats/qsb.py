@@ -11,9 +11,8 @@ device's stamp (about 1.95 ms a step) is used for gaps in time alone.
 from __future__ import annotations
 
 import re
-from collections import Counter
 
-from transmitter.rigs.formats.framing import Cutter
+from transmitter.rigs.formats.base import SerialFormat
 from transmitter.rigs.formats.samples import RawSample, Wraps
 
 LINE_BYTES_MAX = 80
@@ -27,44 +26,31 @@ GREETING = b"W000\nW0B0\nW0C0\nW157\nS0E\n"
 """Quadrature, send always, at the fastest interval, LF and CR and time stamp, then stream."""
 
 
-class QsbFormat:
+class QsbFormat(SerialFormat):
     """This end of one adapter."""
 
     name = "qsb"
     # The stamp has 32 bits; in microseconds it wraps at 2^32 steps.
     wraps = Wraps(device_us=(1 << 32) * STAMP_US)
     greeting = GREETING
-    poll = b""
     has_output = False
 
     def __init__(self) -> None:
-        self.counts: Counter[str] = Counter()
-        self._cutter = Cutter(ord("\n"), LINE_BYTES_MAX)
-
-    def reset(self) -> None:
-        """Wait for the next end of a line."""
-        self._cutter.reset()
-
-    def feed(self, data: bytes) -> list[RawSample]:
-        """Return the counts in these bytes."""
-        samples = []
-        for line in self._cutter.feed(data):
-            text = line.strip().replace(b" ", b"")
-            match = _REPLY.fullmatch(text)
-            if match is not None:
-                samples.append(_sample(match))
-            elif text and not _OTHER.fullmatch(text):
-                self.counts["bad_frames"] += 1
-        return samples
+        super().__init__(b"\n", LINE_BYTES_MAX)
 
     def command(self, sequence: int, volts: tuple[float, ...], enable: bool) -> bytes:
         """Return nothing: the adapter has no outputs."""
         return b""
 
-
-def _sample(match: re.Match[bytes]) -> RawSample:
-    counts = int(match[1], 16)
-    if counts >= 1 << 31:
-        counts -= 1 << 32
-    stamp = None if match[2] is None else int(match[2], 16) * STAMP_US
-    return RawSample((counts,), None, stamp)
+    def _sample(self, piece: bytes) -> RawSample | None:
+        text = piece.strip().replace(b" ", b"")
+        match = _REPLY.fullmatch(text)
+        if match is None:
+            if text and not _OTHER.fullmatch(text):
+                raise ValueError("neither a count nor a reply")
+            return None
+        counts = int(match[1], 16)
+        if counts >= 1 << 31:
+            counts -= 1 << 32
+        stamp = None if match[2] is None else int(match[2], 16) * STAMP_US
+        return RawSample((counts,), None, stamp)

@@ -12,7 +12,7 @@ RESTART_EXCESS_S = 60.0
 
 
 class DeviceFlag(IntFlag):
-    """What a device reports beside its counts."""
+    """A device's report beside its counts."""
 
     ESTOP_OPEN = 1
     WATCHDOG_TRIPPED = 2
@@ -49,7 +49,7 @@ class DeviceSample(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Wraps:
-    """Where a format's sequence and device time start again."""
+    """The wrap-around of a format's sequence and device time."""
 
     sequence: int = 1 << 16
     device_us: int = 1 << 32

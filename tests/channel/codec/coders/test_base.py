@@ -8,17 +8,17 @@ import pytest
 
 from channel.codec.codec import Coder
 from channel.codec.coders.base import FunctionCoder
+from channel.codec.coders.open_loop_zoom import OpenLoopZoomCoder, OpenLoopZoomParameters
+from channel.codec.coders.pcm import PcmCoder, PcmParameters
 from channel.codec.coders.static import StaticCoder, StaticParameters
-from channel.codec.coders.timed import TimedCoder, TimedParameters
-from channel.codec.coders.words import WordsCoder, WordsParameters
 from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
 from channel.codec.words import ERASED
 
 CODERS = (
     ZoomCoder(ZoomParameters(window=4)),
-    TimedCoder(TimedParameters()),
+    OpenLoopZoomCoder(OpenLoopZoomParameters()),
     StaticCoder(StaticParameters(bits=3)),
-    WordsCoder(WordsParameters(rate_filter_s=0.03)),
+    PcmCoder(PcmParameters(rate_filter_s=0.03)),
 )
 
 

@@ -83,17 +83,17 @@ def test_when_every_sequence_of_signs_is_tried_then_none_beats_the_one_that_is_b
     assert both == {(1,), (-1,)}
 
 
-def cost_of(coder, state, angle, swing, signs) -> float:  # type: ignore[no-untyped-def]
+def cost_of(coder, state, angle, rate, signs) -> float:  # type: ignore[no-untyped-def]
     """Follow one sequence of signs through `decode`, as the receiver would."""
     total = 0.0
     for sign in signs:
         correction, state = coder.decode(state, (), (sign,))
         angle -= correction[0]
-        swing -= correction[1] * 0.1
-        total += angle * angle + angle * swing + swing * swing / 3.0
-        angle += swing
+        rate -= correction[1] * 0.1
+        total += angle * angle + angle * rate + rate * rate / 3.0
+        angle += rate
     aa, ar, rr = coder.parameters.weights
-    return float(total + aa * angle * angle + 2.0 * ar * angle * swing + rr * swing * swing)
+    return float(total + aa * angle * angle + 2.0 * ar * angle * rate + rr * rate * rate)
 
 
 @pytest.mark.parametrize(

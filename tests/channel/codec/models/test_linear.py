@@ -37,7 +37,7 @@ def test_when_a_plant_is_driven_then_its_outputs_are_those_of_control(name: str)
     assert np.abs(np.array(outputs).T - expected).max() < 1e-9 * size
 
 
-def test_when_a_plant_is_discretised_then_it_can_be_told_again() -> None:
+def test_when_a_plant_is_discretised_then_the_continuous_one_can_be_found() -> None:
     for name in plant_names():
         plant = plant_of(plant_section(name), TICK_S)
         assert plant is not None

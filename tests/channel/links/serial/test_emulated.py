@@ -1,4 +1,4 @@
-"""The emulated line keeps to its rate, damages what it is told to, and comes back after unplugging."""
+"""The emulated line keeps to its rate, damages bytes as configured, and comes back after unplugging."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from channel.links.serial.emulated import EmulatedLine, Way
+from tests.channel.links.serial.noisy_line import NoisyLine
 from tests.contract.test_links import PATIENCE_S, until
 
 
@@ -48,7 +49,7 @@ def test_when_bytes_are_sent_then_they_arrive_no_faster_than_the_rate(way: Way, 
         assert read(target, len(data)) == data
         took_s = time.monotonic() - started
         # A hundred bytes of ten bits at 4800 bit/s: a real line cannot be quicker. Slower is the
-        # machine's affair.
+        # machine's task.
         assert took_s >= 100 * 10 / 4800
         assert line.carried(way) == 100
         assert line.carried("down" if way == "up" else "up") == 0
@@ -58,19 +59,20 @@ def test_when_a_share_is_damaged_then_the_same_bytes_are_with_the_same_seed(tmp_
     arrived = []
     for _ in range(2):
         with (
-            EmulatedLine(tmp_path, None, damage=0.1, seed=4) as line,
+            NoisyLine(tmp_path, None, seed=4) as line,
             opened(line.transmitter_port, line.receiver_port) as (near, far),
         ):
+            line.corrupt("up", 0.1)
             os.write(near, bytes(1000))
             arrived.append(read(far, 1000))
-            assert line.damaged("up") == sum(byte != 0 for byte in arrived[-1])
+            assert line.damaged["up"] == sum(byte != 0 for byte in arrived[-1])
     assert arrived[0] == arrived[1]
     assert 60 < sum(byte != 0 for byte in arrived[0]) < 140
 
 
 def test_when_bytes_are_injected_then_they_arrive(tmp_path: Path) -> None:
     with (
-        EmulatedLine(tmp_path, None) as line,
+        NoisyLine(tmp_path, None) as line,
         opened(line.transmitter_port, line.receiver_port) as (_, far),
     ):
         line.inject("up", b"noise")

@@ -67,7 +67,7 @@ def test_when_all_byte_values_are_decoded_then_only_the_symbols_are_symbols(
 
 
 @pytest.mark.parametrize(("size", "bits"), [(2, 2), (4, 1), (8, 1)])
-def test_when_so_many_bits_flip_then_the_byte_is_no_symbol(size: int, bits: int) -> None:
+def test_when_that_many_bits_flip_then_the_byte_is_no_symbol(size: int, bits: int) -> None:
     wire = SerialWire(size)
     for slot in range(wire.slot_modulus):
         for number in range(size):
@@ -151,6 +151,6 @@ def unstuff_content(line: bytes) -> bytes:
 @pytest.mark.parametrize(
     ("stuffed", "kind"), [(b"\x05ab", "COBS"), (b"\x04abc", "checksum"), (b"\x01", "checksum")]
 )
-def test_when_a_frame_is_damaged_then_the_kind_of_damage_is_told(stuffed: bytes, kind: str) -> None:
+def test_when_a_frame_is_damaged_then_the_kind_of_damage_is_reported(stuffed: bytes, kind: str) -> None:
     with pytest.raises(FrameError, match=kind):
         unstuff(stuffed)

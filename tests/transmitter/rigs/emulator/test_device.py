@@ -96,7 +96,7 @@ def test_a_recorded_flight_comes_again_and_stays_at_its_end() -> None:
 @pytest.mark.parametrize(
     "text", ["", "stuck", "stuck@", "stuck@5..4", "drop=2", "drop=0.1@3", "fire@1"]
 )
-def test_a_fault_that_is_none_shows_the_grammar(text: str) -> None:
+def test_an_unknown_fault_shows_the_grammar(text: str) -> None:
     with pytest.raises(ValueError, match="stuck@START"):
         Faults((text,))
 

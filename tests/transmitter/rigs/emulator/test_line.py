@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from transmitter.rigs.base import RigError
 from transmitter.rigs.emulator.line import DeviceLine, parse_line
-from transmitter.rigs.errors import RigError
 
 
 def read_all(line: DeviceLine, count: int) -> bytes:
@@ -82,6 +82,6 @@ def test_a_port_that_is_taken_is_a_clear_error() -> None:
 
 
 @pytest.mark.parametrize("text", ["", "tcp:18000", "tcp:host:http"])
-def test_a_port_that_is_none_says_what_there_is(text: str) -> None:
+def test_an_unknown_port_names_the_known_ones(text: str) -> None:
     with pytest.raises(ValueError, match="tcp:HOST:PORT"):
         parse_line(text, 0)

@@ -60,7 +60,7 @@ def test_checksums() -> None:
 
 
 def test_a_cutter_begins_at_the_first_delimiter_and_keeps_halves() -> None:
-    cutter = Cutter(0, 10)
+    cutter = Cutter(b"\0", 10)
     assert cutter.feed(b"half\0one\0tw") == [b"one"]
     assert cutter.feed(b"o\0") == [b"two"]
     cutter.reset()
@@ -68,7 +68,7 @@ def test_a_cutter_begins_at_the_first_delimiter_and_keeps_halves() -> None:
 
 
 def test_a_stream_without_delimiters_fills_no_memory() -> None:
-    cutter = Cutter(0, 10)
+    cutter = Cutter(b"\0", 10)
     for _ in range(100):
         assert cutter.feed(b"\x01" * 50) == []
     assert cutter.overlong == 100

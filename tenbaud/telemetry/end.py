@@ -25,8 +25,8 @@ from tenbaud.telemetry.tap import Tap
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
-    """What was asked for on the command line."""
+class TelemetryOptions:
+    """The telemetry options of the command line."""
 
     endpoint: str = ""
     """"" as usual, "on", "off" or a Zenoh endpoint to listen on"""
@@ -41,11 +41,11 @@ class Wish:
             endpoint_for(self.endpoint, role, (), insecure, secured)
 
 
-NO_WISH = Wish()
+DEFAULT_OPTIONS = TelemetryOptions()
 
 
 @dataclass(slots=True)
-class Station:
+class TelemetryEnd:
     """The telemetry of one end, from before its parts are built until after its flight."""
 
     agreement: Agreement
@@ -58,7 +58,7 @@ class Station:
     pace: float | None
     tap: Tap | None
     security: Security | None
-    wished: bool = False
+    requested: bool = False
     """whether this telemetry was asked for, so that a flight without it is refused"""
     publisher: Publisher | None = field(default=None)
 
@@ -68,7 +68,7 @@ class Station:
         """Return what obeys commands for this transmitter, hung into its loop where it has work."""
         live = LiveTransmitter(run, self.queue, stop, self.pace, keep_alive or (lambda: None))
         if self.queue is not None or self.pace is not None:
-            run.node.at_tick = live.at_tick
+            run.node.before_every_tick(live.at_tick)
         return live
 
     def fly_receiver(self, endpoint: ReceiverEndpoint, stop: Stop) -> LiveReceiver:
@@ -113,52 +113,52 @@ class Station:
         try:
             return TelemetryPort(self.role, name, self.endpoint, on_command, security)
         except LinkError as error:
-            if self.wished:
+            if self.requested:
                 raise
             sys.stderr.write(f"tenbaud: no telemetry: {error}\n")
             return None
 
 
-def open_station(
+def open_telemetry(
     agreement: Agreement,
     role: Role,
     recorder: Recorder,
-    wish: Wish,
+    options: TelemetryOptions,
     addresses: tuple[str, ...] = (),
     insecure: bool = False,
     security: Security | None = None,
-) -> Station:
-    """Return the telemetry of one end; without an own wish, trouble with it only means none.
+) -> TelemetryEnd:
+    """Return the telemetry of one end; unless it was asked for, an error only disables it.
 
     `addresses`, `insecure` and `security` are those of the flight's link; the viewers invited there may
     see the telemetry, and steer where the flight allows it. Raises LinkError for an endpoint that
     was asked for and cannot be used.
     """
     try:
-        endpoint = endpoint_for(wish.endpoint, role, addresses, insecure, security is not None)
+        endpoint = endpoint_for(options.endpoint, role, addresses, insecure, security is not None)
     except LinkError as error:
-        if wish.endpoint:
+        if options.endpoint:
             raise
         sys.stderr.write(f"tenbaud: no telemetry: {error}\n")
         endpoint = None
     if agreement.live and endpoint is not None and not endpoint.startswith((SOCKET, "tls/")):
         sys.stderr.write(
-            f"tenbaud: whoever reaches {endpoint} can steer this flight, every user of this machine "
+            f"tenbaud: anyone who reaches {endpoint} can steer this flight, every user of this machine "
             "included; leave --telemetry out, or use tls/, to decide who may\n"
         )
     tap = Tap(recorder) if endpoint is not None else None
     steerable = agreement.live and agreement.config.receiver.controller == "pid"
-    return Station(
+    return TelemetryEnd(
         agreement,
         role,
         tap or recorder,
         endpoint,
         CommandQueue() if agreement.live and endpoint is not None else None,
         SteeredReference(build_reference(agreement.config)) if steerable else None,
-        wish.pace if agreement.clock == "virtual" else None,
+        options.pace if agreement.clock == "virtual" else None,
         tap,
         None if security is None else _for_viewers(security, agreement.live),
-        bool(wish.endpoint),
+        bool(options.endpoint),
     )
 
 

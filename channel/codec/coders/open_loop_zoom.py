@@ -29,7 +29,7 @@ from channel.codec.words import Alphabet
 
 
 @dataclass(frozen=True, slots=True)
-class TimedParameters:
+class OpenLoopZoomParameters:
     """Constants of the range and the observer gains."""
 
     initial_range: float = 0.5
@@ -43,8 +43,8 @@ class TimedParameters:
     impulse: bool = False
 
 
-class TimedConstants(NamedTuple):
-    """What the functions below need."""
+class OpenLoopZoomConstants(NamedTuple):
+    """Constants of the functions below."""
 
     decay: float
     floor: float
@@ -52,8 +52,8 @@ class TimedConstants(NamedTuple):
     gains: Gains
 
 
-def timed_encode(
-    constants: TimedConstants,
+def open_loop_zoom_encode(
+    constants: OpenLoopZoomConstants,
     coder: Numbers,
     predicted: Numbers,
     measurement: Numbers,
@@ -63,8 +63,8 @@ def timed_encode(
     write_signs(predicted, measurement, symbols)
 
 
-def timed_decode(
-    constants: TimedConstants,
+def open_loop_zoom_decode(
+    constants: OpenLoopZoomConstants,
     coder: Numbers,
     model: Numbers,
     symbols: Symbols,
@@ -78,12 +78,12 @@ def timed_decode(
         after[axis] = constants.floor + constants.decay * coder[axis]
 
 
-class TimedCoder(FunctionCoder):
+class OpenLoopZoomCoder(FunctionCoder):
     """A sign per axis, and ranges that shrink by the clock. Coder state: the ranges."""
 
-    functions = CoderFunctions(timed_encode, timed_decode)
+    functions = CoderFunctions(open_loop_zoom_encode, open_loop_zoom_decode)
 
-    def __init__(self, parameters: TimedParameters) -> None:
+    def __init__(self, parameters: OpenLoopZoomParameters) -> None:
         axes = axes_of(parameters.gains)
         if not 0.0 < parameters.decay <= 1.0:
             raise ValueError(f"decay must be in (0, 1], got {parameters.decay}")
@@ -93,7 +93,7 @@ class TimedCoder(FunctionCoder):
         self.alphabet = Alphabet((-1, 1), axes)
         self.correction_size = len(parameters.gains)
         floor = (1.0 - parameters.decay) * parameters.minimum_range
-        self.constants = TimedConstants(parameters.decay, floor, parameters.gains)
+        self.constants = OpenLoopZoomConstants(parameters.decay, floor, parameters.gains)
 
     def initial(self) -> Vector:
         """Return `M_0` for every axis."""

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from channel.codec.codec import Codec
-from channel.codec.coders.words import WordsCoder, WordsParameters
+from channel.codec.coders.pcm import PcmCoder, PcmParameters
 from channel.codec.models.hold import HoldModel
 from channel.codec.words import ERASED
 
@@ -16,7 +16,7 @@ NOTHING = [(0.0, 0.0)]
 
 
 def codec(rate_filter_s: float = 0.0) -> Codec:
-    return Codec(HoldModel(0.01), WordsCoder(WordsParameters(rate_filter_s=rate_filter_s)), 1)
+    return Codec(HoldModel(0.01), PcmCoder(PcmParameters(rate_filter_s=rate_filter_s)), 1)
 
 
 def test_when_a_ten_bit_encoder_is_read_then_the_word_says_its_angle_exactly() -> None:
@@ -58,8 +58,8 @@ def test_when_the_differentiator_is_filtered_then_a_steady_rate_is_reached_in_it
 
 @pytest.mark.parametrize(
     "parameters",
-    [WordsParameters(bits=16), WordsParameters(range=0.0), WordsParameters(rate_filter_s=-1.0)],
+    [PcmParameters(bits=16), PcmParameters(range=0.0), PcmParameters(rate_filter_s=-1.0)],
 )
-def test_when_parameters_make_no_coder_then_they_are_refused(parameters: WordsParameters) -> None:
+def test_when_parameters_make_no_coder_then_they_are_refused(parameters: PcmParameters) -> None:
     with pytest.raises(ValueError, match="must be"):
-        WordsCoder(parameters)
+        PcmCoder(parameters)

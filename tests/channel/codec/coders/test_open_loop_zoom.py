@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from channel.codec.coders.timed import TimedCoder, TimedParameters
+from channel.codec.coders.open_loop_zoom import OpenLoopZoomCoder, OpenLoopZoomParameters
 from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
 from channel.codec.words import ERASED, Word
 
 
 @pytest.mark.parametrize("words", [[(1,)] * 30, [(-1,), (1,)] * 15, [ERASED] * 30])
 def test_when_any_words_come_then_the_range_is_that_of_the_formula(words: list[Word]) -> None:
-    coder = TimedCoder(TimedParameters(0.5, 0.05, 0.9))
+    coder = OpenLoopZoomCoder(OpenLoopZoomParameters(0.5, 0.05, 0.9))
     state = coder.initial()
     for index, word in enumerate(words):
         expected = 0.05 + (0.5 - 0.05) * 0.9**index
@@ -22,7 +22,7 @@ def test_when_any_words_come_then_the_range_is_that_of_the_formula(words: list[W
 
 
 def test_when_nothing_decays_then_the_range_stays_to_the_last_bit() -> None:
-    coder = TimedCoder(TimedParameters(0.1, 0.1, 1.0))
+    coder = OpenLoopZoomCoder(OpenLoopZoomParameters(0.1, 0.1, 1.0))
     state = coder.initial()
     for _ in range(100):
         _, state = coder.decode(state, (), (1,))
@@ -30,7 +30,7 @@ def test_when_nothing_decays_then_the_range_stays_to_the_last_bit() -> None:
 
 
 def test_when_the_signs_are_asked_for_then_they_are_those_of_the_papers_coder() -> None:
-    timed, zoom = TimedCoder(TimedParameters()), ZoomCoder(ZoomParameters())
+    timed, zoom = OpenLoopZoomCoder(OpenLoopZoomParameters()), ZoomCoder(ZoomParameters())
     for measured, predicted in ((0.1, 0.2), (0.2, 0.1), (0.0, 0.0), (-1.0, -1.0)):
         arguments = ((predicted,), (measured,))
         assert timed.encode(timed.initial(), *arguments) == zoom.encode(zoom.initial(), *arguments)
@@ -38,10 +38,13 @@ def test_when_the_signs_are_asked_for_then_they_are_those_of_the_papers_coder() 
 
 @pytest.mark.parametrize(
     ("parameters", "text"),
-    [(TimedParameters(gains=()), "gains"), (TimedParameters(decay=0.0), "decay must be in")],
+    [
+        (OpenLoopZoomParameters(gains=()), "gains"),
+        (OpenLoopZoomParameters(decay=0.0), "decay must be in"),
+    ],
 )
 def test_when_parameters_make_no_coder_then_they_are_refused(
-    parameters: TimedParameters, text: str
+    parameters: OpenLoopZoomParameters, text: str
 ) -> None:
     with pytest.raises(ValueError, match=text):
-        TimedCoder(parameters)
+        OpenLoopZoomCoder(parameters)

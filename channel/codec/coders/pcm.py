@@ -29,7 +29,7 @@ from channel.codec.words import Alphabet
 
 
 @dataclass(frozen=True, slots=True)
-class WordsParameters:
+class PcmParameters:
     """Constants of the words and of the differentiator."""
 
     bits: int = 10
@@ -42,8 +42,8 @@ class WordsParameters:
     """tau"""
 
 
-class WordsConstants(NamedTuple):
-    """What the functions below need."""
+class PcmConstants(NamedTuple):
+    """Constants of the functions below."""
 
     half: int
     """number of the word for the angle zero"""
@@ -53,8 +53,8 @@ class WordsConstants(NamedTuple):
     rate_filter_s: float
 
 
-def words_encode(
-    constants: WordsConstants,
+def pcm_encode(
+    constants: PcmConstants,
     coder: Numbers,
     predicted: Numbers,
     measurement: Numbers,
@@ -65,8 +65,8 @@ def words_encode(
     write_bits(step + constants.half, symbols)
 
 
-def words_decode(
-    constants: WordsConstants,
+def pcm_decode(
+    constants: PcmConstants,
     coder: Numbers,
     model: Numbers,
     symbols: Symbols,
@@ -93,17 +93,17 @@ def words_decode(
     after[1] = 1.0
 
 
-class WordsCoder(FunctionCoder):
+class PcmCoder(FunctionCoder):
     """`b` binary symbols per word. Coder state: the last angle and how many samples ago it was.
 
     An age of 0 says that there is none yet.
     """
 
-    functions = CoderFunctions(words_encode, words_decode)
+    functions = CoderFunctions(pcm_encode, pcm_decode)
     impulse = True
     correction_size = 2
 
-    def __init__(self, parameters: WordsParameters) -> None:
+    def __init__(self, parameters: PcmParameters) -> None:
         if not 1 <= parameters.bits <= 15:
             raise ValueError(f"bits must be 1 ... 15, got {parameters.bits}")
         if not (parameters.range > 0.0 and parameters.period_s > 0.0):
@@ -113,7 +113,7 @@ class WordsCoder(FunctionCoder):
         self.parameters = parameters
         self.alphabet = Alphabet((0, 1), parameters.bits)
         half = 1 << (parameters.bits - 1)
-        self.constants = WordsConstants(
+        self.constants = PcmConstants(
             half, parameters.range / half, parameters.period_s, parameters.rate_filter_s
         )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from channel.protocol.slot_clock import SlotClock
+from receiver.session.schedule import SlotClock
 from tests.channel.codec.parts import terms
 
 MS = 1_000_000

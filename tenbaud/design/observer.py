@@ -13,13 +13,13 @@ from channel.codec.models.linear import LinearModel
 from tenbaud.bounds.linear import Matrix, van_loan
 from tenbaud.config.schema import FlightConfig
 from tenbaud.design.described import plant_of
-from transmitter.session.sight import Sight
+from transmitter.session.state_observer import StateObserver
 
 LEAST_NOISE = 1e-9
 """of every state, as a share of the largest: a state that no noise reaches is still looked at"""
 
 
-def kalman_sight(model: LinearModel, tick_noise: Matrix, steps: Matrix) -> Sight:
+def kalman_observer(model: LinearModel, tick_noise: Matrix, steps: Matrix) -> StateObserver:
     """Return the observer for a noise covariance per tick and the step of each output's encoder."""
     size, outputs = model.state_size, len(model.outputs)
     transition = np.array(model.constants.transition).reshape(size, size)
@@ -33,10 +33,10 @@ def kalman_sight(model: LinearModel, tick_noise: Matrix, steps: Matrix) -> Sight
             f"the outputs do not show every state, so none is observed: {error}"
         ) from error
     gains = ahead @ C.T @ np.linalg.inv(C @ ahead @ C.T + seen)
-    return Sight(model, _rows(gains), _rows(np.linalg.pinv(C)), (STATE_MAX,) * size)
+    return StateObserver(model, _rows(gains), _rows(np.linalg.pinv(C)), (STATE_MAX,) * size)
 
 
-def sight_of_coder(codec: Codec, counts_per_turn: int) -> Sight:
+def observer_of_coder(codec: Codec, counts_per_turn: int) -> StateObserver:
     """Return the observer for the disturbance that a coder assumes."""
     model, coder = codec.model, codec.coder
     if not (isinstance(model, LinearModel) and isinstance(coder, DirectionCoder)):
@@ -46,10 +46,10 @@ def sight_of_coder(codec: Codec, counts_per_turn: int) -> Sight:
     noise = np.zeros((model.state_size, model.state_size))
     corrected = model.correction_size
     noise[:corrected, :corrected] = np.array(coder.parameters.noise) / codec.ticks_per_sample
-    return kalman_sight(model, noise, np.array([math.tau / counts_per_turn]))
+    return kalman_observer(model, noise, np.array([math.tau / counts_per_turn]))
 
 
-def configured_sight(model: LinearModel, config: FlightConfig) -> Sight:
+def configured_observer(model: LinearModel, config: FlightConfig) -> StateObserver:
     """Return the observer for the disturbance and the encoders of a configuration."""
     tick_s = config.timing.tick_s
     plant = plant_of(config.model, tick_s)
@@ -57,7 +57,7 @@ def configured_sight(model: LinearModel, config: FlightConfig) -> Sight:
         raise ValueError(f"model.kind = {config.model.kind!r} describes no linear plant to observe")
     _, noise = van_loan(plant.A, plant.noise, tick_s)
     step = math.tau / config.transmitter.encoder_counts_per_turn
-    return kalman_sight(model, noise, np.array([step]))
+    return kalman_observer(model, noise, np.array([step]))
 
 
 def _rows(matrix: Matrix) -> tuple[tuple[float, ...], ...]:

@@ -1,4 +1,4 @@
-"""Where the encoder, not the line, limits what is known."""
+"""The limit that the encoder sets, beside that of the line."""
 
 from __future__ import annotations
 

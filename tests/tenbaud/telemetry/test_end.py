@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
@@ -10,8 +10,8 @@ import pytest
 from channel.errors import LinkError
 from channel.links.zenoh.telemetry import TelemetryPort
 from tenbaud import MemoryRecorder
+from tenbaud.telemetry.end import TelemetryEnd, TelemetryOptions, open_telemetry
 from tenbaud.telemetry.place import endpoint_for
-from tenbaud.telemetry.station import Station, Wish, open_station
 from tests.tenbaud.room import agreement
 
 
@@ -22,24 +22,30 @@ class Silent:
         return {}
 
 
-def station(wish: Wish) -> Station:
-    return open_station(agreement(), "receiver", MemoryRecorder(), wish)  # type: ignore[arg-type]
+def telemetry_end(options: TelemetryOptions) -> TelemetryEnd:
+    return open_telemetry(agreement(), "receiver", MemoryRecorder(), options)  # type: ignore[arg-type]
 
 
 def test_when_the_usual_place_is_taken_then_the_flight_goes_on_without(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], request: pytest.FixtureRequest
 ) -> None:
-    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    # Not tmp_path, which may be too long for a socket's name.
+    folder = TemporaryDirectory()
+    request.addfinalizer(folder.cleanup)
+    monkeypatch.setenv("XDG_RUNTIME_DIR", folder.name)
     monkeypatch.setattr("secrets.token_hex", lambda _: "same")
     usual = endpoint_for("", "receiver")
     assert usual is not None
     taken = TelemetryPort("receiver", "another", usual)
     try:
-        unasked = station(Wish())
+        unasked = telemetry_end(TelemetryOptions())
         with unasked.publishing(lambda _: Silent()):
             assert unasked.summary() == {"telemetry": "off"}
         assert "no telemetry" in capsys.readouterr().err
-        with pytest.raises(LinkError), station(Wish("on")).publishing(lambda _: Silent()):
+        with (
+            pytest.raises(LinkError),
+            telemetry_end(TelemetryOptions("on")).publishing(lambda _: Silent()),
+        ):
             pass
     finally:
         taken.close()

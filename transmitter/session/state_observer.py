@@ -7,7 +7,7 @@ here anyway, and every measurement as a correction by constant gains,
     x <- x + L (y - y_hat)
 
 None of it enters the codec's state, and the receiver need not know of it: the receiver sees signs only.
-`rate_sight` has the gains for an angle and its rate; `tenbaud.design.sight` those of a Kalman filter.
+`rate_observer` has gains for an angle and its rate; `tenbaud.design.observer` those of a Kalman filter.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def seen_row(
     return seen
 
 
-class Sight:
+class StateObserver:
     """All corrected states at each tick, from outputs and commands.
 
     `gains` and `anew` have a row per state and a column per output: the correction at a tick, and the
@@ -74,12 +74,14 @@ class Sight:
         return self._state[: self._model.correction_size]
 
 
-def usual_sight(codec: Codec, tick_s: float) -> Sight | None:
+def default_observer(codec: Codec, tick_s: float) -> StateObserver | None:
     """Return the observer of a codec for which none was designed; None for one that needs none."""
-    return rate_sight(codec.model, tick_s) if codec.uses_rates else None
+    return rate_observer(codec.model, tick_s) if codec.uses_rates else None
 
 
-def rate_sight(model: Model, tick_s: float, bandwidth_rad_s: float = BANDWIDTH_RAD_S) -> Sight:
+def rate_observer(
+    model: Model, tick_s: float, bandwidth_rad_s: float = BANDWIDTH_RAD_S
+) -> StateObserver:
     """Return the observer of an angle and its rate, the first two states of a model.
 
     It is the critically damped g-h filter: `1 - r^2` of an error goes to the angle, `(1 - r)^2 / h` to
@@ -96,4 +98,4 @@ def rate_sight(model: Model, tick_s: float, bandwidth_rad_s: float = BANDWIDTH_R
     others = model.state_size - 2
     gains = ((1.0 - kept * kept,), ((1.0 - kept) * (1.0 - kept) / tick_s,), *((0.0,),) * others)
     anew = ((1.0,), *((0.0,),) * (others + 1))
-    return Sight(model, gains, anew, (math.inf, RATE_MAX, *(math.inf,) * others))
+    return StateObserver(model, gains, anew, (math.inf, RATE_MAX, *(math.inf,) * others))

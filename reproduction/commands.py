@@ -1,18 +1,20 @@
-"""`tenbaud figures`: the paper's figures from fresh flights, and the page that compares."""
+"""`tenbaud figures` and `tenbaud bench coders`: the commands that make the project's own pages."""
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from tenbaud.cli import options
-from tenbaud.cli.checkout import need_checkout
+from tenbaud.studies.progress import progress_bar
 
 DRAWINGS = ("theory", "animation")
 DATA_VARIABLE = "TENBAUD_FLIGHT_DATA"
+
+Out = Annotated[
+    Path | None, typer.Option(help="New folder for the run; runs/<time>_<name> if not given.")
+]
 
 
 def figures(
@@ -38,7 +40,7 @@ def figures(
             show_default=False,
         ),
     ] = None,
-    out: options.Out = None,
+    out: Out = None,
 ) -> None:
     """Fly and draw the paper's Figs. 3 to 8; with all of them, write the page that compares.
 
@@ -48,7 +50,6 @@ def figures(
 
     [dim]tenbaud figures theory animation --docs docs[/dim]
     """
-    need_checkout("figures")
     from reproduction.paper.make import NUMBERS
     from tenbaud.files.whole import make_folder
     from tenbaud.recording.folder import create_run_folder
@@ -66,22 +67,45 @@ def figures(
         _draw_paper(wanted, folder, pictures, found)
 
 
+def coders(
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer seeds, wider intervals.")] = False,
+    docs: Annotated[
+        Path, typer.Option(help="Folder for LIMITS.md and, in figures/, its plots.")
+    ] = Path("runs/bench-coders"),
+    data: Annotated[
+        Path | None, typer.Option(help="Folder of the recorded flights.", envvar=DATA_VARIABLE)
+    ] = None,
+) -> None:
+    """Fly every coder on the same seeds, write the table and the pictures."""
+    from reproduction.limits.draw import draw_disturbances, draw_rates
+    from reproduction.limits.page import DISTURBANCE_PICTURE, PICTURE, write_page
+    from reproduction.limits.plan import FULL, QUICK, fly_all
+    from reproduction.limits.recorded import fly_recorded
+    from tenbaud.files.whole import make_folder
+
+    found = found_data(data)
+    with progress_bar("flights") as update:
+        outcome = fly_all(QUICK if quick else FULL, lambda done, total: update(done, total, "flights"))
+        update(1.0, 1.0, "recorded flights")
+        recorded = fly_recorded(found) if found else []
+    make_folder(docs / "figures")
+    write_page(docs / "LIMITS.md", outcome, recorded, quick)
+    draw_rates(docs / PICTURE, outcome)
+    draw_disturbances(docs / DISTURBANCE_PICTURE, outcome)
+    typer.echo(f"the table is in {docs / 'LIMITS.md'}")
+    if found is None:
+        typer.echo(
+            f"the recorded flights were left out: give their folder with --data or in {DATA_VARIABLE}",
+            err=True,
+        )
+
+
 def _draw_paper(wanted: set[str], folder: Path, pictures: Path, data: Path | None) -> None:
     """Draw figures of the paper and, with all of them, write the page beside their folder."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
     from reproduction.paper.make import NUMBERS, make_figures
 
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as bar:
-        task = bar.add_task("starting", total=1.0)
-
-        def on_progress(done: float, total: float, what: str) -> None:
-            bar.update(task, completed=done, total=total, description=what)
-
-        results = make_figures(wanted, folder, pictures, data, on_progress)
+    with progress_bar("starting") as update:
+        results = make_figures(wanted, folder, pictures, data, update)
     typer.echo(f"{len(results.flown)} flights in {results.seconds:.0f} s; pictures in {pictures}")
     typer.echo(f"SVG and recordings in {folder}")
     if wanted != set(NUMBERS):

@@ -15,10 +15,10 @@ from plant_sim.pitch import PitchParameters as PlantParameters
 from plant_sim.pitch import PitchPlant
 from tenbaud.bounds.linear import van_loan
 from tenbaud.design.described import plant_of, plant_section
+from tenbaud.design.observer import kalman_observer
 from tenbaud.design.plant import discretised
-from tenbaud.design.sight import kalman_sight
 from tests.channel.codec.two_axes import TwoAxes
-from transmitter.session.sight import Sight, rate_sight
+from transmitter.session.state_observer import StateObserver, rate_observer
 
 TICK_S = 0.01
 STEP = math.tau / 4096
@@ -29,12 +29,12 @@ def fly(bandwidth_rad_s: float, ticks: int = 6000, missing: range = range(0)) ->
     """Return the rms error of the rate over the second half, behind an encoder of 4096 counts."""
     plant = PitchPlant(PlantParameters(), TICK_S, WhiteTorque(2e-3, TICK_S, 3))
     encoder = Encoder(4096)
-    sight = rate_sight(MODEL, TICK_S, bandwidth_rad_s)
+    observer = rate_observer(MODEL, TICK_S, bandwidth_rad_s)
     volts = (0.0, 0.0)
     total = 0.0
     for tick in range(ticks):
         if tick not in missing:
-            seen = sight.look(tick, (encoder.angle_rad(encoder.counts(plant.angle_rad)),), volts)
+            seen = observer.look(tick, (encoder.angle_rad(encoder.counts(plant.angle_rad)),), volts)
         if tick >= ticks // 2:
             total += (seen[1] - plant.rate_rad_s) ** 2
         volts = (2.0 * math.sin(0.01 * tick), -2.0 * math.sin(0.013 * tick))
@@ -54,15 +54,15 @@ def test_when_ticks_are_missed_then_the_rate_is_found_again() -> None:
 
 
 def test_when_the_encoder_jumps_wildly_then_the_rate_stays_a_rate() -> None:
-    sight = rate_sight(MODEL, TICK_S, 200.0)
-    sight.look(0, (0.0,), (0.0, 0.0))
+    observer = rate_observer(MODEL, TICK_S, 200.0)
+    observer.look(0, (0.0,), (0.0, 0.0))
     for tick in range(1, 20):
-        angle, rate = sight.look(tick, (1e4 * (-1) ** tick,), (0.0, 0.0))
+        angle, rate = observer.look(tick, (1e4 * (-1) ** tick,), (0.0, 0.0))
         assert abs(rate) < 1e3
         assert math.isfinite(angle)
 
 
-def fly_aero(sight: Sight, model: LinearModel, noise: np.ndarray, gap: range) -> np.ndarray:
+def fly_aero(observer: StateObserver, model: LinearModel, noise: np.ndarray, gap: range) -> np.ndarray:
     """Return the rms error of each state over the second half, both axes behind encoders."""
     rng = np.random.default_rng(5)
     root = np.linalg.cholesky(noise + 1e-16 * np.eye(4))
@@ -71,7 +71,7 @@ def fly_aero(sight: Sight, model: LinearModel, noise: np.ndarray, gap: range) ->
     for tick in range(4000):
         if tick not in gap:
             outputs = tuple(round(state[axis] / STEP) * STEP for axis in (0, 2))
-            seen = sight.look(tick, outputs, commands)
+            seen = observer.look(tick, outputs, commands)
         errors.append(np.array(seen) - state)
         commands = (2.0 * math.sin(0.01 * tick), -2.0 * math.sin(0.013 * tick))
         moved = model.tick(tuple(state.tolist()), commands, (0.0,) * 4)
@@ -85,25 +85,27 @@ def test_when_two_axes_are_seen_then_the_kalman_filter_finds_all_states() -> Non
     transition, drive = discretised(plant.A, plant.B, TICK_S)
     model = LinearModel(transition.tolist(), drive.tolist(), plant.C.tolist(), TICK_S)
     _, noise = van_loan(plant.A, plant.noise, TICK_S)
-    found = fly_aero(kalman_sight(model, noise, np.array([STEP])), model, noise, range(0))
+    found = fly_aero(kalman_observer(model, noise, np.array([STEP])), model, noise, range(0))
     assert (found[[0, 2]] < STEP).all()
     assert (found[[1, 3]] < 0.25 * STEP / TICK_S).all()
-    again = fly_aero(kalman_sight(model, noise, np.array([STEP])), model, noise, range(900, 1000))
+    again = fly_aero(kalman_observer(model, noise, np.array([STEP])), model, noise, range(900, 1000))
     assert np.allclose(again, found, rtol=0.05)
     # Gains for ten times the disturbance, or a tenth, are worse.
     for share in (0.01, 100.0):
-        other = fly_aero(kalman_sight(model, share * noise, np.array([STEP])), model, noise, range(0))
+        other = fly_aero(
+            kalman_observer(model, share * noise, np.array([STEP])), model, noise, range(0)
+        )
         assert (other[[1, 3]] > found[[1, 3]]).all()
 
 
 def test_when_outputs_hide_a_state_then_no_observer_is_designed() -> None:
     model = LinearModel(((1.0, 0.0), (0.0, 2.0)), ((1.0,), (1.0,)), ((1.0, 0.0),), TICK_S)
     with pytest.raises(ValueError, match="do not show every state"):
-        kalman_sight(model, np.eye(2), np.array([STEP]))
+        kalman_observer(model, np.eye(2), np.array([STEP]))
 
 
 def test_when_it_makes_no_sense_then_it_is_refused() -> None:
     with pytest.raises(ValueError, match="bandwidth"):
-        rate_sight(MODEL, TICK_S, 0.0)
+        rate_observer(MODEL, TICK_S, 0.0)
     with pytest.raises(ValueError, match="one measured angle"):
-        rate_sight(TwoAxes(TICK_S), TICK_S)
+        rate_observer(TwoAxes(TICK_S), TICK_S)

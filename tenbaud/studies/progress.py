@@ -1,0 +1,41 @@
+"""A progress bar on standard error, for commands that compute for a while."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+Update = Callable[[float, float, str], None]
+"""(done, of how much, what is being done)"""
+
+
+@contextmanager
+def progress_bar(what: str, *, counted: bool = False) -> Iterator[Update]:
+    """Within a `with`, show a bar.
+
+    `counted`: with how many of how many beside it, left on the terminal at the end, and written to a
+    file too; else a bar that a terminal alone shows, and that vanishes.
+    """
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn() if counted else TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=Console(stderr=True),
+        transient=not counted,
+        disable=not counted and not sys.stderr.isatty(),
+    )
+    with bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, total, now: bar.update(task, completed=done, total=total, description=now)

@@ -1,0 +1,75 @@
+"""How the tests share the machine: what they compile, in which order they start, who has both cores."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import sys
+import tempfile
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+# Some hundred processes are started here. Without bytecode on disk each compiles all that it imports,
+# which takes longer than most flights.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+# Beside other tests the threads of the linear algebra mostly wait for each other, and wait by spinning.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+LONGEST_FIRST = ("tests/docs/",)
+"""What takes longest: started last, it would keep one worker busy and the others idle."""
+
+COMPILED_ONCE = ("tests/tenbaud/studies/test_equal_bits.py",)
+"""Their tests stay together too: the first compiles, the others read its machine code from disk."""
+
+_MACHINE = Path(tempfile.gettempdir()) / f"tenbaud-tests-{os.getuid()}.lock"
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Bring the longest to the front."""
+    items.sort(key=_rank)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Keep the tests of a file with a module-wide fixture on one worker, so that it is made once."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class ByFixture(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file = nodeid.partition("::")[0]
+            together = file in COMPILED_ONCE or _has_shared_fixture(config.rootpath / file)
+            return file if together else nodeid
+
+    return ByFixture(config, log)
+
+
+@cache
+def _has_shared_fixture(path: Path) -> bool:
+    return '(scope="module")' in path.read_text(encoding="utf-8")
+
+
+def _rank(item: pytest.Item) -> int:
+    if item.get_closest_marker("both_cores") is not None:
+        return len(LONGEST_FIRST) + 1  # at the end, when no module-wide fixture is at work any more
+    ranks = [rank for rank, start in enumerate(LONGEST_FIRST) if item.nodeid.startswith(start)]
+    return ranks[0] if ranks else len(LONGEST_FIRST)
+
+
+@pytest.fixture(autouse=True)
+def _the_machine(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Keep every other test on the real clock from running beside one that needs both cores."""
+    if request.node.get_closest_marker("real_time") is None:
+        yield
+        return
+    alone = request.node.get_closest_marker("both_cores") is not None
+    with _MACHINE.open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX if alone else fcntl.LOCK_SH)
+        try:
+            yield
+        finally:
+            fcntl.flock(lock, fcntl.LOCK_UN)  # a process that the test forked may still have it open

@@ -1,0 +1,80 @@
+"""Old names in configurations and recordings: read as the new ones, with a warning, same digest."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tenbaud import fly
+from tenbaud.audit.audit import audit
+from tenbaud.build.flight import agree
+from tenbaud.config.deprecated import RENAMED
+from tenbaud.config.load import load_config, preset_names
+from tenbaud.replay.record import load_record
+from tenbaud.replay.replay import replay
+from tests.tenbaud.processes import run as run_command
+
+OLD_FILE = """
+[coder]
+kind = "timed"
+
+[transmitter]
+sight_bandwidth_rad_s = 42.0
+"""
+
+
+@pytest.mark.parametrize(
+    ("overrides", "read"),
+    [
+        ({"transmitter": {"sight_bandwidth_rad_s": 42.0}}, 42.0),
+        ({"coder": {"kind": "timed"}}, "open-loop-zoom"),
+        ({"coder": {"kind": "words"}}, "pcm"),
+    ],
+)
+def test_when_a_setting_has_an_old_name_then_it_is_read_with_a_warning(
+    overrides: dict[str, Any], read: object
+) -> None:
+    with pytest.warns(FutureWarning, match="is deprecated; use"):
+        config = load_config("paper-10baud", None, overrides)
+    assert read in (config.transmitter.rate_observer_bandwidth_rad_s, config.coder.kind)
+
+
+def test_when_a_preset_has_an_old_name_then_the_new_one_is_loaded() -> None:
+    with pytest.warns(FutureWarning, match="use 'open-loop-zoom-10baud'"):
+        config = load_config("timed-10baud")
+    assert config == load_config("open-loop-zoom-10baud")
+    assert set(RENAMED["preset"].values()) <= set(preset_names())
+
+
+def test_when_a_file_has_old_names_then_the_command_names_file_and_new_name(tmp_path: Path) -> None:
+    file = tmp_path / "flight.toml"
+    file.write_text(OLD_FILE)
+    done = run_command("demo", "--config", str(file), "--duration", "1", cwd=tmp_path)
+    assert done.code == 0, done.err
+    assert f"{file}: coder.kind: 'timed' is deprecated; use 'open-loop-zoom'" in done.err
+    assert "use 'rate_observer_bandwidth_rad_s'" in done.err
+
+
+@pytest.mark.filterwarnings("error::FutureWarning")
+@pytest.mark.parametrize("preset", ["open-loop-zoom-10baud", "usual-1000baud"])
+def test_when_a_run_was_recorded_under_old_names_then_it_replays_and_passes_its_audit(
+    preset: str, tmp_path: Path
+) -> None:
+    run = fly(preset, settings={"duration_s": 2.0}, out=tmp_path / "run")
+    config = run.path / "config.toml"
+    text = config.read_text()
+    for names in RENAMED.values():
+        for old, new in names.items():
+            text = text.replace(f'"{new}"', f'"{old}"').replace(f"{new} =", f"{old} =")
+    assert text != config.read_text()
+    config.write_text(text)
+    replayed, audited = replay(load_record(run.path)), audit(run.path)
+    assert replayed.equal, replayed.differences
+    assert audited.passed, audited.leaks + audited.gaps
+
+
+def test_the_digest_of_a_configuration_is_that_of_its_old_names() -> None:
+    assert '"kind":"timed"' in agree(load_config("open-loop-zoom-10baud"), "virtual").identity.config
+    assert '"kind":"words"' in agree(load_config("usual-1000baud"), "virtual").identity.config

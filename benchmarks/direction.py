@@ -3,10 +3,11 @@
     python -m benchmarks.direction [NAME | "NAME RATE" ...]
 
 The plant is the model, driven by white noise. *Known*: of the strength that the coder was designed
-for; *unknown*: three times as strong (in amplitude), and the coder adapts. *Encoder*: unknown, in closed
-loop, the sender's state coming from its Kalman filter behind encoders of 4096 counts a turn; with the
-number of flights of ten minutes, of sixteen, that were lost. Scored is the root of the weighted mean
-square error over all time, over the continuous causal floor.
+for; *unknown*: three times as strong (in amplitude), and the coder adapts. *Encoder*: as designed, the
+coder adapting, in closed loop, the sender's state coming from its Kalman filter behind encoders of 4096
+counts a turn; beside it the floor behind these encoders, and the number of flights of ten minutes, of
+sixteen, that were lost. Scored is the root of the weighted mean square error over all time, over the
+continuous causal floor.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from scipy.linalg import solve_discrete_are
 
 from channel.codec.coders.direction import DirectionCoder
 from channel.codec.models.linear import LinearModel
+from reproduction.limits.encoder import floor_behind_encoders
 from tenbaud.bounds.floor import floor, period_cost
 from tenbaud.bounds.linear import sampled, van_loan
 from tenbaud.design.described import plant_of, plant_section
@@ -197,7 +199,7 @@ def ratios(found: list[float]) -> Ratios:
 
 def main(names: list[str]) -> int:
     """Print a table."""
-    print(f"{'plant':20} bit/s  known            unknown          encoder          lost")
+    print(f"{'plant':20} bit/s  known            unknown          encoder          floor  lost")
     for name, plant, rate in plants():
         if names and not any(f"{name} {rate:g}".startswith(one) for one in names):
             continue
@@ -208,8 +210,12 @@ def main(names: list[str]) -> int:
             exact(plant, rate, unknown, UNKNOWN),
             behind_encoders(plant, rate, unknown),
         )
+        behind = floor_behind_encoders(plant.model(), plant.C, STEP, 1.0 / rate / TICKS, rate)
+        yardstick = math.sqrt(behind / floor(plant.model(), rate))
         texts = "  ".join(f"{one.mean:6.3f} +- {one.half_width:5.3f}" for one in columns)
-        print(f"{name:20} {rate:5g} {texts}  {columns[-1].lost}/{FLIGHTS}", flush=True)
+        print(
+            f"{name:20} {rate:5g} {texts}  {yardstick:5.3f}  {columns[-1].lost}/{FLIGHTS}", flush=True
+        )
     return 0
 
 

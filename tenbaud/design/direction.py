@@ -66,9 +66,9 @@ def design_direction(
     cost, _ = period_cost(model, symbol_period_s)
     products = np.outer(sizes, sizes)
     used = needed / rate_bit_s
-    alpha = max(0.67, 1.0 - 0.855 * 2.0 ** (-2.0 * used))
+    alpha = max(0.67, 0.58 + 0.18 * used)
     # On a plant that grows, steps are larger than the best ones: smaller ones lose it now and then.
-    kappa = max(1.15, 0.8 + 0.54 * used) if needed > 0.0 else 1.0
+    kappa = min(max(0.75 + 0.75 * used, 1.15), 1.25) if needed > 0.0 else 1.0
     scaled = (transition * sizes / sizes[:, None], noise / products, cost * products)
     with np.errstate(all="ignore"):
         best = _search(*scaled, ideal * products, alpha, bits)

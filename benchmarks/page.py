@@ -66,7 +66,7 @@ COUNT_UPDATES = """
 window.updates = 0;
 const clear = CanvasRenderingContext2D.prototype.clearRect;
 CanvasRenderingContext2D.prototype.clearRect = function (...box) {
-  if (this.canvas.id === "pitch-curve") window.updates += 1;
+  if (this.canvas.id === "value-0") window.updates += 1;
   return clear.apply(this, box);
 };
 """

@@ -80,9 +80,9 @@ def fly(case: Case) -> Flown:
     outcome = transmit.fly_virtual(run, build_receiver(agreement, None, DATAGRAM), lambda: False)
     scores, counts = run.node.scores, run.node.session.counts
     return Flown(
-        scores.coded.rms or 0.0,
-        scores.coded.largest,
-        scores.live.rms or 0.0,
+        scores.first.coded.rms or 0.0,
+        scores.first.coded.largest,
+        scores.first.live.rms or 0.0,
         counts["desyncs"],
         counts["rejoins"],
         run.rejoin_bytes,

@@ -21,10 +21,10 @@ import numpy as np
 
 from benchmarks.figures import Figure
 from channel.codec.numerics import sin
-from channel.protocol.limits import from_millivolts, to_millivolts
+from channel.protocol.limits import from_steps, to_steps
 from plant_sim.encoder import angle_of, counts_of
 from plant_sim.pitch import Sine, pitch_step
-from receiver.controllers.pid import motor_volts, pid_integral, pid_volts
+from receiver.controllers.pid import clamped, is_stuck, pid_integral, pid_sum
 from tenbaud.config.load import load_config
 from tenbaud.studies.flights import CompiledPoint
 
@@ -85,7 +85,7 @@ def _python_control(point: CompiledPoint, sine: Sine) -> tuple[float, float]:
     """
     import control
 
-    numbers = point.numbers
+    numbers, signals = point.numbers, point.agreement.signals
     _, _, plant_c, pid_c = point.constants
     codec = point.agreement.codec
     tick_s = point.config.timing.tick_s
@@ -99,9 +99,13 @@ def _python_control(point: CompiledPoint, sine: Sine) -> tuple[float, float]:
             word = codec.coder.encode((m, last), state[:1], (measured,))
             (e1, e2), (m, last) = codec.coder.decode((m, last), state, word)
         error = float(u[0]) - state[0]
-        volts = pid_volts(pid_c, integral, error, state[1])
-        integral = pid_integral(pid_c, integral, error, volts)
-        command = from_millivolts(to_millivolts(motor_volts(pid_c, volts)))
+        total = pid_sum(pid_c, integral, error, state[1])
+        wanted = [bias + share * total for bias, share in zip(numbers.bias, pid_c.mixing, strict=True)]
+        inputs = list(zip(wanted, pid_c.mixing, numbers.command_max, strict=True))
+        stuck = all(is_stuck(value, share * error, most) for value, share, most in inputs)
+        integral = pid_integral(pid_c, integral, error, stuck)
+        limited = [clamped(value, most) for value, _, most in inputs]
+        command = from_steps(to_steps(limited, signals), signals)
         state = codec.model.tick(state, command, (e1, e2))
         body = pitch_step(body, command, 0.0, plant_c, sine)
         return [*body, *state, m, last, e1, e2, integral, tick + 1.0]
@@ -164,7 +168,7 @@ def _c_call(loop: Any, point: CompiledPoint) -> tuple[Callable[[], object], Any]
     zoom = [coder_c.decay, coder_c.floor, coder_c.gains[0][0], coder_c.gains[1][0]]
     zoom.append(point.agreement.codec.coder.initial()[0])
     pid = [pid_c.proportional, pid_c.integral_per_tick, pid_c.derivative]
-    pid += [pid_c.volts_max, pid_c.normal_force_volts]
+    pid += [numbers.command_max[0], 2.0 * numbers.bias[0]]
     out = np.zeros(3)
     reference = np.asarray(point.reference)
     arrays = [np.array(one) for one in (model_c, plant_c, pid, zoom)]

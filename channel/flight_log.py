@@ -27,8 +27,8 @@ class FlightColumns:
     """The columns of the file.
 
     `index_column` counts the steps by ones from any start. `counts_columns` are encoder counts,
-    one column per measured axis, at least one. `volts_columns` are motor voltages in the order
-    (front, rear); () for a file without them.
+    one column per output, at least one. `volts_columns` are what was applied, in the order of the
+    model's inputs; () for a file without them.
     """
 
     index_column: str = "step"
@@ -89,6 +89,15 @@ class FlightLog:
                 f"a flight needs at least {_ROWS_MIN}"
             )
         return cls(tuple(counts), tuple(volts))
+
+
+def column_names(path: FilePath) -> list[str]:
+    """Return the names in the first line; none where it cannot be read: `read_columns` says why."""
+    try:
+        with open(path, newline="", encoding="utf-8-sig") as file:
+            return [cell.strip() for cell in next(csv.reader(file), [])]
+    except (OSError, UnicodeDecodeError, csv.Error):
+        return []
 
 
 def read_columns(path: FilePath, names: tuple[str, ...]) -> Iterator[tuple[int, tuple[str, ...]]]:

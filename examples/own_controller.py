@@ -32,16 +32,17 @@ class StateFeedback:
     def command(self, tick: int, state: tuple[float, ...]) -> tuple[float, float]:
         """Return the voltages of front and rear motor."""
         angle_rad, rate_rad_per_s = state[:2]
-        error_rad = self.reference_rad(tick) - angle_rad
+        error_rad = self.context.reference.value(tick) - angle_rad
         if abs(error_rad) < 0.3:
             self.rest_volts += self.rest_per_tick * error_rad
         volts = self.stiffness * error_rad - self.damping * rate_rad_per_s + self.rest_volts
-        volts = max(-2.0 * self.context.volts_max, min(2.0 * self.context.volts_max, volts))
+        largest = sum(self.context.command_max)
+        volts = max(-largest, min(largest, volts))
         return volts / 2.0, -volts / 2.0
 
-    def reference_rad(self, tick: int) -> float:
-        """Return the set-point, for the recording."""
-        return self.context.reference.angle_rad(tick)
+    def references(self, tick: int) -> tuple[float, ...]:
+        """Return the set-point of each output, for the recording."""
+        return (self.context.reference.value(tick),)
 
 
 if __name__ == "__main__":

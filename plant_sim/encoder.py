@@ -1,20 +1,40 @@
-"""An incremental encoder: angles become whole counts."""
+"""How an output is read: by an incremental encoder, in whole counts, or exactly."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol
 
 
-def counts_of(angle_rad: float, counts_per_turn: int, sign: int, zero_counts: int) -> int:
-    """Return the nearest count of a finite angle; see `Encoder.counts`."""
-    return sign * math.floor(angle_rad / math.tau * counts_per_turn + 0.5) + zero_counts
+def counts_of(
+    value: float, counts_per_turn: float, sign: int, zero_counts: int, turn: float = math.tau
+) -> int:
+    """Return the nearest count of a finite value; see `Encoder.counts`."""
+    return sign * math.floor(value / turn * counts_per_turn + 0.5) + zero_counts
 
 
-def angle_of(counts: int, counts_per_turn: int, sign: int, zero_counts: int) -> float:
-    """Return the angle in the middle of those that read `counts`; see `Encoder.angle_rad`."""
-    return sign * (counts - zero_counts) * math.tau / counts_per_turn
+def angle_of(
+    counts: int, counts_per_turn: float, sign: int, zero_counts: int, turn: float = math.tau
+) -> float:
+    """Return the value in the middle of those that read `counts`; see `Encoder.angle_rad`."""
+    return sign * (counts - zero_counts) * turn / counts_per_turn
+
+
+class OutputReader(Protocol):
+    """What reads one output of a plant."""
+
+    def counts(self, angle_rad: float, /) -> int:
+        """Return the count of a value; ValueError when it is not finite."""
+        ...
+
+    def read(self, value: float, /) -> tuple[int, float]:
+        """Return the count of a value, and the value that is made of it."""
+        ...
+
+    def angle_rad(self, counts: int, /) -> float:
+        """Return the value that counts stand for."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,16 +42,18 @@ class Encoder:
     """An encoder that counts without bound: several turns are several times `counts_per_turn`.
 
     `counts_per_turn` is after quadrature and at least 1; `sign` is +1 or -1 and says which way the
-    counts grow; `zero_counts` is what it reads at 0 rad.
+    counts grow; `zero_counts` is what it reads at 0. `turn` is the value of
+    `counts_per_turn` counts: 2 pi for an angle in rad, 1 for counts per unit of any other output.
     """
 
-    counts_per_turn: int
+    counts_per_turn: float
     sign: int = 1
     zero_counts: int = 0
+    turn: float = math.tau
 
     def __post_init__(self) -> None:
         """Refuse an encoder that cannot be built."""
-        if self.counts_per_turn < 1:
+        if self.turn == math.tau and self.counts_per_turn < 1:
             raise ValueError(f"counts_per_turn is {self.counts_per_turn}; it must be at least 1")
         if self.sign not in (-1, 1):
             raise ValueError(f"sign is {self.sign}; it must be -1 or +1")
@@ -42,16 +64,40 @@ class Encoder:
         Raises ValueError when the angle is not finite.
         """
         try:
-            return counts_of(angle_rad, self.counts_per_turn, self.sign, self.zero_counts)
+            return counts_of(angle_rad, self.counts_per_turn, self.sign, self.zero_counts, self.turn)
         except (ValueError, OverflowError):
             raise ValueError(f"angle_rad is {angle_rad}; it must be finite") from None
 
+    def read(self, value: float) -> tuple[int, float]:
+        """Return the count of a value, and the value that is made of it."""
+        count = self.counts(value)
+        return count, self.angle_rad(count)
+
     def angle_rad(self, counts: int) -> float:
         """Return the angle in the middle of the range of angles that read `counts`."""
-        return angle_of(counts, self.counts_per_turn, self.sign, self.zero_counts)
+        return angle_of(counts, self.counts_per_turn, self.sign, self.zero_counts, self.turn)
 
 
-def angles_rad(encoders: tuple[Encoder, ...], counts: tuple[int, ...]) -> tuple[float, ...]:
+@dataclass(frozen=True, slots=True)
+class ExactReader:
+    """Reads a value as it is; its counts only tell whether the value moved."""
+
+    counts_per_unit: float = 2.0**40
+
+    def counts(self, value: float) -> int:
+        """Return a count that changes with the value."""
+        return math.floor(value * self.counts_per_unit)
+
+    def read(self, value: float) -> tuple[int, float]:
+        """Return the count and the value itself."""
+        return self.counts(value), value
+
+    def angle_rad(self, counts: int) -> float:
+        """Return about the value that counts stand for."""
+        return counts / self.counts_per_unit
+
+
+def angles_rad(encoders: tuple[OutputReader, ...], counts: tuple[int, ...]) -> tuple[float, ...]:
     """Return the angles of several encoders from their counts, in the same order."""
     return tuple(one.angle_rad(count) for one, count in zip(encoders, counts, strict=True))
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
     from plant_sim.disturbance import Disturbance
@@ -17,13 +19,22 @@ class PlantContext:
     """what one call of `advance` simulates"""
     seed: int
     """of everything random"""
-    volts_max: float
-    """where each motor's voltage is clamped"""
+    command_max: tuple[float, ...]
+    """where each input is clamped"""
     mismatch: float | tuple[float, ...]
     """fraction by which the plant is to be off the codec's model"""
     disturbance: Disturbance | None
     """configured torque: `disturbance.torque(step)`, rad/s^2"""
     initial_angle_rad: float
+    model: Mapping[str, Any] = field(default_factory=dict)
+    """the settings of the codec's model, which the plant is to be near"""
+    sine: Callable[[float], float] = math.sin
+    """how a sine is taken: with the codec's own a simulated flight is the same on every machine"""
+
+    @property
+    def volts_max(self) -> float:
+        """Return where the first input is clamped, as it was called before inputs had names."""
+        return self.command_max[0]
 
 
 class Plant(Protocol):

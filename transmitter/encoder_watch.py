@@ -9,22 +9,30 @@ from __future__ import annotations
 
 from collections import deque
 
-from channel.codec.codec import Codec, Vector
+from channel.codec.codec import Codec, Model, Vector
+from channel.codec.signals import Signal, signals_of
 
 MOTION_RAD = 1.0
 """Predicted motion that a standing encoder contradicts. Prediction from an estimate 10 % off the
 plant errs by about 0.1 rad in the window, full voltage moves the body 1.75 rad."""
 
 WINDOW_S = 1.0
+GROWTH_MAX = 5.0
+"""By how much an error of the estimate may grow in a window: it is shorter for an unstable plant."""
+DISTURBED = 1e-6
+RANGE_SHARE = 0.25
+"""Motion of an output that is no angle, as a share of its range; without a range it is not watched."""
 
 
 class EncoderWatch:
-    """Watches every measured axis; costs next to nothing while their counts change."""
+    """Watches every output; costs next to nothing while their counts change."""
 
     def __init__(self, codec: Codec, tick_s: float) -> None:
         self._model = codec.model
         self._nothing_held = codec.nothing_held
-        self._window_ticks = max(1, round(WINDOW_S / tick_s))
+        self._outputs = signals_of(codec.model).outputs
+        self._motions = [motion_of(output) for output in self._outputs]
+        self._window_ticks = window_ticks(codec.model, tick_s)
         self._counts: tuple[int, ...] = ()
         self._still_ticks: list[int] = []
         self._start: Vector = ()
@@ -78,11 +86,41 @@ class EncoderWatch:
         """Compare, at the end of a window, what the model says with axes that never changed."""
         start, end = self._model.measured(self._start), self._model.measured(self._state)
         for axis, ticks in enumerate(self._still_ticks):
-            moved = end[axis] - start[axis]
-            if ticks >= self._window_ticks and not -MOTION_RAD < moved < MOTION_RAD:
+            moved, motion = end[axis] - start[axis], self._motions[axis]
+            if ticks >= self._window_ticks and not -motion < moved < motion:
+                output = self._outputs[axis]
                 return (
-                    f"the encoder of axis {axis} stood at {counts[axis]} counts for {WINDOW_S:g} s "
-                    f"in which the body should have turned {moved:.2f} rad: it is stuck, or the "
+                    f"the encoder of {output.name} stood at {counts[axis]} counts for {ticks} ticks in "
+                    f"which it should have moved by {moved:.2f} {output.unit}: it is stuck, or the "
                     "motors do not turn"
                 )
         return None
+
+
+def motion_of(output: Signal) -> float:
+    """Return the motion of an output that a standing encoder contradicts."""
+    if output.unit in ("", "rad"):
+        return MOTION_RAD
+    return RANGE_SHARE * (output.high - output.low)
+
+
+def window_ticks(model: Model, tick_s: float) -> int:
+    """Return the window: `WINDOW_S`, or as long as an error of the estimate does not grow too far."""
+    longest = max(1, round(WINDOW_S / tick_s))
+    start = model.initial()
+    nothing, idle = (0.0,) * model.correction_size, (0.0,) * model.input_size
+    moved = [
+        tuple(value + (DISTURBED if place == at else 0.0) for place, value in enumerate(start))
+        for at in range(model.correction_size)
+    ]
+    for tick in range(1, longest + 1):
+        start, *moved = [model.tick(state, idle, nothing) for state in (start, *moved)]
+        outputs = model.measured(start)
+        far = [
+            abs(value - usual) > GROWTH_MAX * DISTURBED
+            for state in moved
+            for value, usual in zip(model.measured(state), outputs, strict=True)
+        ]
+        if any(far):
+            return tick
+    return longest

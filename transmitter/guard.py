@@ -1,9 +1,9 @@
 """The guard beside the motors: limiter and watchdog.
 
 Every tick it is asked what to put on the motors. A command passes, in this order, a finite check, the
-clamp and the slew limit; with soft angle limits exceeded, or a sensor that cannot be trusted, nothing
-passes. When commands stay away the last one is held; after the time-out the voltage is taken to the
-safe one along a ramp, and there it stays, latched: while it is latched no symbol leaves. It is
+clamp and the slew limit; with the soft limit of an output exceeded, or a sensor that cannot be trusted,
+nothing passes. When commands stay away the last one is held; after the time-out the command is taken to
+the safe one along a ramp, and there it stays, latched: while it is latched no symbol leaves. It is
 re-armed on purpose only.
 
 The age of a command counts the ticks that were owed one (`transmitter.session.owing`) and had none.
@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from channel.codec.codec import Vector
+from channel.codec.signals import Signal
 from channel.protocol.limits import CommandLimits
 
 
@@ -30,7 +31,7 @@ class GuardState(StrEnum):
 
 
 class GuardCause(StrEnum):
-    """Why the guard takes the voltage down."""
+    """Why the guard takes the command down."""
 
     TIMED_OUT = "timed_out"
     """commands stayed away: the one cause that commands can make good again"""
@@ -59,7 +60,7 @@ class GuardReason:
     number: int | None = None
     """ticks that were owed a command and had none"""
     detail: str | None = None
-    """for people: what the sensor's device says"""
+    """for people: what the sensor's device says, or the name of the output"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,12 +68,14 @@ class GuardSettings:
     """When the guard steps in, and how. Times are in ticks."""
 
     timeout_ticks: int
-    """age of the last command after which the voltage is taken down"""
+    """age of the last command after which it is taken down"""
     ramp_ticks: int
-    """how long the way to the safe voltage takes"""
-    safe_volts: Vector
-    soft_limits_rad: Vector = ()
-    """largest angle of each measured axis, either way; empty: none"""
+    """how long the way to the safe command takes"""
+    safe_command: Vector
+    soft_limits: Vector = ()
+    """largest value of each output, either way; empty: none"""
+    outputs: tuple[Signal, ...] = ()
+    """the outputs by name, for what is said of them"""
 
     def __post_init__(self) -> None:
         if self.timeout_ticks < 1 or self.ramp_ticks < 1:
@@ -83,7 +86,7 @@ class GuardSettings:
 
 
 class Guard:
-    """Decides the applied voltage of every tick."""
+    """Decides what is applied at every tick."""
 
     def __init__(self, limits: CommandLimits, settings: GuardSettings) -> None:
         self._limits = limits
@@ -91,9 +94,10 @@ class Guard:
         self.state = GuardState.READY
         self.reason: GuardReason | None = None
         """why it ramps or latched"""
-        self.volts = settings.safe_volts
+        self.command = settings.safe_command
+        """what is applied"""
         self._age_ticks = 0
-        self._ramp_from = settings.safe_volts
+        self._ramp_from = settings.safe_command
         self._ramp_tick = 0
 
     @property
@@ -106,28 +110,35 @@ class Guard:
         """Return whether it stopped for nothing but commands that stayed away."""
         return self.reason is not None and self.reason.cause is GuardCause.TIMED_OUT
 
-    def check_angles(self, tick: int, measured_rad: Vector) -> None:
-        """Trip when an angle is beyond its soft limit or not a number."""
-        limits = self._settings.soft_limits_rad
-        for axis, angle in enumerate(measured_rad):
-            if not math.isfinite(angle):
-                self.trip(GuardReason(GuardCause.NO_ANGLE, tick, axis, angle))
-            elif limits and abs(angle) > limits[axis]:
-                self.trip(GuardReason(GuardCause.ANGLE_LIMIT, tick, axis, angle, limits[axis]))
+    def check_outputs(self, tick: int, measured: Vector) -> None:
+        """Trip when an output is beyond its soft limit or not a number."""
+        limits = self._settings.soft_limits
+        for axis, value in enumerate(measured):
+            if not math.isfinite(value):
+                self._trip_output(GuardCause.NO_ANGLE, tick, axis, value)
+            elif limits and abs(value) > limits[axis]:
+                self._trip_output(GuardCause.ANGLE_LIMIT, tick, axis, value, limits[axis])
+
+    def _trip_output(
+        self, cause: GuardCause, tick: int, axis: int, value: float, limit: float | None = None
+    ) -> None:
+        outputs = self._settings.outputs
+        label = outputs[axis].label if outputs else None
+        self.trip(GuardReason(cause, tick, axis, value, limit, detail=label))
 
     def trip(self, reason: GuardReason) -> None:
-        """Take the voltage down from now on."""
+        """Take the command down from now on."""
         if not self.stopped:
             self.state = GuardState.RAMPING
             self.reason = reason
-            self._ramp_from = self.volts
+            self._ramp_from = self.command
             self._ramp_tick = 0
         elif self.timed_out and reason.cause is not GuardCause.TIMED_OUT:
             # Something worse than silence: no command makes it good again.
             self.reason = reason
 
     def rearm(self) -> None:
-        """Pass commands again, from the voltage that the motors have now."""
+        """Pass commands again, from what is applied now."""
         if not self.timed_out:
             raise RuntimeError(f"the guard cannot be re-armed: {self.reason or 'it is not stopped'}")
         self.state = GuardState.READY
@@ -135,7 +146,7 @@ class Guard:
         self._age_ticks = 0
 
     def apply(self, tick: int, command: Vector | None, owed: bool = True) -> Vector:
-        """Return the voltages of this tick; `command` is None when none has come.
+        """Return what is applied at this tick; `command` is None when none has come.
 
         `owed`: whether one should have come by now. Where it should not, none is missed.
         """
@@ -147,13 +158,13 @@ class Guard:
             self._take(tick, command, owed)
         if self.state is GuardState.RAMPING:
             self._ramp()
-        return self.volts
+        return self.command
 
     def _take(self, tick: int, command: Vector | None, owed: bool) -> None:
         if command is not None:
             self.state = GuardState.RUNNING
             self._age_ticks = 0
-            self.volts = self._limits.apply(command, self.volts)
+            self.command = self._limits.apply(command, self.command)
             return
         self._age_ticks = self._age_ticks + 1 if owed else 0
         if self.state is GuardState.RUNNING:
@@ -166,9 +177,9 @@ class Guard:
         left = 1.0 - self._ramp_tick / self._settings.ramp_ticks
         if left <= 0.0:
             self.state = GuardState.LATCHED
-            self.volts = self._settings.safe_volts
+            self.command = self._settings.safe_command
             return
-        self.volts = tuple(
+        self.command = tuple(
             safe + (start - safe) * left
-            for start, safe in zip(self._ramp_from, self._settings.safe_volts, strict=True)
+            for start, safe in zip(self._ramp_from, self._settings.safe_command, strict=True)
         )

@@ -63,7 +63,7 @@ class TransmitterNode:
         self._recorder = recorder or NullRecorder()
         self._reading: Reading | None = None
         self._watch = EncoderWatch(session.codec, session.terms.tick_ns / 1e9)
-        self._applied = guard.volts
+        self._applied = guard.command
         self._guard_told = guard.state
 
     def before_every_tick(self, act: Callable[[int], None]) -> None:
@@ -82,7 +82,7 @@ class TransmitterNode:
             time_ns = tick * self.session.terms.tick_ns
             self._recorder.write(DEVICE_CHANNEL, time_ns, device_row(tick, reading.device))
         self._check(tick, reading)
-        self.scores.on_angles(tick, reading.true_rad or reading.measured_rad)
+        self.scores.on_outputs(tick, reading.true_rad or reading.measured_rad)
         if self.gauge is not None:
             self.gauge.on_angle(tick, reading.measured_rad[0])
         asking: list[Frame] = []
@@ -201,7 +201,7 @@ class TransmitterNode:
             self.sensor_fault = GuardReason(GuardCause.SENSOR, tick, detail=fault)
             self.tell(Event(EventKind.SENSOR, tick=tick, detail=fault))
             self.guard.trip(self.sensor_fault)
-        self.guard.check_angles(tick, reading.measured_rad)
+        self.guard.check_outputs(tick, reading.measured_rad)
 
     def _tell_guard(self) -> None:
         self._guard_told = self.guard.state

@@ -54,14 +54,14 @@ def fly_ticks(
     the tick is one of the sample's, `model` its coded state. `ahead`: `model` is the live state that
     the tick's command is to be decided from; else that command is known.
     `close(flight, carried, model)` gets the state after the sample's last tick, and returns `carried`.
-    `tick(flight, model, command, held)` returns the state one tick later.
+    `tick(flight, carried, at, within, model, command, held)` returns (carried, state one tick later).
     """
     for index in range(count + lead):
         if index == count:
             carried = close(flight, carried, model)
             held = nothing
         carried, command = step(flight, carried, first + index, index < count, index >= lead, model)
-        model = tick(flight, model, command, held)
+        carried, model = tick(flight, carried, first + index, index < count, model, command, held)
     if lead == 0:
         carried = close(flight, carried, model)
     return carried
@@ -98,8 +98,16 @@ def _close(flight: _Sample, closed: CodecState, model: Vector) -> CodecState:
     return flight.codec.close(flight.state, flight.opened, model)
 
 
-def _tick(flight: _Sample, model: Vector, command: Vector, held: Vector) -> Vector:
-    return flight.codec.model.tick(model, command, held)
+def _tick(
+    flight: _Sample,
+    closed: CodecState,
+    at: int,
+    within: bool,
+    model: Vector,
+    command: Vector,
+    held: Vector,
+) -> tuple[CodecState, Vector]:
+    return closed, flight.codec.model.tick(model, command, held)
 
 
 def fly_sample(

@@ -104,6 +104,8 @@ class Signals:
     """what is measured, and steered to a set-point"""
     output_states: tuple[int | None, ...] = field(default=())
     """for each output the state that it is, None for another function of the states"""
+    steps_per_unit: tuple[float, ...] = field(init=False)
+    """of each input"""
 
     def __post_init__(self) -> None:
         """Refuse names that occur twice, and outputs that are states which are not there."""
@@ -112,6 +114,8 @@ class Signals:
             doubled = sorted({name for name in names if names.count(name) > 1})
             if doubled:
                 raise ValueError(f"{what}: {', '.join(doubled)} is named twice")
+        steps = tuple([one.steps_per_unit for one in self.inputs])
+        object.__setattr__(self, "steps_per_unit", steps)
         if not self.output_states:
             states = [one.name for one in self.states]
             found = [states.index(one.name) if one.name in states else None for one in self.outputs]

@@ -9,8 +9,8 @@ that they would act on, and count what is dropped under `COUNTER`. The limits:
 * **reach**: a sample is at most twice the history (`Terms.history_samples`) ahead of what this end's
   own clock says; `receiver.session.schedule` is stricter with symbols and requests;
 * **states**: of this codec and finite, the model within `STATE_MAX`, the coder as its kind says;
-* **commands**: as many as a sample has, each within the voltage limit, as the receiver's limiter leaves
-  them;
+* **commands**: as many as a sample has, each within the limit of its input, as the receiver's limiter
+  leaves them;
 * **lists and texts**: no more echoes than a command frame repeats; texts cut and without control
   characters, because they are shown on terminals and sent on.
 """
@@ -25,7 +25,7 @@ from channel.codec.codec import Codec, CodecState, is_coder_state, is_estimate
 from channel.codec.words import WIRE_ERASED
 from channel.protocol.events import Dropped, Event, EventKind, Tell
 from channel.protocol.frames import Bye, Commands, Desync, Echo, Frame, Hello, Refuse, Symbol, Welcome
-from channel.protocol.limits import to_millivolts
+from channel.protocol.limits import to_steps
 from channel.protocol.terms import Terms
 
 COUNTER = "out_of_bounds"
@@ -57,10 +57,10 @@ class Bounds:
         # nothing, and by the round trip, which the history covers as well.
         self._reach = 2 * terms.history_samples
         self._inputs = codec.model.input_size
-        self._millivolts = terms.ticks_per_sample * self._inputs
-        limit = terms.limits.volts_max
-        largest = max([limit, *[abs(volts) for volts in terms.initial_command]])
-        self._millivolts_max = to_millivolts((largest,))[0]
+        self._values = terms.ticks_per_sample * self._inputs
+        pairs = zip(terms.limits.command_max, terms.initial_command, strict=True)
+        largest = [max(limit, abs(first)) for limit, first in pairs]
+        self._steps_max = to_steps(largest, terms.signals)
         self._state_bytes = len(codec.pack(codec.initial()))
         self.sample_max = min(COUNTER_MAX // terms.symbols_per_word, TIME_NS_MAX // terms.sample_ns)
 
@@ -117,11 +117,11 @@ class Bounds:
         """Check an answer; `sample` is where the clock stands, None before this end's first flight."""
         if welcome.session == 0:
             return "a session without a number"
-        hold = welcome.hold_millivolts
+        hold = welcome.hold_steps
         if hold and len(hold) != self._inputs:
-            return f"a command to hold for {len(hold)} motors, not {self._inputs}"
+            return f"a command to hold for {len(hold)} inputs, not {self._inputs}"
         if hold and not self._are_allowed(hold):
-            return f"a command of {hold} mV to hold, beyond +-{self._millivolts_max}"
+            return f"a command of {hold} steps to hold, beyond +-{self._steps_max}"
         if sample is not None and welcome.first_sample > sample + self._reach + self._lead_samples:
             return f"a start at sample {welcome.first_sample} during sample {sample}"
         if sample is None and welcome.first_sample > FIRST_SHARE * self.sample_max:
@@ -138,18 +138,21 @@ class Bounds:
         return None
 
     def _of_echo(self, echo: Echo) -> str | None:
-        if len(echo.millivolts) != self._millivolts:
-            return f"{len(echo.millivolts)} voltages for a sample, not {self._millivolts}"
-        if not self._are_allowed(echo.millivolts):
-            return f"a command beyond +-{self._millivolts_max} mV for sample {echo.sample}"
+        if len(echo.steps) != self._values:
+            return f"{len(echo.steps)} values for a sample, not {self._values}"
+        if not self._are_allowed(echo.steps):
+            return f"a command beyond +-{self._steps_max} steps for sample {echo.sample}"
         if not self._codec.coder.alphabet.has_word(echo.word_number):
             return f"word number {echo.word_number} is no word"
         return None
 
-    def _are_allowed(self, millivolts: Sequence[int]) -> bool:
-        # min and max: this runs for every command frame, and they are the fastest there is.
-        largest = self._millivolts_max
-        return not millivolts or (-largest <= min(millivolts) and max(millivolts) <= largest)
+    def _are_allowed(self, steps: Sequence[int]) -> bool:
+        for index, largest in enumerate(self._steps_max):
+            # min and max: this runs for every command frame, and they are the fastest there is.
+            values = steps[index :: self._inputs]
+            if values and not (-largest <= min(values) and max(values) <= largest):
+                return False
+        return True
 
     def _of_state(self, welcome: Welcome) -> str | None:
         if not welcome.state:

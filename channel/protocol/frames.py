@@ -68,7 +68,7 @@ class Welcome:
     """of the Hello that is answered"""
     request: int = 0
     """of the Hello that is answered"""
-    hold_millivolts: tuple[int, ...] = ()
+    hold_steps: tuple[int, ...] = ()
     """command of the first `D` ticks from `first_sample` on; empty: the initial command"""
     state: bytes = b""
     """codec state before `first_sample`, in canonical bytes; empty: the initial one"""
@@ -134,8 +134,8 @@ class Echo:
     """as `Alphabet.word_number` counts; an erasure has a separate number"""
     digest: int
     """of the codec state after the sample, 64 bits"""
-    millivolts: tuple[int, ...]
-    """commands of ticks `kN + D ... (k+1)N + D - 1`, all motors of a tick together"""
+    steps: tuple[int, ...]
+    """commands of ticks `kN + D ... (k+1)N + D - 1`, all inputs of a tick together"""
 
 
 @dataclass(frozen=True, slots=True)

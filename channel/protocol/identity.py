@@ -56,13 +56,14 @@ def numerics_probe(codec: Codec) -> bytes:
         commands = []
         for _ in range(codec.ticks_per_sample):
             noise = noise * 1_103_515_245 + 12_345 & 0x7FFFFFFF
-            volts = ((noise >> 12) % 9_001 - 4_500) / 1000.0
-            signs = (1.0 if motor % 2 == 0 else -1.0 for motor in range(codec.model.input_size))
-            commands.append(tuple(sign * volts for sign in signs))
+            value = ((noise >> 12) % 9_001 - 4_500) / 1000.0
+            signs = (1.0 if index % 2 == 0 else -1.0 for index in range(codec.model.input_size))
+            commands.append(tuple(sign * value for sign in signs))
         try:
             state = codec.step(state, word, commands)
-        except CodecDiverged:  # an unstable model, which nobody steers here
-            state = codec.initial()
+        except CodecDiverged:
+            # An unstable plant under commands that nobody chose: begin again.
+            state = codec.initial()._replace(sample=sample + 1)
         digest.update(codec.pack(state))
     return digest.digest()
 

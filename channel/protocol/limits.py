@@ -1,4 +1,4 @@
-"""Limits of a motor command and its form on the wire.
+"""Limits of a command and its form on the wire, one of each for every input of the plant.
 
 The receiver limits and rounds a command before it is sent; both codecs use the value decoded from
 the wire, so they hold the same number. The guard beside the motors applies the same limits once
@@ -10,49 +10,70 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 from channel.codec.codec import Vector
+from channel.codec.signals import STEPS_MAX, Signals
 
-VOLTS_MAX = 32.0
-"""Largest voltage that 16-bit millivolts carry with room to spare."""
+COMMAND_MAX = 5.0
+"""Where an input is clamped that has no range and is given no limit."""
 
-PLAUSIBLE_VOLTS_MAX = 1e6
+PLAUSIBLE_MAX = 1e6
 """A law that wants more has lost its way; anything less is only clamped."""
 
 
 @dataclass(frozen=True, slots=True)
 class CommandLimits:
-    """Clamp and slew of each motor voltage."""
+    """Clamp and slew, one for each input, in its own unit."""
 
-    volts_max: float = 5.0
-    slew_volts_per_tick: float = math.inf
+    command_max: Vector
+    slew_per_tick: Vector
 
-    def __post_init__(self) -> None:
-        if not 0.0 < self.volts_max <= VOLTS_MAX:
-            raise ValueError(f"volts_max must be in (0, {VOLTS_MAX}], got {self.volts_max}")
-        if not self.slew_volts_per_tick > 0.0:
-            raise ValueError(f"the slew limit must be positive, got {self.slew_volts_per_tick}")
+    @classmethod
+    def of(
+        cls,
+        signals: Signals,
+        command_max: float | Sequence[float] | None = None,
+        slew_per_tick: float | Sequence[float] = math.inf,
+    ) -> Self:
+        """Return the limits of these inputs: one number for all, or one for each.
 
-    def apply(self, volts: Sequence[float], previous: Vector) -> Vector:
-        """Return the voltages clamped, then moved at most one slew step away from `previous`."""
-        largest = self.volts_max
-        step = self.slew_volts_per_tick
-        if len(volts) == 2 and len(previous) == 2:
+        Without `command_max` an input's range is its limit. ValueError, naming the input, for limits
+        that do not fit the inputs or that a frame does not carry.
+        """
+        if command_max is None:
+            ranges = [max(abs(one.low), abs(one.high)) for one in signals.inputs]
+            command_max = [value if value < math.inf else COMMAND_MAX for value in ranges]
+        limits = cls(
+            per_input("command_max", command_max, signals),
+            per_input("command_slew", slew_per_tick, signals),
+        )
+        for one, largest, slew in zip(
+            signals.inputs, limits.command_max, limits.slew_per_tick, strict=True
+        ):
+            if not largest > 0.0 or not slew > 0.0:
+                raise ValueError(
+                    f"input {one.name}: its limit {largest:g} and its slew limit {slew:g} per tick "
+                    "must be positive"
+                )
+        require_carried("command_max", limits.command_max, signals)
+        return limits
+
+    def apply(self, command: Sequence[float], previous: Vector) -> Vector:
+        """Return the command clamped, then moved at most one slew step away from `previous`."""
+        largest, step = self.command_max, self.slew_per_tick
+        if len(command) == len(previous) == len(largest) == 2:
             # Twice a tick in every flight: written out, it takes half the time.
             return (
-                limited(volts[0], previous[0], largest, step),
-                limited(volts[1], previous[1], largest, step),
+                limited(command[0], previous[0], largest[0], step[0]),
+                limited(command[1], previous[1], largest[1], step[1]),
             )
-        return tuple(
-            [
-                limited(wanted, before, largest, step)
-                for wanted, before in zip(volts, previous, strict=True)
-            ]
-        )
+        wanted = zip(command, previous, largest, step, strict=True)
+        return tuple([limited(*one) for one in wanted])
 
 
 def limited(wanted: float, before: float, largest: float, step: float) -> float:
-    """Return one voltage within +-`largest`, at most `step` away from the one `before`."""
+    """Return one value within +-`largest`, at most `step` away from the one `before`."""
     value = wanted
     if value > largest:
         value = largest
@@ -65,25 +86,55 @@ def limited(wanted: float, before: float, largest: float, step: float) -> float:
     return value
 
 
-def as_carried(volts: float) -> float:
-    """Return one voltage as the wire rounds it: `from_millivolts` of `to_millivolts`."""
-    return round(1000.0 * volts) / 1000.0
+def per_input(what: str, given: float | Sequence[float], signals: Signals) -> Vector:
+    """Return one value for each input; ValueError with the numbers where a list has another length."""
+    names = [one.name for one in signals.inputs]
+    if isinstance(given, int | float):
+        return (float(given),) * len(names)
+    if len(given) != len(names):
+        raise ValueError(
+            f"{what} = {list(given)} has {len(given)} values; the plant has {len(names)} input(s): "
+            f"{', '.join(names)}"
+        )
+    return tuple([float(value) for value in given])
 
 
-def are_plausible(volts: Sequence[float]) -> bool:
-    """Return whether every voltage is a number, and not an absurd one."""
+def require_carried(what: str, command: Vector, signals: Signals) -> None:
+    """Raise ValueError, with the numbers, for a command that a frame cannot hold."""
+    for one, value in zip(signals.inputs, command, strict=True):
+        if not abs(value) <= one.largest:
+            raise ValueError(
+                f"{what} of input {one.name} is {value:g} {one.unit}, and a frame carries at most "
+                f"{one.largest:g}: {STEPS_MAX} steps of {1.0 / one.steps_per_unit:g} {one.unit}"
+            )
+
+
+def are_plausible(command: Sequence[float]) -> bool:
+    """Return whether every value is a number, and not an absurd one."""
     # A loop: this runs at every tick, and `all` costs three times as much.
-    for value in volts:  # noqa: SIM110
-        if not -PLAUSIBLE_VOLTS_MAX < value < PLAUSIBLE_VOLTS_MAX:
+    for value in command:  # noqa: SIM110
+        if not -PLAUSIBLE_MAX < value < PLAUSIBLE_MAX:
             return False
     return True
 
 
-def to_millivolts(volts: Sequence[float]) -> tuple[int, ...]:
-    """Round voltages to the whole millivolts that a frame carries."""
-    return tuple([round(1000.0 * value) for value in volts])
+def as_carried(value: float, steps_per_unit: float) -> float:
+    """Return the value of one input as the wire rounds it."""
+    return round(steps_per_unit * value) / steps_per_unit
 
 
-def from_millivolts(millivolts: Sequence[int]) -> Vector:
-    """Return the voltages that both codecs use for a command of the wire."""
-    return tuple([value / 1000.0 for value in millivolts])
+def to_steps(command: Sequence[float], signals: Signals) -> tuple[int, ...]:
+    """Round a command to the whole steps that a frame carries."""
+    per_unit = signals.steps_per_unit
+    if len(per_unit) == 2:
+        return round(per_unit[0] * command[0]), round(per_unit[1] * command[1])
+    pairs = zip(per_unit, command, strict=True)
+    return tuple([round(steps * value) for steps, value in pairs])
+
+
+def from_steps(steps: Sequence[int], signals: Signals) -> Vector:
+    """Return the command that both codecs use for the steps of a frame."""
+    per_unit = signals.steps_per_unit
+    if len(per_unit) == 2:
+        return steps[0] / per_unit[0], steps[1] / per_unit[1]
+    return tuple([value / one for value, one in zip(steps, per_unit, strict=True)])

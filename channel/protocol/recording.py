@@ -87,7 +87,7 @@ EPOCH_CHANNEL = RecordChannel(
         Field("epoch", "integer", "", "counted from 0"),
         Field("state", "numbers", "", "model state that the epoch starts from"),
         Field("coder", "numbers", "", "coder state that it starts from"),
-        Field("hold_volts", "numbers", "V", "command of its first ticks, until one is decided"),
+        Field("hold", "numbers", "", "command of its first ticks, until one is decided"),
     ),
 )
 

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from channel.codec.codec import Codec, Vector
-from channel.protocol.limits import CommandLimits
+from channel.codec.signals import Signals, signals_of
+from channel.protocol.limits import CommandLimits, require_carried
 from channel.protocol.lockstep import HISTORY_NS, HISTORY_SAMPLES
 
 Delivery = Literal["start", "end"]
@@ -45,8 +46,10 @@ class Terms:
     repeats: int
     """W: how many earlier samples each command frame repeats"""
     initial_command: Vector
-    """motor voltages of ticks 0 ... D - 1"""
+    """command of ticks 0 ... D - 1"""
     limits: CommandLimits
+    signals: Signals
+    """of the codec's model"""
     uplink_line_ns: int = 0
     """on a line of finite rate: how long a symbol is on its way"""
     downlink_line_ns: int = 0
@@ -73,6 +76,7 @@ class Terms:
         and the command lead is the shortest that is possible. ValueError where they cannot be flown.
         """
         symbols_per_word = codec.coder.alphabet.symbols_per_word
+        signals = signals_of(codec.model)
         tick_ns = round(tick_s * 1e9)
         terms = cls(
             tick_ns=tick_ns,
@@ -85,7 +89,8 @@ class Terms:
             downlink_budget_ns=round(downlink_budget_s * 1e9),
             repeats=repeats,
             initial_command=initial_command or (0.0,) * codec.model.input_size,
-            limits=limits or CommandLimits(),
+            limits=limits or CommandLimits.of(signals),
+            signals=signals,
         )
         if lead_ticks is None:
             terms = terms.with_shortest_lead("virtual")
@@ -151,6 +156,13 @@ class Terms:
                 f"{slots_per_s:g} symbols/s, but the line carries rate_baud = {self.rate_baud:g}; "
                 "lengthen symbol_period_s or raise rate_baud"
             )
+        inputs = len(self.signals.inputs)
+        if not inputs == len(self.initial_command) == len(self.limits.command_max):
+            raise ValueError(
+                f"the plant has {inputs} input(s); the initial command has {len(self.initial_command)} "
+                f"value(s) and there are {len(self.limits.command_max)} limit(s)"
+            )
+        require_carried("the initial command", self.initial_command, self.signals)
         echo_bytes = ECHO_BYTES + 2 * len(self.initial_command) * self.ticks_per_sample
         if (self.repeats + 1) * echo_bytes > ECHOES_BYTES_MAX or self.repeats >= ECHOES_MAX:
             raise ValueError(

@@ -7,11 +7,11 @@ there. Bodies, by kind:
 
     1 hello     incarnation u32, request u32, sample u32, why u8, config digest 16 bytes,
                 probe 8 bytes, version text
-    2 welcome   incarnation u32, request u32, first sample u32, motors u8, millivolts s16 ...,
+    2 welcome   incarnation u32, request u32, first sample u32, inputs u8, steps s16 ...,
                 state bytes
     3 refuse    incarnation u32, ending u8, text, config text
     4 symbol    slot u32, number u8
-    5 commands  last sample u32, echoes u8, then per echo: word u16, digest u64, millivolts s16 ...
+    5 commands  last sample u32, echoes u8, then per echo: word u16, digest u64, steps s16 ...
     6 desync    sample u32, digests u64 u64, state bytes
     7 bye       ending u8, text
     8 unknown   nothing
@@ -201,7 +201,7 @@ def _encode_hello(frame: Hello) -> bytes:
 
 
 def _encode_welcome(frame: Welcome) -> bytes:
-    hold = frame.hold_millivolts
+    hold = frame.hold_steps
     head = _WELCOME.pack(frame.incarnation, frame.request, frame.first_sample, len(hold))
     return head + struct.pack(f"<{len(hold)}h", *hold) + frame.state
 
@@ -210,34 +210,34 @@ def _encode_commands(frame: Commands) -> bytes:
     if not frame.echoes:
         raise ValueError("a command frame has at least one echo")
     newest = frame.echoes[-1]
-    volts = len(newest.millivolts)
-    layout = _echo_layout(volts)
+    count = len(newest.steps)
+    layout = _echo_layout(count)
     parts = [_COMMANDS.pack(newest.sample, len(frame.echoes))]
     sample = newest.sample + 1 - len(frame.echoes)
     for echo in frame.echoes:
-        if echo.sample != sample or len(echo.millivolts) != volts:
+        if echo.sample != sample or len(echo.steps) != count:
             raise ValueError("the echoes of a command frame are consecutive and equally long")
-        parts.append(layout.pack(echo.word_number, echo.digest, *echo.millivolts))
+        parts.append(layout.pack(echo.word_number, echo.digest, *echo.steps))
         sample += 1
     return b"".join(parts)
 
 
 @cache
-def _echo_layout(volts: int) -> struct.Struct:
-    return struct.Struct(f"<HQ{volts}h")
+def _echo_layout(count: int) -> struct.Struct:
+    return struct.Struct(f"<HQ{count}h")
 
 
 def _decode_commands(session: int, epoch: int, body: bytes) -> Commands:
     last, count = _COMMANDS.unpack_from(body)
     size, rest = divmod(len(body) - _COMMANDS.size, count) if count else (0, 1)
-    volts, odd = divmod(size - _ECHO.size, 2)
-    if rest or odd or volts < 0 or last + 1 < count:
+    values, odd = divmod(size - _ECHO.size, 2)
+    if rest or odd or values < 0 or last + 1 < count:
         raise FrameError(f"malformed commands: {count} echoes in {len(body)} bytes")
     echoes = []
-    layout = _echo_layout(volts)
+    layout = _echo_layout(values)
     for index in range(count):
-        word_number, digest, *millivolts = layout.unpack_from(body, _COMMANDS.size + index * size)
-        echoes.append(Echo(last + 1 - count + index, word_number, digest, tuple(millivolts)))
+        word_number, digest, *steps = layout.unpack_from(body, _COMMANDS.size + index * size)
+        echoes.append(Echo(last + 1 - count + index, word_number, digest, tuple(steps)))
     return Commands(session, epoch, tuple(echoes))
 
 

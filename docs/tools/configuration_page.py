@@ -8,15 +8,17 @@ import itertools
 import textwrap
 from collections.abc import Iterator
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from tenbaud.config.kinds import PartName
 from tenbaud.config.schema import KINDS, SHARED_SECTIONS, FlightConfig
+from tenbaud.config.section import NamedSections, Section
 
 UNITS = (
+    ("command_slew_per_s", ""),
     ("_rad_per_v_s2", "rad/(V s²)"),
     ("_volts_per_s", "V/s"),
     ("_rad_per_s", "rad/s"),
@@ -25,7 +27,7 @@ UNITS = (
     ("_per_turn", "counts/turn"),
     ("_counts", "counts"),
     ("_volts", "V"),
-    ("volts_max", "V"),
+    ("device_volts_max", "V"),
     ("_baud", "baud"),
     ("_ticks", "ticks"),
     ("_signs", "signs"),
@@ -35,6 +37,8 @@ UNITS = (
     ("bits", "bits"),
 )
 """Ending of a field's name, and the unit that it stands for; the first that fits."""
+
+KINDS_MODULE = "tenbaud.config.kinds"
 
 INTRODUCTION = """# Configuration
 
@@ -78,6 +82,9 @@ def _section(name: str, model: type[BaseModel], kind: str = "") -> Iterator[str]
         if field == "kind" and kind:
             continue
         rows.append(_row(field, info, meanings.get(field, "")))
+    if issubclass(model, NamedSections):
+        named = get_type_hints(model)["__pydantic_extra__"]
+        inner.append((f"{name}.NAME", get_args(named)[1]))
     if rows:
         yield "| field | unit | default | allowed | meaning |"
         yield "|---|---|---|---|---|"
@@ -131,7 +138,7 @@ def _allowed(annotation: Any, metadata: list[Any]) -> str:
         return ", ".join(f"`{_plain(value)}`" for value in get_args(annotation))
     if get_origin(annotation) is tuple:
         return _allowed_list(get_args(annotation))
-    if get_origin(annotation) is dict:
+    if get_origin(annotation) is dict or _models(annotation):
         return "table"
     for check in (getattr(item, "func", None) for item in metadata):
         if isinstance(check, PartName):
@@ -188,8 +195,8 @@ def _meanings(model: type[BaseModel]) -> dict[str, str]:
     """Return the texts below the fields of a section, those of its parents included."""
     found: dict[str, str] = {}
     for owner in reversed(model.__mro__):
-        if owner in (BaseModel, object) or not issubclass(owner, BaseModel):
-            continue
+        if not issubclass(owner, Section) or owner.__module__ == KINDS_MODULE:
+            continue  # the latter is made of a constructor, whose parameters have no texts
         tree = ast.parse(textwrap.dedent(inspect.getsource(owner)))
         body = tree.body[0].body  # type: ignore[attr-defined]
         for field, text in itertools.pairwise(body):

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
-from receiver.controllers.references import Reference
+from channel.codec.codec import Model
+from channel.codec.signals import Signals
+from receiver.controllers.references import Constant, Reference
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,29 +17,74 @@ class ControllerContext:
 
     tick_s: float
     """time between two commands"""
-    reference: Reference
-    """the configured set-point: `reference.angle_rad(tick)`"""
-    volts_max: float
-    """where each motor's voltage is clamped"""
+    references: tuple[Reference | None, ...]
+    """the configured set-point of each output, `references[0].value(tick)`; None: it has none"""
+    command_max: tuple[float, ...]
+    """where each input is clamped"""
     initial_command: tuple[float, ...]
-    """motor voltages before the first command; a command has as many"""
+    """before the first command; a command has as many values"""
+    signals: Signals
+    """names and units of states, inputs and outputs"""
+    model: Model
+    """the codec's model, whose state is estimated"""
+
+    @property
+    def reference(self) -> Any:
+        """Return the set-point of the first output."""
+        return self.references[0] or Constant(0.0, self.tick_s)
+
+    @property
+    def volts_max(self) -> float:
+        """Return where the first input is clamped, as it was called before inputs had names."""
+        return self.command_max[0]
 
 
 class Controller(Protocol):
-    """A law that turns the estimated state into motor voltages, once per control tick.
+    """A law that turns the estimated state into a command, once per control tick.
 
     It runs at the receiver only: what it commands travels to the other end on the wire, so it is
     free to use any arithmetic and to keep any memory.
     """
 
     def command(self, tick: int, state: tuple[float, ...]) -> tuple[float, ...]:
-        """Return the motor voltages (front, rear) for `tick`.
+        """Return the command for `tick`, one value for each input of the model.
 
         Called once for every tick, in order; the first tick is the command lead. `state` is the
-        model state estimated for that tick: angle (rad), rate (rad/s), then what the model adds.
+        model state estimated for that tick.
         """
         ...
 
-    def reference_rad(self, tick: int) -> float | None:
-        """Return the angle the controller steers to at `tick`, or None when it follows none."""
+    def references(self, tick: int) -> tuple[float | None, ...]:
+        """Return what the controller steers each output to at `tick`; None where it follows nothing.
+
+        Outputs behind the last one given follow nothing either.
+        """
         ...
+
+
+class _OfOneReference:
+    """A controller that knows the set-point of its first output only, by the name that it had."""
+
+    def __init__(self, controller: Any) -> None:
+        self._controller = controller
+
+    def command(self, tick: int, state: tuple[float, ...]) -> tuple[float, ...]:
+        """Return the controller's command."""
+        command: tuple[float, ...] = self._controller.command(tick, state)
+        return command
+
+    def references(self, tick: int) -> tuple[float | None, ...]:
+        """Return the controller's set-point."""
+        return (self._controller.reference_rad(tick),)
+
+
+def with_references(controller: Any) -> Any:
+    """Return a controller that has `references`; one that has `reference_rad` instead is wrapped."""
+    if hasattr(controller, "references") or not hasattr(controller, "reference_rad"):
+        return controller
+    text = (
+        f"{type(controller).__name__}.reference_rad(tick) is deprecated; define references(tick), "
+        "which returns a tuple with the set-point of each output"
+    )
+    warnings.warn(text, FutureWarning, stacklevel=3)
+    return _OfOneReference(controller)

@@ -1,15 +1,19 @@
-"""The paper's PID law (24) and its split over the two motors (1)."""
+"""The paper's PID law (24), a loop for each output that is steered, split over the inputs as in (1)."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import Final, Literal, NamedTuple, get_args
 
 from receiver.controllers.references import Reference
 
-GainUnit = Literal["V/rad", "V/deg"]
 AntiWindup = Literal["conditional", "none"]
+Vector = tuple[float, ...]
+Reading = Callable[[Vector], float]
+"""Model state -> an output, or its rate."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,16 +27,29 @@ class PidGains:
     proportional: float
     integral: float
     derivative: float
-    unit: GainUnit
+    unit: str
 
     def __post_init__(self) -> None:
-        """Refuse gains that would push away from the reference, and unknown units."""
+        """Refuse gains that would push away from the reference, and units that are none."""
         for name in ("proportional", "integral", "derivative"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise ValueError(f"gain {name} is {value}; it must be finite and at least 0")
-        if self.unit not in get_args(GainUnit):
-            raise ValueError(f"gain unit is '{self.unit}'; it must be 'V/rad' or 'V/deg'")
+
+    def per_tick(self, tick_s: float, output_unit: str = "rad") -> tuple[float, float, float]:
+        """Return kP, kI per tick and kD in units of the output; ValueError for another unit."""
+        over = self.unit.rpartition("/")[2]
+        if over != output_unit and (over, output_unit) != ("deg", "rad"):
+            raise ValueError(
+                f"gain unit is '{self.unit}'; it must be per {output_unit}"
+                + (" or per deg, such as 'V/rad' or 'V/deg'" if output_unit == "rad" else "")
+            )
+        scale = math.degrees(1.0) if over != output_unit else 1.0
+        return (
+            self.proportional * scale,
+            self.integral * scale * tick_s,
+            self.derivative * scale,
+        )
 
 
 # The paper prints no unit. In V/rad the loop cannot reach the reference at all; in V/deg it behaves
@@ -41,63 +58,125 @@ PAPER_GAINS: Final = PidGains(proportional=0.1, integral=0.053, derivative=0.12,
 
 
 class PidConstants(NamedTuple):
-    """Constants of the functions below; volts and radians."""
+    """Constants of one loop, for the functions below."""
 
     proportional: float
     integral_per_tick: float
     derivative: float
-    volts_max: float
-    normal_force_volts: float
+    mixing: Vector
+    """how much of the loop's sum each input gets"""
     conditional: bool
-    """whether the integral rests while more of it would change no motor"""
+    """whether the integral rests while more of it would change no input"""
 
 
-def pid_volts(
-    constants: PidConstants, integral_volts: float, error_rad: float, rate_rad_s: float
-) -> float:
+def pid_sum(constants: PidConstants, integral: float, error: float, rate: float) -> float:
     """Return u of (24)."""
-    return constants.proportional * error_rad + integral_volts - constants.derivative * rate_rad_s
+    return constants.proportional * error + integral - constants.derivative * rate
 
 
-def pid_integral(
-    constants: PidConstants, integral_volts: float, error_rad: float, pitch_volts: float
-) -> float:
-    """Return the integral term of the next tick.
+def pid_integral(constants: PidConstants, integral: float, error: float, stuck: bool) -> float:
+    """Return the integral term of the next tick; `stuck`: more of it would change no input."""
+    if constants.conditional and stuck:
+        return integral
+    return integral + constants.integral_per_tick * error
 
-    It winds up when more of it would change no motor: both stand at their limit already. One saturated
-    motor is not enough: with a large w one always is, the other still steers, and an integral frozen
-    there would leave a lasting error.
+
+def is_stuck(value: float, push: float, largest: float) -> bool:
+    """Return whether an input of this value would not change if it were pushed further.
+
+    A loop's integral rests when all its inputs are. One saturated input is not enough: with a large
+    bias one always is, the others still steer, and an integral frozen there would leave an error.
     """
-    if constants.conditional:
-        shared = abs(constants.normal_force_volts)
-        saturated = abs(pitch_volts) - shared >= 2.0 * constants.volts_max
-        if saturated and error_rad * pitch_volts > 0.0:
-            return integral_volts
-    return integral_volts + constants.integral_per_tick * error_rad
+    return push == 0.0 or (value >= largest if push > 0.0 else value <= -largest)
 
 
-def motor_volts(constants: PidConstants, pitch_volts: float) -> tuple[float, float]:
-    """Return (front, rear) of (1), each within its limit."""
-    largest = constants.volts_max
-    front = (constants.normal_force_volts + pitch_volts) / 2.0
-    rear = (constants.normal_force_volts - pitch_volts) / 2.0
+def clamped(value: float, largest: float) -> float:
+    """Return the value within its limit."""
     # Comparisons: in plain Python they take a third of the time of `min` and `max`.
-    if front > largest:
-        front = largest
-    elif front < -largest:
-        front = -largest
-    if rear > largest:
-        rear = largest
-    elif rear < -largest:
-        rear = -largest
-    return front, rear
+    if value > largest:
+        return largest
+    return -largest if value < -largest else value
 
 
-class Pid:
-    """A `Controller`: u = kP eps + kI int(eps) - kD rate, then one voltage per motor.
+@dataclass(frozen=True, slots=True)
+class Loop:
+    """One output that is steered."""
+
+    constants: PidConstants
+    reference: Reference
+    output: int
+    """its place among the outputs"""
+    value: Reading
+    rate: Reading
+
+
+class PidLoops:
+    """A `Controller`: for each loop u = kP eps + kI int(eps) - kD rate, mixed into the inputs.
 
     The derivative acts on the estimated rate, not on the error, so a jump of the reference gives no
     kick. The integral is a rectangle sum of past ticks; the present error enters with the next one.
+    """
+
+    def __init__(self, loops: Sequence[Loop], command_max: Vector, bias: Vector) -> None:
+        """Steer by `loops`; `bias` is what the inputs have without them.
+
+        Each input saturates at its `command_max`.
+        """
+        self.loops = tuple(loops)
+        self.command_max = command_max
+        self.bias = bias
+        self.integrals = [0.0] * len(self.loops)
+        """the integral term of each loop's u"""
+        self._outputs = 1 + max([loop.output for loop in loops], default=-1)
+        self._last_tick: int | None = None
+
+    def references(self, tick: int) -> tuple[float | None, ...]:
+        """Return the set-point of each output at `tick`."""
+        found: list[float | None] = [None] * self._outputs
+        for loop in self.loops:
+            found[loop.output] = loop.reference.value(tick)
+        return tuple(found)
+
+    def command(self, tick: int, state: Vector) -> Vector:
+        """Return one value for each input, each within its limit.
+
+        Ticks must rise; over a gap, which a rejoin leaves, the integrals rest. Raises ValueError for a
+        tick that does not rise and for a state that is not finite, and then leaves the controller as
+        it was.
+        """
+        if self._last_tick is not None and tick <= self._last_tick:
+            raise ValueError(f"tick is {tick}; it must be above the last one, {self._last_tick}")
+        wanted = list(self.bias)
+        errors = []
+        for loop, integral in zip(self.loops, self.integrals, strict=True):
+            error = loop.reference.value(tick) - loop.value(state)
+            total = pid_sum(loop.constants, integral, error, loop.rate(state))
+            if not math.isfinite(total):
+                raise ValueError(f"state at tick {tick} is {state}; it must be finite")
+            errors.append(error)
+            for index, share in enumerate(loop.constants.mixing):
+                wanted[index] += share * total
+        self._last_tick = tick
+        limits = self.command_max
+        # Most ticks have no input at its limit, and then no integral rests.
+        inside = True
+        for index, largest in enumerate(limits):
+            inside = inside and -largest < wanted[index] < largest
+        for place, (loop, error) in enumerate(zip(self.loops, errors, strict=True)):
+            stuck = not inside and self._is_stuck(loop.constants.mixing, error, wanted)
+            integral = self.integrals[place]
+            self.integrals[place] = pid_integral(loop.constants, integral, error, stuck)
+        return tuple(wanted) if inside else tuple(map(clamped, wanted, limits))
+
+    def _is_stuck(self, mixing: Vector, error: float, wanted: Sequence[float]) -> bool:
+        inputs = zip(mixing, wanted, self.command_max, strict=True)
+        return all(is_stuck(value, share * error, largest) for share, value, largest in inputs)
+
+
+class Pid(PidLoops):
+    """The paper's: the angle steered by the difference of two motors, front and rear.
+
+    It reads the first two entries of the state: angle (rad) and rate (rad/s).
     """
 
     def __init__(
@@ -122,43 +201,9 @@ class Pid:
             raise ValueError(f"normal_force_volts is {normal_force_volts}; it must be finite")
         if anti_windup not in get_args(AntiWindup):
             raise ValueError(f"anti_windup is '{anti_windup}'; it must be 'conditional' or 'none'")
-        per_rad = math.degrees(1.0) if gains.unit == "V/deg" else 1.0
-        self.constants = PidConstants(
-            gains.proportional * per_rad,
-            gains.integral * per_rad * tick_s,
-            gains.derivative * per_rad,
-            float(volts_max),
-            float(normal_force_volts),
-            anti_windup == "conditional",
-        )
-        self._reference = reference
-        self._integral_volts = 0.0
-        self._last_tick: int | None = None
-
-    @property
-    def integral_volts(self) -> float:
-        """The integral term of u, in volts."""
-        return self._integral_volts
-
-    def reference_rad(self, tick: int) -> float:
-        """Return the reference angle at `tick`."""
-        return self._reference.angle_rad(tick)
-
-    def command(self, tick: int, state: tuple[float, ...]) -> tuple[float, float]:
-        """Return (front, rear) volts for `tick`, each within +-`volts_max`.
-
-        Reads the first two entries of `state`: angle (rad) and rate (rad/s). Ticks must rise; over
-        a gap, which a rejoin leaves, the integral rests. Raises ValueError for a tick that does
-        not rise and for a state that is not finite, and then leaves the controller as it was.
-        """
-        if self._last_tick is not None and tick <= self._last_tick:
-            raise ValueError(f"tick is {tick}; it must be above the last one, {self._last_tick}")
-        error_rad = self._reference.angle_rad(tick) - state[0]
-        pitch_volts = pid_volts(self.constants, self._integral_volts, error_rad, state[1])
-        if not math.isfinite(pitch_volts):
-            raise ValueError(f"state at tick {tick} is {state[:2]}; it must be finite")
-        self._last_tick = tick
-        self._integral_volts = pid_integral(
-            self.constants, self._integral_volts, error_rad, pitch_volts
-        )
-        return motor_volts(self.constants, pitch_volts)
+        conditional = anti_windup == "conditional"
+        kp, ki, kd = gains.per_tick(tick_s)
+        constants = PidConstants(kp, ki, kd, (0.5, -0.5), conditional)
+        loop = Loop(constants, reference, 0, itemgetter(0), itemgetter(1))
+        bias = normal_force_volts / 2.0
+        super().__init__((loop,), (float(volts_max),) * 2, (bias, bias))

@@ -27,6 +27,6 @@ class RecordedController:
             raise ValueError(f"tick is {tick}; it must be at least 0")
         return self._volts[min(tick, self._last_row)]
 
-    def reference_rad(self, tick: int) -> None:
-        """Return None at every `tick`: a recorded flight follows no reference of ours."""
-        return None
+    def references(self, tick: int) -> tuple[float | None, ...]:
+        """Return none: a recorded flight follows no reference of ours."""
+        return ()

@@ -16,11 +16,11 @@ from channel.codec.words import Word
 from channel.errors import CodecDiverged
 from channel.protocol.events import Event, EventKind, Failing, Tell
 from channel.protocol.frames import Echo
-from channel.protocol.limits import are_plausible, from_millivolts, to_millivolts
+from channel.protocol.limits import are_plausible, from_steps, to_steps
 from channel.protocol.lockstep import History
 from channel.protocol.recording import Recorder
 from channel.protocol.terms import Terms
-from receiver.controllers.base import Controller
+from receiver.controllers.base import Controller, with_references
 from receiver.session.records import write_commands, write_sample
 from receiver.session.rejoin import carried_to
 
@@ -65,14 +65,15 @@ class Commander:
         self.history = History(codec, 2 * terms.history_samples)
         self.hold = terms.initial_command
         """last command decided"""
-        self._controller = controller
+        self._controller: Controller = with_references(controller)
+        self._no_references: tuple[float | None, ...] = (None,) * len(terms.signals.outputs)
         self._recorder = recorder
         self._counts = counts
         self._emit = emit
         self._commands: deque[Vector] = deque([self.hold] * terms.lead_ticks)
         """of the next `D` ticks"""
         self._echoes: deque[Echo] = deque(maxlen=terms.repeats + 1)
-        self._millivolts: list[int] = []
+        self._steps: list[int] = []
         """decided for the sample that is being flown"""
         self._unwritten: list[_Flown] = []
 
@@ -117,7 +118,7 @@ class Commander:
     def fly(self, word: Word, epoch: int, now_ns: int) -> tuple[Echo, ...]:
         """Consume the word of the next sample; return its echo after those that it repeats."""
         before = self.state
-        self._millivolts = []
+        self._steps = []
         try:
             flown = fly_sample(self.codec, before, word, tuple(self._commands), self._decide)
         except (ArithmeticError, ValueError) as error:
@@ -129,7 +130,7 @@ class Commander:
         self.history.add(epoch, word, self.state)
         digest = self.codec.digest(self.state)
         number = self.codec.coder.alphabet.word_number(word)
-        self._echoes.append(Echo(before.sample, number, digest, tuple(self._millivolts)))
+        self._echoes.append(Echo(before.sample, number, digest, tuple(self._steps)))
         self._unwritten.append(_Flown(before, word, flown, digest, now_ns))
         if len(self._unwritten) >= UNWRITTEN_MAX:
             self.write_down()
@@ -141,36 +142,38 @@ class Commander:
         for before, word, flown, digest, now_ns in unwritten:
             ranges = self.codec.coder.ranges(before.coder)
             write_sample(self._recorder, self.terms, word, ranges, flown.state, digest, now_ns)
-            write_commands(self._recorder, self.terms, before.sample, flown, self._reference_rad)
+            write_commands(self._recorder, self.terms, before.sample, flown, self._references)
 
     def _decide(self, tick: int, state: Vector) -> Vector:
         """Ask the controller, limit what it wants, and return it as the wire will carry it."""
-        volts = self._ask(tick, state)
-        limited = self.terms.limits.apply(volts, self.hold)
-        millivolts = to_millivolts(limited)
-        self._millivolts += millivolts
-        self.hold = from_millivolts(millivolts)
+        limited = self.terms.limits.apply(self._ask(tick, state), self.hold)
+        steps = to_steps(limited, self.terms.signals)
+        self._steps += steps
+        self.hold = from_steps(steps, self.terms.signals)
         return self.hold
 
-    def _reference_rad(self, tick: int) -> float | None:
+    def _references(self, tick: int) -> tuple[float | None, ...]:
         try:
-            return self._controller.reference_rad(tick)
+            references = self._controller.references(tick)
+            if len(references) == len(self._no_references):
+                return references
+            if len(references) < len(self._no_references):
+                return (*references, *self._no_references[len(references) :])
+            problem = f"{len(references)} set-points for {len(self._no_references)} output(s)"
         except Exception as error:  # the user's code too, and only a column of the recording
-            self._counts["bad_references"] += 1
-            if self._counts["bad_references"] == 1:
-                problem = f"{type(error).__name__}: {error}"
-                self._emit(
-                    Event(EventKind.CONTROLLER, tick=tick, cause=Failing.REFERENCE, detail=problem)
-                )
-            return None
+            problem = f"{type(error).__name__}: {error}"
+        self._counts["bad_references"] += 1
+        if self._counts["bad_references"] == 1:
+            self._emit(Event(EventKind.CONTROLLER, tick=tick, cause=Failing.REFERENCE, detail=problem))
+        return self._no_references
 
     def _ask(self, tick: int, state: Vector) -> Vector:
         """Return what the controller wants; its last command where it fails or wants nonsense."""
         try:
-            volts = self._controller.command(tick, state)
-            if len(volts) == len(self.hold) and are_plausible(volts):
-                return volts
-            problem = f"wants {volts}"
+            command = self._controller.command(tick, state)
+            if len(command) == len(self.hold) and are_plausible(command):
+                return command
+            problem = f"wants {command}"
         except Exception as error:  # a controller is the user's code; the flight goes on without it
             problem = f"failed: {type(error).__name__}: {error}"
         self._counts["bad_commands"] += 1

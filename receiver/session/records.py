@@ -19,8 +19,8 @@ from channel.protocol.recording import (
 )
 from channel.protocol.terms import Terms
 
-ReferenceOf = Callable[[int], float | None]
-"""Tick -> what the controller steers to, rad."""
+ReferencesOf = Callable[[int], tuple[float | None, ...]]
+"""Tick -> what the controller steers each output to."""
 
 TICK_CHANNEL = RecordChannel(
     "tick",
@@ -62,12 +62,12 @@ def write_sample(
 
 
 def write_commands(
-    recorder: Recorder, terms: Terms, sample: int, flown: FlownSample, reference_rad: ReferenceOf
+    recorder: Recorder, terms: Terms, sample: int, flown: FlownSample, references: ReferencesOf
 ) -> None:
     """Write down the commands that were decided with one sample, and what they steered to."""
     tick = sample * terms.ticks_per_sample + terms.lead_ticks
     for predicted, command in zip(flown.live, flown.commands, strict=True):
-        row = (tick, (reference_rad(tick),), predicted, command)
+        row = (tick, references(tick), predicted, command)
         recorder.write(TICK_CHANNEL, tick * terms.tick_ns, row)
         tick += 1
 

@@ -35,7 +35,7 @@ from channel.protocol.frames import (
     Welcome,
 )
 from channel.protocol.identity import Identity
-from channel.protocol.limits import to_millivolts
+from channel.protocol.limits import to_steps
 from channel.protocol.lockstep import History, difference_event
 from channel.protocol.recording import NullRecorder, Recorder
 from channel.protocol.terms import Terms
@@ -236,7 +236,7 @@ class ReceiverSession:
         self._schedule = Schedule(self.terms)
         self._schedule.begin(first * count, now_ns)
         hold = self._commander.hold
-        told = () if hold == self.terms.initial_command else to_millivolts(hold)
+        told = () if hold == self.terms.initial_command else to_steps(hold, self.terms.signals)
         asked = (hello.incarnation, hello.request)
         welcome = Welcome(self.session_number, self.epoch, first, *asked, told, state)
         self._greeter.answer_with(welcome)

@@ -13,13 +13,13 @@ from typing import Any, NamedTuple
 
 from channel.codec.codec import Vector
 from channel.errors import CodecDiverged
-from channel.protocol.limits import from_millivolts, to_millivolts
-from plant_sim.encoder import Encoder
+from channel.protocol.limits import from_steps, to_steps
 from reproduction.limits.candidates import CANDIDATES, PRESETS
 from tenbaud.build.controllers import build_controller
 from tenbaud.build.ends import build_observer
 from tenbaud.build.flight import Agreement, agree
 from tenbaud.build.rig import build_plant
+from tenbaud.build.signals import build_encoders
 from tenbaud.config.load import load_config
 
 FINE_COUNTS = 10_000_000
@@ -66,7 +66,7 @@ def configuration(case: Case) -> Agreement:
         "timing": {"lead_ticks": 0},
         "channel": {"delivery": "start"},
         "transmitter": {
-            "encoder_counts_per_turn": case.counts,
+            "encoders": {"counts_per_turn": case.counts},
             "plant": {"disturbance": f"q={case.density!r}"},
         },
         "receiver": receiver,
@@ -118,7 +118,7 @@ def fly_agreement(agreement: Agreement, start_s: float) -> Errors:
     """
     config, codec, terms = agreement.config, agreement.codec, agreement.terms
     plant = build_plant(config, terms.tick_ns / 1e9)
-    encoder = Encoder(config.transmitter.encoder_counts_per_turn)
+    (encoder,) = build_encoders(config, terms.signals)
     controller = build_controller(config)
     observer = build_observer(agreement)
     limits = terms.limits
@@ -130,7 +130,7 @@ def fly_agreement(agreement: Agreement, start_s: float) -> Errors:
     used = 0
     for tick in range(agreement.flight_ticks):
         true = plant.measured_rad[0]
-        seen: Vector = (encoder.angle_rad(encoder.counts(true)),)
+        seen: Vector = (encoder.read(true)[1],)
         if observer is not None:
             seen = observer.look(tick, seen, volts)
         if tick % count == 0:
@@ -139,11 +139,11 @@ def fly_agreement(agreement: Agreement, start_s: float) -> Errors:
         if tick >= first:
             error = true - codec.model.measured(model)[0]
             estimation += error * error
-            distance = (controller.reference_rad(tick) or 0.0) - true
+            distance = ((*controller.references(tick), None)[0] or 0.0) - true
             tracking += distance * distance
             used += 1
         wanted = limits.apply(controller.command(tick, model), volts)
-        volts = from_millivolts(to_millivolts(wanted))
+        volts = from_steps(to_steps(wanted, terms.signals), terms.signals)
         model = codec.model.tick(model, volts, opened.held)
         plant.advance(volts)
         if tick % count == count - 1:

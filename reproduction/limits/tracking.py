@@ -56,7 +56,7 @@ def fly_tracking(case: TrackingCase) -> float:
         "seed": case.seed,
         "duration_s": SECONDS,
         "transmitter": {
-            "encoder_counts_per_turn": 4096,
+            "encoders": {"counts_per_turn": 4096},
             "plant": {"mismatch": case.mismatch, "disturbance": case.disturbance},
         },
         "link": {"kind": "memory"},

@@ -78,7 +78,7 @@ def fly_story() -> Story:
     overrides: dict[str, Any] = {
         "duration_s": DURATION_S,
         "link": {"impairments": CUT},
-        "receiver": {"reference": {"period_s": 16.0, "amplitude_rad": 1.0, "kind": "sine"}},
+        "receiver": {"reference": {"period_s": 16.0, "amplitude": 1.0, "kind": "sine"}},
         "transmitter": {
             "plant": {"mismatch": 0.1},
             "sabotage": f"sample={CORRUPTED_SAMPLE},field=range",

@@ -42,7 +42,7 @@ def ideal_loop(duration_s: float) -> tuple[Series, Series, Series]:
     pitch, wanted = np.empty(count), np.empty(count)
     for tick in range(count):
         pitch[tick] = plant.angle_rad
-        wanted[tick] = reference.angle_rad(tick)
+        wanted[tick] = reference.value(tick)
         plant.advance(controller.command(tick, (plant.angle_rad, plant.rate_rad_s)))
     return np.arange(count, dtype=np.float64) * np.float64(TICK_S), pitch, wanted
 

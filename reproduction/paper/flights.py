@@ -181,8 +181,8 @@ def _fly_in_memory(job: Job, agreement: Any) -> Flown:
     return Flown(
         job.name,
         transmitter_part(run, outcome),
-        scores.coded.largest,
-        scores.coded.rms or 0.0,
-        scores.angle_max_rad,
-        scores.reference_max_rad,
+        scores.first.coded.largest,
+        scores.first.coded.rms or 0.0,
+        scores.first.largest,
+        scores.first.reference_largest,
     )

@@ -85,7 +85,7 @@ def record_of(excitation: str, duration_s: float, disturbance: str = "", seed: i
     config = load_config(
         "paper-10baud",
         None,
-        {"seed": seed, "transmitter": {"encoder_counts_per_turn": 1024, "plant": section}},
+        {"seed": seed, "transmitter": {"encoders": {"counts_per_turn": 1024}, "plant": section}},
     )
     return from_rig(config, excitation, duration_s)
 

@@ -53,7 +53,7 @@ def _identification(results: Results) -> str:
 The algorithm (9)-(15) on a simulated rig with a ten-bit encoder, which rests for 5 s and is then
 excited by square waves of (frequency in Hz, bias in V, magnitude in V): (a) `{a}`,
 (b) `{b}`.
-Repeat it with `tenbaud identify --set transmitter.encoder_counts_per_turn=1024`.
+Repeat it with `tenbaud identify --set transmitter.encoders.counts_per_turn=1024`.
 
 ![Fig. 3](figures/paper-figure-3.png)
 

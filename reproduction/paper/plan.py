@@ -87,7 +87,7 @@ def unit_jobs() -> list[Job]:
 
 def rate_jobs() -> list[Job]:
     """Return the flights of Fig. 8: a ten-bit encoder at all."""
-    encoder = {"encoder_counts_per_turn": 1024, "plant": {"mismatch": 0.1}}
+    encoder = {"encoders": {"counts_per_turn": 1024}, "plant": {"mismatch": 0.1}}
     flight = {"duration_s": RATE_S, "transmitter": encoder}
     return [
         Job(name, preset, flight, processes=True, keep_series=True)

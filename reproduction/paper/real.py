@@ -110,7 +110,7 @@ def _words(file: Path, period_s: float) -> Overrides:
         file,
         timing={"tick_s": TICK_S, "symbol_period_s": period_s},
         channel={"rate_baud": WORD_BITS / period_s},
-        transmitter={"encoder_counts_per_turn": 4096},
+        transmitter={"encoders": {"counts_per_turn": 4096}},
         duration_s=2.0 * HALF_S,
     )
 

@@ -204,8 +204,8 @@ def scaled_at(rate_baud: float) -> tuple[str, Overrides]:
 
 def with_torque(overrides: Overrides) -> Overrides:
     """Return settings with white torque on the plant and a long flight."""
-    plant = {"transmitter": {"plant": {"disturbance": TORQUE}, "encoder_counts_per_turn": 1_000_000}}
-    return {"duration_s": 200.0, **plant, **overrides}
+    transmitter = {"plant": {"disturbance": TORQUE}, "encoders": {"counts_per_turn": 1_000_000}}
+    return {"duration_s": 200.0, "transmitter": transmitter, **overrides}
 
 
 def errors_of(preset: str, overrides: Overrides) -> Errors:
@@ -220,7 +220,7 @@ def errors_of(preset: str, overrides: Overrides) -> Errors:
     if outcome.code:
         raise TenbaudError(f"{preset} {overrides}: {outcome.text}")
     scores = run.node.scores
-    return Errors(scores.coded.rms or 0.0, scores.live.rms or 0.0)
+    return Errors(scores.first.coded.rms or 0.0, scores.first.live.rms or 0.0)
 
 
 def recorded(preset: str, overrides: Overrides) -> tuple[Curves, Series]:

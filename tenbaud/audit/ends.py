@@ -8,7 +8,7 @@ from typing import Any
 from tenbaud.audit.base import Claim, Evidence, Findings, Place, is_same
 from tenbaud.replay.rows import KEY_MAX
 
-EPOCH_FIELDS = ("sample", "epoch", "state", "coder", "hold_volts")
+EPOCH_FIELDS = ("sample", "epoch", "state", "coder", "hold")
 SAMPLE_FIELDS = ("word", "range", "state", "coder", "digest")
 
 

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from channel.codec.signals import signals_of
+from channel.protocol.identity import Identity
 from tenbaud.audit.base import Claim, Evidence, Findings, Place
 from tenbaud.recording.encoding import SIGNALS_KEY, signals_text
 from tenbaud.recording.notes import hole_notes, stray_notes
 from tenbaud.recording.recover import RECOVERED_NOTE
+from tenbaud.recording.table import Tables
 
 
 def check_heads(evidence: Evidence, findings: Findings) -> None:
@@ -15,7 +19,7 @@ def check_heads(evidence: Evidence, findings: Findings) -> None:
     for end, tables in evidence.record.ends():
         wanted = {
             "role": end,
-            "config_digest": identity.config_digest.hex(),
+            "config_digest": _recorded(identity, tables).config_digest.hex(),
             "tick_s": repr(evidence.agreement.config.timing.tick_s),
             SIGNALS_KEY: signals_text(signals_of(evidence.agreement.codec.model)),
         }
@@ -26,6 +30,11 @@ def check_heads(evidence: Evidence, findings: Findings) -> None:
     clocks = {tables.metadata.get("clock") for _, tables in evidence.record.ends()}
     if len(clocks) > 1:
         findings.leak(Place("receiver", "head", "clock"), "the ends flew on different clocks")
+
+
+def _recorded(identity: Identity, tables: Tables) -> Identity:
+    """Return the identity whose settings are written as they were recorded, old names included."""
+    return replace(identity, config=tables.metadata.get("shared_config", identity.config))
 
 
 def check_rows(evidence: Evidence, findings: Findings) -> None:

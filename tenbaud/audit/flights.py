@@ -48,7 +48,7 @@ def check_starts(evidence: Evidence, findings: Findings) -> None:
         known_past = before is not None or is_initial
         if known_past and evidence.end("receiver") is not None and epoch.hold not in allowed:
             findings.leak(
-                place._replace(field="hold_volts"),
+                place._replace(field="hold"),
                 "the command before it was another",
                 f"{epoch.hold}, not {' or '.join(map(str, allowed))}",
             )
@@ -115,9 +115,9 @@ class _Repeated:
         """Return the earlier command of `tick`."""
         return self._commands.get(tick, self._initial)
 
-    def reference_rad(self, tick: int) -> None:
-        """Return None: nothing is followed."""
-        return None
+    def references(self, tick: int) -> tuple[float | None, ...]:
+        """Return none: nothing is followed."""
+        return ()
 
 
 def _is_carried(evidence: Evidence, epoch: Epoch, state: CodecState, known: list[Vector]) -> bool:
@@ -130,7 +130,7 @@ def _is_carried(evidence: Evidence, epoch: Epoch, state: CodecState, known: list
 STARTS = Claim(
     "epochs start from what was before",
     check_starts,
-    (("receiver", "epoch", ("sample", "state", "coder", "hold_volts")),),
+    (("receiver", "epoch", ("sample", "state", "coder", "hold")),),
 )
 JITTER = Claim("arrival times within the deadlines do not matter", check_jitter, ())
 LENGTH = Claim("every word was flown", check_length, ())

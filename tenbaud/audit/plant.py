@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from typing import Any
 
-from plant_sim.encoder import Encoder
 from tenbaud.audit.base import Claim, Evidence, Findings, Place, is_same
 from tenbaud.build.ends import guard_settings
 from tenbaud.build.flight import Agreement
+from tenbaud.build.signals import build_encoders
 
 TICK = ("transmitter", "tick")
 STOPPED = ("ramping", "latched")
@@ -143,12 +143,12 @@ class _Passed:
 
     def __init__(self, agreement: Agreement) -> None:
         settings = guard_settings(agreement)
-        self.volts = settings.safe_volts
+        self.volts = settings.safe_command
         self.changed = False
         """whether the last row brought another state"""
         self.armed_again = False
         self.stays_stopped = False
-        self._safe, self._ramp_ticks = settings.safe_volts, settings.ramp_ticks
+        self._safe, self._ramp_ticks = settings.safe_command, settings.ramp_ticks
         self._limits = agreement.terms.limits
         self._state = "ready"
         self._from, self._ramped = self.volts, 0
@@ -192,13 +192,13 @@ def check_angles(evidence: Evidence, findings: Findings) -> None:
     config = evidence.agreement.config.transmitter
     if config.rig != "simulated":
         return
-    zero = config.encoder_zero_counts
-    encoder = Encoder(config.encoder_counts_per_turn, config.encoder_sign, zero)
+    encoders = build_encoders(evidence.agreement.config, evidence.agreement.signals)
     for row in evidence.topic(*TICK):
         if row.true is None:
             findings.gap(_place(row, "true"), "a simulated rig knows its angle")
             continue
-        read = tuple(encoder.angle_rad(encoder.counts(_number(one))) for one in row.true)
+        pairs = zip(encoders, row.true, strict=False)
+        read = tuple(encoder.read(_number(one))[1] for encoder, one in pairs)
         if not is_same(read, row.measured):
             findings.leak(
                 _place(row, "measured"),

@@ -8,7 +8,7 @@ from channel.codec.models.hold import HoldModel
 from tenbaud.build.parts import Parts, check_codec
 from tenbaud.build.plugins import build_plugin
 from tenbaud.config.kinds import CODERS, MODELS, kind_of
-from tenbaud.config.models import LinearModelSection, PitchModelSection
+from tenbaud.config.models import LinearModelSection, PendulumModelSection, PitchModelSection
 from tenbaud.config.schema import FlightConfig
 from tenbaud.config.section import KindSection, OutsideSection
 
@@ -17,7 +17,7 @@ def build_codec(config: FlightConfig, parts: Parts | None = None) -> Codec:
     """Return the codec of a configuration; ValueError where its parts do not fit each other."""
     parts = parts or Parts()
     ticks = round(config.timing.symbol_period_s / config.timing.tick_s)
-    model = parts.model or _build_model(config)
+    model = build_model(config, parts)
     coder = parts.coder or _build_coder(config, model)
     needs_hold = isinstance(coder, PcmCoder)
     if needs_hold != isinstance(model, HoldModel):
@@ -32,7 +32,7 @@ def build_codec(config: FlightConfig, parts: Parts | None = None) -> Codec:
         check_plant(config, codec)
     if isinstance(config.model, OutsideSection) or isinstance(config.coder, OutsideSection):
         where = f"model.kind = {config.model.kind!r} with coder.kind = {config.coder.kind!r}"
-        check_codec(where, codec, config.limits.initial_volts)
+        check_codec(where, codec)
     return codec
 
 
@@ -40,10 +40,13 @@ def may_grow(section: KindSection) -> bool:
     """Return whether a model may be unstable, so that a rate may be too low for it."""
     if isinstance(section, PitchModelSection):
         return section.stiffness_per_s2 < 0.0
-    return isinstance(section, LinearModelSection)
+    return isinstance(section, LinearModelSection | PendulumModelSection)
 
 
-def _build_model(config: FlightConfig) -> Model:
+def build_model(config: FlightConfig, parts: Parts | None = None) -> Model:
+    """Return the prediction model of a configuration."""
+    if parts is not None and parts.model is not None:
+        return parts.model
     section = config.model
     context = ModelContext(config.timing.tick_s, config.timing.symbol_period_s)
     model: Model

@@ -1,27 +1,42 @@
-"""The controller of a configuration and the set-point that it follows."""
+"""The controller of a configuration."""
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Sequence
+from operator import itemgetter
 
+from channel.codec.codec import Model
+from channel.codec.signals import Signals, signals_of
 from receiver.controllers.base import Controller, ControllerContext
-from receiver.controllers.pid import Pid, PidGains
+from receiver.controllers.pid import Loop, PidConstants, PidGains, PidLoops, Reading, Vector
 from receiver.controllers.recorded import RecordedController
-from receiver.controllers.references import Constant, Csv, Reference, Sine, Square, Step
+from receiver.controllers.references import Constant
+from tenbaud.build.codec import build_model
 from tenbaud.build.flight import read_flight_log
 from tenbaud.build.plugins import build_part
+from tenbaud.build.references import References, build_references
+from tenbaud.build.signals import build_limits, initial_command
 from tenbaud.config.kinds import CONTROLLERS
 from tenbaud.config.load import ConfigError
-from tenbaud.config.schema import FlightConfig, ReferenceSection
+from tenbaud.config.schema import FlightConfig, PidLoopSection
 
 
-def build_controller(config: FlightConfig, reference: Reference | None = None) -> Controller:
-    """Return the controller; it follows `reference` instead of the configured one if it is given."""
+def build_controller(
+    config: FlightConfig, references: References | None = None, model: Model | None = None
+) -> Controller:
+    """Return the controller; it follows `references` instead of the configured ones if they are given.
+
+    `model` takes the place of the configured one.
+    """
+    model = model or build_model(config)
+    signals = signals_of(model)
     context = ControllerContext(
         config.timing.tick_s,
-        reference or build_reference(config),
-        config.limits.volts_max,
-        config.limits.initial_volts,
+        build_references(config, signals) if references is None else references,
+        build_limits(config, signals).command_max,
+        initial_command(config, signals),
+        signals,
+        model,
     )
     section = config.receiver
     controller: Controller = build_part(
@@ -30,44 +45,108 @@ def build_controller(config: FlightConfig, reference: Reference | None = None) -
     return controller
 
 
-def pid(config: FlightConfig, context: ControllerContext) -> Pid:
-    """Return the PID law."""
-    section = config.receiver.pid
-    return Pid(
-        PidGains(section.proportional, section.integral, section.derivative, section.unit),
-        context.reference,
-        context.tick_s,
-        volts_max=context.volts_max,
-        normal_force_volts=section.normal_force_volts,
-        anti_windup=section.anti_windup,
-    )
-
-
 def recorded(config: FlightConfig, context: ControllerContext) -> RecordedController:
-    """Return what gives the voltages of a recorded flight again."""
+    """Return what gives the commands of a recorded flight again."""
     return RecordedController(read_flight_log(config))
 
 
-def build_reference(config: FlightConfig) -> Reference:
-    """Return the set-point over the ticks."""
-    return reference_of(config.receiver.reference, config.timing.tick_s)
+def pid(config: FlightConfig, context: ControllerContext) -> PidLoops:
+    """Return the PID law: one loop, or those of the list."""
+    section, signals = config.receiver.pid, context.signals
+    listed = [(f"receiver.pid.loops.{place}", one) for place, one in enumerate(section.loops)]
+    loops = [
+        _loop(field, one, context, section.anti_windup == "conditional")
+        for field, one in listed or [("receiver.pid", section)]
+    ]
+    places = [loop.output for loop in loops]
+    for place in places:
+        if places.count(place) > 1:
+            raise ConfigError(
+                f"receiver.pid.loops: two of them steer the output {signals.outputs[place].name}"
+            )
+    bias = section.normal_force_volts / len(signals.inputs)
+    return PidLoops(loops, context.command_max, (bias,) * len(signals.inputs))
 
 
-def reference_of(section: ReferenceSection, tick_s: float) -> Reference:
-    """Return the set-point that a section describes."""
-    match section.kind:
-        case "square":
-            return Square(section.amplitude_rad, section.period_s, tick_s)
-        case "sine":
-            return Sine(section.amplitude_rad, section.period_s, tick_s)
-        case "step":
-            return Step(section.amplitude_rad, section.start_s, tick_s)
-        case "constant":
-            return Constant(section.amplitude_rad, tick_s)
-        case "csv":
-            if not section.file:
-                raise ConfigError("receiver.reference.file names no file for the csv reference")
-            try:
-                return Csv(Path(section.file), tick_s)
-            except ValueError as error:
-                raise ConfigError(f"receiver.reference: {error}") from error
+def _loop(field: str, section: PidLoopSection, context: ControllerContext, conditional: bool) -> Loop:
+    signals = context.signals
+    try:
+        place = signals.index("outputs", section.output) if section.output else 0
+        output = signals.outputs[place]
+        mixing = _mixing(section, signals)
+        gains = PidGains(section.proportional, section.integral, section.derivative, section.unit)
+        output_unit = output.unit or "rad"
+        over = signals.inputs[next(place for place, share in enumerate(mixing) if share)].unit
+        if not section.unit:
+            gains = PidGains(*_three(section), f"{over}/{output_unit}")
+        elif over and section.unit.rpartition("/")[0] != over:
+            raise ValueError(
+                f"unit = {section.unit!r}, and the input is in {over}, the output {output.name} in "
+                f"{output_unit}: give '{over}/{output_unit}'"
+            )
+        constants = PidConstants(*gains.per_tick(context.tick_s, output_unit), mixing, conditional)
+        value = _value_of(context, place)
+        rate = _rate_of(section, context, place, value)
+    except ValueError as error:
+        raise ConfigError(f"{field}: {error}") from error
+    reference = context.references[place] or Constant(0.0, context.tick_s)
+    return Loop(constants, reference, place, value, rate)
+
+
+def _three(section: PidLoopSection) -> tuple[float, float, float]:
+    return section.proportional, section.integral, section.derivative
+
+
+def _mixing(section: PidLoopSection, signals: Signals) -> Vector:
+    """Return the share of each input; without names one input has it all, and two share the push."""
+    if not section.inputs:
+        if len(signals.inputs) > 2:
+            raise ValueError(
+                f"inputs names none of the {len(signals.inputs)} inputs; give the share of each that "
+                f"steers, {{{signals.inputs[0].name} = 1.0}}"
+            )
+        return (1.0,) if len(signals.inputs) == 1 else (0.5, -0.5)
+    shares = [0.0] * len(signals.inputs)
+    for name, share in section.inputs.items():
+        shares[signals.index("inputs", name)] = share
+    if not any(shares):
+        raise ValueError("inputs gives every input the share 0, so nothing would be steered")
+    return tuple(shares)
+
+
+def _value_of(context: ControllerContext, place: int) -> Reading:
+    index = context.signals.output_states[place]
+    if index is not None:
+        return itemgetter(index)
+    measured = context.model.measured
+    return lambda state: measured(state)[place]
+
+
+def _rate_of(
+    section: PidLoopSection, context: ControllerContext, place: int, value: Reading
+) -> Reading:
+    """Return what reads the rate of an output: a state, or its difference from tick to tick."""
+    signals = context.signals
+    names = [one.name for one in signals.states]
+    name = section.rate or f"{signals.outputs[place].name}_rate"
+    if section.rate or name in names:
+        return itemgetter(signals.index("states", name))
+    if getattr(context.model, "signals", None) is None and len(names) > 1:
+        # A model that names nothing: the angle first, then its rate.
+        return itemgetter(1)
+    return _Difference(value, context.tick_s)
+
+
+class _Difference:
+    """The change of an output from one tick to the next, per second."""
+
+    def __init__(self, value: Reading, tick_s: float) -> None:
+        self._value = value
+        self._tick_s = tick_s
+        self._last: float | None = None
+
+    def __call__(self, state: Sequence[float]) -> float:
+        """Return the rate at a tick; 0 at the first."""
+        now = self._value(tuple(state))
+        last, self._last = self._last, now
+        return 0.0 if last is None else (now - last) / self._tick_s

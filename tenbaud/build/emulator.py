@@ -8,6 +8,7 @@ from typing import Literal
 from plant_sim.encoder import Encoder
 from tenbaud.build.flight import read_flight_log
 from tenbaud.build.rig import build_axes, build_plant, quarc_commands, quarc_fields
+from tenbaud.build.signals import configured_signals
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
 from transmitter.rigs.emulator.device import Body, EmulatedDevice, RecordedBody, SimulatedBody
@@ -41,6 +42,12 @@ def build_emulator(
     faults: tuple[str, ...] = (),
 ) -> RigEmulator:
     """Return an emulator that is not yet on its line; ConfigError for settings that cannot be."""
+    signals = configured_signals(config)
+    if len(signals.outputs) != 1 or len(signals.inputs) != 2:
+        raise ConfigError(
+            "the rig emulator has the pitch axis and its two motors only, and model.kind = "
+            f"{config.model.kind!r} is another plant"
+        )
     if form not in DEFAULT_RATES:
         raise ConfigError(f"format {form!r}: one of {', '.join(DEFAULT_RATES)}")
     rate = DEFAULT_RATES[form] if samples_per_s is None else samples_per_s
@@ -81,5 +88,5 @@ def _speech(config: FlightConfig, form: EmulatedFormat, line_form: str, polled: 
         quarc_fields(config),
         quarc_commands(config),
         section.byte_order,
-        scale_of(section.unit, pitch.counts_per_turn),
+        scale_of(section.unit, int(pitch.counts_per_turn)),
     )

@@ -17,17 +17,19 @@ from channel.line.uplink import Uplink
 from channel.protocol.recording import Recorder
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
 from channel.protocol.wire import Wire
+from plant_sim.encoder import Encoder
 from receiver.controllers.base import Controller
-from receiver.controllers.references import Reference
 from receiver.endpoint import ReceiverEndpoint, SteppedEndpoint
 from receiver.session.session import ReceiverSession
 from tenbaud.bounds.closed import double_integrator_floor, double_integrator_rate
 from tenbaud.build.codec import build_codec
-from tenbaud.build.controllers import build_controller, build_reference
+from tenbaud.build.controllers import build_controller
 from tenbaud.build.flight import Agreement, ticks_of, watchdog_wanted_s
 from tenbaud.build.liveness import overtaking_ticks, watchdog_ticks
 from tenbaud.build.parts import Parts
+from tenbaud.build.references import References, build_references, values_of
 from tenbaud.build.rig import build_rig
+from tenbaud.build.signals import build_encoders, configured_signals, safe_command, soft_limits
 from tenbaud.config.kinds import CONTROLLERS
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
@@ -65,7 +67,7 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
     rearm_ticks = None if rearm_s is None else ticks_of(rearm_s, config)
     return TransmitterNode(
         session,
-        build_rig(config, agreement.parts.plant),
+        build_rig(config, agreement.parts.plant, agreement.signals),
         build_guard(agreement),
         scores,
         recorder,
@@ -74,13 +76,13 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
     )
 
 
-def _followed(agreement: Agreement) -> Callable[[int], float | None]:
-    """Return the set-point that the tracking error is against."""
+def _followed(agreement: Agreement) -> Callable[[int], tuple[float | None, ...]]:
+    """Return the set-points that the tracking errors are against."""
     if agreement.parts.controller is not None:
-        return agreement.parts.controller.reference_rad
+        return agreement.parts.controller.references
     if agreement.config.receiver.controller == "recorded":
-        return lambda _tick: None
-    return build_reference(agreement.config).angle_rad
+        return values_of((None,) * len(agreement.signals.outputs))
+    return values_of(build_references(agreement.config, agreement.signals))
 
 
 def build_observer(agreement: Agreement) -> StateObserver | None:
@@ -93,7 +95,11 @@ def build_observer(agreement: Agreement) -> StateObserver | None:
         if isinstance(codec.model, LinearModel):
             from tenbaud.design.observer import configured_observer
 
-            return configured_observer(codec.model, config)
+            readers = build_encoders(config, agreement.signals)
+            steps = [
+                one.turn / one.counts_per_turn if isinstance(one, Encoder) else 0.0 for one in readers
+            ]
+            return configured_observer(codec.model, config, steps)
         return rate_observer(codec.model, tick_s, config.transmitter.rate_observer_bandwidth_rad_s)
     except ValueError as error:
         raise ConfigError(f"coder.kind = {config.coder.kind!r}: {error}") from error
@@ -129,16 +135,17 @@ def build_receiver(
     recorder: Recorder | None,
     wire: Wire,
     take_over: bool = False,
-    reference: Reference | None = None,
+    references: References | None = None,
 ) -> ReceiverEndpoint:
     """Return the controller node of a configuration.
 
-    `take_over` from another one, on purpose; it follows `reference` if one is given.
+    `take_over` from another one, on purpose; it follows `references` if they are given.
     """
     session = ReceiverSession(
         sabotaged(agreement.codec, agreement.config.receiver.sabotage, agreement.live),
         agreement.terms,
-        agreement.parts.controller or build_controller(agreement.config, reference),
+        agreement.parts.controller
+        or build_controller(agreement.config, references, agreement.codec.model),
         agreement.identity,
         secrets.randbits(31) + 1,
         recorder,
@@ -158,9 +165,9 @@ def check_parts(config: FlightConfig, parts: Parts | None = None) -> None:
     `parts` are objects in place of what is configured; they are checked already.
     """
     parts = parts or Parts()
-    build_rig(config, parts.plant)
+    build_rig(config, parts.plant, configured_signals(config, parts))
     if parts.controller is None:
-        controller = build_controller(config)
+        controller = build_controller(config, model=parts.model)
         if config.receiver.controller not in CONTROLLERS.built_in:
             _check_command(config, controller)
 
@@ -173,12 +180,12 @@ def _check_command(config: FlightConfig, controller: Controller) -> None:
     except Exception as error:
         raise ConfigError(
             f"receiver.controller {name}: command(0, {model.initial()}) must return "
-            f"{model.input_size} voltages; it raised {type(error).__name__}: {error}"
+            f"{model.input_size} value(s); it raised {type(error).__name__}: {error}"
         ) from error
     if len(volts) != model.input_size or not all(map(math.isfinite, volts)):
         raise ConfigError(
             f"receiver.controller {name}: command(0, {model.initial()}) must return "
-            f"{model.input_size} finite voltages, one for each motor of the model; it returned {volts}"
+            f"{model.input_size} finite value(s), one for each input of the model; it returned {volts}"
         )
 
 
@@ -191,12 +198,12 @@ def guard_settings(agreement: Agreement) -> GuardSettings:
     """Return when the guard steps in, and how."""
     section = agreement.config.transmitter
     terms = agreement.terms
-    soft = () if section.soft_limit_rad is None else (section.soft_limit_rad,)
     return GuardSettings(
         timeout_ticks=watchdog_ticks(watchdog_wanted_s(agreement.config), terms, agreement.trip),
         ramp_ticks=ticks_of(section.ramp_s, agreement.config),
-        safe_volts=section.safe_volts,
-        soft_limits_rad=soft,
+        safe_command=safe_command(agreement.config, agreement.signals),
+        soft_limits=soft_limits(agreement.config, agreement.signals),
+        outputs=agreement.signals.outputs,
     )
 
 
@@ -217,6 +224,7 @@ def build_gauge(agreement: Agreement) -> GapGauge | None:
         double_integrator_floor(1.0, rate_bit_s),
         lambda per_density: double_integrator_rate(1.0, per_density),
     )
-    step_rad = math.tau / config.transmitter.encoder_counts_per_turn
+    encoder = build_encoders(config, agreement.signals)[0]
+    step_rad = encoder.turn / encoder.counts_per_turn if isinstance(encoder, Encoder) else 0.0
     strength = StrengthMeter(codec, tick_s, step_rad)
     return GapGauge(limit, strength, terms.ticks_per_sample, tick_s)

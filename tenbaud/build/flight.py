@@ -9,18 +9,20 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from channel.codec.codec import Codec
+from channel.codec.signals import Signals, signals_of
 from channel.errors import TenbaudError
 from channel.flight_log import FlightColumns, FlightLog
 from channel.line.impairments import LineFaults, parse_impairments
 from channel.links.kind import LinkKind
 from channel.links.registry import LINKS, link_kind
 from channel.protocol.identity import Identity, numerics_probe
-from channel.protocol.limits import CommandLimits
 from channel.protocol.terms import Clock, Terms
 from channel.registry import RegistryError
 from tenbaud.build.codec import build_codec
 from tenbaud.build.liveness import RoundTrip, check_liveness, round_trip
 from tenbaud.build.parts import Parts
+from tenbaud.build.references import longest_period_s
+from tenbaud.build.signals import build_limits, initial_command
 from tenbaud.config.load import ConfigError
 from tenbaud.config.outside_code import require_allowed
 from tenbaud.config.schema import FlightConfig
@@ -52,6 +54,11 @@ class Agreement:
     """objects in place of what is configured"""
     scored_from: int | None = None
     """the tick from which errors count, where it is not the usual one"""
+
+    @property
+    def signals(self) -> Signals:
+        """Return the names, units and ranges of the model's states, inputs and outputs."""
+        return self.terms.signals
 
     @property
     def flight_ticks(self) -> int:
@@ -88,18 +95,15 @@ class Agreement:
 
     @property
     def window_start_tick(self) -> int:
-        """Return where errors begin to count: after the first period of the reference.
+        """Return where errors begin to count: after the first period of the slowest reference.
 
         A flight that is over by then, or that has no periodic reference, counts from its beginning.
         """
         if self.scored_from is not None:
             return self.scored_from
-        reference = self.config.receiver.reference
-        periodic = self.config.receiver.controller != "recorded" and reference.kind in (
-            "square",
-            "sine",
-        )
-        start = round(reference.period_s * 1e9) // self.terms.tick_ns if periodic else 0
+        recorded = self.config.receiver.controller == "recorded"
+        period_s = 0.0 if recorded else longest_period_s(self.config, self.signals)
+        start = round(period_s * 1e9) // self.terms.tick_ns
         return start if start < self.flight_ticks else 0
 
 
@@ -139,6 +143,7 @@ def checked_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:
 def build_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:
     """Return the terms, with the lead chosen where it is "auto"."""
     lead = config.timing.lead_ticks
+    signals = signals_of(codec.model)
     terms = Terms(
         tick_ns=round(config.timing.tick_s * 1e9),
         ticks_per_sample=codec.ticks_per_sample,
@@ -149,8 +154,9 @@ def build_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:
         deadline_allowance_ns=round(config.channel.deadline_allowance_s * 1e9),
         downlink_budget_ns=round(config.channel.downlink_budget_s * 1e9),
         repeats=config.channel.repeats,
-        initial_command=config.limits.initial_volts,
-        limits=build_limits(config),
+        initial_command=initial_command(config, signals),
+        limits=build_limits(config, signals),
+        signals=signals,
     )
     terms = kind_of_link(config).terms(config.link, codec, terms)
     if lead != "auto":
@@ -170,12 +176,6 @@ def kind_of_link(config: FlightConfig) -> LinkKind:
         return link_kind(config.link.kind)
     except RegistryError as error:
         raise ConfigError(str(error)) from error
-
-
-def build_limits(config: FlightConfig) -> CommandLimits:
-    """Return clamp and slew, the latter per tick."""
-    slew = config.limits.slew_volts_per_s * config.timing.tick_s
-    return CommandLimits(config.limits.volts_max, slew)
 
 
 def read_flight_log(config: FlightConfig) -> FlightLog:

@@ -12,9 +12,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from channel.codec.codec import Codec, Coder, Model, Vector
+from channel.codec.signals import signals_of
 from channel.codec.words import ERASED
 from plant_sim.plant import Plant
-from receiver.controllers.base import Controller
+from receiver.controllers.base import Controller, with_references
 from tenbaud.config.load import ConfigError
 
 OPTIONAL = ("uses_rates",)
@@ -35,6 +36,10 @@ class Parts:
     coder: Coder | None = None
     plant: Plant | None = None
     controller: Controller | None = None
+
+    def __post_init__(self) -> None:
+        """Let a controller that only knows `reference_rad` be one that has `references`."""
+        object.__setattr__(self, "controller", with_references(self.controller))
 
     def check(self) -> None:
         """Raise PartError for an object that lacks what its part must have."""
@@ -59,14 +64,11 @@ def check_part(where: str, part: object, protocol: type) -> None:
         raise PartError(f"{where} ({type(part).__name__}) is no {kind}: {'; '.join(faults)}. {HELP}")
 
 
-def check_codec(where: str, codec: Codec, command: Vector) -> None:
+def check_codec(where: str, codec: Codec) -> None:
     """Run a codec through one word and one erasure; PartError where its parts do not fit each other."""
     try:
-        if codec.model.input_size != len(command):
-            raise ValueError(
-                f"the model's input_size is {codec.model.input_size}, and a command has {len(command)} "
-                "motor voltages"
-            )
+        signals_of(codec.model)
+        command = (0.0,) * codec.model.input_size
         state = codec.initial()
         word = codec.encode(state, _start_of(codec))
         codec.coder.alphabet.word_number(word)

@@ -17,6 +17,7 @@ from importlib import import_module
 from typing import Any
 
 from channel.registry import Registry, RegistryError
+from receiver.controllers.base import Controller, with_references
 from tenbaud.build.parts import PartError, check_part
 from tenbaud.config.outside_code import is_object, require_allowed
 from tenbaud.config.schema import FlightConfig
@@ -52,6 +53,7 @@ def build_plugin(
             f"{type(error).__name__}: {error}. It is called with one context object "
             f"({type(context).__name__}: {', '.join(_names(context))}) and its options."
         ) from error
+    part = with_references(part) if protocol is Controller else part
     check_part(f"{field} = {name!r}", part, protocol)
     return part
 

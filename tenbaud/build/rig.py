@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from channel.codec.numerics import sin
+from channel.codec.signals import Signals
 from plant_sim.disturbance import parse_disturbance
-from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters, PitchPlant
 from plant_sim.plant import Plant, PlantContext
 from tenbaud.build.flight import REAL_RIGS, read_flight_log
 from tenbaud.build.plugins import build_part
+from tenbaud.build.signals import (
+    TURNS,
+    build_encoders,
+    build_limits,
+    configured_signals,
+    safe_command,
+)
 from tenbaud.config.kinds import PLANTS
 from tenbaud.config.load import ConfigError
 from tenbaud.config.models import PitchModelSection
@@ -20,25 +27,31 @@ from transmitter.rigs.device import DeviceRig, DeviceSettings
 from transmitter.rigs.formats.base import SerialFormat
 from transmitter.rigs.simulated import DryRig, ReplayRig, SimulatedRig
 
-MEASURED = ("pitch",)
+THREE_AXES = ("travel", "pitch", "elevation")
+"""Of the three-axis stand, whose encoders have sections of their own."""
+SERIAL_OUTPUTS = 2
+"""What the serial formats carry."""
 
 
-def build_rig(config: FlightConfig, plant: Plant | None = None) -> Rig:
+def build_rig(config: FlightConfig, plant: Plant | None = None, signals: Signals | None = None) -> Rig:
     """Return the rig: a plant off the model by the configured mismatch, a recording, or a real one.
 
-    `plant` takes the place of the configured one on the simulated rig.
+    `plant` takes the place of the configured one on the simulated rig, `signals` of those of the
+    configured model.
     """
     section = config.transmitter
+    signals = signals or configured_signals(config)
     if section.rig in REAL_RIGS:
-        rig: Rig = build_device(config, output=not section.dry_run)
+        rig: Rig = build_device(config, not section.dry_run, signals)
     else:
-        rig = _build_other(config, plant)
-    return DryRig(rig) if section.dry_run else rig
+        rig = _build_other(config, plant, signals)
+    return DryRig(rig, len(signals.inputs)) if section.dry_run else rig
 
 
-def build_device(config: FlightConfig, output: bool) -> DeviceRig:
+def build_device(config: FlightConfig, output: bool, signals: Signals | None = None) -> DeviceRig:
     """Return the real rig; with `output` False it never sends a command."""
     section = config.transmitter
+    signals = signals or configured_signals(config)
     settings = DeviceSettings(
         stale_s=section.bridge.stale_s,
         first_sample_timeout_s=section.bridge.first_sample_timeout_s,
@@ -48,11 +61,11 @@ def build_device(config: FlightConfig, output: bool) -> DeviceRig:
     try:
         match section.rig:
             case "serial":
-                return _build_serial(config, settings)
+                return _build_serial(config, settings, signals)
             case "quarc":
-                return _build_quarc(config, settings)
+                return _build_quarc(config, settings, signals)
             case "hil":
-                return _build_hil(config, settings)
+                return _build_hil(config, settings, signals)
     except ValueError as error:
         raise ConfigError(f"transmitter.{section.rig}: {error}") from error
     raise ConfigError(
@@ -61,8 +74,12 @@ def build_device(config: FlightConfig, output: bool) -> DeviceRig:
     )
 
 
-def build_plant(config: FlightConfig, step_s: float) -> Plant:
-    """Return the simulated plant, off the codec's model by the mismatch, or one from outside."""
+def build_plant(config: FlightConfig, step_s: float, signals: Signals | None = None) -> Plant:
+    """Return the simulated plant, off the codec's model by the mismatch, or one from outside.
+
+    ConfigError where it has other outputs than the model.
+    """
+    signals = signals or configured_signals(config)
     section = config.transmitter.plant
     disturbance = None
     if section.disturbance:
@@ -73,70 +90,112 @@ def build_plant(config: FlightConfig, step_s: float) -> Plant:
     context = PlantContext(
         step_s,
         config.seed,
-        config.limits.volts_max,
+        build_limits(config, signals).command_max,
         section.mismatch,
         disturbance,
         section.initial_angle_rad,
+        config.model.model_dump(exclude={"kind"}),
+        sin,
     )
     plant: Plant = build_part(config, PLANTS, section.kind, context, section.options, Plant)
+    measured, outputs = len(plant.measured_rad), len(signals.outputs)
+    if measured != outputs:
+        raise ConfigError(
+            f"transmitter.plant.kind = {section.kind!r} has {measured} output(s), and model.kind = "
+            f"{config.model.kind!r} has {outputs}: {', '.join(one.name for one in signals.outputs)}"
+        )
     return plant
 
 
 def pitch_plant(config: FlightConfig, context: PlantContext) -> PitchPlant:
     """Return the pitch axis."""
     return PitchPlant(
-        nominal_plant(config).mismatched(config.transmitter.plant.mismatch),
+        nominal_plant(config, context.volts_max).mismatched(config.transmitter.plant.mismatch),
         context.step_s,
         context.disturbance,
         initial_angle_rad=context.initial_angle_rad,
-        # Not the C library's: a simulated flight is then the same on every machine.
-        sine=sin,
+        sine=context.sine,
     )
 
 
-def nominal_plant(config: FlightConfig) -> PitchParameters:
+def nominal_plant(config: FlightConfig, volts_max: float | None = None) -> PitchParameters:
     """Return the plant that the codec's model describes, or the one that is given beside it."""
+    if volts_max is None:
+        volts_max = build_limits(config, configured_signals(config)).command_max[0]
     model = config.model
     plant = config.transmitter.plant
     follows = isinstance(model, PitchModelSection) and plant.relative_to == "model"
     section = model if follows else plant.pitch
-    return PitchParameters(**section.model_dump(exclude={"kind"}), volts_max=config.limits.volts_max)
+    return PitchParameters(**section.model_dump(exclude={"kind"}), volts_max=volts_max)
 
 
-def _build_other(config: FlightConfig, plant: Plant | None) -> Rig:
-    section = config.transmitter
-    encoder = Encoder(
-        section.encoder_counts_per_turn, section.encoder_sign, section.encoder_zero_counts
-    )
-    if section.rig == "replay":
-        return ReplayRig(read_flight_log(config), (encoder,))
+def _build_other(config: FlightConfig, plant: Plant | None, signals: Signals) -> Rig:
+    encoders = build_encoders(config, signals)
+    if config.transmitter.rig == "replay":
+        return ReplayRig(read_flight_log(config), encoders)
     if plant is None:
-        plant = build_plant(config, config.timing.tick_s)
-    return SimulatedRig(plant, (encoder,), section.safe_volts)
+        plant = build_plant(config, config.timing.tick_s, signals)
+    return SimulatedRig(plant, encoders, safe_command(config, signals))
 
 
-def build_axes(config: FlightConfig) -> tuple[Axis, ...]:
-    """Return the encoders that are wired; ConfigError without the pitch."""
+def build_axes(config: FlightConfig, signals: Signals | None = None) -> tuple[Axis, ...]:
+    """Return the encoders that are wired; ConfigError where an output of the model has none."""
     bridge = config.transmitter.bridge
+    outputs = _wired(signals or configured_signals(config))
+    sections: dict[str, AxisSection] = {name: getattr(bridge, name) for name in THREE_AXES}
     names = bridge.axes
+    if names is None:
+        names = THREE_AXES if outputs.keys() <= sections.keys() else tuple(outputs)
+    sections = {name: AxisSection(channel=at) for at, name in enumerate(names)} | sections
+    sections |= bridge.by_name
     if config.transmitter.rig == "serial" and config.transmitter.serial.format == "qsb":
-        # One encoder per adapter: the pitch, whatever channel it would have elsewhere.
-        return (_axis("pitch", bridge.pitch, 0),)
-    if "pitch" not in names or len(set(names)) != len(names):
+        # One encoder per adapter, whatever channel it would have elsewhere.
+        (name,) = list(outputs)[:1]
+        return (_axis(name, sections[name].model_copy(update={"channel": 0}), outputs[name]),)
+    missing = ", ".join(sorted(outputs.keys() - set(names)))
+    if missing or len(set(names)) != len(names):
         raise ConfigError(
-            f"transmitter.bridge.axes = {list(names)}: pitch must be among them, and none twice"
+            f"transmitter.bridge.axes = {list(names)}: {missing or 'the outputs of the model'} must be "
+            "among them, and none twice"
         )
-    sections = {"travel": bridge.travel, "pitch": bridge.pitch, "elevation": bridge.elevation}
-    return tuple(_axis(name, sections[name], sections[name].channel) for name in names)
+    return tuple(_axis(name, sections[name], outputs.get(name, "rad")) for name in names)
 
 
-def _axis(name: str, section: AxisSection, channel: int) -> Axis:
+def _axis(name: str, section: AxisSection, unit: str) -> Axis:
     zero = None if section.zero_counts == "first" else section.zero_counts
-    return Axis(name, channel, section.counts_per_turn, section.sign, zero)
+    counts, turn = (
+        (section.counts_per_turn, TURNS.get(unit))
+        if section.counts_per_unit is None
+        else (section.counts_per_unit, 1.0)
+    )
+    if turn is None:
+        raise ConfigError(
+            f"transmitter.bridge.{name}: the output is in {unit}, which has no turns; give "
+            "counts_per_unit"
+        )
+    return Axis(name, section.channel, counts, section.sign, zero, turn)
 
 
-def _motors(config: FlightConfig) -> Motors:
-    return Motors(**config.transmitter.bridge.motors.model_dump())
+def build_motors(config: FlightConfig, signals: Signals, outputs: int) -> Motors:
+    """Return how each input reaches a device of `outputs` outputs; ConfigError for unknown names."""
+    section = config.transmitter.bridge.motors
+    names = [one.name for one in signals.inputs]
+    gain = section.amplifier_gain if section.unit == "dac_volts" else 1.0
+    channels = list(range(len(names)) if section.channels is None else section.channels)
+    signs = list((1,) * len(names) if section.signs is None else section.signs)
+    gains = [gain] * len(names)
+    place = "transmitter.bridge.motors"
+    if not len(channels) == len(signs) == len(names):
+        raise ConfigError(f"{place}: channels and signs have one for each input: {', '.join(names)}")
+    for name, own in section.by_name.items():
+        if name not in names:
+            raise ConfigError(f"{place}.{name}: the plant's input(s) are {', '.join(names)}")
+        at = names.index(name)
+        channels[at], signs[at], gains[at] = own.channel, own.sign, 1.0 / own.scale
+    if len(set(channels)) != len(channels):
+        raise ConfigError(f"{place}: the inputs {', '.join(names)} are on the outputs {channels}")
+    limit = section.device_volts_max
+    return Motors(tuple(gains), tuple(channels), tuple(signs), limit, outputs)
 
 
 def serial_format(config: FlightConfig) -> SerialFormat:
@@ -153,30 +212,45 @@ def serial_format(config: FlightConfig) -> SerialFormat:
     return AsciiFormat(section.columns, section.poll, section.command_style, section.pulse_full_volts)
 
 
-def _build_serial(config: FlightConfig, settings: DeviceSettings) -> DeviceRig:
+def _wired(signals: Signals) -> dict[str, str]:
+    """Return the name and unit of each output; the one of a model that names none is the pitch."""
+    outputs = {one.name: one.unit or "rad" for one in signals.outputs}
+    return {"pitch": "rad"} if list(outputs) == ["output_1"] else outputs
+
+
+def _measured(signals: Signals) -> tuple[str, ...]:
+    return tuple(_wired(signals))
+
+
+def _build_serial(config: FlightConfig, settings: DeviceSettings, signals: Signals) -> DeviceRig:
     from transmitter.rigs.formats.ascii import AsciiFormat
     from transmitter.rigs.serial_bridge import BytePort, SerialBridge
 
     section = config.transmitter.serial
     if not section.port:
         raise ValueError("port names no serial port; write --rig cobs:/dev/ttyACM0")
+    motors = build_motors(config, signals, SERIAL_OUTPUTS)
+    if len(motors.off()) > SERIAL_OUTPUTS:
+        raise ValueError(f"the serial formats carry outputs 0 and 1, not {max(motors.channels)}")
     second = BytePort(section.motor_port, section.motor_line_baud) if section.motor_port else None
     return SerialBridge(
         BytePort(section.port, section.line_baud),
         serial_format(config),
-        build_axes(config),
-        MEASURED,
-        _motors(config),
+        build_axes(config, signals),
+        _measured(signals),
+        motors,
         settings,
         motor_port=second,
         motor_format=AsciiFormat() if second else None,
     )
 
 
-def quarc_fields(config: FlightConfig) -> tuple[str, ...]:
+def quarc_fields(config: FlightConfig, signals: Signals | None = None) -> tuple[str, ...]:
     """Return the fields of the model's vector, axes as the channels they have."""
-    axes = {axis.name: f"c{axis.channel}" for axis in build_axes(config)}
-    fields = tuple(axes.get(name, name) for name in config.transmitter.quarc.fields)
+    signals = signals or configured_signals(config)
+    axes = {axis.name: f"c{axis.channel}" for axis in build_axes(config, signals)}
+    given = config.transmitter.quarc.fields
+    fields = tuple(axes.get(name, name) for name in (tuple(axes) if given is None else given))
     for name in fields:
         is_channel = len(name) == 2 and name[0] == "c" and name[1].isdigit()
         if not is_channel and name not in ("seq", "time_s", "flags", "-"):
@@ -184,48 +258,59 @@ def quarc_fields(config: FlightConfig) -> tuple[str, ...]:
                 f"transmitter.quarc.fields: {name!r} is no wired axis, c0 to c9, seq, time_s, "
                 "flags or -"
             )
-    if not any(name == axes["pitch"] for name in fields):
-        raise ConfigError("transmitter.quarc.fields: the pitch is not among them")
+    for name in _wired(signals):
+        if axes[name] not in fields:
+            raise ConfigError(f"transmitter.quarc.fields: the output {name} is not among them")
     return fields
 
 
-def quarc_commands(config: FlightConfig) -> tuple[str, ...]:
-    """Return the fields of the vector that the model takes, motors as the outputs they are on."""
-    front, rear = config.transmitter.bridge.motors.channels
-    names = {"front": f"v{front}", "rear": f"v{rear}"}
-    return tuple(names.get(name, name) for name in config.transmitter.quarc.command_fields)
+def quarc_commands(config: FlightConfig, signals: Signals | None = None) -> tuple[str, ...]:
+    """Return the fields of the vector that the model takes, inputs as the outputs they are on."""
+    signals = signals or configured_signals(config)
+    channels = build_motors(config, signals, 0).channels
+    names = {one.name: f"v{at}" for one, at in zip(signals.inputs, channels, strict=True)}
+    given = config.transmitter.quarc.command_fields
+    fields = tuple(names) if given is None else given
+    for name in fields:
+        if name not in (*names, "seq", "enable"):
+            raise ConfigError(
+                f"transmitter.quarc.command_fields: {name!r} is none of the inputs "
+                f"({', '.join(names)}), seq or enable"
+            )
+    return tuple(names.get(name, name) for name in fields)
 
 
-def _build_quarc(config: FlightConfig, settings: DeviceSettings) -> DeviceRig:
+def _build_quarc(config: FlightConfig, settings: DeviceSettings, signals: Signals) -> DeviceRig:
     from transmitter.rigs.formats.doubles import DoublesLayout
     from transmitter.rigs.quarc import QuarcBridge
 
     section = config.transmitter.quarc
-    fields = quarc_fields(config)
+    fields = quarc_fields(config, signals)
     # An axis that the model does not send is not wired, as far as we are concerned.
-    axes = tuple(axis for axis in build_axes(config) if f"c{axis.channel}" in fields)
+    axes = tuple(axis for axis in build_axes(config, signals) if f"c{axis.channel}" in fields)
     layout = DoublesLayout(
         fields,
         section.byte_order,
         section.unit,
-        {axis.channel: axis.counts_per_turn for axis in axes},
+        {axis.channel: int(axis.counts_per_turn) for axis in axes},
     )
     return QuarcBridge(
         section.host,
         section.port,
         section.role,
         layout,
-        quarc_commands(config),
+        quarc_commands(config, signals),
         section.byte_order,
         axes,
-        MEASURED,
-        _motors(config),
+        _measured(signals),
+        build_motors(config, signals, 0),
         settings,
     )
 
 
-def _build_hil(config: FlightConfig, settings: DeviceSettings) -> DeviceRig:
+def _build_hil(config: FlightConfig, settings: DeviceSettings, signals: Signals) -> DeviceRig:
     from transmitter.rigs.hil import HilRig, HilSettings
 
     hil = HilSettings(**config.transmitter.hil.model_dump())
-    return HilRig(hil, build_axes(config), MEASURED, _motors(config), settings)
+    motors = build_motors(config, signals, len(hil.analog_channels))
+    return HilRig(hil, build_axes(config, signals), _measured(signals), motors, settings)

@@ -211,11 +211,13 @@ def show_check(result: RigCheck) -> None:
         f"flags: {', '.join(result.flags) or 'none'}",
         highlight=False,
     )
-    pitch = next(axis for axis in result.axes if axis.name == "pitch")
+    pitch = [axis for axis in result.axes if axis.name == "pitch"]
+    (axis,) = pitch or result.axes[:1]
+    field = f"transmitter.bridge.{axis.name}"
     console.print(
-        "Nose up must make the pitch grow; if it falls, turn transmitter.bridge.pitch.sign round. "
-        "An axis that did not move has not been checked. For this position to be 0 rad: "
-        f"transmitter.bridge.pitch.zero_counts = {pitch.counts_last}",
+        f"{'Nose up' if pitch else 'Its positive direction'} must make the {axis.name} grow; if it "
+        f"falls, turn {field}.sign round. An axis that did not move has not been checked. For this "
+        f"position to be 0: {field}.zero_counts = {axis.counts_last}",
         highlight=False,
     )
     for problem in result.problems:

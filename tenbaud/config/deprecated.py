@@ -2,22 +2,34 @@
 
 from __future__ import annotations
 
+import copy
 import warnings
-from functools import partial
 from typing import Any
 
 RENAMED: dict[str, dict[str, str]] = {
     "preset": {"timed-10baud": "open-loop-zoom-10baud"},
     "coder.kind": {"timed": "open-loop-zoom", "words": "pcm"},
-    "transmitter": {"sight_bandwidth_rad_s": "rate_observer_bandwidth_rad_s"},
 }
-"""Old name to new, of the values of a setting or of the fields of a section."""
+"""Old name to new, of the values of a setting."""
+MOVED = {
+    "limits.volts_max": "limits.command_max",
+    "limits.slew_volts_per_s": "limits.command_slew_per_s",
+    "limits.initial_volts": "limits.initial_command",
+    "transmitter.safe_volts": "transmitter.safe_command",
+    "transmitter.soft_limit_rad": "transmitter.soft_limits",
+    "transmitter.encoder_counts_per_turn": "transmitter.encoders.counts_per_turn",
+    "transmitter.encoder_sign": "transmitter.encoders.sign",
+    "transmitter.encoder_zero_counts": "transmitter.encoders.zero_counts",
+    "transmitter.sight_bandwidth_rad_s": "transmitter.rate_observer_bandwidth_rad_s",
+    "receiver.reference.amplitude_rad": "receiver.reference.amplitude",
+}
+"""Old full name of a field to the new one."""
 DIGEST_KINDS = {new: old for old, new in RENAMED["coder.kind"].items()}
 """Names in the shared configuration, whose digest both ends compare and recordings hold."""
 
 
 def current_name(place: str, name: str, source: str, *, warn: bool = True) -> str:
-    """Return the present name of a value or field; warn, if asked to, where `name` is an old one."""
+    """Return the present name of a value; warn, if asked to, where `name` is an old one."""
     new = RENAMED[place].get(name, name)
     if warn and new != name:
         text = f"{source}: {place}: {name!r} is deprecated; use {new!r}"
@@ -27,13 +39,24 @@ def current_name(place: str, name: str, source: str, *, warn: bool = True) -> st
 
 def with_current_names(values: dict[str, Any], source: str, *, warn: bool = True) -> dict[str, Any]:
     """Return the values of a configuration under their present names."""
-    values = dict(values)
-    current = partial(current_name, source=source, warn=warn)
-    coder, transmitter = values.get("coder"), values.get("transmitter")
+    values = copy.deepcopy(values)
+    coder = values.get("coder")
     if isinstance(coder, dict) and isinstance(coder.get("kind"), str):
-        values["coder"] = coder | {"kind": current("coder.kind", coder["kind"])}
-    if isinstance(transmitter, dict):
-        values["transmitter"] = {
-            current("transmitter", name): value for name, value in transmitter.items()
-        }
+        coder["kind"] = current_name("coder.kind", coder["kind"], source, warn=warn)
+    for old, new in MOVED.items():
+        *sections, field = old.split(".")
+        here: Any = values
+        for section in sections:
+            here = here.get(section) if isinstance(here, dict) else None
+        if not isinstance(here, dict) or field not in here:
+            continue
+        if warn:
+            text = f"{source}: {old!r} is deprecated; use {new!r}"
+            warnings.warn(text, FutureWarning, stacklevel=3)
+        value = here.pop(field)
+        *sections, field = new.split(".")
+        here = values
+        for section in sections:
+            here = here.setdefault(section, {})
+        here.setdefault(field, value)
     return values

@@ -26,6 +26,7 @@ MODELS = Registry(
     {
         "pitch": "tenbaud.config.models:PITCH",
         "hold": "tenbaud.config.models:HOLD",
+        "pendulum": "tenbaud.config.models:PENDULUM",
         "linear": "tenbaud.config.models:LINEAR",
     },
 )
@@ -47,6 +48,7 @@ PLANTS = Registry(
     "tenbaud.plants",
     {
         "pitch": "tenbaud.build.rig:pitch_plant",
+        "pendulum": "plant_sim.pendulum:PendulumPlant",
     },
 )
 CONTROLLERS = Registry(
@@ -55,6 +57,7 @@ CONTROLLERS = Registry(
     {
         "pid": "tenbaud.build.controllers:pid",
         "recorded": "tenbaud.build.controllers:recorded",
+        "state_feedback": "tenbaud.build.state_feedback:state_feedback",
     },
 )
 

@@ -169,7 +169,7 @@ def _describe(detail: ErrorDetails) -> tuple[str, str]:
     place = [str(part) for part in detail["loc"] if not str(part).startswith(branches)]
     kind = place.pop(1) if len(place) > 1 and place[1] in _kinds(place[0]) else None
     name = ".".join(place) or "(whole file)"
-    if detail["type"] == "extra_forbidden":
+    if detail["type"] in ("extra_forbidden", "model_type"):
         return name, f"unknown field{_nearest(place, kind)}"
     if detail["type"] == "union_tag_invalid":
         tag = detail["ctx"]["tag"]

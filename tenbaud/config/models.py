@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from channel.codec.codec import ModelContext
 from channel.codec.models.hold import HoldModel
 from channel.codec.models.linear import LinearModel
+from channel.codec.models.pendulum import PendulumModel
 from channel.codec.models.pitch import PitchModel, PitchParameters
 from channel.codec.signals import InputSignal, Signal, Signals, named
 from tenbaud.config.kinds import Kind
@@ -127,6 +128,16 @@ def _check_length(name: str, values: tuple[object, ...], count: int, default: in
         raise ValueError(f"{name} has {len(values)} entries, and {count} are needed")
 
 
+class PendulumModelSection(KindSection):
+    """An inverted pendulum, upright at angle 0 and pushed by one motor: unstable."""
+
+    kind: Literal["pendulum"] = "pendulum"
+    growth_per_s: Annotated[float, Field(ge=0.1, le=100.0)] = 7.32
+    """lambda: errors grow by exp(lambda) a second"""
+    damping_per_s: Annotated[float, Field(ge=0.0, le=100.0)] = 0.1
+    torque_gain_rad_per_v_s2: Annotated[float, Field(ge=-100.0, le=100.0)] = 4.0
+
+
 def _pitch(section: PitchModelSection, context: ModelContext) -> PitchModel:
     parameters = PitchParameters(**section.model_dump(exclude={"kind"}))
     return PitchModel(parameters, context.tick_s)
@@ -153,6 +164,11 @@ def _linear(section: LinearModelSection, context: ModelContext) -> LinearModel:
     )
 
 
+def _pendulum(section: PendulumModelSection, context: ModelContext) -> PendulumModel:
+    return PendulumModel(context, **section.model_dump(exclude={"kind"}))
+
+
+PENDULUM = Kind(PendulumModelSection, _pendulum)
 PITCH = Kind(PitchModelSection, _pitch)
 HOLD = Kind(HoldModelSection, _hold)
 LINEAR = Kind(LinearModelSection, _linear)

@@ -80,8 +80,11 @@ def require_regular_files(config: FlightConfig) -> None:
     named = {}
     if config.receiver.controller == "recorded":
         named["flight_log.file"] = config.flight_log.file
-    elif config.receiver.reference.kind == "csv":
-        named["receiver.reference.file"] = config.receiver.reference.file
+    else:
+        reference = config.receiver.reference
+        for name, one in {"receiver.reference": reference, **reference.by_name}.items():
+            if one.kind == "csv":
+                named[f"{name}.file"] = one.file
     for field, name in named.items():
         if name and Path(name).exists() and not Path(name).is_file():
             raise ConfigError(f"{field} = {name!r} is not a regular file, so it is not opened")

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from tenbaud.config.section import Counts, Positive, Section
+from tenbaud.config.section import Counts, NamedSections, Positive, Section
 
 Channel = Annotated[int, Field(ge=0, le=9)]
 Sign = Literal[-1, 1]
@@ -17,6 +17,8 @@ class AxisSection(Section):
 
     channel: Channel = 0
     counts_per_turn: Annotated[int, Field(ge=2, le=10_000_000)] = 4096
+    counts_per_unit: Positive | None = None
+    """of an output that is no angle, in place of counts_per_turn"""
     sign: Sign = 1
     zero_counts: Counts | Literal["first"] = 0
     """counts at 0 rad; "first": those of the first sample, with the body at 0 rad then"""
@@ -41,34 +43,50 @@ class ElevationSection(AxisSection):
     sign: Sign = -1
 
 
-class MotorsSection(Section):
-    """The conversion of a motor voltage for the device."""
+class MotorSection(Section):
+    """One input of the plant."""
+
+    channel: Channel = 0
+    """output of the device"""
+    sign: Sign = 1
+    scale: Positive = 1.0
+    """units of the device for one of the input"""
+
+
+class MotorsSection(NamedSections):
+    """The conversion of a command for the device; single inputs by name, in place of the lists."""
 
     unit: Literal["motor_volts", "dac_volts"] = "motor_volts"
     """what the device takes: volts at the motor, or before its amplifier"""
     amplifier_gain: Positive = 3.0
     """motor volts per output volt, used for dac_volts; a VoltPAQ has 3"""
-    channels: tuple[Channel, Channel] = (0, 1)
-    """output of the front motor, of the rear motor"""
-    signs: tuple[Sign, Sign] = (1, 1)
+    channels: tuple[Channel, ...] | None = None
+    """output of each input; none: in their order"""
+    signs: tuple[Sign, ...] | None = None
+    """of each input; none: 1"""
     device_volts_max: Annotated[float, Field(ge=0.001, le=32.0)] = 10.0
     """what the device's output can give, in its own unit"""
 
+    __pydantic_extra__: dict[str, MotorSection]
 
-class BridgeSection(Section):
-    """Common settings of every real rig."""
+
+class BridgeSection(NamedSections):
+    """Common settings of every real rig; encoders of other axes than these three by name."""
 
     travel: TravelSection = TravelSection()
     pitch: PitchSection = PitchSection()
     elevation: ElevationSection = ElevationSection()
-    axes: tuple[Literal["travel", "pitch", "elevation"], ...] = ("travel", "pitch", "elevation")
-    """those that are wired; pitch must be among them"""
+    axes: tuple[str, ...] | None = None
+    """those that are wired, the model's outputs among them; none: these three for a model whose outputs
+    are among them, else the model's outputs"""
     motors: MotorsSection = MotorsSection()
     stale_s: Annotated[float, Field(ge=0.001, le=10.0)] = 0.1
     """age of the newest sample beyond which the sensor counts as lost"""
     first_sample_timeout_s: Annotated[float, Field(ge=0.01, le=120.0)] = 5.0
     rate_max_rad_per_s: Positive = 20.0
-    """faster than any axis turns; a step of the counts beyond it is a jump"""
+    """faster than any axis moves; a step of the counts beyond it is a jump"""
+
+    __pydantic_extra__: dict[str, AxisSection]
 
 
 class SerialSection(Section):
@@ -98,13 +116,13 @@ class QuarcSection(Section):
     role: Literal["client", "server"] = "client"
     """what this end is; the model's Stream block is the other"""
     byte_order: Literal["little", "big"] = "little"
-    fields: tuple[str, ...] = ("travel", "pitch", "elevation")
-    """of the vector that the model sends: travel, pitch, elevation, c0 ... c9, seq, time_s,
-    flags, -"""
+    fields: tuple[str, ...] | None = None
+    """of the vector that the model sends: names of axes, c0 ... c9, seq, time_s, flags, -; none: the
+    axes that are wired"""
     unit: Literal["counts", "rad", "deg"] = "counts"
     """of its angles"""
-    command_fields: tuple[Literal["front", "rear", "seq", "enable"], ...] = ("front", "rear")
-    """of the vector that it takes"""
+    command_fields: tuple[str, ...] | None = None
+    """of the vector that it takes: names of inputs, seq, enable; none: the inputs"""
 
 
 class HilSection(Section):

@@ -29,15 +29,17 @@ from tenbaud.config.models import PitchModelSection
 from tenbaud.config.permission import CodePermission
 from tenbaud.config.rig_schema import BridgeSection, HilSection, QuarcSection, SerialSection
 from tenbaud.config.section import (
+    Command,
     Counts,
+    Factor,
     Gain,
     KindSection,
     Mismatch,
+    NamedSections,
     NotNegative,
     Options,
     Positive,
     Section,
-    Volts,
 )
 
 
@@ -103,11 +105,16 @@ KINDS: dict[str, dict[str, type[KindSection]]] = {
 
 
 class Limits(Section):
-    """Limits of a command; the receiver keeps them and the guard beside the motors checks them."""
+    """Limits of a command; the receiver keeps them and the guard beside the motors checks them.
 
-    volts_max: Annotated[float, Field(ge=0.001, le=32.0)] = 5.0
-    slew_volts_per_s: Positive = 1000.0
-    initial_volts: tuple[Volts, Volts] = (0.0, 0.0)
+    Each field is a number for all inputs or a list with one for each, in the unit of the input.
+    """
+
+    command_max: Positive | tuple[Positive, ...] | None = None
+    """largest value of an input, either way; none: the input's own range, or 5 where it has none"""
+    command_slew_per_s: Positive | tuple[Positive, ...] = 1000.0
+    """fastest change of an input"""
+    initial_command: Command = 0.0
     """command of the ticks before the first one decided"""
 
 
@@ -129,6 +136,26 @@ class PlantSection(Section):
     initial_angle_rad: Annotated[float, Field(ge=-3.2, le=3.2)] = 0.0
 
 
+class EncoderSection(Section):
+    """How an output is read."""
+
+    counts_per_turn: Annotated[int, Field(ge=2, le=10_000_000)] | None = None
+    """of an angle; none: 4096"""
+    counts_per_unit: Positive | None = None
+    """of any other output: counts per metre, per rad/s; none: it is read exactly"""
+    sign: Literal[-1, 1] = 1
+    zero_counts: Counts = 0
+    """counts at 0"""
+    quantised: bool = True
+    """false: the output is read exactly"""
+
+
+class EncodersSection(EncoderSection, NamedSections):
+    """The encoders of a simulated rig or a replay: those of all outputs, and single ones by name."""
+
+    __pydantic_extra__: dict[str, EncoderSection]
+
+
 class TransmitterSection(Section):
     """The sensor node."""
 
@@ -137,18 +164,18 @@ class TransmitterSection(Section):
     """read the rig and never move it"""
     rate_observer_bandwidth_rad_s: Annotated[float, Field(ge=0.001, le=10_000.0)] = 30.0
     """bandwidth of the rate observer, for coders that use rates"""
-    encoder_counts_per_turn: Annotated[int, Field(ge=2, le=10_000_000)] = 4096
-    encoder_sign: Literal[-1, 1] = 1
-    encoder_zero_counts: Counts = 0
+    encoders: EncodersSection = EncodersSection()
     plant: PlantSection = PlantSection()
     watchdog_s: Positive | Literal["auto"] = "auto"
     """age of the last command after which the watchdog trips; "auto": the largest of 5 T_s,
     0.1 s, command lead + 2 T_s and round trip + 2 T_s"""
     ramp_s: Positive = 1.0
-    """time from the held voltage to the safe one"""
-    safe_volts: tuple[Volts, Volts] = (0.0, 0.0)
-    soft_limit_rad: Positive | None = None
-    """largest measured angle before the guard ramps down; none: no limit"""
+    """time from the held command to the safe one"""
+    safe_command: Command = 0.0
+    """a number for all inputs, or a list with one for each"""
+    soft_limits: Positive | tuple[Positive, ...] | dict[str, Positive] | None = None
+    """largest measured value before the guard ramps down: a number for all outputs, a list with one for
+    each, or a table by name; none: no limit"""
     bridge: BridgeSection = BridgeSection()
     serial: SerialSection = SerialSection()
     quarc: QuarcSection = QuarcSection()
@@ -159,40 +186,83 @@ class TransmitterSection(Section):
     """such as "sample=500,field=range": corrupt one bit of this end's codec on purpose"""
 
 
-class PidSection(Section):
-    """PID law (24)."""
+class PidLoopSection(Section):
+    """One loop of a PID law: which output, by which inputs."""
+
+    output: str = ""
+    """name of the output; empty: the first"""
+    rate: str = ""
+    """name of the state that is its rate; empty: OUTPUT_rate, or else the output's change"""
+    inputs: dict[str, Factor] = Field(default_factory=dict)
+    """share of the loop's sum that each input gets; empty: a single input has it all, and of two the
+    first has half of it and the second has minus half"""
+    proportional: Gain = 0.0
+    integral: Gain = 0.0
+    derivative: Gain = 0.0
+    unit: str = ""
+    """of the gains, such as V/rad or V/deg; empty: the input's unit per unit of the output"""
+
+
+class PidSection(PidLoopSection):
+    """PID law (24): one loop, or the list `loops` of several."""
 
     proportional: Gain = 0.1
     integral: Gain = 0.053
     derivative: Gain = 0.12
-    unit: Literal["V/rad", "V/deg"] = "V/deg"
+    unit: str = "V/deg"
     """the paper prints no unit; only V/deg follows its reference"""
     anti_windup: Literal["conditional", "none"] = "conditional"
-    normal_force_volts: Volts = 0.0
-    """w of (1), common to both motors"""
+    normal_force_volts: Factor = 0.0
+    """w of (1): a sum that all inputs share equally"""
+    loops: tuple[PidLoopSection, ...] = ()
+    """[[receiver.pid.loops]]: in place of the one loop that is described here"""
+
+
+class StateFeedbackSection(Section):
+    """Feedback of all states: gains as given, or designed (LQR) from weights."""
+
+    gains: tuple[tuple[Factor, ...], ...] = ()
+    """a row for each input, a column for each state; empty: designed"""
+    integral_gains: tuple[tuple[Factor, ...], ...] = ()
+    """beside given gains: a row for each input, a column for each output"""
+    state_weights: dict[str, NotNegative] = Field(default_factory=dict)
+    """cost of each state by name, 0 for those left out; empty: 1 for every output"""
+    input_weights: dict[str, Positive] = Field(default_factory=dict)
+    """cost of each input by name, 1 for those left out"""
+    integral_weights: dict[str, Positive] = Field(default_factory=dict)
+    """outputs with integral action, and the cost of the integral of their error"""
+    anti_windup: Literal["conditional", "none"] = "conditional"
 
 
 class ReferenceSection(Section):
-    """The set-point of the controller."""
+    """The set-point of an output."""
 
     kind: Literal["square", "step", "sine", "constant", "csv"] = "square"
-    amplitude_rad: Annotated[float, Field(ge=-6.3, le=6.3)] = 1.5707963267948966
+    amplitude: Factor = 1.5707963267948966
+    """in the unit of the output"""
     period_s: Positive = 25.0
     start_s: NotNegative = 1.0
     """time of the step"""
     file: str = ""
-    """for csv: columns time_s, angle_rad"""
+    """for csv: columns time_s and NAME_UNIT of the output, such as pitch_rad"""
+
+
+class ReferencesSection(ReferenceSection, NamedSections):
+    """The set-point of the first output; those of the others, or of any, by name."""
+
+    __pydantic_extra__: dict[str, ReferenceSection]
 
 
 class ReceiverSection(Section):
     """The controller node."""
 
     controller: Annotated[str, AfterValidator(PartName(CONTROLLERS))] = "pid"
-    """the PID law, the voltages of a recorded flight, or a law from outside"""
+    """the PID law, feedback of all states, the commands of a recorded flight, or a law from outside"""
     controller_options: Options = Field(default_factory=dict)
     """options of an external class"""
     pid: PidSection = PidSection()
-    reference: ReferenceSection = ReferenceSection()
+    state_feedback: StateFeedbackSection = StateFeedbackSection()
+    reference: ReferencesSection = ReferencesSection()
     sabotage: SabotageText = ""
     """such as "sample=500,field=range": corrupt one bit of this end's codec on purpose"""
 

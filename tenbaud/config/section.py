@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, JsonValue
 
@@ -14,6 +14,8 @@ Factor = Annotated[float, Field(ge=-1e9, le=1e9)]
 Mismatch = Annotated[float, Field(ge=-0.999, le=10.0)]
 """A fraction: -1 would leave nothing of the constant."""
 Volts = Annotated[float, Field(ge=-32.0, le=32.0)]
+Command = Factor | tuple[Factor, ...]
+"""A number for all inputs, or a list with one for each."""
 Counts = Annotated[int, Field(ge=-(2**31), lt=2**31)]
 
 OfferedName = Annotated[str, Field(pattern=r"^[A-Za-z_][\w.-]*(:[A-Za-z_]\w*)?$")]
@@ -26,6 +28,17 @@ class Section(BaseModel):
     """Unknown fields are errors; values do not change after loading."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class NamedSections(Section):
+    """A section that may hold, beside its fields, sections of single signals by name."""
+
+    model_config = ConfigDict(extra="allow")
+
+    @property
+    def by_name(self) -> dict[str, Any]:
+        """Return the sections by the name of their output."""
+        return dict(self.__pydantic_extra__ or {})
 
 
 class KindSection(Section):

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from channel.codec.codec import Codec
 from tenbaud.bounds.floor import RateTooLow
 from tenbaud.bounds.linear import rate_needed
-from tenbaud.config.models import LinearModelSection, PitchModelSection
+from tenbaud.config.models import LinearModelSection, PendulumModelSection, PitchModelSection
 from tenbaud.config.schema import FlightConfig
 from tenbaud.config.section import KindSection
 from tenbaud.design.plant import LinearPlant, continuous, discretised, linear_plant
@@ -41,6 +41,9 @@ def plant_of(section: KindSection, tick_s: float) -> LinearPlant | None:
         stiffness, damping = section.stiffness_per_s2, section.rate_damping_per_s
         a, b = [[0.0, 1.0], [-stiffness, -damping]], [[0.0], [1.0]]
         return linear_plant(a, b, [[1.0, 0.0]], densities=PITCH_DENSITY)
+    if isinstance(section, PendulumModelSection):
+        a = [[0.0, 1.0], [section.growth_per_s**2, -section.damping_per_s]]
+        return linear_plant(a, [[0.0], [1.0]], [[1.0, 0.0]], densities=PITCH_DENSITY)
     if not isinstance(section, LinearModelSection):
         return None
     dynamics: ArrayLike

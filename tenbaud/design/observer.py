@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.linalg import solve_discrete_are
@@ -15,6 +16,8 @@ from tenbaud.config.schema import FlightConfig
 from tenbaud.design.described import plant_of
 from transmitter.session.state_observer import StateObserver
 
+LEAST_STEP = 1e-6
+"""of an output that is read exactly"""
 LEAST_NOISE = 1e-9
 """of every state, as a share of the largest: a state that no noise reaches is still looked at"""
 
@@ -24,7 +27,7 @@ def kalman_observer(model: LinearModel, tick_noise: Matrix, steps: Matrix) -> St
     size, outputs = model.state_size, len(model.outputs)
     transition = np.array(model.constants.transition).reshape(size, size)
     C = np.array(model.outputs)
-    seen = np.diag(np.broadcast_to(steps, (outputs,)) ** 2 / 12.0)
+    seen = np.diag(np.maximum(np.broadcast_to(steps, (outputs,)), LEAST_STEP) ** 2 / 12.0)
     noise = tick_noise + LEAST_NOISE * float(np.trace(tick_noise)) * np.eye(size)
     try:
         ahead = solve_discrete_are(transition.T, C.T, noise, seen)
@@ -49,15 +52,16 @@ def observer_of_coder(codec: Codec, counts_per_turn: int) -> StateObserver:
     return kalman_observer(model, noise, np.array([math.tau / counts_per_turn]))
 
 
-def configured_observer(model: LinearModel, config: FlightConfig) -> StateObserver:
-    """Return the observer for the disturbance and the encoders of a configuration."""
+def configured_observer(
+    model: LinearModel, config: FlightConfig, steps: Sequence[float]
+) -> StateObserver:
+    """Return the observer for a configuration's disturbance and the steps of its encoders."""
     tick_s = config.timing.tick_s
     plant = plant_of(config.model, tick_s)
     if plant is None:
         raise ValueError(f"model.kind = {config.model.kind!r} describes no linear plant to observe")
     _, noise = van_loan(plant.A, plant.noise, tick_s)
-    step = math.tau / config.transmitter.encoder_counts_per_turn
-    return kalman_observer(model, noise, np.array([step]))
+    return kalman_observer(model, noise, np.array(steps))
 
 
 def _rows(matrix: Matrix) -> tuple[tuple[float, ...], ...]:

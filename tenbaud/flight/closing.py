@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from tenbaud.flight.status import in_degrees
 from tenbaud.flight.summary import Summary
 from tenbaud.recording.folder import RunFolder
 
@@ -74,22 +74,11 @@ def warnings_of(summary: Summary) -> list[str]:
 
 def _figures(summary: Summary, unicode: bool) -> Iterator[tuple[str, str]]:
     get = summary.get
-    degree = "°" if unicode else " deg"
     flown = f"{get('preset')} over {get('link')}, {get('clock')} clock"
     yield "Flown", f"{get('plant')}; {flown}" if get("plant") else flown
     if get("coder_bits_up") is not None:
         yield "Uplink", _uplink(summary)
-    largest, rms = get("error_live_max_rad"), get("error_live_rms_rad")
-    if largest is not None and rms is not None:
-        window = get("window_start_s") or 0.0
-        after = f", after the first {window:g} s" if window else ""
-        fractions = (get("error_live_rms_fraction"), get("error_live_max_fraction"))
-        share = " ({:.2%} and {:.2%} of the largest)".format(*fractions) if all(fractions) else ""
-        error = f"{math.degrees(rms):.2f}{degree} rms, {math.degrees(largest):.2f}{degree} max"
-        yield "Estimate error", error + share + after
-    tracking = get("tracking_rms_rad")
-    if tracking is not None:
-        yield "Tracking error", f"{math.degrees(tracking):.1f}{degree} rms, steps included"
+    yield from _errors(summary, unicode)
     yield "Link", _link(summary)
     if get("impairments"):
         yield "Impaired", f"{get('impairments')}"
@@ -98,6 +87,30 @@ def _figures(summary: Summary, unicode: bool) -> Iterator[tuple[str, str]]:
             "Loop lateness",
             f"{get('loop_late_ms_p50'):.2f} ms median, {get('loop_late_ms_p99'):.2f} ms p99",
         )
+
+
+def _errors(summary: Summary, unicode: bool) -> Iterator[tuple[str, str]]:
+    """Yield the errors of every output in its unit, angles in degrees."""
+    window = summary.get("window_start_s") or 0.0
+    after = f", after the first {window:g} s" if window else ""
+    outputs: dict[str, Summary] = summary.get("outputs") or {}
+
+    def shown(value: float, unit: str, digits: int) -> str:
+        value, unit = in_degrees(value, unit)
+        if unit != "deg":
+            return f"{value:.3g} {unit}".rstrip()
+        return f"{value:.{digits}f}{'°' if unicode else ' deg'}"
+
+    for name, one in outputs.items():
+        of = f"{name.replace('_', ' ')}: " if len(outputs) > 1 else ""
+        rms, most, largest = one["error_live_rms"], one["error_live_max"], one["largest"]
+        if rms is not None and most is not None:
+            share = f" ({rms / largest:.2%} and {most / largest:.2%} of the largest)" if largest else ""
+            error = f"{shown(rms, one['unit'], 2)} rms, {shown(most, one['unit'], 2)} max"
+            yield "Estimate error", of + error + share + after
+        if one["tracking_rms"] is not None:
+            tracking = shown(one["tracking_rms"], one["unit"], 1)
+            yield "Tracking error", f"{of}{tracking} rms, steps included"
 
 
 def _uplink(summary: Summary) -> str:

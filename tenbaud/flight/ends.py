@@ -23,7 +23,7 @@ from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.flight import receive, transmit
 from tenbaud.flight.display import StatusReporter
 from tenbaud.flight.outcome import SAFE, Outcome, outcome_of
-from tenbaud.flight.status import Status, StatusMode
+from tenbaud.flight.status import Status, StatusMode, outputs_status
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, gap_part, link_part, receiver_part, transmitter_part
 from tenbaud.flight.trouble import Trouble
@@ -201,9 +201,12 @@ def transmitter_status(run: TransmitterRun) -> Status:
         "tick": node.tick,
         "of_ticks": run.agreement.flight_ticks,
         "time_s": node.tick * tick_s,
-        "pitch_rad": node.scores.last_angle_rad,
-        "error_rad": node.scores.last_coded_error_rad,
-        "range_rad": coder.ranges(node.session.copies.confirmed.coder)[0],
+        "outputs": outputs_status(
+            run.agreement.signals,
+            [one.last for one in node.scores.outputs],
+            coder.ranges(node.session.copies.confirmed.coder),
+            [one.last_coded_error for one in node.scores.outputs],
+        ),
         "erasures": node.session.counts["erasures"],
         "desyncs": node.session.counts["desyncs"],
         "digest_checks": node.session.counts["digest_checks"],
@@ -217,13 +220,16 @@ def transmitter_status(run: TransmitterRun) -> Status:
 
 def receiver_status(agreement: Agreement, endpoint: ReceiverEndpoint) -> Status:
     """Return what a person wants to know of a running receiver."""
-    session = endpoint.session
+    session, model = endpoint.session, agreement.codec.model
     return {
         "role": "receiver",
         "phase": session.phase.value,
         "time_s": session.state.sample * agreement.terms.sample_ns / 1e9,
-        "pitch_rad": session.state.model[0],
-        "range_rad": agreement.codec.coder.ranges(session.state.coder)[0],
+        "outputs": outputs_status(
+            signals_of(model),
+            model.measured(session.state.model),
+            agreement.codec.coder.ranges(session.state.coder),
+        ),
         "erasures": session.counts["erasures"],
         "words": session.history.last_words(WORDS_SHOWN),
         "baud": session.meter.baud,

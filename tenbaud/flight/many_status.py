@@ -14,6 +14,7 @@ from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from rich.table import Table
 
+from channel.codec.signals import signals_of
 from receiver.loops.many import ManyService, Served
 from receiver.session.session import Phase
 from tenbaud.sentences import endings
@@ -57,7 +58,17 @@ class ManyStatus:
         served = sorted(self._service.served, key=_calmness)
         room = max(3, self._console.height - LINES_AROUND)
         table = Table(box=None, pad_edge=False)
-        for name in ("session", "phase", "time", "pitch", "M", "baud", "erased", "rejoins", "dropped"):
+        for name in (
+            "session",
+            "phase",
+            "time",
+            "outputs",
+            "M",
+            "baud",
+            "erased",
+            "rejoins",
+            "dropped",
+        ):
             table.add_column(name, justify="left" if name in ("session", "phase") else "right")
         for one in served[:room]:
             table.add_row(*_row(one))
@@ -86,13 +97,16 @@ def _natural(name: str) -> list[str]:
 def _row(served: Served) -> tuple[str, ...]:
     session = served.endpoint.session
     baud = session.meter.baud
-    state = session.state
+    state, model = session.state, session.codec.model
+    plant = signals_of(model)
+    values = zip(model.measured(state.model), plant.outputs, strict=True)
+    ranges = session.codec.coder.ranges(state.coder)
     return (
         served.name,
         endings.phase_text(session.phase.value),
         f"{state.sample * session.terms.sample_ns / 1e9:.1f} s",
-        f"{state.model[0]:+.3f} rad",
-        f"{session.codec.coder.ranges(state.coder)[0]:.3f}",
+        ", ".join(f"{value:+.3f} {output.unit}".rstrip() for value, output in values),
+        ", ".join(f"{one:.3f}" for one in ranges),
         "" if baud is None else f"{baud:.2f}",
         str(session.counts["erasures"]),
         str(session.counts["rejoins"]),

@@ -18,7 +18,7 @@ from channel.protocol.terms import Terms
 from channel.protocol.wire import DATAGRAM, Wire
 from plant_sim.encoder import Encoder
 from plant_sim.plant import Plant
-from receiver.controllers.base import Controller
+from receiver.controllers.base import Controller, with_references
 from receiver.endpoint import ReceiverEndpoint
 from receiver.session.session import ReceiverSession
 from tenbaud.build.flight import software_version
@@ -76,13 +76,14 @@ class MemoryFlight:
         uplink_line: Line | None = None,
         downlink_line: Line | None = None,
         encoder_counts_per_turn: int = 4096,
-        safe_volts: Vector | None = None,
+        safe_command: Vector | None = None,
         scored_from_s: float = 0.0,
         stop_on_desync: bool = False,
         recorder: Recorder | None = None,
         receiver_recorder: Recorder | None = None,
         wire: Wire = DATAGRAM,
     ) -> None:
+        controller = with_references(controller)
         _check(codec, terms, plant, controller)
         self.codec = codec
         self.terms = terms
@@ -110,7 +111,7 @@ class MemoryFlight:
         up_ns = uplink_line.longest_delay_ns + terms.symbol_delay_ns
         delay_ns = max(up_ns, downlink_line.longest_delay_ns)
         self.node = self._node(
-            encoder_counts_per_turn, safe_volts, round(scored_from_s * 1e9), delay_ns
+            encoder_counts_per_turn, safe_command, round(scored_from_s * 1e9), delay_ns
         )
         self.uplink = Uplink(terms, codec.coder.alphabet, uplink_line, wire)
         self.endpoint = ReceiverEndpoint(self.receiver, Downlink(wire))
@@ -120,24 +121,23 @@ class MemoryFlight:
         self._flown = False
 
     def _node(
-        self, counts_per_turn: int, safe_volts: Vector | None, scored_from_ns: int, delay_ns: int
+        self, counts_per_turn: int, safe_command: Vector | None, scored_from_ns: int, delay_ns: int
     ) -> TransmitterNode:
         terms = self.terms
-        if safe_volts is None:
-            safe_volts = (0.0,) * self.codec.model.input_size
+        if safe_command is None:
+            safe_command = (0.0,) * self.codec.model.input_size
+        encoders = tuple(Encoder(counts_per_turn) for _ in self.plant.measured_rad)
         trip = round_trip(terms, LineFaults(), "virtual")
         timeout_ticks = watchdog_ticks(None, terms, trip) - (-delay_ns // terms.tick_ns)
         return TransmitterNode(
             self.transmitter,
-            SimulatedRig(
-                self.plant, tuple(Encoder(counts_per_turn) for _ in self.plant.measured_rad), safe_volts
-            ),
-            Guard(terms.limits, GuardSettings(timeout_ticks, RAMP_TICKS, safe_volts)),
+            SimulatedRig(self.plant, encoders, safe_command),
+            Guard(terms.limits, GuardSettings(timeout_ticks, RAMP_TICKS, safe_command)),
             Scores(
                 self.codec.model,
                 scored_from_ns // terms.tick_ns,
                 (terms.history_samples + SPAN_SAMPLES) * terms.ticks_per_sample,
-                self.controller.reference_rad,
+                self.controller.references,
             ),
             self.transmitter_rows,
             round(REARM_S * 1e9) // terms.tick_ns,
@@ -205,7 +205,7 @@ def _check(codec: Codec, terms: Terms, plant: Plant, controller: Controller) -> 
                 f"terms.{name} is {ours}, and the codec's is {theirs}; Terms.for_codec(codec, tick_s) "
                 "makes terms that agree"
             )
-    check_codec("the codec", codec, terms.initial_command)
+    check_codec("the codec", codec)
     predicted, measured = codec.model.measured(codec.model.initial()), plant.measured_rad
     if len(predicted) != len(measured):
         raise PartError(

@@ -30,8 +30,8 @@ class FlightResult:
     """true angles, a column per measured axis"""
     measured_rad: Series
     """the same as the encoders give them"""
-    reference_rad: Series
-    """set-point of the controller"""
+    references: Series
+    """set-points of the controller, a column per output"""
     states: Series
     """the codec's estimate, a column per model state"""
     live_states: Series
@@ -58,6 +58,11 @@ class FlightResult:
     """the last lost lockstep, with both digests; None: there was none"""
     ended_by: str
     """what ended the flight before its time; empty: it was flown to its end"""
+
+    @property
+    def reference_rad(self) -> Series:
+        """The set-point of the first output."""
+        return np.asarray(self.references[:, 0], dtype=np.float64)
 
     @property
     def largest_error_rad(self) -> float:
@@ -96,7 +101,7 @@ def result_of(
         time_s=np.asarray(np.arange(ticks) * (terms.tick_ns / 1e9), dtype=np.float64),
         angles_rad=angles,
         measured_rad=_per_tick(up, "tick", "measured", ticks, axes),
-        reference_rad=_per_tick(down, "tick", "reference", ticks, 1)[:, 0],
+        references=_per_tick(down, "tick", "reference", ticks, axes),
         states=states,
         live_states=live,
         commands=_per_tick(up, "tick", "applied", ticks, inputs),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from tenbaud.config.schema import FlightConfig
@@ -36,10 +36,7 @@ ROWS: tuple[tuple[str, str, str], ...] = (
     ("rejoins, and what they cost", "rejoins", "{}"),
     ("asked to go wrong", "impairments", "{}"),
     ("went wrong, up / down", "impaired", "{}"),
-    ("largest pitch in the window", "pitch_amplitude_rad", "{:.3f} rad"),
-    ("error of the codec: max / rms", "error_coded", "{}"),
-    ("error of the prediction: max / rms", "error_live", "{}"),
-    ("tracking, rms", "tracking_rms_rad", "{:.3f} rad"),
+    ("", "outputs", ""),
     ("disturbance found, density q", "disturbance_rad2_per_s3", "{:.2g} rad^2/s^3"),
     ("rms error over the least possible", "rms_over_floor", "{:.2f}"),
     ("bits an ideal code would need for it", "ideal_bits", "{:.0f}"),
@@ -118,10 +115,34 @@ def _table(summaries: Sequence[Summary]) -> Table:
     for _ in summaries:
         table.add_column(overflow="fold")
     for label, name, form in ROWS:
+        if name == "outputs":
+            for output in first.get("outputs") or {}:
+                for row in _output_rows(output, [one["outputs"][output] for one in summaries]):
+                    table.add_row(*row)
+            continue
         cells = [_cell(summary, name, form) for summary in summaries]
         if any(cells):
             table.add_row(label, *cells)
     return table
+
+
+def _output_rows(name: str, figures: Sequence[Summary]) -> Iterator[list[str]]:
+    """Yield label and cells of what is known of an output."""
+    name = name.replace("_", " ")
+
+    def quantity(one: Summary, key: str) -> str:
+        return "" if one[key] is None else f"{one[key]:.3f} {one['unit']}".rstrip()
+
+    def error(one: Summary, kind: str) -> str:
+        largest, rms = one[f"{kind}_max"], one[f"{kind}_rms"]
+        if largest is None or rms is None or not one["largest"]:
+            return ""
+        return f"{largest / one['largest']:.2%} / {rms / one['largest']:.2%} of the largest {name}"
+
+    yield [f"largest {name} in the window", *(quantity(one, "largest") for one in figures)]
+    yield ["error of the codec: max / rms", *(error(one, "error_coded") for one in figures)]
+    yield ["error of the prediction: max / rms", *(error(one, "error_live") for one in figures)]
+    yield ["tracking, rms", *(quantity(one, "tracking_rms") for one in figures)]
 
 
 def _cell(summary: Summary, name: str, form: str) -> str:
@@ -157,13 +178,6 @@ def _value(summary: Summary, name: str) -> Any:
         case "link_dropped":
             return ", ".join(f"{kind} {n}" for kind, n in (get("link_dropped") or {}).items()) or None
         case "reconnects" | "out_of_bounds":
-            return get(name) or None
-        case "error_coded" | "error_live":
-            largest, rms = get(f"{name}_max_fraction"), get(f"{name}_rms_fraction")
-            if largest is None or rms is None:
-                return None
-            return f"{largest:.2%} / {rms:.2%} of the largest pitch"
-        case "pitch_amplitude_rad":
             return get(name) or None
         case "lateness":
             if get("loop_late_ms_p50") is None:

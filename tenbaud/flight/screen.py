@@ -6,7 +6,6 @@ terminal without Unicode gets the same in plain characters.
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from collections.abc import Sequence
 
@@ -14,7 +13,7 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from tenbaud.flight.status import Status
+from tenbaud.flight.status import Status, in_degrees
 from tenbaud.sentences import endings
 
 GAUGE_DEGREES = 180
@@ -30,14 +29,17 @@ class Screen:
 
     def __init__(self, unicode: bool = True) -> None:
         self._newest: dict[str, Status] = {}
-        self._errors: deque[float] = deque(maxlen=SPARK_CELLS)
+        self._errors: dict[str, deque[float]] = {}
+        self._largest: dict[str, float] = {}
         self._unicode = unicode
 
     def update(self, status: Status) -> None:
         """Take a status in."""
         self._newest[status["role"]] = status
-        if status.get("error_rad") is not None:
-            self._errors.append(abs(status["error_rad"]))
+        for one in status.get("outputs", ()):
+            if one["error"] is not None:
+                errors = self._errors.setdefault(one["name"], deque(maxlen=SPARK_CELLS))
+                errors.append(abs(one["error"]))
 
     def __rich__(self) -> RenderableType:
         """Return what is to be shown now."""
@@ -53,12 +55,8 @@ class Screen:
         head = Text(endings.phase_text(status["phase"]), style=style)
         head.append(_time_text(status))
         table.add_row(status["role"], head)
-        if status.get("pitch_rad") is not None:
-            angle = math.degrees(status["pitch_rad"])
-            table.add_row("pitch", f"{angle:+7.1f} deg  {self._gauge(angle)}")
-        if status.get("error_rad") is not None:
-            error, width = math.degrees(status["error_rad"]), math.degrees(status["range_rad"])
-            table.add_row("error", f"{error:+7.2f} deg  of M {width:.2f}  {self._sparks()}")
+        for one in status.get("outputs", ()):
+            self._output(table, one)
         if status.get("words"):
             table.add_row("bits", self._tape(status["words"]))
         if status.get("digest_checks") is not None:
@@ -67,8 +65,24 @@ class Screen:
             table.add_row("line", counts)
         return table
 
-    def _gauge(self, angle: float) -> str:
-        share = min(1.0, max(-1.0, angle / GAUGE_DEGREES))
+    def _output(self, table: Table, one: Status) -> None:
+        name = one["name"]
+        if one["value"] is not None:
+            value, unit = in_degrees(one["value"], one["unit"])
+            largest = max(abs(value), self._largest.get(name, 0.0))
+            self._largest[name] = GAUGE_DEGREES if unit == "deg" else largest
+            gauge = self._gauge(value / (self._largest[name] or 1.0))
+            shown = f"{value:+7.1f}" if unit == "deg" else f"{value:+9.4g}"
+            table.add_row(Text(name), Text(f"{shown} {unit}  {gauge}"))
+        if one["error"] is not None:
+            error, unit = in_degrees(one["error"], one["unit"])
+            width, _ = in_degrees(one["range"] or 0.0, one["unit"])
+            shown = f"{error:+7.2f}" if unit == "deg" else f"{error:+9.3g}"
+            sparks = self._sparks(self._errors[name])
+            table.add_row("error", Text(f"{shown} {unit}  of M {width:.3g}  {sparks}"))
+
+    def _gauge(self, share: float) -> str:
+        share = min(1.0, max(-1.0, share))
         place = round((share + 1.0) / 2.0 * (GAUGE_CELLS - 1))
         rail, middle, mark = "─┼●" if self._unicode else "-+o"
         cells = [rail] * GAUGE_CELLS
@@ -76,11 +90,11 @@ class Screen:
         cells[place] = mark
         return "".join(cells)
 
-    def _sparks(self) -> str:
+    def _sparks(self, errors: Sequence[float]) -> str:
         marks = SPARKS if self._unicode else ASCII_SPARKS
-        largest = max(self._errors) or 1.0
+        largest = max(errors) or 1.0
         last = len(marks) - 1
-        return "".join(marks[round(error / largest * last)] for error in self._errors)
+        return "".join(marks[round(error / largest * last)] for error in errors)
 
     def _tape(self, words: Sequence[Sequence[int] | None]) -> Text:
         high, low, none = "▀▄×" if self._unicode else "'.x"  # noqa: RUF001

@@ -2,12 +2,35 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import Any, Literal
 
+from channel.codec.signals import Signals
 from tenbaud.sentences import endings
 
 StatusMode = Literal["auto", "lines", "none"]
 Status = dict[str, Any]
+
+
+def outputs_status(
+    plant: Signals,
+    values: Sequence[float | None],
+    ranges: Sequence[float],
+    errors: Sequence[float | None] = (),
+) -> list[Status]:
+    """Return what a status says of each output; None for what is not known."""
+    names = ("value", "range", "error")
+    told = []
+    for place, one in enumerate(plant.outputs):
+        known = [each[place] if place < len(each) else None for each in (values, ranges, errors)]
+        told.append({"name": one.words, "unit": one.unit, **dict(zip(names, known, strict=True))})
+    return told
+
+
+def in_degrees(value: float, unit: str) -> tuple[float, str]:
+    """Return a value as a person reads it, and its unit: angles in degrees."""
+    return (math.degrees(value), "deg") if unit == "rad" else (value, unit)
 
 
 def status_line(status: Status) -> str:
@@ -15,10 +38,15 @@ def status_line(status: Status) -> str:
     words = [f"{status['role']}: {endings.phase_text(status['phase'])}"]
     if status.get("time_s") is not None:
         words.append(f"{status['time_s']:7.1f} s")
+    for output in status.get("outputs", ()):
+        for name, label, form in (
+            ("value", output["name"], "{:+.3f} {}"),
+            ("error", "error", "{:+.4f} {}"),
+            ("range", "M", "{:.3f}"),
+        ):
+            if output[name] is not None:
+                words.append(f"{label} {form.format(output[name], output['unit'])}".rstrip())
     for name, label, form in (
-        ("pitch_rad", "pitch", "{:+.3f} rad"),
-        ("error_rad", "error", "{:+.4f} rad"),
-        ("range_rad", "M", "{:.3f}"),
         ("rms_over_floor", "floor x", "{:.1f}"),
         ("erasures", "erased", "{}"),
         ("guard", "guard", "{}"),

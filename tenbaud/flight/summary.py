@@ -24,7 +24,7 @@ Summary = dict[str, Any]
 def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
     """Return what the transmitter knows: plant, errors, bits sent, its loop."""
     node, terms, config = run.node, run.agreement.terms, run.agreement.config
-    session, scores, meter = node.session, node.scores, run.uplink.meter
+    session, scores, meter = node.session, node.scores.first, run.uplink.meter
     flown_s = run.ticks * terms.tick_ns / 1e9
     return {
         **_common(run.agreement, outcome, session.end),
@@ -52,11 +52,12 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         "impaired_up": dict(run.uplink.line.counts),
         "impaired_down": dict(run.downlink.counts),
         "window_start_s": run.agreement.window_start_tick * terms.tick_ns / 1e9,
-        "pitch_amplitude_rad": scores.angle_max_rad,
-        "reference_amplitude_rad": scores.reference_max_rad or None,
-        **_errors("error_coded", scores.coded, scores.angle_max_rad, scores.reference_max_rad),
-        **_errors("error_live", scores.live, scores.angle_max_rad, scores.reference_max_rad),
+        "pitch_amplitude_rad": scores.largest,
+        "reference_amplitude_rad": scores.reference_largest or None,
+        **_errors("error_coded", scores.coded, scores.largest, scores.reference_largest),
+        **_errors("error_live", scores.live, scores.largest, scores.reference_largest),
         "tracking_rms_rad": scores.tracking.rms,
+        "outputs": _outputs(run),
         **gap_part(node.gauge.whole if node.gauge is not None else None),
         "commands_late": node.commands_late,
         "symbols_refused": run.uplink.shaper.refused,
@@ -199,6 +200,22 @@ def real_rig_name(section: TransmitterSection) -> str:
             return f"QUARC model at {section.quarc.host}:{section.quarc.port}"
         case _:
             return f"Quanser {section.hil.card_type} {section.hil.card_identifier}"
+
+
+def _outputs(run: TransmitterRun) -> Summary:
+    """Return the figures of every output, by its name, in its own unit."""
+    figures = {}
+    for output, scores in zip(run.agreement.signals.outputs, run.node.scores.outputs, strict=True):
+        figures[output.name] = {
+            "unit": output.unit,
+            "largest": scores.largest,
+            "error_coded_max": scores.coded.largest if scores.coded.count else None,
+            "error_coded_rms": scores.coded.rms,
+            "error_live_max": scores.live.largest if scores.live.count else None,
+            "error_live_rms": scores.live.rms,
+            "tracking_rms": scores.tracking.rms,
+        }
+    return figures
 
 
 def _errors(name: str, meter: ErrorMeter, angle_max: float, reference_max: float) -> Summary:

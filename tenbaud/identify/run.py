@@ -15,6 +15,7 @@ from plant_sim.identification.record import (
     identify,
     quiescent_angle,
 )
+from tenbaud.build.signals import build_limits, configured_signals
 from tenbaud.config.schema import FlightConfig
 from tenbaud.files.whole import write_whole
 
@@ -85,7 +86,7 @@ def settings_of(config: FlightConfig, settle_s: float) -> PitchSettings:
     """Return the paper's constants with the lag and the saturation of a configuration."""
     return PitchSettings(
         motor_lag_s=getattr(config.model, "motor_lag_s", PitchSettings().motor_lag_s),
-        volts_max=config.limits.volts_max,
+        volts_max=build_limits(config, configured_signals(config)).command_max[0],
         settle_s=settle_s,
     )
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -15,6 +14,7 @@ from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.excitation import excite, parse_excitation
 from plant_sim.identification.record import PitchRecord
 from tenbaud.build.rig import build_rig
+from tenbaud.build.signals import build_encoders, configured_signals
 from tenbaud.config.schema import FlightConfig
 from tenbaud.recording.folder import find_recordings
 from tenbaud.recording.reader import Recording
@@ -116,11 +116,10 @@ def from_csv(path: Path, columns: LogColumns, config: FlightConfig) -> PitchReco
     if clock:
         step_s = _even_step(path, table[:, 0], lines, clock, step_s, timed=bool(columns.time))
         table = table[:, 1:]
-    section = config.transmitter
     angle = table[:, 0]
     if columns.unit == "counts":
-        turn = math.tau / section.encoder_counts_per_turn
-        angle = (angle - section.encoder_zero_counts) * section.encoder_sign * turn
+        encoder = build_encoders(config, configured_signals(config))[0]
+        angle = np.array([encoder.angle_rad(round(count)) for count in angle.tolist()])
     elif columns.unit == "deg":
         angle = np.radians(angle)
     return PitchRecord(step_s, angle, table[:, 1], table[:, 2])

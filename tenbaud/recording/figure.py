@@ -26,19 +26,16 @@ from tenbaud.recording.overview import (
 )
 from tenbaud.recording.reader import MessageStream, rows_in_blocks, stored_metadata
 from tenbaud.recording.rows import Row
+from tenbaud.recording.style import FAINT, LINE_A, LINE_B, LINE_C, legend_above, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-VALUE_COLOUR = "#1b1b1b"
-REFERENCE_COLOUR = "#8a8a8a"
-CODED_COLOUR = "#0b6fb8"
-LIVE_COLOUR = "#d9730d"
 ERASURE_COLOUR = "#d01c1f"
 FLIP_COLOUR = "#8e3fb0"
 REJOIN_COLOUR = "#2a8c4a"
-COLOURS = ("#0b6fb8", "#d9730d", "#2a8c4a", "#8e3fb0", "#1b1b1b", "#b08a00")
+COLOURS = (LINE_B, LINE_C, "#2a8c4a", "#8e3fb0", LINE_A, "#b08a00")
 """Of several outputs or inputs in one panel."""
 STEPS = {"drawstyle": "steps-post"}
 
@@ -91,8 +88,6 @@ def draw_run(transmitter: Path | None, receiver: Path | None, title: str, own: b
 
     `own`: the recordings were made just now, and what they store for the figure is trusted.
     """
-    from matplotlib.figure import Figure  # takes half a second, which other commands need not pay
-
     if transmitter is None:
         raise RecordingError(
             "There is no transmitter's recording here, and what was measured is recorded there. Give "
@@ -101,20 +96,17 @@ def draw_run(transmitter: Path | None, receiver: Path | None, title: str, own: b
     flight = _read_flight(transmitter, receiver, own)
     drawn = _panels(flight)
     ratios = [ratio for ratio, _, _ in drawn]
-    figure = Figure(figsize=(9.0, 1.4 + sum(ratios)), layout="constrained")
-    panels = figure.subplots(len(drawn), 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
+    height = (0.9 + sum(ratios)) / len(drawn)
+    figure, panels = new_figure(len(drawn), height, ratios, width=9.0)
     for number, (panel, (_, label, draw)) in enumerate(zip(panels, drawn, strict=True)):
         draw(panel, flight)
         panel.set_ylabel(label)
         panel.set_title(f"({chr(ord('a') + number)})", loc="left", fontsize=9)
-        panel.grid(visible=True, color="#e6e6e6", linewidth=0.6)
-        panel.set_axisbelow(True)
-        panel.spines[["top", "right"]].set_visible(False)
     times_s, _ = flight.curves["value"][0]
     panels[0].set_xlim(times_s[0], max(times_s[-1], 1e-3))
     panels[-1].set_xlabel("time, s")
     figure.suptitle(title, fontsize=11)
-    figure.align_ylabels(list(panels))
+    figure.align_ylabels(panels)
     return figure
 
 
@@ -128,7 +120,7 @@ def _panels(flight: _Flight) -> list[tuple[float, str, _Draw]]:
     ]
     for name, height, curve, draw in (
         ("error", 2.0, "error_coded", _draw_errors),
-        (r"range $M_k$", 1.6, "range", _draw_ranges),
+        (r"range $M_k$", 1.6, "range", partial(_draw_steps, curve="range")),
     ):
         for label, places in outputs:
             if flight.knows(curve, places):
@@ -138,7 +130,7 @@ def _panels(flight: _Flight) -> list[tuple[float, str, _Draw]]:
                     of_what = "".join(f", {unit}" for unit in units if unit)
                 found.append((height, name + _plain(of_what), partial(draw, places=places)))
     found += [
-        (1.4, _plain(label), partial(_draw_inputs, places=places))
+        (1.4, _plain(label), partial(_draw_steps, curve="applied", places=places))
         for label, places in inputs
         if flight.knows("applied", places)
     ]
@@ -215,14 +207,14 @@ def _draw_values(panel: Axes, flight: _Flight, places: list[int]) -> None:
     """Draw outputs with their set-points and estimates."""
     # Good estimates lie on the value: only thin lines over a thick one can all be seen.
     kinds = [
-        _Kind("reference", "reference", REFERENCE_COLOUR, 1.1, {"linestyle": "-."}),
-        _Kind("value", "", VALUE_COLOUR, 2.2, {"alpha": 0.5 if len(places) > 1 else 1.0}),
+        _Kind("reference", "reference", FAINT, 1.1, {"linestyle": "-."}),
+        _Kind("value", "", LINE_A, 2.2, {"alpha": 0.5 if len(places) > 1 else 1.0}),
     ]
     if flight.live_is_coded:
-        kinds.append(_Kind("coded", "estimate", CODED_COLOUR))
+        kinds.append(_Kind("coded", "estimate", LINE_B))
     else:
-        kinds.append(_Kind("live", "live estimate", LIVE_COLOUR))
-        kinds.append(_Kind("coded", "coded estimate", CODED_COLOUR))
+        kinds.append(_Kind("live", "live estimate", LINE_C))
+        kinds.append(_Kind("coded", "coded estimate", LINE_B))
     _draw_curves(panel, flight, flight.plant.outputs, places, kinds)
     for index, (start_s, end_s) in enumerate(flight.cuts_s):
         label = "line cut" if index == 0 else ""
@@ -241,34 +233,29 @@ def _draw_values(panel: Axes, flight: _Flight, places: list[int]) -> None:
                 "markersize": 5,
             }
             panel.plot(times_s, low, transform=across, clip_on=False, label=name, **style)
-    _legend_above(panel)
+    legend_above(panel, 7)
 
 
 def _draw_errors(panel: Axes, flight: _Flight, places: list[int]) -> None:
-    kinds = [_Kind("error_coded", "", CODED_COLOUR, 0.9)]
+    kinds = [_Kind("error_coded", "", LINE_B, 0.9)]
     if not flight.live_is_coded:
-        kinds.insert(0, _Kind("error_live", "live estimate", LIVE_COLOUR, 0.9))
+        kinds.insert(0, _Kind("error_live", "live estimate", LINE_C, 0.9))
     if len(places) == 1:
         name = "estimate" if flight.live_is_coded else "coded estimate"
         kinds = [one._replace(label=f"error of the {one.label or name}") for one in kinds]
     _draw_curves(panel, flight, flight.plant.outputs, places, kinds)
     panel.axhline(0.0, color="#999999", linewidth=0.6)
-    _legend_above(panel)
+    legend_above(panel, 7)
 
 
-def _draw_ranges(panel: Axes, flight: _Flight, places: list[int]) -> None:
-    kind = _Kind("range", "", CODED_COLOUR, 0.9, STEPS)
-    _draw_curves(panel, flight, flight.plant.outputs, places, [kind])
-    panel.set_ylim(bottom=0.0)
+def _draw_steps(panel: Axes, flight: _Flight, curve: str, places: list[int]) -> None:
+    """Draw ranges or inputs."""
+    signals = flight.plant.inputs if curve == "applied" else flight.plant.outputs
+    _draw_curves(panel, flight, signals, places, [_Kind(curve, "", LINE_B, 0.9, STEPS)])
+    if curve == "range":
+        panel.set_ylim(bottom=0.0)
     if len(places) > 1:
-        _legend_above(panel)
-
-
-def _draw_inputs(panel: Axes, flight: _Flight, places: list[int]) -> None:
-    kind = _Kind("applied", "", COLOURS[0], 0.9, STEPS)
-    _draw_curves(panel, flight, flight.plant.inputs, places, [kind])
-    if len(places) > 1:
-        _legend_above(panel)
+        legend_above(panel, 7)
 
 
 class _Kind(NamedTuple):
@@ -308,28 +295,14 @@ def _draw_curves(
 def _draw_symbols(panel: Axes, flight: _Flight) -> None:
     times_s, symbols = flight.symbols
     if not flight.symbols_are_means:
-        panel.vlines(times_s, 0.0, symbols, color=VALUE_COLOUR, linewidth=0.8)
+        panel.vlines(times_s, 0.0, symbols, color=LINE_A, linewidth=0.8)
     else:
         means = np.nan_to_num(symbols)
-        panel.fill_between(times_s, means, step="post", color=VALUE_COLOUR, linewidth=0.0)
+        panel.fill_between(times_s, means, step="post", color=LINE_A, linewidth=0.0)
     panel.axhline(0.0, color="#999999", linewidth=0.6)
     for name, colour in (("erased", ERASURE_COLOUR), ("flipped", FLIP_COLOUR)):
         if len(flight.marks[name]):
             panel.vlines(flight.marks[name], -1.0, 1.0, color=colour, linewidth=0.9, label=name)
-    _legend_above(panel)
+    legend_above(panel, 7)
     panel.set_ylim(-1.35, 1.35)
     panel.set_yticks([-1.0, 0.0, 1.0])
-
-
-def _legend_above(panel: Axes) -> None:
-    handles, labels = panel.get_legend_handles_labels()
-    if handles:
-        panel.legend(
-            handles,
-            labels,
-            loc="lower right",
-            bbox_to_anchor=(1.0, 0.98),
-            ncols=7,
-            frameon=False,
-            fontsize=8,
-        )

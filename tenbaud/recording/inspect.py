@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import orjson
 
 from channel.protocol.recording import Field, RecordChannel
-from tenbaud.recording.encoding import END_METADATA
+from tenbaud.recording.encoding import END_METADATA, SIGNALS_KEY, recorded_signals
 from tenbaud.recording.folder import RunFolder, find_recordings, read_summary
-from tenbaud.recording.holes import Hole
-from tenbaud.recording.notes import hole_notes, printable, stray_notes, version_notes
+from tenbaud.recording.notes import printable, recording_notes
 from tenbaud.recording.reader import Recording, TopicSummary
 from tenbaud.recording.rows import Row
 from tenbaud.sentences import events
@@ -23,20 +22,14 @@ EVENT_TOPIC = "event"
 EVENTS_SHOWN = 20
 
 
-@dataclass(frozen=True, slots=True)
-class Description:
+class Description(NamedTuple):
     """One recording. `rows_dropped` is None when the file was cut before it could say."""
 
-    path: Path
-    size_bytes: int
-    complete: bool
-    metadata: dict[str, str]
+    recording: Recording
     rows_dropped: int | None
     error: str | None
-    holes: list[Hole]
     notes: list[str]
     """another version, holes"""
-    topics: dict[str, TopicSummary]
     events: list[Row]
     """The first twenty."""
 
@@ -53,7 +46,7 @@ def describe_text(path: Path) -> str:
     """The same for a person, as plain text; for a run folder headed by the run's figures."""
     described = describe(path)
     parts = [_headline(path), *(_text(description) for description in described)]
-    if not all(description.complete for description in described):
+    if not all(description.recording.complete for description in described):
         parts.append(f"`tenbaud recover {path}` makes whole files of what was cut or damaged")
     return printable("\n\n".join(part for part in parts if part))
 
@@ -82,15 +75,16 @@ def _headline(path: Path) -> str:
 
 
 def _plain(description: Description) -> dict[str, Any]:
+    recording = description.recording
     return {
-        "path": str(description.path),
-        "size_bytes": description.size_bytes,
-        "complete": description.complete,
+        "path": str(recording.path),
+        "size_bytes": recording.path.stat().st_size,
+        "complete": recording.complete,
         "rows_dropped": description.rows_dropped,
         "error": description.error,
         "notes": description.notes,
-        "holes": [asdict(hole) for hole in description.holes],
-        "metadata": description.metadata,
+        "holes": [asdict(hole) for hole in recording.holes],
+        "metadata": recording.metadata,
         "topics": {
             topic: {
                 "rows": summary.rows,
@@ -98,7 +92,7 @@ def _plain(description: Description) -> dict[str, Any]:
                 "last_time_s": summary.last_time_ns / 1e9,
                 "fields": [asdict(field) for field in summary.channel.fields],
             }
-            for topic, summary in description.topics.items()
+            for topic, summary in recording.topics.items()
         },
         "events": description.events,
     }
@@ -107,22 +101,10 @@ def _plain(description: Description) -> dict[str, Any]:
 def _describe_file(path: Path) -> Description:
     recording = Recording(path)
     end = recording.metadata_record(END_METADATA)
-    return Description(
-        path=path,
-        size_bytes=path.stat().st_size,
-        complete=recording.complete,
-        metadata=recording.metadata,
-        rows_dropped=_count(end.get("rows_dropped")),
-        error=end.get("error"),
-        holes=recording.holes,
-        notes=[
-            *version_notes(path, recording.metadata),
-            *hole_notes(path, recording.holes),
-            *stray_notes(path, recording.strays),
-        ],
-        topics=recording.topics,
-        events=[row for _, row in islice(recording.rows(EVENT_TOPIC), EVENTS_SHOWN)],
-    )
+    # Whether it was cut is said beside its size.
+    notes = recording_notes(path, recording.metadata, True, recording.holes, recording.strays)
+    events = [row for _, row in islice(recording.rows(EVENT_TOPIC), EVENTS_SHOWN)]
+    return Description(recording, _count(end.get("rows_dropped")), end.get("error"), notes, events)
 
 
 def _count(text: str | None) -> int | None:
@@ -131,25 +113,26 @@ def _count(text: str | None) -> int | None:
 
 
 def _text(description: Description) -> str:
-    state = "complete"
-    if not description.complete:
+    recording, state = description.recording, "complete"
+    if not recording.complete:
         state = "damaged: these are the rows that are whole"
-        if not description.holes:
+        if not recording.holes:
             state = "cut: these are the rows up to the cut"
-    lines = [str(description.path), f"  {description.size_bytes / 1e6:.2f} MB, {state}"]
+    size = recording.path.stat().st_size / 1e6
+    lines = [str(recording.path), f"  {size:.2f} MB, {state}"]
     if description.rows_dropped:
         lines.append(f"  {description.rows_dropped} rows were dropped")
     if description.error is not None:
         lines.append(f"  {description.error}")
     lines += [f"  {note}" for note in description.notes]
-    for name, value in description.metadata.items():
+    for name, value in recording.metadata.items():
         lines.extend(_metadata_lines(name, value))
-    for topic, summary in description.topics.items():
+    for topic, summary in recording.topics.items():
         lines.append("")
         lines.append(f"  {topic}: {_span(summary)}")
         lines.extend(_field_lines(summary.channel))
     if description.events:
-        total = description.topics[EVENT_TOPIC].rows
+        total = recording.topics[EVENT_TOPIC].rows
         shown = len(description.events)
         lines.append("")
         lines.append("  events" if shown == total else f"  the first {shown} of {total} events")
@@ -159,6 +142,10 @@ def _text(description: Description) -> str:
 
 def _metadata_lines(name: str, value: str) -> list[str]:
     """Return one line; for a configuration, which is JSON, one per section."""
+    if name == SIGNALS_KEY:
+        plant = recorded_signals({name: value})
+        kinds = (("states", plant.states), ("inputs", plant.inputs), ("outputs", plant.outputs))
+        return [f"  {kind}: {'; '.join(one.label for one in signals)}" for kind, signals in kinds]
     try:
         sections = orjson.loads(value) if value.startswith("{") else None
     except ValueError:

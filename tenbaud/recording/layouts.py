@@ -1,18 +1,16 @@
 """Layouts for Foxglove and PlotJuggler that show a flight at once, from one description of the plots.
 
-Foxglove names a value `topic.field` or `topic.field[0]`; PlotJuggler, for JSON messages, `topic/field`
-or `topic/field[0]`. Both say nothing at all when a name is wrong.
+Foxglove names a value `topic.field`; PlotJuggler, for JSON messages, `topic/field`. Both say nothing at
+all when a name is wrong.
 """
 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.etree import ElementTree
 
-from channel.codec.signals import Signals
 from tenbaud.files.whole import write_whole
 from tenbaud.recording.signals import output_name
 
@@ -23,24 +21,16 @@ FOXGLOVE_SUFFIX = ".foxglove.json"
 PLOTJUGGLER_SUFFIX = ".plotjuggler.xml"
 
 
-@dataclass(frozen=True, slots=True)
-class Curve:
-    """One curve: a field of a topic, `index` its place in a list; None for a plain number."""
+class Curve(NamedTuple):
+    """One curve: a field of a topic."""
 
     topic: str
     field: str
-    index: int | None
     label: str
     colour: str
 
-    @property
-    def place(self) -> str:
-        """The index as both tools write it."""
-        return "" if self.index is None else f"[{self.index}]"
 
-
-@dataclass(frozen=True, slots=True)
-class Plot:
+class Plot(NamedTuple):
     """One panel."""
 
     title: str
@@ -56,37 +46,6 @@ _OF_OUTPUTS = (
     ("range M: {}", (("range", CODED),)),
 )
 """Title of a panel of outputs -> what it shows of each, by the names of `Run.signals`."""
-
-
-def recording_plots(plant: Signals) -> tuple[Plot, ...]:
-    """Return the plots of a transmitter's recording as it is."""
-    plots = []
-    for label, places in plant.groups("outputs"):
-        curves = []
-        for place in places:
-            state = plant.output_states[place]
-            curves.append(Curve("tick", "measured", place, plant.outputs[place].words, VALUE))
-            if state is not None:
-                curves.append(Curve("estimate", "coded_state", state, "coded estimate", CODED))
-                curves.append(Curve("estimate", "live_state", state, "live estimate", LIVE))
-        plots.append(Plot(label, tuple(curves)))
-    ranges = [
-        Curve("sample", "range", place, f"range of {one.words}", CODED)
-        for place, one in enumerate(plant.outputs)
-    ]
-    words = (
-        Curve("sample", "word", 0, "consumed", VALUE),
-        Curve("sample", "word_sent", 0, "sent", REFERENCE),
-    )
-    plots += [Plot("range M", tuple(ranges)), Plot("symbols", words)]
-    for label, places in plant.groups("inputs"):
-        applied = [
-            Curve("tick", "applied", place, plant.inputs[place].words, INPUTS[number % len(INPUTS)])
-            for number, place in enumerate(places)
-        ]
-        plots.append(Plot(label, tuple(applied)))
-    late = Curve("tick", "lateness_ms", None, "lateness", LIVE)
-    return (*plots, Plot("lateness of the loop, ms", (late,)))
 
 
 def flight_plots(run: Run) -> tuple[Plot, ...]:
@@ -108,7 +67,7 @@ def flight_plots(run: Run) -> tuple[Plot, ...]:
     for title, curves in shown:
         found = [(run.signals[name], colour) for name, colour in curves if name in run.signals]
         if found:
-            there = [Curve("flight", one.column, None, one.name, colour) for one, colour in found]
+            there = [Curve("flight", one.column, one.name, colour) for one, colour in found]
             plots.append(Plot(title, tuple(there)))
     return tuple(plots)
 
@@ -158,7 +117,7 @@ def _foxglove_plot(plot: Plot) -> dict[str, Any]:
         "foxglovePanelTitle": plot.title,
         "paths": [
             {
-                "value": f"{curve.topic}.{curve.field}{curve.place}",
+                "value": f"{curve.topic}.{curve.field}",
                 "enabled": True,
                 "timestampMethod": "receiveTime",
                 "label": curve.label,
@@ -196,7 +155,7 @@ def plotjuggler_layout(plots: tuple[Plot, ...], recording: str) -> str:
         area = ElementTree.SubElement(splitter, "DockArea", name=plot.title)
         shown = ElementTree.SubElement(area, "plot", mode="TimeSeries", style="Lines")
         for curve in plot.curves:
-            name = f"{curve.topic}/{curve.field}{curve.place}"
+            name = f"{curve.topic}/{curve.field}"
             ElementTree.SubElement(shown, "curve", name=name, color=curve.colour)
     ElementTree.SubElement(tabs, "currentTabIndex", index="0")
     ElementTree.SubElement(root, "use_relative_time_offset", enabled="1")

@@ -1,8 +1,8 @@
 """Rows as earlier versions wrote them, read as those of today: the one place that knows old names.
 
 Up to wire version 1 an event was kind, sample and a sentence. The fields of today are filled from it,
-and the sentence stays, as `text`, for people. The fields of a tick had units in their names, and there
-was one set-point.
+and the sentence stays, as `text`, for people. Fields of ticks and epochs had units in their
+names, and there was one set-point.
 """
 
 from __future__ import annotations
@@ -23,8 +23,9 @@ NEW_NAMES = {
     "applied_volts": "applied",
     "reference_rad": "reference",
     "command_volts": "command",
+    "hold_volts": "hold",
 }
-"""Field of a tick -> its name today."""
+"""Field of a tick or an epoch -> its name today."""
 
 SIGNALS_WITHOUT = PITCH_SIGNALS
 """Of a recording that does not describe its signals: all flights were of the pitch."""
@@ -51,9 +52,9 @@ def of_today(channel: RecordChannel) -> RecordChannel:
     """Return the channel as its rows will be read."""
     if channel.fields == OLD_EVENT_CHANNEL.fields:
         return _FILLED
-    if channel.topic != "tick":
+    if channel.topic not in ("tick", "epoch"):
         return channel
-    return RecordChannel("tick", tuple(_field_of_today(one) for one in channel.fields))
+    return RecordChannel(channel.topic, tuple(_field_of_today(one) for one in channel.fields))
 
 
 def _field_of_today(one: Field) -> Field:
@@ -72,7 +73,7 @@ def rows_of_today(topic: str, rows: list[dict[str, Any]]) -> list[dict[str, Any]
     """Return rows of one file with the fields of today; those that have them as they are."""
     if topic == "event":
         return [_filled(row) for row in rows]
-    if topic == "tick" and rows and not NEW_NAMES.keys().isdisjoint(rows[0]):
+    if topic in ("tick", "epoch") and rows and not NEW_NAMES.keys().isdisjoint(rows[0]):
         return [_renamed(row) for row in rows]
     return rows
 

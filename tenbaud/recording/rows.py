@@ -45,7 +45,7 @@ KNOWN = (
 
 NEVER_NULL = {
     ("epoch", "epoch"),
-    *(("epoch", name) for name in ("state", "coder", "hold_volts")),
+    *(("epoch", name) for name in ("state", "coder", "hold")),
     *(("sample", name) for name in ("state", "coder", "digest")),
     *(("tick", name) for name in ("live_state", "command", "applied")),
     *(("symbol", name) for name in ("symbol", "arrived_ns", "taken", "wire_bytes")),

@@ -1,4 +1,4 @@
-"""How the paper's figures are drawn here: sizes, lines, files."""
+"""How figures are drawn here: sizes, lines, files."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ POINTS = 3000
 
 
 def new_figure(
-    rows: int, height: float = 2.0, ratios: Sequence[float] | None = None
+    rows: int, height: float = 2.0, ratios: Sequence[float] | None = None, width: float = 8.0
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure with `rows` panels under each other that share their time axis."""
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure  # takes half a second, which other commands need not pay
 
-    figure = Figure(figsize=(8.0, 0.5 + height * rows), layout="constrained")
+    figure = Figure(figsize=(width, 0.5 + height * rows), layout="constrained")
     grid = figure.subplots(rows, 1, sharex=True, squeeze=False, height_ratios=ratios)
     panels = [row[0] for row in grid]
     for panel in panels:
@@ -38,9 +38,11 @@ def new_figure(
     return figure, panels
 
 
-def legend_above(panel: Axes) -> None:
-    """Put the legend above the panel's right end, where no curve is."""
-    panel.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=4, fontsize=8, frameon=False)
+def legend_above(panel: Axes, columns: int = 4) -> None:
+    """Put the legend, if there is any, above the panel's right end, where no curve is."""
+    if panel.get_legend_handles_labels()[0]:
+        above = (1.0, 0.97)
+        panel.legend(loc="lower right", bbox_to_anchor=above, ncols=columns, fontsize=8, frameon=False)
 
 
 def decimated(times: Series, values: Series) -> tuple[Series, Series]:

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 from receiver.controllers.base import Controller
 from receiver.controllers.references import Reference
-from tenbaud.build.controllers import build_controller, build_reference
+from tenbaud.build.controllers import build_controller
+from tenbaud.build.references import build_references
+from tenbaud.build.signals import configured_signals
 from tenbaud.config.schema import FlightConfig
 from tenbaud.replay.record import FlightRecord
 
@@ -19,7 +21,7 @@ class RecordedCommands:
         self,
         commands: Mapping[int, tuple[float, ...]],
         initial: tuple[float, ...],
-        references: Mapping[int, float | None],
+        references: Mapping[int, tuple[float | None, ...]],
     ) -> None:
         self._commands = commands
         self._last = initial
@@ -30,9 +32,9 @@ class RecordedCommands:
         self._last = self._commands.get(tick, self._last)
         return self._last
 
-    def reference_rad(self, tick: int) -> float | None:
-        """Return the set-point that was recorded for `tick`; None without one."""
-        return self._references.get(tick)
+    def references(self, tick: int) -> tuple[float | None, ...]:
+        """Return the set-points that were recorded for `tick`."""
+        return self._references.get(tick, ())
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,14 +44,14 @@ class SteppedReference:
     configured: Reference
     steps: tuple[tuple[int, float], ...]
 
-    def angle_rad(self, tick: int) -> float:
+    def value(self, tick: int) -> float:
         """Return the set-point at `tick`."""
-        angle = self.configured.angle_rad(tick)
+        found = self.configured.value(tick)
         for start, value in self.steps:
             if tick < start:
                 break
-            angle = value
-        return angle
+            found = value
+        return found
 
 
 def steps_by_hand(record: FlightRecord) -> tuple[tuple[int, float], ...]:
@@ -59,11 +61,13 @@ def steps_by_hand(record: FlightRecord) -> tuple[tuple[int, float], ...]:
     """
     if "receiver" not in record.rows:
         return ()
-    reference = build_reference(record.agreement.config)
+    reference = build_references(record.agreement.config, record.agreement.signals)[0]
+    if reference is None:
+        return ()
     rows = record.rows["receiver"].topic("tick")
-    told = [(row.tick, row.reference[0]) for row in rows if row.reference != (None,)]
+    told = [(row.tick, row.reference[0]) for row in rows if row.reference[0] is not None]
     first = next(
-        (index for index, (tick, angle) in enumerate(told) if angle != reference.angle_rad(tick)), None
+        (index for index, (tick, angle) in enumerate(told) if angle != reference.value(tick)), None
     )
     if first is None:
         return ()
@@ -78,7 +82,8 @@ def controller_of(config: FlightConfig, steps: tuple[tuple[int, float], ...] = (
     """Return the controller that was flown, with the set-points that it was given by hand."""
     if not steps:
         return build_controller(config)
-    return build_controller(config, SteppedReference(build_reference(config), steps))
+    first, *others = build_references(config, configured_signals(config))
+    return build_controller(config, (first and SteppedReference(first, steps), *others))
 
 
 def recorded_commands(record: FlightRecord) -> RecordedCommands | None:
@@ -87,7 +92,7 @@ def recorded_commands(record: FlightRecord) -> RecordedCommands | None:
     rows = record.rows.get("receiver")
     if rows is not None and rows.topic("tick").recorded:
         commands = {row.tick: row.command for row in rows.topic("tick")}
-        references = {row.tick: row.reference[0] for row in rows.topic("tick")}
+        references = {row.tick: row.reference for row in rows.topic("tick")}
         return RecordedCommands(commands, initial, references)
     beside = record.rows.get("transmitter")
     if beside is None or not beside.topic("tick").recorded:

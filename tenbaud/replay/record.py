@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,9 @@ from typing import Any
 from channel.codec.codec import CodecState, Vector
 from channel.codec.words import Word
 from tenbaud.build.flight import Agreement, agree
+from tenbaud.config.deprecated import with_current_names
 from tenbaud.config.outside_code import require_allowed, require_regular_files
+from tenbaud.config.schema import FlightConfig
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.run import Run
 from tenbaud.recording.table import Tables
@@ -97,10 +100,10 @@ def _agreement(run: Run, tables: Tables, allow_code: bool) -> Agreement:
 
 def _check_same(tables: Tables, agreement: Agreement, end: str) -> None:
     identity = agreement.identity
-    if tables.metadata.get("shared_config") != identity.config:
+    recorded = _with_current_names(tables.metadata.get("shared_config", ""))
+    if recorded != identity.config:
         from channel.protocol.identity import differing_fields
 
-        recorded = tables.metadata.get("shared_config", "")
         lines = "\n  ".join(differing_fields(identity.config, recorded)[:6])
         raise RecordingError(
             f"The {end}'s recording was flown with another configuration than the run's config.toml "
@@ -113,6 +116,15 @@ def _check_same(tables: Tables, agreement: Agreement, end: str) -> None:
             f"{identity.numerics_probe.hex()}). Replay it with the version and the plug-ins that flew "
             f"it: {tables.metadata.get('version')}."
         )
+
+
+def _with_current_names(shared: str) -> str:
+    """Return a recorded shared configuration as this version writes the same settings."""
+    try:
+        values = with_current_names(json.loads(shared), "", warn=False)
+        return FlightConfig.model_validate(values).shared_json(values["timing"]["lead_ticks"])
+    except (ValueError, KeyError, TypeError):
+        return shared
 
 
 def epochs_of(record: FlightRecord) -> list[Epoch]:
@@ -184,4 +196,4 @@ def _is_word(word: tuple[int, ...], agreement: Agreement) -> bool:
 
 
 def _epoch(row: Any) -> Epoch:
-    return Epoch(row.epoch, CodecState(row.sample, row.state, row.coder), row.hold_volts)
+    return Epoch(row.epoch, CodecState(row.sample, row.state, row.coder), row.hold)

@@ -22,6 +22,7 @@ from typing import Any, Literal
 from channel.codec.codec import Codec, CodecState
 from channel.codec.words import ERASED, Alphabet, Word
 from tenbaud.build.flight import Agreement, agree
+from tenbaud.config.deprecated import with_current_names
 from tenbaud.config.outside_code import require_allowed, require_regular_files
 from tenbaud.config.schema import FlightConfig
 from tenbaud.recording.errors import RecordingError
@@ -109,7 +110,7 @@ def unpack(path: Path, *, allow_code: bool = False) -> Unpacked:
             raise ValueError("it begins otherwise")
         (length,) = _LENGTH.unpack_from(data, len(MAGIC))
         head: dict[str, Any] = json.loads(_unpacked_head(data[head_at : head_at + length]))
-        config = FlightConfig.model_validate(head["config"])
+        config = FlightConfig.model_validate(with_current_names(head["config"], "", warn=False))
         if allow_code:
             config = config.allowing_code()
         require_allowed(config)

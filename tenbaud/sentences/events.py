@@ -124,11 +124,11 @@ def _guard_cause(one: Fields) -> str:
             return f"tick {tick}: {one['detail']}"
         case "angle_limit":
             return (
-                f"axis {axis} is at {value:.3f} rad at tick {tick}, beyond its soft limit of "
-                f"{limit:g} rad"
+                f"{one['detail'] or f'axis {axis}, rad'}: {value:.3f} at tick {tick} is beyond the "
+                f"soft limit of {limit:g}"
             )
         case "no_angle":
-            return f"axis {axis} reads no number at tick {tick}"
+            return f"{one['detail'] or f'axis {axis}'} reads no number at tick {tick}"
         case "bad_command":
             return f"the command of tick {tick} is not a number"
     return str(one["cause"])
@@ -165,7 +165,10 @@ def _control(one: Fields) -> str:
     tick = one["tick"]
     before = f"tick {tick}" if tick is not None else f"sample {one['sample']}"
     texts: dict[str, Callable[[], str]] = {
-        "set_point": lambda: f"set-point {one['value']!r} rad",
+        # Of a recording without the unit it was an angle.
+        "set_point": lambda: " ".join(
+            ("set-point", repr(one["value"]), "rad" if one["detail"] is None else one["detail"])
+        ).rstrip(),
         "follow": lambda: "follow the reference",
         "pause": lambda: f"pause before tick {one['number']}",
         "go_on": lambda: "go on",

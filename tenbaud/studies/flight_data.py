@@ -19,9 +19,12 @@ class Numbers(NamedTuple):
     impulse: bool
     replay: bool
     """the rig is a recording: counts, commands and applied voltages are given"""
-    volts_max: float
-    slew: float
+    command_max: tuple[float, float]
+    slew: tuple[float, float]
     """per tick"""
+    steps_per_unit: tuple[float, float]
+    bias: tuple[float, float]
+    """of the inputs, without the controller's loop"""
     initial_front: float
     initial_rear: float
     safe_front: float

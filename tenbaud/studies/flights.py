@@ -10,19 +10,24 @@ from typing import Any
 
 import numpy as np
 
-from channel.codec.codec import Codec
+from channel.codec.codec import Codec, Vector
 from channel.codec.coders.base import FunctionCoder
 from channel.codec.models.linear import LinearModel
 from channel.codec.numerics import sin
+from channel.codec.signals import Signal
 from channel.flight_log import FlightLog
 from plant_sim.disturbance import parse_disturbance
+from plant_sim.encoder import Encoder
 from plant_sim.pitch import pitch_constants
-from receiver.controllers.pid import Pid, PidConstants
+from receiver.controllers.base import Controller
+from receiver.controllers.pid import PidConstants, PidLoops
 from receiver.controllers.recorded import RecordedController
-from tenbaud.build.controllers import build_controller, reference_of
+from tenbaud.build.controllers import build_controller
 from tenbaud.build.ends import build_observer, guard_settings
 from tenbaud.build.flight import Agreement, kind_of_link, read_flight_log
+from tenbaud.build.references import reference_of, reference_sections
 from tenbaud.build.rig import nominal_plant
+from tenbaud.build.signals import build_encoders
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig, FlightLogSection, ReferenceSection
 from tenbaud.flight.verdict import FlightCounts, faults_of
@@ -31,7 +36,7 @@ from tenbaud.studies.figures import FlightFigures, shared_parts
 from tenbaud.studies.flight_data import DONE, Errors, Given, Motion, Numbers, Work
 from tenbaud.studies.kernel import fly
 from tenbaud.studies.schedule import Schedule, Uncommon, schedule_of
-from transmitter.encoder_watch import WINDOW_S
+from transmitter.encoder_watch import window_ticks
 from transmitter.session.state_observer import StateObserver
 
 NOTHING = np.zeros(0)
@@ -79,9 +84,9 @@ class CompiledPoint:
         if replay:
             self._log = recorded_flight(config)
             ticks = min(ticks, len(self._log))
-        self.numbers = _numbers(self.agreement, ticks, replay)
-        controller = build_controller(config)
-        pid = controller.constants if isinstance(controller, Pid) else _no_pid()
+        controller = build_controller(config, model=self.agreement.codec.model)
+        pid, bias = _pid(controller, self.agreement.codec.model.initial())
+        self.numbers = _numbers(self.agreement, ticks, replay, bias)
         plant = nominal_plant(config).mismatched(config.transmitter.plant.mismatch)
         codec = self.agreement.codec
         self._observer = build_observer(self.agreement)
@@ -91,14 +96,7 @@ class CompiledPoint:
             pitch_constants(plant, config.timing.tick_s),
             pid,
         )
-        self.reference = (
-            NOTHING
-            if replay
-            else _reference(
-                config.receiver.reference.model_dump_json(), config.timing.tick_s, self._ahead
-            )
-        )
-
+        self.reference = NOTHING if replay else _reference(self.agreement, self._ahead)
         self._work = _work(codec, self._samples, ticks, self._ahead)
 
     @property
@@ -218,6 +216,8 @@ def _require_ordinary(config: FlightConfig, codec: Codec) -> None:
     if kind_of_link(config).changes_terms:
         raise Uncommon("a link on which bytes take time, such as a serial line")
     model, coder = codec.model, codec.coder
+    if model.input_size != 2 or len(model.measured(model.initial())) != 1:
+        raise Uncommon("a plant that is not of one output and two inputs")
     functions = hasattr(model, "tick_function") or hasattr(model, "row_function")
     if not (functions and isinstance(coder, FunctionCoder)):
         raise Uncommon("a model or coder that is not written as functions")
@@ -225,10 +225,12 @@ def _require_ordinary(config: FlightConfig, codec: Codec) -> None:
         raise Uncommon("a linear model whose output is not its first state")
 
 
-def _numbers(agreement: Agreement, ticks: int, replay: bool) -> Numbers:
+def _numbers(agreement: Agreement, ticks: int, replay: bool, bias: tuple[float, float]) -> Numbers:
     config, terms = agreement.config, agreement.terms
-    section = config.transmitter
-    soft = section.soft_limit_rad
+    settings = guard_settings(agreement)
+    encoder = build_encoders(config, agreement.signals)[0]
+    if not isinstance(encoder, Encoder):
+        raise Uncommon("an output that is read exactly")
     return Numbers(
         ticks=ticks,
         per_sample=terms.ticks_per_sample,
@@ -236,24 +238,37 @@ def _numbers(agreement: Agreement, ticks: int, replay: bool) -> Numbers:
         window_start=agreement.window_start_tick,
         impulse=agreement.codec.coder.impulse,
         replay=replay,
-        volts_max=float(terms.limits.volts_max),
-        slew=float(terms.limits.slew_volts_per_tick),
+        command_max=_pair(terms.limits.command_max),
+        slew=_pair(terms.limits.slew_per_tick),
+        steps_per_unit=_pair(terms.signals.steps_per_unit),
+        bias=bias,
         initial_front=float(terms.initial_command[0]),
         initial_rear=float(terms.initial_command[1]),
-        safe_front=float(section.safe_volts[0]),
-        safe_rear=float(section.safe_volts[1]),
-        guard_timeout=guard_settings(agreement).timeout_ticks,
-        soft_limit=math.inf if soft is None else float(soft),
-        watch=max(1, round(WINDOW_S * 1e9 / terms.tick_ns)),
-        counts_per_turn=section.encoder_counts_per_turn,
+        safe_front=float(settings.safe_command[0]),
+        safe_rear=float(settings.safe_command[1]),
+        guard_timeout=settings.timeout_ticks,
+        soft_limit=float(settings.soft_limits[0]) if settings.soft_limits else math.inf,
+        watch=window_ticks(agreement.codec.model, terms.tick_ns / 1e9),
+        counts_per_turn=int(encoder.counts_per_turn),
         uses_rates=agreement.codec.uses_rates,
-        sign=section.encoder_sign,
-        zero_counts=section.encoder_zero_counts,
+        sign=encoder.sign,
+        zero_counts=encoder.zero_counts,
     )
 
 
-def _no_pid() -> PidConstants:
-    return PidConstants(0.0, 0.0, 0.0, 1.0, 0.0, False)
+def _pair(values: Vector) -> tuple[float, float]:
+    return values[0], values[1]
+
+
+def _pid(controller: Controller, state: Vector) -> tuple[PidConstants, tuple[float, float]]:
+    """Return the one loop of a controller, and the bias; Uncommon for another than the kernel's."""
+    if not isinstance(controller, PidLoops):
+        return PidConstants(0.0, 0.0, 0.0, (0.0, 0.0), False), (0.0, 0.0)
+    places = tuple(float(place) for place in range(len(state)))
+    for loop in controller.loops:
+        if (len(controller.loops), loop.value(places), loop.rate(places)) != (1, 0.0, 1.0):
+            raise Uncommon("a controller that is not one loop on the first state and its rate")
+    return controller.loops[0].constants, _pair(controller.bias)
 
 
 def _work(codec: Codec, samples: int, ticks: int, ahead: int) -> Work:
@@ -283,12 +298,18 @@ def _work(codec: Codec, samples: int, ticks: int, ahead: int) -> Work:
     )
 
 
+def _reference(agreement: Agreement, ticks: int) -> Any:
+    output, section = reference_sections(agreement.config, agreement.signals)[0]
+    if section is None:
+        return NOTHING
+    return _values(section.model_dump_json(), agreement.config.timing.tick_s, output, ticks)
+
+
 @lru_cache(maxsize=64)
-def _reference(section: str, tick_s: float, ticks: int) -> Any:
+def _values(section: str, tick_s: float, output: Signal, ticks: int) -> Any:
     """Return the set-point of every tick; the section as JSON, so that it can be remembered."""
-    reference = reference_of(ReferenceSection.model_validate_json(section), tick_s)
-    values = np.array([reference.angle_rad(tick) for tick in range(ticks)])
-    return values
+    reference = reference_of(ReferenceSection.model_validate_json(section), tick_s, output)
+    return np.array([reference.value(tick) for tick in range(ticks)])
 
 
 def recorded_flight(config: FlightConfig) -> FlightLog:

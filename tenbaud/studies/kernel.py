@@ -20,7 +20,7 @@ from channel.codec.codec import add_correction, is_estimate
 from channel.codec.lead import fly_ticks
 from channel.protocol.limits import as_carried, limited
 from plant_sim.pitch import pitch_step
-from receiver.controllers.pid import motor_volts, pid_integral, pid_volts
+from receiver.controllers.pid import clamped, is_stuck, pid_integral, pid_sum
 from tenbaud.studies.flight_data import DONE, LEFT, Errors, Given, Motion, Numbers, Work
 from tenbaud.studies.parts import decode, encode, held_of, sine, state_of, tick
 from tenbaud.studies.sensor_side import act, angle_at, count_at, guess, look, put, score
@@ -72,34 +72,17 @@ def fly(
 
 
 def _step(flight: Any, carried: Carried, at: int, within: bool, ahead: bool, state: Any) -> Any:
-    """Do what belongs to a tick beside the model: decide its command, and let the plant move under it.
-
-    Codec and plant in one loop: neither waits for the other within a tick, so that the processor works
-    on both at once.
-    """
-    sample, numbers, constants, given, work = flight
-    plant_constants, pid_constants = constants[2], constants[3]
+    """Keep the state of a tick, and decide its command where that is not known."""
+    _, numbers, constants, given, work = flight
     well, integral, plant, motion, errors = carried
     if within:
         work.coded[at] = state[0]
     if ahead:
         work.live[at] = state[0]
         decided, integral = _decide(
-            at, state[0], state[1], integral, numbers, pid_constants, given, work
+            at, state[0], state[1], integral, numbers, constants[3], given, work
         )
         well = well and decided
-    if within and at < numbers.ticks:
-        if at > sample * numbers.per_sample and numbers.uses_rates:
-            look(at, _read(at, plant[0], numbers, given), numbers, constants[0], given, work)
-        untripped, motion = act(at, plant[0], motion, numbers, constants[0], given, work)
-        well = well and untripped
-        if at >= numbers.window_start:
-            angle = angle_at(motion.counts, numbers) if numbers.replay else plant[0]
-            errors = score(at, sample, angle, errors, numbers, given, work)
-        if not numbers.replay:
-            torque = given.torque[at] if given.torque.shape[0] > 0 else 0.0
-            volts = (motion.front, motion.rear)
-            plant = pitch_step(plant, volts, torque, plant_constants, sine)
     return (well, integral, plant, motion, errors), (work.front[at], work.rear[at])
 
 
@@ -111,8 +94,29 @@ def _close(flight: Any, carried: Carried, state: Any) -> Carried:
     return (carried[0] and is_estimate(state), carried[1], carried[2], carried[3], carried[4])
 
 
-def _tick(flight: Any, state: Any, volts: Any, held: Any) -> Any:
-    return tick(state, volts, held, flight[2][0])
+def _tick(
+    flight: Any, carried: Carried, at: int, within: bool, state: Any, volts: Any, held: Any
+) -> Any:
+    """Advance the model, and the plant beside it.
+
+    Neither waits for the other within a tick, so that the processor works on both at once.
+    """
+    sample, numbers, constants, given, work = flight
+    well, integral, plant, motion, errors = carried
+    state = tick(state, volts, held, constants[0])
+    if within and at < numbers.ticks:
+        if at > sample * numbers.per_sample and numbers.uses_rates:
+            look(at, _read(at, plant[0], numbers, given), numbers, constants[0], given, work)
+        untripped, motion = act(at, plant[0], motion, numbers, constants[0], given, work)
+        well = well and untripped
+        if at >= numbers.window_start:
+            angle = angle_at(motion.counts, numbers) if numbers.replay else plant[0]
+            errors = score(at, sample, angle, errors, numbers, given, work)
+        if not numbers.replay:
+            torque = given.torque[at] if given.torque.shape[0] > 0 else 0.0
+            volts = (motion.front, motion.rear)
+            plant = pitch_step(plant, volts, torque, constants[2], sine)
+    return (well, integral, plant, motion, errors), state
 
 
 def _measure(
@@ -203,13 +207,20 @@ def _decide(
         front, rear = given.commands[at, 0], given.commands[at, 1]
     else:
         error = given.reference[at] - angle
-        volts = pid_volts(pid_constants, integral, error, rate)
-        if not math.isfinite(volts):
+        total = pid_sum(pid_constants, integral, error, rate)
+        if not math.isfinite(total):
             return False, integral
-        integral = pid_integral(pid_constants, integral, error, volts)
-        front, rear = motor_volts(pid_constants, volts)
+        first, second = pid_constants.mixing
+        front = numbers.bias[0] + first * total
+        rear = numbers.bias[1] + second * total
+        stuck = is_stuck(front, first * error, numbers.command_max[0])
+        stuck = is_stuck(rear, second * error, numbers.command_max[1]) and stuck
+        integral = pid_integral(pid_constants, integral, error, stuck)
+        front = clamped(front, numbers.command_max[0])
+        rear = clamped(rear, numbers.command_max[1])
     front_before = work.front[at - 1] if at > 0 else numbers.initial_front
     rear_before = work.rear[at - 1] if at > 0 else numbers.initial_rear
-    work.front[at] = as_carried(limited(front, front_before, numbers.volts_max, numbers.slew))
-    work.rear[at] = as_carried(limited(rear, rear_before, numbers.volts_max, numbers.slew))
+    largest, slew, steps = numbers.command_max, numbers.slew, numbers.steps_per_unit
+    work.front[at] = as_carried(limited(front, front_before, largest[0], slew[0]), steps[0])
+    work.rear[at] = as_carried(limited(rear, rear_before, largest[1], slew[1]), steps[1])
     return True, integral

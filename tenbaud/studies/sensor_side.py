@@ -113,8 +113,9 @@ def act(
     if not given.late[at]:
         work.given_out[0] = work.front[at]
         work.given_out[1] = work.rear[at]
-        front = limited(work.front[at], front, numbers.volts_max, numbers.slew)
-        rear = limited(work.rear[at], rear, numbers.volts_max, numbers.slew)
+        largest, slew = numbers.command_max, numbers.slew
+        front = limited(work.front[at], front, largest[0], slew[0])
+        rear = limited(work.rear[at], rear, largest[1], slew[1])
         age = 0
     else:
         age += 1

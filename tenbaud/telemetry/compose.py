@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections import deque
+from math import isfinite
 from typing import Any
 
 from channel.codec.codec import Vector
+from channel.codec.signals import Signal, signals_of
 from channel.protocol.events import EVENT_CHANNEL
 from channel.protocol.recording import RecordChannel
 from receiver.endpoint import ReceiverEndpoint
@@ -55,7 +57,15 @@ class _Composer:
         self.skipped = 0
         """messages that were not sent, because their time had passed or the network refused"""
         self._number = 0
-        self._measured = agreement.codec.model.measured
+        model = agreement.codec.model
+        self._measured = model.measured
+        plant = signals_of(model)
+        self.outputs = plant.outputs
+        self._plant = {
+            "model": agreement.config.model.kind,
+            "outputs": [_named(one) for one in plant.outputs],
+            "inputs": [_named(one) for one in plant.inputs],
+        }
         self._stride = max(1, round(POINT_PERIOD_S / (agreement.terms.tick_ns / 1e9)))
 
     def skip(self, messages: int) -> None:
@@ -72,6 +82,7 @@ class _Composer:
         return {
             "version": SCHEMA_VERSION,
             "session": self.agreement.config.link.session,
+            "plant": self._plant,
             "flight": session.session_number,
             "number": self._number,
             "phase": session.phase.value,
@@ -84,8 +95,8 @@ class _Composer:
             "dropped": self.tap.dropped + self.skipped,
         }
 
-    def _angle(self, state: Vector | None) -> float | None:
-        return None if state is None else self._measured(state)[0]
+    def _outputs_of(self, state: Vector | None) -> Vector | None:
+        return None if state is None else self._measured(state)
 
 
 class TransmitterComposer(_Composer):
@@ -95,11 +106,11 @@ class TransmitterComposer(_Composer):
         super().__init__(run.agreement, tap)
         self._run = run
         self._live = live
-        self._range = 0.0
-        self._angles: dict[int, tuple[float, float, float | None]] = {}
-        self._estimates: dict[int, tuple[float, float | None, float]] = {}
+        self._range: Vector = (0.0,) * len(self.outputs)
+        self._read_of: dict[int, dict[str, Any]] = {}
+        self._estimated_of: dict[int, dict[str, Any]] = {}
         self._lateness_ms: deque[float] = deque(maxlen=LATENESS_TICKS)
-        self._volts: list[float] | None = None
+        self._applied: Vector | None = None
 
     def compose(self) -> dict[str, Any]:
         """Return the message of this moment."""
@@ -125,7 +136,7 @@ class TransmitterComposer(_Composer):
             "points": _thinned(points, POINTS_MAX),
             "samples": samples[-SAMPLES_MAX:],
             "guard": node.guard.state.value,
-            "volts": self._volts,
+            "applied": self._applied,
             "lateness": self._lateness(),
             "paused": self._live.paused,
             "pace": self._live.pace if self.agreement.clock == "virtual" else None,
@@ -141,18 +152,23 @@ class TransmitterComposer(_Composer):
                 if real:
                     self._lateness_ms.append(row[T_LATE_MS])
                 if row[T_TICK] % stride == 0:
-                    true = row[T_TRUE]
-                    angles = (row[T_TIME], row[T_MEASURED][0], None if true is None else true[0])
-                    self._angles[row[T_TICK]] = angles
-                    self._volts = list(row[T_APPLIED])
+                    self._read_of[row[T_TICK]] = {
+                        "time_s": row[T_TIME],
+                        "measured": row[T_MEASURED],
+                        "true": row[T_TRUE],
+                    }
+                    self._applied = row[T_APPLIED]
                     self._join(row[T_TICK], points)
             elif topic == "estimate":
                 if row[E_TICK] % stride == 0:
-                    coded = self._measured(row[E_CODED])[0]
-                    self._estimates[row[E_TICK]] = (coded, self._angle(row[E_LIVE]), self._range)
+                    self._estimated_of[row[E_TICK]] = {
+                        "coded": self._measured(row[E_CODED]),
+                        "live": self._outputs_of(row[E_LIVE]),
+                        "range": self._range,
+                    }
                     self._join(row[E_TICK], points)
             elif topic == "sample":
-                self._range = row[S_RANGE][0]
+                self._range = row[S_RANGE]
                 samples.append(
                     {
                         "sample": row[S_SAMPLE],
@@ -162,28 +178,15 @@ class TransmitterComposer(_Composer):
                         "peer_digest": row[S_PEER],
                     }
                 )
-        for waiting in (self._angles, self._estimates):
+        for waiting in (self._read_of, self._estimated_of):
             while len(waiting) > TICKS_WAITING_MAX:
                 del waiting[next(iter(waiting))]
         return points, samples
 
     def _join(self, tick: int, points: list[Any]) -> None:
-        """Make a point of a tick as soon as both its angle and its estimate are known."""
-        angles, estimates = self._angles.get(tick), self._estimates.get(tick)
-        if angles is None or estimates is None:
-            return
-        del self._angles[tick], self._estimates[tick]
-        (time_s, measured, true), (coded, live, width) = angles, estimates
-        points.append(
-            {
-                "time_s": time_s,
-                "measured_rad": measured,
-                "true_rad": true,
-                "coded_rad": coded,
-                "live_rad": live,
-                "range_rad": width,
-            }
-        )
+        """Make a point of a tick as soon as both reading and estimate are known."""
+        if tick in self._read_of and tick in self._estimated_of:
+            points.append(self._read_of.pop(tick) | self._estimated_of.pop(tick))
 
     def _lateness(self) -> dict[str, float] | None:
         if not self._lateness_ms:
@@ -215,8 +218,8 @@ class ReceiverComposer(_Composer):
         points = [
             {
                 "time_s": row[D_TICK] * terms.tick_ns / 1e9,
-                "reference_rad": row[D_REFERENCE][0],
-                "live_rad": self._measured(row[D_LIVE])[0],
+                "reference": row[D_REFERENCE],
+                "live": self._measured(row[D_LIVE]),
             }
             for topic, row in rows
             if topic == "tick" and row[D_TICK] % stride == 0
@@ -226,7 +229,7 @@ class ReceiverComposer(_Composer):
             for topic, row in rows
             if topic == "sample"
         ]
-        steering = self._live.steering
+        steering = self._live.steering or (None,) * len(self.outputs)
         return {
             "role": "receiver",
             **self._common(session, self._live.impairments, rows),
@@ -238,9 +241,14 @@ class ReceiverComposer(_Composer):
             "baud_measured": session.meter.baud,
             "points": _thinned(points, POINTS_MAX),
             "samples": samples[-SAMPLES_MAX:],
-            "set_point_rad": None if steering is None else steering.by_hand_rad,
-            "steerable": steering is not None,
+            "set_points": [None if one is None else one.by_hand for one in steering],
+            "steerable": [one is not None for one in steering],
         }
+
+
+def _named(one: Signal) -> dict[str, Any]:
+    low, high = (value if isfinite(value) else None for value in (one.low, one.high))
+    return {"name": one.name, "unit": one.unit, "low": low, "high": high}
 
 
 COUNTED_UP = ("erasures", "desyncs", "rejoins", "digest_checks", "words_missed", "stale_frames")

@@ -12,10 +12,10 @@ from channel.errors import LinkError
 from channel.links.base import Role
 from channel.links.security import Security
 from channel.protocol.recording import Recorder
-from receiver.controllers.steered import SteeredReference
+from receiver.controllers.references import SteeredReference
 from receiver.endpoint import ReceiverEndpoint
-from tenbaud.build.controllers import build_reference
 from tenbaud.build.flight import Agreement
+from tenbaud.build.references import build_references
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.telemetry.commands import CommandQueue
 from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
@@ -42,6 +42,8 @@ class TelemetryOptions:
 
 
 DEFAULT_OPTIONS = TelemetryOptions()
+STEERABLE = ("pid", "state_feedback")
+"""Controllers whose set-points may be taken over in flight."""
 
 
 @dataclass(slots=True)
@@ -54,7 +56,7 @@ class TelemetryEnd:
     """what the end records into: the tap, where there is one"""
     endpoint: str | None
     queue: CommandQueue | None
-    steering: SteeredReference | None
+    steering: tuple[SteeredReference | None, ...] | None
     pace: float | None
     tap: Tap | None
     security: Security | None
@@ -147,19 +149,24 @@ def open_telemetry(
             "included; leave --telemetry out, or use tls/, to decide who may\n"
         )
     tap = Tap(recorder) if endpoint is not None else None
-    steerable = agreement.live and agreement.config.receiver.controller == "pid"
+    steerable = agreement.live and agreement.config.receiver.controller in STEERABLE
     return TelemetryEnd(
         agreement,
         role,
         tap or recorder,
         endpoint,
         CommandQueue() if agreement.live and endpoint is not None else None,
-        SteeredReference(build_reference(agreement.config)) if steerable else None,
+        _steered(agreement) if steerable else None,
         options.pace if agreement.clock == "virtual" else None,
         tap,
         None if security is None else _for_viewers(security, agreement.live),
         bool(options.endpoint),
     )
+
+
+def _steered(agreement: Agreement) -> tuple[SteeredReference | None, ...]:
+    references = build_references(agreement.config, agreement.signals)
+    return tuple([None if one is None else SteeredReference(one) for one in references])
 
 
 def _for_viewers(security: Security, steerable: bool) -> Security:

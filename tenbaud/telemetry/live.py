@@ -17,12 +17,13 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
+from channel.codec.signals import signals_of
 from channel.line.impairments import impair, parse_impairments
 from channel.links.base import Role
 from channel.protocol.events import ByHand, Event, EventKind, write_event
 from channel.protocol.recording import Recorder
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
-from receiver.controllers.steered import SteeredReference
+from receiver.controllers.references import SteeredReference
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.telemetry.commands import CommandQueue
@@ -157,7 +158,7 @@ class LiveReceiver:
         queue: CommandQueue | None,
         should_stop: Stop,
         recorder: Recorder,
-        steering: SteeredReference | None,
+        steering: tuple[SteeredReference | None, ...] | None,
         impairments: str,
     ) -> None:
         self.queue = queue
@@ -178,12 +179,8 @@ class LiveReceiver:
     def _one(self, command: Command) -> Event | None:
         session = self._endpoint.session
         match command:
-            case SetPoint(angle_rad=angle_rad):
-                if self.steering is None:
-                    return _ignored("this controller has no set-point")
-                self.steering.steer(angle_rad)
-                cause = ByHand.FOLLOW if angle_rad is None else ByHand.SET_POINT
-                return _by_hand(cause, value=angle_rad)
+            case SetPoint(value=value, output=place):
+                return self._steer(place, value)
             case Impair(text=text):
                 self.impairments = text
                 if impair(self._endpoint.downlink.line, parse_impairments(text).down):
@@ -191,6 +188,20 @@ class LiveReceiver:
             case Corrupt(end="receiver", field=field):
                 return corrupt(session, field, session.state.sample)
         return None
+
+    def _steer(self, place: int, value: float | None) -> Event:
+        outputs = signals_of(self._endpoint.session.codec.model).outputs
+        steering = self.steering[place] if self.steering and place < len(self.steering) else None
+        if steering is None or place >= len(outputs):
+            return _ignored("this controller has no such set-point")
+        output = outputs[place]
+        if value is not None and not output.low <= value <= output.high:
+            return _ignored(f"{output.name} is within {output.low:g} and {output.high:g} {output.unit}")
+        steering.steer(value)
+        if value is None:
+            return _by_hand(ByHand.FOLLOW)
+        detail = f"{output.unit} of {output.name}" if len(outputs) > 1 else output.unit
+        return _by_hand(ByHand.SET_POINT, value=value, detail=detail.strip())
 
     def _tell(self, event: Event) -> None:
         session = self._endpoint.session

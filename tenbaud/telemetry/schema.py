@@ -12,31 +12,48 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, field_validator
 from channel.line.impairments import parse_impairments
 from channel.protocol.events import EventKind
 
-SCHEMA_VERSION = 2
-ANGLE_MAX_RAD = 1.6
+SCHEMA_VERSION = 3
+SET_POINT_MAX = 1e6
 
 
 class _Message(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+class SignalName(_Message):
+    """One output or input of the plant."""
+
+    name: str
+    unit: str = Field(description="as a person writes it; empty: none")
+    low: float | None = Field(description="smallest value that makes sense; null: not known")
+    high: float | None = Field(description="largest value that makes sense; null: not known")
+
+
+class PlantSignals(_Message):
+    """What the lists of the messages hold, in this order."""
+
+    model: str = Field(description="kind of the codec's model")
+    outputs: list[SignalName]
+    inputs: list[SignalName]
+
+
 class Point(_Message):
-    """One tick as both the rig and the codec know it."""
+    """One tick as both the rig and the codec know it; the lists have a value per output."""
 
     time_s: float = Field(description="flight time")
-    measured_rad: float = Field(description="angle as the encoder gives it")
-    true_rad: float | None = Field(description="true angle, where the rig knows it")
-    coded_rad: float = Field(description="the codec's estimate of that tick")
-    live_rad: float | None = Field(description="the receiver's predicted estimate of it")
-    range_rad: float = Field(description="range M of the coder at that tick")
+    measured: list[float] = Field(description="as the sensors give them")
+    true: list[float] | None = Field(description="true outputs, where the rig knows them")
+    coded: list[float] = Field(description="the codec's estimate of that tick")
+    live: list[float] | None = Field(description="the receiver's predicted estimate of it")
+    range: list[float] = Field(description="ranges M of the coder at that tick")
 
 
 class Decision(_Message):
-    """One tick as the receiver decided it."""
+    """One tick as the receiver decided it; the lists have a value per output."""
 
     time_s: float = Field(description="flight time")
-    reference_rad: float | None = Field(description="set-point of the controller")
-    live_rad: float = Field(description="estimate that the command was decided with")
+    reference: list[float | None] = Field(description="set-points; null: it has none")
+    live: list[float] = Field(description="estimate that the command was decided with")
 
 
 class SentSample(_Message):
@@ -90,8 +107,9 @@ class Lateness(_Message):
 
 
 class _EndMessage(_Message):
-    version: Literal[2] = Field(description="of this schema")
+    version: Literal[3] = Field(description="of this schema")
     session: str = Field(description="name of the session")
+    plant: PlantSignals
     flight: int = Field(description="number of the session, 0 while there is none")
     number: int = Field(description="counts the messages of this end")
     phase: Literal["greeting", "waiting", "flying", "rejoining", "ended"] = Field(
@@ -119,8 +137,8 @@ class TransmitterTelemetry(_EndMessage):
     duration_s: float = Field(description="of the whole flight as configured")
     points: list[Point] = Field(description="ticks since the message before, some left out")
     samples: list[SentSample] = Field(description="confirmed since the message before")
-    guard: str = Field(description="state of the guard beside the motors")
-    volts: list[float] | None = Field(description="voltages put on the motors last")
+    guard: str = Field(description="state of the guard")
+    applied: list[float] | None = Field(description="what each input was given last")
     lateness: Lateness | None = Field(description="null on the virtual clock")
     paused: bool = Field(description="the virtual clock stands still")
     pace: float | None = Field(description="virtual seconds per second at most; null: unlimited")
@@ -136,15 +154,18 @@ class ReceiverTelemetry(_EndMessage):
     baud_measured: float | None = Field(description="symbols per second on this end's clock")
     points: list[Decision] = Field(description="ticks since the message before, some left out")
     samples: list[TakenSample] = Field(description="consumed since the message before")
-    set_point_rad: float | None = Field(description="given by hand; null: the reference is followed")
-    steerable: bool = Field(description="whether the controller has a set-point at all")
+    set_points: list[float | None] = Field(
+        description="given by hand, of each output; null: the reference is followed"
+    )
+    steerable: list[bool] = Field(description="whether the set-point of each output can be given")
 
 
 class SetPoint(_Message):
-    """Steer to an angle, or (null) follow the configured reference again."""
+    """Steer an output to a value, or (null) follow the configured reference again."""
 
     kind: Literal["set_point"]
-    angle_rad: Annotated[float, Field(ge=-ANGLE_MAX_RAD, le=ANGLE_MAX_RAD)] | None
+    value: Annotated[float, Field(ge=-SET_POINT_MAX, le=SET_POINT_MAX)] | None
+    output: Annotated[int, Field(ge=0)] = 0
 
 
 class Pause(_Message):

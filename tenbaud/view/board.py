@@ -120,13 +120,8 @@ class Board:
 
     def _on_transmitter(self, message: dict[str, Any]) -> None:
         for point in message["points"]:
-            true = point["true_rad"]
-            row = [
-                point["time_s"],
-                point["measured_rad"] if true is None else true,
-                point["coded_rad"],
-                point["range_rad"],
-            ]
+            values = point["measured"] if point["true"] is None else point["true"]
+            row = [point["time_s"], values, point["coded"], point["range"]]
             self._points.append(row)
             self._fresh["points"].append(row)
         for sample in message["samples"]:
@@ -136,7 +131,7 @@ class Board:
 
     def _on_receiver(self, message: dict[str, Any]) -> None:
         for point in message["points"]:
-            row = [point["time_s"], point["reference_rad"]]
+            row = [point["time_s"], point["reference"]]
             self._decisions.append(row)
             self._fresh["decisions"].append(row)
         for sample in message["samples"]:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable
+from functools import partial
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +18,13 @@ from tenbaud.view.feed import Feed
 STATIC = Path(__file__).parent / "static"
 REFRESH_S = 0.25
 SET_POINT_STEP_DEG = 5
+SET_POINT_STEPS = 40
 PACES = {0.25: "¼", 1.0: "1", 5.0: "5", 25.0: "25"}
 
 LOOK_ONLY = "This address is view-only: it has no controls."
 
 Send = Callable[..., None]
+Moved = Callable[[float], None]
 
 
 def build_page(board: Board, feed: Feed, *, steers: bool) -> None:
@@ -99,7 +104,7 @@ class _Panel:
         return button
 
     def slider(
-        self, name: str, least: int, most: int, step: int, unit: str, moved: Callable[[], None]
+        self, name: str, least: float, most: float, step: float, unit: str, moved: Moved
     ) -> _Slider:
         return _Slider(name, (least, most, step), unit, moved)
 
@@ -111,13 +116,12 @@ class _Slider:
     would jump back during a quick movement. `moved` is called on release, or at each key.
     """
 
-    def __init__(
-        self, name: str, spread: tuple[int, int, int], unit: str, moved: Callable[[], None]
-    ) -> None:
+    def __init__(self, name: str, spread: tuple[float, float, float], unit: str, moved: Moved) -> None:
         self.value = 0.0
         self._moved = moved
         self._unit = unit
         least, most, step = spread
+        name, unit = escape(name), escape(unit)
         self._element = ui.html(
             f'<span>{name}</span><output class="slider-value">0{unit}</output>'
             f'<input type="range" min="{least}" max="{most}" step="{step}" value="0" '
@@ -126,7 +130,10 @@ class _Slider:
             tag="label",
         ).classes("slider")
         show = "event.currentTarget.querySelector('output').textContent"
-        self._element.on("input", js_handler=f"(event) => {{ {show} = event.target.value + '{unit}' }}")
+        self._element.on(
+            "input",
+            js_handler=f"(event) => {{ {show} = event.target.value + {json.dumps(self._unit)} }}",
+        )
         number = "(event) => emit(Number(event.target.value))"
         self._element.on("change", lambda event: self._take(event.args), js_handler=number)
 
@@ -136,30 +143,62 @@ class _Slider:
         ui.run_javascript(
             f"const slider = document.getElementById('c{self._element.id}');"
             f"slider.querySelector('input').value = 0;"
-            f"slider.querySelector('output').textContent = '0{self._unit}';"
+            f"slider.querySelector('output').textContent = {json.dumps('0' + self._unit)};"
         )
 
     def _take(self, value: float) -> None:
         self.value = value
-        self._moved()
+        self._moved(value)
 
 
 class _SetPoint(_Panel):
     def __init__(self, send: Send) -> None:
-        super().__init__("Set-point", "The pitch that the controller aims for.")
+        super().__init__("Set-point", "What the controller aims for.")
+        self._send = send
+        self._outputs: list[dict[str, Any]] = []
         with self.box:
-            self.angle = self.slider(
-                "Set-point",
-                -90,
-                90,
-                SET_POINT_STEP_DEG,
-                "°",
-                lambda: send(kind="set_point", angle_rad=math.radians(self.angle.value)),
-            )
-            self.button("Follow the reference", lambda: send(kind="set_point", angle_rad=None))
+            self._sliders = ui.element("div")
+            self.button("Follow the reference", self._follow)
+
+    def _follow(self) -> None:
+        for place in range(len(self._outputs)):
+            self._send(kind="set_point", value=None, output=place)
+
+    def _build(self, outputs: list[dict[str, Any]], steerable: list[bool]) -> None:
+        """Make a slider for each output that can be steered."""
+        self._outputs = outputs
+        self._sliders.clear()
+        with self._sliders:
+            for place, (output, can) in enumerate(zip(outputs, steerable, strict=False)):
+                if not can:
+                    continue
+                spread, unit, factor = _spread(output)
+                words = str(output["name"]).replace("_", " ")
+                name = "Set-point" if len(outputs) == 1 else f"Set-point of {words}"
+                self.slider(name, *spread, unit, partial(self._moved, place, factor))
+
+    def _moved(self, place: int, factor: float, value: float) -> None:
+        self._send(kind="set_point", value=value * factor, output=place)
 
     def refresh(self, allowed: bool, upper: dict[str, Any], lower: dict[str, Any]) -> None:
-        self.enable(allowed and bool(lower.get("steerable")))
+        outputs = lower["plant"]["outputs"] if lower else []
+        if outputs != self._outputs:
+            self._build(outputs, lower["steerable"])
+        self.enable(allowed and any(lower.get("steerable", ())))
+
+
+def _spread(output: dict[str, Any]) -> tuple[tuple[float, float, float], str, float]:
+    """Return least, most and step of a slider, its unit, and what its value is multiplied by.
+
+    Angles are in degrees. Without a range in the plant's description: 90 degrees, or 1.
+    """
+    low, high, unit = output["low"], output["high"], str(output["unit"])
+    known = low is not None and high is not None
+    if unit == "rad":
+        ends = (math.ceil(math.degrees(low)), math.floor(math.degrees(high))) if known else (-90, 90)
+        return (*ends, SET_POINT_STEP_DEG), "°", math.radians(1.0)
+    low, high = (low, high) if known else (-1.0, 1.0)
+    return (low, high, (high - low) / SET_POINT_STEPS), f" {unit}" if unit else "", 1.0
 
 
 class _Clock(_Panel):
@@ -207,7 +246,7 @@ class _Line(_Panel):
             self.delay = self.slider("Delay each way", 0, 300, 10, " ms", self._changed)
             self.button("Repair the line", self._repair)
 
-    def _changed(self) -> None:
+    def _changed(self, _value: float = 0.0) -> None:
         parts = []
         if self.loss.value:
             parts.append(f"up:loss={self.loss.value / 100:g}")

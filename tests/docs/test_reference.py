@@ -32,7 +32,7 @@ def section_of(page: str, title: str) -> str:
         ("`[link]`", "| `best_effort` |  | `false` | `true`, `false` |"),
         ("`[transmitter.bridge.pitch]`", "| `counts_per_turn` | counts/turn | `4096` |"),
         ('`[coder]` with `kind = "zoom"`', "| `window_signs` | signs | `2` | whole number ≥ 1, ≤ 16 |"),
-        ("`[transmitter]`", "| `soft_limit_rad` | rad | none | number ≥ 1e-09, ≤ 1000000000 or none |"),
+        ("`[transmitter]`", "| `ramp_s` | s | `1.0` | number ≥ 1e-09, ≤ 1000000000 |"),
     ],
 )
 def test_when_a_field_is_looked_up_then_unit_default_range_and_meaning_are_there(
@@ -45,7 +45,7 @@ def leaves(values: dict[str, object], name: str = "") -> list[tuple[str, str]]:
     """Return (section, field) of everything that a configuration holds."""
     found = []
     for field, value in values.items():
-        if isinstance(value, dict):
+        if isinstance(value, dict) and not field.endswith(("_weights", "options", "inputs")):
             found += leaves(value, f"{name}.{field}" if name else field)
         else:
             found.append((name, field))

@@ -26,7 +26,7 @@ from tests.rules.sources import TOP
 PAGE = (TOP / "docs/reference/wire-format.md").read_text(encoding="utf-8")
 SERIAL_PAGE = (TOP / "docs/serial.md").read_text(encoding="utf-8")
 NUMBERS = {"u8": "<B", "u16": "<H", "u32": "<I", "u64": "<Q", "s16": "<h", "s64": "<q"}
-NOT_IN_THE_FRAME = ("version", "kind", "CRC", "echoes", "motors")
+NOT_IN_THE_FRAME = ("version", "kind", "CRC", "echoes", "inputs")
 """Names of the head, and counts that the code takes from the length of a list."""
 
 

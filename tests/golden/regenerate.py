@@ -25,10 +25,10 @@ from channel.codec.coders.static import StaticCoder, StaticParameters
 from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
 from channel.codec.models.hold import HoldModel
 from channel.codec.models.linear import LinearModel
-from channel.codec.models.pitch import PitchModel, PitchParameters
+from channel.codec.models.pitch import PITCH_SIGNALS, PitchModel, PitchParameters
 from channel.protocol import frames, wire
 from channel.protocol.endings import Ending
-from channel.protocol.limits import from_millivolts
+from channel.protocol.limits import from_steps
 
 FOLDER = Path(__file__).resolve().parent
 
@@ -174,7 +174,7 @@ GOLDEN_CODECS: dict[str, Codec] = {
 
 
 def codec_vectors() -> dict[str, list[list[object]]]:
-    """Return [word, millivolts of all ticks, digest, model in hex, coder in hex] of each sample."""
+    """Return [word, steps of all ticks, digest, model in hex, coder in hex] of each sample."""
     chooser = random.Random(20240614)
     vectors: dict[str, list[list[object]]] = {}
     for name, codec in GOLDEN_CODECS.items():
@@ -186,7 +186,7 @@ def codec_vectors() -> dict[str, list[list[object]]]:
                 (chooser.randrange(-5000, 5001), chooser.randrange(-5000, 5001))
                 for _ in range(codec.ticks_per_sample)
             ]
-            state = codec.step(state, word, [from_millivolts(pair) for pair in pairs])
+            state = codec.step(state, word, [from_steps(pair, PITCH_SIGNALS) for pair in pairs])
             rows.append(
                 [
                     word and list(word),

@@ -54,7 +54,7 @@ def pitch_flight(
 
 def largest_share(flight: MemoryFlight) -> float:
     """Return the largest coded error as a share of the largest angle, in the scored window."""
-    return flight.node.scores.coded.largest / flight.node.scores.angle_max_rad
+    return flight.node.scores.first.coded.largest / flight.node.scores.first.largest
 
 
 def assert_lockstep(flight: MemoryFlight, samples: int) -> None:

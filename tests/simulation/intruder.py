@@ -171,7 +171,7 @@ class Intruder:
                     values[self.chance.randrange(size)] = self._float()
         return struct.pack(f"<q{size}d", sample, *values)
 
-    def _millivolts(self, count: int) -> tuple[int, ...]:
+    def _steps(self, count: int) -> tuple[int, ...]:
         largest = self.chance.choice((1000, 5000, 5001, 32767))
         return tuple(self.chance.randrange(-largest, largest + 1) for _ in range(count))
 
@@ -208,7 +208,7 @@ class Intruder:
             sample,
             self._number(self._incarnation, U32),
             self._number(self._request, U32),
-            self._millivolts(self.chance.choice((0, inputs, inputs, inputs, 7, 255))),
+            self._steps(self.chance.choice((0, inputs, inputs, inputs, 7, 255))),
             self._state_bytes(sample if self.chance.random() < 0.8 else self._sample),
         )
 
@@ -230,7 +230,7 @@ class Intruder:
                 last + 1 - count + index,
                 self.chance.choice((0, 1, 1, U16, U16 - 1, 2)),
                 self.chance.choice((0, U64, self.chance.getrandbits(64))),
-                self._millivolts(volts),
+                self._steps(volts),
             )
             for index in range(count)
         )

@@ -47,8 +47,8 @@ def test_when_the_paper_is_flown_then_the_error_is_within_its_bound(
     assert result.ticks == 10_000
     assert_lockstep(flight, 10_000 // ticks)
     assert 0.001 < largest_share(flight) < bound
-    assert flight.node.scores.live.largest == flight.node.scores.coded.largest
-    assert flight.node.scores.angle_max_rad > 1.5
+    assert flight.node.scores.first.live.largest == flight.node.scores.first.coded.largest
+    assert flight.node.scores.first.largest > 1.5
     assert flight.node.commands_late == 0
     assert flight.receiver.counts["erasures"] == 0
 
@@ -69,7 +69,7 @@ def test_when_bits_arrive_at_the_end_of_their_slot_then_the_live_error_stays_bou
     flight.fly(100.0)
     assert_lockstep(flight, 1000)
     scores = flight.node.scores
-    assert scores.coded.largest < scores.live.largest < 0.05 * scores.angle_max_rad
+    assert scores.first.coded.largest < scores.first.live.largest < 0.05 * scores.first.largest
     assert largest_share(flight) < 0.02
     assert flight.node.commands_late == 0
 
@@ -220,7 +220,7 @@ def test_when_one_end_computes_a_sine_one_ulp_off_then_it_is_reported_and_ends_s
 
     assert flight.transmitter.phase is Phase.ENDED
     assert flight.node.latched
-    assert flight.node.guard.volts == (0.0, 0.0)
+    assert flight.node.guard.command == (0.0, 0.0)
     assert result.ticks <= report.sample * 10 + 60
     applied = flight.transmitter_rows.column("tick", "applied")
     assert applied[-1] == (0.0, 0.0)

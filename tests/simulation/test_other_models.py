@@ -6,7 +6,9 @@ import pytest
 
 from channel.codec.codec import Codec
 from channel.codec.coders.zoom import ZoomCoder
+from channel.codec.signals import signals_of
 from channel.codec.words import WIRE_ERASED, Alphabet
+from channel.protocol.limits import CommandLimits
 from tenbaud import MemoryFlight
 from tests.channel.codec.chua import (
     CHUA_TICK_S,
@@ -25,7 +27,14 @@ MS = 1_000_000
 
 def test_when_chua_is_flown_through_both_sessions_then_no_command_is_needed() -> None:
     codec = Codec(ChuaModel(CHUA_TICK_S), ZoomCoder(CHUA_ZOOM), CHUA_TICKS_PER_SAMPLE)
-    flight_terms = terms(tick_ns=5 * MS, rate_baud=20.0, initial_command=(), lead_ticks=7)
+    flight_terms = terms(
+        tick_ns=5 * MS,
+        rate_baud=20.0,
+        initial_command=(),
+        limits=CommandLimits((), ()),
+        signals=signals_of(codec.model),
+        lead_ticks=7,
+    )
     flight_terms.check("real")
     flight = MemoryFlight(
         codec,
@@ -41,8 +50,8 @@ def test_when_chua_is_flown_through_both_sessions_then_no_command_is_needed() ->
     assert flight.transmitter.counts["digest_checks"] == flight.receiver.state.sample >= 1990
     assert flight.transmitter.counts["desyncs"] == 0
     assert flight.node.commands_late == 0
-    assert flight.node.scores.angle_max_rad > 1.5
-    assert flight.node.scores.coded.largest < 0.2
+    assert flight.node.scores.first.largest > 1.5
+    assert flight.node.scores.first.coded.largest < 0.2
 
 
 @pytest.mark.parametrize("ticks", [4, 5])
@@ -65,8 +74,8 @@ def test_when_two_axes_are_flown_then_a_word_takes_two_slots(ticks: int) -> None
     assert_lockstep(flight, samples)
     assert flight.receiver.counts["erasures"] == 0
     assert flight.uplink.meter.symbols == 2 * samples
-    assert flight.node.scores.coded.largest < 0.05
-    assert flight.node.scores.angle_max_rad < 0.2
+    assert flight.node.scores.first.coded.largest < 0.05
+    assert flight.node.scores.first.largest < 0.2
 
 
 def test_when_one_symbol_of_a_word_of_two_is_lost_then_both_ends_see_the_word_erased() -> None:

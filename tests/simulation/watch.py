@@ -101,9 +101,9 @@ class Watch:
     # Safety
 
     def on_volts(self, volts: Vector) -> None:
-        limit = self.terms.limits.volts_max
-        if not all(-limit <= value <= limit for value in volts):
-            raise SafetyViolation(f"voltages {volts} beyond +-{limit} V")
+        limits = self.terms.limits.command_max
+        if not all(abs(value) <= limit for value, limit in zip(volts, limits, strict=True)):
+            raise SafetyViolation(f"voltages {volts} beyond {limits} V")
 
     def on_symbol_sent(self, now_ns: int) -> None:
         self._sent_ns.append(now_ns)
@@ -203,6 +203,6 @@ class Watch:
         if world.plan.is_slow:
             return
         assert world.node is not None
-        error = world.node.scores.last_coded_error_rad
+        error = world.node.scores.first.last_coded_error
         if error is None or abs(error) > ERROR_BOUND_RAD:
             raise LivenessViolation(f"the error is {error} rad, not below {ERROR_BOUND_RAD}")

@@ -25,6 +25,7 @@ from plant_sim.pitch import PitchParameters, PitchPlant
 from receiver.controllers.pid import PAPER_GAINS, Pid
 from receiver.endpoint import ReceiverEndpoint
 from receiver.session.session import ReceiverSession
+from tenbaud.build.references import values_of
 from tests.channel.codec.parts import TICK_NS, TICK_S, identity_of, pitch_codec
 from tests.simulation.faults import FAULTY_S, QUIET_S, Plan
 from tests.simulation.flight import COUNTS_PER_TURN, REFERENCE
@@ -146,7 +147,7 @@ class World:
             overtaking_ticks=self.plan.overtaking_ticks,
         )
         guard = Guard(self.terms.limits, GuardSettings(self.plan.watchdog_ticks, 50, (0.0, 0.0)))
-        scores = Scores(self.codec.model, 0, 2000, REFERENCE.angle_rad)
+        scores = Scores(self.codec.model, 0, 2000, values_of((REFERENCE,)))
         self.node = TransmitterNode(session, self.rig, guard, scores, recorder, ALIVE_TICKS)
         self.watch.node = self.node
         self.uplink = Uplink(self.terms, self.codec.coder.alphabet, self.up)

@@ -18,7 +18,7 @@ from typing import Any
 from channel.links.serial.emulated import EmulatedLine
 from tests.tenbaud.processes import REPOSITORY
 
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 
 
 class End:

@@ -28,11 +28,11 @@ class Pull:
         self.context, self.stiffness = context, stiffness
 
     def command(self, tick, state):
-        volts = self.stiffness * (self.reference_rad(tick) - state[0]) - 3.0 * state[1]
+        volts = self.stiffness * (self.references(tick)[0] - state[0]) - 3.0 * state[1]
         return volts / 2.0, -volts / 2.0
 
-    def reference_rad(self, tick):
-        return self.context.reference.angle_rad(tick)
+    def references(self, tick):
+        return (self.context.reference.value(tick),)
 '''
 
 PLANT = '''

@@ -205,7 +205,7 @@ def test_when_the_plug_stays_out_then_the_motors_go_to_their_safe_voltage(tmp_pa
         flown = fly(line, changed, line.unplug)
     assert flown.outcome.code is ExitCode.LINK_LOST
     assert "safe voltage" in flown.outcome.text
-    assert flown.transmitter.node.guard.volts == (0.0, 0.0)
+    assert flown.transmitter.node.guard.command == (0.0, 0.0)
 
 
 def test_when_the_line_is_too_slow_then_it_is_refused_with_the_arithmetic() -> None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 
-from channel.codec.codec import Codec, Vector
-from channel.codec.coders.zoom import ZoomCoder
+from channel.codec.codec import Codec, ModelContext, Vector
+from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
+from channel.codec.models.pendulum import PendulumModel
 from plant_sim.encoder import QUANSER_PITCH
 from plant_sim.pitch import PitchParameters, PitchPlant
 from tests.channel.codec.parts import TICK_S, pitch_codec
 from tests.channel.codec.two_axes import TWO_AXES_ZOOM, TwoAxes
-from transmitter.encoder_watch import EncoderWatch
+from transmitter.encoder_watch import EncoderWatch, window_ticks
 
 CODEC = pitch_codec()
 REST: Vector = (-0.115, 0.0, 0.0, 0.0)
@@ -31,8 +32,8 @@ def test_when_an_encoder_is_stuck_then_the_fault_says_where_and_how_far_the_body
     watch = EncoderWatch(CODEC, TICK_S)
     faults = [watch.check((12,), (5.0, -5.0), REST) for _ in range(102)]
     (fault,) = [fault for fault in faults if fault is not None]
-    assert "axis 0 stood at 12 counts for 1 s" in fault
-    assert "turned 1.4" in fault
+    assert "the encoder of pitch stood at 12 counts for 10" in fault
+    assert "moved by 1.4" in fault
 
 
 def test_when_the_body_rests_at_its_equilibrium_then_nothing_is_flagged() -> None:
@@ -83,4 +84,14 @@ def test_when_one_of_two_encoders_sticks_then_that_axis_is_named() -> None:
     faults = [watch.check((tick, 7), (3.0, 3.0), (0.0, 0.0, 0.0, 0.0)) for tick in range(102)]
     assert faults[:98] == [None] * 98
     (fault,) = [fault for fault in faults if fault is not None]
-    assert "axis 1 stood at 7 counts" in fault
+    assert "output_2 stood at 7 counts" in fault
+
+
+def test_an_unstable_plant_is_watched_for_as_long_as_its_estimate_can_be_relied_on() -> None:
+    context = ModelContext(TICK_S, 0.1)
+    pendulum = Codec(PendulumModel(context), ZoomCoder(ZoomParameters()), 10)
+    assert window_ticks(CODEC.model, TICK_S) == 100
+    assert 20 <= window_ticks(pendulum.model, TICK_S) <= 40
+    watch = EncoderWatch(pendulum, TICK_S)
+    # Upright and at rest, an estimate off by a hundredth of a radian falls over within a second.
+    assert all(watch.check((0,), (0.0,), (0.01, 0.0)) is None for _ in range(1000))

@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from channel.codec.models.pitch import PITCH_SIGNALS
 from channel.protocol.limits import CommandLimits
 from transmitter.guard import Guard, GuardCause, GuardReason, GuardSettings, GuardState
 
@@ -17,7 +18,7 @@ STOPPED = GuardReason(GuardCause.STOPPED, 1)
 def guard(
     slew: float = math.inf, soft: tuple[float, ...] = (), safe: tuple[float, float] = SAFE
 ) -> Guard:
-    return Guard(CommandLimits(5.0, slew), GuardSettings(3, 4, safe, soft))
+    return Guard(CommandLimits.of(PITCH_SIGNALS, 5.0, slew), GuardSettings(3, 4, safe, soft))
 
 
 def test_when_nothing_has_come_then_the_safe_voltage_is_on_the_motors() -> None:
@@ -119,7 +120,7 @@ def test_when_commands_are_within_the_limits_then_they_pass_as_they_are() -> Non
 def test_when_an_angle_is_beyond_its_soft_limit_then_the_voltage_is_taken_down(angle: float) -> None:
     one = guard(soft=(1.0, 2.0))
     one.apply(0, (4.5, 3.5))
-    one.check_angles(1, (angle, 0.0))
+    one.check_outputs(1, (angle, 0.0))
     assert one.apply(1, (5.0, 5.0)) == (3.5, 2.5)
     cause = GuardCause.ANGLE_LIMIT if math.isfinite(angle) else GuardCause.NO_ANGLE
     assert one.reason is not None
@@ -128,17 +129,17 @@ def test_when_an_angle_is_beyond_its_soft_limit_then_the_voltage_is_taken_down(a
 
 def test_when_angles_are_at_their_soft_limits_then_commands_pass() -> None:
     one = guard(soft=(1.0, 2.0))
-    one.check_angles(0, (-1.0, 2.0))
+    one.check_outputs(0, (-1.0, 2.0))
     assert not one.stopped
-    one.check_angles(0, (1.0, 2.1))
+    one.check_outputs(0, (1.0, 2.1))
     assert one.reason == GuardReason(GuardCause.ANGLE_LIMIT, 0, 1, 2.1, 2.0)
 
 
 def test_when_there_are_no_soft_limits_then_any_number_is_an_angle() -> None:
     one = guard()
-    one.check_angles(0, (1e6,))
+    one.check_outputs(0, (1e6,))
     assert not one.stopped
-    one.check_angles(0, (math.nan,))
+    one.check_outputs(0, (math.nan,))
     assert one.stopped
 
 

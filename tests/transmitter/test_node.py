@@ -47,7 +47,7 @@ class ScriptedRig(Rig):
 def node_with(rig: ScriptedRig, recorder: MemoryRecorder | None = None) -> TransmitterNode:
     session = TransmitterSession(CODEC, terms(), identity_of(CODEC), 5, recorder)
     guard = Guard(session.terms.limits, GuardSettings(20, 10, (0.0, 0.0), (1.0,)))
-    scores = Scores(CODEC.model, 0, 640, lambda _: None)
+    scores = Scores(CODEC.model, 0, 640, lambda _: ())
     node = TransmitterNode(session, rig, guard, scores, recorder)
     node.deliver(Welcome(77, 0, 0, 5))
     return node
@@ -76,7 +76,7 @@ def test_when_commands_come_then_they_are_on_the_motors_at_their_ticks() -> None
     assert rig.written == [(tick, (2.0, -2.0)) for tick in range(50)]
     assert node.commands_late == 0
     node.flush_records()
-    assert node.scores.coded.count == node.scores.live.count == 50
+    assert node.scores.first.coded.count == node.scores.first.live.count == 50
 
 
 def test_when_no_command_has_come_then_it_is_counted_as_late_and_the_last_one_is_held() -> None:
@@ -99,7 +99,7 @@ def test_when_the_guard_has_stopped_then_no_symbol_leaves_although_the_session_f
         node.actuate(tick)
         assert node.session.phase is Phase.FLYING
     assert node.latched
-    assert node.guard.volts == (0.0, 0.0)
+    assert node.guard.command == (0.0, 0.0)
     assert node.session.copies.next_sample == 1
 
 
@@ -123,7 +123,7 @@ def test_when_the_session_ends_then_the_voltage_is_taken_down_with_its_reason() 
     ("rig", "text"),
     [
         (ScriptedRig(faulty_tick=25), "tick 25: the cable is off"),
-        (ScriptedRig(angle_rad=1.5), "axis 0 is at 1.500 rad at tick 0"),
+        (ScriptedRig(angle_rad=1.5), "axis 0, rad: 1.500 at tick 0"),
     ],
     ids=["fault", "soft limit"],
 )

@@ -8,6 +8,7 @@ import time
 import pytest
 
 from channel.codec.codec import Vector
+from channel.codec.models.pitch import PITCH_SIGNALS
 from channel.line.uplink import Uplink
 from channel.protocol.endings import End, Ending
 from channel.protocol.events import EventKind, event_fields
@@ -65,8 +66,8 @@ def flight_over(link: MemoryLink, kind: type[SimulatedRig]) -> RealFlight:
     node = TransmitterNode(
         TransmitterSession(CODEC, TERMS, IDENTITY, 5),
         kind(PitchPlant(PitchParameters(), TICK_S), (Encoder(4096),), (0.0, 0.0)),
-        Guard(CommandLimits(5.0), GuardSettings(100, 50, (0.0, 0.0))),
-        Scores(CODEC.model, 0, 1000, lambda _: None),
+        Guard(CommandLimits.of(PITCH_SIGNALS, 5.0), GuardSettings(100, 50, (0.0, 0.0))),
+        Scores(CODEC.model, 0, 1000, lambda _: ()),
         rearm_ticks=10_000,
     )
     return RealFlight(TransmitterEndpoint(node, Uplink(TERMS, CODEC.coder.alphabet)), link, 10.0)

@@ -2,7 +2,7 @@
 
 Two errors are kept for every tick of the window. *Coded* is the codec's own error at that tick, as in
 the paper; *live* is the error of the receiver's predicted estimate when it had to decide the
-tick's command, prediction included. Both are against the true angle where the rig knows it, else
+tick's command, prediction included. Both are against the true output where the rig knows it, else
 against the encoder.
 """
 
@@ -14,8 +14,8 @@ from collections.abc import Callable
 
 from channel.codec.codec import Model, Vector
 
-Reference = Callable[[int], float | None]
-"""Set-point of the first axis at a tick, rad; None where there is none."""
+References = Callable[[int], tuple[float | None, ...]]
+"""Set-points of the outputs at a tick; None, or missing at the end, where there is none."""
 
 
 class ErrorMeter:
@@ -40,11 +40,34 @@ class ErrorMeter:
         return math.sqrt(self._sum_of_squares / self.count) if self.count else None
 
 
-class Scores:
-    """Collects the errors of a flight from tick `window_start_tick` on.
+class OutputScores:
+    """The errors of one output, and how far it went."""
 
-    `span_ticks` bounds how long an angle waits for its estimate; older ones are forgotten.
-    `on_live_error` gets every live error of the window, rad.
+    def __init__(self) -> None:
+        self.coded = ErrorMeter()
+        self.live = ErrorMeter()
+        self.tracking = ErrorMeter()
+        self.largest = 0.0
+        """of the output itself, either way"""
+        self.reference_largest = 0.0
+        self.last_coded_error: float | None = None
+        self.last: float | None = None
+
+    def on_value(self, value: float, reference: float | None) -> None:
+        """Take the output of a tick in the window."""
+        if value > self.largest or -value > self.largest:
+            self.largest = abs(value)
+        if reference is not None:
+            if reference > self.reference_largest or -reference > self.reference_largest:
+                self.reference_largest = abs(reference)
+            self.tracking.add(reference - value)
+
+
+class Scores:
+    """Collects the errors of a flight from tick `window_start_tick` on, for each output.
+
+    `span_ticks` bounds how long a reading waits for its estimate; older ones are forgotten.
+    `on_live_error` gets every live error of the first output in the window.
     """
 
     def __init__(
@@ -52,65 +75,63 @@ class Scores:
         model: Model,
         window_start_tick: int,
         span_ticks: int,
-        reference: Reference,
+        references: References,
         on_live_error: Callable[[float], None] = lambda _: None,
     ) -> None:
         self.window_start_tick = window_start_tick
-        self.coded = ErrorMeter()
-        self.live = ErrorMeter()
-        self.tracking = ErrorMeter()
-        self.angle_max_rad = 0.0
-        self.reference_max_rad = 0.0
-        self.last_coded_error_rad: float | None = None
-        self.last_angle_rad: float | None = None
+        self.outputs = tuple([OutputScores() for _ in model.measured(model.initial())])
         self._model = model
-        self._reference = reference
+        self._references = references
         self._on_live_error = on_live_error
-        # An estimate may come before its angle (the echo of a sample's first tick speaks of all its
+        # An estimate may come before its reading (the echo of a sample's first tick speaks of all its
         # ticks) or long after it; each waits for the other.
-        self._angles: deque[tuple[int, float]] = deque(maxlen=span_ticks)
-        self._estimates: deque[tuple[int, float, float | None]] = deque(maxlen=span_ticks)
+        self._readings: deque[tuple[int, Vector]] = deque(maxlen=span_ticks)
+        self._estimates: deque[tuple[int, Vector, Vector | None]] = deque(maxlen=span_ticks)
+
+    @property
+    def first(self) -> OutputScores:
+        """Return the scores of the first output."""
+        return self.outputs[0]
 
     def forget_reference(self) -> None:
         """Score no more tracking: the set-point is no longer the one that is known here."""
-        self._reference = lambda _tick: None
+        self._references = lambda _tick: ()
 
-    def on_angles(self, tick: int, angles_rad: Vector) -> None:
-        """Note the angles of a tick; ticks come in order."""
-        angle = angles_rad[0]
-        self.last_angle_rad = angle
-        if tick >= self.window_start_tick:
-            if angle > self.angle_max_rad or -angle > self.angle_max_rad:
-                self.angle_max_rad = abs(angle)
-            reference = self._reference(tick)
-            if reference is not None:
-                if reference > self.reference_max_rad or -reference > self.reference_max_rad:
-                    self.reference_max_rad = abs(reference)
-                self.tracking.add(reference - angle)
-        self._angles.append((tick, angle))
+    def on_outputs(self, tick: int, values: Vector) -> None:
+        """Note the outputs of a tick; ticks come in order."""
+        inside = tick >= self.window_start_tick
+        references = self._references(tick) if inside else ()
+        for place, score in enumerate(self.outputs):
+            score.last = value = values[place]
+            if inside:
+                score.on_value(value, references[place] if place < len(references) else None)
+        self._readings.append((tick, values))
         self._join()
 
     def on_estimate(self, tick: int, coded: Vector, live: Vector | None) -> None:
         """Note what was estimated of a tick; ticks come in order."""
         measured = self._model.measured
-        self._estimates.append((tick, measured(coded)[0], None if live is None else measured(live)[0]))
+        self._estimates.append((tick, measured(coded), None if live is None else measured(live)))
         self._join()
 
     def _join(self) -> None:
         """Score every tick of which both sides are known; forget those that one side skipped."""
-        angles, estimates = self._angles, self._estimates
-        while angles and estimates:
-            if angles[0][0] < estimates[0][0]:
-                angles.popleft()
-            elif estimates[0][0] < angles[0][0]:
+        readings, estimates = self._readings, self._estimates
+        while readings and estimates:
+            if readings[0][0] < estimates[0][0]:
+                readings.popleft()
+            elif estimates[0][0] < readings[0][0]:
                 estimates.popleft()
             else:
-                self._score(angles.popleft()[1], *estimates.popleft())
+                self._score(readings.popleft()[1], *estimates.popleft())
 
-    def _score(self, angle: float, tick: int, coded: float, live: float | None) -> None:
-        self.last_coded_error_rad = angle - coded
-        if tick >= self.window_start_tick:
-            self.coded.add(angle - coded)
-            if live is not None:
-                self.live.add(angle - live)
-                self._on_live_error(angle - live)
+    def _score(self, values: Vector, tick: int, coded: Vector, live: Vector | None) -> None:
+        inside = tick >= self.window_start_tick
+        for place, score in enumerate(self.outputs):
+            score.last_coded_error = error = values[place] - coded[place]
+            if inside:
+                score.coded.add(error)
+                if live is not None:
+                    score.live.add(values[place] - live[place])
+        if inside and live is not None:
+            self._on_live_error(values[0] - live[0])

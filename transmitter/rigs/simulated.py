@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from channel.codec.codec import Vector
 from channel.flight_log import FlightLog
-from plant_sim.encoder import Encoder, angles_rad
+from plant_sim.encoder import OutputReader, angles_rad
 from plant_sim.plant import Plant
 from transmitter.rigs.base import Reading, Rig
 
@@ -14,12 +14,12 @@ class SimulatedRig(Rig):
 
     name = "simulated"
 
-    def __init__(self, plant: Plant, encoders: tuple[Encoder, ...], safe_volts: Vector) -> None:
+    def __init__(self, plant: Plant, encoders: tuple[OutputReader, ...], safe_command: Vector) -> None:
         self._plant = plant
         self._encoders = encoders
         self._encoder = encoders[0] if len(encoders) == 1 else None
-        self._safe_volts = safe_volts
-        self._volts = safe_volts
+        self._safe_command = safe_command
+        self._volts = safe_command
         self._tick = 0
 
     def read(self, tick: int) -> Reading:
@@ -29,11 +29,11 @@ class SimulatedRig(Rig):
             self._tick += 1
         true = self._plant.measured_rad
         if len(true) == 1 and self._encoder is not None:
-            count = self._encoder.counts(true[0])
-            return Reading((count,), (self._encoder.angle_rad(count),), true)
+            count, value = self._encoder.read(true[0])
+            return Reading((count,), (value,), true)
         pairs = zip(self._encoders, true, strict=True)
-        counts = tuple(encoder.counts(angle) for encoder, angle in pairs)
-        return Reading(counts, angles_rad(self._encoders, counts), true)
+        counts, values = zip(*[encoder.read(value) for encoder, value in pairs], strict=True)
+        return Reading(counts, values, true)
 
     def write(self, tick: int, volts: Vector) -> None:
         """Hold these voltages on the motors from this tick on."""
@@ -41,7 +41,7 @@ class SimulatedRig(Rig):
 
     def safe_stop(self) -> None:
         """Put the safe voltage on the motors."""
-        self._volts = self._safe_volts
+        self._volts = self._safe_command
 
 
 class DryRig(Rig):
@@ -81,7 +81,7 @@ class ReplayRig(Rig):
 
     name = "replay"
 
-    def __init__(self, log: FlightLog, encoders: tuple[Encoder, ...]) -> None:
+    def __init__(self, log: FlightLog, encoders: tuple[OutputReader, ...]) -> None:
         self._log = log
         self._encoders = encoders
 

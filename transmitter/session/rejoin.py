@@ -10,7 +10,7 @@ from __future__ import annotations
 from channel.codec.codec import Codec, CodecState, Vector
 from channel.protocol.frames import Echo, Hello, Welcome, Why
 from channel.protocol.identity import Identity
-from channel.protocol.limits import from_millivolts
+from channel.protocol.limits import from_steps
 from channel.protocol.terms import Terms
 
 ASK_AGAIN_NS = 10_000_000
@@ -81,17 +81,17 @@ class Asking:
 def start_of(welcome: Welcome, codec: Codec, terms: Terms) -> tuple[CodecState, Vector]:
     """Return the common state of a Welcome within bounds, and the command to hold."""
     hold = terms.initial_command
-    if welcome.hold_millivolts:
-        hold = from_millivolts(welcome.hold_millivolts)
+    if welcome.hold_steps:
+        hold = from_steps(welcome.hold_steps, terms.signals)
     if not welcome.state:
         return codec.initial()._replace(sample=welcome.first_sample), hold
     return codec.unpack(welcome.state), hold
 
 
-def commands_of(echo: Echo, ticks_per_sample: int) -> list[Vector]:
+def commands_of(echo: Echo, terms: Terms) -> list[Vector]:
     """Return the commands of an echo within bounds, one for each tick."""
-    inputs = len(echo.millivolts) // ticks_per_sample
+    inputs = len(terms.signals.inputs)
     return [
-        from_millivolts(echo.millivolts[index * inputs : (index + 1) * inputs])
-        for index in range(ticks_per_sample)
+        from_steps(echo.steps[index * inputs : (index + 1) * inputs], terms.signals)
+        for index in range(terms.ticks_per_sample)
     ]

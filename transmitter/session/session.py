@@ -323,7 +323,7 @@ class TransmitterSession:
     def _confirm(self, echo: Echo) -> list[Frame]:
         """Advance the confirmed copy by one echo; return the report of a desync, if it is one."""
         word = self.codec.coder.alphabet.word(echo.word_number)
-        commands = commands_of(echo, self.terms.ticks_per_sample)
+        commands = commands_of(echo, self.terms)
         try:
             done = self.copies.confirm(word, commands, echo.digest)
         except CANNOT_FLY as error:

@@ -69,9 +69,9 @@ class SerialBudget:
 
 
 def serial_budget(terms: Terms, inputs: int) -> SerialBudget:
-    """Return the budget of a flight whose commands have `inputs` voltages each."""
-    millivolts = (1,) * (terms.ticks_per_sample * inputs)
-    echoes = tuple(Echo(sample, 1, 1, millivolts) for sample in range(terms.repeats + 1))
+    """Return the budget of a flight whose commands have `inputs` values each."""
+    steps = (1,) * (terms.ticks_per_sample * inputs)
+    echoes = tuple(Echo(sample, 1, 1, steps) for sample in range(terms.repeats + 1))
     # COBS adds a byte for every 254; a frame full of zeros is not shorter.
     content = len(encode(Commands(1, 1, echoes)))
     stuffed = len(cobs_encode(b"\1" * content))

@@ -42,7 +42,7 @@ def open_port(
         port = serial.serial_for_url(url, do_not_open=True)
         port.baudrate = line_rate_baud
         port.timeout = read_timeout_s
-        if not url.startswith("rfc2217://"):  # which knows neither
+        if not url.startswith("rfc2217://"):  # which supports neither
             port.write_timeout = write_timeout_s
             port.exclusive = True
         port.open()

@@ -1,7 +1,23 @@
-// Drawing on canvas: two charts and the tape. Plain lines, redrawn whole; colours come from the page.
+// Drawing on canvas: two charts for every output, and the tape. Plain lines, redrawn whole; colours come from the page.
 
 const SPAN_S = 30;
 const DEGREES = 180 / Math.PI;
+const ROUND_DEGREES = [0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 45, 90, 180, 360];
+
+// How values of a unit are shown: angles in degrees, everything else as it is.
+export function shown(unit) {
+  return unit === "rad" ? { factor: DEGREES, unit: "°", words: "degrees" }
+    : { factor: 1, unit: unit ? ` ${unit}` : "", words: unit };
+}
+
+// A round step that gives about three lines on either side of zero.
+function roundStep(most, look) {
+  const least = most / 3;
+  const degrees = look.unit === "°" && ROUND_DEGREES.find((step) => step >= least);
+  if (degrees) return degrees;
+  const power = 10 ** Math.floor(Math.log10(least));
+  return [1, 2, 5, 10].map((one) => one * power).find((step) => step >= least);
+}
 
 export function colours() {
   const style = getComputedStyle(document.body);
@@ -28,22 +44,24 @@ function fitted(canvas, height) {
 }
 
 // A chart's frame: horizontal lines at round values, and functions from values to pixels.
-function frame(canvas, height, now, low, high, step, ink) {
+function frame(canvas, height, now, largest, look, ink) {
   const [context, width] = fitted(canvas, height);
-  const left = 38;
+  const left = 46, step = roundStep(largest, look), high = Math.ceil(largest / step) * step, low = -high;
+  const digits = Math.max(0, Math.ceil(-Math.log10(step) - 1e-9));
   const x = (time) => left + (width - left - 4) * (1 - (now - time) / SPAN_S);
-  const y = (value) => 6 + (height - 12) * (high - value) / (high - low);
+  const y = (value) => 8 + (height - 16) * (high - value) / (high - low);
   context.textAlign = "right";
   context.textBaseline = "middle";
   context.lineWidth = 1;
-  for (let value = Math.ceil(low / step) * step; value <= high; value += step) {
+  for (let line = Math.round(low / step); line * step <= high * 1.0001; line++) {
+    const value = line * step;
     context.strokeStyle = ink.line;
     context.beginPath();
     context.moveTo(left, y(value));
     context.lineTo(width, y(value));
     context.stroke();
     context.fillStyle = ink.dim;
-    context.fillText(`${Math.round(value * 10) / 10}°`, left - 6, y(value));
+    context.fillText(`${value.toFixed(digits).replace("-", "\u2212")}${look.unit === "°" ? "°" : ""}`, left - 6, y(value));
   }
   context.beginPath();
   context.rect(left, 0, width - left, height);
@@ -81,30 +99,30 @@ function band(chart, rows, upper, lower, colour) {
   context.fill();
 }
 
-// rows: [time, true, estimate, range]; decisions: [time, set-point]
-export function drawPitch(canvas, now, rows, decisions, ink) {
-  let most = 30;
-  for (const row of rows) most = Math.max(most, Math.abs(row[1]) * DEGREES);
-  for (const row of decisions) most = Math.max(most, Math.abs(row[1] || 0) * DEGREES);
-  most = Math.ceil((most + 5) / 30) * 30;
-  const chart = frame(canvas, 210, now, -most, most, most > 60 ? 45 : 15, ink);
-  band(chart, rows, (row) => (row[2] + row[3]) * DEGREES, (row) => (row[2] - row[3]) * DEGREES, ink.tube);
-  line(chart, decisions, (row) => (row[1] === null ? null : row[1] * DEGREES), ink.reference, 1.5, true);
-  line(chart, rows, (row) => row[2] * DEGREES, ink.estimate, 3);
-  line(chart, rows, (row) => row[1] * DEGREES, ink.ink, 1.2);
+// rows: [time, values, estimates, ranges], decisions: [time, set-points], each with one entry per output
+export function drawOutput(canvas, height, now, rows, decisions, place, look, ink) {
+  const at = (index) => (row) => (row[index][place] === null || row[index][place] === undefined ? null : row[index][place] * look.factor);
+  const value = at(1), estimate = at(2), range = at(3), reference = at(1);
+  let most = look.unit === "°" ? 2 : 1e-6;
+  for (const row of rows) most = Math.max(most, Math.abs(value(row)) * 1.05);
+  for (const row of decisions) most = Math.max(most, Math.abs(reference(row) || 0) * 1.05);
+  const chart = frame(canvas, height, now, most, look, ink);
+  band(chart, rows, (row) => estimate(row) + range(row), (row) => estimate(row) - range(row), ink.tube);
+  line(chart, decisions, reference, ink.reference, 1.5, true);
+  line(chart, rows, estimate, ink.estimate, 3);
+  line(chart, rows, value, ink.ink, 1.2);
   chart.context.restore();
 }
 
-export function drawError(canvas, now, rows, ink) {
-  let most = 4;
-  for (const row of rows) most = Math.max(most, row[3] * DEGREES, Math.abs(row[1] - row[2]) * DEGREES);
-  const step = most > 40 ? 30 : most > 12 ? 10 : most > 5 ? 5 : 2;
-  most = Math.ceil(most / step) * step;
-  const chart = frame(canvas, 120, now, -most, most, step, ink);
-  band(chart, rows, (row) => row[3] * DEGREES, (row) => -row[3] * DEGREES, ink.tube);
-  line(chart, rows, (row) => row[3] * DEGREES, ink.estimate, 1);
-  line(chart, rows, (row) => -row[3] * DEGREES, ink.estimate, 1);
-  line(chart, rows, (row) => (row[1] - row[2]) * DEGREES, ink.error, 1.8);
+export function drawError(canvas, height, now, rows, place, look, ink) {
+  const error = (row) => (row[1][place] - row[2][place]) * look.factor, range = (row) => (row[3][place] ?? 0) * look.factor;
+  let most = look.unit === "°" ? 0.5 : 1e-9;
+  for (const row of rows) most = Math.max(most, range(row), Math.abs(error(row)));
+  const chart = frame(canvas, height, now, most, look, ink);
+  band(chart, rows, range, (row) => -range(row), ink.tube);
+  line(chart, rows, range, ink.estimate, 1);
+  line(chart, rows, (row) => -range(row), ink.estimate, 1);
+  line(chart, rows, error, ink.error, 1.8);
   chart.context.restore();
 }
 

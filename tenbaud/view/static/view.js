@@ -1,6 +1,6 @@
 // The page's own script: takes the stream in, keeps the last thirty seconds, and draws them.
 
-import { colours, drawError, drawPitch, drawTape } from "./draw.js";
+import { colours, drawError, drawOutput, drawTape, shown } from "./draw.js";
 
 const KEPT_S = 32, SAMPLES_KEPT = 160, EVENTS_SHOWN = 7, STALE_MS = 1500, BROKEN_SHOWN_MS = 2500, TEXT_MS = 200;
 const DEGREES = 180 / Math.PI;
@@ -68,24 +68,105 @@ function same(one, other) {
   return [...names].every((name) => ["time_s", "sample", "text"].includes(name) || one[name] === other[name]);
 }
 
-// ---- the picture
+// ---- the plant: what it is called, and its picture
 
-function turn(id, angle) {
-  at(id).setAttribute("transform", `rotate(${(-angle * DEGREES).toFixed(2)} 160 122)`);
+let plant = null, picture = null;
+const largest = { outputs: [], inputs: [] };
+
+function make(tag, name = "", text = "") {
+  const element = document.createElement(tag);
+  element.className = name;
+  element.textContent = text;
+  return element;
+}
+
+const words = (one) => one.name.replaceAll("_", " ");
+const title = (one) => words(one).replace(/^./, (letter) => letter.toUpperCase());
+
+// Builds what depends on the plant, once for each: charts, the picture, bars.
+function become(told) {
+  if (!told || JSON.stringify(told) === JSON.stringify(plant)) return;
+  plant = told;
+  const several = plant.outputs.length > 1;
+  at("curves").replaceChildren(...plant.outputs.flatMap((one, place) => {
+    const look = shown(one.unit), unit = look.words ? `${look.words}, ` : "";
+    return [["value", title(one), `${unit}last 30 s of flight`], ["error", several ? `${title(one)}, estimation error` : "Estimation error", `${unit}within the range ± M`]]
+      .flatMap(([kind, name, small]) => {
+        const heading = make("h2", "", `${name} `), canvas = make("canvas");
+        heading.append(make("small", "", small));
+        canvas.id = `${kind}-${place}`;
+        canvas.setAttribute("role", "img");
+        canvas.setAttribute("aria-label", `${name} over time`);
+        return [heading, canvas];
+      });
+  }));
+  // Pictures of what is drawn as it is; everything else has bars.
+  const name = several ? "" : plant.outputs[0]?.name === "pitch" ? "helicopter" : plant.model === "pendulum" ? "pendulum" : "";
+  for (const id of ["helicopter", "pendulum"]) at(id).toggleAttribute("hidden", id !== name);
+  picture = name && at(name);
+  if (name === "helicopter") drawScale();
+  largest.outputs = plant.outputs.map(spread);
+  largest.inputs = plant.inputs.map(spread);
+  at("outputs").replaceChildren(...(picture ? [] : plant.outputs.flatMap((one) => gauge(one, ["reference", "estimate", "body"]))));
+  at("inputs").replaceChildren(...plant.inputs.flatMap((one) => gauge(one, ["bar"])));
+  set("value-name", several ? "value" : plant.outputs[0] ? words(plant.outputs[0]) : "");
+}
+
+const spread = (one) => (one.low !== null && one.high !== null ? Math.max(Math.abs(one.low), Math.abs(one.high)) : 1e-9);
+
+function gauge(one, marks) {
+  const track = make("span", "gauge");
+  track.append(make("i", "middle"), ...marks.map((mark) => make("i", mark)));
+  return [make("b", "", words(one)), track, make("output")];
+}
+
+// Where a value stands on a track, in percent, and the largest seen as its end.
+function placed(most, place, value) {
+  most[place] = Math.max(most[place], Math.abs(value));
+  return 50 + 50 * Math.max(-1, Math.min(1, value / most[place]));
+}
+
+function drawGauges(id, most, signals, each) {
+  const rows = at(id).children;
+  for (let place = 0; place * 3 < rows.length; place++) {
+    const [, track, text] = [0, 1, 2].map((part) => rows[place * 3 + part]);
+    for (const [mark, value] of Object.entries(each(place))) {
+      const element = track.querySelector(`.${mark}`);
+      element.hidden = value === null || value === undefined;
+      if (element.hidden) continue;
+      const left = placed(most, place, value);
+      if (mark === "bar") { element.style.left = `${Math.min(left, 50)}%`; element.style.width = `${Math.abs(left - 50)}%`; }
+      else element.style.left = `${left}%`;
+      if (mark === "bar" || mark === "body") text.textContent = quantity(value, shown(signals[place].unit));
+    }
+  }
+}
+
+function turn(part, angle, centre) {
+  picture.querySelector(part).setAttribute("transform", `rotate(${(-angle * DEGREES).toFixed(2)} ${centre})`);
 }
 
 function drawPicture() {
-  const point = memory.points.at(-1), decision = memory.decisions.at(-1), volts = memory.heads.transmitter?.volts;
-  if (!point) return;
-  turn("body", point[1]);
-  turn("estimate", point[2]);
-  at("reference").style.display = decision && decision[1] !== null ? "" : "none";
-  if (decision && decision[1] !== null) turn("reference", decision[1]);
-  if (volts) {
+  const point = memory.points.at(-1), decision = memory.decisions.at(-1), applied = memory.heads.transmitter?.applied;
+  if (!point || !plant) return;
+  const references = decision ? decision[1] : [];
+  if (picture) {
+    const centre = picture.id === "pendulum" ? "160 132" : "160 122", reference = references[0] ?? null;
+    turn(".body", point[1][0], centre);
+    turn(".estimate", point[2][0], centre);
+    picture.querySelector(".reference").style.display = reference === null ? "none" : "";
+    if (reference !== null) turn(".reference", reference, centre);
+  } else {
+    for (const [, values] of memory.points) values.forEach((value, place) => placed(largest.outputs, place, value));
+    drawGauges("outputs", largest.outputs, plant.outputs, (place) => ({ body: point[1][place], estimate: point[2][place], reference: references[place] }));
+  }
+  if (!applied) return;
+  drawGauges("inputs", largest.inputs, plant.inputs, (place) => ({ bar: applied[place] }));
+  if (picture?.id === "helicopter") {
     // The front rotor lifts the front: it is drawn at the right, where the nose is.
-    const arrow = (x, volt) => `M${x} 98v${(-volt * 6).toFixed(1)}`;
-    at("thrust-front").setAttribute("d", Math.abs(volts[0]) > 0.05 ? arrow(254, volts[0]) : "");
-    at("thrust-rear").setAttribute("d", Math.abs(volts[1]) > 0.05 ? arrow(66, volts[1]) : "");
+    const arrow = (x, volt) => (Math.abs(volt) > 0.05 ? `M${x} 98v${(-volt * 6).toFixed(1)}` : "");
+    at("thrust-front").setAttribute("d", arrow(254, applied[0]));
+    at("thrust-rear").setAttribute("d", arrow(66, applied[1]));
   }
 }
 
@@ -96,7 +177,7 @@ function drawScale() {
     parts.push(`<path d="M${160 + 112 * cos} ${122 + 112 * sin}L${160 + 119 * cos} ${122 + 119 * sin}"/>`);
     if (degrees > -90) parts.push(`<text x="${160 + 146 * cos}" y="${126 + 148 * sin}">${degrees}°</text>`);
   }
-  at("scale").innerHTML = parts.join("");
+  picture.querySelector(".scale").innerHTML = parts.join("");
 }
 
 // ---- words and figures
@@ -106,7 +187,14 @@ function set(id, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
-const degrees = (radians, digits = 1) => `${radians < 0 ? "−" : "+"}${Math.abs(radians * DEGREES).toFixed(digits)}°`;
+// A value with its unit: angles to a tenth of a degree, others to three figures.
+function quantity(value, look, digits = 1) {
+  const size = Math.abs(value * look.factor);
+  return `${value < 0 ? "−" : "+"}${look.unit === "°" ? size.toFixed(digits) : size.toPrecision(3)}${look.unit}`;
+}
+
+// What there is of every output: `each` gives the value of the one at a place.
+const ofOutputs = (each, digits) => plant.outputs.map((one, place) => quantity(each(place), shown(one.unit), digits)).join(", ");
 
 function state(now) {
   const head = memory.heads.transmitter;
@@ -168,10 +256,10 @@ function showText(now) {
   }
   const counts = (up || down)?.counts;
   if (counts) set("f-erasures", String(counts.erasures));
-  if (point) {
-    set("pitch", degrees(point[1]));
-    set("f-error", degrees(point[1] - point[2], 2));
-    set("f-range", degrees(point[3], 2).slice(1));
+  if (point && plant) {
+    set("value", plant.outputs.length > 1 ? "" : ofOutputs((place) => point[1][place]));
+    set("f-error", ofOutputs((place) => point[1][place] - point[2][place], 2));
+    set("f-range", ofOutputs((place) => point[3][place] ?? 0, 2).replaceAll("+", ""));
   }
   const rows = memory.events.map(({ role, time_s: time, kind, text }) =>
     [role === "transmitter" ? "sensor" : "controller", time, kind === "desync" || kind === "refused", text]);
@@ -220,9 +308,14 @@ function draw() {
   if (!dirty || document.hidden) return;
   dirty = false;
   const time = forget();
+  become((memory.heads.transmitter || memory.heads.receiver)?.plant);
   drawPicture();
-  drawPitch(at("pitch-curve"), time, memory.points, memory.decisions, ink);
-  drawError(at("error-curve"), time, memory.points, ink);
+  const [high, low] = plant?.outputs.length > 1 ? [150, 90] : [210, 120];
+  (plant?.outputs || []).forEach((one, place) => {
+    const look = shown(one.unit);
+    drawOutput(at(`value-${place}`), high, time, memory.points, memory.decisions, place, look, ink);
+    drawError(at(`error-${place}`), low, time, memory.points, place, look, ink);
+  });
   // The tape changes with the bits, half as often as the curves.
   if (tapeDirty) drawTape(at("tape"), [...memory.samples.values()].sort((a, b) => a[0] - b[0]), ink);
   tapeDirty = false;
@@ -259,7 +352,6 @@ new MutationObserver(() => {
   if (document.body.classList.contains("body--dark") !== dark) paint();
 }).observe(document.body, { attributes: true, attributeFilter: ["class"] });
 
-drawScale();
 paint();
 listen();
 // Figures five times a second: what changes faster cannot be read. It also draws without new data.

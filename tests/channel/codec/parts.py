@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from channel.codec.codec import Codec, Vector
 from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
-from channel.codec.models.pitch import PitchModel, PitchParameters
+from channel.codec.models.pitch import PITCH_SIGNALS, PitchModel, PitchParameters
 from channel.protocol.identity import Identity, numerics_probe
 from channel.protocol.limits import CommandLimits
 from channel.protocol.terms import Terms
@@ -36,7 +36,8 @@ PAPER_TERMS = Terms(
     downlink_budget_ns=10_000_000,
     repeats=2,
     initial_command=(0.0, 0.0),
-    limits=CommandLimits(5.0),
+    limits=CommandLimits.of(PITCH_SIGNALS, 5.0),
+    signals=PITCH_SIGNALS,
 )
 
 
@@ -60,5 +61,5 @@ class ConstantController:
         self.asked.append((tick, state))
         return self.volts
 
-    def reference_rad(self, tick: int) -> float | None:
-        return None
+    def references(self, tick: int) -> tuple[float | None, ...]:
+        return (None,)

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from channel.protocol.limits import from_millivolts
+from channel.codec.models.pitch import PITCH_SIGNALS
+from channel.protocol.limits import from_steps
 from tests.golden.regenerate import GOLDEN_CODECS, codec_vectors
 
 GOLDEN = json.loads(
@@ -21,9 +22,9 @@ def test_when_the_golden_inputs_are_flown_then_every_bit_is_as_written(name: str
     state = codec.initial()
     rows = GOLDEN[name]
     assert len(rows) == 60
-    for sample, (word, millivolts, digest, model, coder) in enumerate(rows):
+    for sample, (word, steps, digest, model, coder) in enumerate(rows):
         commands = [
-            from_millivolts(millivolts[2 * tick : 2 * tick + 2])
+            from_steps(steps[2 * tick : 2 * tick + 2], PITCH_SIGNALS)
             for tick in range(codec.ticks_per_sample)
         ]
         state = codec.step(state, None if word is None else tuple(word), commands)

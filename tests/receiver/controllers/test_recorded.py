@@ -23,7 +23,7 @@ def test_a_lead_skips_the_first_rows() -> None:
 
 def test_it_follows_no_reference() -> None:
     controller: Controller = RecordedController(LOG)
-    assert controller.reference_rad(0) is None
+    assert controller.references(0) == ()
 
 
 def test_a_tick_below_zero_is_refused() -> None:

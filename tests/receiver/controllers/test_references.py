@@ -14,13 +14,13 @@ TICK_S = 0.01
 
 
 def angles(reference: Reference, ticks: list[int]) -> list[float]:
-    return [reference.angle_rad(tick) for tick in ticks]
+    return [reference.value(tick) for tick in ticks]
 
 
 def test_constant_and_step() -> None:
     assert angles(Constant(0.3, TICK_S), [0, 1, 10**6]) == [0.3, 0.3, 0.3]
     assert angles(Step(-0.4, 0.29, TICK_S), [0, 28, 29, 30]) == [0.0, 0.0, -0.4, -0.4]
-    assert Step(1.0, 0.0, TICK_S).angle_rad(0) == 1.0
+    assert Step(1.0, 0.0, TICK_S).value(0) == 1.0
 
 
 def test_step_starts_on_its_tick_whatever_the_division_rounds_to() -> None:
@@ -49,7 +49,7 @@ def test_square_switches_on_the_tick_in_a_long_run(half_ticks: int) -> None:
 def test_sine_starts_at_zero_and_rises() -> None:
     sine = Sine(0.5, 4.0, TICK_S)
     assert angles(sine, [0, 100, 200, 300]) == pytest.approx([0.0, 0.5, 0.0, -0.5], abs=1e-12)
-    assert sine.angle_rad(1) > 0.0
+    assert sine.value(1) > 0.0
 
 
 def write(folder: Path, text: str) -> Path:
@@ -88,7 +88,7 @@ def test_csv_errors_name_file_and_line(tmp_path: Path, text: str, fault: str) ->
 def test_values_out_of_range_are_refused_by_name() -> None:
     with pytest.raises(ValueError, match=r"period_s is 0\.015; it must be finite and at least 0\.02"):
         Square(1.0, 0.015, TICK_S)
-    with pytest.raises(ValueError, match="amplitude_rad is nan"):
+    with pytest.raises(ValueError, match="amplitude is nan"):
         Sine(math.nan, 1.0, TICK_S)
     with pytest.raises(ValueError, match="start_s is -1"):
         Step(1.0, -1.0, TICK_S)

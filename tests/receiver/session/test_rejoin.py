@@ -55,7 +55,7 @@ def test_when_a_rejoin_is_asked_for_then_a_new_epoch_begins_ahead_of_both() -> N
     welcome = only_welcome(session.on_frame(request(1, 12), 12 * 100 * MS))
     # 13 ticks of lead are two samples.
     assert (welcome.epoch, welcome.first_sample, welcome.request) == (1, 14, 1)
-    assert welcome.hold_millivolts == (1000, -1000)
+    assert welcome.hold_steps == (1000, -1000)
     assert CODEC.unpack(welcome.state) == session.state
     assert session.state.sample == 14
     assert session.next_deadline() is None
@@ -120,7 +120,7 @@ def test_when_the_transmitter_was_started_again_then_it_flies_on_in_the_receiver
     welcome = only_welcome(session.on_frame(stranger, 2_140 * MS))
     assert (welcome.session, welcome.epoch, welcome.first_sample) == (SESSION, 1, 22)
     assert welcome.state == b""
-    assert welcome.hold_millivolts == ()
+    assert welcome.hold_steps == ()
     assert session.state == CODEC.initial()._replace(sample=22)
     # The first transmitter was only asleep: nobody listens to it any more.
     assert Commands not in {type(frame) for frame in session.on_frame(symbol(22), 2_150 * MS)}

@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from channel.codec.models.pitch import PITCH_SIGNALS
 from channel.codec.words import WIRE_ERASED
 from channel.protocol.endings import End, Ending
 from channel.protocol.events import EventKind
@@ -18,7 +19,7 @@ from channel.protocol.frames import (
     Unknown,
     Welcome,
 )
-from channel.protocol.limits import CommandLimits, from_millivolts
+from channel.protocol.limits import CommandLimits, from_steps
 from channel.protocol.lockstep import HISTORY_SAMPLES
 from tests.receiver.session.sessions import (
     CODEC,
@@ -47,7 +48,7 @@ def test_when_symbols_come_in_order_then_each_flies_one_sample() -> None:
         echo = answer.echoes[-1]
         assert (echo.sample, echo.word_number) == (slot, number)
         assert echo.digest == CODEC.digest(state)
-        assert echo.millivolts == (1000, -1000) * 10
+        assert echo.steps == (1000, -1000) * 10
         assert session.state == state
     assert session.counts["erasures"] == 0
     assert session.meter.baud == pytest.approx(10.0)
@@ -224,17 +225,17 @@ def test_when_the_controller_gives_no_number_then_the_last_command_is_held(bad: 
     session._commander._controller.volts = (3.0, bad)  # type: ignore[attr-defined]
     (answer,) = session.on_frame(symbol(1), 0)
     assert isinstance(answer, Commands)
-    assert answer.echoes[-1].millivolts == (2000, -1500) * 10
+    assert answer.echoes[-1].steps == (2000, -1500) * 10
     assert session.counts["bad_commands"] == 10
 
 
 def test_when_the_controller_has_no_reference_then_the_flight_goes_on_and_says_so_once() -> None:
     session = flying()
 
-    def fail(tick: int) -> float:
+    def fail(tick: int) -> tuple[float, ...]:
         raise LookupError("the table ends")
 
-    session._commander._controller.reference_rad = fail  # type: ignore[method-assign]
+    session._commander._controller.references = fail  # type: ignore[method-assign]
     for slot in range(2):
         session.on_frame(symbol(slot), 0)
         session.flush_records()
@@ -243,15 +244,15 @@ def test_when_the_controller_has_no_reference_then_the_flight_goes_on_and_says_s
 
 
 def test_when_commands_are_limited_and_rounded_then_the_codec_uses_what_the_wire_carries() -> None:
-    session = flying(7.0, -0.12345, limits=CommandLimits(5.0, 0.3))
+    session = flying(7.0, -0.12345, limits=CommandLimits.of(PITCH_SIGNALS, 5.0, 0.3))
     (answer,) = session.on_frame(symbol(0), 0)
     assert isinstance(answer, Commands)
-    millivolts = answer.echoes[-1].millivolts
-    assert millivolts[:8:2] == (300, 600, 900, 1200)
-    assert millivolts[1::2] == (-123,) * 10
-    decoded = [from_millivolts(millivolts[2 * tick : 2 * tick + 2]) for tick in range(10)]
+    steps = answer.echoes[-1].steps
+    assert steps[:8:2] == (300, 600, 900, 1200)
+    assert steps[1::2] == (-123,) * 10
+    decoded = [from_steps(steps[2 * tick : 2 * tick + 2], PITCH_SIGNALS) for tick in range(10)]
     assert session.state == CODEC.step(CODEC.initial(), (1,), decoded)
     session.on_frame(symbol(1), 0)
     (answer,) = session.on_frame(symbol(2), 0)
     assert isinstance(answer, Commands)
-    assert answer.echoes[-1].millivolts[::2] == (5000,) * 10
+    assert answer.echoes[-1].steps[::2] == (5000,) * 10

@@ -35,9 +35,9 @@ def test_when_both_sessions_fly_it_in_memory_then_the_errors_are_the_same_to_the
     outcome = transmit.fly_virtual(run, build_receiver(agreement, None, DATAGRAM), lambda: False)
     assert not outcome.code
     lean = fly_agreement(agreement, 10.0)
-    assert run.node.scores.coded.count == 2000
-    assert math.sqrt(lean.estimation) == run.node.scores.coded.rms
-    assert math.sqrt(lean.tracking) == run.node.scores.tracking.rms
+    assert run.node.scores.first.coded.count == 2000
+    assert math.sqrt(lean.estimation) == run.node.scores.first.coded.rms
+    assert math.sqrt(lean.tracking) == run.node.scores.first.tracking.rms
 
 
 @pytest.mark.parametrize("rate", [10.0, 20.0])

@@ -32,7 +32,7 @@ ROUGH = "loss=0.2,up:flip=0.05,delay=20ms±10ms,duplicate=0.1,cut=4s+3s"
         ("usual-1000baud", {"link__impairments": "loss=0.01,duplicate=0.2"}),
         ("static-10baud", {"link__impairments": "loss=0.1", "channel__delivery": "end"}),
         ("tuned-10baud", {"transmitter__dry_run": True}),
-        ("tuned-10baud", {"limits__slew_volts_per_s": 5.0, "link__impairments": "loss=0.2"}),
+        ("tuned-10baud", {"limits__command_slew_per_s": 5.0, "link__impairments": "loss=0.2"}),
     ],
     ids=lambda value: " ".join(map(str, value.values())) if isinstance(value, dict) else value,
 )
@@ -50,7 +50,7 @@ def test_a_flight_as_it_was_recorded_passes(
 
 def test_a_flight_that_the_guard_ended_passes(tmp_path: Path) -> None:
     with pytest.raises(FlightFailed, match="soft limit"):
-        flown(tmp_path / "run", transmitter__soft_limit_rad=0.5)
+        flown(tmp_path / "run", transmitter__soft_limits=0.5)
     result = audit(tmp_path / "run")
     assert result.passed, "\n".join(result.leaks + result.gaps)
 

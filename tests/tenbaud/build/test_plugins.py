@@ -145,7 +145,7 @@ def test_one_of_each_flies_as_two_processes(outside: Path) -> None:
     run = Run(outside / "run")
     assert run.config.coder.kind == "outside:Steps"
     assert abs(run.error_coded[1000:]).max() < 0.3
-    assert abs(run.pitch).max() > 1.0
+    assert abs(run.output_1).max() > 1.0
     assert set(run.range) == {0.03}
     # The recording knows enough to fly it all again, from outside classes too.
     assert audit(outside / "run", allow_code=True).passed
@@ -157,8 +157,13 @@ def test_options_reach_the_class_and_count_in_the_handshake(outside: Path) -> No
     )
     assert one.codec.initial().coder == (0.03,)
     assert one.identity.config_digest != other.identity.config_digest
-    controller = build_controller(one.config)
-    assert controller.command(0, (controller.reference_rad(0), 0.0)) == (0.05, -0.05)  # type: ignore[arg-type]
+    with pytest.warns(
+        FutureWarning, match=r"Law\.reference_rad\(tick\) is deprecated; define references"
+    ):
+        controller = build_controller(one.config)
+    (set_point,) = controller.references(0)
+    assert set_point is not None
+    assert controller.command(0, (set_point, 0.0)) == (0.05, -0.05)
 
 
 def test_a_coder_that_uses_rates_is_given_them(outside: Path) -> None:
@@ -181,12 +186,12 @@ def test_a_coder_that_uses_rates_is_given_them(outside: Path) -> None:
             "outside:Deaf",
             r"its method command must take \(tick, state\), not \(tick\); it has no method ref",
         ),
-        ("receiver.controller", "outside:OneMotor", r"2 finite voltages.* returned \[1\.0\]"),
-        ("receiver.controller", "outside:Raising", "2 voltages; it raised KeyError: 'gain'"),
+        ("receiver.controller", "outside:OneMotor", r"2 finite value.* returned \[1\.0\]"),
+        ("receiver.controller", "outside:Raising", r"2 value\(s\); it raised KeyError: 'gain'"),
         ("receiver.controller", "outside:Picky", "Picky.context. failed: RuntimeError: not today"),
         ("receiver.controller", "needy:Law", "needs a_library_that_nobody_has"),
         ("receiver.controller", "broken:Law", "broken cannot be imported: SyntaxError"),
-        ("receiver.controller", "pidd", r"pid, recorded and module:Class; did you mean pid\?"),
+        ("receiver.controller", "pidd", r"state_feedback and module:Class; did you mean pid\?"),
         ("receiver.controller", "a b:C", "a class from outside is written module:Class"),
         (
             "transmitter.plant.kind",
@@ -211,7 +216,7 @@ def test_wrong_options_name_the_context_and_what_it_offers(outside: Path) -> Non
     settings = {"receiver.controller": "outside:Law", "receiver.controller_options.gain": 2.0}
     with pytest.raises(ConfigError, match=r"Law\(context, gain=2.0\) failed: TypeError") as told:
         build_controller(own(settings))
-    assert "ControllerContext: tick_s, reference, volts_max, initial_command" in str(told.value)
+    assert "ControllerContext: tick_s, references, command_max, initial_command" in str(told.value)
 
 
 def test_the_command_line_says_it_in_one_message(outside: Path) -> None:

@@ -72,7 +72,7 @@ def test_quarc_vectors_follow_the_wiring() -> None:
     ("changes", "text"),
     [
         ({"bridge": {"axes": ["travel"]}}, "pitch must be among them"),
-        ({"quarc": {"fields": ["travel"]}}, "the pitch is not among them"),
+        ({"quarc": {"fields": ["travel"]}}, "the output pitch is not among them"),
         ({"quarc": {"fields": ["pitch", "height"]}}, "height"),
     ],
 )

@@ -10,7 +10,7 @@ import pytest
 from tenbaud import fly
 from tenbaud.audit.audit import audit
 from tenbaud.build.flight import agree
-from tenbaud.config.deprecated import RENAMED
+from tenbaud.config.deprecated import MOVED, RENAMED
 from tenbaud.config.load import load_config, preset_names
 from tenbaud.replay.record import load_record
 from tenbaud.replay.replay import replay
@@ -31,6 +31,8 @@ sight_bandwidth_rad_s = 42.0
         ({"transmitter": {"sight_bandwidth_rad_s": 42.0}}, 42.0),
         ({"coder": {"kind": "timed"}}, "open-loop-zoom"),
         ({"coder": {"kind": "words"}}, "pcm"),
+        ({"transmitter": {"encoder_counts_per_turn": 500}}, 500),
+        ({"limits": {"volts_max": 3.0}}, 3.0),
     ],
 )
 def test_when_a_setting_has_an_old_name_then_it_is_read_with_a_warning(
@@ -38,7 +40,9 @@ def test_when_a_setting_has_an_old_name_then_it_is_read_with_a_warning(
 ) -> None:
     with pytest.warns(FutureWarning, match="is deprecated; use"):
         config = load_config("paper-10baud", None, overrides)
-    assert read in (config.transmitter.rate_observer_bandwidth_rad_s, config.coder.kind)
+    transmitter = config.transmitter
+    found = (transmitter.rate_observer_bandwidth_rad_s, transmitter.encoders.counts_per_turn)
+    assert read in (*found, config.coder.kind, config.limits.command_max)
 
 
 def test_when_a_preset_has_an_old_name_then_the_new_one_is_loaded() -> None:
@@ -54,7 +58,7 @@ def test_when_a_file_has_old_names_then_the_command_names_file_and_new_name(tmp_
     done = run_command("demo", "--config", str(file), "--duration", "1", cwd=tmp_path)
     assert done.code == 0, done.err
     assert f"{file}: coder.kind: 'timed' is deprecated; use 'open-loop-zoom'" in done.err
-    assert "use 'rate_observer_bandwidth_rad_s'" in done.err
+    assert "use 'transmitter.rate_observer_bandwidth_rad_s'" in done.err
 
 
 @pytest.mark.filterwarnings("error::FutureWarning")
@@ -68,7 +72,13 @@ def test_when_a_run_was_recorded_under_old_names_then_it_replays_and_passes_its_
     for names in RENAMED.values():
         for old, new in names.items():
             text = text.replace(f'"{new}"', f'"{old}"').replace(f"{new} =", f"{old} =")
+    for old, new in MOVED.items():
+        section, field = new.rsplit(".", 1)
+        if old.startswith(f"{section}.") and old.count(".") == new.count("."):
+            text = text.replace(f"{field} =", f"{old.rpartition('.')[2]} =")
     assert text != config.read_text()
+    assert "volts_max = 5.0" in text
+    assert "amplitude_rad = " in text
     config.write_text(text)
     replayed, audited = replay(load_record(run.path)), audit(run.path)
     assert replayed.equal, replayed.differences

@@ -39,7 +39,7 @@ SCENARIOS: dict[str, tuple[ExitCode, dict[str, Any]]] = {
     "desync": (ExitCode.DESYNC, {"transmitter": {"on_desync": "stop"}}),
     "rejoin": (ExitCode.OK, {"transmitter": {"sabotage": "sample=20,field=range"}}),
     "link lost": (ExitCode.LINK_LOST, {}),
-    "safety stop": (ExitCode.SAFETY_STOP, {"transmitter": {"soft_limit_rad": 0.2}}),
+    "safety stop": (ExitCode.SAFETY_STOP, {"transmitter": {"soft_limits": 0.2}}),
     "not flown": (ExitCode.NOT_FLOWN, {"link": {"impairments": "up:loss=0.98"}}),
 }
 SENTENCES = ("text", "outcome", "detail", "sensor_fault")

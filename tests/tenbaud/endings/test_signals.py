@@ -21,7 +21,7 @@ from tests.tenbaud.endings.commands import nothing_half_is_left, processes_with
 from tests.tenbaud.processes import Ended, finish, start
 
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 FLIGHT = ("demo", "--clock", "real", "--duration", "60", "--mismatch", "0", "--out", "run")
 
 

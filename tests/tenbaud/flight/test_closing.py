@@ -29,11 +29,15 @@ FLOWN: dict[str, Any] = {
     "digest_checks": 1000,
     "desyncs": 0,
     "window_start_s": 25.0,
-    "error_live_max_rad": 0.0197547,
-    "error_live_rms_rad": 0.0067732,
-    "error_live_max_fraction": 0.0087637,
-    "error_live_rms_fraction": 0.0030048,
-    "tracking_rms_rad": 0.8536,
+    "outputs": {
+        "pitch": {
+            "unit": "rad",
+            "largest": 2.254,
+            "error_live_max": 0.0197547,
+            "error_live_rms": 0.0067732,
+            "tracking_rms": 0.8536,
+        }
+    },
     "ticks_commanded": 10000,
 }
 
@@ -60,11 +64,21 @@ def test_a_flight_that_failed_does_not_say_finished(tmp_path: Path, code: int) -
 
 
 def test_a_flight_that_was_stopped_before_its_window_shows_no_figures_of_it(tmp_path: Path) -> None:
-    none = dict.fromkeys(name for name in FLOWN if name.startswith(("error_", "tracking")))
-    text = "\n".join(lines_of(tmp_path, **none))
+    none = dict.fromkeys(("error_live_max", "error_live_rms", "tracking_rms"))
+    output = {"unit": "rad", "largest": 0.0, **none}
+    text = "\n".join(lines_of(tmp_path, outputs={"pitch": output}))
     assert "None" not in text
     assert "0.000" not in text
     assert "Estimate error" not in text
+
+
+def test_each_of_several_outputs_has_its_name_and_unit(tmp_path: Path) -> None:
+    pitch = FLOWN["outputs"]["pitch"]
+    outputs = {"arm_angle": pitch, "place": {**pitch, "unit": "m", "largest": 0.0}}
+    text = "\n".join(lines_of(tmp_path, outputs=outputs))
+    assert "arm angle: 0.39° rms, 1.13° max (0.30% and 0.88% of the largest), after" in text
+    assert "place: 0.00677 m rms, 0.0198 m max, after the first 25 s" in text
+    assert "place: 0.854 m rms, steps included" in text
 
 
 def test_a_receiver_alone_has_no_checks_to_count(tmp_path: Path) -> None:

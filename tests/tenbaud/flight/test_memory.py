@@ -52,8 +52,8 @@ class Damper:
     def command(self, tick: int, state: tuple[float, ...]) -> tuple[float, ...]:
         return (-2.0 * state[0] - 2.0 * state[1],)
 
-    def reference_rad(self, tick: int) -> float | None:
-        return 0.0
+    def references(self, tick: int) -> tuple[float | None, ...]:
+        return (0.0,)
 
 
 CODEC = Codec(CartModel(), coders.ZoomCoder(coders.ZoomParameters(window=3)), ticks_per_sample=10)
@@ -118,8 +118,8 @@ def test_when_a_flight_has_flown_then_it_does_not_fly_again() -> None:
 
 
 class Mute:
-    def reference_rad(self, tick: int) -> None:
-        return None
+    def references(self, tick: int) -> tuple[float | None, ...]:
+        return (None,)
 
 
 class Hasty(Damper):
@@ -183,7 +183,7 @@ def test_when_a_presets_parts_fly_then_the_states_are_those_of_the_preset(tmp_pa
         controller=parts.controller,
     )
     assert digests_of(run) == digests_of(named)
-    assert run.config.receiver.controller == "object:Pid"
+    assert run.config.receiver.controller == "object:PidLoops"
     np.testing.assert_array_equal(run.error_live, named.error_live)
 
 

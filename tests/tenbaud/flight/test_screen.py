@@ -16,12 +16,21 @@ import pytest
 from rich.console import Console
 
 from tenbaud.flight.screen import Screen, unicode_fits
+from tenbaud.flight.status import status_line
 from tests.tenbaud.processes import REPOSITORY, run
 
 STATUS: dict[str, Any] = {
     "role": "transmitter", "phase": "flying", "tick": 500, "of_ticks": 1000, "time_s": 5.0,
-    "pitch_rad": 0.5, "error_rad": -0.01, "range_rad": 0.05, "erasures": 3, "desyncs": 1,
+    "outputs": [{"name": "pitch", "unit": "rad", "value": 0.5, "error": -0.01, "range": 0.05}],
+    "erasures": 3, "desyncs": 1,
     "digest_checks": 50, "rejoins": 1, "words": [(1,), None, (-1,)], "guard": "running",
+}  # fmt: skip
+RECEIVER: dict[str, Any] = {
+    "role": "receiver", "phase": "flying",
+    "outputs": [
+        {"name": "arm", "unit": "rad", "value": 0.4, "error": None, "range": 0.1},
+        {"name": "pump [speed]", "unit": "", "value": 12.5, "error": 0.25, "range": 0.1},
+    ],
 }  # fmt: skip
 
 
@@ -36,11 +45,13 @@ def test_it_says_all_that_matters() -> None:
     screen = Screen()
     assert "starting" in drawn(screen)
     screen.update(STATUS)
-    screen.update({"role": "receiver", "phase": "flying", "pitch_rad": 0.4, "baud": 9.98})
+    screen.update({**RECEIVER, "baud": 9.98})
     text = drawn(screen, color_system=None)
     for words in ("5.0 s", "50 %", "+28.6 deg", "-0.57 deg", "50 digests", "1 differed", "3 erased"):
         assert words in text
     assert "receiver" in text
+    for words in ("arm   +22.9 deg", "pump [speed]     +12.5", "+0.25   of M 0.1"):
+        assert words in text
     assert "9.98 baud" in text
     assert "▀×▄" in text  # noqa: RUF001
 
@@ -52,6 +63,12 @@ def test_without_unicode_it_is_plain_ascii() -> None:
     assert text.isascii()
     assert "'x." in text
     assert not unicode_fits(Console(file=io.TextIOWrapper(io.BytesIO(), encoding="ascii")))
+
+
+def test_a_line_has_every_output_with_its_unit() -> None:
+    assert status_line(RECEIVER) == (
+        "receiver: flying  arm +0.400 rad  M 0.100  pump [speed] +12.500  error +0.2500  M 0.100"
+    )
 
 
 def test_no_color_leaves_no_colour(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -68,7 +85,8 @@ def test_no_color_leaves_no_colour(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_pitch_beyond_the_gauge_stays_on_it() -> None:
     screen = Screen()
     for angle in (-9.0, 0.0, 9.0):
-        screen.update({**STATUS, "pitch_rad": angle})
+        (output,) = STATUS["outputs"]
+        screen.update({**STATUS, "outputs": [{**output, "value": angle}]})
         assert drawn(screen).count("●") == 1
 
 

@@ -32,7 +32,7 @@ def test_when_the_simulated_rig_is_identified_then_both_ends_can_fly_with_the_re
     tmp_path: Path,
 ) -> None:
     out = tmp_path / "out"
-    result = run("--set", "transmitter.encoder_counts_per_turn=1024", "--json", "--out", str(out))
+    result = run("--set", "transmitter.encoders.counts_per_turn=1024", "--json", "--out", str(out))
     for index in (0, 1):
         estimates = found(result, index)
         for name, true in TRUE.items():

@@ -12,8 +12,11 @@ from tests.tenbaud.recording.rows import EVENT, Rows
 def test_run_folder_is_described_file_by_file(tmp_path: Path, fly: Callable[..., Path]) -> None:
     folder = fly(tmp_path / "run", ticks=100)
     transmitter, receiver = describe(folder)
-    assert (transmitter.path.name, receiver.path.name) == ("transmitter.mcap", "receiver.mcap")
-    assert transmitter.complete
+    assert (transmitter.recording.path.name, receiver.recording.path.name) == (
+        "transmitter.mcap",
+        "receiver.mcap",
+    )
+    assert transmitter.recording.complete
     assert transmitter.rows_dropped == 0
     text = describe_text(folder)
     for words in (
@@ -32,6 +35,7 @@ def test_a_real_run_is_headed_by_its_figures_and_its_configuration_is_readable(t
     text = describe_text(run.path)
     assert text.startswith("tuned-10baud: the flight is over, 3 s, 30 bits up")
     assert "    timing: lead_ticks 0, symbol_period_s 0.1, tick_s 0.01" in text
+    assert "  inputs: front, V; rear, V\n  outputs: pitch, rad\n" in text
     assert "recover" not in text
     described = json.loads(json.dumps(describe_json(run.path)))
     assert [one["complete"] for one in described] == [True, True]
@@ -44,7 +48,7 @@ def test_cut_file_is_called_cut(tmp_path: Path, fly: Callable[..., Path]) -> Non
     path = fly(tmp_path / "run", ticks=100) / "transmitter.mcap"
     path.write_bytes(path.read_bytes()[:-100])
     [description] = describe(path)
-    assert not description.complete
+    assert not description.recording.complete
     assert "cut: these are the rows up to the cut" in describe_text(path)
     assert f"`tenbaud recover {path}`" in describe_text(path)
 

@@ -60,11 +60,11 @@ def test_a_changed_word_is_another_flight(tmp_path: Path) -> None:
 
 def test_set_points_given_by_hand_are_replayed(tmp_path: Path) -> None:
     """A flight whose reference was moved: recorded by a flight that had it so from the beginning."""
-    moved = flown(tmp_path / "moved", receiver__reference__amplitude_rad=0.5)
+    moved = flown(tmp_path / "moved", receiver__reference__amplitude=0.5)
     config = moved.folder.config
     text = config.read_text()
-    assert "amplitude_rad = 0.5" in text
-    config.write_text(text.replace("amplitude_rad = 0.5", "amplitude_rad = 0.4"))
+    assert "amplitude = 0.5" in text
+    config.write_text(text.replace("amplitude = 0.5", "amplitude = 0.4"))
     replayed = replay(load_record(moved.path))
     assert replayed.equal, replayed.differences
     assert replayed.steps[0] == (0, 0.5)

@@ -24,10 +24,12 @@ from tenbaud.config.schema import FlightConfig
 from tenbaud.design.complete import completed
 from tenbaud.flight import transmit
 from tenbaud.studies import compiled as compiling
+from tenbaud.studies.chunk import fly_point
 from tenbaud.studies.compiled import compiled
 from tenbaud.studies.flights import CompiledPoint, compiled_flight
 from tenbaud.studies.plain import fly_plain
 from tenbaud.studies.schedule import Uncommon
+from tenbaud.studies.settings import StudyError
 from transmitter.session.records import SAMPLE_CHANNEL
 
 PRESETS = (
@@ -50,10 +52,9 @@ REAL_WIRE = {
     "timing": {"lead_ticks": 17},
     "transmitter": {
         "plant": {"mismatch": (0.1, -0.2, 0.15), "disturbance": "q=2e-3,step=0.5@3..5"},
-        "encoder_sign": -1,
-        "encoder_zero_counts": 77,
+        "encoders": {"sign": -1, "zero_counts": 77},
     },
-    "limits": {"slew_volts_per_s": 40.0, "initial_volts": (0.4, -0.2)},
+    "limits": {"command_slew_per_s": 40.0, "initial_command": (0.4, -0.2)},
     "receiver": {"pid": {"normal_force_volts": 1.0}, "reference": {"kind": "sine", "period_s": 4.0}},
 }
 BAD_LINE = {
@@ -121,7 +122,17 @@ def test_when_a_flight_is_compiled_then_no_bit_differs(preset: str, changes: dic
 def test_when_a_kind_of_model_or_coder_exists_then_a_preset_above_flies_it() -> None:
     configs = [config_of(preset, {}) for preset in (*PRESETS, "fixed-10baud")]
     assert {config.coder.kind for config in configs} == set(CODERS.built_in)
-    assert {config.model.kind for config in configs} == set(MODELS.built_in)
+    # Other plants than the pitch axis fly by the sessions.
+    assert {config.model.kind for config in configs} == set(MODELS.built_in) - {"pendulum"}
+
+
+def test_when_a_study_has_another_plant_then_the_nodes_fly_it() -> None:
+    config = config_of("pendulum-30baud", {})
+    (figures,) = fly_point(config, [1], "auto")
+    assert (figures.outcome, figures.engine) == ("ok", "plain")
+    assert 0.0 < figures.error_coded_rms < figures.pitch_amplitude < 0.1
+    with pytest.raises(StudyError, match="cannot fly the rig simulated with the controller state"):
+        fly_point(config, [1], "compiled")
 
 
 def test_when_a_recorded_flight_is_compiled_then_no_figure_differs(tmp_path: Path) -> None:
@@ -148,7 +159,7 @@ def test_when_a_recorded_flight_is_compiled_then_no_figure_differs(tmp_path: Pat
 @pytest.mark.parametrize(
     "changes",
     [
-        {"transmitter": {"soft_limit_rad": 0.5}},
+        {"transmitter": {"soft_limits": 0.5}},
         {"coder": {"gains": (4000.0, 9e7)}},
         {"link": {"impairments": "up:dead=1s"}},
         {"link": {"impairments": "raw=0.01"}},

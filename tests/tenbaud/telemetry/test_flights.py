@@ -54,7 +54,7 @@ class Watched:
         found = [message for message in self.messages() if message.role == role]
         return found[-1] if found else None
 
-    def wait(self, met: Callable[[], object], seconds: float = 20.0) -> None:
+    def wait(self, met: Callable[[], object], seconds: float = 60.0) -> None:
         until_s = time.monotonic() + seconds
         while not met():
             assert time.monotonic() < until_s, self.received[-1:]
@@ -114,9 +114,13 @@ def test_when_a_flight_is_looked_at_then_every_message_keeps_to_the_schema(tmp_p
     times = [point.time_s for one in sent for point in one.points]
     assert times == sorted(times)
     assert len(times) > 30
-    assert {point.reference_rad for one in taken for point in one.points} == {math.pi / 2.0}
+    assert {tuple(point.reference) for one in taken for point in one.points} == {(math.pi / 2.0,)}
     assert any(one.lateness is not None and one.lateness.p99_ms >= 0.0 for one in sent)
     assert sent[-1].phase == "ended"
+    for one in messages:
+        assert one.plant.model == "pitch"
+        assert [(signal.name, signal.unit) for signal in one.plant.outputs] == [("pitch", "rad")]
+        assert [signal.name for signal in one.plant.inputs] == ["front", "rear"]
     assert not any(one.takes_commands for one in messages)
     assert upper.summary["telemetry"] == "on"
     assert upper.summary["telemetry_sent"] >= len(sent)
@@ -152,8 +156,8 @@ def test_when_a_flight_is_steered_then_every_command_takes_hold_and_is_written_d
     how = ("--clock", "virtual", "--allow-control")
     with watched(tmp_path, *how, transmitter=flight) as pair:
         pair.wait(lambda: pair.newest("transmitter") and pair.newest("transmitter").time_s > 0.5)
-        pair.send(kind="set_point", angle_rad=0.25)
-        pair.wait(lambda: pair.newest("receiver").set_point_rad == 0.25)
+        pair.send(kind="set_point", value=0.25)
+        pair.wait(lambda: pair.newest("receiver").set_points == [0.25])
         pair.send(kind="pause", paused=True)
         pair.wait(lambda: pair.newest("transmitter").paused)
         stood = pair.newest("transmitter").time_s
@@ -193,7 +197,7 @@ def test_when_control_is_not_allowed_then_commands_do_nothing(tmp_path: Path) ->
     flight = ("--duration", "8", "--pace", "4")
     with watched(tmp_path, "--clock", "virtual", transmitter=flight) as pair:
         pair.wait(lambda: pair.newest("transmitter") and pair.newest("transmitter").time_s > 0.5)
-        for command in ({"kind": "set_point", "angle_rad": 0.1}, {"kind": "pause", "paused": True}):
+        for command in ({"kind": "set_point", "value": 0.1}, {"kind": "pause", "paused": True}):
             pair.send(**command)
         pair.send(kind="corrupt", end="receiver", field="range")
         upper, lower = pair.ended()

@@ -19,9 +19,9 @@ def test_the_committed_schema_is_the_present_one() -> None:
 
 def test_commands_are_taken_in_order() -> None:
     queue = CommandQueue()
-    queue.offer(b'{"kind":"set_point","angle_rad":0.5}')
+    queue.offer(b'{"kind":"set_point","value":0.5}')
     queue.offer(b'{"kind":"impair","text":"loss=0.2"}')
-    assert queue.take() == SetPoint(kind="set_point", angle_rad=0.5)
+    assert queue.take() == SetPoint(kind="set_point", value=0.5)
     assert queue.take() == Impair(kind="impair", text="loss=0.2")
     assert queue.take() is None
     assert queue.refused == 0
@@ -34,9 +34,10 @@ def test_commands_are_taken_in_order() -> None:
         b"\xff\xfe",
         b"{}",
         b'{"kind":"land"}',
-        b'{"kind":"set_point","angle_rad":7}',
-        b'{"kind":"set_point","angle_rad":NaN}',
-        b'{"kind":"set_point","angle_rad":0.1,"more":1}',
+        b'{"kind":"set_point","value":1e7}',
+        b'{"kind":"set_point","value":NaN}',
+        b'{"kind":"set_point","value":0.1,"more":1}',
+        b'{"kind":"set_point","value":0.1,"output":-1}',
         b'{"kind":"impair","text":"loss=2"}',
         b'{"kind":"impair","text":"skew=200ppm"}',
         b'{"kind":"corrupt","end":"transmitter","field":"model.0"}',

@@ -10,14 +10,14 @@ from tenbaud.view.board import NEWS_KEPT, POINTS_KEPT, SILENCE_S, Board
 
 def transmitter(number: int = 1, flight: int = 7, **more: Any) -> bytes:
     point = {
-        "time_s": number / 20, "measured_rad": 0.1, "true_rad": 0.11, "coded_rad": 0.12,
-        "live_rad": None, "range_rad": 0.05,
+        "time_s": number / 20, "measured": [0.1, 0.2], "true": [0.11, 0.2],
+        "coded": [0.12, 0.3], "live": None, "range": [0.05, 0.1],
     }  # fmt: skip
     sample = {
         "sample": number, "word_sent": [1], "word": None, "digest": "aa", "peer_digest": "ab",
     }  # fmt: skip
     message = {
-        "version": 2, "role": "transmitter", "session": "lab", "flight": flight, "phase": "flying",
+        "version": 3, "role": "transmitter", "session": "lab", "flight": flight, "phase": "flying",
         "takes_commands": False, "points": [point], "samples": [sample],
         "events": [{"time_s": 1.0, "kind": "erased", "sample": number, "slot": number}],
     }  # fmt: skip
@@ -26,9 +26,9 @@ def transmitter(number: int = 1, flight: int = 7, **more: Any) -> bytes:
 
 def receiver(number: int = 1, flight: int = 7, **more: Any) -> bytes:
     message = {
-        "version": 2, "role": "receiver", "session": "lab", "flight": flight, "phase": "flying",
+        "version": 3, "role": "receiver", "session": "lab", "flight": flight, "phase": "flying",
         "takes_commands": True, "events": [],
-        "points": [{"time_s": number / 20, "reference_rad": 0.5, "live_rad": 0.1}],
+        "points": [{"time_s": number / 20, "reference": [0.5, None], "live": [0.1, 0.2]}],
         "samples": [{"sample": number, "word": [-1], "digest": "cc"}],
     }  # fmt: skip
     return json.dumps({**message, **more}).encode()
@@ -44,8 +44,8 @@ def test_both_ends_are_joined_by_sample() -> None:
     assert board.take([receiver(3), transmitter(3)], 0.0)
     _, (whole,) = news(board)
     assert whole["samples"] == [[3, [1], None, "aa", "ab"]]
-    assert whole["points"] == [[0.15, 0.11, 0.12, 0.05]]
-    assert whole["decisions"] == [[0.15, 0.5]]
+    assert whole["points"] == [[0.15, [0.11, 0.2], [0.12, 0.3], [0.05, 0.1]]]
+    assert whole["decisions"] == [[0.15, [0.5, None]]]
     (event,) = whole["events"]
     assert (event["role"], event["kind"], event["slot"]) == ("transmitter", "erased", event["sample"])
     assert event["text"] == f"slot {event['slot']} is erased"
@@ -57,9 +57,9 @@ def test_both_ends_are_joined_by_sample() -> None:
 def test_a_rig_that_knows_no_true_angle_shows_the_measured_one() -> None:
     board = Board()
     message = json.loads(transmitter())
-    message["points"][0]["true_rad"] = None
+    message["points"][0]["true"] = None
     board.take([json.dumps(message).encode()], 0.0)
-    assert news(board)[1][0]["points"][0][1] == 0.1
+    assert news(board)[1][0]["points"][0][1] == [0.1, 0.2]
 
 
 def test_a_browser_gets_everything_first_and_then_only_what_is_new() -> None:
@@ -90,7 +90,7 @@ def test_without_news_there_is_none() -> None:
 
 def test_what_is_no_telemetry_is_counted_and_left() -> None:
     board = Board()
-    junk = [b"", b"[]", b"{}", b"\xff", transmitter(version=1), b'{"version":2,"role":"pilot"}']
+    junk = [b"", b"[]", b"{}", b"\xff", transmitter(version=1), b'{"version":3,"role":"pilot"}']
     junk += [transmitter(role="pilot"), transmitter(role=5)]
     assert not board.take(junk, 0.0)
     assert board.foreign == len(junk)

@@ -70,14 +70,18 @@ NUMBER = "parseFloat(document.getElementById('{}').textContent.replace('\\u2212'
 def test_it_loads_and_goes_on_by_itself_without_any_request_beyond_loopback(
     page: Any, flight: Served
 ) -> None:
-    for element in ("f-time", "pitch", "digest-up"):
+    for element in ("f-time", "value", "digest-up"):
         old = page.locator(f"#{element}").inner_text()
         wait(page, TEXT_IS_NOT, [element, old])
-    picture = page.locator("#body").get_attribute("transform")
-    wait(page, "(old) => document.getElementById('body').getAttribute('transform') !== old", picture)
+    picture = page.locator("#helicopter .body").get_attribute("transform")
+    wait(
+        page,
+        "(old) => document.querySelector('#helicopter .body').getAttribute('transform') !== old",
+        picture,
+    )
     assert page.locator("#digest-up").inner_text() != "\u2013"
     assert number(page, "#f-baud") == pytest.approx(10.0, abs=0.5)
-    for canvas in ("#pitch-curve", "#error-curve", "#tape"):
+    for canvas in ("#value-0", "#error-0", "#tape"):
         drawn = page.locator(canvas).evaluate(
             "(c) => c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some((v) => v > 0)"
         )
@@ -101,7 +105,7 @@ def test_the_set_point_steers_the_flight_from_the_keyboard_alone(page: Any) -> N
         page.keyboard.press("ArrowRight")
     page.get_by_text("set-point 0.349").first.wait_for()
     page.get_by_role("button", name="25", exact=True).click()
-    wait(page, f"() => Math.abs({NUMBER.format('pitch')} - 20) < 4")
+    wait(page, f"() => Math.abs({NUMBER.format('value')} - 20) < 4")
     page.get_by_role("button", name="1", exact=True).click()
     page.get_by_role("button", name="Follow the reference").click()
     page.get_by_text("follow the reference").first.wait_for()
@@ -162,7 +166,7 @@ def test_a_narrow_screen_shows_everything_without_scrolling_sideways(
     state_is(page, "lockstep")
     page.get_by_role("button", name="Repair the line").wait_for()
     assert page.evaluate("document.documentElement.scrollWidth") <= 360
-    for element in ("#helicopter", "#pitch-curve", "#tape", "#figures", ".panel >> nth=3"):
+    for element in ("#helicopter", "#value-0", "#tape", "#figures", ".panel >> nth=3"):
         box = page.locator(element).bounding_box()
         assert box["x"] >= 0
         assert box["x"] + box["width"] <= 360
@@ -186,17 +190,27 @@ def test_without_a_flight_it_says_so(chromium: Any, tmp_path: Path) -> None:
         page.close()
 
 
-def test_the_gap_to_the_limit_is_shown_when_there_is_one(chromium: Any, tmp_path: Path) -> None:
+def test_a_plant_of_any_outputs_is_shown_with_its_names_and_units_and_the_gap_to_the_limit(
+    chromium: Any, tmp_path: Path
+) -> None:
     from channel.links.zenoh.telemetry import TelemetryPort
 
     place = f"unixsock-stream/{tmp_path}/t.sock"
+    signals = [
+        {"name": name, "unit": unit, "low": None, "high": None}
+        for name, unit in (("arm", "rad"), ("cart_place", "m"), ("torque", "N m"))
+    ]
+    point = {"time_s": 0.9, "measured": [0.5, 1.5], "true": None, "live": None}
     message = {
-        "role": "transmitter", "version": 2, "session": "lab", "flight": 5, "number": 1,
+        "role": "transmitter", "version": 3, "session": "lab",
+        "plant": {"model": "mine:Model", "outputs": signals[:2], "inputs": signals[2:]},
+        "flight": 5, "number": 1,
         "phase": "flying", "clock": "real", "takes_commands": False, "time_s": 1.0, "epoch": 0,
         "impairments": "", "counts": {"erasures": 0, "desyncs": 0, "rejoins": 0, "digest_checks": 1},
         "events": [], "dropped": 0, "preset": "x", "tick_s": 0.01, "symbol_period_s": 0.1,
-        "baud_configured": 10.0, "duration_s": 100.0, "points": [], "samples": [],
-        "guard": "running", "volts": None, "paused": False, "pace": None,
+        "baud_configured": 10.0, "duration_s": 100.0, "samples": [],
+        "points": [{**point, "coded": [0.25, 1.25], "range": [0.1, 0.5]}],
+        "guard": "running", "applied": [-0.25], "paused": False, "pace": None,
         "lateness": {"p50_ms": 0.1, "p99_ms": 0.25, "max_ms": 1.0}, "gap_to_floor": 1.42,
     }  # fmt: skip
     TELEMETRY.validate_python(message)
@@ -211,6 +225,15 @@ def test_the_gap_to_the_limit_is_shown_when_there_is_one(chromium: Any, tmp_path
                 break
         assert number(page, "#f-gap") == 1.42
         assert number(page, "#f-late") == 0.25
+        for canvas in ("#value-0", "#error-0", "#value-1", "#error-1"):
+            assert page.locator(canvas).is_visible()
+        assert "Cart place m, last 30 s of flight" in page.locator("#curves").inner_text()
+        assert page.locator("#outputs").inner_text().split("\n") == [
+            *("arm", "+28.6°", "cart place", "+1.50 m")
+        ]
+        assert page.locator("#inputs").inner_text().split("\n") == ["torque", "\u22120.250 N m"]
+        assert page.locator("#f-error").inner_text() == "+14.32°, +0.250 m"
+        assert page.locator("#helicopter").is_hidden()
         page.get_by_text("takes no commands").wait_for()
         page.close()
     port.close()

@@ -25,7 +25,7 @@ pytestmark = [
 
 DURATION_S = 5
 STOPPED_S, RUNNING_S = 0.4, 0.1
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 
 
 @contextlib.contextmanager

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from channel.codec.codec import Vector
+from channel.codec.models.pitch import PITCH_SIGNALS
 from channel.protocol.limits import CommandLimits
 from transmitter.guard import Guard, GuardSettings
 from transmitter.loops.real import RampDown
@@ -17,7 +18,7 @@ RAMP_TICKS = 50
 
 
 def node(ramps_down: bool, volts: Vector = (4.0, -2.0)) -> Any:
-    guard = Guard(CommandLimits(5.0), GuardSettings(50, RAMP_TICKS, (0.0, 0.0)))
+    guard = Guard(CommandLimits.of(PITCH_SIGNALS, 5.0), GuardSettings(50, RAMP_TICKS, (0.0, 0.0)))
     guard.apply(0, volts)
     written: list[Vector] = []
     rig = SimpleNamespace(ramps_down=ramps_down, write=lambda _tick, value: written.append(value))

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from channel.codec.models.pitch import PITCH_SIGNALS
 from channel.errors import ConfigMismatch, LinkLost
 from channel.line.uplink import Uplink
 from channel.line.virtual import Step, encode_step
@@ -55,8 +56,8 @@ def flight_over(
     node = TransmitterNode(
         session,
         SimulatedRig(plant, (Encoder(4096),), (0.0, 0.0)),
-        Guard(CommandLimits(5.0), GuardSettings(400, 10, (0.0, 0.0))),
-        Scores(CODEC.model, 0, 1000, lambda _: None),
+        Guard(CommandLimits.of(PITCH_SIGNALS, 5.0), GuardSettings(400, 10, (0.0, 0.0))),
+        Scores(CODEC.model, 0, 1000, lambda _: ()),
     )
     endpoint = TransmitterEndpoint(node, Uplink(TERMS, CODEC.coder.alphabet))
     return RealFlight(endpoint, link, peer_timeout_s)

@@ -22,14 +22,15 @@ def test_a_jump_is_measured_against_rate_and_time() -> None:
 
 def test_motor_volts_pass_and_dac_volts_are_divided_by_the_amplifier() -> None:
     assert Motors().to_device((3.0, -1.5)) == (3.0, -1.5)
-    assert Motors("dac_volts", 3.0).to_device((3.0, -1.5)) == (1.0, -0.5)
+    assert Motors((3.0, 3.0)).to_device((3.0, -1.5)) == (1.0, -0.5)
 
 
 def test_the_device_gets_no_more_than_it_can_give() -> None:
-    assert Motors(device_volts_max=2.0).to_device((3.0, -3.0)) == (2.0, -2.0)
+    assert Motors(device_max=2.0).to_device((3.0, -3.0)) == (2.0, -2.0)
 
 
 def test_outputs_may_be_crossed_turned_round_and_elsewhere() -> None:
     motors = Motors(channels=(3, 1), signs=(1, -1))
     assert motors.to_device((2.0, 1.0)) == (0.0, -1.0, 0.0, 2.0)
     assert motors.off() == (0.0, 0.0, 0.0, 0.0)
+    assert Motors((1.0,), (0,), (1,)).to_device((2.0,)) == (2.0, 0.0), "one motor, two outputs"

@@ -60,8 +60,8 @@ class Far:
         sample = self.state.sample
         self.state = CODEC.step(self.state, word, [volts] * 10)
         number = CODEC.coder.alphabet.word_number(word)
-        millivolts = tuple(round(1000 * value) for value in volts) * 10
-        return Echo(sample, number, CODEC.digest(self.state), millivolts)
+        steps = tuple(round(1000 * value) for value in volts) * 10
+        return Echo(sample, number, CODEC.digest(self.state), steps)
 
 
 def frame(*echoes: Echo, session: int = SESSION, epoch: int = 3) -> Commands:
@@ -330,7 +330,7 @@ def test_when_the_digests_differ_and_it_is_set_to_stop_then_it_reports_and_ends(
     session, far = flying(stop_on_desync=True), Far()
     session.on_measurement(0, (1.0,))
     echo = far.echo()
-    wrong = Echo(echo.sample, echo.word_number, echo.digest ^ 1, echo.millivolts)
+    wrong = Echo(echo.sample, echo.word_number, echo.digest ^ 1, echo.steps)
     report, goodbye = session.on_frame(frame(wrong))
     assert isinstance(goodbye, Bye)
     assert report == Desync(SESSION, 3, 0, echo.digest, echo.digest ^ 1, CODEC.pack(far.state))
@@ -349,7 +349,7 @@ def test_when_several_digests_differ_in_one_frame_then_the_first_is_reported() -
     for sample in range(3):
         session.on_measurement(10 * sample, (1.0,))
         echo = far.echo()
-        echoes.append(Echo(sample, echo.word_number, echo.digest ^ (sample > 0), echo.millivolts))
+        echoes.append(Echo(sample, echo.word_number, echo.digest ^ (sample > 0), echo.steps))
     answers: list[Frame] = session.on_frame(frame(*echoes))
     assert [answer.sample for answer in answers if isinstance(answer, Desync)] == [1]
 

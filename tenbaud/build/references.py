@@ -1,0 +1,71 @@
+"""The set-points of a configuration, one for each output."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from channel.codec.signals import Signal, Signals
+from receiver.controllers.references import Constant, Csv, Reference, Sine, Square, Step
+from tenbaud.build.signals import check_outputs
+from tenbaud.config.load import ConfigError
+from tenbaud.config.schema import FlightConfig, ReferenceSection
+
+References = tuple[Reference | None, ...]
+PERIODIC = ("square", "sine")
+
+
+def reference_sections(
+    config: FlightConfig, signals: Signals
+) -> tuple[tuple[Signal, ReferenceSection | None], ...]:
+    """Return each output with the section of its set-point; that of the first is the one for all."""
+    section = config.receiver.reference
+    check_outputs("receiver.reference", section.by_name, signals)
+    rest = (None,) * (len(signals.outputs) - 1)
+    pairs = zip(signals.outputs, (section, *rest), strict=True)
+    return tuple([(one, section.by_name.get(one.name, usual)) for one, usual in pairs])
+
+
+def build_references(config: FlightConfig, signals: Signals) -> References:
+    """Return the set-point of each output over the ticks; None for one that follows nothing."""
+    tick_s = config.timing.tick_s
+    return tuple(
+        [
+            None if section is None else reference_of(section, tick_s, output)
+            for output, section in reference_sections(config, signals)
+        ]
+    )
+
+
+def values_of(references: References) -> Callable[[int], tuple[float | None, ...]]:
+    """Return what gives the values of all set-points at a tick."""
+    if len(references) == 1 and references[0] is not None:
+        value = references[0].value
+        return lambda tick: (value(tick),)
+    return lambda tick: tuple([None if one is None else one.value(tick) for one in references])
+
+
+def longest_period_s(config: FlightConfig, signals: Signals) -> float:
+    """Return the period of the slowest periodic set-point; 0 without one."""
+    sections = [section for _, section in reference_sections(config, signals) if section]
+    return max([one.period_s for one in sections if one.kind in PERIODIC], default=0.0)
+
+
+def reference_of(section: ReferenceSection, tick_s: float, output: Signal) -> Reference:
+    """Return the set-point that a section describes."""
+    match section.kind:
+        case "square":
+            return Square(section.amplitude, section.period_s, tick_s)
+        case "sine":
+            return Sine(section.amplitude, section.period_s, tick_s)
+        case "step":
+            return Step(section.amplitude, section.start_s, tick_s)
+        case "constant":
+            return Constant(section.amplitude, tick_s)
+        case "csv":
+            if not section.file:
+                raise ConfigError("receiver.reference.file names no file for the csv reference")
+            try:
+                return Csv(Path(section.file), tick_s, output.column)
+            except ValueError as error:
+                raise ConfigError(f"receiver.reference: {error}") from error

@@ -43,6 +43,12 @@ LINEAR = {
     "C": [[1.0, 0.0]],
     "G": [[0.0], [1.0]],
     "densities": [2e-3],
+    "states": ["pitch", "pitch_rate"],
+    "state_units": ["rad", "rad/s"],
+    "inputs": ["front", "rear"],
+    "input_units": ["V", "V"],
+    "outputs": ["pitch"],
+    "output_units": ["rad"],
 }
 """The pitch near its rest, without motor lag; the plant stays the nonlinear one."""
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy.linalg import solve_continuous_are
 
 from tenbaud.bounds.closed import DOUBLE_INTEGRATOR
 from tenbaud.bounds.floor import floor
-from tenbaud.bounds.linear import LinearModel
+from tenbaud.bounds.linear import LinearModel, integrators
 
 
 def encoder_floor(counts_per_turn: int) -> float:
@@ -30,9 +32,17 @@ def double_integrator_rate_at_encoder_floor(density: float, counts_per_turn: int
 def floor_behind_encoder(
     density: float, rate_bit_s: float, counts_per_turn: int, tick_s: float
 ) -> float:
-    """Return the mean square floor, in rad^2, of an angle under white torque that an encoder reads.
+    """Return the mean square floor, in rad^2, of an angle under white torque that an encoder reads."""
+    step = math.tau / counts_per_turn
+    return floor_behind_encoders(integrators(2, density), [[1.0, 0.0]], step, tick_s, rate_bit_s)
 
-    The encoder's rounding is taken for white noise of `width^2 / 12` at every tick. Who forms the bits
+
+def floor_behind_encoders(
+    model: LinearModel, outputs: ArrayLike, steps: ArrayLike, tick_s: float, rate_bit_s: float
+) -> float:
+    """Return the least mean square error where encoders of these steps read the outputs at every tick.
+
+    An encoder's rounding is taken for white noise of `step^2 / 12` at every tick. Who forms the bits
     then knows the Kalman filter's estimate and no more; the error is the filter's own, plus the floor
     of what the estimate does, which is the same plant driven by the innovations, `L r L'` (separation
     of estimation and coding: Wolf and Ziv, IEEE Trans. Inf. Theory 16, 1970). Rounding is not white
@@ -40,12 +50,9 @@ def floor_behind_encoder(
     """
     if not tick_s > 0.0:
         raise ValueError(f"tick_s is {tick_s}; it must be above 0")
-    noise = encoder_floor(counts_per_turn) ** 2 * tick_s
-    # Steady Kalman-Bucy filter of the double integrator: bandwidth (q / r)^(1/4).
-    bandwidth = float((density / noise) ** 0.25)
-    gain = np.array([math.sqrt(2.0) * bandwidth, bandwidth**2])
-    own = math.sqrt(2.0) * bandwidth * noise
-    driven = LinearModel(
-        np.array([[0.0, 1.0], [0.0, 0.0]]), noise * np.outer(gain, gain), np.array([1.0, 0.0])
-    )
-    return own + floor(driven, rate_bit_s)
+    C = np.atleast_2d(np.asarray(outputs, dtype=float))
+    seen = np.diag(np.broadcast_to(np.asarray(steps, dtype=float), (len(C),)) ** 2 / 12.0 * tick_s)
+    own = solve_continuous_are(model.dynamics.T, C.T, model.noise, seen)
+    gain = own @ C.T @ np.linalg.inv(seen)
+    driven = LinearModel(model.dynamics, gain @ seen @ gain.T, model.cost)
+    return float(np.sum(model.cost * own)) + floor(driven, rate_bit_s)

@@ -16,7 +16,7 @@ from channel.errors import CodecDiverged
 from channel.protocol.limits import from_steps, to_steps
 from reproduction.limits.candidates import CANDIDATES, PRESETS
 from tenbaud.build.controllers import build_controller
-from tenbaud.build.ends import build_rate_observer
+from tenbaud.build.ends import build_observer
 from tenbaud.build.flight import Agreement, agree
 from tenbaud.build.rig import build_plant
 from tenbaud.build.signals import build_encoders
@@ -120,7 +120,7 @@ def fly_agreement(agreement: Agreement, start_s: float) -> Errors:
     plant = build_plant(config, terms.tick_ns / 1e9)
     (encoder,) = build_encoders(config, terms.signals)
     controller = build_controller(config)
-    observer = build_rate_observer(agreement)
+    observer = build_observer(agreement)
     limits = terms.limits
     first = round(start_s * 1e9) // terms.tick_ns
     count = codec.ticks_per_sample

@@ -6,7 +6,7 @@ For a linear model under white noise, an estimate that rests on R bit/s without 
     tr A + 1/2 tr(Q P^-1) <= R ln 2,     A P + P A' + Q >= 0
 
 (Duncan, SIAM J. Appl. Math. 19, 1970, with the sequential rate-distortion problem of Tanaka et al.).
-The least `c' P c` under these is the floor; `closed.py` has the two cases with a closed form.
+The least `tr(W P)` under these is the floor; `closed.py` has the two cases with a closed form.
 A controller that hears no more than these bits cannot track better either: its error is the sum of the
 estimation error and something that does not correlate with it.
 
@@ -28,6 +28,7 @@ from tenbaud.bounds.convex import Value, log_determinant, minimise, traces
 from tenbaud.bounds.linear import LinearModel, Matrix, rate_needed, sampled
 
 QUADRATURE_POINTS = 12
+SCALINGS = 2
 
 
 class RateTooLow(ValueError):
@@ -35,17 +36,41 @@ class RateTooLow(ValueError):
 
 
 def floor(model: LinearModel, rate_bit_s: float, erased: float = 0.0) -> float:
-    """Return the least mean square error of the output at R bit/s, in its unit squared.
+    """Return the least mean square error at R bit/s: that of the outputs, by their weights.
 
     `erased` is the fraction of the bits that are lost, and known by both ends to be lost: the floor is
     that of `(1 - erased) R`, the capacity of the erasure channel with feedback.
     """
-    rate = _paid(model, rate_bit_s, erased)
-    speed = _speed(model, rate)
-    one, unit = _in_units_of(speed, model)
-    nats = rate / speed * LN2
+    return float(np.sum(model.cost * floor_covariance(model, rate_bit_s, erased)))
+
+
+def floor_covariance(model: LinearModel, rate_bit_s: float, erased: float = 0.0) -> Matrix:
+    """Return the covariance P of the errors whose weighted mean square is least."""
+    scaled = _Scaled(model, _paid(model, rate_bit_s, erased))
+    nats = scaled.rate_nats
+    return scaled.back(minimise(_Flow(scaled.model), _start(scaled.model, nats), nats))
+
+
+def ideal_worth(model: LinearModel, rate_bit_s: float) -> tuple[Matrix, Matrix]:
+    """Return (P, N): the floor's covariance, and what an error costs an ideal code, now and later.
+
+    With the multipliers lambda of the rate and Z of `K = A P + P A' + Q >= 0`, which fulfil
+    `W = lambda/2 P^-1 Q P^-1 + A' Z + Z A`, it is `N = lambda/2 P^-1 - Z`: bits go where the eigenvalue
+    of `N P` is largest, lambda/2, and no reduction of any other error is worth its bits.
+    """
+    scaled = _Scaled(model, rate_bit_s)
+    nats = scaled.rate_nats
+    one = scaled.model
     covariance = minimise(_Flow(one), _start(one, nats), nats)
-    return unit * float(one.output @ covariance @ one.output)
+    inverse = np.linalg.inv(covariance)
+    # The barrier's Z is a multiple of K^-1.
+    slack = np.linalg.inv(_Flow(one).slack(covariance))
+    paid = 0.5 * inverse @ one.noise @ inverse
+    spared = one.dynamics.T @ slack + slack @ one.dynamics
+    columns = np.stack([paid.ravel(), spared.ravel()], axis=1)
+    (price, share), *_ = np.linalg.lstsq(columns, one.cost.ravel(), rcond=None)
+    worth = (0.5 * price * inverse - share * slack) * scaled.unit / scaled.speed
+    return scaled.back(covariance), worth / np.outer(scaled.sizes, scaled.sizes)
 
 
 def word_floor(model: LinearModel, bits: float, period_s: float, erased: float = 0.0) -> float:
@@ -54,13 +79,12 @@ def word_floor(model: LinearModel, bits: float, period_s: float, erased: float =
     The word is there at the instant of its sample. A word lost with probability `erased` counts for
     `1 - erased` of its bits.
     """
-    rate = _paid(model, bits / period_s, erased)
-    speed = _speed(model, rate)
-    one, unit = _in_units_of(speed, model)
-    problem = _Words(one, speed * period_s)
-    nats = rate * period_s * LN2
+    scaled = _Scaled(model, _paid(model, bits / period_s, erased))
+    period = scaled.speed * period_s
+    problem = _Words(scaled.model, period)
+    nats = scaled.rate_nats * period
     covariance = minimise(problem, problem.start(nats), nats)
-    return unit * (float(np.trace(problem.cost @ covariance)) + problem.between)
+    return scaled.unit * (float(np.sum(problem.cost * covariance)) + problem.between)
 
 
 def _paid(model: LinearModel, rate_bit_s: float, erased: float) -> float:
@@ -80,22 +104,30 @@ def _paid(model: LinearModel, rate_bit_s: float, erased: float) -> float:
     return rate
 
 
-def _speed(model: LinearModel, rate_bit_s: float) -> float:
-    """Return what sets the pace, bits or plant, in 1/s."""
-    return max(rate_bit_s, float(np.abs(np.linalg.eigvals(model.dynamics)).max()))
+class _Scaled:
+    """The model per `1 / speed` instead of per second, each state in units of its usual error.
 
-
-def _in_units_of(speed: float, model: LinearModel) -> tuple[LinearModel, float]:
-    """Return the model per `1 / speed` instead of per second, with noise of size one, and its unit.
-
-    The unit is that of the squared error. State i is counted in units of speed^i, so that a chain of
-    integrators has the same numbers at any rate and matrices stay well conditioned.
+    So matrices are well conditioned at any rate, whatever the states are counted in.
     """
-    scale = speed ** np.arange(model.states, dtype=float)
-    dynamics = model.dynamics * scale / scale[:, None] / speed
-    noise = model.noise / np.outer(scale, scale) / speed
-    size = float(np.trace(noise))
-    return LinearModel(dynamics, noise / size, model.output * scale), size
+
+    def __init__(self, model: LinearModel, rate_bit_s: float) -> None:
+        self.speed = max(rate_bit_s, float(np.abs(np.linalg.eigvals(model.dynamics)).max()))
+        self.rate_nats = rate_bit_s / self.speed * LN2
+        self.sizes = np.ones(model.states)
+        for _ in range(SCALINGS):
+            self.sizes *= np.sqrt(np.diag(_start(self._of(model, 1.0), self.rate_nats)))
+        self.unit = float(np.sum(model.cost * np.outer(self.sizes, self.sizes)))
+        """of the scaled model's mean square error"""
+        self.model = self._of(model, self.unit)
+
+    def _of(self, model: LinearModel, unit: float) -> LinearModel:
+        products = np.outer(self.sizes, self.sizes)
+        dynamics = model.dynamics * self.sizes / self.sizes[:, None] / self.speed
+        return LinearModel(dynamics, model.noise / products / self.speed, model.cost * products / unit)
+
+    def back(self, covariance: Matrix) -> Matrix:
+        """Return a covariance in the model's own units."""
+        return covariance * np.outer(self.sizes, self.sizes)
 
 
 def _start(model: LinearModel, rate_nats: float) -> Matrix:
@@ -128,7 +160,7 @@ class _Flow:
 
     def __init__(self, model: LinearModel) -> None:
         self.model = model
-        self.cost: Matrix = np.outer(model.output, model.output)
+        self.cost = model.cost
 
     def rate(self, covariance: Matrix, basis: Matrix) -> Value:
         a, q = self.model.dynamics, self.model.noise
@@ -148,21 +180,26 @@ class _Flow:
         return np.asarray(products + products.transpose(0, 2, 1))
 
 
+def period_cost(model: LinearModel, period_s: float) -> tuple[Matrix, float]:
+    """Return M and m: an error e at a period's beginning costs `e' M e + m` in the mean over it."""
+    cost = np.zeros_like(model.noise)
+    between = 0.0
+    nodes, weights = np.polynomial.legendre.leggauss(QUADRATURE_POINTS)
+    for node, weight in zip(nodes, weights, strict=True):
+        transition, noise = sampled(model, 0.5 * (node + 1.0) * period_s)
+        cost += 0.5 * weight * transition.T @ model.cost @ transition
+        between += 0.5 * weight * float(np.sum(model.cost * noise))
+    return cost, between
+
+
 class _Words:
     """A word per period; P is the covariance just after it."""
 
     def __init__(self, model: LinearModel, period_s: float) -> None:
         self.model = model
         self.transition, self.noise = sampled(model, period_s)
-        cost = np.zeros_like(self.noise)
-        between = 0.0
-        nodes, weights = np.polynomial.legendre.leggauss(QUADRATURE_POINTS)
-        for node, weight in zip(nodes, weights, strict=True):
-            transition, noise = sampled(model, 0.5 * (node + 1.0) * period_s)
-            seen = transition.T @ model.output
-            cost += 0.5 * weight * np.outer(seen, seen)
-            between += 0.5 * weight * float(model.output @ noise @ model.output)
-        self.cost: Matrix = cost
+        cost, between = period_cost(model, period_s)
+        self.cost = cost
         self.between = between
         """what grows within a period whatever the words say"""
 

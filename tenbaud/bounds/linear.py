@@ -17,7 +17,7 @@ RANK_TOLERANCE = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class LinearModel:
-    """`dx = A x dt + dw`, `E dw dw' = Q dt`, of which `c' x` is to be known.
+    """`dx = A x dt + dw`, `E dw dw' = Q dt`, of which the outputs `C x` are to be known.
 
     States that no noise reaches do not belong in it: both ends know them from the commands.
     """
@@ -26,31 +26,37 @@ class LinearModel:
     """A, 1/s"""
     noise: Matrix
     """Q, two-sided spectral density"""
-    output: Matrix
-    """c"""
+    cost: Matrix
+    """W, the weight of an error: `C' diag(w) C` for outputs of weights w"""
 
     @property
     def states(self) -> int:
         """Return how many states there are."""
-        return len(self.output)
+        return len(self.cost)
 
 
-def linear_model(dynamics: ArrayLike, noise: ArrayLike, output: ArrayLike) -> LinearModel:
+def linear_model(
+    dynamics: ArrayLike, noise: ArrayLike, outputs: ArrayLike, weights: ArrayLike | None = None
+) -> LinearModel:
     """Return a checked model; ValueError says what is wrong with it.
 
-    Every state must be driven by the noise and seen in the output: otherwise the floor is that of a
-    smaller model, and which one is for the caller to say.
+    `outputs` is C, or the one row of it; `weights` are those of the squared output errors, 1 without.
+    Every state must be driven by the noise and seen in an output of some weight: otherwise the floor is
+    that of a smaller model, and which one is for the caller to say (`reached`).
     """
     a = np.atleast_2d(np.asarray(dynamics, dtype=float))
     q = np.atleast_2d(np.asarray(noise, dtype=float))
-    c = np.atleast_1d(np.asarray(output, dtype=float))
-    states = len(c)
+    c = np.atleast_2d(np.asarray(outputs, dtype=float))
+    w = np.ones(len(c)) if weights is None else np.atleast_1d(np.asarray(weights, dtype=float))
+    states = c.shape[1]
     if a.shape != (states, states) or q.shape != (states, states):
         raise ValueError(
-            f"the output has {states} entries, so dynamics and noise must be {states} x {states}; "
+            f"an output has {states} entries, so dynamics and noise must be {states} x {states}; "
             f"they are {a.shape} and {q.shape}"
         )
-    if not (np.isfinite(a).all() and np.isfinite(q).all() and np.isfinite(c).all()):
+    if w.shape != (len(c),) or not (w >= 0.0).all():
+        raise ValueError(f"weights are one for each of the {len(c)} outputs, at least 0; got {w}")
+    if not all(np.isfinite(one).all() for one in (a, q, c, w)):
         raise ValueError("the model has an entry that is not finite")
     if not np.allclose(q, q.T) or np.linalg.eigvalsh(q).min() < -1e-12 * max(1.0, np.abs(q).max()):
         raise ValueError("the noise density must be symmetric and not negative")
@@ -58,23 +64,42 @@ def linear_model(dynamics: ArrayLike, noise: ArrayLike, output: ArrayLike) -> Li
         raise ValueError(
             "the noise does not reach every state: leave out those it does not, both ends know them"
         )
-    if _rank_of_powers(a.T, c[:, None]) < states:
+    if _rank_of_powers(a.T, c.T * w) < states:
         raise ValueError(
             "the output does not see every state (the pair is not observable): no rate bounds a state "
             "that never shows; leave it out, or choose an output that sees it"
         )
-    return LinearModel(a, q, c)
+    return LinearModel(a, q, c.T * w @ c)
+
+
+def reached(
+    dynamics: Matrix, noise: Matrix, outputs: Matrix, weights: Matrix
+) -> tuple[LinearModel, Matrix]:
+    """Return the part of a plant that the noise reaches, and its basis: x = basis z.
+
+    The rest is known to both ends from the commands. ValueError where the outputs do not show it all.
+    """
+    powers = _powers(dynamics, noise)
+    left, sizes, _ = np.linalg.svd(powers)
+    rank = int(np.count_nonzero(sizes > RANK_TOLERANCE * max(1.0, float(sizes[0]))))
+    basis = np.eye(len(dynamics)) if rank == len(dynamics) else left[:, :rank]
+    model = linear_model(basis.T @ dynamics @ basis, basis.T @ noise @ basis, outputs @ basis, weights)
+    return model, basis
 
 
 def _rank_of_powers(a: Matrix, columns: Matrix) -> int:
-    """Return the rank of [B, AB, A^2 B, ...], each block scaled so that a fast A does not hide it."""
+    return int(np.linalg.matrix_rank(_powers(a, columns), tol=RANK_TOLERANCE))
+
+
+def _powers(a: Matrix, columns: Matrix) -> Matrix:
+    """Return [B, AB, A^2 B, ...], each block scaled so that a fast A does not hide it."""
     block = columns / (np.abs(columns).max() or 1.0)
     blocks = [block]
     speed = np.abs(a).max() or 1.0
     for _ in range(len(a) - 1):
         block = a @ block / speed
         blocks.append(block)
-    return int(np.linalg.matrix_rank(np.hstack(blocks), tol=RANK_TOLERANCE))
+    return np.hstack(blocks)
 
 
 def integrators(count: int, density: float) -> LinearModel:
@@ -123,12 +148,17 @@ def rate_needed(dynamics: ArrayLike) -> float:
 
 
 def sampled(model: LinearModel, period_s: float) -> tuple[Matrix, Matrix]:
+    """Return transition matrix and noise covariance over a period."""
+    return van_loan(model.dynamics, model.noise, period_s)
+
+
+def van_loan(dynamics: Matrix, noise: Matrix, period_s: float) -> tuple[Matrix, Matrix]:
     """Return transition matrix and noise covariance over a period (Van Loan, IEEE TAC 23, 1978)."""
-    states = model.states
+    states = len(dynamics)
     block = np.zeros((2 * states, 2 * states))
-    block[:states, :states] = -model.dynamics
-    block[:states, states:] = model.noise
-    block[states:, states:] = model.dynamics.T
+    block[:states, :states] = -dynamics
+    block[:states, states:] = noise
+    block[states:, states:] = dynamics.T
     exponential = expm(block * period_s)
     transition = exponential[states:, states:].T
     covariance = transition @ exponential[:states, states:]

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 
 from channel.codec.codec import Codec
+from channel.codec.models.linear import LinearModel
 from channel.codec.models.pitch import PitchModel
 from channel.line.clocks import SkewedClock
 from channel.line.impairments import Direction, ImpairedLine, SymbolWire
@@ -36,8 +37,8 @@ from transmitter.guard import Guard, GuardSettings
 from transmitter.metrics.gap import GapGauge, Limit, StrengthMeter
 from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode
-from transmitter.session.rate_observer import RateObserver
 from transmitter.session.session import TransmitterSession
+from transmitter.session.state_observer import StateObserver, rate_observer
 
 
 def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> TransmitterNode:
@@ -50,7 +51,7 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
         secrets.randbits(32),
         recorder,
         stop_on_desync=config.transmitter.on_desync == "stop",
-        rate_observer=build_rate_observer(agreement),
+        state_observer=build_observer(agreement),
         overtaking_ticks=overtaking_ticks(terms, agreement.faults),
     )
     gauge = build_gauge(agreement)
@@ -84,17 +85,24 @@ def _followed(agreement: Agreement) -> Callable[[int], tuple[float | None, ...]]
     return values_of(build_references(agreement.config, agreement.signals))
 
 
-def build_rate_observer(agreement: Agreement) -> RateObserver | None:
+def build_observer(agreement: Agreement) -> StateObserver | None:
     """Return what gives a coder its rates, None for one that does without."""
     codec = agreement.codec
     if not codec.uses_rates:
         return None
-    tick_s = agreement.terms.tick_ns / 1e9
+    config, tick_s = agreement.config, agreement.terms.tick_ns / 1e9
     try:
-        bandwidth = agreement.config.transmitter.rate_observer_bandwidth_rad_s
-        return RateObserver(codec.model, tick_s, bandwidth)
+        if isinstance(codec.model, LinearModel):
+            from tenbaud.design.observer import configured_observer
+
+            readers = build_encoders(config, agreement.signals)
+            steps = [
+                one.turn / one.counts_per_turn if isinstance(one, Encoder) else 0.0 for one in readers
+            ]
+            return configured_observer(codec.model, config, steps)
+        return rate_observer(codec.model, tick_s, config.transmitter.rate_observer_bandwidth_rad_s)
     except ValueError as error:
-        raise ConfigError(f"coder.kind = {agreement.config.coder.kind!r}: {error}") from error
+        raise ConfigError(f"coder.kind = {config.coder.kind!r}: {error}") from error
 
 
 def build_uplink(agreement: Agreement, wire: Wire, recorder: Recorder | None = None) -> Uplink:

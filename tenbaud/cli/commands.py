@@ -8,6 +8,7 @@ import typer
 
 from tenbaud.cli import (
     demo,
+    design,
     identify,
     keys,
     nodes,
@@ -58,7 +59,10 @@ for panel, commands in (
         (runs.inspect, runs.diff, runs.replay, runs.audit, runs.convert, runs.recover),
     ),
     ("Rigs and machines", (rig.doctor, rig.rig, rig.rig_check, router.router)),
-    ("Models, coders, studies", (identify.identify, sweep.sweep, tune.tune)),
+    (
+        "Models, coders, studies",
+        (design.floor, design.design, identify.identify, sweep.sweep, tune.tune),
+    ),
 ):
     for command in commands:
         app.command(rich_help_panel=panel)(command)

@@ -7,13 +7,14 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from channel.codec.codec import Coder, CoderContext
+from channel.codec.coders.direction import DirectionCoder, DirectionParameters
 from channel.codec.coders.history import HistoryCoder, HistoryParameters
 from channel.codec.coders.open_loop_zoom import OpenLoopZoomCoder, OpenLoopZoomParameters
 from channel.codec.coders.pcm import PcmCoder, PcmParameters
 from channel.codec.coders.static import StaticCoder, StaticParameters
 from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
 from tenbaud.config.kinds import Kind
-from tenbaud.config.section import AngleRange, Factor, KindSection, NotNegative
+from tenbaud.config.section import AngleRange, Factor, KindSection, NotNegative, Positive
 
 
 class ZoomCoderSection(KindSection):
@@ -91,6 +92,35 @@ class HistoryCoderSection(KindSection):
     """samples that the transmitter looks ahead"""
 
 
+Square = Annotated[tuple[tuple[Factor, ...], ...], Field(min_length=1, max_length=64)]
+
+
+class DirectionCoderSection(KindSection):
+    """Signs asked of the direction that is worth most, for any linear plant; from `tenbaud design`."""
+
+    kind: Literal["direction"] = "direction"
+    bits: Annotated[int, Field(ge=1, le=15)] = 1
+    """signs per sample"""
+    adapts: bool = True
+    """follow a disturbance of unknown strength; false: it is as `noise` says"""
+    transition: Square
+    """F of a sample, of the corrected states"""
+    noise: Square
+    """Q, covariance of what the disturbance adds in a sample"""
+    worth: Square
+    """N, what an error costs, now and later"""
+    start: Square
+    """P, covariance before the first word"""
+    removed: Annotated[float, Field(ge=0.001, le=0.999)] = 0.67
+    """alpha, of the variance along the direction, by a sign"""
+    step: Annotated[float, Field(ge=0.001, le=10.0)] = 1.0
+    """kappa, correction in standard deviations"""
+    initial_strength: Positive = 1.0
+    """sigma, disturbance in units of the assumed one"""
+    minimum_strength: Positive = 0.001
+    maximum_strength: Positive = 1000.0
+
+
 def _gains(gains: tuple[float, float]) -> tuple[tuple[float, ...], ...]:
     return tuple((gain,) for gain in gains)
 
@@ -160,9 +190,20 @@ def _history(section: HistoryCoderSection, context: CoderContext) -> Coder:
     )
 
 
+def _direction(section: DirectionCoderSection, context: CoderContext) -> Coder:
+    coder = DirectionCoder(DirectionParameters(**section.model_dump(exclude={"kind"})))
+    if coder.correction_size != context.model.correction_size:
+        raise ValueError(
+            f"the coder corrects {coder.correction_size} states and the model takes corrections of "
+            f"{context.model.correction_size}: design it for this model"
+        )
+    return coder
+
+
 ZOOM = Kind(ZoomCoderSection, _zoom)
 FIXED = Kind(FixedCoderSection, _fixed)
 OPEN_LOOP_ZOOM = Kind(OpenLoopZoomCoderSection, _open_loop_zoom)
 STATIC = Kind(StaticCoderSection, _static)
 PCM = Kind(PcmCoderSection, _pcm)
 HISTORY = Kind(HistoryCoderSection, _history)
+DIRECTION = Kind(DirectionCoderSection, _direction)

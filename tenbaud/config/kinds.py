@@ -27,6 +27,7 @@ MODELS = Registry(
         "pitch": "tenbaud.config.models:PITCH",
         "hold": "tenbaud.config.models:HOLD",
         "pendulum": "tenbaud.config.models:PENDULUM",
+        "linear": "tenbaud.config.models:LINEAR",
     },
 )
 CODERS = Registry(
@@ -39,6 +40,7 @@ CODERS = Registry(
         "static": "tenbaud.config.coders:STATIC",
         "pcm": "tenbaud.config.coders:PCM",
         "history": "tenbaud.config.coders:HISTORY",
+        "direction": "tenbaud.config.coders:DIRECTION",
     },
 )
 PLANTS = Registry(

@@ -45,22 +45,33 @@ def load_config(
     `allow_code`: classes from outside that it names may be imported, as for a flight of one's own.
     `recorded`: the file was written by a flight; old names in it cause no warning. Raises ConfigError.
     """
+    values = merged_values(preset, path, overrides, recorded=recorded)
+    try:
+        config = FlightConfig.model_validate(values)
+    except ValidationError as error:
+        source = str(path) if path is not None else f"preset {values['preset']}"
+        raise ConfigError(_describe_all(source, error)) from error
+    return config.allowing_code() if allow_code else config
+
+
+def merged_values(
+    preset: str | None = None,
+    path: Path | None = None,
+    overrides: dict[str, Any] | None = None,
+    *,
+    recorded: bool = False,
+) -> dict[str, Any]:
+    """Return what `load_config` checks: nested settings, as they were read."""
     source = str(path) if path is not None else f"preset {preset or DEFAULT_PRESET}"
     from_file = (
-        with_current_names(_read_toml(path), source, warn=not recorded) if path is not None else {}
+        with_current_names(read_toml(path), source, warn=not recorded) if path is not None else {}
     )
     base = preset or from_file.get("preset") or DEFAULT_PRESET
     if not isinstance(base, str):
         raise ConfigError(f"{path}: preset must be a name in quotes, got {base!r}")
     base = current_name("preset", base, source, warn=not recorded)
     values = _merge(_read_preset(base), from_file)
-    values = _merge(values, with_current_names(overrides or {}, "the settings"))
-    values["preset"] = base
-    try:
-        config = FlightConfig.model_validate(values)
-    except ValidationError as error:
-        raise ConfigError(_describe_all(source, error)) from error
-    return config.allowing_code() if allow_code else config
+    return _merge(values, with_current_names(overrides or {}, "the settings")) | {"preset": base}
 
 
 def nested(settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -111,7 +122,8 @@ def _read_preset(name: str) -> dict[str, Any]:
     return tomllib.loads(resource.read_text())
 
 
-def _read_toml(path: Path) -> dict[str, Any]:
+def read_toml(path: Path) -> dict[str, Any]:
+    """Return a TOML file's settings; ConfigError where it cannot be read."""
     try:
         return tomllib.loads(path.read_text())
     except OSError as error:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from channel.codec.codec import ModelContext
 from channel.codec.models.hold import HoldModel
+from channel.codec.models.linear import LinearModel
 from channel.codec.models.pendulum import PendulumModel
 from channel.codec.models.pitch import PitchModel, PitchParameters
+from channel.codec.signals import InputSignal, Signal, Signals, named
 from tenbaud.config.kinds import Kind
-from tenbaud.config.section import KindSection
+from tenbaud.config.section import Factor, KindSection, NotNegative, Positive
 
 
 class PitchModelSection(KindSection):
@@ -29,6 +31,101 @@ class HoldModelSection(KindSection):
     """No model: angle and rate stay as the last word set them. For the coder `words`."""
 
     kind: Literal["hold"] = "hold"
+
+
+Matrix = tuple[tuple[Factor, ...], ...]
+Names = tuple[str, ...]
+
+
+class LinearModelSection(KindSection):
+    """A linear plant: dx/dt = A x + B u + G w, y = C x; per tick x <- F x + E u."""
+
+    kind: Literal["linear"] = "linear"
+    A: Matrix = ()
+    B: Matrix = ()
+    C: Annotated[Matrix, Field(min_length=1)]
+    """rows of the outputs"""
+    F: Matrix = ()
+    """what both ends predict with: states after a tick; `tenbaud design` finds it from A"""
+    E: Matrix = ()
+    """what a command that is held over a tick adds; from A and B"""
+    G: Matrix = ()
+    """where the disturbance enters; empty: where the commands do"""
+    densities: tuple[NotNegative, ...] = (1.0,)
+    """q of the disturbance: one for each column of G, or one for all"""
+    weights: tuple[NotNegative, ...] = (1.0,)
+    """of the squared error of each output, or one for all"""
+    corrected: Annotated[int, Field(ge=0, le=64)] = 0
+    """how many of the states, from the first, take corrections; 0: all"""
+    start: tuple[Factor, ...] = ()
+    """state that both ends begin with; empty: zero"""
+    states: Names = ()
+    state_units: Names = ()
+    inputs: Names = ()
+    input_units: Names = ()
+    outputs: Names = ()
+    output_units: Names = ()
+    input_steps_per_unit: tuple[Positive, ...] = ()
+    """a command travels in whole steps: 1000 per volt are mV; empty: 1000"""
+
+    def signals(self, inputs: int) -> Signals:
+        """Return the names and units, numbered names where none are given."""
+
+        def given(what: str, count: int) -> list[tuple[str, str]]:
+            names = getattr(self, f"{what}s") or [one.name for one in named(what, count)]
+            return list(zip(names, getattr(self, f"{what}_units") or [""] * count, strict=True))
+
+        steps = self.input_steps_per_unit or (1000.0,) * inputs
+        return Signals(
+            tuple(Signal(*one) for one in given("state", len(self.C[0]))),
+            tuple(
+                InputSignal(*one, steps_per_unit=step)
+                for one, step in zip(given("input", inputs), steps, strict=True)
+            ),
+            tuple(Signal(*one) for one in given("output", len(self.C))),
+            tuple(_state_of(row) for row in self.C),
+        )
+
+    @model_validator(mode="after")
+    def _fitting(self) -> LinearModelSection:
+        size = len(self.C[0])
+        transition, drive = ("A", "B") if self.A else ("F", "E")
+        columns = len((getattr(self, drive) or ((),))[0])
+        shapes = {transition: (size, size), drive: (size, columns), "C": (len(self.C), size)}
+        if self.A and self.F:
+            shapes |= {"F": (size, size), "E": (size, columns)}
+        if self.G:
+            shapes["G"] = (size, len(self.G[0]))
+        for name, (height, width) in shapes.items():
+            matrix = getattr(self, name)
+            if len(matrix) != height or any(len(row) != width for row in matrix) or not width:
+                found = " and ".join(sorted({str(len(row)) for row in matrix})) or "0"
+                raise ValueError(
+                    f"{name} must have {height} rows of {width or 1} numbers, as C has {size} columns; "
+                    f"it has {len(matrix)} rows of {found}"
+                )
+        _check_length("densities", self.densities, len(self.G[0]) if self.G else columns, 1)
+        _check_length("weights", self.weights, len(self.C), 1)
+        _check_length("start", self.start, size, 0)
+        if self.corrected > size:
+            raise ValueError(f"corrected is {self.corrected}, and there are {size} states")
+        for name, count in (("state", size), ("input", columns), ("output", len(self.C))):
+            _check_length(f"{name}s", getattr(self, f"{name}s"), count, 0)
+            _check_length(f"{name}_units", getattr(self, f"{name}_units"), count, 0)
+        _check_length("input_steps_per_unit", self.input_steps_per_unit, columns, 0)
+        self.signals(columns)
+        return self
+
+
+def _state_of(row: tuple[float, ...]) -> int | None:
+    """Return which state an output is, None for another function of them."""
+    one = [index for index, value in enumerate(row) if value]
+    return one[0] if len(one) == 1 and row[one[0]] == 1.0 else None
+
+
+def _check_length(name: str, values: tuple[object, ...], count: int, default: int) -> None:
+    if len(values) not in (count, default):
+        raise ValueError(f"{name} has {len(values)} entries, and {count} are needed")
 
 
 class PendulumModelSection(KindSection):
@@ -50,6 +147,23 @@ def _hold(section: HoldModelSection, context: ModelContext) -> HoldModel:
     return HoldModel(context.tick_s)
 
 
+def _linear(section: LinearModelSection, context: ModelContext) -> LinearModel:
+    if not section.F:
+        raise ValueError(
+            "model.F and model.E, the plant of one tick, are missing: `tenbaud design` finds them from "
+            "A and B, once and for both ends"
+        )
+    return LinearModel(
+        section.F,
+        section.E,
+        section.C,
+        context.tick_s,
+        corrected=section.corrected or None,
+        start=section.start or None,
+        signals=section.signals(len(section.E[0])),
+    )
+
+
 def _pendulum(section: PendulumModelSection, context: ModelContext) -> PendulumModel:
     return PendulumModel(context, **section.model_dump(exclude={"kind"}))
 
@@ -57,3 +171,4 @@ def _pendulum(section: PendulumModelSection, context: ModelContext) -> PendulumM
 PENDULUM = Kind(PendulumModelSection, _pendulum)
 PITCH = Kind(PitchModelSection, _pitch)
 HOLD = Kind(HoldModelSection, _hold)
+LINEAR = Kind(LinearModelSection, _linear)

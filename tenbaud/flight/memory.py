@@ -6,6 +6,7 @@ import json
 from dataclasses import asdict
 
 from channel.codec.codec import Codec, Vector
+from channel.codec.models.linear import LinearModel
 from channel.errors import ConfigMismatch, LinkLost
 from channel.line.impairments import LineFaults
 from channel.line.line import CleanLine, Downlink, Line
@@ -34,6 +35,7 @@ from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode
 from transmitter.rigs.simulated import SimulatedRig
 from transmitter.session.session import Phase, TransmitterSession
+from transmitter.session.state_observer import StateObserver
 
 INCARNATION, SESSION_NUMBER = 1, 1
 """Fixed: a separate process would draw them, and a flight in memory is the same every time."""
@@ -93,7 +95,13 @@ class MemoryFlight:
             software_version(), json.dumps(asdict(terms), sort_keys=True), numerics_probe(codec)
         )
         self.transmitter = TransmitterSession(
-            codec, terms, identity, INCARNATION, self.transmitter_rows, stop_on_desync=stop_on_desync
+            codec,
+            terms,
+            identity,
+            INCARNATION,
+            self.transmitter_rows,
+            stop_on_desync=stop_on_desync,
+            state_observer=_observer(codec, encoder_counts_per_turn),
         )
         self.receiver = ReceiverSession(
             receiver_codec or codec, terms, controller, identity, SESSION_NUMBER, self.receiver_rows
@@ -169,6 +177,15 @@ class MemoryFlight:
         """Return what ended a flight before its time, for people."""
         end = self.transmitter.end
         return guard_text(self.node.guard.reason) if end is None else end_text(end, "receiver")
+
+
+def _observer(codec: Codec, counts_per_turn: int) -> StateObserver | None:
+    """Return what shows a coder all states of a linear model; None: as the session has it."""
+    if not (codec.uses_rates and isinstance(codec.model, LinearModel)):
+        return None
+    from tenbaud.design.observer import observer_of_coder
+
+    return observer_of_coder(codec, counts_per_turn)
 
 
 def _check(codec: Codec, terms: Terms, plant: Plant, controller: Controller) -> None:

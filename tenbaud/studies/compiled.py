@@ -21,15 +21,17 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any
 
+import numpy as np
+
 from channel.codec.lead import fly_ticks
 from channel.codec.numerics import refuse
 from channel.errors import TenbaudError
 
 PACKAGES = ("channel", "plant_sim", "receiver", "transmitter", "tenbaud")
 
-OPTIONS = {"fastmath": False, "error_model": "python", "nogil": True, "_nrt": False}
-"""How everything is compiled: divisions by zero are errors and nothing is reordered, as in Python; no
-memory is allocated, and so none is counted."""
+OPTIONS = {"fastmath": False, "error_model": "python", "nogil": True}
+"""How everything is compiled: divisions by zero are errors and nothing is reordered, as in Python. No
+memory is allocated, and so none is counted, but where a function says so."""
 
 SOURCES = (*PACKAGES[:-1], "tenbaud.build", "tenbaud.config", "tenbaud.flight", "tenbaud.studies")
 """Packages that the figures of a flight depend on."""
@@ -60,17 +62,20 @@ def require(*modules: str) -> None:
 
 
 @cache
-def compiled(function: Callable[..., Any], parts: Parts = (), inline: bool = False) -> Any:
+def compiled(
+    function: Callable[..., Any], parts: Parts = (), inline: bool = False, allocates: bool = False
+) -> Any:
     """Return a function of this project, compiled, with all of ours that it calls.
 
     `parts` replace names in functions of the studies, which are put into their caller (`inline`).
+    `allocates`: they make lists.
     """
     if not isinstance(function, FunctionType):
         raise TypeError(f"{function!r} is no plain function and cannot be compiled")
     names = dict(parts)
     for name in function.__code__.co_names:
         value = function.__globals__.get(name)
-        if name in names or not isinstance(value, FunctionType):
+        if name in names or not isinstance(value, FunctionType) or value is function:
             continue
         package, _, rest = value.__module__.partition(".")
         if value is refuse:
@@ -78,14 +83,43 @@ def compiled(function: Callable[..., Any], parts: Parts = (), inline: bool = Fal
         elif package in PACKAGES:
             ours = rest.startswith("studies")
             # Put into its caller: only so are the functions that it is given known by then.
-            names[name] = compiled(value, parts if ours else (), ours or value is fly_ticks)
+            inlined = ours or value is fly_ticks
+            names[name] = compiled(value, parts if ours else (), inlined, allocates)
     scope = {**function.__globals__, **names}
     copy = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
     copy.__module__ = function.__module__
     # The cache knows a function by its name: with other parts it is another function.
     own = "_".join([function.__qualname__, *(part.__name__ for _, part in parts)])
     copy.__qualname__ = copy.__name__ = own
-    return _jit(copy, inline="always" if inline else "never", forceinline=True)
+    again = function.__name__ in function.__code__.co_names
+    made = _jit(copy, allocates, inline="always" if inline else "never", forceinline=not again)
+    if again:  # a function that calls itself
+        scope[function.__name__] = made
+    return made
+
+
+def arrays_of(constants: Any) -> Any:
+    """Return constants with arrays for their sequences of numbers, which are read at any index."""
+    if not hasattr(constants, "_replace"):
+        return constants
+    rows = {name: value for name, value in constants._asdict().items() if isinstance(value, tuple)}
+    numbers = {name: np.array(value) for name, value in rows.items() if isinstance(value[0], float)}
+    return constants._replace(**numbers)
+
+
+@cache
+def tick_of_rows(row_function: Callable[..., float], size: int) -> Any:
+    """Return a compiled tick of a model that is written as a function of each state."""
+    row = compiled(row_function)
+    tuple_setitem: Any = import_module("numba.cpython.unsafe.tuple").tuple_setitem
+
+    def tick(state: Any, command: Any, held: Any, constants: Any) -> Any:
+        after = state
+        for index in range(size):
+            after = tuple_setitem(after, index, row(state, command, held, constants, index))
+        return after
+
+    return _named(tick, f"tick_{row_function.__name__}_{size}")
 
 
 @cache
@@ -109,12 +143,12 @@ def _named(function: Callable[..., Any], name: str) -> Any:
     return _jit(function, forceinline=True)
 
 
-def _jit(function: Callable[..., Any], **more: Any) -> Any:
+def _jit(function: Callable[..., Any], allocates: bool = False, **more: Any) -> Any:
     numba: Any = import_module("numba")
     folder = _cache_folder()
     if folder is not None:
         numba.config.CACHE_DIR = str(folder)
-    return numba.njit(**OPTIONS, **more, cache=folder is not None)(function)
+    return numba.njit(**OPTIONS, **more, _nrt=allocates, cache=folder is not None)(function)
 
 
 @cache

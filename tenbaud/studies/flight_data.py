@@ -36,6 +36,8 @@ class Numbers(NamedTuple):
     watch: int
     """ticks of the window in which the encoder is watched"""
     counts_per_turn: int
+    uses_rates: bool
+    """words are formed from all corrected states, which the transmitter observes"""
     sign: int
     zero_counts: int
 
@@ -65,6 +67,10 @@ class Given(NamedTuple):
     """replay: front and rear volts per tick, `D` ticks beyond the flight included"""
     applied: Any
     """replay: front and rear volts per tick; empty when they were not recorded"""
+    gains: Any
+    anew: Any
+    largest: Any
+    """of the transmitter's observer (`transmitter.session.state_observer`); a row per state"""
 
 
 class Work(NamedTuple):
@@ -85,6 +91,10 @@ class Work(NamedTuple):
     correction: Any
     nothing: Any
     """no correction"""
+    seen: Any
+    """the transmitter's observer; without one, the measured angle"""
+    given_out: Any
+    """front and rear: the last command that the observer knows"""
     coded: Any
     """per tick: the codec's angle"""
     live: Any

@@ -12,6 +12,7 @@ import numpy as np
 
 from channel.codec.codec import Codec, Vector
 from channel.codec.coders.base import FunctionCoder
+from channel.codec.models.linear import LinearModel
 from channel.codec.numerics import sin
 from channel.codec.signals import Signal
 from channel.flight_log import FlightLog
@@ -22,7 +23,7 @@ from receiver.controllers.base import Controller
 from receiver.controllers.pid import PidConstants, PidLoops
 from receiver.controllers.recorded import RecordedController
 from tenbaud.build.controllers import build_controller
-from tenbaud.build.ends import guard_settings
+from tenbaud.build.ends import build_observer, guard_settings
 from tenbaud.build.flight import Agreement, kind_of_link, read_flight_log
 from tenbaud.build.references import reference_of, reference_sections
 from tenbaud.build.rig import nominal_plant
@@ -30,12 +31,13 @@ from tenbaud.build.signals import build_encoders
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig, FlightLogSection, ReferenceSection
 from tenbaud.flight.verdict import FlightCounts, faults_of
-from tenbaud.studies.compiled import compiled, reader
+from tenbaud.studies.compiled import arrays_of, compiled, reader, tick_of_rows
 from tenbaud.studies.figures import FlightFigures, shared_parts
 from tenbaud.studies.flight_data import DONE, Errors, Given, Motion, Numbers, Work
 from tenbaud.studies.kernel import fly
 from tenbaud.studies.schedule import Schedule, Uncommon, schedule_of
 from transmitter.encoder_watch import window_ticks
+from transmitter.session.state_observer import StateObserver
 
 NOTHING = np.zeros(0)
 NO_PAIRS = np.zeros((0, 2))
@@ -69,6 +71,7 @@ class CompiledPoint:
     _log: FlightLog | None = field(init=False, default=None)
     reference: Any = field(init=False)
     _clean: Any = field(init=False, default=None)
+    _observer: StateObserver | None = field(init=False)
     _work: Work = field(init=False)
 
     def __post_init__(self) -> None:
@@ -86,9 +89,10 @@ class CompiledPoint:
         self.numbers = _numbers(self.agreement, ticks, replay, bias)
         plant = nominal_plant(config).mismatched(config.transmitter.plant.mismatch)
         codec = self.agreement.codec
+        self._observer = build_observer(self.agreement)
         self.constants = (
-            codec.model.constants,  # type: ignore[attr-defined]
-            codec.coder.constants,  # type: ignore[attr-defined]
+            arrays_of(codec.model.constants),  # type: ignore[attr-defined]
+            arrays_of(codec.coder.constants),  # type: ignore[attr-defined]
             pitch_constants(plant, config.timing.tick_s),
             pid,
         )
@@ -169,21 +173,35 @@ class CompiledPoint:
             self.reference,
             torque,
             *_recorded(self._log, self._ahead),
+            *_observer(self._observer),
         )
 
 
 def compiled_flight(codec: Codec) -> Any:
     """Return the compiled flight for a codec's kinds of model and coder."""
-    encode, decode = codec.coder.functions  # type: ignore[attr-defined]
+    encode, decode, allocates = codec.coder.functions  # type: ignore[attr-defined]
     parts = (
-        ("tick", compiled(codec.model.tick_function)),  # type: ignore[attr-defined]
-        ("encode", compiled(encode)),
-        ("decode", compiled(decode)),
+        ("tick", _compiled_tick(codec.model)),
+        ("encode", compiled(encode, allocates=allocates)),
+        ("decode", compiled(decode, allocates=allocates)),
         ("state_of", reader(codec.model.state_size)),
         ("held_of", reader(codec.model.correction_size)),
         ("sine", compiled(sin)),
     )
     return compiled(fly, parts)
+
+
+def _compiled_tick(model: Any) -> Any:
+    if hasattr(model, "row_function"):
+        return tick_of_rows(model.row_function, model.state_size)
+    return compiled(model.tick_function)
+
+
+def _observer(observer: StateObserver | None) -> tuple[Any, Any, Any]:
+    """Return gains, gains after a gap and largest states of the transmitter's observer."""
+    if observer is None:
+        return NO_PAIRS, NO_PAIRS, NOTHING
+    return np.array(observer.gains), np.array(observer.anew), np.array(observer.largest)
 
 
 def _require_ordinary(config: FlightConfig, codec: Codec) -> None:
@@ -200,10 +218,11 @@ def _require_ordinary(config: FlightConfig, codec: Codec) -> None:
     model, coder = codec.model, codec.coder
     if model.input_size != 2 or len(model.measured(model.initial())) != 1:
         raise Uncommon("a plant that is not of one output and two inputs")
-    if not (hasattr(model, "tick_function") and isinstance(coder, FunctionCoder)):
+    functions = hasattr(model, "tick_function") or hasattr(model, "row_function")
+    if not (functions and isinstance(coder, FunctionCoder)):
         raise Uncommon("a model or coder that is not written as functions")
-    if codec.uses_rates:
-        raise Uncommon("a coder that is shown rates, which the transmitter's observer finds")
+    if isinstance(model, LinearModel) and model.outputs != ((1.0, *[0.0] * (model.state_size - 1)),):
+        raise Uncommon("a linear model whose output is not its first state")
 
 
 def _numbers(agreement: Agreement, ticks: int, replay: bool, bias: tuple[float, float]) -> Numbers:
@@ -231,6 +250,7 @@ def _numbers(agreement: Agreement, ticks: int, replay: bool, bias: tuple[float, 
         soft_limit=float(settings.soft_limits[0]) if settings.soft_limits else math.inf,
         watch=window_ticks(agreement.codec.model, terms.tick_ns / 1e9),
         counts_per_turn=int(encoder.counts_per_turn),
+        uses_rates=agreement.codec.uses_rates,
         sign=encoder.sign,
         zero_counts=encoder.zero_counts,
     )
@@ -268,6 +288,8 @@ def _work(codec: Codec, samples: int, ticks: int, ahead: int) -> Work:
         spare=np.empty(len(coder)),
         correction=np.empty(codec.model.correction_size),
         nothing=np.zeros(codec.model.correction_size),
+        seen=np.empty(states),
+        given_out=np.empty(2),
         coded=np.empty(ahead),
         live=np.empty(ahead),
         front=np.empty(ahead),

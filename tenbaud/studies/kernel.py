@@ -23,7 +23,7 @@ from plant_sim.pitch import pitch_step
 from receiver.controllers.pid import clamped, is_stuck, pid_integral, pid_sum
 from tenbaud.studies.flight_data import DONE, LEFT, Errors, Given, Motion, Numbers, Work
 from tenbaud.studies.parts import decode, encode, held_of, sine, state_of, tick
-from tenbaud.studies.sensor_side import act, angle_at, count_at, guess, put, score
+from tenbaud.studies.sensor_side import act, angle_at, count_at, guess, look, put, score
 
 Carried = tuple[bool, float, tuple[float, float, float, float], Motion, Errors]
 """Whether all is well, the PID's integral, the plant's state, the sensor node's side, the errors."""
@@ -45,6 +45,9 @@ def fly(
     errors = Errors(0, 0.0, 0.0, 0, 0.0, 0.0, 0, 0.0, 0.0)
     work.front[: numbers.lead] = numbers.initial_front
     work.rear[: numbers.lead] = numbers.initial_rear
+    put(work.models[0], work.seen)
+    work.given_out[0] = numbers.initial_front
+    work.given_out[1] = numbers.initial_rear
     carried = (True, 0.0, plant, motion, errors)
     for sample in range(given.scored.shape[0]):
         well = _measure(sample, carried[2][0], numbers, model_constants, coder_constants, given, work)
@@ -102,6 +105,8 @@ def _tick(
     well, integral, plant, motion, errors = carried
     state = tick(state, volts, held, constants[0])
     if within and at < numbers.ticks:
+        if at > sample * numbers.per_sample and numbers.uses_rates:
+            look(at, _read(at, plant[0], numbers, given), numbers, constants[0], given, work)
         untripped, motion = act(at, plant[0], motion, numbers, constants[0], given, work)
         well = well and untripped
         if at >= numbers.window_start:
@@ -131,16 +136,16 @@ def _measure(
     well = True
     if known < sample:
         well = guess(sample, numbers, model_constants, coder_constants, given, work)
-    counts = given.counts[first] if numbers.replay else count_at(angle, numbers)
-    _send(sample, angle_at(counts, numbers), coder_constants, work)
+    look(first, _read(first, angle, numbers, given), numbers, model_constants, given, work)
+    size = work.word.shape[0]
+    word = work.sent[sample * size : (sample + 1) * size]
+    encode(coder_constants, work.coder, work.model, work.seen, word)
     return well
 
 
-def _send(sample: int, angle: float, coder_constants: Any, work: Work) -> None:
-    """Form the word of a sample on the transmitter's copy, which `work.model` and `coder` hold."""
-    size = work.word.shape[0]
-    word = work.sent[sample * size : (sample + 1) * size]
-    encode(coder_constants, work.coder, work.model, (angle,), word)
+def _read(at: int, angle: float, numbers: Numbers, given: Given) -> float:
+    """Return the angle that the encoder shows."""
+    return angle_at(given.counts[at] if numbers.replay else count_at(angle, numbers), numbers)
 
 
 def _receive(sample: int, given: Given, work: Work) -> bool:

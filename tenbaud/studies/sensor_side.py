@@ -11,6 +11,7 @@ from plant_sim.encoder import angle_of, counts_of
 from tenbaud.studies.flight_data import Errors, Given, Motion, Numbers, Work
 from tenbaud.studies.parts import decode, held_of, state_of, tick
 from transmitter.encoder_watch import MOTION_RAD
+from transmitter.session.state_observer import seen_row
 
 
 def put(values: Any, target: Any) -> None:
@@ -27,6 +28,24 @@ def count_at(angle: float, numbers: Numbers) -> int:
 def angle_at(counts: int, numbers: Numbers) -> float:
     """Return the angle that counts stand for."""
     return angle_of(counts, numbers.counts_per_turn, numbers.sign, numbers.zero_counts)
+
+
+def look(
+    at: int, angle: float, numbers: Numbers, model_constants: Any, given: Given, work: Work
+) -> None:
+    """Let the transmitter's observer look at a tick, as `StateObserver.look` does."""
+    if not numbers.uses_rates:
+        work.seen[0] = angle
+        return
+    state = state_of(work.seen)
+    gains = given.anew
+    if at > 0:
+        volts = (work.given_out[0], work.given_out[1])
+        state = tick(state, volts, held_of(work.nothing), model_constants)
+        gains = given.gains
+    errors = (angle - state[0],)
+    for row in range(len(state)):
+        work.seen[row] = seen_row(state, errors, gains, given.largest, row)
 
 
 def guess(
@@ -92,6 +111,8 @@ def act(
         return False, motion
     front, rear, age, late = motion.front, motion.rear, motion.age, motion.late
     if not given.late[at]:
+        work.given_out[0] = work.front[at]
+        work.given_out[1] = work.rear[at]
         largest, slew = numbers.command_max, numbers.slew
         front = limited(work.front[at], front, largest[0], slew[0])
         rear = limited(work.rear[at], rear, largest[1], slew[1])

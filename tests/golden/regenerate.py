@@ -17,12 +17,14 @@ from pathlib import Path
 
 from channel.codec import numerics
 from channel.codec.codec import Codec
+from channel.codec.coders.direction import DirectionCoder, DirectionParameters
 from channel.codec.coders.history import HistoryCoder, HistoryParameters
 from channel.codec.coders.open_loop_zoom import OpenLoopZoomCoder, OpenLoopZoomParameters
 from channel.codec.coders.pcm import PcmCoder, PcmParameters
 from channel.codec.coders.static import StaticCoder, StaticParameters
 from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
 from channel.codec.models.hold import HoldModel
+from channel.codec.models.linear import LinearModel
 from channel.codec.models.pitch import PITCH_SIGNALS, PitchModel, PitchParameters
 from channel.protocol import frames, wire
 from channel.protocol.endings import Ending
@@ -83,6 +85,60 @@ def frame_vectors() -> dict[str, list[list[str]]]:
     return {"frames": [[type(frame).__name__, wire.encode(frame).hex()] for frame in examples]}
 
 
+AERO = LinearModel(
+    (
+        (0.999913, 0.00998322, 0.0, 0.0),
+        (-0.0173662, 0.996616, 0.0, 0.0),
+        (0.0, 0.0, 1.0, 0.00995373),
+        (0.0, 0.0, 0.0, 0.99076),
+    ),
+    (
+        (2.55529e-06, 4.87828e-06),
+        (0.000510769, 0.000975105),
+        (-5.67862e-06, 4.62702e-06),
+        (-0.00113397, 0.000923975),
+    ),
+    ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0)),
+    0.01,
+)
+AERO_DIRECTION = DirectionParameters(
+    transition=(
+        (0.99141, 0.0980819, 0.0, 0.0),
+        (-0.170617, 0.95902, 0.0, 0.0),
+        (0.0, 0.0, 1.0, 0.095499),
+        (0.0, 0.0, 0.0, 0.911351),
+    ),
+    noise=(
+        (6.48154e-07, 9.62006e-06, 0.0, 0.0),
+        (9.62006e-06, 0.000192429, 0.0, 0.0),
+        (0.0, 0.0, 6.22199e-07, 9.12006e-06),
+        (0.0, 0.0, 9.12006e-06, 0.000182532),
+    ),
+    worth=(
+        (1.7128, 0.142798, 0.0, 0.0),
+        (0.142798, 0.0253156, 0.0, 0.0),
+        (0.0, 0.0, 1.20751, 0.0853921),
+        (0.0, 0.0, 0.0853921, 0.0162508),
+    ),
+    start=(
+        (5.06312e-06, 2.68876e-05, 0.0, 0.0),
+        (2.68876e-05, 0.00032425, 0.0, 0.0),
+        (0.0, 0.0, 4.53875e-06, 2.42168e-05),
+        (0.0, 0.0, 2.42168e-05, 0.000292631),
+    ),
+    bits=2,
+)
+"""Two axes at 20 bit/s, designed once and written down: no golden bit depends on a library."""
+
+PITCH_DIRECTION = DirectionParameters(
+    transition=((0.997508, 0.0994173), (-0.0497087, 0.987567)),
+    noise=((6.6e-07, 9.9e-06), (9.9e-06, 0.000197)),
+    worth=((1.76, 0.152), (0.152, 0.0288)),
+    start=((5.7e-06, 3.05e-05), (3.05e-05, 0.000353)),
+    step=1.15,
+    removed=0.7,
+)
+
 GOLDEN_CODECS: dict[str, Codec] = {
     "paper": Codec(PitchModel(PitchParameters(), 0.01), ZoomCoder(ZoomParameters()), 10),
     "three signs, impulse": Codec(
@@ -109,6 +165,10 @@ GOLDEN_CODECS: dict[str, Codec] = {
             )
         ),
         10,
+    ),
+    "direction of a linear plant, two signs": Codec(AERO, DirectionCoder(AERO_DIRECTION), 10),
+    "direction of the pitch": Codec(
+        PitchModel(PitchParameters(), 0.01), DirectionCoder(PITCH_DIRECTION), 10
     ),
 }
 

@@ -40,9 +40,9 @@ from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
 from transmitter.session.copies import CANNOT_FLY, Confirmed, Copies, EchoOrder
 from transmitter.session.owing import Owing
-from transmitter.session.rate_observer import RateObserver
 from transmitter.session.records import write_failure, write_sample
 from transmitter.session.rejoin import Asking, commands_of, start_of
+from transmitter.session.state_observer import StateObserver, default_observer
 from transmitter.session.takeover import Takeover
 
 
@@ -60,7 +60,7 @@ class TransmitterSession:
 
     `incarnation` is drawn by the caller (32 bits), so that the session itself stays deterministic.
     `stop_on_desync`: end the flight at the first digest that differs, instead of rejoining.
-    `rate_observer`: measures rates for a coder that uses them; None: one with the default bandwidth.
+    `state_observer`: finds the states for a coder that uses rates; None: that of angle and rate.
     `overtaking_ticks`: how long after a command frame one may come that was sent before it.
     """
 
@@ -73,7 +73,7 @@ class TransmitterSession:
         recorder: Recorder | None = None,
         *,
         stop_on_desync: bool = False,
-        rate_observer: RateObserver | None = None,
+        state_observer: StateObserver | None = None,
         overtaking_ticks: int = 0,
     ) -> None:
         self.codec = codec
@@ -109,9 +109,7 @@ class TransmitterSession:
         self._echoes = EchoOrder(overtaking_ticks, terms.history_samples)
         self._lag_samples_max = terms.history_samples
         """Echoes may be this many samples behind before a rejoin is asked for."""
-        if codec.uses_rates and rate_observer is None:
-            rate_observer = RateObserver(codec.model, terms.tick_ns / 1e9)
-        self._rate_observer = rate_observer if codec.uses_rates else None
+        self._observer = state_observer or default_observer(codec, terms.tick_ns / 1e9)
         self._recorder = recorder or NullRecorder()
         self._due: deque[tuple[int, Vector]] = deque(
             enumerate([terms.initial_command] * terms.lead_ticks)
@@ -136,8 +134,8 @@ class TransmitterSession:
         not sent, and the next sample starts afresh.
         """
         self._tick = tick
-        if self._rate_observer is not None:
-            measurement = self._rate_observer.look(tick, measurement, self._command)
+        if self._observer is not None:
+            measurement = self._observer.look(tick, measurement, self._command)
         if self.phase is Phase.REJOINING:
             return self._ask()
         if self.phase is not Phase.FLYING:

@@ -4,7 +4,8 @@ The nodes run these functions as they stand; a study compiles the very same ones
 formula has one text. They therefore keep to what both understand: they read sequences of numbers by
 index and write their results by index into sequences that the caller provides (lists here, arrays
 there); constants come as one named tuple of numbers and of tuples of numbers; helpers are functions of
-the same kind. No lists, strings, objects or exceptions within.
+the same kind. No strings, objects or exceptions within, and no lists but of numbers to work in, made by
+`[0.0] * n` and declared by `allocates`.
 """
 
 from __future__ import annotations
@@ -29,6 +30,8 @@ class CoderFunctions(NamedTuple):
     decode: Callable[[Any, Numbers, Numbers, Symbols, bool, Results, Results], None]
     """(constants, coder, model, symbols, erased, correction, after): writes the correction of the
     first model states and the next coder state; an erased word has the symbol 0 everywhere"""
+    allocates: bool = False
+    """whether they make lists to work in"""
 
 
 class FunctionCoder:

@@ -13,6 +13,7 @@ from channel.codec import numerics
 from channel.codec.codec import Codec
 from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
 from channel.codec.models import pitch
+from channel.codec.models.linear import LinearModel
 from channel.codec.models.pitch import PitchModel, PitchParameters
 from channel.protocol.identity import Identity, differing_fields, numerics_probe
 from tests.channel.codec.chua import CHUA_TICK_S, CHUA_ZOOM, ChuaModel
@@ -119,3 +120,9 @@ def test_when_the_peers_configuration_is_no_object_then_it_still_differs(theirs:
 def test_when_the_peers_configuration_is_nested_too_deeply_then_it_cannot_be_read() -> None:
     theirs = "[" * 16_000
     assert differing_fields('{"a": 1}', theirs) == ["the peer's configuration cannot be read"]
+
+
+def test_when_an_unstable_plant_diverges_in_the_probe_then_it_starts_again() -> None:
+    fast = LinearModel(((1.5, 0.1), (0.0, 1.0)), ((0.0,), (1.0,)), ((1.0, 0.0),), 0.01, corrected=1)
+    codec = Codec(fast, ZoomCoder(ZoomParameters(gains=((1.0,),))), 10)
+    assert numerics_probe(codec) == numerics_probe(codec)

@@ -16,9 +16,13 @@ from tenbaud.bounds.closed import (
 from tenbaud.bounds.floor import (
     RateTooLow,
     floor,
+    floor_covariance,
+    ideal_worth,
     word_floor,
 )
-from tenbaud.bounds.linear import integrators, linear_model, pitch, sampled
+from tenbaud.bounds.linear import LinearModel, integrators, linear_model, pitch, reached, sampled
+from tenbaud.design.described import plant_of, plant_section
+from tenbaud.design.floors import floors
 
 PENDULUM = linear_model([[0.0, 1.0], [7.3198**2, 0.0]], [[0.0, 0.0], [0.0, 1e-3]], [1.0, 0.0])
 
@@ -127,3 +131,78 @@ def test_when_erasures_take_the_margin_then_the_error_names_them() -> None:
 def test_when_the_rate_is_no_rate_then_it_is_refused(rate: float) -> None:
     with pytest.raises(ValueError, match="must be above 0"):
         floor(integrators(1, 1.0), rate)
+
+
+def beside(*densities: float, states: int) -> LinearModel:
+    """Return chains of integrators side by side, the first state of each an output."""
+    size = len(densities) * states
+    dynamics, noise = np.zeros((size, size)), np.zeros((size, size))
+    outputs = np.zeros((len(densities), size))
+    for axis, density in enumerate(densities):
+        own = slice(axis * states, (axis + 1) * states)
+        one = integrators(states, density)
+        dynamics[own, own], noise[own, own] = one.dynamics, one.noise
+        outputs[axis, axis * states] = 1.0
+    return linear_model(dynamics, noise, outputs)
+
+
+def test_when_axes_share_the_bits_then_the_floor_allots_them() -> None:
+    """Separate axes: bits go by the root of q to a Wiener process, by its 4th root to a double."""
+    wiener = floor(beside(1e-4, 9e-4, states=1), 10.0)
+    assert wiener == pytest.approx(WIENER * (0.01 + 0.03) ** 2 / 10.0, rel=1e-8)
+    fourth = 2e-6**0.25 + 16e-6**0.25
+    double = DOUBLE_INTEGRATOR * fourth**4 / 10.0**3
+    assert floor(beside(2e-6, 16e-6, states=2), 10.0) == pytest.approx(double, rel=1e-8)
+
+
+def test_when_outputs_weigh_more_then_they_are_known_better() -> None:
+    model = beside(1e-3, 1e-3, states=1)
+    heavy = linear_model(model.dynamics, model.noise, np.eye(2), [4.0, 1.0])
+    covariance = floor_covariance(heavy, 10.0)
+    assert covariance[1, 1] == pytest.approx(2.0 * covariance[0, 0], rel=1e-6)
+    assert floor(heavy, 10.0) == pytest.approx(WIENER * 1e-3 * (2.0 + 1.0) ** 2 / 10.0, rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("rate", "degrees"),
+    [(10.0, (0.043, 0.043, 0.102)), (20.0, (0.017, 0.018, 0.039)), (30.0, (0.009, 0.010, 0.022))],
+)
+def test_when_the_axes_of_a_helicopter_are_coupled_then_their_floor_is_the_joint_one(
+    rate: float, degrees: tuple[float, ...]
+) -> None:
+    section = plant_section("helicopter").model_copy(update={"densities": (2e-6, 2e-6, 2e-3)})
+    plant = plant_of(section, 0.01)
+    assert plant is not None
+    found = floors(plant, rate)
+    assert found.rms is not None
+    assert [math.degrees(rms) for rms in found.rms] == pytest.approx(degrees, abs=6e-4)
+
+
+def test_when_a_pair_is_unstable_then_both_its_modes_are_paid_for() -> None:
+    """Two separate scalar plants, one of them unstable: rates add up as the scalar formula says."""
+    q, total = 1e-3, 12.0
+    model = linear_model(np.diag([2.0, -1.0]), np.diag([q, q]), np.eye(2))
+
+    def cost(first: float) -> float:
+        nats = (first * math.log(2.0), (total - first) * math.log(2.0))
+        return q / (2.0 * (nats[0] - 2.0)) + q / (2.0 * (nats[1] + 1.0))
+
+    best = min(cost(first) for first in np.linspace(3.0, 11.9, 200_000))
+    assert floor(model, total) == pytest.approx(best, rel=1e-7)
+
+
+def test_when_the_worth_of_an_error_is_asked_for_then_it_is_the_slope_of_the_floor() -> None:
+    covariance, worth = ideal_worth(integrators(2, 2e-3), 10.0)
+    values = np.linalg.eigvals(worth @ covariance).real
+    # The price of a nat is what the floor falls by.
+    slope = 3.0 * double_integrator_floor(2e-3, 10.0) / (10.0 * math.log(2.0))
+    assert max(values) == pytest.approx(0.5 * slope, rel=1e-4)
+    assert min(values) > 0.0
+
+
+def test_when_noise_leaves_states_out_then_the_floor_is_that_of_the_others() -> None:
+    dynamics = np.array([[0.0, 1.0, 0.3], [0.0, 0.0, 0.2], [0.0, 0.0, -5.0]])
+    noise = np.diag([0.0, 2e-3, 0.0])
+    part, basis = reached(dynamics, noise, np.array([[1.0, 0.0, 0.0]]), np.ones(1))
+    assert basis.shape == (3, 2)
+    assert floor(part, 10.0) == pytest.approx(double_integrator_floor(2e-3, 10.0), rel=1e-8)

@@ -64,6 +64,12 @@ def test_when_a_model_makes_no_sense_then_the_error_says_why(
         linear_model(dynamics, noise, output)  # type: ignore[arg-type]
 
 
+def test_when_weights_do_not_fit_the_outputs_then_they_are_refused() -> None:
+    for weights in ([1.0], [1.0, -1.0]):
+        with pytest.raises(ValueError, match="one for each of the 2 outputs, at least 0"):
+            linear_model(np.zeros((2, 2)), np.eye(2), np.eye(2), weights)
+
+
 def test_when_the_encoder_is_that_of_the_rig_then_its_floor_is_known() -> None:
     assert math.degrees(encoder_floor(4096)) == pytest.approx(0.0254, abs=5e-5)
     with pytest.raises(ValueError, match="at least 1"):

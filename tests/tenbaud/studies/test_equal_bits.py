@@ -6,6 +6,7 @@ import csv
 import math
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from tenbaud.build.flight import agree
 from tenbaud.config.kinds import CODERS, MODELS
 from tenbaud.config.load import load_config
 from tenbaud.config.schema import FlightConfig
+from tenbaud.design.complete import completed
 from tenbaud.flight import transmit
 from tenbaud.studies import compiled as compiling
 from tenbaud.studies.chunk import fly_point
@@ -30,7 +32,25 @@ from tenbaud.studies.schedule import Uncommon
 from tenbaud.studies.settings import StudyError
 from transmitter.session.records import SAMPLE_CHANNEL
 
-PRESETS = ("paper-10baud", "tuned-20baud", "open-loop-zoom-10baud", "static-10baud", "usual-1000baud")
+PRESETS = (
+    *("paper-10baud", "tuned-20baud", "open-loop-zoom-10baud", "static-10baud", "usual-1000baud"),
+    *("history-10baud", "direction", "linear"),
+)
+LINEAR = {
+    "kind": "linear",
+    "A": [[0.0, 1.0], [-0.5, -0.1]],
+    "B": [[0.0, 0.0], [0.35, -0.35]],
+    "C": [[1.0, 0.0]],
+    "G": [[0.0], [1.0]],
+    "densities": [2e-3],
+    "states": ["pitch", "pitch_rate"],
+    "state_units": ["rad", "rad/s"],
+    "inputs": ["front", "rear"],
+    "input_units": ["V", "V"],
+    "outputs": ["pitch"],
+    "output_units": ["rad"],
+}
+"""The pitch near its rest, without motor lag; the plant stays the nonlinear one."""
 
 CLEAN: dict[str, Any] = {}
 REAL_WIRE = {
@@ -55,7 +75,16 @@ BURSTS = {
 
 
 def config_of(preset: str, changes: dict[str, Any]) -> FlightConfig:
-    return load_config(preset, None, {**changes, "duration_s": 8.0, "seed": 11})
+    values = {**changes, "duration_s": 8.0, "seed": 11}
+    if preset.endswith("baud"):
+        return load_config(preset, None, values)
+    return load_config("paper-10baud", None, {**values, **designed(preset == "linear")})
+
+
+@cache
+def designed(linear: bool) -> dict[str, Any]:
+    """Return model and coder."""
+    return completed({"coder": {"kind": "direction"}, **({"model": LINEAR} if linear else {})})
 
 
 def digests_of(config: FlightConfig) -> list[str]:
@@ -97,10 +126,9 @@ def test_when_a_flight_is_compiled_then_no_bit_differs(preset: str, changes: dic
 
 
 def test_when_a_kind_of_model_or_coder_exists_then_a_preset_above_flies_it() -> None:
-    configs = [load_config(preset) for preset in (*PRESETS, "fixed-10baud")]
-    # A coder that is shown rates flies in a study as it does in the nodes, by their own sessions.
-    assert {config.coder.kind for config in configs} == set(CODERS.built_in) - {"history"}
-    # Other plants than the pitch axis fly by the sessions too.
+    configs = [config_of(preset, {}) for preset in (*PRESETS, "fixed-10baud")]
+    assert {config.coder.kind for config in configs} == set(CODERS.built_in)
+    # Other plants than the pitch axis fly by the sessions.
     assert {config.model.kind for config in configs} == set(MODELS.built_in) - {"pendulum"}
 
 
@@ -142,7 +170,6 @@ def test_when_a_recorded_flight_is_compiled_then_no_figure_differs(tmp_path: Pat
         {"link": {"impairments": "up:dead=1s"}},
         {"link": {"impairments": "raw=0.01"}},
         {"transmitter": {"sabotage": "sample=9,field=range"}},
-        {"coder": {"kind": "history"}},
         {"transmitter": {"plant": {"kind": "outside:Cart"}}},
     ],
     ids=str,

@@ -1,0 +1,360 @@
+"""One sign at a time, asked of the direction in state space in which an error is worth most.
+
+Both ends propagate a covariance P of what they cannot know, from the plant's F and Q and from the
+symbols. N says what an error costs, now and later. For each bit, with shared numbers alone:
+
+1. `P <- P + gamma max(m, 0)^3 D D'`: long runs of agreeing signs mean that P is too small along D.
+2. The direction c: the eigenvector of `N P` with the largest eigenvalue, scaled to `c' P c = 1`, found
+   as a column of `(N P)^16`; `v = P c`.
+3. The transmitter sends `s = sign(c' (x - x_hat))`.
+4. `d = c' D`, `z = s d / sqrt(d^2 + delta)`, `m <- m + mu (z - m)`: does the sign agree with what a
+   larger disturbance would have said?
+5. The correction is `sigma kappa (1 + tau z) s v`.
+6. `P <- P - alpha v v'`, `D <- D - a d v + kappa s v`.
+7. `sigma <- sigma (1 + k (z + beta) + eta max(m, 0)^3)` within its limits.
+
+Once a sample then, erased or not, `P <- F P F' + Q` and `D <- F D`. P and D are in units of sigma, the
+strength of the disturbance in units of the assumed one; D is how the estimate depends on log sigma.
+With k and eta zero the strength is taken as known.
+
+alpha would be 2/pi and kappa sqrt(2/pi) for the sign of a normal error. The comparisons (largest
+entry, positive part) are of shared numbers, which are equal to the last bit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from channel.codec.codec import Vector
+from channel.codec.coders.base import (
+    CoderFunctions,
+    FunctionCoder,
+    Numbers,
+    Results,
+    SymbolResults,
+    Symbols,
+)
+from channel.codec.models.linear import Rows, check, flat
+from channel.codec.words import Alphabet
+
+SQUARINGS = 4
+GROWTH_MAX = 1e12
+"""P is held within this many times what it starts from, however long nothing arrives."""
+
+
+@dataclass(frozen=True, slots=True)
+class DirectionParameters:
+    """Parameters; the matrices are those of the corrected states, for one sample."""
+
+    transition: Rows
+    """F"""
+    noise: Rows
+    """Q"""
+    worth: Rows
+    """N"""
+    start: Rows
+    """P before the first word"""
+    bits: int = 1
+    """signs per sample"""
+    adapts: bool = True
+    """follow a disturbance of unknown strength; False: it is as Q says"""
+    removed: float = 0.67
+    """alpha"""
+    step: float = 1.0
+    """kappa"""
+    initial_strength: float = 1.0
+    minimum_strength: float = 1e-3
+    maximum_strength: float = 1e3
+    """sigma"""
+
+
+class DirectionConstants(NamedTuple):
+    """What the functions below need; matrices row by row."""
+
+    transition: Vector
+    noise: Vector
+    worth: Vector
+    largest: Vector
+    """per state: the variance that P is held within"""
+    alpha: float
+    kappa: float
+    smallest_strength: float
+    largest_strength: float
+    k: float
+    eta: float
+    gamma: float = 0.35
+    mu: float = 0.4
+    a: float = 0.8
+    delta: float = 0.003
+    tau: float = 0.04
+    beta: float = 0.15
+
+
+def size_of(constants: DirectionConstants) -> int:
+    """Return how many states are corrected."""
+    return len(constants.largest)
+
+
+def place(row: int, column: int) -> int:
+    """Return where an entry of a symmetric matrix is, of which the lower half is kept row by row."""
+    if row < column:
+        return column * (column + 1) // 2 + row  # integers
+    return row * (row + 1) // 2 + column  # integers
+
+
+def aim(constants: DirectionConstants, coder: Results, c: Results, v: Results) -> bool:
+    """Step 1 and 2: let P grow, write the direction and what is known along it.
+
+    `coder` is P (lower half), D, m, sigma. Return whether there is a direction: not when P is zero.
+    """
+    n = size_of(constants)
+    first = n * (n + 1) // 2  # integers
+    run = coder[first + n]
+    if run > 0.0:
+        growth = constants.gamma * (run * run * run)
+        for i in range(n):
+            for j in range(i + 1):
+                coder[place(i, j)] += growth * (coder[first + i] * coder[first + j])
+    power = [0.0] * (n * n)
+    square = [0.0] * (n * n)
+    for i in range(n):
+        for j in range(n):
+            total = 0.0
+            for k in range(n):
+                total += constants.worth[i * n + k] * coder[place(k, j)]
+            power[i * n + j] = total
+    for _ in range(SQUARINGS):
+        trace = 0.0
+        for i in range(n):
+            trace += power[i * n + i]
+        if not trace > 0.0:
+            return False
+        scale = 1.0 / (trace * trace)
+        for i in range(n):
+            for j in range(n):
+                total = 0.0
+                for k in range(n):
+                    total += power[i * n + k] * power[k * n + j]
+                square[i * n + j] = total * scale
+        for i in range(n * n):
+            power[i] = square[i]
+    best = 0
+    for i in range(1, n):
+        if power[i * n + i] > power[best * n + best]:
+            best = i
+    for i in range(n):
+        c[i] = power[i * n + best]
+    variance = 0.0
+    for i in range(n):
+        total = 0.0
+        for j in range(n):
+            total += coder[place(i, j)] * c[j]
+        v[i] = total
+        variance += c[i] * total
+    if not variance > 0.0:
+        return False
+    scale = 1.0 / math.sqrt(variance)
+    for i in range(n):
+        c[i] *= scale
+        v[i] *= scale
+    return True
+
+
+def learn(
+    constants: DirectionConstants,
+    coder: Results,
+    c: Numbers,
+    v: Numbers,
+    sign: int,
+    correction: Results,
+) -> None:
+    """Steps 4 to 7: add the correction that a sign means, and write what is known after it."""
+    n = size_of(constants)
+    first = n * (n + 1) // 2  # integers
+    strength = coder[first + n + 1]
+    d = 0.0
+    for i in range(n):
+        d += c[i] * coder[first + i]
+    agrees = sign * d / math.sqrt(d * d + constants.delta)
+    run = coder[first + n] + constants.mu * (agrees - coder[first + n])
+    size = strength * constants.kappa * (1.0 + constants.tau * agrees) * sign
+    swing = constants.kappa * sign - constants.a * d
+    for i in range(n):
+        correction[i] += size * v[i]
+        for j in range(i + 1):
+            coder[place(i, j)] -= constants.alpha * (v[i] * v[j])
+        coder[first + i] += swing * v[i]
+    positive = run if run > 0.0 else 0.0
+    change = constants.k * (agrees + constants.beta) + constants.eta * (positive * positive * positive)
+    strength = strength * (1.0 + change)
+    if strength < constants.smallest_strength:
+        strength = constants.smallest_strength
+    if strength > constants.largest_strength:
+        strength = constants.largest_strength
+    coder[first + n] = run
+    coder[first + n + 1] = strength
+
+
+def wait(constants: DirectionConstants, coder: Results) -> None:
+    """Let P and D grow over a sample, within the limits of P."""
+    n = size_of(constants)
+    first = n * (n + 1) // 2  # integers
+    moved = [0.0] * (n * n)
+    turned = [0.0] * n
+    for i in range(n):
+        total = 0.0
+        for j in range(n):
+            total += constants.transition[i * n + j] * coder[first + j]
+            product = 0.0
+            for k in range(n):
+                product += constants.transition[i * n + k] * coder[place(k, j)]
+            moved[i * n + j] = product
+        turned[i] = total
+    excess = 1.0
+    for i in range(n):
+        for j in range(i + 1):
+            total = constants.noise[i * n + j]
+            for k in range(n):
+                total += moved[i * n + k] * constants.transition[j * n + k]
+            coder[place(i, j)] = total
+        variance = coder[place(i, i)]
+        if variance > excess * constants.largest[i]:
+            excess = variance / constants.largest[i]
+    shrink = 1.0 / math.sqrt(excess)
+    for i in range(n):
+        coder[first + i] = turned[i] * shrink
+    if excess > 1.0:
+        for i in range(first):
+            coder[i] = coder[i] / excess
+
+
+def direction_encode(
+    constants: DirectionConstants,
+    coder: Numbers,
+    predicted: Numbers,
+    measurement: Numbers,
+    symbols: SymbolResults,
+) -> None:
+    """Write the signs of the errors along the directions asked for; vectors are of corrected states."""
+    n = size_of(constants)
+    own = [0.0] * len(coder)
+    for i in range(len(coder)):
+        own[i] = coder[i]
+    c = [0.0] * n
+    v = [0.0] * n
+    correction = [0.0] * n
+    for bit in range(len(symbols)):
+        symbols[bit] = 1
+        if aim(constants, own, c, v):
+            error = 0.0
+            for i in range(n):
+                error += c[i] * (measurement[i] - predicted[i] - correction[i])
+            if error < 0.0:
+                symbols[bit] = -1
+            learn(constants, own, c, v, symbols[bit], correction)
+
+
+def direction_decode(
+    constants: DirectionConstants,
+    coder: Numbers,
+    model: Numbers,
+    symbols: Symbols,
+    erased: bool,
+    correction: Results,
+    after: Results,
+) -> None:
+    """Write the correction of the corrected states and the coder state at the next sample."""
+    n = size_of(constants)
+    for i in range(len(after)):
+        after[i] = coder[i]
+    for i in range(n):
+        correction[i] = 0.0
+    if not erased:
+        c = [0.0] * n
+        v = [0.0] * n
+        for bit in range(len(symbols)):
+            if aim(constants, after, c, v):
+                learn(constants, after, c, v, symbols[bit], correction)
+    wait(constants, after)
+
+
+class DirectionCoder(FunctionCoder):
+    """One or more signs per sample for all corrected states together.
+
+    Coder state: the lower half of P, D, m (mean agreement of the last signs) and sigma.
+    """
+
+    functions = CoderFunctions(direction_encode, direction_decode, allocates=True)
+    impulse = True
+    uses_rates = True
+
+    def __init__(self, parameters: DirectionParameters) -> None:
+        p = parameters
+        size = len(p.transition)
+        for name in ("transition", "noise", "worth", "start"):
+            check(name, getattr(p, name), size, size)
+        check_parameters(p)
+        self.parameters = p
+        self.alphabet = Alphabet((-1, 1), p.bits)
+        self.correction_size = size
+        self.constants = DirectionConstants(
+            flat(p.transition),
+            flat(p.noise),
+            flat(p.worth),
+            tuple(GROWTH_MAX * p.start[state][state] for state in range(size)),
+            p.removed,
+            p.step,
+            p.minimum_strength,
+            p.maximum_strength,
+            0.01 if p.adapts else 0.0,
+            0.03 if p.adapts else 0.0,
+        )
+
+    def initial(self) -> Vector:
+        """Return what both ends know before the first word."""
+        start = self.parameters.start
+        lower = [start[row][column] for row in range(len(start)) for column in range(row + 1)]
+        nothing = [0.0] * (self.correction_size + 1)
+        return (*lower, *nothing, self.parameters.initial_strength)
+
+    def is_state(self, coder: Vector) -> bool:
+        """Return whether the variances are within their limits, and the strength within its own."""
+        within = self.parameters.minimum_strength <= coder[-1] <= self.parameters.maximum_strength
+        largest = self.constants.largest
+        return within and all(
+            0.0 <= coder[place(state, state)] <= 2.0 * limit for state, limit in enumerate(largest)
+        )
+
+    def ranges(self, coder: Vector) -> Vector:
+        """Return, for each corrected state, the standard deviation that both ends assume."""
+        sizes = []
+        for state in range(self.correction_size):
+            variance = coder[place(state, state)]
+            sizes.append(coder[-1] * math.sqrt(variance if variance > 0.0 else 0.0))
+        return tuple(sizes)
+
+
+def check_parameters(parameters: DirectionParameters) -> None:
+    """Raise ValueError where the parameters make no coder."""
+    if not 1 <= parameters.bits <= 15:
+        raise ValueError(f"bits must be 1 ... 15, got {parameters.bits}")
+    if not 0.0 < parameters.removed < 1.0:
+        raise ValueError(f"removed must be above 0 and below 1, got {parameters.removed}")
+    smallest, largest = parameters.minimum_strength, parameters.maximum_strength
+    if not 0.0 < smallest <= parameters.initial_strength <= largest:
+        raise ValueError(
+            "strengths must be 0 < minimum <= initial <= maximum, got "
+            f"{smallest}, {parameters.initial_strength}, {largest}"
+        )
+    for name in ("noise", "worth", "start"):
+        rows = getattr(parameters, name)
+        for row in range(len(rows)):
+            for column in range(row + 1):
+                if rows[row][column] != rows[column][row]:
+                    raise ValueError(
+                        f"{name} must be symmetric, and its entries {row + 1}, {column + 1} differ"
+                    )
+            if name == "start" and not rows[row][row] > 0.0:
+                raise ValueError(f"start must be above 0 on its diagonal, state {row + 1} is not")

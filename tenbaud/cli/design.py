@@ -1,0 +1,129 @@
+"""`tenbaud floor` and `tenbaud design`: what a rate allows, and the constants that come near to it."""
+
+from __future__ import annotations
+
+import json as json_module
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from tenbaud.cli import options
+from tenbaud.flight.outcome import ExitCode
+
+if TYPE_CHECKING:
+    from tenbaud.design.floors import Floors
+
+
+def floor(
+    preset: options.Preset = None,
+    config: options.ConfigFile = None,
+    plant: Annotated[
+        str | None,
+        typer.Option(help="A linear plant by name instead of a configuration's.", show_default=False),
+    ] = None,
+    rate: Annotated[
+        float | None,
+        typer.Option(
+            help="In bit/s; the flight's if not given.", min=1e-6, max=1e9, show_default=False
+        ),
+    ] = None,
+    json: options.AsJson = False,
+) -> None:
+    """Print the smallest rate that a plant needs, and the least error that a rate allows.
+
+    Both hold for any code. Exit code 1 if the rate is too low.
+
+    [dim]tenbaud floor --preset paper-10baud[/dim]
+
+    [dim]tenbaud floor --plant pendulum --rate 20[/dim]
+    """
+    from tenbaud.build.codec import build_codec
+    from tenbaud.config.load import load_config
+    from tenbaud.design.described import plant_of, plant_section
+    from tenbaud.design.floors import floors
+
+    period = None
+    if plant is not None:
+        section: Any = _known(plant_section, plant)
+        tick_s = 0.01
+    else:
+        flown = load_config(preset, config)
+        section, tick_s = flown.model, flown.timing.tick_s
+        alphabet = build_codec(flown).coder.alphabet
+        bits = alphabet.symbols_per_word * math.log2(len(alphabet.symbols))
+        if rate is None:
+            period = flown.timing.symbol_period_s
+            rate = bits / period
+    if rate is None:
+        raise typer.BadParameter("give --rate for a plant by name")
+    described = plant_of(section, tick_s)
+    if described is None:
+        raise typer.BadParameter(f"model.kind = {section.kind!r} has no floor: it describes no plant")
+    found = _known(floors, described, rate, period)
+    if json:
+        typer.echo(json_module.dumps(asdict(found), indent=2))
+    else:
+        names = getattr(section, "outputs", ()) or ("pitch",) * len(described.C)
+        units = getattr(section, "output_units", ()) or ("rad",) * len(described.C)
+        densities = ", ".join(f"{density:g}" for density in described.densities)
+        typer.echo(_text(found, list(zip(names, units, strict=True)), densities))
+    if found.rms is None:
+        raise typer.Exit(int(ExitCode.FAILED))
+
+
+def design(
+    config: Annotated[
+        Path, typer.Option("--config", help="TOML file with a linear model and a coder `direction`.")
+    ],
+    out: Annotated[Path, typer.Option(help="The completed configuration, for both ends.")],
+    preset: options.Preset = None,
+) -> None:
+    """Complete a configuration: discretise its linear model, design its `direction` coder.
+
+    Once, for both ends: give the same completed file to the transmitter and the receiver.
+
+    [dim]tenbaud design --config plant.toml --out flight.toml[/dim]
+    """
+    import tomli_w
+
+    from tenbaud.config.load import load_config, merged_values, read_toml
+    from tenbaud.design.complete import completed
+    from tenbaud.files.whole import write_whole
+
+    own = read_toml(config)
+    whole = completed(merged_values(preset, config))
+    own |= {name: whole[name] for name in ("model", "coder")}
+    if preset is not None:
+        own["preset"] = preset
+    load_config(None, None, own)
+    write_whole(out, tomli_w.dumps(own))
+    typer.echo(f"wrote {out}")
+
+
+def _known(function: Any, *arguments: Any) -> Any:
+    """Call a function whose ValueError is about what was asked for."""
+    try:
+        return function(*arguments)
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error
+
+
+def _text(found: Floors, outputs: list[tuple[str, str]], densities: str) -> str:
+    lines = [
+        ("rate", f"{found.rate_bit_s:.4g} bit/s"),
+        ("smallest rate", f"{found.rate_needed_bit_s:.4g} bit/s, by the data-rate theorem"),
+        ("disturbance", f"densities {densities}"),
+    ]
+    if found.rms is None:
+        lines.append(("least error", "none: at this rate it grows without bound, whatever the code"))
+    else:
+        for (name, unit), rms in zip(outputs, found.rms, strict=True):
+            degrees = f"  ({math.degrees(rms):.3g} deg)" if unit == "rad" else ""
+            lines.append((f"least rms {name}", f"{rms:.4g} {unit}{degrees}"))
+    if found.words_over_flow is not None:
+        lines.append(("bits in words", f"{found.words_over_flow:.3f} times that"))
+    width = max(len(name) for name, _ in lines)
+    return "\n".join(f"{name:{width}}  {text}" for name, text in lines)

@@ -1,0 +1,62 @@
+"""Completing a configuration: what both ends must share to the last bit is worked out once, here.
+
+Neither end discretises or designs by itself: two machines' libraries differ in the last bit. The result
+goes into the shared configuration by value.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+from tenbaud.config.load import ConfigError
+from tenbaud.config.models import LinearModelSection, PitchModelSection
+from tenbaud.config.schema import Timing
+from tenbaud.config.section import KindSection
+from tenbaud.design.described import corrected_part, plant_of
+from tenbaud.design.direction import design_direction
+from tenbaud.design.plant import discretised
+
+
+def completed(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return nested settings with the sections `model` and `coder` completed.
+
+    A linear model gets F and E from its A and B, and a coder `direction` its constants for the plant;
+    both anew where they are there already. Raises ConfigError where nothing can be designed.
+    """
+    timing = Timing.model_validate(values.get("timing", {}))
+    given, coder = dict(values.get("model", {})), dict(values.get("coder", {}))
+    try:
+        section = _section(given)
+        if isinstance(section, LinearModelSection) and section.A:
+            F, E = discretised(section.A, section.B, timing.tick_s)
+            given |= {"F": F.tolist(), "E": E.tolist()}
+            section = LinearModelSection.model_validate(given)
+        if coder.get("kind") == "direction":
+            coder |= _direction(section, coder, timing)
+    except ValueError as error:
+        raise ConfigError(f"this cannot be designed: {error}") from error
+    return {**values, "model": given, "coder": coder}
+
+
+def _section(model: dict[str, Any]) -> KindSection:
+    kind = model.get("kind", "pitch")
+    if kind not in ("linear", "pitch"):
+        raise ValueError(f"model.kind = {kind!r}; designs are for linear and pitch")
+    sort = LinearModelSection if kind == "linear" else PitchModelSection
+    return sort.model_validate(model)
+
+
+def _direction(section: KindSection, coder: Mapping[str, Any], timing: Timing) -> dict[str, Any]:
+    plant = plant_of(section, timing.tick_s)
+    if plant is None:
+        raise ValueError(f"model.kind = {section.kind!r} describes no plant")
+    plant = corrected_part(plant, getattr(section, "corrected", 0))
+    rate = coder.get("bits", 1) / timing.symbol_period_s
+    found = asdict(design_direction(plant, rate, timing.symbol_period_s))
+    designed = ("transition", "noise", "worth", "start", "removed", "step")
+    return {
+        name: [list(row) for row in found[name]] if isinstance(found[name], tuple) else found[name]
+        for name in designed
+    }

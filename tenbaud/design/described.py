@@ -1,0 +1,100 @@
+"""Linear plants by name and by configuration: what `tenbaud floor` and `tenbaud design` are about."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from importlib.resources import files
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from channel.codec.codec import Codec
+from tenbaud.bounds.floor import RateTooLow
+from tenbaud.bounds.linear import rate_needed
+from tenbaud.config.models import LinearModelSection, PendulumModelSection, PitchModelSection
+from tenbaud.config.schema import FlightConfig
+from tenbaud.config.section import KindSection
+from tenbaud.design.plant import LinearPlant, continuous, discretised, linear_plant
+
+PITCH_DENSITY = 2e-3
+"""rad^2/s^3; of the torque that designs and floors of the pitch assume"""
+FOLDER = files("tenbaud") / "presets" / "plants"
+
+
+def plant_names() -> list[str]:
+    """Return the linear plants that come with the package."""
+    return sorted(item.name[:-5] for item in FOLDER.iterdir() if item.name.endswith(".toml"))
+
+
+def plant_section(name: str) -> LinearModelSection:
+    """Return the model of a plant of the package; ValueError where there is none of that name."""
+    if name not in plant_names():
+        raise ValueError(f"there is no linear plant {name!r}; known are {', '.join(plant_names())}")
+    values = tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
+    return LinearModelSection.model_validate(values["model"])
+
+
+def plant_of(section: KindSection, tick_s: float) -> LinearPlant | None:
+    """Return the plant that a model describes, linearised at rest; None for a model that has none."""
+    if isinstance(section, PitchModelSection):
+        stiffness, damping = section.stiffness_per_s2, section.rate_damping_per_s
+        a, b = [[0.0, 1.0], [-stiffness, -damping]], [[0.0], [1.0]]
+        return linear_plant(a, b, [[1.0, 0.0]], densities=PITCH_DENSITY)
+    if isinstance(section, PendulumModelSection):
+        a = [[0.0, 1.0], [section.growth_per_s**2, -section.damping_per_s]]
+        return linear_plant(a, [[0.0], [1.0]], [[1.0, 0.0]], densities=PITCH_DENSITY)
+    if not isinstance(section, LinearModelSection):
+        return None
+    dynamics: ArrayLike
+    drive: ArrayLike
+    dynamics, drive = section.A, section.B
+    if not section.A:
+        dynamics, drive = continuous(section.F, section.E, tick_s)
+    return linear_plant(
+        dynamics, drive, section.C, section.G or None, section.densities, section.weights
+    )
+
+
+def check_plant(config: FlightConfig, codec: Codec) -> None:
+    """Raise ValueError where the bits are too few for a plant, or its matrices are not of one plant."""
+    section, tick_s = config.model, config.timing.tick_s
+    if isinstance(section, LinearModelSection) and section.A and section.F:
+        for name, expected in zip("FE", discretised(section.A, section.B, tick_s), strict=True):
+            if not np.allclose(getattr(section, name), expected, rtol=1e-9, atol=1e-12):
+                raise ValueError(
+                    f"model.{name} is not that of A and B for ticks of {tick_s:g} s: run `tenbaud "
+                    "design` again after a change of the plant or of timing.tick_s"
+                )
+    plant = plant_of(section, tick_s)
+    if plant is None:
+        return
+    alphabet = codec.coder.alphabet
+    bits = alphabet.symbols_per_word * math.log2(len(alphabet.symbols))
+    rate, needed = bits / (tick_s * codec.ticks_per_sample), rate_needed(plant.A)
+    if not rate > needed:
+        raise RateTooLow(
+            f"{rate:.4g} bit/s are too few: this plant grows by itself, and the data-rate theorem asks "
+            f"for more than {needed:.4g} bit/s; shorten timing.symbol_period_s and raise "
+            "channel.rate_baud"
+        )
+
+
+def corrected_part(plant: LinearPlant, states: int) -> LinearPlant:
+    """Return the plant of the first states, which take corrections; the others are known."""
+    if states in (0, len(plant.A)):
+        return plant
+    kept = slice(states)
+    if np.any(plant.G[states:]) or np.any(plant.A[states:, kept]):
+        raise ValueError(
+            f"only the first {states} of {len(plant.A)} states take corrections, so the others must "
+            "follow from the commands alone; the disturbance or the first states reach them"
+        )
+    return LinearPlant(
+        plant.A[kept, kept],
+        plant.B[kept],
+        plant.C[:, kept],
+        plant.G[kept],
+        plant.densities,
+        plant.weights,
+    )

@@ -1,0 +1,165 @@
+"""The constants of the `direction` coder, found once and offline from a plant and a rate.
+
+What an error costs is not what it costs now: an error of the rate is an error of the angle later. N is
+that cost-to-go under the coder itself, which asks for the direction that N calls the most expensive. So
+it is found by turns, from an ideal code's (the floor's multipliers) or from that of a few samples
+without bits: fly the covariance forward under N, bring the cost of its errors back, take N between the
+two. Of all N, the one under which the mean error is least is kept.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from channel.codec.coders.direction import DirectionParameters
+from tenbaud.bounds.floor import RateTooLow, ideal_worth, period_cost
+from tenbaud.bounds.linear import Matrix, rate_needed, sampled
+from tenbaud.design.plant import LinearPlant
+
+ROUNDS = 25
+SAMPLES = 600
+AHEAD = 8
+"""samples that first guesses of N look ahead at most"""
+GROWN = 4
+"""samples that the first P has grown for"""
+SQUARINGS = 4
+GAIN_LEAST, PATIENCE = 1e-4, 3
+"""relative gain of a round; the search ends after more than this number of rounds that gain less"""
+WORTH_MAX = 1e9
+"""of an error of the usual size, in units of the floor"""
+
+
+class Turn(NamedTuple):
+    """A covariance flown forward, and the cost of its errors brought back."""
+
+    cost: float
+    worth: Matrix
+    covariance: Matrix
+
+
+def design_direction(
+    plant: LinearPlant, rate_bit_s: float, symbol_period_s: float, *, adapts: bool = True
+) -> DirectionParameters:
+    """Return what the coder needs for a plant at a rate; ValueError where there is no such coder.
+
+    A word of `rate_bit_s symbol_period_s` bits leaves every symbol period.
+    """
+    bits = round(rate_bit_s * symbol_period_s)
+    if bits < 1 or abs(bits - rate_bit_s * symbol_period_s) > 1e-6 * bits:
+        raise ValueError(
+            f"{rate_bit_s:g} bit/s make {rate_bit_s * symbol_period_s:g} bits in a symbol period of "
+            f"{symbol_period_s:g} s; a word has a whole number of them"
+        )
+    needed = rate_needed(plant.A)
+    if not rate_bit_s > needed:
+        raise RateTooLow(
+            f"{rate_bit_s:g} bit/s are too few: the data-rate theorem asks for more than "
+            f"{needed:.4g} bit/s of this plant"
+        )
+    model = plant.model()
+    covariance, ideal = ideal_worth(model, rate_bit_s)
+    sizes = np.sqrt(np.diag(covariance))
+    transition, noise = sampled(model, symbol_period_s)
+    cost, _ = period_cost(model, symbol_period_s)
+    products = np.outer(sizes, sizes)
+    used = needed / rate_bit_s
+    alpha = max(0.67, 0.58 + 0.18 * used)
+    # On a plant that grows, steps are larger than the best ones: smaller ones lose it now and then.
+    kappa = min(max(0.75 + 0.75 * used, 1.15), 1.25) if needed > 0.0 else 1.0
+    scaled = (transition * sizes / sizes[:, None], noise / products, cost * products)
+    with np.errstate(all="ignore"):
+        best = _search(*scaled, ideal * products, alpha, bits)
+    return DirectionParameters(
+        transition=_rows(transition),
+        noise=_rows(noise),
+        worth=_rows(best.worth / products),
+        start=_rows(best.covariance * products),
+        bits=bits,
+        adapts=adapts,
+        removed=alpha,
+        step=kappa,
+    )
+
+
+def _search(F: Matrix, Q: Matrix, M: Matrix, ideal: Matrix, alpha: float, bits: int) -> Turn:
+    covariance = Q
+    for _ in range(GROWN):
+        covariance = _symmetric(F @ covariance @ F.T + Q)
+    guesses = [ideal, M]
+    moved = F
+    for _ in range(AHEAD):
+        guesses.append(guesses[-1] + moved.T @ M @ moved)
+        moved = moved @ F
+    best = Turn(math.inf, M, covariance)
+    for guess in map(_symmetric, guesses):
+        turn = _turn(F, Q, M, guess, covariance, alpha, bits)
+        if turn.cost < best.cost:
+            best = Turn(turn.cost, guess, turn.covariance)
+    if not math.isfinite(best.cost):
+        raise ValueError("no direction coder was found: the rate is too near to the smallest one")
+    worth, covariance = best.worth, best.covariance
+    idle = 0
+    for _ in range(ROUNDS):
+        turn = _turn(F, Q, M, worth, covariance, alpha, bits)
+        idle = idle + 1 if turn.cost > best.cost * (1.0 - GAIN_LEAST) else 0
+        if turn.cost < best.cost:
+            best = Turn(turn.cost, worth, turn.covariance)
+        # Where one mode is corrected too seldom, the cost of an error grows without bound.
+        if idle > PATIENCE or not float(np.abs(turn.worth).max()) < WORTH_MAX:
+            break
+        worth = _symmetric(0.5 * (worth + turn.worth))
+        covariance = turn.covariance
+    return best
+
+
+def _turn(
+    F: Matrix, Q: Matrix, M: Matrix, N: Matrix, covariance: Matrix, alpha: float, bits: int
+) -> Turn:
+    """Fly `SAMPLES` bits forward from a covariance, and the cost of an error back from N.
+
+    The cost is not finite where the covariance grew without bound.
+    """
+    P = covariance
+    flown = []
+    cost = 0.0
+    for bit in range(SAMPLES):
+        c, v = _direction(N, P)
+        flown.append((c, v))
+        P = P - alpha * np.outer(v, v)
+        if (bit + 1) % bits == 0:
+            if bit >= SAMPLES // 3:
+                cost += float(np.sum(M * P))
+            P = _symmetric(F @ P @ F.T + Q)
+    ahead = N
+    total = np.zeros_like(N)
+    for bit in range(SAMPLES - 1, -1, -1):
+        c, v = flown[bit]
+        now = M + F.T @ ahead @ F if (bit + 1) % bits == 0 else ahead
+        if SAMPLES // 3 <= bit < 2 * SAMPLES // 3:
+            total = total + now
+        known = now @ v
+        both = np.outer(c, known)
+        ahead = now - alpha * (both + both.T) + alpha * float(v @ known) * np.outer(c, c)
+    return Turn(cost * bits / (SAMPLES - SAMPLES // 3), total / (SAMPLES // 3), P)
+
+
+def _direction(N: Matrix, P: Matrix) -> tuple[Matrix, Matrix]:
+    """Return c and v as the coder finds them; without a number where P is no covariance any more."""
+    power = N @ P
+    for _ in range(SQUARINGS):
+        power = power @ power / np.trace(power) ** 2
+    c = power[:, np.argmax(np.diag(power))]
+    v = P @ c
+    scale = 1.0 / np.sqrt(c @ v)
+    return c * scale, v * scale
+
+
+def _symmetric(matrix: Matrix) -> Matrix:
+    return 0.5 * (matrix + matrix.T)
+
+
+def _rows(matrix: Matrix) -> tuple[tuple[float, ...], ...]:
+    return tuple(tuple(float(value) for value in row) for row in matrix)

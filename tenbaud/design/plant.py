@@ -1,0 +1,98 @@
+"""A linear plant as designs and floors take it, and its discretisation.
+
+dx/dt = A x + B u + G w,     y = C x,     E w(t) w(t')' = diag(q) delta(t - t')
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.linalg import expm, logm
+
+from tenbaud.bounds.linear import LinearModel, Matrix, linear_model
+
+IMAGINARY_MAX = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class LinearPlant:
+    """A, B, C, the disturbance's G and q, and the weight of each output's squared error."""
+
+    A: Matrix
+    B: Matrix
+    C: Matrix
+    G: Matrix
+    densities: Matrix
+    """q, two-sided, one for each column of G"""
+    weights: Matrix
+
+    @property
+    def noise(self) -> Matrix:
+        """Return G diag(q) G'."""
+        return self.G * self.densities @ self.G.T
+
+    @property
+    def cost(self) -> Matrix:
+        """Return C' diag(w) C."""
+        return self.C.T * self.weights @ self.C
+
+    def model(self) -> LinearModel:
+        """Return what the floors are of; ValueError where there is none."""
+        return linear_model(self.A, self.noise, self.C, self.weights)
+
+
+def linear_plant(
+    A: ArrayLike,
+    B: ArrayLike,
+    C: ArrayLike,
+    G: ArrayLike | None = None,
+    densities: ArrayLike = 1.0,
+    weights: ArrayLike | None = None,
+) -> LinearPlant:
+    """Return a plant; the disturbance acts like the commands unless G says otherwise.
+
+    One density serves all columns of G, as one weight does all outputs.
+    """
+    a, b, c = (np.atleast_2d(np.asarray(one, dtype=float)) for one in (A, B, C))
+    g = b if G is None else np.atleast_2d(np.asarray(G, dtype=float))
+    for name, matrix, shape in (
+        ("A", a, (len(a), len(a))),
+        ("B", b, (len(a), b.shape[1])),
+        ("C", c, (len(c), len(a))),
+        ("G", g, (len(a), g.shape[1])),
+    ):
+        if matrix.shape != shape or not np.isfinite(matrix).all():
+            raise ValueError(f"{name} must be {shape[0]} x {shape[1]} finite numbers, got {matrix}")
+    q = np.broadcast_to(np.asarray(densities, dtype=float), (g.shape[1],)).copy()
+    w = np.broadcast_to(np.asarray(1.0 if weights is None else weights, dtype=float), (len(c),)).copy()
+    return LinearPlant(a, b, c, g, q, w)
+
+
+def discretised(A: ArrayLike, B: ArrayLike, period_s: float) -> tuple[Matrix, Matrix]:
+    """Return (F, E) of a period under a held command: zero-order hold."""
+    a, b = (np.atleast_2d(np.asarray(one, dtype=float)) for one in (A, B))
+    states, inputs = b.shape
+    block = np.zeros((states + inputs, states + inputs))
+    block[:states, :states] = a
+    block[:states, states:] = b
+    grown = expm(block * period_s)
+    return grown[:states, :states], grown[:states, states:]
+
+
+def continuous(F: ArrayLike, E: ArrayLike, period_s: float) -> tuple[Matrix, Matrix]:
+    """Return (A, B) whose zero-order hold over a period is (F, E); ValueError where there is none."""
+    f, e = (np.atleast_2d(np.asarray(one, dtype=float)) for one in (F, E))
+    states, inputs = e.shape
+    block = np.eye(states + inputs)
+    block[:states, :states] = f
+    block[:states, states:] = e
+    grown = np.asarray(logm(block))
+    if not np.isfinite(grown).all() or np.abs(grown.imag).max() > IMAGINARY_MAX:
+        raise ValueError(
+            f"F = {f.tolist()} is no zero-order hold of a continuous plant: it has an eigenvalue that "
+            "is zero or on the negative real axis"
+        )
+    found = grown.real / period_s
+    return found[:states, :states], found[:states, states:]

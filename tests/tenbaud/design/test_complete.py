@@ -1,0 +1,160 @@
+"""Configurations of linear plants: completed once, refused when they are not, or not any more."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from channel.codec.models.linear import LinearModel
+from channel.codec.signals import signals_of
+from tenbaud.build.codec import build_codec
+from tenbaud.build.flight import agree
+from tenbaud.cli.commands import app
+from tenbaud.config.load import ConfigError, dump_config, load_config
+from tenbaud.design.complete import completed
+
+PENDULUM: dict[str, Any] = {
+    "kind": "linear",
+    "A": [[0.0, 1.0], [53.6, 0.0]],
+    "B": [[0.0], [1.0]],
+    "C": [[1.0, 0.0]],
+    "densities": [2e-3],
+    "states": ["angle", "rate"],
+    "state_units": ["rad", "rad/s"],
+}
+AT_20 = {"timing": {"symbol_period_s": 0.05}, "channel": {"rate_baud": 20.0}}
+FILE = """
+model = {kind = "linear", A = [[0, 1], [53.6, 0]], B = [[0], [1]], C = [[1, 0]], densities = [2e-3]}
+coder = {kind = "direction"}
+timing = {symbol_period_s = 0.05}
+channel = {rate_baud = 20.0}
+"""
+
+
+def test_when_a_configuration_is_completed_then_both_ends_read_the_same_bits() -> None:
+    values = completed({**AT_20, "model": PENDULUM, "coder": {"kind": "direction"}})
+    config = load_config("paper-10baud", None, values)
+    codec = build_codec(config)
+    assert isinstance(codec.model, LinearModel)
+    assert codec.model.constants.transition == pytest.approx(
+        (1.0027, 0.010009, 0.53648, 1.0027), rel=1e-4
+    )
+    assert [one.label for one in signals_of(codec.model).states] == ["angle, rad", "rate, rad/s"]
+    assert signals_of(codec.model).output_states == (0,)
+    again = load_config("paper-10baud", None, json.loads(config.model_dump_json()))
+    other = build_codec(again)
+    assert other.model.constants == codec.model.constants  # type: ignore[attr-defined]
+    assert other.coder.constants == codec.coder.constants  # type: ignore[attr-defined]
+    assert again.shared_json(5) == config.shared_json(5)
+    assert "direction" in dump_config(config)
+
+
+def test_when_the_bits_are_too_few_for_a_plant_then_the_error_has_both_numbers() -> None:
+    for model in (PENDULUM, {"kind": "pitch", "stiffness_per_s2": -53.6, "rate_damping_per_s": 0.0}):
+        values = completed({"model": model})
+        config = load_config("paper-10baud", None, values)
+        with pytest.raises(ConfigError, match=r"10 bit/s are too few.*more than 10\.56 bit/s"):
+            agree(config, "virtual")
+
+
+def test_when_the_plant_was_changed_after_its_design_then_it_is_refused() -> None:
+    values = completed({**AT_20, "model": PENDULUM})
+    changed = {**values["model"], "A": [[0.0, 1.0], [50.0, 0.0]]}
+    for model, timing in ((changed, {}), (values["model"], {"tick_s": 0.005})):
+        config = load_config(
+            "paper-10baud", None, {**values, "model": model, "timing": {**AT_20["timing"], **timing}}
+        )
+        with pytest.raises(ConfigError, match=r"model\.F is not that of A and B.*tenbaud design"):
+            agree(config, "virtual")
+
+
+def test_when_a_linear_model_was_never_designed_then_it_says_how() -> None:
+    config = load_config("paper-10baud", None, {**AT_20, "model": PENDULUM})
+    with pytest.raises(ConfigError, match="`tenbaud design` finds them"):
+        agree(config, "virtual")
+
+
+def test_when_the_plant_is_discrete_then_its_continuous_one_is_found() -> None:
+    values = completed({**AT_20, "model": PENDULUM, "coder": {"kind": "direction"}})
+    discrete = {name: value for name, value in values["model"].items() if name not in "AB"}
+    again = completed({**values, "model": discrete})
+    for name in ("transition", "worth", "start"):
+        for row, other in zip(again["coder"][name], values["coder"][name], strict=True):
+            assert row == pytest.approx(other, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"A": [[0.0, 1.0]]}, "A must have 2 rows of 2 numbers"),
+        ({"B": [[0.0], [1.0, 2.0]]}, "B must have 2 rows of 1 numbers"),
+        ({"densities": [1.0, 2.0]}, "densities has 2 entries, and 1 are needed"),
+        ({"weights": [1.0, 2.0]}, "weights has 2 entries"),
+        ({"states": ["angle"]}, "states has 1 entries, and 2 are needed"),
+        ({"states": ["angle", "angle"]}, "states: angle is named twice"),
+        ({"states": ["angle", "Rate!"]}, "'Rate!' is no name of a signal"),
+        ({"corrected": 3}, "corrected is 3, and there are 2 states"),
+        ({"C": [[1.0, 0.0], [1.0]]}, "C must have 2 rows of 2 numbers"),
+    ],
+)
+def test_when_a_section_does_not_fit_then_the_error_names_the_field(
+    changes: dict[str, Any], text: str
+) -> None:
+    with pytest.raises(ConfigError, match=text.replace("!", r"\!")):
+        load_config("paper-10baud", None, {"model": {**PENDULUM, **changes}})
+
+
+def test_when_nothing_can_be_designed_then_the_error_says_why() -> None:
+    for model, text in (
+        ({**PENDULUM, "C": [[0.0, 0.0]]}, "not observable"),
+        ({**PENDULUM, "G": [[0.0], [0.0]]}, "does not reach every state"),
+        ({"kind": "hold"}, "designs are for linear and pitch"),
+    ):
+        with pytest.raises(ConfigError, match=text):
+            completed({**AT_20, "model": model, "coder": {"kind": "direction"}})
+
+
+def test_when_a_coder_is_of_another_plant_then_it_is_refused() -> None:
+    values = completed({**AT_20, "model": PENDULUM, "coder": {"kind": "direction"}})
+    three = {"kind": "linear", "F": [[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]], "C": [[1.0, 0, 0]]}
+    config = load_config("paper-10baud", None, {**values, "model": {**three, "E": [[1.0]] * 3}})
+    with pytest.raises(ConfigError, match="corrects 2 states and the model takes corrections of 3"):
+        agree(config, "virtual")
+
+
+def test_when_the_command_completes_a_file_then_it_flies(tmp_path: Path) -> None:
+    source, made = tmp_path / "plant.toml", tmp_path / "flight.toml"
+    source.write_text(FILE)
+    done = CliRunner().invoke(app, ["design", "--config", str(source), "--out", str(made)])
+    assert done.exit_code == 0, done.output
+    codec = build_codec(load_config(None, made))
+    assert codec.coder.alphabet.symbols_per_word == 1
+    shown = CliRunner().invoke(app, ["floor", "--config", str(made)])
+    assert "10.56 bit/s, by the data-rate theorem" in shown.output
+    assert "20 bit/s" in shown.output
+
+
+def test_when_a_floor_is_asked_for_then_every_output_has_its_own() -> None:
+    shown = CliRunner().invoke(app, ["floor", "--plant", "helicopter", "--rate", "20"])
+    assert shown.exit_code == 0, shown.output
+    for axis, degrees in (("travel", "0.133"), ("elevation", "0.135"), ("pitch", "0.134")):
+        assert any(
+            f"least rms {axis}" in line and degrees in line for line in shown.output.splitlines()
+        )
+    found = CliRunner().invoke(app, ["floor", "--plant", "pendulum", "--rate", "10", "--json"])
+    assert found.exit_code == 1
+    figures = json.loads(found.output)
+    assert figures["rate_needed_bit_s"] == pytest.approx(10.562, abs=1e-3)
+    assert figures["rms"] is None
+
+
+def test_when_a_preset_is_asked_about_then_its_rate_and_words_count() -> None:
+    shown = CliRunner().invoke(app, ["floor", "--preset", "paper-20baud"])
+    assert "20 bit/s" in shown.output
+    assert "bits in words" in shown.output
+    assert CliRunner().invoke(app, ["floor", "--preset", "usual-1000baud"]).exit_code == 2
+    assert CliRunner().invoke(app, ["floor", "--plant", "nobody", "--rate", "2"]).exit_code == 2

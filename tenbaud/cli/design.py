@@ -91,7 +91,7 @@ def design(
 
     from tenbaud.config.load import load_config, merged_values, read_toml
     from tenbaud.design.complete import completed
-    from tenbaud.files.whole import write_whole
+    from tenbaud.files.whole import make_folder, write_whole
 
     own = read_toml(config)
     whole = completed(merged_values(preset, config))
@@ -99,6 +99,7 @@ def design(
     if preset is not None:
         own["preset"] = preset
     load_config(None, None, own)
+    make_folder(out.parent)
     write_whole(out, tomli_w.dumps(own))
     typer.echo(f"wrote {out}")
 

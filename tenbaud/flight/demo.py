@@ -106,7 +106,7 @@ def _result(agreement: Agreement, transmitter: _Child, receiver: _Child) -> Demo
         return DemoResult(summary, ExitCode.OK, [])
     code = first_code(*(end.outcome().code for end in ends if end.process.returncode > 0))
     code = first_code(code, outcomes[0].code)
-    was_killed = ends[0].process.returncode < 0
+    was_killed = ends[0].process.returncode < 0 and not ends[0].died_of_interrupt
     if was_killed or not summary.get("exit_code"):
         summary["outcome"], summary["exit_code"] = outcomes[0].text, int(code)
     return DemoResult(summary, code, [outcome.text for outcome in reversed(outcomes)])
@@ -137,7 +137,10 @@ def _wait(ends: tuple[_Child, _Child], stop: StopFlag) -> None:
             # Where the transmitter owns the time it also ends the receiver's part, by its farewell.
             own_time = ends[0].agreement.clock == "virtual"
             for end in ends[:1] if own_time else ends:
-                end.signal(signal.SIGINT)
+                end.interrupt()
+        if passed_on and ends[0].died_of_interrupt:
+            # It had not begun, and says no farewell.
+            ends[1].interrupt()
         if passed_on or any(end.process.poll() is not None for end in ends):
             patience_s -= 0.1
             if patience_s < 0.0:
@@ -157,6 +160,7 @@ class _Child:
     summary: Summary = field(init=False, default_factory=dict)
     said: list[str] = field(init=False, default_factory=list)
     _threads: list[threading.Thread] = field(init=False, default_factory=list)
+    _interrupted: bool = field(init=False, default=False)
 
     def __post_init__(self) -> None:
         verb = "transmit" if self.role == "transmitter" else "receive"
@@ -184,10 +188,16 @@ class _Child:
             elif line.strip():
                 self.said.append(line.rstrip())
 
-    def signal(self, number: int) -> None:
-        """Send a signal to the process if it still runs."""
-        if self.process.poll() is None:
-            self.process.send_signal(number)
+    def interrupt(self) -> None:
+        """Have the process end, once; one that has ended is left alone."""
+        if not self._interrupted and self.process.poll() is None:
+            self._interrupted = True
+            self.process.send_signal(signal.SIGINT)
+
+    @property
+    def died_of_interrupt(self) -> bool:
+        """Return whether the interrupt came before the process could take it, in its first moments."""
+        return self._interrupted and self.process.poll() == -signal.SIGINT
 
     def end(self) -> None:
         """Make sure that the process has ended, and read what it left."""
@@ -203,4 +213,6 @@ class _Child:
 
     def outcome(self) -> Outcome:
         """Return how the process ended, once it has."""
+        if self.died_of_interrupt:
+            return Outcome(ExitCode.INTERRUPTED, "interrupted")
         return outcome_of_status(self.role, self.process.returncode, "\n  ".join(self.said[-6:]))

@@ -10,6 +10,7 @@ import pytest
 
 from tenbaud import FlightResult, MemoryFlight, Run, load_preset
 from tenbaud.audit.audit import audit
+from tenbaud.config.load import ConfigError
 from tenbaud.replay.record import load_record
 from tenbaud.replay.replay import replay
 from tests.tenbaud.processes import run as run_command
@@ -54,10 +55,9 @@ def test_a_plant_off_the_model_and_pushed_about_stands_with_the_lead_of_a_real_c
     assert result.commands.shape == (5000, 1), "one motor is one motor"
 
 
-def test_with_fewer_bits_than_its_errors_grow_by_it_falls() -> None:
-    # 7.1 bit/s, where 10.56 are needed.
-    result = flown(10.0, timing__symbol_period_s=0.14)
-    assert np.nanmax(np.abs(result.angles_rad)) > FALLEN_RAD or result.ended_by
+def test_with_fewer_bits_than_its_errors_grow_by_it_is_refused_with_both_rates() -> None:
+    with pytest.raises(ConfigError, match=r"7\.143 bit/s are too few.* more than 10\.49 bit/s"):
+        flown(10.0, timing__symbol_period_s=0.14)
 
 
 @pytest.mark.soak

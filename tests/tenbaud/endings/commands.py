@@ -27,7 +27,7 @@ grid = { loss = [0.0, 0.1] }
 
 @dataclass(frozen=True)
 class Inputs:
-    """What the commands read: a flown run, keys, a study."""
+    """What the commands read: a flown run, keys, a study, a coder to design."""
 
     folder: Path
 
@@ -43,14 +43,19 @@ class Inputs:
     def study(self) -> str:
         return str(self.folder / "study.toml")
 
+    @property
+    def plant(self) -> str:
+        return str(self.folder / "plant.toml")
+
 
 def make_inputs(folder: Path) -> Inputs:
-    """Fly once, and make keys and a study."""
+    """Fly once, and make keys, a study and a coder to design."""
     made = Inputs(folder)
     assert run(["demo", "--link", "memory", *SHORT, "--json", "--out", made.run]) == 0
     create_authority(Path(made.keys))
     add_node(Path(made.keys), "rig", NodeRole.TRANSMITTER, ())
     Path(made.study).write_text(STUDY)
+    Path(made.plant).write_text('[coder]\nkind = "direction"\n')
     return made
 
 
@@ -70,6 +75,7 @@ WRITERS: dict[str, Arguments] = {
     "identify": lambda inputs, out: ["identify", inputs.run, "--out", out],
     "sweep": lambda inputs, out: ["sweep", inputs.study, "--workers", "1", "--no-plots", "--out", out],
     "keys init": lambda _, out: ["keys", "init", "--folder", out],
+    "design": lambda inputs, out: ["design", "--config", inputs.plant, "--out", out],
 }
 """Commands that leave something at `out`."""
 
@@ -98,6 +104,7 @@ READERS: dict[str, Arguments] = {
         *("--folder", inputs.keys),
     ],
     "doctor": lambda *_: ["doctor"],
+    "floor": lambda *_: ["floor", "--plant", "pendulum", "--rate", "20"],
 }
 """Commands that leave nothing new, or only beside what they read."""
 

@@ -37,11 +37,16 @@ class SlotShaper:
         return max(begins, now_ns)
 
 
+def bits_per_symbol(alphabet: Alphabet) -> float:
+    """Return the bits that one symbol of an alphabet carries at most."""
+    return log2(len(alphabet.symbols))
+
+
 class UplinkMeter:
     """Counts what the transmitter put on the line."""
 
     def __init__(self, alphabet: Alphabet) -> None:
-        self._bits_per_symbol = log2(len(alphabet.symbols))
+        self._bits_per_symbol = bits_per_symbol(alphabet)
         self.symbols = 0
         self.wire_bytes = 0
         self.control_bytes = 0

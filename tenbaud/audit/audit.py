@@ -9,11 +9,11 @@ by them that had not gone up? Did both ends record the same flight, all of it? T
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import log2
 from pathlib import Path
 from typing import Any
 
 from channel.errors import CodecDiverged, TenbaudError
+from channel.line.uplink import bits_per_symbol
 from receiver.controllers.base import Controller
 from tenbaud.audit.base import Evidence, Findings, Place
 from tenbaud.audit.table import CLAIMS
@@ -60,7 +60,7 @@ def count(evidence: Evidence) -> Counted:
     return Counted(
         symbols_sent=None if paid is None else len(paid),
         symbols_refused=None if paid is None else len(sent) - len(paid),
-        bits_per_symbol=log2(len(evidence.agreement.codec.coder.alphabet.symbols)),
+        bits_per_symbol=bits_per_symbol(evidence.agreement.codec.coder.alphabet),
         slots=slots,
         symbol_bytes=None if paid is None else sum(row.wire_bytes for row in paid),
         symbols_taken=None if taken is None else len(taken),

@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import Any
 
 from channel.codec.words import Word
+from channel.line.uplink import bits_per_symbol
 from tenbaud.audit.base import Claim, Evidence, Findings, Place
 from tenbaud.build.flight import Agreement
 
@@ -102,11 +103,9 @@ def check_coder_bits(evidence: Evidence, findings: Findings) -> None:
         return
     summary = evidence.summary("transmitter")
     alphabet = evidence.agreement.codec.coder.alphabet
-    from math import log2
-
     left = sum(row.left_ns is not None for row in rows)
     shown = {
-        "coder_bits_up": left * log2(len(alphabet.symbols)),
+        "coder_bits_up": left * bits_per_symbol(alphabet),
         "symbols_refused": float(len(rows) - left),
     }
     for name, value in shown.items():

@@ -13,7 +13,7 @@ from channel.codec.models.pitch import PitchModel
 from channel.line.clocks import SkewedClock
 from channel.line.impairments import Direction, ImpairedLine, SymbolWire
 from channel.line.line import CleanLine, Downlink, Line
-from channel.line.uplink import Uplink
+from channel.line.uplink import Uplink, bits_per_symbol
 from channel.protocol.recording import Recorder
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
 from channel.protocol.wire import Wire
@@ -218,7 +218,7 @@ def build_gauge(agreement: Agreement) -> GapGauge | None:
         return None
     tick_s = terms.tick_ns / 1e9
     alphabet = codec.coder.alphabet
-    bits = alphabet.symbols_per_word * math.log2(len(alphabet.symbols))
+    bits = alphabet.symbols_per_word * bits_per_symbol(alphabet)
     rate_bit_s = bits / (terms.sample_ns / 1e9)
     limit = Limit(
         double_integrator_floor(1.0, rate_bit_s),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json as json_module
 import math
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,6 +15,7 @@ from tenbaud.cli import options
 from tenbaud.flight.outcome import ExitCode
 
 if TYPE_CHECKING:
+    from channel.codec.signals import Signal
     from tenbaud.design.floors import Floors
 
 
@@ -40,6 +42,8 @@ def floor(
 
     [dim]tenbaud floor --plant pendulum --rate 20[/dim]
     """
+    from channel.codec.signals import signals_of
+    from channel.line.uplink import bits_per_symbol
     from tenbaud.build.codec import build_codec
     from tenbaud.config.load import load_config
     from tenbaud.design.described import plant_of, plant_section
@@ -49,14 +53,16 @@ def floor(
     if plant is not None:
         section: Any = _known(plant_section, plant)
         tick_s = 0.01
+        outputs = section.signals(len((section.B or section.E)[0])).outputs
     else:
         flown = load_config(preset, config)
         section, tick_s = flown.model, flown.timing.tick_s
-        alphabet = build_codec(flown).coder.alphabet
-        bits = alphabet.symbols_per_word * math.log2(len(alphabet.symbols))
+        codec = build_codec(flown)
+        outputs = signals_of(codec.model).outputs
         if rate is None:
+            alphabet = codec.coder.alphabet
             period = flown.timing.symbol_period_s
-            rate = bits / period
+            rate = alphabet.symbols_per_word * bits_per_symbol(alphabet) / period
     if rate is None:
         raise typer.BadParameter("give --rate for a plant by name")
     described = plant_of(section, tick_s)
@@ -66,10 +72,8 @@ def floor(
     if json:
         typer.echo(json_module.dumps(asdict(found), indent=2))
     else:
-        names = getattr(section, "outputs", ()) or ("pitch",) * len(described.C)
-        units = getattr(section, "output_units", ()) or ("rad",) * len(described.C)
         densities = ", ".join(f"{density:g}" for density in described.densities)
-        typer.echo(_text(found, list(zip(names, units, strict=True)), densities))
+        typer.echo(_text(found, outputs, densities))
     if found.rms is None:
         raise typer.Exit(int(ExitCode.FAILED))
 
@@ -112,7 +116,7 @@ def _known(function: Any, *arguments: Any) -> Any:
         raise typer.BadParameter(str(error)) from error
 
 
-def _text(found: Floors, outputs: list[tuple[str, str]], densities: str) -> str:
+def _text(found: Floors, outputs: Sequence[Signal], densities: str) -> str:
     lines = [
         ("rate", f"{found.rate_bit_s:.4g} bit/s"),
         ("smallest rate", f"{found.rate_needed_bit_s:.4g} bit/s, by the data-rate theorem"),
@@ -121,9 +125,9 @@ def _text(found: Floors, outputs: list[tuple[str, str]], densities: str) -> str:
     if found.rms is None:
         lines.append(("least error", "none: at this rate it grows without bound, whatever the code"))
     else:
-        for (name, unit), rms in zip(outputs, found.rms, strict=True):
-            degrees = f"  ({math.degrees(rms):.3g} deg)" if unit == "rad" else ""
-            lines.append((f"least rms {name}", f"{rms:.4g} {unit}{degrees}"))
+        for one, rms in zip(outputs, found.rms, strict=True):
+            degrees = f"  ({math.degrees(rms):.3g} deg)" if one.unit == "rad" else ""
+            lines.append((f"least rms {one.name}", f"{rms:.4g} {one.unit}{degrees}".rstrip()))
     if found.words_over_flow is not None:
         lines.append(("bits in words", f"{found.words_over_flow:.3f} times that"))
     width = max(len(name) for name, _ in lines)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import tomllib
 from importlib.resources import files
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from channel.codec.codec import Codec
+from channel.line.uplink import bits_per_symbol
 from tenbaud.bounds.floor import RateTooLow
 from tenbaud.bounds.linear import rate_needed
 from tenbaud.config.models import LinearModelSection, PendulumModelSection, PitchModelSection
@@ -70,7 +70,7 @@ def check_plant(config: FlightConfig, codec: Codec) -> None:
     if plant is None:
         return
     alphabet = codec.coder.alphabet
-    bits = alphabet.symbols_per_word * math.log2(len(alphabet.symbols))
+    bits = alphabet.symbols_per_word * bits_per_symbol(alphabet)
     rate, needed = bits / (tick_s * codec.ticks_per_sample), rate_needed(plant.A)
     if not rate > needed:
         raise RateTooLow(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from channel.line.uplink import bits_per_symbol
 from tenbaud.files.whole import make_folder, write_whole
 from tenbaud.recording.errors import RecordingError
 from tenbaud.replay.control import controller_of, steps_by_hand
@@ -40,8 +41,6 @@ class Replayed:
 
 def replay(record: FlightRecord) -> Replayed:
     """Fly a recorded flight again from its symbols and compare."""
-    from math import log2
-
     agreement = record.agreement
     _check_shape(record)
     epochs = epochs_of(record)
@@ -54,7 +53,7 @@ def replay(record: FlightRecord) -> Replayed:
     alphabet = agreement.codec.coder.alphabet
     last = flown[-1].digest if flown else ""
     erased = sum(word is None for word in words)
-    bits = (len(words) - erased) * alphabet.symbols_per_word * log2(len(alphabet.symbols))
+    bits = (len(words) - erased) * alphabet.symbols_per_word * bits_per_symbol(alphabet)
     return Replayed(
         len(flown),
         compared,

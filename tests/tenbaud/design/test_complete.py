@@ -152,6 +152,16 @@ def test_when_a_floor_is_asked_for_then_every_output_has_its_own() -> None:
     assert figures["rms"] is None
 
 
+@pytest.mark.parametrize(
+    ("preset", "output"), [("paper-10baud", "pitch"), ("pendulum-30baud", "angle")]
+)
+def test_when_a_preset_is_asked_about_then_its_output_has_the_name_of_its_model(
+    preset: str, output: str
+) -> None:
+    shown = CliRunner().invoke(app, ["floor", "--preset", preset])
+    assert f"least rms {output} " in shown.output
+
+
 def test_when_a_preset_is_asked_about_then_its_rate_and_words_count() -> None:
     shown = CliRunner().invoke(app, ["floor", "--preset", "paper-20baud"])
     assert "20 bit/s" in shown.output

@@ -31,9 +31,9 @@ REACH_MIN = 1e-9
 def state_feedback(config: FlightConfig, context: ControllerContext) -> StateFeedback:
     """Return the controller of a configuration; ConfigError, with names, for one that cannot be."""
     section, signals, model = config.receiver.state_feedback, context.signals, context.model
-    law = _law(section, context)
+    plant = Linear(model, context.initial_command)
+    law = _law(section, plant, context)
     steered = [one is not None for one in context.references]
-    plant = linearised(model, context.initial_command)
     base, forward = _set_points(plant, law[0], steered, signals)
     return StateFeedback(
         FeedbackLaw(
@@ -51,7 +51,7 @@ def state_feedback(config: FlightConfig, context: ControllerContext) -> StateFee
 
 
 class Linear:
-    """x' = A x + B u, y = C x about a point, which itself moves by `drift` in a tick."""
+    """A model about its initial state and a command: x' = A x + B u, y = C x, and `drift` in a tick."""
 
     def __init__(self, model: Model, command: Sequence[float]) -> None:
         self.state = np.array(model.initial())
@@ -77,17 +77,14 @@ class Linear:
         self.c: Matrix = np.array(seen[:size]).T
 
 
-def linearised(model: Model, command: Sequence[float]) -> Linear:
-    """Return a model about its initial state and a command."""
-    return Linear(model, command)
-
-
-def _law(section: StateFeedbackSection, context: ControllerContext) -> tuple[Matrix, Matrix]:
+def _law(
+    section: StateFeedbackSection, plant: Linear, context: ControllerContext
+) -> tuple[Matrix, Matrix]:
     """Return K and K_i."""
     signals = context.signals
     inputs, states, outputs = (len(one) for one in (signals.inputs, signals.states, signals.outputs))
     if not section.gains:
-        return _designed(section, linearised(context.model, context.initial_command), context)
+        return _designed(section, plant, context)
     gains = _given("gains", section.gains, inputs, states)
     if not section.integral_gains:
         return gains, np.zeros((inputs, outputs))

@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from channel.codec.coders.direction import DirectionParameters
+from channel.codec.coders.direction import SQUARINGS, DirectionParameters
 from tenbaud.bounds.floor import RateTooLow, ideal_worth, period_cost
 from tenbaud.bounds.linear import Matrix, rate_needed, sampled
-from tenbaud.design.plant import LinearPlant
+from tenbaud.design.plant import LinearPlant, rows_of
 
 ROUNDS = 25
 SAMPLES = 600
@@ -25,7 +25,6 @@ AHEAD = 8
 """samples that first guesses of N look ahead at most"""
 GROWN = 4
 """samples that the first P has grown for"""
-SQUARINGS = 4
 GAIN_LEAST, PATIENCE = 1e-4, 3
 """relative gain of a round; the search ends after more than this number of rounds that gain less"""
 WORTH_MAX = 1e9
@@ -73,10 +72,10 @@ def design_direction(
     with np.errstate(all="ignore"):
         best = _search(*scaled, ideal * products, alpha, bits)
     return DirectionParameters(
-        transition=_rows(transition),
-        noise=_rows(noise),
-        worth=_rows(best.worth / products),
-        start=_rows(best.covariance * products),
+        transition=rows_of(transition),
+        noise=rows_of(noise),
+        worth=rows_of(best.worth / products),
+        start=rows_of(best.covariance * products),
         bits=bits,
         adapts=adapts,
         removed=alpha,
@@ -159,7 +158,3 @@ def _direction(N: Matrix, P: Matrix) -> tuple[Matrix, Matrix]:
 
 def _symmetric(matrix: Matrix) -> Matrix:
     return 0.5 * (matrix + matrix.T)
-
-
-def _rows(matrix: Matrix) -> tuple[tuple[float, ...], ...]:
-    return tuple(tuple(float(value) for value in row) for row in matrix)

@@ -14,6 +14,7 @@ from channel.codec.models.linear import LinearModel
 from tenbaud.bounds.linear import Matrix, van_loan
 from tenbaud.config.schema import FlightConfig
 from tenbaud.design.described import plant_of
+from tenbaud.design.plant import rows_of
 from transmitter.session.state_observer import StateObserver
 
 LEAST_STEP = 1e-6
@@ -36,7 +37,7 @@ def kalman_observer(model: LinearModel, tick_noise: Matrix, steps: Matrix) -> St
             f"the outputs do not show every state, so none is observed: {error}"
         ) from error
     gains = ahead @ C.T @ np.linalg.inv(C @ ahead @ C.T + seen)
-    return StateObserver(model, _rows(gains), _rows(np.linalg.pinv(C)), (STATE_MAX,) * size)
+    return StateObserver(model, rows_of(gains), rows_of(np.linalg.pinv(C)), (STATE_MAX,) * size)
 
 
 def observer_of_coder(codec: Codec, counts_per_turn: int) -> StateObserver:
@@ -62,7 +63,3 @@ def configured_observer(
         raise ValueError(f"model.kind = {config.model.kind!r} describes no linear plant to observe")
     _, noise = van_loan(plant.A, plant.noise, tick_s)
     return kalman_observer(model, noise, np.array(steps))
-
-
-def _rows(matrix: Matrix) -> tuple[tuple[float, ...], ...]:
-    return tuple(tuple(float(value) for value in row) for row in matrix)

@@ -96,3 +96,8 @@ def continuous(F: ArrayLike, E: ArrayLike, period_s: float) -> tuple[Matrix, Mat
         )
     found = grown.real / period_s
     return found[:states, :states], found[:states, states:]
+
+
+def rows_of(matrix: Matrix) -> tuple[tuple[float, ...], ...]:
+    """Return a matrix as a configuration and the codec hold it."""
+    return tuple(tuple(float(value) for value in row) for row in matrix)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from channel.codec.signals import signals_of
 from channel.protocol.identity import Identity
 from tenbaud.audit.base import Claim, Evidence, Findings, Place
 from tenbaud.recording.encoding import SIGNALS_KEY, signals_text
@@ -21,7 +20,7 @@ def check_heads(evidence: Evidence, findings: Findings) -> None:
             "role": end,
             "config_digest": _recorded(identity, tables).config_digest.hex(),
             "tick_s": repr(evidence.agreement.config.timing.tick_s),
-            SIGNALS_KEY: signals_text(signals_of(evidence.agreement.codec.model)),
+            SIGNALS_KEY: signals_text(evidence.agreement.signals),
         }
         for name, value in wanted.items():
             said = tables.metadata.get(name)

@@ -154,7 +154,7 @@ def _open_loop_zoom(section: OpenLoopZoomCoderSection, context: CoderContext) ->
 
 
 def _fixed(section: FixedCoderSection, context: CoderContext) -> Coder:
-    """A timed coder whose range has nowhere to go."""
+    """Return an open-loop zoom coder whose range is at its end from the beginning."""
     size = section.range_rad
     return OpenLoopZoomCoder(
         OpenLoopZoomParameters(initial_range=size, minimum_range=size, decay=1.0, **_common(section))

@@ -14,7 +14,6 @@ from rich.console import Console, Group, RenderableType
 from rich.live import Live
 from rich.table import Table
 
-from channel.codec.signals import signals_of
 from receiver.loops.many import ManyService, Served
 from receiver.session.session import Phase
 from tenbaud.sentences import endings
@@ -98,8 +97,7 @@ def _row(served: Served) -> tuple[str, ...]:
     session = served.endpoint.session
     baud = session.meter.baud
     state, model = session.state, session.codec.model
-    plant = signals_of(model)
-    values = zip(model.measured(state.model), plant.outputs, strict=True)
+    values = zip(model.measured(state.model), session.terms.signals.outputs, strict=True)
     ranges = session.codec.coder.ranges(state.coder)
     return (
         served.name,

@@ -7,7 +7,7 @@ from math import isfinite
 from typing import Any
 
 from channel.codec.codec import Vector
-from channel.codec.signals import Signal, signals_of
+from channel.codec.signals import Signal
 from channel.protocol.events import EVENT_CHANNEL
 from channel.protocol.recording import RecordChannel
 from receiver.endpoint import ReceiverEndpoint
@@ -59,7 +59,7 @@ class _Composer:
         self._number = 0
         model = agreement.codec.model
         self._measured = model.measured
-        plant = signals_of(model)
+        plant = agreement.signals
         self.outputs = plant.outputs
         self._plant = {
             "model": agreement.config.model.kind,

@@ -17,7 +17,6 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-from channel.codec.signals import signals_of
 from channel.line.impairments import impair, parse_impairments
 from channel.links.base import Role
 from channel.protocol.events import ByHand, Event, EventKind, write_event
@@ -190,7 +189,7 @@ class LiveReceiver:
         return None
 
     def _steer(self, place: int, value: float | None) -> Event:
-        outputs = signals_of(self._endpoint.session.codec.model).outputs
+        outputs = self._endpoint.session.terms.signals.outputs
         steering = self.steering[place] if self.steering and place < len(self.steering) else None
         if steering is None or place >= len(outputs):
             return _ignored("this controller has no such set-point")

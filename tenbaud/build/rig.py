@@ -96,6 +96,8 @@ def build_plant(config: FlightConfig, step_s: float, signals: Signals | None = N
         section.initial_angle_rad,
         config.model.model_dump(exclude={"kind"}),
         sin,
+        tuple([one.name for one in signals.inputs]),
+        tuple([one.name for one in signals.outputs]),
     )
     plant: Plant = build_part(config, PLANTS, section.kind, context, section.options, Plant)
     measured, outputs = len(plant.measured_rad), len(signals.outputs)

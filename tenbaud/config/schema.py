@@ -122,9 +122,9 @@ class PlantSection(Section):
     """The simulated plant, relative to the codec's model."""
 
     kind: Annotated[str, AfterValidator(PartName(PLANTS))] = "pitch"
-    """the pitch axis, or a plant from outside"""
+    """the pitch axis, another built-in plant, a file of machine code (FMU), or a plant from outside"""
     options: Options = Field(default_factory=dict)
-    """options of an external class"""
+    """options of the kind: constructor arguments of its class"""
     relative_to: Literal["model", "pitch"] = "model"
     """the codec's model, so that the plant changes with it; or the constants in `pitch`"""
     pitch: PitchModelSection = PitchModelSection()

@@ -24,6 +24,7 @@ entry, positive part) are of shared numbers, which are equal to the last bit.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -280,6 +281,20 @@ def direction_decode(
     wait(constants, after)
 
 
+def most_correlated(coder: Numbers, v: Numbers, readout: Rows) -> int:
+    """Return the output C x for which (C v)^2 / (C P C') is largest, the first of equals."""
+    best, most = 0, 0.0
+    for output, row in enumerate(readout):
+        told = variance = 0.0
+        for i in range(len(v)):
+            told += row[i] * v[i]
+            for j in range(len(v)):
+                variance += row[i] * row[j] * coder[place(i, j)]
+        if variance > 0.0 and told * told > most * variance:
+            best, most = output, told * told / variance
+    return best
+
+
 class DirectionCoder(FunctionCoder):
     """One or more signs per sample for all corrected states together.
 
@@ -326,6 +341,18 @@ class DirectionCoder(FunctionCoder):
         return within and all(
             0.0 <= coder[place(state, state)] <= 2.0 * limit for state, limit in enumerate(largest)
         )
+
+    def about(self, coder: Vector, word: Sequence[int], readout: Rows) -> tuple[int, ...]:
+        """Return, for each sign, the output whose error correlates most with the answer."""
+        known = list(coder)
+        c, v, correction = ([0.0] * self.correction_size for _ in range(3))
+        found = []
+        for at, sign in enumerate(word):
+            is_asked = aim(self.constants, known, c, v)
+            found.append(most_correlated(known, v, readout) if is_asked else 0)
+            if is_asked and at + 1 < len(word):
+                learn(self.constants, known, c, v, sign, correction)
+        return tuple(found)
 
     def ranges(self, coder: Vector) -> Vector:
         """Return, for each corrected state, the standard deviation that both ends assume."""

@@ -27,7 +27,7 @@ class SimulatedRig(Rig):
         while self._tick < tick:
             self._plant.advance(self._volts)
             self._tick += 1
-        true = self._plant.measured_rad
+        true = self._plant.measured
         if len(true) == 1 and self._encoder is not None:
             count, value = self._encoder.read(true[0])
             return Reading((count,), (value,), true)

@@ -20,6 +20,9 @@ from pydantic import Discriminator, JsonValue, Tag, create_model
 from channel.registry import Registry
 from tenbaud.config.section import KindSection, OutsideSection
 
+FMU = "fmu"
+"""The plant that runs the machine code of a file: code from outside, although its class is built in."""
+
 MODELS = Registry(
     "model.kind",
     "tenbaud.models",
@@ -50,6 +53,7 @@ PLANTS = Registry(
         "pitch": "tenbaud.build.rig:pitch_plant",
         "pendulum": "plant_sim.pendulum:PendulumPlant",
         "linear": "plant_sim.linear:SimulatedLinear",
+        FMU: "plant_sim.fmu:FmuPlant",
     },
 )
 CONTROLLERS = Registry(

@@ -41,7 +41,7 @@ class MujocoPendulum:
         self.data.qpos[0] = angle_rad
 
     @property
-    def measured_rad(self) -> tuple[float, ...]:
+    def measured(self) -> tuple[float, ...]:
         return (float(self.data.qpos[0]),)
 
     def advance(self, volts: tuple[float, ...]) -> None:

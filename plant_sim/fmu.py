@@ -36,9 +36,9 @@ class FmuPlant:
         outputs: Names | None = None,
         start: Mapping[str, float] | None = None,
     ) -> None:
-        if context.mismatch != 0.0 or context.disturbance is not None or context.initial_angle_rad:
+        if context.mismatch != 0.0 or context.disturbance is not None or any(context.initial):
             raise ValueError(
-                "mismatch, disturbance and initial angle are of built-in plants; give the FMU's own "
+                "mismatch, disturbance and initial outputs are of built-in plants; give the FMU's own "
                 "variables as start = { variable = value }"
             )
         fmpy, description = _described(file)
@@ -67,7 +67,7 @@ class FmuPlant:
         self._measured = self._read()
 
     @property
-    def measured_rad(self) -> tuple[float, ...]:
+    def measured(self) -> tuple[float, ...]:
         """The outputs after the last step, in the model's order and units."""
         return self._measured
 

@@ -52,6 +52,7 @@ PLANTS = Registry(
     {
         "pitch": "tenbaud.build.rig:pitch_plant",
         "pendulum": "plant_sim.pendulum:PendulumPlant",
+        "linear": "plant_sim.linear:SimulatedLinear",
         FMU: "plant_sim.fmu:FmuPlant",
     },
 )
@@ -73,6 +74,8 @@ class Kind:
     section: type[KindSection]
     build: Callable[[Any, Any], Any]
     """from the section and the context to the part"""
+    plant: str = "pitch"
+    """of a model: the kind of the plant that it describes"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,9 +83,13 @@ class PartName:
     """Checks the name of a kind."""
 
     registry: Registry
+    also: str = ""
+    """a name beside those of kinds"""
 
     def __call__(self, name: str) -> str:
         """Return the name; ValueError where nobody offers it."""
+        if self.also and name == self.also:
+            return name
         if not self.registry.classes or ":" not in name:
             return self.registry.check(name)
         if not re.fullmatch(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*", name):

@@ -52,7 +52,7 @@ def outside_parts(config: FlightConfig) -> list[OutsidePart]:
         OutsidePart(MODELS, config.model.kind),
         OutsidePart(CODERS, config.coder.kind),
         OutsidePart(CONTROLLERS, config.receiver.controller),
-        OutsidePart(PLANTS, config.transmitter.plant.kind),
+        OutsidePart(PLANTS, config.plant_kind),
         OutsidePart(LINKS, config.link.kind),
     )
     parts = [

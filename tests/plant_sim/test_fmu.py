@@ -66,7 +66,7 @@ class PythonPendulum:
         self._moved = found["moved"]
 
     @property
-    def measured_rad(self) -> tuple[float, ...]:
+    def measured(self) -> tuple[float, ...]:
         return self._state[:1]
 
     def advance(self, volts: tuple[float, ...]) -> None:
@@ -85,7 +85,7 @@ def settings(fmu: Path, **options: Any) -> dict[str, Any]:
     names = {"file": str(fmu), "inputs": {"motor": "torque"}, **options}
     return {
         "duration_s": 4.0,
-        "transmitter.plant": {"kind": "fmu", "options": names, "initial_angle_rad": 0.0},
+        "transmitter.plant": {"kind": "fmu", "options": names, "initial": 0.0},
     }
 
 
@@ -109,7 +109,7 @@ preset = "pendulum-30baud"
 duration_s = 2.0
 [transmitter.plant]
 kind = "fmu"
-initial_angle_rad = 0.0
+initial = 0.0
 options = {{ file = "{fmu}", inputs = {{ motor = "torque" }} }}
 """
     )
@@ -170,7 +170,7 @@ def test_a_refused_step_is_reported_with_its_tick_and_time(fmu: Path, tmp_path: 
 
 
 def test_settings_of_built_in_plants_are_refused(fmu: Path) -> None:
-    with pytest.raises(PartError, match="mismatch, disturbance and initial angle are of built-in"):
+    with pytest.raises(PartError, match="mismatch, disturbance and initial outputs are of built-in"):
         fly("pendulum-30baud", settings={**settings(fmu), "transmitter.plant.mismatch": 0.1})
 
 
@@ -180,8 +180,8 @@ def test_unpacked_files_go_with_the_plant(fmu: Path, monkeypatch: pytest.MonkeyP
     removed: list[str] = []
     monkeypatch.setattr(shutil, "rmtree", lambda folder, **_: removed.append(folder))
     names = {"inputs": ("torque",), "outputs": ("angle",)}
-    plant = FmuPlant(PlantContext(TICK_S, 0, (10.0,), 0.0, None, 0.0, **names), str(fmu))
+    plant = FmuPlant(PlantContext(TICK_S, 0, (10.0,), 0.0, None, (), **names), str(fmu))
     plant.advance((1.0,))
-    assert plant.measured_rad != (0.01,)
+    assert plant.measured != (0.01,)
     del plant
     assert len(removed) == 1

@@ -32,7 +32,7 @@ class SimulatedRig(Rig):
                     f"the simulated plant failed after tick {self._tick}: {error}"
                 ) from error
             self._tick += 1
-        true = self._plant.measured_rad
+        true = self._plant.measured
         if len(true) == 1 and self._encoder is not None:
             count, value = self._encoder.read(true[0])
             return Reading((count,), (value,), true)

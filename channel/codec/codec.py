@@ -90,8 +90,8 @@ class Coder(Protocol):
         """Return the range `M` of each measured axis, for display."""
 
     # A coder may have `is_state(coder: Vector) -> bool` too: whether it can be in a state that came
-    # over a line. Without it, any finite one is taken. And `about(coder, word, readout)`: which output
-    # each symbol of a word was about. Without it, the symbols are about the outputs in turn.
+    # over a line. Without it, any finite one is taken. And `about(coder, word)`: which output each
+    # symbol of a word was about. Without it, the symbols are about the outputs in turn.
 
 
 class CodecState(NamedTuple):
@@ -199,9 +199,7 @@ class Codec:
         if word is ERASED:
             return None
         find = getattr(self.coder, "about", None)
-        found: tuple[int, ...] = (
-            self._in_turn if find is None else find(state.coder, word, self._readout)
-        )
+        found: tuple[int, ...] = self._in_turn if find is None else find(state.coder, word)
         return found
 
     @cached_property
@@ -209,18 +207,6 @@ class Codec:
         outputs = len(self.model.measured(self.model.initial()))
         count = self.coder.alphabet.symbols_per_word
         return tuple([place * outputs // count for place in range(count)])  # integers
-
-    @cached_property
-    def _readout(self) -> tuple[Vector, ...]:
-        """How much of an error of each corrected state is in each output, at the initial state."""
-        start = self.model.initial()
-        outputs = self.model.measured(start)
-        rows: list[list[float]] = [[] for _ in outputs]
-        for moved in range(self.model.correction_size):
-            state = tuple([value + (place == moved) for place, value in enumerate(start)])
-            for row, value, before in zip(rows, self.model.measured(state), outputs, strict=True):
-                row.append(value - before)
-        return tuple([tuple(row) for row in rows])
 
     def step(self, state: CodecState, word: Word, commands: Sequence[Vector]) -> CodecState:
         """Run one whole sample: its word, then the commands of its `N` ticks."""

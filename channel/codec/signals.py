@@ -17,12 +17,12 @@ STEPS_MAX = 32_767
 """Largest number of steps, either way, that a frame carries for an input."""
 
 
-PICTURES = {
-    "helicopter": (1, 3),
-    "pendulum": (1,),
-    "rotary pendulum": (2,),
-    "servo": (1,),
-}
+PICTURES: tuple[tuple[str, tuple[int, ...]], ...] = (
+    ("helicopter", (1, 3)),
+    ("pendulum", (1,)),
+    ("rotary pendulum", (2,)),
+    ("servo", (1,)),
+)
 """Pictures of plants, and for how many outputs; all are angles. The parts turn in the order of the
 outputs: the helicopter's by pitch, or by travel, elevation and pitch; a rotary pendulum's by arm and
 pendulum."""
@@ -127,11 +127,11 @@ class Signals:
             doubled = sorted({name for name in names if names.count(name) > 1})
             if doubled:
                 raise ValueError(f"{what}: {', '.join(doubled)} is named twice")
-        wanted = PICTURES.get(self.picture, (len(self.outputs),))
-        if self.picture and (self.picture not in PICTURES or len(self.outputs) not in wanted):
+        if self.picture and len(self.outputs) not in dict(PICTURES).get(self.picture, ()):
+            known = ", ".join([f"{name} (outputs: {counts})" for name, counts in PICTURES])
             raise ValueError(
-                f"picture {self.picture!r} does not fit {len(self.outputs)} output(s); known are "
-                + ", ".join(f"{name} ({parts})" for name, parts in PICTURES.items())
+                f"picture {self.picture!r} is unknown or not for {len(self.outputs)} output(s); known "
+                f"are {known}"
             )
         steps = tuple([one.steps_per_unit for one in self.inputs])
         object.__setattr__(self, "steps_per_unit", steps)

@@ -128,10 +128,10 @@ class Signals:
             if doubled:
                 raise ValueError(f"{what}: {', '.join(doubled)} is named twice")
         if self.picture and len(self.outputs) not in dict(PICTURES).get(self.picture, ()):
-            known = ", ".join([f"{name} (outputs: {counts})" for name, counts in PICTURES])
+            pictures = ", ".join([f"{one} (outputs: {counts})" for one, counts in PICTURES])
             raise ValueError(
                 f"picture {self.picture!r} is unknown or not for {len(self.outputs)} output(s); known "
-                f"are {known}"
+                f"are {pictures}"
             )
         steps = tuple([one.steps_per_unit for one in self.inputs])
         object.__setattr__(self, "steps_per_unit", steps)

@@ -20,7 +20,7 @@ GAUGE_DEGREES = 180
 GAUGE_CELLS = 41
 TAPE_CELLS = 48
 SPARK_CELLS = 48
-TAPE_STYLES = ("blue", "yellow", "green", "magenta", "cyan", "white")
+TAPE_STYLES = ("blue", "green", "magenta", "yellow", "cyan", "white")
 """Of bits about the first output, the second, ...: red is what is erased."""
 SPARKS = "▁▂▃▄▅▆▇█"
 ASCII_SPARKS = " .:-=+*#"

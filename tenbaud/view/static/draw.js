@@ -149,10 +149,12 @@ export function drawTape(canvas, samples, ink, several) {
     }
     const flipped = sent !== null && !same(sent, taken);
     const share = taken.reduce((sum, value) => sum + value, 0) / taken.length;
-    const bars = several && about ? taken.map((value, place) => [value, ink.outputs[about[place] % OUTPUT_COLOURS]]) : [[share, share >= 0 ? ink.estimate : ink.minus]];
+    // What the newest bits were about comes with the sensor's next message.
+    const colour = (place) => (about ? ink.outputs[about[place] % OUTPUT_COLOURS] : ink.dim);
+    const bars = several ? taken.map((value, place) => [value, colour(place)]) : [[share, share >= 0 ? ink.estimate : ink.minus]];
     const wide = (cell - 5) / bars.length;
-    bars.forEach(([value, colour], place) => {
-      context.fillStyle = flipped ? ink.error : colour;
+    bars.forEach(([value, own], place) => {
+      context.fillStyle = flipped ? ink.error : own;
       const size = Math.max(4, Math.min(1, Math.abs(value)) * (height / 2 - 5));
       context.fillRect(left + 2.5 + place * wide, value >= 0 ? height / 2 - 1 - size : height / 2 + 1, wide, size);
     });

@@ -279,7 +279,7 @@ function showText(now) {
     at("events").dataset.key = key;
     at("events").replaceChildren(...rows.map(([who, time, bad, text]) => {
       const [item, when, source] = ["li", "time", "span"].map((name) => document.createElement(name));
-      when.textContent = `${time.toFixed(1)} s`;
+      when.textContent = `${Math.max(0, time).toFixed(1)} s`;
       source.textContent = who;
       item.append(when, source, text);
       if (bad) item.className = "bad";

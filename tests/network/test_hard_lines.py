@@ -98,9 +98,8 @@ def test_a_peer_that_vanishes_without_a_word_is_noticed_within_the_lease(
     assert gone
     # A busy machine looks at the lease late.
     assert gone[0] - heard_s < 3 * LEASE_MS / 1e3
-    # Hold, ramp, safe: watchdog and ramp are 0.5 s and 1 s.
-    safe_from = heard_s + 0.5 + 1.0 + 0.05
-    late = [row["applied"] for row in ticks if row["tick"] * 0.01 > safe_from]
+    # Hold, ramp, safe: 0.5 s by the clock, then 100 steps; a loop that misses ticks takes longer.
+    late = [row["applied"] for row in ticks if row["tick"] * 0.01 > heard_s + 0.5][102:]
     assert late
     assert all(volts == [0.0, 0.0] for volts in late)
 

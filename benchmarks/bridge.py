@@ -132,7 +132,7 @@ def _trip(
     device.send()
     if rig.wait_for_sample(2.0) is None:
         raise TimeoutError("the bridge saw no sample")
-    measured = rig.read(tick).measured_rad
+    measured = rig.read(tick).measured
     for symbol in session.on_measurement(tick, measured):
         link.send(link.wire.encode(symbol))
     while session.copies.confirmed.sample <= tick:

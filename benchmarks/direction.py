@@ -24,13 +24,14 @@ from scipy.linalg import solve_discrete_are
 
 from channel.codec.coders.direction import DirectionCoder
 from channel.codec.models.linear import LinearModel
+from plant_sim.zero_order_hold import discretised
 from reproduction.limits.encoder import floor_behind_encoders
 from tenbaud.bounds.floor import floor, period_cost
 from tenbaud.bounds.linear import sampled, van_loan
 from tenbaud.design.described import plant_of, plant_section
 from tenbaud.design.direction import design_direction
 from tenbaud.design.observer import kalman_observer
-from tenbaud.design.plant import LinearPlant, discretised
+from tenbaud.design.plant import LinearPlant
 from tenbaud.studies.compiled import arrays_of, compiled
 
 SAMPLES = 12_000

@@ -37,11 +37,11 @@ class Model:  # what both codecs predict with; volts do nothing to the circuit
 
 class Plant:  # the circuit itself, which starts elsewhere
     state: Vector = (0.3, 0.1, -0.2)
-    measured_rad = state[:1]
+    measured = state[:1]
 
     def advance(self, volts: Vector) -> None:
         self.state = advance(self.state, (0.0, 0.0))
-        self.measured_rad = self.state[:1]
+        self.measured = self.state[:1]
 
 
 if __name__ == "__main__":

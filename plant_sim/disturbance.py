@@ -14,7 +14,8 @@ from numpy.random import PCG64, Generator, SeedSequence
 
 GRAMMAR: Final = (
     "comma-separated q=DENSITY (rad^2/s^3, at most once) and step=TORQUE@START[..END] "
-    "(rad/s^2, seconds), for example q=2e-3,step=0.5@10..12"
+    "(rad/s^2, seconds), for example q=2e-3,step=0.5@10..12; where a plant is disturbed in several "
+    "places, q is that of each of them and step is at the first, or one value for each: q=1e-3:2e-6"
 )
 
 Torques: TypeAlias = "np.ndarray[tuple[int], np.dtype[np.float64]]"
@@ -49,12 +50,15 @@ class WhiteTorque:
 
     Divided this way the rate wanders equally far whatever the step: its variance grows by
     `spectral_density_rad2_s3` per second (two-sided density). Equal seeds give equal torques with
-    one version of numpy; the block number enters the seed, so only one block is ever kept.
+    one version of numpy; the block number enters the seed, so only one block is ever kept. Each
+    `place` has values of its own.
     """
 
-    __slots__ = ("_block", "_block_index", "_deviation", "_seed")
+    __slots__ = ("_block", "_block_index", "_deviation", "_key", "_seed")
 
-    def __init__(self, spectral_density_rad2_s3: float, step_s: float, seed: int) -> None:
+    def __init__(
+        self, spectral_density_rad2_s3: float, step_s: float, seed: int, place: int = 0
+    ) -> None:
         """Take a density of at least 0, a step above 0 and a seed of at least 0."""
         if not (math.isfinite(spectral_density_rad2_s3) and spectral_density_rad2_s3 >= 0.0):
             raise ValueError(
@@ -66,6 +70,7 @@ class WhiteTorque:
             raise ValueError(f"seed is {seed}; it must be at least 0")
         self._deviation = math.sqrt(spectral_density_rad2_s3 / step_s)
         self._seed = seed
+        self._key = (place,) if place else ()
         self._block_index: int | None = None
         self._block: list[float] = []
 
@@ -85,7 +90,7 @@ class WhiteTorque:
         return np.concatenate([np.empty(0), *(self._draw(index) for index in blocks)])[:steps]
 
     def _draw(self, block_index: int) -> Torques:
-        sequence = SeedSequence(self._seed, spawn_key=(block_index,))
+        sequence = SeedSequence(self._seed, spawn_key=(block_index, *self._key))
         return Generator(PCG64(sequence)).standard_normal(_BLOCK_STEPS) * self._deviation
 
 
@@ -151,8 +156,8 @@ class Sum:
         return total
 
 
-def parse_disturbance(text: str, step_s: float, seed: int) -> PlannedDisturbance:
-    """Build the disturbance a command line names, as `GRAMMAR` says.
+def parse_disturbance(text: str, step_s: float, seed: int, place: int = 0) -> PlannedDisturbance:
+    """Build the disturbance a command line names, as `GRAMMAR` says, that of one place of the plant.
 
     Raises ValueError that names the piece that is wrong and repeats the grammar.
     """
@@ -166,9 +171,10 @@ def parse_disturbance(text: str, step_s: float, seed: int) -> PlannedDisturbance
                 if has_density:
                     raise ValueError("q is given twice")
                 has_density = True
-                parts.append(WhiteTorque(_number(value, "q"), step_s, seed))
+                density = _of_place(value, place, for_all=True)
+                parts.append(WhiteTorque(_number(density, "q"), step_s, seed, place))
             elif kind == "step":
-                parts.append(_parse_step(value, step_s))
+                parts.append(_parse_step(value, step_s, place))
             else:
                 raise ValueError(f"unknown kind '{kind}'")
         except ValueError as error:
@@ -178,14 +184,33 @@ def parse_disturbance(text: str, step_s: float, seed: int) -> PlannedDisturbance
     return Sum(*parts)
 
 
-def _parse_step(value: str, step_s: float) -> StepTorque:
+def require_places(text: str, places: int) -> None:
+    """Raise ValueError where a disturbance has more values than the plant has places for them."""
+    for piece in text.split(","):
+        given = piece.count(":") + 1
+        if given > places:
+            raise ValueError(
+                f"disturbance piece '{piece.strip()}' has {given} values, and this plant is disturbed "
+                f"in {places} place(s)"
+            )
+
+
+def _of_place(values: str, place: int, *, for_all: bool = False) -> str:
+    """Return the value of one place, "0" where it has none."""
+    given = values.split(":")
+    if for_all and len(given) == 1:
+        return given[0]
+    return given[place] if place < len(given) else "0"
+
+
+def _parse_step(value: str, step_s: float, place: int) -> StepTorque:
     torque_text, at, times = value.partition("@")
     if not at:
         raise ValueError("a step needs '@START'")
     start_text, dots, end_text = times.partition("..")
     return StepTorque(
         start_s=_number(start_text, "START"),
-        torque_rad_s2=_number(torque_text, "TORQUE"),
+        torque_rad_s2=_number(_of_place(torque_text, place), "TORQUE"),
         step_s=step_s,
         end_s=_number(end_text, "END") if dots else None,
     )

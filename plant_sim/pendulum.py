@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from plant_sim.plant import PlantContext
+from plant_sim.plant import PlantContext, held_command
 
 SUBSTEPS = 4
 RUB_RATE_RAD_S = 0.05
@@ -36,7 +36,7 @@ class PendulumPlant:
         self._damping: float = model["damping_per_s"] * (1.0 + off[1])
         self._gain: float = model["torque_gain_rad_per_v_s2"] * (1.0 + off[2])
         self._friction = friction_rad_per_s2
-        self._volts_max = context.command_max[0]
+        self._command_max = context.command_max
         self._step_s = context.step_s / SUBSTEPS
         self._left = math.exp(-self._step_s / motor_lag_s)
         self._disturbance = context.disturbance
@@ -45,16 +45,13 @@ class PendulumPlant:
         self._steps = 0
 
     @property
-    def measured_rad(self) -> tuple[float, ...]:
+    def measured(self) -> tuple[float, ...]:
         """The angle."""
         return self._state[:1]
 
     def advance(self, volts: tuple[float, ...]) -> None:
         """Hold the motor's voltage, clamped, for one step; ValueError for one that is no number."""
-        (wanted,) = volts
-        if not math.isfinite(wanted):
-            raise ValueError(f"the motor's voltage is {wanted}; it must be finite")
-        held = min(max(wanted, -self._volts_max), self._volts_max)
+        (held,) = held_command(volts, self._command_max)
         disturbance = self._disturbance
         torque = 0.0 if disturbance is None else disturbance.torque(self._steps)
         self._steps += 1

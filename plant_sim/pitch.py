@@ -193,7 +193,7 @@ class PitchPlant:
         return self._state
 
     @property
-    def measured_rad(self) -> tuple[float, ...]:
+    def measured(self) -> tuple[float, ...]:
         """The one angle the encoder sees."""
         return (self._state[0],)
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -25,11 +26,40 @@ class PlantContext:
     """fraction by which the plant is to be off the codec's model"""
     disturbance: Disturbance | None
     """configured torque: `disturbance.torque(step)`, rad/s^2"""
-    initial_angle_rad: float
+    initial: tuple[float, ...] = ()
+    """value of each output at the start, as far as it is configured"""
     model: Mapping[str, Any] = field(default_factory=dict)
     """the settings of the codec's model, which the plant is to be near"""
     sine: Callable[[float], float] = math.sin
     """how a sine is taken: with the codec's own a simulated flight is the same on every machine"""
+    inputs: tuple[str, ...] = ()
+    """names of the model's inputs, in the order of a command"""
+    outputs: tuple[str, ...] = ()
+    """names of the model's outputs, which are what the plant has"""
+    disturbance_text: str = ""
+    """configured disturbance, for a plant that is disturbed in several places"""
+
+    def disturbances(self, places: int) -> tuple[Disturbance, ...]:
+        """Return the disturbance of each place, none of them where none is configured.
+
+        ValueError for a configured disturbance that has more places.
+        """
+        if not self.disturbance_text:
+            return ()
+        from plant_sim.disturbance import parse_disturbance, require_places
+
+        require_places(self.disturbance_text, places)
+        return tuple(
+            [
+                parse_disturbance(self.disturbance_text, self.step_s, self.seed, place)
+                for place in range(places)
+            ]
+        )
+
+    @property
+    def initial_angle_rad(self) -> float:
+        """Return the first output's value at the start, as it was called before outputs had names."""
+        return self.initial[0] if self.initial else 0.0
 
     @property
     def volts_max(self) -> float:
@@ -38,22 +68,54 @@ class PlantContext:
 
 
 class Plant(Protocol):
-    """A plant advanced in fixed steps of held voltage.
+    """A plant advanced in fixed steps of a held command.
 
-    A plant knows nothing of encoders, symbols or the network: it takes volts and has true angles.
+    A plant knows nothing of encoders, symbols or the network: it takes commands and has true outputs.
     The length of one step is fixed when the plant is built, because lags and integration constants
     are computed once for it.
     """
 
     @property
-    def measured_rad(self) -> tuple[float, ...]:
-        """True angle of each axis that carries an encoder, in rad, unwrapped, in encoder order."""
+    def measured(self) -> tuple[float, ...]:
+        """True value of each output, in the model's order and units; angles unwrapped."""
         ...
 
     def advance(self, volts: tuple[float, ...]) -> None:
-        """Hold one voltage per motor for exactly one step; the plant does its own clamping.
+        """Hold one value per input for exactly one step; the plant does its own clamping.
 
-        Raises ValueError when the number of voltages is not the number of motors, or when one of
+        Raises ValueError when the number of values is not the number of inputs, or when one of
         them is not finite.
         """
         ...
+
+
+def held_command(command: Sequence[float], largest: Sequence[float]) -> tuple[float, ...]:
+    """Return a command within the limits of its inputs, as `Plant.advance` asks for."""
+    if len(command) != len(largest):
+        raise ValueError(f"{len(command)} value(s) given; the plant has {len(largest)} input(s)")
+    if not all(map(math.isfinite, command)):
+        raise ValueError(f"the command is {tuple(command)}; it must be finite")
+    return tuple([min(max(one, -most), most) for one, most in zip(command, largest, strict=True)])
+
+
+def with_measured(plant: Any) -> Any:
+    """Return a plant that has `measured`; one that has `measured_rad` instead is wrapped."""
+    if hasattr(plant, "measured") or not hasattr(plant, "measured_rad"):
+        return plant
+    text = f"{type(plant).__name__}.measured_rad is deprecated; call it measured"
+    warnings.warn(text, FutureWarning, stacklevel=3)
+    return _OfAngles(plant)
+
+
+class _OfAngles:
+    """A plant under the name that its outputs had when all were angles."""
+
+    def __init__(self, plant: Any) -> None:
+        self._plant = plant
+        self.advance = plant.advance
+
+    @property
+    def measured(self) -> tuple[float, ...]:
+        """The outputs."""
+        outputs: tuple[float, ...] = self._plant.measured_rad
+        return outputs

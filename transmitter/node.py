@@ -82,15 +82,15 @@ class TransmitterNode:
             time_ns = tick * self.session.terms.tick_ns
             self._recorder.write(DEVICE_CHANNEL, time_ns, device_row(tick, reading.device))
         self._check(tick, reading)
-        self.scores.on_outputs(tick, reading.true_rad or reading.measured_rad)
+        self.scores.on_outputs(tick, reading.true or reading.measured)
         if self.gauge is not None:
-            self.gauge.on_angle(tick, reading.measured_rad[0])
+            self.gauge.on_angle(tick, reading.measured[0])
         asking: list[Frame] = []
         if self.guard.stopped:
             if not self._may_rearm:
                 return []
             asking = self.session.rejoin(Why.GUARD)
-        return asking + self.session.on_measurement(tick, reading.measured_rad)
+        return asking + self.session.on_measurement(tick, reading.measured)
 
     def deliver(self, frame: Frame) -> list[Frame]:
         """Hand an arrived frame to the session; return the answers. `rest` has what it confirmed."""
@@ -145,8 +145,8 @@ class TransmitterNode:
             (
                 tick,
                 time_ns / 1e9,
-                reading.measured_rad,
-                reading.true_rad,
+                reading.measured,
+                reading.true,
                 command,
                 self._applied,
                 late,
@@ -205,7 +205,7 @@ class TransmitterNode:
             self.sensor_fault = GuardReason(GuardCause.SENSOR, tick, detail=fault)
             self.tell(Event(EventKind.SENSOR, tick=tick, detail=fault))
             self.guard.trip(self.sensor_fault)
-        self.guard.check_outputs(tick, reading.measured_rad)
+        self.guard.check_outputs(tick, reading.measured)
 
     def _tell_guard(self) -> None:
         self._guard_told = self.guard.state

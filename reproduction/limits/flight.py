@@ -129,7 +129,7 @@ def fly_agreement(agreement: Agreement, start_s: float) -> Errors:
     estimation = tracking = 0.0
     used = 0
     for tick in range(agreement.flight_ticks):
-        true = plant.measured_rad[0]
+        true = plant.measured[0]
         seen: Vector = (encoder.read(true)[1],)
         if observer is not None:
             seen = observer.look(tick, seen, volts)

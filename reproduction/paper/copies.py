@@ -49,7 +49,7 @@ def fly_copies(echo: bool) -> CopiesApart:
     for sample in range(round(DURATION_S / (ticks * tick_s))):
         time_s = sample * ticks * tick_s
         rows.append((time_s, plant.angle_rad - receiver.model[0], _apart(sender, receiver)))
-        sent = codec.encode(sender, plant.measured_rad)
+        sent = codec.encode(sender, plant.measured)
         received = sent
         if chance.random() < FLIPPED and time_s >= FIRST_FLIP_S:
             received = tuple(-symbol for symbol in sent)

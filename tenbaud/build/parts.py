@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from channel.codec.codec import Codec, Coder, Model, Vector
 from channel.codec.signals import signals_of
 from channel.codec.words import ERASED
-from plant_sim.plant import Plant
+from plant_sim.plant import Plant, with_measured
 from receiver.controllers.base import Controller, with_references
 from tenbaud.config.load import ConfigError
 
@@ -38,8 +38,9 @@ class Parts:
     controller: Controller | None = None
 
     def __post_init__(self) -> None:
-        """Let a controller that only knows `reference_rad` be one that has `references`."""
+        """Let a controller or plant with the names of before be one with those of today."""
         object.__setattr__(self, "controller", with_references(self.controller))
+        object.__setattr__(self, "plant", with_measured(self.plant))
 
     def check(self) -> None:
         """Raise PartError for an object that lacks what its part must have."""

@@ -12,15 +12,19 @@ import difflib
 import inspect
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
 
 from channel.registry import Registry, RegistryError
+from plant_sim.plant import Plant, with_measured
 from receiver.controllers.base import Controller, with_references
 from tenbaud.build.parts import PartError, check_part
 from tenbaud.config.outside_code import is_object, require_allowed
 from tenbaud.config.schema import FlightConfig
+
+UNDER_OLD_NAMES: dict[type, Callable[[Any], Any]] = {Controller: with_references, Plant: with_measured}
+"""Parts whose members were called otherwise once, and what wraps those."""
 
 
 def build_plugin(
@@ -32,7 +36,6 @@ def build_plugin(
     protocol: type,
 ) -> Any:
     """Return the object that a class from outside builds; PartError if it is not what is needed.
-
 
     `name` is `module:Class` or what an installed package offers. CodeNotAllowed if nobody allowed the
     configuration's code to run.
@@ -48,12 +51,15 @@ def build_plugin(
     try:
         part = found(context, **options)
     except Exception as error:  # it is the user's code, and anything may be wrong in it
+        if name in registry.built_in and isinstance(error, ValueError):
+            raise PartError(f"{field} = {name!r}: {error}") from error
         raise PartError(
             f"{field} = {name!r}: {found.__name__}({_call(options)}) failed: "
             f"{type(error).__name__}: {error}. It is called with one context object "
             f"({type(context).__name__}: {', '.join(_names(context))}) and its options."
         ) from error
-    part = with_references(part) if protocol is Controller else part
+    if protocol in UNDER_OLD_NAMES:
+        part = UNDER_OLD_NAMES[protocol](part)
     check_part(f"{field} = {name!r}", part, protocol)
     return part
 

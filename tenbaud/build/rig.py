@@ -93,16 +93,24 @@ def build_plant(config: FlightConfig, step_s: float, signals: Signals | None = N
         build_limits(config, signals).command_max,
         section.mismatch,
         disturbance,
-        section.initial_angle_rad,
+        section.initial_outputs,
         config.model.model_dump(exclude={"kind"}),
         sin,
+        disturbance_text=section.disturbance,
+        inputs=tuple([one.name for one in signals.inputs]),
+        outputs=tuple([one.name for one in signals.outputs]),
     )
-    plant: Plant = build_part(config, PLANTS, section.kind, context, section.options, Plant)
-    measured, outputs = len(plant.measured_rad), len(signals.outputs)
-    if measured != outputs:
+    if len(context.initial) > len(signals.outputs):
         raise ConfigError(
-            f"transmitter.plant.kind = {section.kind!r} has {measured} output(s), and model.kind = "
-            f"{config.model.kind!r} has {outputs}: {', '.join(one.name for one in signals.outputs)}"
+            f"transmitter.plant.initial has {len(context.initial)} values, and the plant "
+            f"{len(signals.outputs)} output(s)"
+        )
+    plant: Plant = build_part(config, PLANTS, config.plant_kind, context, section.options, Plant)
+    measured, outputs = len(plant.measured), [one.name for one in signals.outputs]
+    if measured != len(outputs):
+        raise ConfigError(
+            f"transmitter.plant.kind = {config.plant_kind!r} has {measured} output(s), and "
+            f"model.kind = {config.model.kind!r} has {len(outputs)}: {', '.join(outputs)}"
         )
     return plant
 
@@ -110,7 +118,7 @@ def build_plant(config: FlightConfig, step_s: float, signals: Signals | None = N
 def pitch_plant(config: FlightConfig, context: PlantContext) -> PitchPlant:
     """Return the pitch axis."""
     return PitchPlant(
-        nominal_plant(config, context.volts_max).mismatched(config.transmitter.plant.mismatch),
+        nominal_plant(config, context.command_max[0]).mismatched(config.transmitter.plant.mismatch),
         context.step_s,
         context.disturbance,
         initial_angle_rad=context.initial_angle_rad,

@@ -127,7 +127,7 @@ def _records(
 
     if source is None:
         rest = config.transmitter.plant.model_copy(
-            update={"initial_angle_rad": getattr(config.model, "equilibrium_rad", 0.0)}
+            update={"initial": getattr(config.model, "equilibrium_rad", 0.0)}
         )
         at_rest = config.model_copy(
             update={"transmitter": config.transmitter.model_copy(update={"plant": rest})}

@@ -21,6 +21,7 @@ MOVED = {
     "transmitter.encoder_sign": "transmitter.encoders.sign",
     "transmitter.encoder_zero_counts": "transmitter.encoders.zero_counts",
     "transmitter.sight_bandwidth_rad_s": "transmitter.rate_observer_bandwidth_rad_s",
+    "transmitter.plant.initial_angle_rad": "transmitter.plant.initial",
     "receiver.reference.amplitude_rad": "receiver.reference.amplitude",
 }
 """Old full name of a field to the new one."""

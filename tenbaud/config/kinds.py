@@ -20,6 +20,9 @@ from pydantic import Discriminator, JsonValue, Tag, create_model
 from channel.registry import Registry
 from tenbaud.config.section import KindSection, OutsideSection
 
+FMU = "fmu"
+"""The plant that runs the machine code of a file: code from outside, although its class is built in."""
+
 MODELS = Registry(
     "model.kind",
     "tenbaud.models",
@@ -49,6 +52,8 @@ PLANTS = Registry(
     {
         "pitch": "tenbaud.build.rig:pitch_plant",
         "pendulum": "plant_sim.pendulum:PendulumPlant",
+        "linear": "plant_sim.linear:SimulatedLinear",
+        FMU: "plant_sim.fmu:FmuPlant",
     },
 )
 CONTROLLERS = Registry(
@@ -69,6 +74,8 @@ class Kind:
     section: type[KindSection]
     build: Callable[[Any, Any], Any]
     """from the section and the context to the part"""
+    plant: str = "pitch"
+    """of a model: the kind of the plant that it describes"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,9 +83,13 @@ class PartName:
     """Checks the name of a kind."""
 
     registry: Registry
+    also: str = ""
+    """a name beside those of kinds"""
 
     def __call__(self, name: str) -> str:
         """Return the name; ValueError where nobody offers it."""
+        if self.also and name == self.also:
+            return name
         if not self.registry.classes or ":" not in name:
             return self.registry.check(name)
         if not re.fullmatch(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*", name):

@@ -38,7 +38,10 @@ Names = tuple[str, ...]
 
 
 class LinearModelSection(KindSection):
-    """A linear plant: dx/dt = A x + B u + G w, y = C x; per tick x <- F x + E u."""
+    """A linear plant: dx/dt = A x + B u + G w, y = C x; per tick x <- F x + E u.
+
+    About an operating point it is dx/dt = A (x - x0) + B (u - u0) + G w; y is still C x.
+    """
 
     kind: Literal["linear"] = "linear"
     A: Matrix = ()
@@ -58,7 +61,11 @@ class LinearModelSection(KindSection):
     corrected: Annotated[int, Field(ge=0, le=64)] = 0
     """how many of the states, from the first, take corrections; 0: all"""
     start: tuple[Factor, ...] = ()
-    """state that both ends begin with; empty: zero"""
+    """state that both ends begin with; empty: the operating state"""
+    operating_state: tuple[Factor, ...] = ()
+    """x0, at rest under u0: where a nonlinear plant was linearised; empty: zero"""
+    operating_command: tuple[Factor, ...] = ()
+    """u0; empty: zero"""
     states: Names = ()
     state_units: Names = ()
     inputs: Names = ()
@@ -107,6 +114,8 @@ class LinearModelSection(KindSection):
         _check_length("densities", self.densities, len(self.G[0]) if self.G else columns, 1)
         _check_length("weights", self.weights, len(self.C), 1)
         _check_length("start", self.start, size, 0)
+        _check_length("operating_state", self.operating_state, size, 0)
+        _check_length("operating_command", self.operating_command, columns, 0)
         if self.corrected > size:
             raise ValueError(f"corrected is {self.corrected}, and there are {size} states")
         for name, count in (("state", size), ("input", columns), ("output", len(self.C))):
@@ -160,6 +169,7 @@ def _linear(section: LinearModelSection, context: ModelContext) -> LinearModel:
         context.tick_s,
         corrected=section.corrected or None,
         start=section.start or None,
+        operating=(section.operating_state, section.operating_command),
         signals=section.signals(len(section.E[0])),
     )
 
@@ -168,7 +178,7 @@ def _pendulum(section: PendulumModelSection, context: ModelContext) -> PendulumM
     return PendulumModel(context, **section.model_dump(exclude={"kind"}))
 
 
-PENDULUM = Kind(PendulumModelSection, _pendulum)
+PENDULUM = Kind(PendulumModelSection, _pendulum, "pendulum")
 PITCH = Kind(PitchModelSection, _pitch)
 HOLD = Kind(HoldModelSection, _hold)
-LINEAR = Kind(LinearModelSection, _linear)
+LINEAR = Kind(LinearModelSection, _linear, "linear")

@@ -22,6 +22,7 @@ from tenbaud.config.kinds import (
     MODELS,
     PLANTS,
     PartName,
+    kind_of,
     sections_of,
     union_of,
 )
@@ -38,6 +39,7 @@ from tenbaud.config.section import (
     NamedSections,
     NotNegative,
     Options,
+    OutsideSection,
     Positive,
     Section,
 )
@@ -121,10 +123,10 @@ class Limits(Section):
 class PlantSection(Section):
     """The simulated plant, relative to the codec's model."""
 
-    kind: Annotated[str, AfterValidator(PartName(PLANTS))] = "pitch"
-    """the pitch axis, or a plant from outside"""
+    kind: Annotated[str, AfterValidator(PartName(PLANTS, also="auto"))] = "auto"
+    """built in, an FMU (machine code in a file) or from outside; "auto": that of the codec's model"""
     options: Options = Field(default_factory=dict)
-    """options of an external class"""
+    """what the plant's class is built with"""
     relative_to: Literal["model", "pitch"] = "model"
     """the codec's model, so that the plant changes with it; or the constants in `pitch`"""
     pitch: PitchModelSection = PitchModelSection()
@@ -133,7 +135,13 @@ class PlantSection(Section):
     """fraction by which damping, stiffness and gain are off the model: 0.1 is 10 % more of each"""
     disturbance: str = ""
     """such as "q=2e-3,step=0.5@30": white torque density in rad^2/s^3, torque steps in rad/s^2"""
-    initial_angle_rad: Annotated[float, Field(ge=-3.2, le=3.2)] = 0.0
+    initial: Command = ()
+    """outputs at the start: a number for the first, or a list; empty: as the plant starts by itself"""
+
+    @property
+    def initial_outputs(self) -> tuple[float, ...]:
+        """Return the outputs at the start, as far as they are given."""
+        return self.initial if isinstance(self.initial, tuple) else (self.initial,)
 
 
 class EncoderSection(Section):
@@ -331,6 +339,15 @@ class FlightConfig(CodePermission):
     flight_log: FlightLogSection = FlightLogSection()
     link: LinkSection = LinkSection()
     telemetry: TelemetrySection = TelemetrySection()
+
+    @property
+    def plant_kind(self) -> str:
+        """Return the kind of the simulated plant."""
+        kind = self.transmitter.plant.kind
+        if kind != "auto":
+            return kind
+        outside = isinstance(self.model, OutsideSection)
+        return "pitch" if outside else kind_of(MODELS, self.model.kind).plant
 
     def shared_json(self, lead_ticks: int) -> str:
         """Return the shared part as canonical JSON, with the command lead that was chosen."""

@@ -10,13 +10,13 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
+from plant_sim.zero_order_hold import discretised
 from tenbaud.config.load import ConfigError
 from tenbaud.config.models import LinearModelSection, PitchModelSection
 from tenbaud.config.schema import Timing
 from tenbaud.config.section import KindSection
 from tenbaud.design.described import corrected_part, plant_of
 from tenbaud.design.direction import design_direction
-from tenbaud.design.plant import discretised
 
 
 def completed(values: Mapping[str, Any]) -> dict[str, Any]:

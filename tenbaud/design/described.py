@@ -10,12 +10,13 @@ from numpy.typing import ArrayLike
 
 from channel.codec.codec import Codec
 from channel.line.uplink import bits_per_symbol
+from plant_sim.zero_order_hold import continuous, discretised
 from tenbaud.bounds.floor import RateTooLow
 from tenbaud.bounds.linear import rate_needed
 from tenbaud.config.models import LinearModelSection, PendulumModelSection, PitchModelSection
 from tenbaud.config.schema import FlightConfig
 from tenbaud.config.section import KindSection
-from tenbaud.design.plant import LinearPlant, continuous, discretised, linear_plant
+from tenbaud.design.plant import LinearPlant, linear_plant
 
 PITCH_DENSITY = 2e-3
 """rad^2/s^3; of the torque that designs and floors of the pitch assume"""

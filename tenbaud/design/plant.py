@@ -1,4 +1,4 @@
-"""A linear plant as designs and floors take it, and its discretisation.
+"""A linear plant as designs and floors take it.
 
 dx/dt = A x + B u + G w,     y = C x,     E w(t) w(t')' = diag(q) delta(t - t')
 """
@@ -9,11 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import expm, logm
 
 from tenbaud.bounds.linear import LinearModel, Matrix, linear_model
-
-IMAGINARY_MAX = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,34 +65,6 @@ def linear_plant(
     q = np.broadcast_to(np.asarray(densities, dtype=float), (g.shape[1],)).copy()
     w = np.broadcast_to(np.asarray(1.0 if weights is None else weights, dtype=float), (len(c),)).copy()
     return LinearPlant(a, b, c, g, q, w)
-
-
-def discretised(A: ArrayLike, B: ArrayLike, period_s: float) -> tuple[Matrix, Matrix]:
-    """Return (F, E) of a period under a held command: zero-order hold."""
-    a, b = (np.atleast_2d(np.asarray(one, dtype=float)) for one in (A, B))
-    states, inputs = b.shape
-    block = np.zeros((states + inputs, states + inputs))
-    block[:states, :states] = a
-    block[:states, states:] = b
-    grown = expm(block * period_s)
-    return grown[:states, :states], grown[:states, states:]
-
-
-def continuous(F: ArrayLike, E: ArrayLike, period_s: float) -> tuple[Matrix, Matrix]:
-    """Return (A, B) whose zero-order hold over a period is (F, E); ValueError where there is none."""
-    f, e = (np.atleast_2d(np.asarray(one, dtype=float)) for one in (F, E))
-    states, inputs = e.shape
-    block = np.eye(states + inputs)
-    block[:states, :states] = f
-    block[:states, states:] = e
-    grown = np.asarray(logm(block))
-    if not np.isfinite(grown).all() or np.abs(grown.imag).max() > IMAGINARY_MAX:
-        raise ValueError(
-            f"F = {f.tolist()} is no zero-order hold of a continuous plant: it has an eigenvalue that "
-            "is zero or on the negative real axis"
-        )
-    found = grown.real / period_s
-    return found[:states, :states], found[:states, states:]
 
 
 def rows_of(matrix: Matrix) -> tuple[tuple[float, ...], ...]:

@@ -17,7 +17,7 @@ from channel.protocol.recording import Recorder
 from channel.protocol.terms import Terms
 from channel.protocol.wire import DATAGRAM, Wire
 from plant_sim.encoder import Encoder
-from plant_sim.plant import Plant
+from plant_sim.plant import Plant, with_measured
 from receiver.controllers.base import Controller, with_references
 from receiver.endpoint import ReceiverEndpoint
 from receiver.session.session import ReceiverSession
@@ -83,7 +83,7 @@ class MemoryFlight:
         receiver_recorder: Recorder | None = None,
         wire: Wire = DATAGRAM,
     ) -> None:
-        controller = with_references(controller)
+        controller, plant = with_references(controller), with_measured(plant)
         _check(codec, terms, plant, controller)
         self.codec = codec
         self.terms = terms
@@ -126,7 +126,7 @@ class MemoryFlight:
         terms = self.terms
         if safe_command is None:
             safe_command = (0.0,) * self.codec.model.input_size
-        encoders = tuple(Encoder(counts_per_turn) for _ in self.plant.measured_rad)
+        encoders = tuple(Encoder(counts_per_turn) for _ in self.plant.measured)
         trip = round_trip(terms, LineFaults(), "virtual")
         timeout_ticks = watchdog_ticks(None, terms, trip) - (-delay_ns // terms.tick_ns)
         return TransmitterNode(
@@ -206,7 +206,7 @@ def _check(codec: Codec, terms: Terms, plant: Plant, controller: Controller) -> 
                 "makes terms that agree"
             )
     check_codec("the codec", codec)
-    predicted, measured = codec.model.measured(codec.model.initial()), plant.measured_rad
+    predicted, measured = codec.model.measured(codec.model.initial()), plant.measured
     if len(predicted) != len(measured):
         raise PartError(
             f"the plant ({type(plant).__name__}) measures {len(measured)} angle(s) and the model "

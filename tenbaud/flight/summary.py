@@ -179,11 +179,9 @@ def _plant_name(agreement: Agreement) -> str:
         return f"replay of {Path(agreement.config.flight_log.file).name}"
     if section.rig != "simulated":
         return real_rig_name(section)
-    if section.plant.kind != "pitch":
-        return section.plant.kind
     mismatch = section.plant.mismatch
     off = mismatch if isinstance(mismatch, tuple) else (mismatch,)
-    name = "pitch"
+    name = agreement.config.plant_kind
     if any(off):
         name += " off the model by " + ", ".join(f"{value:+.0%}" for value in off)
     if section.plant.disturbance:

@@ -61,7 +61,7 @@ def from_rig(config: FlightConfig, excitation: str, duration_s: float) -> PitchR
         def step(tick: int, front: float, rear: float) -> float | None:
             reading = rig.read(tick)
             rig.write(tick, (front, rear))
-            return None if reading is None else reading.measured_rad[0]
+            return None if reading is None else reading.measured[0]
 
         signal = parse_excitation(excitation, tick_s)
         force = config.receiver.pid.normal_force_volts

@@ -164,7 +164,7 @@ class CompiledPoint:
     def given(self, schedule: Schedule, torque: Any) -> Given:
         """Return what a flight reads."""
         return Given(
-            np.array([self.config.transmitter.plant.initial_angle_rad, 0.0]),
+            np.array([(*self.config.transmitter.plant.initial_outputs, 0.0)[0], 0.0]),
             np.array(self.agreement.codec.coder.alphabet.symbols, dtype=np.int64),
             schedule.shifts,
             schedule.known,
@@ -209,7 +209,7 @@ def _require_ordinary(config: FlightConfig, codec: Codec) -> None:
     rig, controller = config.transmitter.rig, config.receiver.controller
     if (rig, controller) not in (("simulated", "pid"), ("replay", "recorded")):
         raise Uncommon(f"the rig {rig} with the controller {controller}")
-    if rig == "simulated" and config.transmitter.plant.kind != "pitch":
+    if rig == "simulated" and config.plant_kind != "pitch":
         raise Uncommon("a plant from outside")
     if config.transmitter.sabotage or config.receiver.sabotage or config.transmitter.dry_run:
         raise Uncommon("sabotage and dry runs")

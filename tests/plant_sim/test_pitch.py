@@ -129,10 +129,10 @@ def test_mismatch_scales_damping_stiffness_and_gain_only() -> None:
 
 def test_plant_starts_at_rest_and_measures_its_angle() -> None:
     plant: Plant = PitchPlant(PAPER, 0.01)
-    assert plant.measured_rad == (0.0,)
+    assert plant.measured == (0.0,)
     moved = PitchPlant(PAPER, 0.01, initial_angle_rad=0.2, initial_rate=-0.3)
     assert moved.state == (0.2, -0.3, 0.0, 0.0)
-    assert moved.measured_rad == (0.2,)
+    assert moved.measured == (0.2,)
 
 
 @pytest.mark.parametrize(

@@ -59,7 +59,7 @@ class WorldRig(Rig):
         self.volts: Vector = (0.0, 0.0)
 
     def read(self, tick: int) -> Reading:
-        true = self.plant.measured_rad
+        true = self.plant.measured
         counts = (self.encoder.counts(true[0]),)
         return Reading(counts, (self.encoder.angle_rad(counts[0]),), true)
 

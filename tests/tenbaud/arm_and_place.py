@@ -64,7 +64,7 @@ class Plant:
         self._ticks = 0
 
     @property
-    def measured_rad(self) -> Vector:
+    def measured(self) -> Vector:
         return self.state[:2]
 
     def advance(self, volts: Vector) -> None:

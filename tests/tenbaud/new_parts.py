@@ -44,7 +44,7 @@ class Cart:
         self.place, self.speed = context.initial_angle_rad, 0.0
 
     @property
-    def measured_rad(self):
+    def measured(self):
         return (self.place,)
 
     def advance(self, volts):

@@ -56,7 +56,7 @@ class Plant:
         self.state = (0.05, 0.02, 0.0, 0.0)
 
     @property
-    def measured_rad(self):
+    def measured(self):
         return self.state[:2]
 
     def advance(self, volts):

@@ -57,7 +57,7 @@ def test_when_the_real_body_flies_then_nothing_is_flagged_whatever_it_does() -> 
     watch = EncoderWatch(CODEC, TICK_S)
     for tick in range(10_000):
         push = 3.0 if tick // 250 % 2 else -3.0
-        counts = (QUANSER_PITCH.counts(plant.measured_rad[0]),)
+        counts = (QUANSER_PITCH.counts(plant.measured[0]),)
         assert watch.check(counts, (push, -push), plant.state) is None
         plant.advance((push, -push))
 
@@ -68,7 +68,7 @@ def test_when_the_encoder_sticks_in_flight_then_it_is_found_within_two_windows()
     found = None
     for tick in range(1000):
         push = 4.0 if tick // 150 % 2 else -4.0
-        seen = plant.measured_rad[0] if tick < 400 else 0.3
+        seen = plant.measured[0] if tick < 400 else 0.3
         counts = (QUANSER_PITCH.counts(seen),)
         if watch.check(counts, (push, -push), plant.state) is not None:
             found = tick

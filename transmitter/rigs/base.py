@@ -33,9 +33,9 @@ class Reading(NamedTuple):
 
     counts: tuple[int, ...]
     """of the encoders, unwrapped"""
-    measured_rad: Vector
+    measured: Vector
     """the same as angles"""
-    true_rad: Vector | None = None
+    true: Vector | None = None
     """true angles, where the rig is simulated"""
     applied_volts: Vector | None = None
     """voltages that were applied regardless of ours, in a recorded flight"""

@@ -100,7 +100,7 @@ class FakeHIL:
         self._look()
         self._move()
         if not self.stuck:
-            buffer[1] = QUANSER_PITCH.counts(self._plant.measured_rad[0])
+            buffer[1] = QUANSER_PITCH.counts(self._plant.measured[0])
         return 1
 
     def task_stop(self, task: int) -> None:

@@ -1,10 +1,11 @@
 """Any linear plant as the codec predicts it, one tick at a time.
 
-    x <- F x + E u + h e,     y = C x
+    x <- x0 + F (x - x0) + E (u - u0) + h e,     y = C x
 
 F and E are those of a tick of h seconds under a held command, e is a correction that is held over the
-tick. The matrices come by value: `tenbaud design` discretises once and writes them into the
-configuration, so that no two libraries ever have to agree on a last bit.
+tick, x0 and u0 are the operating point of a plant that was linearised, zero for one that is linear. The
+matrices come by value: `tenbaud design` discretises once and writes them into the configuration, so
+that no two libraries ever have to agree on a last bit.
 """
 
 from __future__ import annotations
@@ -27,13 +28,15 @@ class LinearConstants(NamedTuple):
     """E"""
     tick_s: float
     """h"""
+    constant: Vector
+    """x0 - F x0 - E u0"""
 
 
 def linear_row(
     state: Vector, command: Vector, held: Vector, constants: LinearConstants, row: int
 ) -> float:
     """Return one state after a tick."""
-    total = 0.0
+    total = constants.constant[row]
     states = len(state)
     for index in range(states):
         total += constants.transition[row * states + index] * state[index]
@@ -49,7 +52,8 @@ class LinearModel:
     """Prediction model `x <- F x + E u` with the outputs `C x`.
 
     All states take corrections, or the first `corrected` of them. `start` is the state that both ends
-    begin with, zero if not given. Raises ValueError for matrices that do not fit each other.
+    begin with, x0 if not given; `operating` is (x0, u0), each of them empty for zero. Raises ValueError
+    for matrices that do not fit each other.
     """
 
     row_function = staticmethod(linear_row)
@@ -63,6 +67,7 @@ class LinearModel:
         *,
         corrected: int | None = None,
         start: Sequence[float] | None = None,
+        operating: tuple[Sequence[float], Sequence[float]] = ((), ()),
         signals: Signals | None = None,
     ) -> None:
         self.state_size = len(transition)
@@ -73,12 +78,21 @@ class LinearModel:
         self.correction_size = self.state_size if corrected is None else corrected
         if not 1 <= self.correction_size <= self.state_size:
             raise ValueError(f"corrected is {corrected}; it must be 1 to {self.state_size} states")
-        self._start = (0.0,) * self.state_size if start is None else tuple(start)
+        rest = tuple(operating[0]) or (0.0,) * self.state_size
+        held = tuple(operating[1]) or (0.0,) * self.input_size
+        check("operating", (rest,), 1, self.state_size)
+        check("operating", (held,), 1, self.input_size)
+        self._start = rest if start is None else tuple(start)
         if len(self._start) != self.state_size:
             raise ValueError(f"start has {len(self._start)} numbers, one for each state is needed")
         self.signals = signals
         self.outputs = tuple(tuple(row) for row in outputs)
-        self.constants = LinearConstants(flat(transition), flat(drive), tick_s)
+        nothing = LinearConstants(flat(transition), flat(drive), tick_s, (0.0,) * self.state_size)
+        self.constants = nothing._replace(
+            constant=tuple(
+                [rest[row] - linear_row(rest, held, (), nothing, row) for row in range(self.state_size)]
+            )
+        )
 
     def initial(self) -> Vector:
         """Return the state that both ends start from."""

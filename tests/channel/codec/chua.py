@@ -70,7 +70,7 @@ class ChuaPlant:
         self._tick_s = tick_s
 
     @property
-    def measured_rad(self) -> Vector:
+    def measured(self) -> Vector:
         return self.state[:1]
 
     def advance(self, volts: Vector) -> None:

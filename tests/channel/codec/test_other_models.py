@@ -32,7 +32,7 @@ def chua_errors(samples: int, erase_every: int = 0) -> list[float]:
     state = codec.initial()
     errors = []
     for sample in range(samples):
-        word = codec.encode(state, plant.measured_rad)
+        word = codec.encode(state, plant.measured)
         erased = erase_every and sample % erase_every == 0
         state, states = codec.trace(state, ERASED if erased else word, [()] * codec.ticks_per_sample)
         for model in states:
@@ -69,12 +69,12 @@ def test_when_two_axes_are_followed_then_one_word_of_two_symbols_serves_both() -
     state = codec.initial()
     errors = []
     for sample in range(600):
-        word = codec.encode(state, plant.measured_rad)
+        word = codec.encode(state, plant.measured)
         push = 1.0 if (sample // 25) % 2 else -1.0
         commands = [(push, -0.5 * push)] * 4
         state, states = codec.trace(state, word, commands)
         for model, command in zip(states, commands, strict=True):
-            pairs = zip(model[:2], plant.measured_rad, strict=True)
+            pairs = zip(model[:2], plant.measured, strict=True)
             errors.append(max(abs(ours - theirs) for ours, theirs in pairs))
             plant.advance(command)
     assert max(errors[1200:]) < 0.05

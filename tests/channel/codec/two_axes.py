@@ -50,7 +50,7 @@ class TwoAxesPlant:
         self._model = TwoAxes(tick_s)
 
     @property
-    def measured_rad(self) -> Vector:
+    def measured(self) -> Vector:
         return self.state[:2]
 
     def advance(self, volts: Vector) -> None:

@@ -44,7 +44,7 @@ class Cart:
     def __init__(self, context, friction=0.5):
         self.h, self.friction, self.x, self.v = context.step_s, friction, context.initial_angle_rad, 0.0
     @property
-    def measured_rad(self):
+    def measured(self):
         return (self.x,)
     def advance(self, volts):
         self.v += self.h * (0.4 * (volts[0] - volts[1]) - self.friction * self.v)
@@ -196,7 +196,7 @@ def test_a_coder_that_uses_rates_is_given_them(outside: Path) -> None:
         (
             "transmitter.plant.kind",
             "outside:Law",
-            r"it has no attribute measured_rad \(.*float.*\); it has no method advance\(volts\)",
+            r"it has no attribute measured \(.*float.*\); it has no method advance\(volts\)",
         ),
         ("coder.kind", "outside:Law", r"is no coder: it has no attribute alphabet \(Alphabet\)"),
         ("coder.kind", "outside:Growing", "cannot run one sample: .* number of states changed"),

@@ -33,6 +33,7 @@ sight_bandwidth_rad_s = 42.0
         ({"coder": {"kind": "words"}}, "pcm"),
         ({"transmitter": {"encoder_counts_per_turn": 500}}, 500),
         ({"limits": {"volts_max": 3.0}}, 3.0),
+        ({"transmitter": {"plant": {"initial_angle_rad": 0.25}}}, 0.25),
     ],
 )
 def test_when_a_setting_has_an_old_name_then_it_is_read_with_a_warning(
@@ -42,7 +43,20 @@ def test_when_a_setting_has_an_old_name_then_it_is_read_with_a_warning(
         config = load_config("paper-10baud", None, overrides)
     transmitter = config.transmitter
     found = (transmitter.rate_observer_bandwidth_rad_s, transmitter.encoders.counts_per_turn)
-    assert read in (*found, config.coder.kind, config.limits.command_max)
+    found += (transmitter.plant.initial, config.limits.command_max)
+    assert read in (*found, config.coder.kind)
+
+
+def test_when_a_plant_has_measured_rad_then_it_flies_with_a_warning() -> None:
+    class Still:
+        measured_rad = (0.25,)
+
+        def advance(self, command: tuple[float, ...]) -> None:
+            pass
+
+    with pytest.warns(FutureWarning, match=r"Still.measured_rad is deprecated; call it measured"):
+        result = fly("paper-10baud", plant=Still(), settings={"duration_s": 0.5})
+    assert result.summary["ticks_commanded"] == 50
 
 
 def test_when_a_preset_has_an_old_name_then_the_new_one_is_loaded() -> None:

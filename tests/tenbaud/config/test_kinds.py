@@ -41,6 +41,25 @@ def test_when_a_preset_names_no_kind_or_another_then_that_coder_is_built(
     assert type(agree(load_config(preset), "virtual").codec.coder) is coder
 
 
+@pytest.mark.parametrize(
+    ("model", "given", "kind"),
+    [
+        ("pitch", "auto", "pitch"),
+        ("hold", "auto", "pitch"),
+        ("pendulum", "auto", "pendulum"),
+        ("linear", "auto", "linear"),
+        ("linear", "pendulum", "pendulum"),
+        ("my:Model", "auto", "pitch"),
+    ],
+)
+def test_when_no_plant_is_named_then_it_is_the_model_s(model: str, given: str, kind: str) -> None:
+    section = {"kind": model} | (
+        {"C": [[1.0]], "A": [[0.0]], "B": [[1.0]]} if model == "linear" else {}
+    )
+    overrides = {"model": section, "transmitter": {"plant": {"kind": given}}}
+    assert load_config("paper-10baud", None, overrides).plant_kind == kind
+
+
 def test_when_the_kind_changes_then_fields_of_the_old_kind_are_gone() -> None:
     config = load_config("paper-10baud", None, {"coder": {"kind": "fixed", "range_rad": 0.2}})
     assert config.coder.kind == "fixed"

@@ -26,7 +26,7 @@ class Cart:
         self.x, self.v = 0.2, 0.0
 
     @property
-    def measured_rad(self) -> tuple[float, ...]:
+    def measured(self) -> tuple[float, ...]:
         return (self.x,)
 
     def advance(self, volts: tuple[float, ...]) -> None:
@@ -134,7 +134,7 @@ class Growing(coders.ZoomCoder):
 
 
 class TwoAngles(Cart):
-    measured_rad = (0.0, 0.0)  # type: ignore[assignment]
+    measured = (0.0, 0.0)  # type: ignore[assignment]
 
 
 GROWING = Codec(CartModel(), Growing(coders.ZoomParameters()), 10)
@@ -147,7 +147,7 @@ NOT_ONE = Codec(CartModel(), coders.ZoomCoder(coders.ZoomParameters()), 5)
         ({"controller": Mute()}, r"the controller \(Mute\) .* it has no method command\(tick, state\)"),
         ({"controller": Hasty()}, r"its method command must take \(tick, state\), not \(tick\)"),
         ({"controller": Damper}, r"is the class Damper; give an object of it, Damper\(\.\.\.\)"),
-        ({"plant": object()}, r"no attribute measured_rad \(tuple.*\); it has no method adv"),
+        ({"plant": object()}, r"no attribute measured \(tuple.*\); it has no method adv"),
         ({"plant": TwoAngles()}, r"measures 2 angle\(s\) and the model \(CartModel\) predicts 1"),
         ({"codec": CartModel()}, r"\(CartModel\) is no Codec: give Codec\(model, coder, ticks"),
         ({"codec": GROWING}, "the number of states changed within a sample"),

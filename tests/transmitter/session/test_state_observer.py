@@ -13,10 +13,10 @@ from plant_sim.disturbance import WhiteTorque
 from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters as PlantParameters
 from plant_sim.pitch import PitchPlant
+from plant_sim.zero_order_hold import discretised
 from tenbaud.bounds.linear import van_loan
 from tenbaud.design.described import plant_of, plant_section
 from tenbaud.design.observer import kalman_observer
-from tenbaud.design.plant import discretised
 from tests.channel.codec.two_axes import TwoAxes
 from transmitter.session.state_observer import StateObserver, rate_observer
 

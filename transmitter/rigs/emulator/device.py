@@ -44,7 +44,7 @@ class SimulatedBody:
         while (self._steps + 1) * self._step_ns <= time_ns:
             self._plant.advance(volts)
             self._steps += 1
-        return self._encoder.counts(self._plant.measured_rad[0])
+        return self._encoder.counts(self._plant.measured[0])
 
 
 class RecordedBody:

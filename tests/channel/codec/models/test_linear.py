@@ -9,8 +9,8 @@ import pytest
 from channel.codec.codec import Codec
 from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
 from channel.codec.models.linear import LinearModel
+from plant_sim.zero_order_hold import continuous, discretised
 from tenbaud.design.described import plant_names, plant_of, plant_section
-from tenbaud.design.plant import continuous, discretised
 
 TICK_S = 0.01
 F = ((1.0, 0.5), (-0.25, 0.75))
@@ -54,6 +54,19 @@ def test_when_a_tick_is_written_out_then_it_is_the_matrix_product() -> None:
     assert model.tick((0.5, -1.0), (0.25,), (0.0, 0.0)) == (0.0, -0.125 - 0.75 + 0.5)
     assert model.measured((0.5, -1.0)) == (0.5,)
     assert model.correction_size == 2
+
+
+def test_when_it_was_linearised_then_it_rests_at_the_operating_point_and_deviates_from_there() -> None:
+    at, under = (0.5, -1.0), (0.25,)
+    model = LinearModel(F, E, C, TICK_S, operating=(at, under))
+    assert model.initial() == at
+    assert model.tick(at, under, (0.0, 0.0)) == at
+    about, plain = LinearModel(F, E, C, TICK_S, operating=(at, under)), LinearModel(F, E, C, TICK_S)
+    moved = plain.tick((0.25, 0.5), (0.125,), (0.0, 0.0))
+    expected = tuple(one + other for one, other in zip(at, moved, strict=True))
+    assert about.tick((0.75, -0.5), (0.375,), (0.0, 0.0)) == expected
+    with pytest.raises(ValueError, match="row 1 of operating has 2 numbers; 1 are needed"):
+        LinearModel(F, E, C, TICK_S, operating=(at, at))
 
 
 def test_when_only_the_first_states_are_corrected_then_a_held_correction_is_theirs() -> None:

@@ -1,0 +1,43 @@
+"""A linear plant between two ticks: what it does under a held command, and the way back.
+
+dx/dt = A x + B u   and   x[n+1] = F x[n] + E u[n]
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from numpy.typing import ArrayLike
+from scipy.linalg import expm, logm
+
+Matrix = npt.NDArray[np.float64]
+
+IMAGINARY_MAX = 1e-9
+
+
+def discretised(A: ArrayLike, B: ArrayLike, period_s: float) -> tuple[Matrix, Matrix]:
+    """Return (F, E) of a period under a held command: zero-order hold."""
+    a, b = (np.atleast_2d(np.asarray(one, dtype=float)) for one in (A, B))
+    states, inputs = b.shape
+    block = np.zeros((states + inputs, states + inputs))
+    block[:states, :states] = a
+    block[:states, states:] = b
+    grown = expm(block * period_s)
+    return grown[:states, :states], grown[:states, states:]
+
+
+def continuous(F: ArrayLike, E: ArrayLike, period_s: float) -> tuple[Matrix, Matrix]:
+    """Return (A, B) whose zero-order hold over a period is (F, E); ValueError where there is none."""
+    f, e = (np.atleast_2d(np.asarray(one, dtype=float)) for one in (F, E))
+    states, inputs = e.shape
+    block = np.eye(states + inputs)
+    block[:states, :states] = f
+    block[:states, states:] = e
+    grown = np.asarray(logm(block))
+    if not np.isfinite(grown).all() or np.abs(grown.imag).max() > IMAGINARY_MAX:
+        raise ValueError(
+            f"F = {f.tolist()} is no zero-order hold of a continuous plant: it has an eigenvalue that "
+            "is zero or on the negative real axis"
+        )
+    found = grown.real / period_s
+    return found[:states, :states], found[:states, states:]

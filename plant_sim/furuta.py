@@ -6,7 +6,7 @@ torque = k (u - k r') / R
 
 r is the arm's angle and p the rod's. The parameters are those of the Quanser QUBE-Servo: a rod of 24 g
 and 129 mm on an arm of 95 g and 85 mm, k = 0.042 N m/A, R = 8.4 ohm. The bearing's dry friction (`rub`)
-and the winding's lag are beside the codec's model, which is the rest of this near upright.
+is beside the codec's model, which is the rest of this near upright.
 """
 
 from __future__ import annotations
@@ -93,7 +93,6 @@ class FurutaPlant(OdePlant):
         arm_damping: float = 1.04e-6,
         rod_damping: float = 5e-6,
         friction: float = 1e-4,
-        winding_lag_s: float = 0.0001,
     ) -> None:
         require_at_least_zero(arm_damping=arm_damping, rod_damping=rod_damping, friction=friction)
         damping, gravity, gain = fractions(context)
@@ -110,6 +109,4 @@ class FurutaPlant(OdePlant):
             torque_per_volt=per_volt * (1.0 + gain),
         )
         start = (*started(context, (0.0, 0.0)), 0.0, 0.0)
-        super().__init__(
-            context, furuta_slopes, constants, start, outputs=2, places=2, motor_lag_s=winding_lag_s
-        )
+        super().__init__(context, furuta_slopes, constants, start, outputs=2, places=2)

@@ -32,7 +32,10 @@ class PlantContext:
     """the settings of the codec's model, which the plant is to be near"""
     sine: Callable[[float], float] = math.sin
     """how a sine is taken: with the codec's own a simulated flight is the same on every machine"""
-
+    inputs: tuple[str, ...] = ()
+    """names of the model's inputs, in the order of a command"""
+    outputs: tuple[str, ...] = ()
+    """names of the model's outputs, which are what the plant has"""
     disturbance_text: str = ""
     """configured disturbance, for a plant that is disturbed in several places"""
 

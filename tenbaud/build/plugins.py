@@ -51,6 +51,8 @@ def build_plugin(
     try:
         part = found(context, **options)
     except Exception as error:  # it is the user's code, and anything may be wrong in it
+        if name in registry.built_in and isinstance(error, ValueError):
+            raise PartError(f"{field} = {name!r}: {error}") from error
         raise PartError(
             f"{field} = {name!r}: {found.__name__}({_call(options)}) failed: "
             f"{type(error).__name__}: {error}. It is called with one context object "

@@ -96,7 +96,9 @@ def build_plant(config: FlightConfig, step_s: float, signals: Signals | None = N
         section.initial_outputs,
         config.model.model_dump(exclude={"kind"}),
         sin,
-        section.disturbance,
+        disturbance_text=section.disturbance,
+        inputs=tuple([one.name for one in signals.inputs]),
+        outputs=tuple([one.name for one in signals.outputs]),
     )
     if len(context.initial) > len(signals.outputs):
         raise ConfigError(

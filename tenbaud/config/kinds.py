@@ -20,6 +20,9 @@ from pydantic import Discriminator, JsonValue, Tag, create_model
 from channel.registry import Registry
 from tenbaud.config.section import KindSection, OutsideSection
 
+FMU = "fmu"
+"""The plant that runs the machine code of a file: code from outside, although its class is built in."""
+
 MODELS = Registry(
     "model.kind",
     "tenbaud.models",
@@ -53,6 +56,7 @@ PLANTS = Registry(
         "servo": "plant_sim.servo:ServoPlant",
         "furuta": "plant_sim.furuta:FurutaPlant",
         "helicopter": "plant_sim.helicopter:HelicopterPlant",
+        FMU: "plant_sim.fmu:FmuPlant",
     },
 )
 CONTROLLERS = Registry(

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from channel.links.registry import LINKS
 from channel.registry import Registry
-from tenbaud.config.kinds import CODERS, CONTROLLERS, MODELS, PLANTS
+from tenbaud.config.kinds import CODERS, CONTROLLERS, FMU, MODELS, PLANTS
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
 
@@ -39,10 +39,11 @@ def object_kind(part: object) -> str:
 
 
 class OutsidePart(NamedTuple):
-    """A class from outside, as a configuration names it."""
+    """A class from outside, as a configuration names it; or a file of machine code."""
 
     registry: Registry
     name: str
+    file: str = ""
 
 
 def outside_parts(config: FlightConfig) -> list[OutsidePart]:
@@ -54,9 +55,13 @@ def outside_parts(config: FlightConfig) -> list[OutsidePart]:
         OutsidePart(PLANTS, config.plant_kind),
         OutsidePart(LINKS, config.link.kind),
     )
-    return [
+    parts = [
         part for part in named if part.name not in part.registry.built_in and not is_object(part.name)
     ]
+    plant = config.transmitter.plant
+    if plant.kind == FMU:
+        parts.append(OutsidePart(PLANTS, FMU, str(plant.options.get("file", "no file"))))
+    return parts
 
 
 def require_allowed(config: FlightConfig) -> None:
@@ -92,6 +97,8 @@ def require_regular_files(config: FlightConfig) -> None:
 
 def _what_would_run(part: OutsidePart) -> str:
     name = part.name
+    if part.file:
+        return f"would run the machine code in {part.file}"
     if ":" not in name:
         return f"would import what {part.registry.offered_by(name)}"
     module, _, called = name.partition(":")

@@ -124,7 +124,7 @@ class PlantSection(Section):
     """The simulated plant, relative to the codec's model."""
 
     kind: Annotated[str, AfterValidator(PartName(PLANTS, also="auto"))] = "auto"
-    """a plant of the package or from outside; "auto": that of the codec's model"""
+    """built in, an FMU (machine code in a file) or from outside; "auto": that of the codec's model"""
     options: Options = Field(default_factory=dict)
     """what the plant's class is built with"""
     relative_to: Literal["model", "pitch"] = "model"

@@ -67,6 +67,13 @@ def test_chua_is_followed_over_twenty_bits_per_second(tmp_path: Path) -> None:
     assert 0.0 < share < 5.0
 
 
+def test_a_mujoco_model_is_held_upright(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco", reason="mujoco is no dependency")
+    told = run_script(EXAMPLES / "mujoco_pendulum.py", tmp_path)
+    assert numbers_in(told, r"within (\d\.\d+) degrees")[0] < 1.0
+    assert told.endswith("desyncs: 0\n")
+
+
 def test_the_notebook_runs_from_top_to_bottom(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     nbclient = pytest.importorskip("nbclient")
     nbformat = pytest.importorskip("nbformat")

@@ -18,7 +18,6 @@ NOT_FOR_USERS = ("dev", "docs")
 
 UNDECLARED = {
     "quanser": "the maker's own package comes with its driver and is in no index",
-    "fmpy": "FMU plants",
 }
 """Imported where a person has them, never installed by us."""
 

@@ -6,7 +6,7 @@ from channel.codec.codec import Vector
 from channel.flight_log import FlightLog
 from plant_sim.encoder import OutputReader, angles_rad
 from plant_sim.plant import Plant
-from transmitter.rigs.base import Reading, Rig
+from transmitter.rigs.base import Reading, Rig, RigError
 
 
 class SimulatedRig(Rig):
@@ -25,7 +25,12 @@ class SimulatedRig(Rig):
     def read(self, tick: int) -> Reading:
         """Return the counts at a tick, and the true angles beside them."""
         while self._tick < tick:
-            self._plant.advance(self._volts)
+            try:
+                self._plant.advance(self._volts)
+            except Exception as error:  # a plant from outside may fail in any way
+                raise RigError(
+                    f"the simulated plant failed after tick {self._tick}: {error}"
+                ) from error
             self._tick += 1
         true = self._plant.measured
         if len(true) == 1 and self._encoder is not None:

@@ -67,9 +67,11 @@ class TransmitterEndpoint:
         """
         self._lateness_ns = now_ns - self.tick * self._tick_ns
         if self._lateness_ns:
-            missed = self._lateness_ns // self._tick_ns
+            missed = min(self._lateness_ns // self._tick_ns, self._end_tick - self.tick)
             self.ticks_missed += missed
             self.tick += missed
+            if self.tick == self._end_tick:
+                return None
             self.lateness.add(self._lateness_ns)
         frames = None if self.node.over else self.node.measure(self.tick)
         return None if frames is None else self._offer(frames, now_ns)

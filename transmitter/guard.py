@@ -97,6 +97,8 @@ class Guard:
         self.command = settings.safe_command
         """what is applied"""
         self._age_ticks = 0
+        self._tick: int | None = None
+        """the last one applied"""
         self._ramp_from = settings.safe_command
         self._ramp_tick = 0
 
@@ -158,6 +160,7 @@ class Guard:
             self._take(tick, command, owed)
         if self.state is GuardState.RAMPING:
             self._ramp()
+        self._tick = tick
         return self.command
 
     def _take(self, tick: int, command: Vector | None, owed: bool) -> None:
@@ -166,7 +169,9 @@ class Guard:
             self._age_ticks = 0
             self.command = self._limits.apply(command, self.command)
             return
-        self._age_ticks = self._age_ticks + 1 if owed else 0
+        # Ticks that were missed pass as well: the watchdog counts time.
+        passed_ticks = 1 if self._tick is None else tick - self._tick
+        self._age_ticks = self._age_ticks + passed_ticks if owed else 0
         if self.state is GuardState.RUNNING:
             self.state = GuardState.HOLDING
         if self._age_ticks > self._settings.timeout_ticks:

@@ -178,6 +178,10 @@ class TransmitterNode:
             and self.tick - session.heard_tick <= self._rearm_ticks
         )
 
+    def conclude(self, tick: int) -> None:
+        """Note that the flight ends before `tick`."""
+        self.session.conclude(tick, withheld=self.guard.stopped)
+
     def stop(self) -> None:
         """Take the motors down because a person or a signal asked for it."""
         self.guard.trip(GuardReason(GuardCause.STOPPED, self.tick))

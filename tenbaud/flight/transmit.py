@@ -183,14 +183,10 @@ def _not_flown(run: TransmitterRun) -> Outcome | None:
 def flight_counts(run: TransmitterRun) -> FlightCounts:
     """Return what the verdict on a flight rests on."""
     node, session = run.node, run.node.session
-    samples = run.ticks // run.agreement.terms.ticks_per_sample
-    confirmed = session.counts["digest_checks"]
-    # While the line rests at the end, the receiver may erase samples that were never flown.
-    beyond = max(0, confirmed - samples)
     return FlightCounts(
-        samples=samples,
-        confirmed=confirmed - beyond,
-        erased=session.counts["erasures"] - beyond,
+        samples=-(-run.ticks // run.agreement.terms.ticks_per_sample),
+        confirmed=session.counts["digest_checks"],
+        erased=session.counts["erasures"],
         rejoins=session.counts["rejoins"],
         ticks=run.ticks,
         ticks_down=node.ticks_down,

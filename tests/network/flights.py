@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
 
 from tenbaud.keys.authority import NodeRole
 from tenbaud.keys.store import add_node, create_authority
 from tests.network.namespaces import Lab, Machine
+from tests.tenbaud.confirmed import PATIENT, Summary
 from tests.tenbaud.ends import End, wait_for
 from tests.tenbaud.processes import REPOSITORY
 
@@ -42,7 +42,7 @@ class Flight:
         rig_link: list[str],
         desk_link: list[str],
         duration_s: float = 3600.0,
-        settings: tuple[str, ...] = (),
+        settings: tuple[str, ...] = PATIENT,
     ) -> None:
         shared = ["--set", "link.peer_timeout_s=30", *settings]
         self.desk = End("receive", desk_link, folder / "desk", *shared, prefix=desk.prefix, draws=False)
@@ -67,13 +67,13 @@ class Flight:
             lambda: f"{self.rig.status} {self.rig.said} {self.desk.status} {self.desk.said}",
         )
 
-    def ended(self) -> tuple[dict[str, Any], dict[str, Any]]:
+    def ended(self) -> tuple[Summary, Summary]:
         """Wait for the planned end; return both summaries, (rig, desk)."""
         (rig_code, rig), (desk_code, desk) = self.rig.ended(), self.desk.ended()
         assert (rig_code, desk_code) == (0, 0), (rig["outcome"], desk["outcome"], self.rig.said)
         return rig, desk
 
-    def stopped(self) -> tuple[dict[str, Any], dict[str, Any]]:
+    def stopped(self) -> tuple[Summary, Summary]:
         """Interrupt the transmitter; return both summaries, (rig, desk)."""
         _, rig = self.rig.stop_politely()
         _, desk = self.desk.ended()

@@ -10,6 +10,7 @@ import pytest
 
 from tests.network.flights import DESK_AT, RIG_AT, Flight, at, make_keys, tls_links, two_machines
 from tests.network.namespaces import Lab
+from tests.tenbaud.confirmed import PATIENT, check_flown
 
 pytestmark = pytest.mark.real_time
 
@@ -30,8 +31,8 @@ def test_a_flight_over_tls_on_a_line_of_limited_rate(lab: Lab, tmp_path: Path) -
         plug.limit("rate", "64kbit", "burst", "4kb", "latency", "400ms")
     with Flight(tmp_path, rig, desk, **tls_links(make_keys(tmp_path)), duration_s=4.0) as flight:
         upper, lower = flight.ended()
-    assert upper["digest_checks"] == 40
-    assert upper["desyncs"] == lower["desyncs"] == 0
+    check_flown(upper, 40, lower)
+    assert lower["desyncs"] == 0
     assert upper["connections_refused"] == lower["connections_refused"] == {}
     assert all(plug.limited_bytes() > 1000 for plug in plugs), "the flight went another way"
 
@@ -39,7 +40,13 @@ def test_a_flight_over_tls_on_a_line_of_limited_rate(lab: Lab, tmp_path: Path) -
 def test_a_flight_over_a_line_with_delay_and_loss(lab: Lab, tmp_path: Path) -> None:
     rig, desk = two_machines(lab)
     cable = lab.bad_cable(rig, RIG_AT, desk, DESK_AT, delay_s=0.02, loss=0.05)
-    budget = ("--set", "channel.deadline_allowance_s=0.1", "--set", "channel.downlink_budget_s=0.1")
+    budget = (
+        "--set",
+        "channel.deadline_allowance_s=0.1",
+        "--set",
+        "channel.downlink_budget_s=0.1",
+        *PATIENT,
+    )
     links = tls_links(make_keys(tmp_path))
     with Flight(tmp_path, rig, desk, **links, duration_s=6.0, settings=budget) as flight:
         upper, _ = flight.ended()
@@ -51,7 +58,7 @@ def test_a_flight_over_a_line_with_delay_and_loss(lab: Lab, tmp_path: Path) -> N
 def test_the_cable_is_pulled_for_five_seconds_and_put_back(lab: Lab, tmp_path: Path) -> None:
     rig, desk = two_machines(lab)
     plug, _ = lab.cable(rig, RIG_AT, desk, DESK_AT)
-    with Flight(tmp_path, rig, desk, **tls_links(make_keys(tmp_path))) as flight:
+    with Flight(tmp_path, rig, desk, **tls_links(make_keys(tmp_path)), settings=()) as flight:
         flight.wait_until_flying()
         plug.pull()
         time.sleep(PULLED_S)
@@ -71,7 +78,7 @@ def test_both_machines_get_another_address(lab: Lab, tmp_path: Path) -> None:
     keys = make_keys(tmp_path, (DESK_AT, OTHER_DESK_AT))
     links = tls_links(keys)
     links["rig_link"] += ["--connect", at(OTHER_DESK_AT)]
-    with Flight(tmp_path, rig, desk, **links) as flight:
+    with Flight(tmp_path, rig, desk, **links, settings=()) as flight:
         flight.wait_until_flying()
         for plug, old, new in (
             (rig_plug, RIG_AT, OTHER_RIG_AT),
@@ -103,5 +110,5 @@ def test_the_ends_find_each_other_by_scouting(lab: Lab, tmp_path: Path) -> None:
         ],
     }
     with Flight(tmp_path, rig, desk, **links, duration_s=2.0) as flight:
-        upper, _ = flight.ended()
-    assert upper["digest_checks"] == 20
+        upper, lower = flight.ended()
+    check_flown(upper, 20, lower)

@@ -10,6 +10,7 @@ from tenbaud.config.load import load_config
 from tenbaud.recording.comparison import Verdict
 from tenbaud.recording.diff import compare_runs
 from tenbaud.recording.folder import RunFolder
+from tests.tenbaud.confirmed import PATIENT, check_flown, need_idle
 from tests.tenbaud.processes import run
 
 SUMMARY_FIELDS = [
@@ -109,7 +110,9 @@ def test_when_the_wire_delivers_at_the_end_of_a_slot_then_it_flies_on_the_provis
 
 @pytest.mark.real_time
 def test_when_flown_on_every_clock_and_link_then_the_states_are_identical(tmp_path: Path) -> None:
-    flown = ["--lead", "25", "--duration", "3", "--mismatch", "0.1", "--disturbance", "q=2e-3"]
+    # The lead leaves a busy machine time; what it misses all the same makes it another flight.
+    flown = ["--lead", "105", "--set", "channel.deadline_allowance_s=1", *PATIENT]
+    flown += ["--duration", "3", "--mismatch", "0.1", "--disturbance", "q=2e-3"]
     for name, how in (
         ("real", ["--clock", "real"]),
         ("virtual", []),
@@ -117,7 +120,9 @@ def test_when_flown_on_every_clock_and_link_then_the_states_are_identical(tmp_pa
     ):
         ended = run("demo", "--json", "--out", name, *flown, *how, cwd=tmp_path)
         assert ended.code == 0, ended.err
-        assert ended.summary["commands_late"] == ended.summary["erasures"] == 0, name
+        check_flown(ended.summary, 30)
+        if name == "real":
+            need_idle(ended.summary)
     for other in ("virtual", "memory"):
         compared = compare_runs(tmp_path / "real", tmp_path / other)
         assert compared.verdict is Verdict.EQUAL, f"real and {other}: {compared}"
@@ -129,11 +134,10 @@ def test_when_the_real_clock_flies_then_the_receiver_measures_the_baud_rate(tmp_
     ended = run("demo", "--json", "--clock", "real", "--duration", "10", cwd=tmp_path)
     assert ended.code == 0, ended.err
     summary = ended.summary
-    # A busy machine may hold an end up past a slot, which then carries no symbol.
-    assert summary["baud_measured"] == pytest.approx(10.0, abs=0.1 + 0.11 * summary["erasures"])
-    assert summary["digest_checks"] == 100
-    assert summary["desyncs"] == 0
+    check_flown(summary, 100)
     assert summary["loop_late_ms_p99"] is not None
+    need_idle(summary)
+    assert summary["baud_measured"] == pytest.approx(10.0, abs=0.1)
 
 
 def test_when_the_seed_changes_then_the_disturbed_flight_changes(tmp_path: Path) -> None:

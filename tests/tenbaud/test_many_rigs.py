@@ -19,6 +19,7 @@ from tenbaud.flight import many
 from tenbaud.flight.ends import open_recorder
 from tenbaud.flight.rate_limited_log import LINES_AT_ONCE, PERIOD_S
 from tenbaud.recording.writer import McapRecorder
+from tests.tenbaud.confirmed import check_flown
 from tests.tenbaud.processes import finish, start
 from tests.tenbaud.room import PATIENCE_S, Rig, Room, agreement
 
@@ -266,8 +267,8 @@ def test_when_processes_meet_over_zenoh_then_each_flies_with_its_own_file(
     flights = {flight["session"]: flight for flight in ended.summary["flights"]}
     assert sorted(flights) == ["rig/a", "rig/b"]
     for name, upper in (("rig/a", a.summary), ("rig/b", b.summary)):
-        assert upper["desyncs"] == 0
-        assert upper["digest_checks"] == flights[name]["samples"] == 30
+        check_flown(upper, 30, flights[name])
+        assert flights[name]["samples"] >= 30
         assert flights[name]["config_digest"] == upper["config_digest"]
     assert a.summary["config_digest"] != b.summary["config_digest"]
     assert (tmp_path / "many" / "rig-b" / "receiver.mcap").stat().st_size > 0

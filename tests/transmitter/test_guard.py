@@ -51,6 +51,15 @@ def test_when_commands_come_back_in_time_then_it_runs_on_and_the_age_starts_anew
         assert one.state is GuardState.RUNNING
 
 
+def test_when_ticks_are_missed_then_the_watchdog_counts_them_and_the_ramp_does_not() -> None:
+    one = guard()
+    one.apply(0, (4.5, 3.5))
+    assert one.apply(3, None) == (4.5, 3.5)
+    assert one.apply(7, None) == (3.5, 2.5)
+    assert one.reason == GuardReason(GuardCause.TIMED_OUT, 7, number=7)
+    assert one.apply(20, None) == (2.5, 1.5)
+
+
 def test_when_no_command_ever_comes_then_it_latches_too() -> None:
     one = guard()
     for tick in range(8):

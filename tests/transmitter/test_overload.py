@@ -21,6 +21,7 @@ from receiver.session.session import ReceiverSession
 from tenbaud.sentences.events import event_text
 from tests.channel.codec.parts import THREE_SIGNS, ConstantController, identity_of, pitch_codec, terms
 from tests.channel.links.memory_pair import MemoryLink, memory_pair
+from tests.tenbaud.machine import Pacer
 from transmitter.endpoint import TransmitterEndpoint
 from transmitter.guard import Guard, GuardSettings
 from transmitter.loops.real import RealFlight
@@ -97,7 +98,8 @@ def flown(rig: type[SimulatedRig], controller: ConstantController) -> RealFlight
 def test_when_an_end_is_too_slow_then_it_is_reported_and_the_flight_goes_on(
     rig: type[SimulatedRig], controller: ConstantController
 ) -> None:
-    flight = flown(rig, controller)
+    with Pacer() as pacer:
+        flight = flown(rig, controller)
     session = flight.endpoint.node.session
     told = [event_text(event_fields(event)) for event in session.events if event.kind is EventKind.RATE]
     assert told
@@ -105,14 +107,17 @@ def test_when_an_end_is_too_slow_then_it_is_reported_and_the_flight_goes_on(
     assert flight.endpoint.rate.kept_symbols_per_s is not None
     assert flight.endpoint.rate.kept_symbols_per_s < 950.0
     assert session.counts["desyncs"] == 0
+    pacer.need_idle()
     # Without the common state there is no flight: it is asked for now and then, not all the time.
     assert session.counts["digest_checks"] > TICKS // 25
     assert session.counts["rejoins"] <= TICKS * TICK_S / 0.05, "at most one answer's age apart"
 
 
 def test_when_only_the_transmitter_is_too_slow_then_no_common_state_is_asked_for() -> None:
-    flight = flown(SlowRig, ConstantController(1.0, -1.0))
+    with Pacer() as pacer:
+        flight = flown(SlowRig, ConstantController(1.0, -1.0))
     session = flight.endpoint.node.session
     assert flight.endpoint.ticks_missed > TICKS // 2
+    pacer.need_idle()
     assert session.counts["rejoins"] == 0
     assert session.counts["digest_checks"] > TICKS * 9 // 10

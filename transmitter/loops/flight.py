@@ -48,6 +48,7 @@ class Flight(ABC):
 
         `farewell` gives the ending for the receiver once the echoes are in.
         """
+        self.endpoint.node.conclude(self.endpoint.tick)
         self._linger()
         self.endpoint.node.flush_records()
         self.leave(farewell())

@@ -28,6 +28,8 @@ HELLO_PERIOD_NS = 200_000_000
 """Longest time between two requests for a session."""
 LEAD_IN_NS = 20_000_000
 """Between the handshake and tick 0."""
+LAST_ECHO_NS = 1_000_000_000
+"""How much later than agreed the last echo may come, when no other can make up for it."""
 CATCH_UP_MESSAGES_MAX = 64
 """Messages taken in a row by a loop that is behind its ticks."""
 
@@ -118,7 +120,8 @@ class RealFlight(Flight):
     def _linger(self) -> None:
         session = self.endpoint.node.session
         ramp_down = self._ramp_down = RampDown(self.endpoint.node, self.endpoint.tick)
-        until_ns = self._now_ns() + session.terms.linger_ns(self.endpoint.uplink.line.longest_delay_ns)
+        agreed_ns = session.terms.linger_ns(self.endpoint.uplink.line.longest_delay_ns)
+        until_ns = self._now_ns() + agreed_ns + LAST_ECHO_NS
         while (now_ns := self._now_ns()) < until_ns:
             if session.phase is not Phase.FLYING or (
                 session.copies.lag_samples == 0 and not self._outbox

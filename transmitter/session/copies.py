@@ -12,6 +12,7 @@ repeats: its echoes wait in `EchoOrder` until the earlier frame has come, or can
 
 from __future__ import annotations
 
+import sys
 from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -56,7 +57,7 @@ class Copies:
         self._commands: deque[Vector] = deque([terms.initial_command] * terms.lead_ticks)
         """of the ticks from the confirmed sample's first one on"""
         self._sent: deque[Word] = deque()
-        """of the samples from the confirmed one on"""
+        """of the samples from the confirmed one on; ERASED where none was"""
         self._provisional = self.confirmed
         self._assumed: deque[tuple[Word, list[Vector]]] = deque()
         """inputs that the provisional copy took for the samples since the confirmed one"""
@@ -93,8 +94,14 @@ class Copies:
         return self._provisional
 
     def sent(self, word: Word) -> None:
-        """Note the word that was sent for `next_sample`; ERASED where none was."""
+        """Note the word that was sent for `next_sample`."""
         self._sent.append(word)
+
+    def skip_to(self, sample: int) -> int:
+        """Note that no words were sent for the samples before this one; return how many."""
+        missed = max(0, sample - self.next_sample)
+        self._sent.extend([ERASED] * missed)
+        return missed
 
     def confirm(self, word: Word, commands: list[Vector], peer_digest: int) -> Confirmed:
         """Advance the confirmed copy by the echo of its next sample.
@@ -151,6 +158,7 @@ class EchoOrder:
     def __init__(self, overtaking_ticks: int, ahead_samples: int) -> None:
         self._overtaking_ticks = overtaking_ticks
         self._ahead_samples = ahead_samples
+        self._end_sample = sys.maxsize
         self._early: dict[int, Echo] = {}
         self._missing: int | None = None
         """sample whose echo a later frame has shown to be lost or overtaken"""
@@ -174,7 +182,11 @@ class EchoOrder:
 
     def take(self, expected: int) -> Echo | None:
         """Return the echo of this sample, which is then held no longer."""
-        return self._early.pop(expected, None)
+        return self._early.pop(expected, None) if expected < self._end_sample else None
+
+    def end_before(self, sample: int) -> None:
+        """Take no echo of this sample or a later one: they are not flown."""
+        self._end_sample = sample
 
     def is_lost(self, expected: int, tick: int) -> bool:
         """Return whether the echo of this sample can no longer come."""

@@ -145,9 +145,7 @@ class TransmitterSession:
             return self.rejoin(Why.LAG, replace(ASKED, number=self._lag_samples_max))
         if frames := self._check_gap():
             return frames
-        while self.copies.next_sample < sample:
-            self.counts["words_missed"] += 1
-            self.copies.sent(ERASED)
+        self.counts["words_missed"] += self.copies.skip_to(sample)
         if offset != 0 or self.copies.next_sample != sample:
             return []
         try:
@@ -159,6 +157,13 @@ class TransmitterSession:
         number = self.codec.coder.alphabet.symbol_number
         here = (self.session_number, self.epoch)
         return [Symbol(*here, slot, number(symbol)) for slot, symbol in enumerate(word, first)]
+
+    def conclude(self, tick: int, *, withheld: bool = False) -> None:
+        """End the flight before `tick`; last words that were missed, not `withheld`, are erasures."""
+        self._echoes.end_before(end := -(-tick // self.terms.ticks_per_sample))
+        if self.phase is Phase.FLYING and not withheld:
+            self._tick = max(self._tick, tick - 1)
+            self.counts["words_missed"] += self.copies.skip_to(end)
 
     def rejoin(self, why: Why, details: Event = ASKED) -> list[Frame]:
         """Stop sending symbols and ask for a new epoch; return the frames that do."""
@@ -304,8 +309,7 @@ class TransmitterSession:
             self.counts["stale_frames"] += 1
             return []
         sent = (self.copies.confirmed.sample, self.copies.next_sample)
-        problem = self._bounds.of_commands(frame, self._sample, *sent)
-        if self._bounds.drops(problem):
+        if self._bounds.drops(self._bounds.of_commands(frame, self._sample, *sent)):
             return []
         self.heard_tick = self._tick
         self._takeover.on_command()
@@ -330,8 +334,8 @@ class TransmitterSession:
             return self._on_diverged(error)
         self.confirmed.append(done)
         self.history.add(self.epoch, word, done.flown.state)
-        self.counts["digest_checks"] += 1
-        self.counts["erasures"] += word is ERASED
+        unsent = done.lag_samples == 0
+        self.counts.update(digest_checks=1, erasures=word is ERASED, words_missed=unsent)
         if done.digest != echo.digest:
             return self._on_desync(done)
         # Only now: a receiver with a different state must move no motor.

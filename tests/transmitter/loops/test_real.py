@@ -1,12 +1,17 @@
-"""Both real drivers over a memory link, in two threads: counts only, never times."""
+"""Both real drivers over a memory link, in two threads: counts only, never times.
+
+A busy machine may hold either thread up at any tick. All laws here hold then as well.
+"""
 
 from __future__ import annotations
 
 import threading
+import time
 from typing import Any
 
 import pytest
 
+from channel.codec.codec import Vector
 from channel.codec.models.pitch import PITCH_SIGNALS
 from channel.errors import ConfigMismatch, LinkLost
 from channel.line.uplink import Uplink
@@ -48,14 +53,43 @@ TERMS = terms(
 IDENTITY = identity_of(CODEC)
 
 
+class HeldUp(SimulatedRig):
+    """Returns late from tick 194, so that the next tick is one after the last sample's first tick."""
+
+    late_s = 0.017
+
+    def write(self, tick: int, volts: Vector) -> None:
+        super().write(tick, volts)
+        if tick == TICKS - 6:
+            time.sleep(self.late_s)
+
+
+class HeldUpBeyond(HeldUp):
+    """Returns from tick 194 when the flight's time is over."""
+
+    late_s = 0.2
+
+
+class LastCommandLate(Pid):
+    """Takes longer over the last sample than the agreed time for its echo."""
+
+    def command(self, tick: int, state: Vector) -> Vector:
+        if tick == TICKS + TERMS.lead_ticks - 1:
+            time.sleep(0.8)
+        return super().command(tick, state)
+
+
 def flight_over(
-    link: MemoryLink, identity: Identity = IDENTITY, peer_timeout_s: float = 10.0
+    link: MemoryLink,
+    identity: Identity = IDENTITY,
+    peer_timeout_s: float = 10.0,
+    rig: type[SimulatedRig] = SimulatedRig,
 ) -> RealFlight:
     session = TransmitterSession(CODEC, TERMS, identity, 5)
     plant = PitchPlant(PitchParameters(), TICK_S)
     node = TransmitterNode(
         session,
-        SimulatedRig(plant, (Encoder(4096),), (0.0, 0.0)),
+        rig(plant, (Encoder(4096),), (0.0, 0.0)),
         Guard(CommandLimits.of(PITCH_SIGNALS, 5.0), GuardSettings(400, 10, (0.0, 0.0))),
         Scores(CODEC.model, 0, 1000, lambda _: ()),
     )
@@ -63,8 +97,8 @@ def flight_over(
     return RealFlight(endpoint, link, peer_timeout_s)
 
 
-def endpoint() -> ReceiverEndpoint:
-    controller = Pid(PAPER_GAINS, Constant(0.5, TICK_S), TICK_S)
+def endpoint(kind: type[Pid] = Pid) -> ReceiverEndpoint:
+    controller = kind(PAPER_GAINS, Constant(0.5, TICK_S), TICK_S)
     return ReceiverEndpoint(ReceiverSession(CODEC, TERMS, controller, IDENTITY, 77))
 
 
@@ -93,9 +127,15 @@ class Service:
         assert not self._thread.is_alive()
 
 
-def test_when_a_flight_is_flown_in_real_time_then_every_sample_is_checked() -> None:
+@pytest.mark.parametrize(
+    ("rig", "controller"),
+    [(SimulatedRig, Pid), (HeldUp, Pid), (HeldUpBeyond, Pid), (SimulatedRig, LastCommandLate)],
+)
+def test_when_a_flight_is_flown_in_real_time_then_every_sample_is_checked(
+    rig: type[SimulatedRig], controller: type[Pid]
+) -> None:
     near, far = memory_pair()
-    flight, end = flight_over(near), endpoint()
+    flight, end = flight_over(near, rig=rig), endpoint(controller)
     node, session = flight.endpoint.node, flight.endpoint.node.session
     with Service(end, far) as service:
         flight.greet()
@@ -108,15 +148,19 @@ def test_when_a_flight_is_flown_in_real_time_then_every_sample_is_checked() -> N
     assert end.session.end == End(Ending.OVER, "landed", by_peer=True)
     # Whatever the machine did meanwhile, both ends have seen the same, and say so sample by sample.
     checked = session.counts["digest_checks"]
-    assert checked == end.session.state.sample == session.copies.confirmed.sample
-    assert session.copies.confirmed == end.session.state
+    assert checked == TICKS // 4 or session.counts["rejoins"]
+    assert checked == session.copies.confirmed.sample
+    # What the receiver erases before the farewell comes was not flown.
+    beyond = end.session.state.sample - checked
+    assert beyond >= 0
+    assert beyond or session.copies.confirmed == end.session.state
     assert session.counts["desyncs"] == end.session.counts["desyncs"] == 0
-    assert session.counts["erasures"] == end.session.counts["erasures"]
+    assert session.counts["erasures"] == end.session.counts["erasures"] - beyond
     meter, shaper = flight.endpoint.uplink.meter, flight.endpoint.uplink.shaper
-    assert meter.symbols == end.session.meter.symbols <= TICKS // 4
-    assert meter.symbols + session.counts["words_missed"] + shaper.refused >= TICKS // 4
+    assert meter.symbols == end.session.meter.symbols
+    assert meter.symbols + session.counts["words_missed"] + shaper.refused == TICKS // 4
     assert flight.endpoint.lateness.count == TICKS - flight.endpoint.ticks_missed
-    assert flight.endpoint.inlet.wire_bytes == end.downlink.wire_bytes
+    assert beyond or flight.endpoint.inlet.wire_bytes == end.downlink.wire_bytes
     assert end.inlet.wire_bytes == meter.wire_bytes, "the farewell is counted too"
     assert flight.endpoint.inlet.malformed == end.inlet.malformed == 0
     assert not node.latched

@@ -172,6 +172,21 @@ def two_axes() -> TransmitterSession:
     return session
 
 
+def test_when_the_last_samples_first_tick_was_missed_then_its_erasure_is_confirmed_as_well() -> None:
+    session, far = flying(), Far()
+    session.on_measurement(0, (0.0,))
+    session.on_frame(frame(far.echo()))
+    assert session.on_measurement(11, (0.0,)) == [], "tick 10 was missed"
+    assert session.copies.lag_samples == 0
+    session.conclude(20)
+    assert (session.counts["words_missed"], session.copies.lag_samples) == (1, 1)
+    session.on_frame(frame(far.echo(ERASED)))
+    assert (session.counts["digest_checks"], session.counts["erasures"]) == (2, 1)
+    session.on_frame(frame(far.echo(ERASED)))
+    assert session.counts["digest_checks"] == 2, "that one was not flown"
+    assert session.counts["desyncs"] == 0
+
+
 def test_when_a_word_has_two_symbols_then_both_are_given_with_their_slots() -> None:
     session = two_axes()
     left = {}

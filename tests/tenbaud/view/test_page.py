@@ -250,9 +250,8 @@ def test_a_plant_of_any_outputs_is_shown_with_its_names_and_units_and_the_gap_to
         width = page.locator("#tape").bounding_box()["width"]
         for place, cell in ((1, 0), (0, 1)):
             found = page.evaluate(tape, [int(width - 18 * cell - 9), 15])
-            assert "#{:02x}{:02x}{:02x}".format(*found[:3]) == page.evaluate(
-                colour, f"--output-{place}"
-            )
+            shown = page.evaluate(colour, f"--output-{place}")
+            assert "#{:02x}{:02x}{:02x}".format(*found[:3]) == shown
         for picture, turned in PICTURES.items():
             count = len(turned)
             message["plant"] = {**message["plant"], "picture": picture, "outputs": signals[:count]}

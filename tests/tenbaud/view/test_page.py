@@ -22,7 +22,7 @@ pytestmark = [
 
 PICTURES = {
     "pendulum": ["160 132"],
-    "servo": ["160 100"],
+    "dial": ["160 100"],
     "rotary pendulum": ["84 70", "238 112"],
 }
 """Pictures, and what their parts turn about."""

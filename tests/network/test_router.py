@@ -44,7 +44,7 @@ def running_router(hub: Machine, keys: Path, receivers: str) -> Iterator[None]:
     finally:
         process.send_signal(signal.SIGINT)
         try:
-            said = process.communicate(timeout=10.0)[1]
+            said = process.communicate(timeout=60.0)[1]
         except subprocess.TimeoutExpired:
             process.kill()
             raise

@@ -25,7 +25,7 @@ from tenbaud.recording.comparison import Verdict
 from tenbaud.recording.diff import compare_runs
 from tenbaud.recording.folder import RunFolder
 from tests.channel.links.serial.noisy_line import NoisyLine
-from tests.tenbaud.confirmed import check_flown, need_idle
+from tests.tenbaud.confirmed import PATIENT, check_flown, need_idle
 from tests.tenbaud.processes import run
 
 pytestmark = pytest.mark.real_time
@@ -235,7 +235,7 @@ def test_when_the_lead_leaves_no_time_for_the_line_then_it_is_refused() -> None:
 def test_when_the_demo_flies_over_a_serial_line_then_it_is_the_flight_of_any_link(
     clock: str, tmp_path: Path
 ) -> None:
-    common = ["--json", "--duration", "8", "--mismatch", "0.1", "--clock", clock]
+    common = ["--json", "--duration", "8", "--mismatch", "0.1", "--clock", clock, *PATIENT]
     ended = run("demo", "--link", "serial", "--out", "serial", *common, cwd=tmp_path)
     assert ended.code == 0, ended.err
     summary = ended.summary
@@ -265,7 +265,7 @@ def test_when_the_uplink_is_slow_and_the_commands_come_back_on_another_port_then
 ) -> None:
     ended = run(
         *("demo", "--json", "--link", "serial", "--line-rate", "300", "--downlink", "second"),
-        *("--clock", "real", "--duration", "5", "--mismatch", "0", "--out", "slow"),
+        *("--clock", "real", "--duration", "5", "--mismatch", "0", "--out", "slow", *PATIENT),
         cwd=tmp_path,
     )
     assert ended.code == 0, ended.err

@@ -114,7 +114,7 @@ def in_terminal(folder: Path, *arguments: str, **environment: str) -> str:
 
     reader = threading.Thread(target=read)
     reader.start()
-    out, _ = process.communicate(timeout=60.0)
+    out, _ = process.communicate(timeout=240.0)
     reader.join(10.0)
     os.close(ours)
     assert process.returncode == 0

@@ -55,7 +55,7 @@ class Watched:
         found = [message for message in self.messages() if message.role == role]
         return found[-1] if found else None
 
-    def wait(self, met: Callable[[], object], seconds: float = 60.0) -> None:
+    def wait(self, met: Callable[[], object], seconds: float = 240.0) -> None:
         until_s = time.monotonic() + seconds
         while not met():
             assert time.monotonic() < until_s, self.received[-1:]
@@ -77,7 +77,7 @@ class Watched:
 def _patiently(do: Callable[[], Any]) -> Any:
     from channel.errors import LinkError
 
-    until_s = time.monotonic() + 20.0
+    until_s = time.monotonic() + 240.0
     while True:
         try:
             return do()

@@ -59,7 +59,7 @@ def number(page: Any, element: str) -> float:
     return float(re.findall(r"[-+]?\d+\.?\d*", text)[0])
 
 
-def wait(page: Any, expression: str, argument: object = None, seconds: float = 60.0) -> None:
+def wait(page: Any, expression: str, argument: object = None, seconds: float = 240.0) -> None:
     page.wait_for_function(expression, arg=argument, timeout=seconds * 1000.0)
 
 
@@ -260,7 +260,7 @@ def test_when_the_flight_falls_silent_or_ends_then_it_says_so(chromium: Any, tmp
         state_is(page, "lockstep")
         one.process.send_signal(signal.SIGINT)
         page.get_by_text("The flight is over").first.wait_for()
-        one.process.wait(20.0)
+        one.process.wait(240.0)
         page.close()
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert summary["outcome"] == "stopped by the user"

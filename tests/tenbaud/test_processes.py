@@ -38,7 +38,7 @@ def test_when_one_ends_sine_differs_then_the_probe_refuses(tmp_path: Path) -> No
         assert "numerics probe differs" in ended.err
 
 
-@pytest.mark.parametrize("clock", ["virtual", pytest.param("real", marks=pytest.mark.real_time)])
+@pytest.mark.parametrize("clock", ["virtual", "real"])
 def test_when_one_ends_sine_changes_in_flight_then_the_first_sample_is_named(
     tmp_path: Path, clock: str
 ) -> None:
@@ -125,7 +125,6 @@ def _pair_in_flight(tmp_path: Path) -> dict[str, object]:
     raise AssertionError("the pair did not get into flight")
 
 
-@pytest.mark.real_time
 @pytest.mark.parametrize(
     ("verb", "number", "codes"),
     [

@@ -28,8 +28,6 @@ from tests.channel.links.serial.noisy_line import NoisyLine
 from tests.tenbaud.confirmed import PATIENT, check_flown, need_idle
 from tests.tenbaud.processes import run
 
-pytestmark = pytest.mark.real_time
-
 
 @dataclass
 class Flown:
@@ -117,6 +115,7 @@ def settings(**link: Any) -> dict[str, Any]:
     }
 
 
+@pytest.mark.real_time
 def test_when_it_flies_at_ten_baud_then_ten_bytes_a_second_go_up_and_ten_baud_are_measured(
     tmp_path: Path,
 ) -> None:
@@ -231,7 +230,7 @@ def test_when_the_lead_leaves_no_time_for_the_line_then_it_is_refused() -> None:
         agree(load_config(None, None, short), "real")
 
 
-@pytest.mark.parametrize("clock", ["virtual", "real"])
+@pytest.mark.parametrize("clock", ["virtual", pytest.param("real", marks=pytest.mark.real_time)])
 def test_when_the_demo_flies_over_a_serial_line_then_it_is_the_flight_of_any_link(
     clock: str, tmp_path: Path
 ) -> None:

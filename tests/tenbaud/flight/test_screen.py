@@ -125,7 +125,6 @@ def in_terminal(folder: Path, *arguments: str, **environment: str) -> str:
 FLIGHT = ("demo", "--clock", "real", "--duration", "2", "--json", "--out")
 
 
-@pytest.mark.real_time
 def test_on_a_terminal_the_view_is_drawn_and_cleared(tmp_path: Path) -> None:
     shown = in_terminal(tmp_path, *FLIGHT, "a")
     assert "digests" in shown
@@ -135,7 +134,6 @@ def test_on_a_terminal_the_view_is_drawn_and_cleared(tmp_path: Path) -> None:
     assert "\x1b[3" not in without
 
 
-@pytest.mark.real_time
 def test_elsewhere_there_are_plain_lines(tmp_path: Path) -> None:
     ended = run("demo", "--clock", "real", "--duration", "4", "--json", "--out", "r", cwd=tmp_path)
     assert ended.code == 0, ended.err

@@ -21,8 +21,6 @@ from tenbaud.sentences.events import event_text
 from tenbaud.telemetry.schema import TELEMETRY, ReceiverTelemetry, TransmitterTelemetry
 from tests.tenbaud.processes import Ended, finish, run, start
 
-pytestmark = pytest.mark.real_time
-
 
 class Watched:
     """Two ends and a viewer of both."""

@@ -15,10 +15,7 @@ import pytest
 from benchmarks.browser import Served, browser, served, state_is, why_no_browser
 from tenbaud.telemetry.schema import TELEMETRY
 
-pytestmark = [
-    pytest.mark.real_time,
-    pytest.mark.skipif(why_no_browser() is not None, reason=str(why_no_browser())),
-]
+pytestmark = pytest.mark.skipif(why_no_browser() is not None, reason=str(why_no_browser()))
 
 FLIGHT = ("--preset", "tuned-10baud", "--mismatch", "0.1")
 

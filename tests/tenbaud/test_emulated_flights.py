@@ -57,7 +57,6 @@ def simulated_rms(seconds: float, lead_ticks: int) -> float:
 
 
 @pytest.mark.real_time
-@pytest.mark.both_cores
 @pytest.mark.parametrize("form", ["cobs", "ascii", "quarc"])
 def test_an_emulated_rig_flies_like_the_simulated_one(form: str, tmp_path: Path) -> None:
     rig, ends = PEERS[form]

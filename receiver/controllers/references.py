@@ -52,6 +52,22 @@ class Constant(AngleReference):
 
 
 @dataclass(frozen=True, slots=True)
+class Shifted(AngleReference):
+    """A set-point about another level than 0."""
+
+    about: Reference
+    offset: float
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range."""
+        _require_finite("offset", self.offset)
+
+    def value(self, tick: int) -> float:
+        """Return the set-point at `tick`."""
+        return self.offset + self.about.value(tick)
+
+
+@dataclass(frozen=True, slots=True)
 class Step(AngleReference):
     """0 until `start_s` (at least 0), `amplitude` from there on."""
 

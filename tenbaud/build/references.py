@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from channel.codec.signals import Signal, Signals
-from receiver.controllers.references import Constant, Csv, Reference, Sine, Square, Step
+from receiver.controllers.references import Constant, Csv, Reference, Shifted, Sine, Square, Step
 from tenbaud.build.signals import check_outputs
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig, ReferenceSection
@@ -53,6 +53,11 @@ def longest_period_s(config: FlightConfig, signals: Signals) -> float:
 
 def reference_of(section: ReferenceSection, tick_s: float, output: Signal) -> Reference:
     """Return the set-point that a section describes."""
+    found = _about_zero(section, tick_s, output)
+    return Shifted(found, section.offset) if section.offset else found
+
+
+def _about_zero(section: ReferenceSection, tick_s: float, output: Signal) -> Reference:
     match section.kind:
         case "square":
             return Square(section.amplitude, section.period_s, tick_s)

@@ -91,9 +91,7 @@ def design(
 
     [dim]tenbaud design --config plant.toml --out flight.toml[/dim]
     """
-    import tomli_w
-
-    from tenbaud.config.load import load_config, merged_values, read_toml
+    from tenbaud.config.load import load_config, merged_values, read_toml, toml_text
     from tenbaud.design.complete import completed
     from tenbaud.files.whole import make_folder, write_whole
 
@@ -104,7 +102,7 @@ def design(
         own["preset"] = preset
     load_config(None, None, own)
     make_folder(out.parent)
-    write_whole(out, tomli_w.dumps(own))
+    write_whole(out, toml_text(own))
     typer.echo(f"wrote {out}")
 
 

@@ -60,13 +60,21 @@ def diff(
 
 
 def presets() -> None:
-    """List the presets that come with tenbaud."""
+    """List the presets that come with tenbaud by plant, with their rates."""
     from tenbaud.config.load import load_config, preset_names
 
-    names = preset_names()
-    width = max(map(len, names))
-    for name in names:
-        typer.echo(f"{name:{width}}  {load_config(name).description}")
+    configs = {name: load_config(name) for name in preset_names()}
+    plants: dict[str, list[str]] = {}
+    for name, config in configs.items():
+        # A plant that is nothing but matrices has its name from its preset.
+        own = config.plant_kind == "linear"
+        plants.setdefault(name.rpartition("-")[0] if own else config.plant_kind, []).append(name)
+    width = max(map(len, configs))
+    for plant in sorted(plants, key=lambda one: (one != "pitch", one)):
+        typer.echo(plant)
+        for name in sorted(plants[plant], key=lambda one: configs[one].channel.rate_baud):
+            config = configs[name]
+            typer.echo(f"  {name:{width}} {config.channel.rate_baud:7.4g} baud  {config.description}")
 
 
 RunArgument = Annotated[Path, typer.Argument(help="Folder of a run, or one recording.")]

@@ -53,6 +53,9 @@ PLANTS = Registry(
         "pitch": "tenbaud.build.rig:pitch_plant",
         "pendulum": "plant_sim.pendulum:PendulumPlant",
         "linear": "plant_sim.linear:SimulatedLinear",
+        "servo": "plant_sim.servo:ServoPlant",
+        "furuta": "plant_sim.furuta:FurutaPlant",
+        "helicopter": "plant_sim.helicopter:HelicopterPlant",
         FMU: "plant_sim.fmu:FmuPlant",
     },
 )

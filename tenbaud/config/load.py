@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from importlib.resources import files
@@ -19,6 +20,7 @@ from tenbaud.config.schema import KINDS, FlightConfig
 from tenbaud.config.section import OutsideSection, Section
 
 DEFAULT_PRESET = "paper-10baud"
+_SPLIT = re.compile(r",\n\s+")
 
 
 class ConfigError(TenbaudError):
@@ -108,9 +110,15 @@ def _set_twice(section: str) -> ConfigError:
 
 def dump_config(config: FlightConfig) -> str:
     """Return a configuration as TOML that `load_config` reads back to the same values."""
+    return toml_text(config.model_dump(mode="json", exclude_none=True))
+
+
+def toml_text(values: Mapping[str, Any]) -> str:
+    """Return settings as TOML, a row of a matrix in a line."""
     import tomli_w
 
-    return tomli_w.dumps(config.model_dump(mode="json", exclude_none=True))
+    text = tomli_w.dumps(values)
+    return re.sub(r"\[\n\s+([^\[\]{}]*?),\n\s*\]", lambda row: f"[{_SPLIT.sub(', ', row[1])}]", text)
 
 
 def _read_preset(name: str) -> dict[str, Any]:

@@ -248,6 +248,8 @@ class ReferenceSection(Section):
     kind: Literal["square", "step", "sine", "constant", "csv"] = "square"
     amplitude: Factor = 1.5707963267948966
     """in the unit of the output"""
+    offset: Factor = 0.0
+    """what is added to a set-point of any kind"""
     period_s: Positive = 25.0
     start_s: NotNegative = 1.0
     """time of the step"""

@@ -56,6 +56,17 @@ def test_it_says_all_that_matters() -> None:
     assert "▀×▄" in text  # noqa: RUF001
 
 
+def test_bits_have_the_colour_of_the_output_that_they_were_about() -> None:
+    screen = Screen()
+    outputs = [{**STATUS["outputs"][0], "name": name} for name in ("arm", "cart")]
+    words = {"words": [(1,), None, (-1,)], "about": [(0,), None, (1,)]}
+    screen.update({**STATUS, "outputs": outputs, **words})
+    text = drawn(screen, color_system="standard")
+    blue, red, green = "\x1b[34m", "\x1b[31m", "\x1b[32m"
+    assert f"{blue}▀\x1b[0m{red}×\x1b[0m{green}▄" in text  # noqa: RUF001
+    assert f"{blue}  arm\x1b[0m{green}  cart" in text
+
+
 def test_without_unicode_it_is_plain_ascii() -> None:
     screen = Screen(unicode=False)
     screen.update(STATUS)

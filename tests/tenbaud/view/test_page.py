@@ -17,6 +17,13 @@ from tenbaud.telemetry.schema import TELEMETRY
 
 pytestmark = pytest.mark.skipif(why_no_browser() is not None, reason=str(why_no_browser()))
 
+PICTURES = {
+    "pendulum": ["160 132"],
+    "servo": ["160 100"],
+    "rotary pendulum": ["84 70", "238 112"],
+}
+"""Pictures, and what their parts turn about."""
+
 FLIGHT = ("--preset", "tuned-10baud", "--mismatch", "0.1")
 
 
@@ -205,12 +212,14 @@ def test_a_plant_of_any_outputs_is_shown_with_its_names_and_units_and_the_gap_to
     point = {"time_s": 0.9, "measured": [0.5, 1.5], "true": None, "live": None}
     message = {
         "role": "transmitter", "version": 3, "session": "lab",
-        "plant": {"model": "mine:Model", "outputs": signals[:2], "inputs": signals[2:]},
+        "plant": {"model": "mine:Model", "picture": "", "outputs": signals[:2], "inputs": signals[2:]},
         "flight": 5, "number": 1,
         "phase": "flying", "clock": "real", "takes_commands": False, "time_s": 1.0, "epoch": 0,
         "impairments": "", "counts": {"erasures": 0, "desyncs": 0, "rejoins": 0, "digest_checks": 1},
         "events": [], "dropped": 0, "preset": "x", "tick_s": 0.01, "symbol_period_s": 0.1,
-        "baud_configured": 10.0, "duration_s": 100.0, "samples": [],
+        "baud_configured": 10.0, "duration_s": 100.0,
+        "samples": [{"sample": number, "word_sent": [1], "word": [1], "about": [int(number > 2)],
+                     "digest": "aa", "peer_digest": "aa"} for number in range(4)],
         "points": [{**point, "coded": [0.25, 1.25], "range": [0.1, 0.5]}],
         "guard": "running", "applied": [-0.25], "paused": False, "pace": None,
         "lateness": {"p50_ms": 0.1, "p99_ms": 0.25, "max_ms": 1.0}, "gap_to_floor": 1.42,
@@ -235,7 +244,28 @@ def test_a_plant_of_any_outputs_is_shown_with_its_names_and_units_and_the_gap_to
         ]
         assert page.locator("#inputs").inner_text().split("\n") == ["torque", "\u22120.250 N m"]
         assert page.locator("#f-error").inner_text() == "+14.32°, +0.250 m"
-        assert page.locator("#helicopter").is_hidden()
+        assert page.locator(".plant:visible").count() == 0
+        assert page.locator("#bit-keys").inner_text() == "arm 75 %cart place 25 %"
+        colour = "(name) => getComputedStyle(document.body).getPropertyValue(name).trim()"
+        pixels = "getElementById('tape').getContext('2d').getImageData(x, y, 1, 1).data"
+        tape = f"([x, y]) => [...document.{pixels}]"
+        width = page.locator("#tape").bounding_box()["width"]
+        for place, cell in ((1, 0), (0, 1)):
+            found = page.evaluate(tape, [int(width - 18 * cell - 9), 15])
+            shown = page.evaluate(colour, f"--output-{place}")
+            assert "#{:02x}{:02x}{:02x}".format(*found[:3]) == shown
+        for picture, turned in PICTURES.items():
+            count = len(turned)
+            message["plant"] = {**message["plant"], "picture": picture, "outputs": signals[:count]}
+            message["points"] = [{**point, "time_s": message["time_s"], "measured": [0.5] * count,
+                                  "coded": [0.25] * count, "range": [0.1] * count}]  # fmt: skip
+            port.publish(json.dumps(message).encode())
+            page.locator(f"#{picture.replace(' ', '-')}").wait_for()
+            assert page.locator(".plant:visible").count() == 1
+            bodies = page.locator(".plant:visible .body").all()
+            assert [one.get_attribute("transform") for one in bodies] == [
+                f"rotate(-28.65 {centre})" for centre in turned
+            ]
         page.get_by_text("takes no commands").wait_for()
         page.close()
     port.close()

@@ -1,0 +1,85 @@
+"""Each plant of the package flies by its preset: in memory, and as two processes on either clock."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+from typer.testing import CliRunner
+
+from channel.protocol.terms import Clock
+from tenbaud import fly
+from tenbaud.audit.audit import audit
+from tenbaud.cli.commands import app
+from tests.tenbaud.confirmed import check_flown, held_up
+
+
+class Flown(NamedTuple):
+    """How long a preset flies in memory, and what its outputs must keep to there."""
+
+    seconds: float
+    real_s: float
+    errors: dict[str, float]
+    """largest rms of the live estimate's error"""
+    reach: dict[str, float]
+    """largest output"""
+
+
+PRESETS = {
+    "integrator-10baud": Flown(20.0, 3.0, {"angle": 0.005}, {"angle": 1.0}),
+    "servo-10baud": Flown(20.0, 3.0, {"angle": 0.01}, {"angle": 1.5}),
+    "aero-20baud": Flown(20.0, 3.0, {"pitch": 0.006, "yaw": 0.006}, {"pitch": 0.5, "yaw": 1.0}),
+    "furuta-50baud": Flown(10.0, 3.0, {"arm": 0.02, "pendulum": 0.01}, {"arm": 0.6, "pendulum": 0.2}),
+    "heading-1baud": Flown(200.0, 6.0, {"heading": 0.01}, {"heading": 0.6}),
+    "helicopter-10baud": Flown(
+        20.0,
+        3.0,
+        {"travel": 0.015, "elevation": 0.015, "pitch": 0.02},
+        {"travel": 1.0, "elevation": 0.4, "pitch": 0.5},
+    ),
+}
+CLOCKS = ["virtual", pytest.param("real", marks=pytest.mark.real_time)]
+
+
+def check(preset: str, summary: dict[str, Any], tolerance: float = 1.0) -> None:
+    outputs, flown = summary["outputs"], PRESETS[preset]
+    assert list(outputs) == list(flown.errors)
+    for name, output in outputs.items():
+        assert 0.0 < output["error_live_rms"] < tolerance * flown.errors[name], name
+        assert output["largest"] < flown.reach[name], name
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_it_flies_in_memory_and_every_output_is_known(preset: str, tmp_path: Path) -> None:
+    run = fly(preset, settings={"duration_s": PRESETS[preset].seconds}, out=tmp_path / "run")
+    check_flown(run.summary, run.summary["samples"])
+    check(preset, run.summary)
+
+
+def test_presets_are_listed_by_plant_with_their_rates() -> None:
+    shown = CliRunner().invoke(app, ["presets"]).output
+    plants: dict[str, str] = {}
+    for line in shown.splitlines():
+        plant, _, rest = line.partition("  ")
+        plants[plant or list(plants)[-1]] = plants.get(plant or list(plants)[-1], "") + rest
+    named = {"pitch": "paper-10baud", "pendulum": "pendulum-30baud"}
+    named |= {preset.rpartition("-")[0]: preset for preset in PRESETS}
+    assert plants.keys() == named.keys()
+    for plant, preset in named.items():
+        rate = preset.rpartition("-")[2].removesuffix("baud")
+        assert re.search(rf"{preset} +{rate} baud  \w", plants[plant]), plant
+
+
+@pytest.mark.parametrize("clock", CLOCKS)
+@pytest.mark.parametrize("preset", PRESETS)
+def test_it_flies_as_two_processes(preset: str, clock: Clock, tmp_path: Path) -> None:
+    settings = {"duration_s": PRESETS[preset].real_s, "transmitter.watchdog_s": 30.0}
+    run = fly(preset, settings=settings, out=tmp_path / "run", link="zenoh", clock=clock)
+    check_flown(run.summary, round(settings["duration_s"] / run.config.timing.symbol_period_s))
+    result = audit(tmp_path / "run")
+    assert result.passed, result.leaks + result.gaps
+    if clock == "virtual" or held_up(run.summary) is None:
+        # The first seconds, and on the real clock the command lead, add to the error.
+        check(preset, run.summary, 3.0 if clock == "virtual" else 6.0)

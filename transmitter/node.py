@@ -109,6 +109,7 @@ class TransmitterNode:
         per_sample = self.session.terms.ticks_per_sample
         for done in self.session.take_confirmed():
             pairs = zip(done.flown.coded, done.live, strict=True)
+            self.scores.on_word(done.word, done.about)
             for tick, (coded, live) in enumerate(pairs, done.sample * per_sample):
                 self.scores.on_estimate(tick, coded, live)
             if self.gauge is not None:

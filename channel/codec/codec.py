@@ -34,10 +34,11 @@ import math
 import struct
 from collections.abc import MutableSequence, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from hashlib import blake2b
 from typing import NamedTuple, Protocol
 
-from channel.codec.words import Alphabet, Word
+from channel.codec.words import ERASED, Alphabet, Word
 from channel.errors import CodecDiverged
 
 Vector = tuple[float, ...]
@@ -89,7 +90,8 @@ class Coder(Protocol):
         """Return the range `M` of each measured axis, for display."""
 
     # A coder may have `is_state(coder: Vector) -> bool` too: whether it can be in a state that came
-    # over a line. Without it, any finite one is taken.
+    # over a line. Without it, any finite one is taken. And `about(coder, word)`: which output each
+    # symbol of a word was about. Without it, the symbols are about the outputs in turn.
 
 
 class CodecState(NamedTuple):
@@ -188,6 +190,23 @@ class Codec:
                 "check the model's parameters and the units of the measurement"
             )
         return CodecState(state.sample + 1, model, opened.coder)
+
+    def about(self, state: CodecState, word: Word) -> tuple[int, ...] | None:
+        """Return the place of the output that each symbol of a word was about; None for ERASED.
+
+        It follows from shared state, and none follows from it: it is for people.
+        """
+        if word is ERASED:
+            return None
+        find = getattr(self.coder, "about", None)
+        found: tuple[int, ...] = self._in_turn if find is None else find(state.coder, word)
+        return found
+
+    @cached_property
+    def _in_turn(self) -> tuple[int, ...]:
+        outputs = len(self.model.measured(self.model.initial()))
+        count = self.coder.alphabet.symbols_per_word
+        return tuple([place * outputs // count for place in range(count)])  # integers
 
     def step(self, state: CodecState, word: Word, commands: Sequence[Vector]) -> CodecState:
         """Run one whole sample: its word, then the commands of its `N` ticks."""

@@ -17,6 +17,17 @@ STEPS_MAX = 32_767
 """Largest number of steps, either way, that a frame carries for an input."""
 
 
+PICTURES: tuple[tuple[str, tuple[int, ...]], ...] = (
+    ("helicopter", (1, 3)),
+    ("pendulum", (1,)),
+    ("rotary pendulum", (2,)),
+    ("servo", (1,)),
+)
+"""Pictures of plants, and for how many outputs; all are angles. The parts turn in the order of the
+outputs: the helicopter's by pitch, or by travel, elevation and pitch; a rotary pendulum's by arm and
+pendulum."""
+
+
 @dataclass(frozen=True, slots=True)
 class Signal:
     """One state or output.
@@ -104,6 +115,8 @@ class Signals:
     """what is measured, and steered to a set-point"""
     output_states: tuple[int | None, ...] = field(default=())
     """for each output the state that it is, None for another function of the states"""
+    picture: str = ""
+    """what the plant looks like, one of `PICTURES`; empty: each output is shown as a bar"""
     steps_per_unit: tuple[float, ...] = field(init=False)
     """of each input"""
 
@@ -114,6 +127,12 @@ class Signals:
             doubled = sorted({name for name in names if names.count(name) > 1})
             if doubled:
                 raise ValueError(f"{what}: {', '.join(doubled)} is named twice")
+        if self.picture and len(self.outputs) not in dict(PICTURES).get(self.picture, ()):
+            pictures = ", ".join([f"{one} (outputs: {counts})" for one, counts in PICTURES])
+            raise ValueError(
+                f"picture {self.picture!r} is unknown or not for {len(self.outputs)} output(s); known "
+                f"are {pictures}"
+            )
         steps = tuple([one.steps_per_unit for one in self.inputs])
         object.__setattr__(self, "steps_per_unit", steps)
         if not self.output_states:

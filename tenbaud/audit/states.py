@@ -27,7 +27,11 @@ def check_samples(evidence: Evidence, findings: Findings) -> None:
             wanted = expected.samples.get(row.sample)
             if wanted is None:
                 continue  # flown with another receiver, or after the receiver's recording was cut
-            fields = SAMPLE_FIELDS if end == "receiver" else (*SAMPLE_FIELDS, "peer_digest")
+            fields: tuple[str, ...] = SAMPLE_FIELDS
+            if end == "transmitter":
+                # Recordings of before do not say what a word was about.
+                says = row.about is not None or row.word is None
+                fields = (*fields, "peer_digest", *(("about",) if says else ()))
             _compare(Place(end, "sample", f"sample {row.sample}"), row, wanted, fields, findings)
 
 
@@ -113,7 +117,7 @@ SAMPLES = Claim(
     "states of both ends follow from the words",
     check_samples,
     (
-        ("transmitter", "sample", (*SAMPLE_FIELDS, "peer_digest")),
+        ("transmitter", "sample", (*SAMPLE_FIELDS, "peer_digest", "about")),
         ("receiver", "sample", SAMPLE_FIELDS),
     ),
 )

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from channel.codec.codec import Coder, CoderContext
+from channel.codec.coders.base import readout_of
 from channel.codec.coders.direction import DirectionCoder, DirectionParameters
 from channel.codec.coders.history import HistoryCoder, HistoryParameters
 from channel.codec.coders.open_loop_zoom import OpenLoopZoomCoder, OpenLoopZoomParameters
@@ -191,7 +192,8 @@ def _history(section: HistoryCoderSection, context: CoderContext) -> Coder:
 
 
 def _direction(section: DirectionCoderSection, context: CoderContext) -> Coder:
-    coder = DirectionCoder(DirectionParameters(**section.model_dump(exclude={"kind"})))
+    parameters = DirectionParameters(**section.model_dump(exclude={"kind"}))
+    coder = DirectionCoder(parameters, readout_of(context.model))
     if coder.correction_size != context.model.correction_size:
         raise ValueError(
             f"the coder corrects {coder.correction_size} states and the model takes corrections of "

@@ -74,6 +74,8 @@ class LinearModelSection(KindSection):
     output_units: Names = ()
     input_steps_per_unit: tuple[Positive, ...] = ()
     """a command travels in whole steps: 1000 per volt are mV; empty: 1000"""
+    picture: Literal["", "helicopter", "pendulum", "rotary pendulum", "servo"] = ""
+    """what displays draw, its parts turned by the outputs in order; empty: a bar for each output"""
 
     def signals(self, inputs: int) -> Signals:
         """Return the names and units, numbered names where none are given."""
@@ -91,6 +93,7 @@ class LinearModelSection(KindSection):
             ),
             tuple(Signal(*one) for one in given("output", len(self.C))),
             tuple(_state_of(row) for row in self.C),
+            self.picture,
         )
 
     @model_validator(mode="after")

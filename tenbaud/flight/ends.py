@@ -6,11 +6,12 @@ import gc
 import json
 import sys
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from channel.codec.words import Word
 from channel.links.base import Link, Role
 from channel.links.kind import LinkEnd, NodePlace
 from channel.links.security import Security
@@ -210,11 +211,16 @@ def transmitter_status(run: TransmitterRun) -> Status:
         "desyncs": node.session.counts["desyncs"],
         "digest_checks": node.session.counts["digest_checks"],
         "rejoins": node.session.counts["rejoins"],
-        "words": node.session.history.last_words(WORDS_SHOWN),
+        # Copied in one go: the flight's thread may add to it meanwhile.
+        **_tape(tuple(node.scores.last_words)),
         "guard": node.guard.state.value,
         "kept_symbols_per_s": run.endpoint.rate.kept_symbols_per_s,
         **gap_part(node.gauge.now if node.gauge is not None else None),
     }
+
+
+def _tape(words: Sequence[tuple[Word, tuple[int, ...] | None]]) -> Status:
+    return {"words": [word for word, _ in words], "about": [about for _, about in words]}
 
 
 def receiver_status(agreement: Agreement, endpoint: ReceiverEndpoint) -> Status:

@@ -142,6 +142,9 @@ def _output_rows(name: str, figures: Sequence[Summary]) -> Iterator[list[str]]:
     yield [f"largest {name} in the window", *(quantity(one, "largest") for one in figures)]
     yield ["error of the codec: max / rms", *(error(one, "error_coded") for one in figures)]
     yield ["error of the prediction: max / rms", *(error(one, "error_live") for one in figures)]
+    shares = [one.get("symbols_share") for one in figures]
+    if any(share not in (None, 1.0) for share in shares):
+        yield [f"symbols about {name}", *("" if one is None else f"{one:.1%}" for one in shares)]
     yield ["tracking, rms", *(quantity(one, "tracking_rms") for one in figures)]
 
 

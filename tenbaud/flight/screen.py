@@ -20,6 +20,8 @@ GAUGE_DEGREES = 180
 GAUGE_CELLS = 41
 TAPE_CELLS = 48
 SPARK_CELLS = 48
+TAPE_STYLES = ("blue", "green", "magenta", "yellow", "cyan", "white")
+"""Of bits about the first output, the second, ...: red is what is erased."""
 SPARKS = "▁▂▃▄▅▆▇█"
 ASCII_SPARKS = " .:-=+*#"
 
@@ -58,7 +60,8 @@ class Screen:
         for one in status.get("outputs", ()):
             self._output(table, one)
         if status.get("words"):
-            table.add_row("bits", self._tape(status["words"]))
+            outputs = [one["name"] for one in status.get("outputs", ())]
+            table.add_row("bits", self._tape(status["words"], status.get("about", ()), outputs))
         if status.get("digest_checks") is not None:
             table.add_row("lockstep", _lockstep(status))
         if counts := _counts(status):
@@ -96,16 +99,29 @@ class Screen:
         last = len(marks) - 1
         return "".join(marks[round(error / largest * last)] for error in errors)
 
-    def _tape(self, words: Sequence[Sequence[int] | None]) -> Text:
+    def _tape(
+        self,
+        words: Sequence[Sequence[int] | None],
+        about: Sequence[Sequence[int] | None],
+        outputs: Sequence[str],
+    ) -> Text:
+        """Return the last words, of several outputs each in the colour of that it was about."""
         high, low, none = "▀▄×" if self._unicode else "'.x"  # noqa: RUF001
+        is_coloured = len(outputs) > 1 and len(about) == len(words)
         text = Text()
-        for word in words[-TAPE_CELLS:]:
+        for at in range(max(0, len(words) - TAPE_CELLS), len(words)):
+            word = words[at]
             if word is None:
                 text.append(none, style="red")
-            else:
-                text.append(
-                    high if sum(word) >= 0 else low, style="blue" if sum(word) >= 0 else "magenta"
-                )
+                continue
+            is_high = sum(word) >= 0
+            style = "blue" if is_high else "magenta"
+            if is_coloured and (places := about[at]):
+                style = TAPE_STYLES[max(places, key=list(places).count) % len(TAPE_STYLES)]
+            text.append(high if is_high else low, style=style)
+        if is_coloured:
+            for place, name in enumerate(outputs):
+                text.append(f"  {name}", style=TAPE_STYLES[place % len(TAPE_STYLES)])
         return text
 
 

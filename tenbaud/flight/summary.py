@@ -203,6 +203,7 @@ def real_rig_name(section: TransmitterSection) -> str:
 def _outputs(run: TransmitterRun) -> Summary:
     """Return the figures of every output, by its name, in its own unit."""
     figures = {}
+    symbols = sum(scores.symbols for scores in run.node.scores.outputs)
     for output, scores in zip(run.agreement.signals.outputs, run.node.scores.outputs, strict=True):
         figures[output.name] = {
             "unit": output.unit,
@@ -212,6 +213,7 @@ def _outputs(run: TransmitterRun) -> Summary:
             "error_live_max": scores.live.largest if scores.live.count else None,
             "error_live_rms": scores.live.rms,
             "tracking_rms": scores.tracking.rms,
+            "symbols_share": scores.symbols / symbols if symbols else None,
         }
     return figures
 

@@ -57,6 +57,8 @@ class _Flight:
     marks: dict[str, Series]
     symbols: Curve
     symbols_are_means: bool
+    about: list[Series]
+    """of each output: which symbols were about it, or their share; nothing where that is not known"""
     cuts_s: list[tuple[float, float]]
     """times in which nothing was to pass, on purpose"""
 
@@ -134,7 +136,11 @@ def _panels(flight: _Flight) -> list[tuple[float, str, _Draw]]:
         for label, places in inputs
         if flight.knows("applied", places)
     ]
-    return [*found, (1.0, "mean of bits" if flight.symbols_are_means else "bits", _draw_symbols)]
+    if not flight.symbols_are_means:
+        return [*found, (1.0, "bits", _draw_symbols)]
+    if flight.about:
+        return [*found, (1.0, "share of bits", _draw_shares)]
+    return [*found, (1.0, "mean of bits", _draw_symbols)]
 
 
 def _plain(label: str) -> str:
@@ -161,8 +167,16 @@ def _read_flight(transmitter: Path, receiver: Path | None, own: bool) -> _Flight
         {name: marks_of(one) for name, one in overview.marks.items()},
         overview.symbols.curve(),
         overview.symbols.thinned,
+        _about(overview),
         _cuts(metadata.get("impairments", ""), times_s[-1]),
     )
+
+
+def _about(overview: Overview) -> list[Series]:
+    shares = [
+        one.curve()[1] for _, one in sorted(overview.means().items()) if one is not overview.symbols
+    ]
+    return [] if all(np.isnan(one).all() for one in shares) else shares
 
 
 def _read_overview(path: Path, own: bool = False) -> tuple[Overview, dict[str, str]]:
@@ -295,14 +309,40 @@ def _draw_curves(
 def _draw_symbols(panel: Axes, flight: _Flight) -> None:
     times_s, symbols = flight.symbols
     if not flight.symbols_are_means:
-        panel.vlines(times_s, 0.0, symbols, color=LINE_A, linewidth=0.8)
+        colours: Any = LINE_A
+        if flight.about:
+            places = np.nan_to_num(np.array(flight.about)).argmax(axis=0)
+            colours = np.array(COLOURS)[places % len(COLOURS)]
+        panel.vlines(times_s, 0.0, symbols, color=colours, linewidth=0.8)
+        _name_outputs(panel, flight)
     else:
         means = np.nan_to_num(symbols)
         panel.fill_between(times_s, means, step="post", color=LINE_A, linewidth=0.0)
     panel.axhline(0.0, color="#999999", linewidth=0.6)
-    for name, colour in (("erased", ERASURE_COLOUR), ("flipped", FLIP_COLOUR)):
-        if len(flight.marks[name]):
-            panel.vlines(flight.marks[name], -1.0, 1.0, color=colour, linewidth=0.9, label=name)
-    legend_above(panel, 7)
+    _draw_faults(panel, flight, -1.0)
     panel.set_ylim(-1.35, 1.35)
     panel.set_yticks([-1.0, 0.0, 1.0])
+
+
+def _draw_shares(panel: Axes, flight: _Flight) -> None:
+    """Draw which share of the symbols was about each output, one above the other."""
+    shares = np.nan_to_num(np.array(flight.about))
+    colours = [COLOURS[place % len(COLOURS)] for place in range(len(shares))]
+    panel.stackplot(flight.symbols[0], shares, colors=colours, step="post", linewidth=0.0)
+    _name_outputs(panel, flight)
+    _draw_faults(panel, flight, 0.0)
+    panel.set_ylim(0.0, 1.0)
+
+
+def _name_outputs(panel: Axes, flight: _Flight) -> None:
+    """Put the outputs that the symbols were about into the legend."""
+    for place, share in enumerate(flight.about):
+        label = f"{flight.plant.outputs[place].words} {np.nanmean(share):.0%}"
+        panel.plot([], [], color=COLOURS[place % len(COLOURS)], linewidth=3.0, label=label)
+
+
+def _draw_faults(panel: Axes, flight: _Flight, low: float) -> None:
+    for name, colour in (("erased", ERASURE_COLOUR), ("flipped", FLIP_COLOUR)):
+        if len(flight.marks[name]):
+            panel.vlines(flight.marks[name], low, 1.0, color=colour, linewidth=0.9, label=name)
+    legend_above(panel, 7)

@@ -2,13 +2,13 @@
 
 Up to wire version 1 an event was kind, sample and a sentence. The fields of today are filled from it,
 and the sentence stays, as `text`, for people. Fields of ticks and epochs had units in their
-names, and there was one set-point.
+names, and there was one set-point. A sample did not say what its symbols were about.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -52,6 +52,8 @@ def of_today(channel: RecordChannel) -> RecordChannel:
     """Return the channel as its rows will be read."""
     if channel.fields == OLD_EVENT_CHANNEL.fields:
         return _FILLED
+    if channel.topic == "sample" and _lacks_about([one.name for one in channel.fields]):
+        return RecordChannel("sample", (*channel.fields, Field("about", "integers")))
     if channel.topic not in ("tick", "epoch"):
         return channel
     return RecordChannel(channel.topic, tuple(_field_of_today(one) for one in channel.fields))
@@ -66,13 +68,21 @@ def _field_of_today(one: Field) -> Field:
 
 def names_of_today(names: Iterable[str]) -> list[str]:
     """Return the names of a row's fields as they are read."""
-    return [NEW_NAMES.get(name, name) for name in names]
+    found = [NEW_NAMES.get(name, name) for name in names]
+    return [*found, "about"] if _lacks_about(found) else found
+
+
+def _lacks_about(names: Collection[str]) -> bool:
+    """Whether these are the fields of a sample that does not say what its symbols were about."""
+    return "word_sent" in names and "about" not in names
 
 
 def rows_of_today(topic: str, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return rows of one file with the fields of today; those that have them as they are."""
     if topic == "event":
         return [_filled(row) for row in rows]
+    if topic == "sample" and rows and _lacks_about(rows[0]):
+        return [{**row, "about": None} for row in rows]
     if topic in ("tick", "epoch") and rows and not NEW_NAMES.keys().isdisjoint(rows[0]):
         return [_renamed(row) for row in rows]
     return rows

@@ -29,7 +29,7 @@ MARKS = ("erased", "flipped", "desync", "rejoin")
 FIELDS: dict[str, tuple[str, ...]] = {
     "tick": ("tick", "true", "measured", "applied", "reference"),
     "estimate": ("tick", "coded_state", "live_state"),
-    "sample": ("range", "word", "word_sent"),
+    "sample": ("range", "word", "word_sent", "about"),
     "event": ("kind",),
 }
 """The topics and fields that are looked at."""
@@ -47,9 +47,12 @@ class Overview:
         self.curves["applied"] = [Envelope() for _ in plant.inputs]
         self.marks = {name: Envelope() for name in MARKS}
         self.symbols = Means(SYMBOLS_DRAWN_SINGLY)
+        self.about = [Means(SYMBOLS_DRAWN_SINGLY) for _ in plant.outputs]
+        """of each output: 1 for a symbol that was about it, else 0"""
         self._values: dict[int, list[float]] = {}
         self._waiting: dict[int, list[float]] = {}
-        self._last_word: tuple[float, list[Any] | None] | None = None
+        self._last_words: tuple[list[float], list[Any], list[Any]] = ([], [], [])
+        """time, word and what it was about of the last sample, whose end the next one shows"""
 
     def add(self, topic: str, times_ns: Sequence[int], columns: Columns) -> None:
         """Add rows of one topic, in the order of the file."""
@@ -73,12 +76,16 @@ class Overview:
         }
         return curves | self.marks
 
+    def means(self) -> dict[str, Means]:
+        """Return what is kept as means, by a name of its own."""
+        about = self.about if len(self.about) > 1 else []
+        return {"symbols": self.symbols} | {f"about_{place}": one for place, one in enumerate(about)}
+
     def finish(self) -> None:
         """Add what waited for a row that does not come."""
-        if self._last_word is not None:
-            time_s, word = self._last_word
-            self._last_word = None
-            self.symbols.add(*_symbols([time_s, time_s], [word]))
+        times_s, words, about = self._last_words
+        self._last_words = ([], [], [])
+        self._add_symbols([*times_s, *times_s], words, about)
 
     def _add_curves(self, name: str, times: Series, table: Series) -> None:
         for place, envelope in enumerate(self.curves[name]):
@@ -150,13 +157,23 @@ class Overview:
         )
         self._mark("erased", times[erased])
         self._mark("flipped", times[flipped])
-        times_s = times.tolist()
-        if self._last_word is not None:
-            times_s.insert(0, self._last_word[0])
-            words = [self._last_word[1], *words]
+        about = columns("about") or [None] * len(words)
+        held = zip(self._last_words, (times.tolist(), words, about), strict=True)
+        times_s, words, about = ([*before, *new] for before, new in held)
         # The symbols of a word fill its sample period evenly, which the next row tells.
-        self.symbols.add(*_symbols(times_s, words[:-1]))
-        self._last_word = (times_s[-1], words[-1])
+        self._add_symbols(times_s, words[:-1], about[:-1])
+        self._last_words = (times_s[-1:], words[-1:], about[-1:])
+
+    def _add_symbols(self, times_s: list[float], words: list[Any], about: list[Any]) -> None:
+        if not words:
+            return
+        times, values = _symbols(times_s, words)
+        self.symbols.add(times, values)
+        if len(self.about) > 1:
+            places = [None if word is None else of for word, of in zip(words, about, strict=True)]
+            _, outputs = _symbols(times_s, places)
+            for place, means in enumerate(self.about):
+                means.add(times, np.where(np.isnan(outputs), np.nan, outputs == place))
 
     def _add_events(self, times: Series, columns: Columns) -> None:
         for time_s, kind in zip(times, columns("kind") or [], strict=False):
@@ -196,7 +213,8 @@ def packed(overview: Overview) -> dict[str, str]:
     """Return an overview as metadata."""
     overview.finish()
     parts: dict[str, Any] = {name: one.curve() for name, one in overview.held().items()}
-    parts["symbols"] = (*overview.symbols.curve(), overview.symbols.thinned)
+    for name, means in overview.means().items():
+        parts[name] = (*means.curve(), means.thinned)
     return {
         name: orjson.dumps(part, option=orjson.OPT_SERIALIZE_NUMPY).decode()
         for name, part in parts.items()
@@ -210,9 +228,10 @@ def unpacked(metadata: Mapping[str, str], plant: Signals) -> Overview | None:
         for name, held in overview.held().items():
             times, values = orjson.loads(metadata[name])
             held.restore(np.array(times, dtype=np.float64), np.array(values, dtype=np.float64))
-        times, values, thinned = orjson.loads(metadata["symbols"])
-        times, values = np.array(times, dtype=np.float64), np.array(values, dtype=np.float64)
-        overview.symbols.restore(times, values, bool(thinned))
+        for name, means in overview.means().items():
+            times, values, thinned = orjson.loads(metadata[name])
+            times, values = np.array(times, dtype=np.float64), np.array(values, dtype=np.float64)
+            means.restore(times, values, bool(thinned))
     except (KeyError, ValueError, TypeError):
         return None
     return overview

@@ -244,6 +244,9 @@ def definitions(plant: Signals) -> dict[str, Definition]:
         for place, one in enumerate(plant.inputs):
             made = partial(of_input, place=place)
             add(f"{one.name}{suffix}", one.unit, f"{one.words}, {meaning}", made)
+    if len(plant.outputs) > 1:
+        meaning = "output that the tick's symbol was about, from 0; NaN: erased"
+        add("about", "", meaning, lambda one: one.word("about"))
     return found | _OF_ALL
 
 

@@ -58,7 +58,7 @@ KINDS: dict[str, dict[str, Kind]] = {
         "event": _EVENT,
         "lockstep_failure": _LOCKSTEP,
         "tick": _kind(transmitter.TICK_CHANNEL, "true", "commanded"),
-        "sample": _kind(transmitter.SAMPLE_CHANNEL, "word_sent", "word"),
+        "sample": _kind(transmitter.SAMPLE_CHANNEL, "word_sent", "word", "about"),
         "estimate": _kind(transmitter.ESTIMATE_CHANNEL, "live_state"),
         "gap": _kind(GAP_CHANNEL, *(one.name for one in GAP_CHANNEL.fields[1:])),
         "device": _kind(transmitter.DEVICE_CHANNEL, "device_s"),

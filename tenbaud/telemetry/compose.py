@@ -41,8 +41,8 @@ T_TICK, T_TIME, T_MEASURED, T_TRUE, T_APPLIED, T_LATE_MS = _at(
     TICK_CHANNEL, "tick", "time_s", "measured", "true", "applied", "lateness_ms"
 )
 E_TICK, E_CODED, E_LIVE = _at(ESTIMATE_CHANNEL, "tick", "coded_state", "live_state")
-S_SAMPLE, S_SENT, S_WORD, S_RANGE, S_DIGEST, S_PEER = _at(
-    SAMPLE_CHANNEL, "sample", "word_sent", "word", "range", "digest", "peer_digest"
+S_SAMPLE, S_SENT, S_WORD, S_ABOUT, S_RANGE, S_DIGEST, S_PEER = _at(
+    SAMPLE_CHANNEL, "sample", "word_sent", "word", "about", "range", "digest", "peer_digest"
 )
 D_TICK, D_REFERENCE, D_LIVE = _at(DECIDED, "tick", "reference", "live_state")
 R_SAMPLE, R_WORD, R_DIGEST = _at(TAKEN, "sample", "word", "digest")
@@ -63,6 +63,7 @@ class _Composer:
         self.outputs = plant.outputs
         self._plant = {
             "model": agreement.config.model.kind,
+            "picture": plant.picture,
             "outputs": [_named(one) for one in plant.outputs],
             "inputs": [_named(one) for one in plant.inputs],
         }
@@ -174,6 +175,7 @@ class TransmitterComposer(_Composer):
                         "sample": row[S_SAMPLE],
                         "word_sent": _word(row[S_SENT]),
                         "word": _word(row[S_WORD]),
+                        "about": _word(row[S_ABOUT]),
                         "digest": row[S_DIGEST],
                         "peer_digest": row[S_PEER],
                     }

@@ -33,6 +33,7 @@ class PlantSignals(_Message):
     """What the lists of the messages hold, in this order."""
 
     model: str = Field(description="kind of the codec's model")
+    picture: str = Field(description="what the plant looks like, see the model's signals; empty: bars")
     outputs: list[SignalName]
     inputs: list[SignalName]
 
@@ -62,6 +63,9 @@ class SentSample(_Message):
     sample: int
     word_sent: list[int] | None = Field(description="symbols sent; null: none")
     word: list[int] | None = Field(description="symbols as the receiver consumed them; null: erased")
+    about: list[int] | None = Field(
+        description="place of the output that each symbol was about, by the codec; null: erased"
+    )
     digest: str = Field(description="64-bit digest of the transmitter's copy after the sample")
     peer_digest: str = Field(description="the receiver's digest of the same sample")
 

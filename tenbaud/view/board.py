@@ -128,6 +128,7 @@ class Board:
             kept = self._sample(sample["sample"])
             kept[1], kept[2] = sample["word_sent"], sample["word"]
             kept[3], kept[4] = sample["digest"], sample["peer_digest"]
+            kept[5] = sample["about"]
 
     def _on_receiver(self, message: dict[str, Any]) -> None:
         for point in message["points"]:
@@ -139,10 +140,10 @@ class Board:
             kept[2], kept[4] = sample["word"], sample["digest"]
 
     def _sample(self, number: int) -> list[Any]:
-        """Return the memory of a sample: number, word sent, word taken, own and other digest."""
+        """Return the memory of a sample: number, word sent, word taken, both digests, outputs."""
         kept = self._samples.get(number)
         if kept is None:
-            kept = self._samples[number] = [number, None, None, None, None]
+            kept = self._samples[number] = [number, None, None, None, None, None]
             while len(self._samples) > SAMPLES_KEPT:
                 del self._samples[next(iter(self._samples))]
         self._fresh["samples"][number] = kept

@@ -13,9 +13,13 @@ from collections import deque
 from collections.abc import Callable
 
 from channel.codec.codec import Model, Vector
+from channel.codec.words import Word
 
 References = Callable[[int], tuple[float | None, ...]]
 """Set-points of the outputs at a tick; None, or missing at the end, where there is none."""
+
+
+WORDS_KEPT = 48
 
 
 class ErrorMeter:
@@ -52,6 +56,8 @@ class OutputScores:
         self.reference_largest = 0.0
         self.last_coded_error: float | None = None
         self.last: float | None = None
+        self.symbols = 0
+        """that were about this output, in the whole flight"""
 
 
 class Scores:
@@ -71,6 +77,8 @@ class Scores:
     ) -> None:
         self.window_start_tick = window_start_tick
         self.outputs = tuple([OutputScores() for _ in model.measured(model.initial())])
+        self.last_words: deque[tuple[Word, tuple[int, ...] | None]] = deque(maxlen=WORDS_KEPT)
+        """the last confirmed words, and the output that each symbol was about"""
         self._model = model
         self._references = references
         self._on_live_error = on_live_error
@@ -87,6 +95,12 @@ class Scores:
     def forget_reference(self) -> None:
         """Score no more tracking: the set-point is no longer the one that is known here."""
         self._references = lambda _tick: ()
+
+    def on_word(self, word: Word, about: tuple[int, ...] | None) -> None:
+        """Note a confirmed word and what its symbols were about."""
+        self.last_words.append((word, about))
+        for place in about or ():
+            self.outputs[place].symbols += 1
 
     def on_outputs(self, tick: int, values: Vector) -> None:
         """Note the outputs of a tick; ticks come in order."""

@@ -45,6 +45,8 @@ class Confirmed(NamedTuple):
     """of the receiver's"""
     lag_samples: int
     """samples that had been sent beyond this one when its echo came"""
+    about: tuple[int, ...] | None
+    """the output that each symbol was about; None for an erased word"""
 
 
 class Copies:
@@ -124,7 +126,10 @@ class Copies:
         self.confirmed = flown.state
         self._keep_provisional(word, taken)
         digest = self.codec.digest(flown.state)
-        return Confirmed(before.sample, before, sent, word, flown, live, digest, peer_digest, lag)
+        about = self.codec.about(before, word)
+        return Confirmed(
+            before.sample, before, sent, word, flown, live, digest, peer_digest, lag, about
+        )
 
     def _keep_provisional(self, word: Word, taken: list[Vector]) -> None:
         """Start the provisional copy anew unless all that it assumed still stands."""

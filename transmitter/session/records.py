@@ -63,6 +63,7 @@ SAMPLE_CHANNEL = RecordChannel(
         Field("digest", "string", "", "64-bit digest of the codec state after the sample"),
         Field("peer_digest", "string", "", "the receiver's digest of the same sample"),
         Field("lag_samples", "integer", "", "samples sent beyond it when its echo came", timing=True),
+        Field("about", "integers", "", "output that each symbol was about, from 0; null: erased"),
     ),
 )
 
@@ -81,6 +82,7 @@ def write_sample(recorder: Recorder, terms: Terms, codec: Codec, done: Confirmed
         f"{done.digest:016x}",
         f"{done.peer_digest:016x}",
         done.lag_samples,
+        done.about,
     )
     recorder.write(SAMPLE_CHANNEL, done.sample * terms.sample_ns, row)
     for offset, (coded, live) in enumerate(zip(done.flown.coded, done.live, strict=True)):

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, MutableSequence, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
-from channel.codec.codec import Vector
+from channel.codec.codec import Model, Vector
 from channel.codec.words import ERASED, Alphabet, Word
 
 Numbers: TypeAlias = Sequence[float]
@@ -32,6 +32,20 @@ class CoderFunctions(NamedTuple):
     first model states and the next coder state; an erased word has the symbol 0 everywhere"""
     allocates: bool = False
     """whether they make lists to work in"""
+
+
+def readout_of(model: Model) -> list[Vector]:
+    """Return, for each output, how much of each corrected state is in it, near the start."""
+    start = model.initial()
+    moved = [
+        tuple([value + (place == at) for place, value in enumerate(start)])
+        for at in range(model.correction_size)
+    ]
+    columns = [model.measured(state) for state in moved]
+    return [
+        tuple([column[output] - value for column in columns])
+        for output, value in enumerate(model.measured(start))
+    ]
 
 
 class FunctionCoder:

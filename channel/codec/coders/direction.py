@@ -24,6 +24,7 @@ entry, positive part) are of shared numbers, which are equal to the last bit.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -280,19 +281,31 @@ def direction_decode(
     wait(constants, after)
 
 
+def variance_of(coder: Numbers, row: Numbers) -> float:
+    """Return the variance of a sum of states, `row` being their factors."""
+    total = 0.0
+    for i in range(len(row)):
+        for j in range(len(row)):
+            total += row[i] * row[j] * coder[place(i, j)]
+    return total
+
+
 class DirectionCoder(FunctionCoder):
     """One or more signs per sample for all corrected states together.
 
-    Coder state: the lower half of P, D, m (mean agreement of the last signs) and sigma.
+    Coder state: the lower half of P, D, m (mean agreement of the last signs) and sigma. `readout` has a
+    row for each output, how much of each corrected state is in it; none: each of them is an output. It
+    serves what is shown to people.
     """
 
     functions = CoderFunctions(direction_encode, direction_decode, allocates=True)
     impulse = True
     uses_rates = True
 
-    def __init__(self, parameters: DirectionParameters) -> None:
+    def __init__(self, parameters: DirectionParameters, readout: Rows = ()) -> None:
         p = parameters
         size = len(p.transition)
+        self.readout = readout or [[0.0 + (row == at) for at in range(size)] for row in range(size)]
         for name in ("transition", "noise", "worth", "start"):
             check(name, getattr(p, name), size, size)
         check_parameters(p)
@@ -327,11 +340,35 @@ class DirectionCoder(FunctionCoder):
             0.0 <= coder[place(state, state)] <= 2.0 * limit for state, limit in enumerate(largest)
         )
 
+    def about(self, coder: Vector, word: Sequence[int]) -> tuple[int, ...]:
+        """Return, for each sign, the output whose error correlates most with what was asked."""
+        known = list(coder)
+        c, v, correction = ([0.0] * self.correction_size for _ in range(3))
+        found = []
+        for at, sign in enumerate(word):
+            is_asked = aim(self.constants, known, c, v)
+            found.append(self._most_correlated(known, v) if is_asked else 0)
+            if is_asked and at + 1 < len(word):
+                learn(self.constants, known, c, v, sign, correction)
+        return tuple(found)
+
+    def _most_correlated(self, coder: Numbers, v: Numbers) -> int:
+        """Return the output C x for which (C v)^2 / (C P C') is largest, the first of equals."""
+        best, most = 0, 0.0
+        for output, row in enumerate(self.readout):
+            common = 0.0
+            for i in range(len(v)):
+                common += row[i] * v[i]
+            variance = variance_of(coder, row)
+            if variance > 0.0 and common * common > most * variance:
+                best, most = output, common * common / variance
+        return best
+
     def ranges(self, coder: Vector) -> Vector:
-        """Return, for each corrected state, the standard deviation that both ends assume."""
+        """Return, for each output, the standard deviation that both ends assume."""
         sizes = []
-        for state in range(self.correction_size):
-            variance = coder[place(state, state)]
+        for row in self.readout:
+            variance = variance_of(coder, row)
             sizes.append(coder[-1] * math.sqrt(variance if variance > 0.0 else 0.0))
         return tuple(sizes)
 

@@ -17,6 +17,7 @@ PENDULUM_SIGNALS = Signals(
     states=(Signal("angle", "rad"), Signal("angle_rate", "rad/s")),
     inputs=(InputSignal("motor", "V", -10.0, 10.0),),
     outputs=(Signal("angle", "rad", -1.0, 1.0),),
+    picture="pendulum",
 )
 
 

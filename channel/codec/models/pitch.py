@@ -25,6 +25,7 @@ PITCH_SIGNALS = Signals(
     ),
     inputs=(InputSignal("front", "V", group="motors"), InputSignal("rear", "V", group="motors")),
     outputs=(Signal("pitch", "rad"),),
+    picture="helicopter",
 )
 
 

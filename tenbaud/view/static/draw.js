@@ -19,11 +19,14 @@ function roundStep(most, look) {
   return [1, 2, 5, 10].map((one) => one * power).find((step) => step >= least);
 }
 
+export const OUTPUT_COLOURS = 6;
+
 export function colours() {
   const style = getComputedStyle(document.body);
   const of = (name) => style.getPropertyValue(`--${name}`).trim();
-  return Object.fromEntries(
-    ["ink", "dim", "line", "card", "estimate", "tube", "error", "reference", "bad", "minus"].map((n) => [n, of(n)]));
+  const names = ["ink", "dim", "line", "card", "estimate", "tube", "error", "reference", "bad", "minus"];
+  const outputs = Array.from({ length: OUTPUT_COLOURS }, (_, place) => of(`output-${place}`));
+  return { outputs, ...Object.fromEntries(names.map((n) => [n, of(n)])) };
 }
 
 // Return a context whose unit is one CSS pixel; the bitmap follows the element's size.
@@ -128,14 +131,15 @@ export function drawError(canvas, height, now, rows, place, look, ink) {
 
 const same = (one, other) => one && other && one.length === other.length && one.every((v, i) => v === other[i]);
 
-// samples: [number, sent, taken, own digest, other digest], oldest first. The newest is at the right.
-export function drawTape(canvas, samples, ink) {
+// samples: [number, sent, taken, own digest, other digest, about], oldest first. The newest is at the right.
+// Of several outputs each symbol is a bar in the colour of the one that it was about.
+export function drawTape(canvas, samples, ink, several) {
   const height = 46;
   const [context, width] = fitted(canvas, height);
   const cell = 18;
   const count = Math.min(samples.length, Math.floor(width / cell));
   for (let index = 0; index < count; index++) {
-    const [, sent, taken] = samples[samples.length - 1 - index];
+    const [, sent, taken, , , about] = samples[samples.length - 1 - index];
     const left = width - (index + 1) * cell;
     if (taken === null) {
       context.strokeStyle = ink.bad;
@@ -145,9 +149,15 @@ export function drawTape(canvas, samples, ink) {
     }
     const flipped = sent !== null && !same(sent, taken);
     const share = taken.reduce((sum, value) => sum + value, 0) / taken.length;
-    context.fillStyle = flipped ? ink.error : share >= 0 ? ink.estimate : ink.minus;
-    const size = Math.max(4, Math.min(1, Math.abs(share)) * (height / 2 - 5));
-    context.fillRect(left + 2.5, share >= 0 ? height / 2 - 1 - size : height / 2 + 1, cell - 5, size);
+    // What the newest bits were about comes with the sensor's next message.
+    const colour = (place) => (about ? ink.outputs[about[place] % OUTPUT_COLOURS] : ink.dim);
+    const bars = several ? taken.map((value, place) => [value, colour(place)]) : [[share, share >= 0 ? ink.estimate : ink.minus]];
+    const wide = (cell - 5) / bars.length;
+    bars.forEach(([value, own], place) => {
+      context.fillStyle = flipped ? ink.error : own;
+      const size = Math.max(4, Math.min(1, Math.abs(value)) * (height / 2 - 5));
+      context.fillRect(left + 2.5 + place * wide, value >= 0 ? height / 2 - 1 - size : height / 2 + 1, wide, size);
+    });
   }
   context.fillStyle = ink.line;
   context.fillRect(0, height / 2 - 0.5, width, 1);

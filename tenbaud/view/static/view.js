@@ -1,6 +1,6 @@
 // The page's own script: takes the stream in, keeps the last thirty seconds, and draws them.
 
-import { colours, drawError, drawOutput, drawTape, shown } from "./draw.js";
+import { colours, drawError, drawOutput, drawTape, OUTPUT_COLOURS, shown } from "./draw.js";
 
 const KEPT_S = 32, SAMPLES_KEPT = 160, EVENTS_SHOWN = 7, STALE_MS = 1500, BROKEN_SHOWN_MS = 2500, TEXT_MS = 200;
 const DEGREES = 180 / Math.PI;
@@ -70,13 +70,20 @@ function same(one, other) {
 
 // ---- the plant: what it is called, and its picture
 
-let plant = null, picture = null;
+let plant = null, picture = "";
 const largest = { outputs: [], inputs: [] };
 
 function make(tag, name = "", text = "") {
   const element = document.createElement(tag);
   element.className = name;
   element.textContent = text;
+  return element;
+}
+
+// A square in the colour of the bits that are about an output.
+function key(place) {
+  const element = make("i", "key square");
+  element.style.background = `var(--output-${place % OUTPUT_COLOURS})`;
   return element;
 }
 
@@ -93,6 +100,7 @@ function become(told) {
     return [["value", title(one), `${unit}last 30 s of flight`], ["error", several ? `${title(one)}, estimation error` : "Estimation error", `${unit}within the range ± M`]]
       .flatMap(([kind, name, small]) => {
         const heading = make("h2", "", `${name} `), canvas = make("canvas");
+        if (several) heading.prepend(key(place));
         heading.append(make("small", "", small));
         canvas.id = `${kind}-${place}`;
         canvas.setAttribute("role", "img");
@@ -100,15 +108,18 @@ function become(told) {
         return [heading, canvas];
       });
   }));
-  // Pictures of what is drawn as it is; everything else has bars.
-  const name = several ? "" : plant.outputs[0]?.name === "pitch" ? "helicopter" : plant.model === "pendulum" ? "pendulum" : "";
-  for (const id of ["helicopter", "pendulum"]) at(id).toggleAttribute("hidden", id !== name);
-  picture = name && at(name);
-  if (name === "helicopter") drawScale();
+  // A plant without a picture has bars; so have several outputs, for their values.
+  const id = plant.picture.replaceAll(" ", "-");
+  picture = (id && (at(`${id}-${plant.outputs.length}`) || at(id))) || "";
+  for (const one of document.querySelectorAll(".plant")) one.toggleAttribute("hidden", one !== picture);
+  if (picture.id === "helicopter") drawScale();
+  for (const text of picture ? picture.querySelectorAll("[data-name]") : []) text.textContent = words(plant.outputs[text.dataset.name]);
   largest.outputs = plant.outputs.map(spread);
   largest.inputs = plant.inputs.map(spread);
-  at("outputs").replaceChildren(...(picture ? [] : plant.outputs.flatMap((one) => gauge(one, ["reference", "estimate", "body"]))));
+  at("outputs").replaceChildren(...(picture && !several ? [] : plant.outputs.flatMap((one) => gauge(one, ["reference", "estimate", "body"]))));
   at("inputs").replaceChildren(...plant.inputs.flatMap((one) => gauge(one, ["bar"])));
+  at("bit-keys").replaceChildren(...(several ? plant.outputs.flatMap((one, place) => [key(place), make("span")])
+    : [make("i", "key plus-key"), "up ", make("i", "key minus-key"), "down"]));
   set("value-name", several ? "value" : plant.outputs[0] ? words(plant.outputs[0]) : "");
 }
 
@@ -142,27 +153,27 @@ function drawGauges(id, most, signals, each) {
   }
 }
 
-function turn(part, angle, centre) {
-  picture.querySelector(part).setAttribute("transform", `rotate(${(-angle * DEGREES).toFixed(2)} ${centre})`);
+// Turns every part of the picture: `data-turn` has the place of its output and its centre.
+function turn(values) {
+  for (const part of picture.querySelectorAll("[data-turn]")) {
+    const [place, ...centre] = part.dataset.turn.split(" "), angle = values[part.classList[0]][place] ?? null;
+    part.style.display = angle === null ? "none" : "";
+    if (angle !== null) part.setAttribute("transform", `rotate(${(-angle * DEGREES).toFixed(2)} ${centre.join(" ")})`);
+  }
 }
 
 function drawPicture() {
   const point = memory.points.at(-1), decision = memory.decisions.at(-1), applied = memory.heads.transmitter?.applied;
   if (!point || !plant) return;
   const references = decision ? decision[1] : [];
-  if (picture) {
-    const centre = picture.id === "pendulum" ? "160 132" : "160 122", reference = references[0] ?? null;
-    turn(".body", point[1][0], centre);
-    turn(".estimate", point[2][0], centre);
-    picture.querySelector(".reference").style.display = reference === null ? "none" : "";
-    if (reference !== null) turn(".reference", reference, centre);
-  } else {
+  if (picture) turn({ body: point[1], estimate: point[2], reference: references });
+  if (at("outputs").children.length) {
     for (const [, values] of memory.points) values.forEach((value, place) => placed(largest.outputs, place, value));
     drawGauges("outputs", largest.outputs, plant.outputs, (place) => ({ body: point[1][place], estimate: point[2][place], reference: references[place] }));
   }
   if (!applied) return;
   drawGauges("inputs", largest.inputs, plant.inputs, (place) => ({ bar: applied[place] }));
-  if (picture?.id === "helicopter") {
+  if (picture.id === "helicopter" && applied.length === 2) {
     // The front rotor lifts the front: it is drawn at the right, where the nose is.
     const arrow = (x, volt) => (Math.abs(volt) > 0.05 ? `M${x} 98v${(-volt * 6).toFixed(1)}` : "");
     at("thrust-front").setAttribute("d", arrow(254, applied[0]));
@@ -268,7 +279,7 @@ function showText(now) {
     at("events").dataset.key = key;
     at("events").replaceChildren(...rows.map(([who, time, bad, text]) => {
       const [item, when, source] = ["li", "time", "span"].map((name) => document.createElement(name));
-      when.textContent = `${time.toFixed(1)} s`;
+      when.textContent = `${Math.max(0, time).toFixed(1)} s`;
       source.textContent = who;
       item.append(when, source, text);
       if (bad) item.className = "bad";
@@ -303,6 +314,14 @@ function forget() {
   return now;
 }
 
+// Which share of the bits on the tape is about each output.
+function nameBits(about) {
+  at("bit-keys").querySelectorAll("span").forEach((text, place) => {
+    const share = about.filter((one) => one === place).length / (about.length || 1);
+    text.textContent = `${words(plant.outputs[place])} ${Math.round(100 * share)} %`;
+  });
+}
+
 function draw() {
   asked = false;
   if (!dirty || document.hidden) return;
@@ -317,7 +336,11 @@ function draw() {
     drawError(at(`error-${place}`), low, time, memory.points, place, look, ink);
   });
   // The tape changes with the bits, half as often as the curves.
-  if (tapeDirty) drawTape(at("tape"), [...memory.samples.values()].sort((a, b) => a[0] - b[0]), ink);
+  if (tapeDirty) {
+    const samples = [...memory.samples.values()].sort((a, b) => a[0] - b[0]), several = plant?.outputs.length > 1;
+    drawTape(at("tape"), samples, ink, several);
+    if (several) nameBits(samples.flatMap((sample) => sample[5] || []));
+  }
   tapeDirty = false;
 }
 

@@ -19,6 +19,7 @@ from tenbaud.recording.convert import convert
 from tenbaud.recording.encoding import SIGNALS_KEY, recorded_signals, signals_text
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.layouts import flight_plots
+from tenbaud.recording.overview import Overview, packed, unpacked
 from tenbaud.recording.reader import Recording
 from tenbaud.recording.signals import definitions
 from tests.tenbaud.arm_and_place import ZOOM, Law, Model, Plant, fly_recorded
@@ -86,6 +87,38 @@ def test_converted_files_have_its_names_and_units(run: Run, tmp_path: Path) -> N
     assert signals["place"]["values"] == run.place.tolist()
     convert(run, "mat", tmp_path / "flight.mat")
     assert loadmat(tmp_path / "flight.mat", simplify_cells=True)["torque"]["unit"] == "N m"
+
+
+def test_each_symbol_says_which_output_it_was_about(run: Run) -> None:
+    rows = [row for _, row in Recording(run.folder.transmitter).rows("sample")]
+    assert all(row["about"] == (None if row["word"] is None else [0, 1]) for row in rows)
+    assert run.about[:10].tolist() == [0.0] * 5 + [1.0] * 5
+    legend = run.plot().axes[-1].get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == ["arm 50%", "place 50%"]
+
+
+def test_the_figure_of_many_bits_shows_the_share_that_was_about_each_output(run: Run) -> None:
+    rows = {
+        "word": [[1], [-1], [1], [1]] * 400,
+        "about": [[0], [0], [0], [1]] * 400,
+    }
+    overview = Overview(run.plant)
+    overview.add("sample", [at * 100_000_000 for at in range(1600)], rows.get)
+    stored = unpacked(packed(overview), run.plant)
+    assert stored is not None
+    for one in (overview, stored):
+        shares = [means.curve()[1] for means in one.about]
+        assert one.symbols.thinned
+        assert len(shares[0]) < 1300
+        assert [share.mean() for share in shares] == pytest.approx([0.75, 0.25], abs=0.02)
+
+
+def test_a_summary_has_the_share_of_symbols_about_each_output(tmp_path: Path) -> None:
+    settings = {"duration_s": 2.0, "channel.rate_baud": 40.0}
+    parts = {"model": Model(), "coder": ZoomCoder(ZOOM), "plant": Plant(), "controller": Law()}
+    run = fly("paper-20baud", settings=settings, out=tmp_path / "run", **parts)
+    assert [one["symbols_share"] for one in run.summary["outputs"].values()] == [0.5, 0.5]
 
 
 def test_the_figure_has_a_panel_for_each_group_of_outputs_and_for_the_input(run: Run) -> None:

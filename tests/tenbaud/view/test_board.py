@@ -14,7 +14,8 @@ def transmitter(number: int = 1, flight: int = 7, **more: Any) -> bytes:
         "coded": [0.12, 0.3], "live": None, "range": [0.05, 0.1],
     }  # fmt: skip
     sample = {
-        "sample": number, "word_sent": [1], "word": None, "digest": "aa", "peer_digest": "ab",
+        "sample": number, "word_sent": [1], "word": None, "about": None, "digest": "aa",
+        "peer_digest": "ab",
     }  # fmt: skip
     message = {
         "version": 3, "role": "transmitter", "session": "lab", "flight": flight, "phase": "flying",
@@ -43,7 +44,7 @@ def test_both_ends_are_joined_by_sample() -> None:
     board = Board()
     assert board.take([receiver(3), transmitter(3)], 0.0)
     _, (whole,) = news(board)
-    assert whole["samples"] == [[3, [1], None, "aa", "ab"]]
+    assert whole["samples"] == [[3, [1], None, "aa", "ab", None]]
     assert whole["points"] == [[0.15, [0.11, 0.2], [0.12, 0.3], [0.05, 0.1]]]
     assert whole["decisions"] == [[0.15, [0.5, None]]]
     (event,) = whole["events"]
@@ -104,7 +105,7 @@ def test_a_second_flight_waits_until_the_first_is_over_or_silent() -> None:
     assert board.flight == 7
     board.take([transmitter(2, 8)], SILENCE_S)
     assert board.flight == 8
-    assert news(board)[1][0]["samples"] == [[2, [1], None, "aa", "ab"]]
+    assert news(board)[1][0]["samples"] == [[2, [1], None, "aa", "ab", None]]
     board.take([transmitter(3, 8, phase="ended")], SILENCE_S)
     board.take([transmitter(1, 9)], SILENCE_S)
     assert board.flight == 9

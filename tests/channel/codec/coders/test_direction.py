@@ -14,6 +14,7 @@ from channel.codec.words import ERASED
 from tests.golden.regenerate import AERO_DIRECTION, PITCH_DIRECTION
 
 ZERO = (0.0, 0.0)
+AXES = [(1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0)]
 
 
 def follow(coder: DirectionCoder, samples: int, strength: float, seed: int = 4) -> tuple[float, Vector]:
@@ -68,6 +69,30 @@ def test_when_a_direction_is_aimed_at_then_it_is_the_top_eigenvector() -> None:
         sum(AERO_DIRECTION.worth[row][column] * v[column] for column in range(4)) for row in range(2)
     ]
     assert image[0] / image[1] == pytest.approx(c[0] / c[1], rel=1e-3)
+
+
+def test_a_sign_is_about_the_output_whose_error_correlates_most_with_what_is_asked() -> None:
+    coder = DirectionCoder(AERO_DIRECTION, AXES)
+    swapped = DirectionCoder(AERO_DIRECTION, AXES[::-1])
+    state, counts = coder.initial(), [0, 0]
+    c, v = [0.0] * 4, [0.0] * 4
+    assert aim(coder.constants, list(state), c, v)
+    # Nothing couples the two axes yet, so that the direction is all within one.
+    assert coder.about(state, (1, -1)) == ((0, 1) if c[2:] == [0.0, 0.0] else (1, 0))
+    for _ in range(50):
+        first, second = coder.about(state, (1, -1))
+        assert swapped.about(state, (1, -1)) == (1 - first, 1 - second)
+        counts[first] += 1
+        counts[second] += 1
+        _, state = coder.decode(state, (0.0,) * 4, (1, -1))
+    assert min(counts) > 10
+
+
+def test_ranges_are_of_outputs_that_may_be_sums_of_states() -> None:
+    coder = DirectionCoder(AERO_DIRECTION)
+    total = DirectionCoder(AERO_DIRECTION, [(1.0, 0.0, -2.0, 0.0)])
+    angle, _, other, _ = coder.ranges(coder.initial())
+    assert total.ranges(coder.initial())[0] == pytest.approx(math.hypot(angle, 2.0 * other))
 
 
 def test_when_two_signs_are_sent_then_the_second_is_about_what_the_first_has_left() -> None:

@@ -20,8 +20,17 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 # Beside other tests the threads of the linear algebra mostly wait for each other, and wait by spinning.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-LONGEST_FIRST = ("tests/docs/",)
-"""What takes longest: started last, it would keep one worker busy and the others idle."""
+LONGEST_FIRST = (
+    "tests/docs/",
+    "tests/tenbaud/view/test_page.py",
+    "tests/network/",
+    "tests/tenbaud/test_restarts.py",
+    "tests/tenbaud/telemetry/test_flights.py",
+    "tests/tenbaud/test_emulated_flights.py",
+    "tests/tenbaud/test_serial_flight.py",
+    "tests/tenbaud/test_processes.py",
+)
+"""What takes or waits longest: started last, it would keep one worker busy and the others idle."""
 
 COMPILED_ONCE = ("tests/tenbaud/studies/test_equal_bits.py",)
 """Their tests stay together too: the first compiles, the others read its machine code from disk."""

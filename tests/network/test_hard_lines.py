@@ -28,8 +28,6 @@ from tests.network.namespaces import Lab, Machine
 from tests.tenbaud.confirmed import check_flown
 from tests.tenbaud.ends import PATIENCE_S, End
 
-pytestmark = pytest.mark.real_time
-
 TENBAUD = (sys.executable, "-m", "tenbaud")
 
 

@@ -19,8 +19,6 @@ from tests.network.flights import DESK_AT, RIG_AT, Flight, environment, make_key
 from tests.network.namespaces import Lab, Machine
 from tests.tenbaud.processes import REPOSITORY
 
-pytestmark = pytest.mark.real_time
-
 OUTSIDE, DESK_OUTSIDE = "10.77.2.1", "10.77.2.2"
 ATTEMPTS = 20
 ATTEMPTS_PER_S = 8

@@ -5,15 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import pytest
 import zenoh
 
 from tests.docs.blocks import blocks_of
 from tests.network.namespaces import Lab
 from tests.network.pages import run_page
 from tests.tenbaud.confirmed import check_flown
-
-pytestmark = pytest.mark.real_time
 
 
 def summaries(folder: Path) -> list[dict[str, object]]:

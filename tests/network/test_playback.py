@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import pytest
 import zenoh
 
 from channel.links.endpoints import free_endpoint
@@ -16,8 +15,6 @@ from channel.links.zenoh.router import ZenohRouter
 from tests.network.flights import Flight
 from tests.network.namespaces import Machine
 from tests.tenbaud.ends import wait_for
-
-pytestmark = pytest.mark.real_time
 
 COMMANDS = "tenbaud/helicopter/down/command"
 

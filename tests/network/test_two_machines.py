@@ -12,8 +12,6 @@ from tests.network.flights import DESK_AT, RIG_AT, Flight, at, make_keys, tls_li
 from tests.network.namespaces import Lab
 from tests.tenbaud.confirmed import PATIENT, check_flown
 
-pytestmark = pytest.mark.real_time
-
 OTHER_RIG_AT, OTHER_DESK_AT = "10.77.1.31", "10.77.1.32"
 PULLED_S = 5.0
 

@@ -10,8 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tests.tenbaud.confirmed import PATIENT as NO_WATCHDOG
+from tests.tenbaud.ends import PATIENCE_S
+
 TENBAUD = [sys.executable, "-m", "tenbaud"]
-PATIENT = ["--set", "transmitter.bridge.stale_s=1.0"]
+PATIENT = ["--set", "transmitter.bridge.stale_s=1.0", *NO_WATCHDOG]
 """The tests share the machine with others; what is stale on a quiet one is too strict here."""
 
 
@@ -29,7 +32,7 @@ class RigProcess:
     def end(self) -> dict[str, Any]:
         """Stop it; return what the device saw."""
         self.process.send_signal(signal.SIGINT)
-        out, _ = self.process.communicate(timeout=20)
+        out, _ = self.process.communicate(timeout=PATIENCE_S)
         figures: dict[str, Any] = json.loads(out)
         return figures
 
@@ -73,6 +76,4 @@ def fly_emulated(
 def demo(*arguments: str, seconds: float, out: Path) -> subprocess.CompletedProcess[str]:
     command = [*TENBAUD, "demo", "--json", "--duration", f"{seconds:g}", "--out", str(out)]
     command += ["--set", "coder.window_signs=3", *arguments]
-    return subprocess.run(
-        command, capture_output=True, text=True, check=False, timeout=60 + 2 * seconds
-    )
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=PATIENCE_S)

@@ -18,7 +18,8 @@ from typing import Any
 from channel.links.serial.emulated import EmulatedLine
 from tests.tenbaud.processes import REPOSITORY
 
-PATIENCE_S = 60.0
+PATIENCE_S = 240.0
+"""For what ends as soon as it may. On a machine with much else to do a process may start slowly."""
 
 
 class End:

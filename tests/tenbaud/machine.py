@@ -49,7 +49,7 @@ class Pacer:
         return self
 
     def __exit__(self, *_: object) -> None:
-        out, _ = self._process.communicate("\n", timeout=60.0)
+        out, _ = self._process.communicate("\n", timeout=240.0)
         self.missed = int(out)
 
     def need_idle(self) -> None:

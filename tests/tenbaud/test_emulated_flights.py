@@ -19,8 +19,6 @@ from tenbaud.recording.reader import MessageStream
 from tests.tenbaud.confirmed import check_flown
 from tests.tenbaud.emulated_flight import PATIENT, RigProcess, demo, fly_emulated
 
-pytestmark = pytest.mark.real_time
-
 SECONDS = 5.0
 SOAK_SECONDS = 60.0
 OFF = [0.0, 0.0]
@@ -58,7 +56,7 @@ def simulated_rms(seconds: float, lead_ticks: int) -> float:
     return rms
 
 
-@pytest.mark.both_cores
+@pytest.mark.real_time
 @pytest.mark.parametrize("form", ["cobs", "ascii", "quarc"])
 def test_an_emulated_rig_flies_like_the_simulated_one(form: str, tmp_path: Path) -> None:
     rig, ends = PEERS[form]

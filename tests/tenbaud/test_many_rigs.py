@@ -19,7 +19,7 @@ from tenbaud.flight import many
 from tenbaud.flight.ends import open_recorder
 from tenbaud.flight.rate_limited_log import LINES_AT_ONCE, PERIOD_S
 from tenbaud.recording.writer import McapRecorder
-from tests.tenbaud.confirmed import check_flown
+from tests.tenbaud.confirmed import PATIENT, check_flown
 from tests.tenbaud.processes import finish, start
 from tests.tenbaud.room import PATIENCE_S, Rig, Room, agreement
 
@@ -235,7 +235,7 @@ def test_when_recording_one_rig_fails_then_only_its_flight_ends(tmp_path: Path) 
     assert room.summary("rig/good")["samples"] == 5
 
 
-@pytest.mark.parametrize("clock", ["virtual", pytest.param("real", marks=pytest.mark.real_time)])
+@pytest.mark.parametrize("clock", ["virtual", "real"])
 def test_when_processes_meet_over_zenoh_then_each_flies_with_its_own_file(
     tmp_path: Path, clock: str
 ) -> None:
@@ -244,7 +244,7 @@ def test_when_processes_meet_over_zenoh_then_each_flies_with_its_own_file(
     own.write_text("[coder]\nwindow_signs = 3\n")
     endpoint = free_endpoint()
     shared = ["--clock", clock, "--json"]
-    flight = ["transmit", "--connect", endpoint, "--duration", "3", *shared]
+    flight = ["transmit", "--connect", endpoint, "--duration", "3", *PATIENT, *shared]
     receiver = start(
         *("receive", "--sessions", "rig/*", "--configs", "rigs", "--listen", endpoint),
         *("--flights", "2", "--out", "many", *shared),

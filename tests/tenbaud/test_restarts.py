@@ -16,8 +16,6 @@ from channel.links.serial.emulated import EmulatedLine
 from tenbaud.recording.reader import Recording
 from tests.tenbaud.ends import Pair, Relay, over_serial, over_zenoh
 
-pytestmark = pytest.mark.real_time
-
 SEED = 20240619
 SAFE_VOLTS = [0.0, 0.0]
 WATCHDOG_S = 0.5

@@ -21,7 +21,7 @@ from tests.tenbaud.endings.commands import nothing_half_is_left, processes_with
 from tests.tenbaud.processes import Ended, finish, start
 
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
-PATIENCE_S = 60.0
+PATIENCE_S = 240.0
 FLIGHT = ("demo", "--clock", "real", "--duration", "60", "--mismatch", "0", "--out", "run")
 
 
@@ -140,7 +140,11 @@ class _Killer:
 
 
 def _fly(
-    folder: Path, killer: _Killer, monkeypatch: pytest.MonkeyPatch, duration_s: float
+    folder: Path,
+    killer: _Killer,
+    monkeypatch: pytest.MonkeyPatch,
+    duration_s: float,
+    watchdog_s: float = 0.5,
 ) -> demo.DemoResult:
     made = demo._Child
 
@@ -149,7 +153,11 @@ def _fly(
         return killer.ends[role]
 
     monkeypatch.setattr(demo, "_Child", remembered)
-    settings = {"duration_s": duration_s, "link": {"peer_timeout_s": 2.0}}
+    settings = {
+        "duration_s": duration_s,
+        "link": {"peer_timeout_s": 2.0},
+        "transmitter": {"watchdog_s": watchdog_s},
+    }
     agreement = agree(load_config(None, None, settings), "real")
     folder.mkdir()
     return demo.fly_demo(agreement, RunFolder(folder), killer.on_status)
@@ -172,8 +180,8 @@ def test_an_end_that_is_killed_in_flight_is_the_cause_that_is_named(
 def test_a_receiver_that_dies_late_does_not_cost_the_summary(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # Stopped in the last moments it cannot end; it is killed when the transmitter has ended.
-    killer = _Killer("receiver", 1.75, signal.SIGSTOP)
+    # Stopped in the last second it cannot end; it is killed when the transmitter has ended.
+    killer = _Killer("receiver", 2.0, signal.SIGSTOP)
     waited = demo._wait
 
     def wait(ends: Any, stop: Any) -> None:
@@ -182,11 +190,11 @@ def test_a_receiver_that_dies_late_does_not_cost_the_summary(
         waited(ends, stop)
 
     monkeypatch.setattr(demo, "_wait", wait)
-    result = _fly(tmp_path / "run", killer, monkeypatch, 2.0)
+    result = _fly(tmp_path / "run", killer, monkeypatch, 3.0, watchdog_s=30.0)
     assert result.messages[-1] == "the receiver was killed by SIGKILL"
     assert result.code in (ExitCode.FAILED, ExitCode.LINK_LOST)
     written = json.loads((tmp_path / "run" / "summary.json").read_text())
-    assert written["digest_checks"] >= 15
+    assert written["digest_checks"] >= 18
     assert written["exit_code"] == result.code
 
 

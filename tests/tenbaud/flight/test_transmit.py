@@ -74,7 +74,6 @@ def test_when_the_last_echo_differs_then_the_flight_is_a_desync(on_desync: str) 
     assert on_desync == "stop" or endpoint.session.end == told
 
 
-@pytest.mark.real_time
 def test_when_the_last_echo_differs_on_the_real_clock_then_the_flight_is_a_desync() -> None:
     endpoint = corrupted_receiver("real")
     outcome = fly_real(endpoint, lambda _: False)
@@ -85,7 +84,6 @@ def test_when_the_last_echo_differs_on_the_real_clock_then_the_flight_is_a_desyn
     assert f"differ after sample {LAST_SAMPLE}" in end.text
 
 
-@pytest.mark.real_time
 def test_when_it_is_stopped_as_the_welcome_arrives_then_the_receiver_is_informed() -> None:
     endpoint = build_receiver(agreement_on("real"), None, DATAGRAM)
     outcome = fly_real(endpoint, lambda run: run.node.session.phase is Phase.FLYING)

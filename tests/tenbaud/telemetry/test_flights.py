@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -19,8 +20,6 @@ from tenbaud.recording.reader import Recording
 from tenbaud.sentences.events import event_text
 from tenbaud.telemetry.schema import TELEMETRY, ReceiverTelemetry, TransmitterTelemetry
 from tests.tenbaud.processes import Ended, finish, run, start
-
-pytestmark = pytest.mark.real_time
 
 
 class Watched:
@@ -54,7 +53,7 @@ class Watched:
         found = [message for message in self.messages() if message.role == role]
         return found[-1] if found else None
 
-    def wait(self, met: Callable[[], object], seconds: float = 60.0) -> None:
+    def wait(self, met: Callable[[], object], seconds: float = 240.0) -> None:
         until_s = time.monotonic() + seconds
         while not met():
             assert time.monotonic() < until_s, self.received[-1:]
@@ -64,6 +63,11 @@ class Watched:
         for feed in self.feeds:
             feed.send("helicopter", json.dumps(command).encode())
 
+    def stopped(self) -> tuple[Ended, Ended]:
+        """Interrupt the flight; return both ends."""
+        self.upper.send_signal(signal.SIGINT)
+        return self.ended()
+
     def ended(self) -> tuple[Ended, Ended]:
         return finish(self.upper), finish(self.lower)
 
@@ -71,7 +75,7 @@ class Watched:
 def _patiently(do: Callable[[], Any]) -> Any:
     from channel.errors import LinkError
 
-    until_s = time.monotonic() + 20.0
+    until_s = time.monotonic() + 240.0
     while True:
         try:
             return do()
@@ -100,9 +104,13 @@ def controls(path: Path) -> list[str]:
 
 
 def test_when_a_flight_is_looked_at_then_every_message_keeps_to_the_schema(tmp_path: Path) -> None:
-    with watched(tmp_path, "--clock", "real", transmitter=("--duration", "4")) as pair:
-        upper, lower = pair.ended()
-        assert (upper.code, lower.code) == (0, 0), upper.err + lower.err
+    with watched(tmp_path, "--clock", "real", transmitter=("--duration", "600")) as pair:
+        # However late the viewer finds the flight.
+        pair.wait(lambda: pair.newest("transmitter") and pair.newest("receiver"))
+        began = pair.newest("transmitter").time_s
+        pair.wait(lambda: pair.newest("transmitter").time_s > began + 3.5)
+        upper, lower = pair.stopped()
+        assert (upper.code, lower.code) == (130, 0), upper.err + lower.err
         messages = pair.messages()
     sent = [one for one in messages if isinstance(one, TransmitterTelemetry)]
     taken = [one for one in messages if isinstance(one, ReceiverTelemetry)]
@@ -194,14 +202,16 @@ def test_when_a_flight_is_steered_then_every_command_takes_hold_and_is_written_d
 
 
 def test_when_control_is_not_allowed_then_commands_do_nothing(tmp_path: Path) -> None:
-    flight = ("--duration", "8", "--pace", "4")
+    flight = ("--duration", "3600", "--pace", "4")
     with watched(tmp_path, "--clock", "virtual", transmitter=flight) as pair:
         pair.wait(lambda: pair.newest("transmitter") and pair.newest("transmitter").time_s > 0.5)
         for command in ({"kind": "set_point", "value": 0.1}, {"kind": "pause", "paused": True}):
             pair.send(**command)
         pair.send(kind="corrupt", end="receiver", field="range")
-        upper, lower = pair.ended()
-    assert (upper.code, lower.code) == (0, 0)
+        sent_s = pair.newest("transmitter").time_s
+        pair.wait(lambda: pair.newest("transmitter").time_s > sent_s + 4.0)
+        upper, lower = pair.stopped()
+    assert (upper.code, lower.code) == (130, 0)
     assert upper.summary["desyncs"] == 0
     assert not controls(tmp_path / "upper" / "transmitter.mcap")
     assert not controls(tmp_path / "lower" / "receiver.mcap")

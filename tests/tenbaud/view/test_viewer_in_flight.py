@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from tenbaud.view.server import free_port
-from tests.tenbaud.confirmed import check_flown
+from tests.tenbaud.confirmed import PATIENT, check_flown
 from tests.tenbaud.machine import Pacer
 from tests.tenbaud.processes import finish, start
 from tests.tenbaud.view.viewers import beside, is_free
@@ -27,7 +27,7 @@ pytestmark = [
 
 DURATION_S = 5
 STOPPED_S, RUNNING_S = 0.4, 0.1
-PATIENCE_S = 60.0
+PATIENCE_S = 240.0
 
 
 @contextlib.contextmanager
@@ -71,7 +71,7 @@ def test_a_viewer_in_trouble_does_not_hold_the_flight_up(
 ) -> None:
     port = free_port("127.0.0.1")
     arguments = ("--view-port", str(port), "--clock", "real", "--duration", str(DURATION_S))
-    process = start("demo", "--view", *arguments, "--out", "run", cwd=tmp_path)
+    process = start("demo", "--view", *arguments, *PATIENT, "--out", "run", cwd=tmp_path)
     _wait_until_flying(tmp_path / "run" / "transmitter.mcap")
     (viewer,) = beside(port)
     with Pacer() as pacer, trouble(viewer):

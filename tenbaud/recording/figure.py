@@ -40,6 +40,8 @@ COLOURS = (LINE_B, LINE_C, "#2a8c4a", "#8e3fb0", LINE_A, "#b08a00")
 STEPS = {"drawstyle": "steps-post"}
 
 
+SHARES_DRAWN = 100
+"""Stretches of a flight of which the share of the bits is drawn."""
 DRAWN_MAX = 8
 """Groups of outputs or of inputs that have a panel."""
 
@@ -329,9 +331,12 @@ def _draw_symbols(panel: Axes, flight: _Flight) -> None:
 
 def _draw_shares(panel: Axes, flight: _Flight) -> None:
     """Draw which share of the symbols was about each output, one above the other."""
-    shares = np.nan_to_num(np.array(flight.about))
+    times_s, shares = flight.symbols[0], np.nan_to_num(np.array(flight.about))
+    size = max(1, len(times_s) // SHARES_DRAWN)
+    count = len(times_s) // size * size
+    means = shares[:, :count].reshape(len(shares), -1, size).mean(axis=2)
     colours = [COLOURS[place % len(COLOURS)] for place in range(len(shares))]
-    panel.stackplot(flight.symbols[0], shares, colors=colours, step="post", linewidth=0.0)
+    panel.stackplot(times_s[:count:size], means, colors=colours, step="post", linewidth=0.0)
     _name_outputs(panel, flight)
     _draw_faults(panel, flight, 0.0)
     panel.set_ylim(0.0, 1.0)

@@ -15,6 +15,7 @@ from benchmarks.figures import Figure, show, write
 from benchmarks.flights import (
     FlightFailed,
     cold_start_figures,
+    fly_figures,
     memory_figures,
     real_figures,
     virtual_figures,
@@ -30,6 +31,7 @@ BENCHMARKS: dict[str, Callable[[], Iterable[Figure]]] = {
     "start": cold_start_figures,
     "virtual": virtual_figures,
     "real": real_figures,
+    "fly": fly_figures,
     "memory": memory_figures,
     "latency": latency_figures,
     "fastest": fastest_figures,

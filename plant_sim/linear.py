@@ -31,12 +31,12 @@ class LinearStep(NamedTuple):
 def linear_step(state: Vector, held: Vector, constants: LinearStep, row: int) -> float:
     """Return one state after a step of held inputs and disturbances."""
     total = constants.constant[row]
-    size = len(state)
+    transition, drive = constants.transition, constants.drive
+    size, width = len(state), len(held)
     for index in range(size):
-        total += constants.transition[row * size + index] * state[index]
-    width = len(held)
+        total += transition[row * size + index] * state[index]
     for index in range(width):
-        total += constants.drive[row * width + index] * held[index]
+        total += drive[row * width + index] * held[index]
     return total
 
 

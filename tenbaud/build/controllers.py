@@ -28,9 +28,20 @@ def build_controller(
 
     `model` takes the place of the configured one.
     """
-    model = model or build_model(config)
+    section = config.receiver
+    context = controller_context(config, model or build_model(config), references)
+    controller: Controller = build_part(
+        config, CONTROLLERS, section.controller, context, section.controller_options, Controller
+    )
+    return controller
+
+
+def controller_context(
+    config: FlightConfig, model: Model, references: References | None = None
+) -> ControllerContext:
+    """Return what a controller is built with."""
     signals = signals_of(model)
-    context = ControllerContext(
+    return ControllerContext(
         config.timing.tick_s,
         build_references(config, signals) if references is None else references,
         build_limits(config, signals).command_max,
@@ -38,11 +49,6 @@ def build_controller(
         signals,
         model,
     )
-    section = config.receiver
-    controller: Controller = build_part(
-        config, CONTROLLERS, section.controller, context, section.controller_options, Controller
-    )
-    return controller
 
 
 def recorded(config: FlightConfig, context: ControllerContext) -> RecordedController:

@@ -48,19 +48,36 @@ def build_plugin(
             "run that program again, or name its class as module:Class"
         )
     found = _load_class(field, name) if ":" in name else _offered(registry, name)
+    ours = name in registry.built_in
+    return build_class(f"{field} = {name!r}", found, context, options, protocol, ours=ours)
+
+
+def build_class(
+    where: str,
+    found: Any,
+    context: object,
+    options: Mapping[str, Any],
+    protocol: type,
+    *,
+    ours: bool = False,
+) -> Any:
+    """Return the object of a class, called with its context; PartError if it is not what is needed.
+
+    `ours`: a class of the package, whose ValueErrors are about its settings.
+    """
     try:
         part = found(context, **options)
     except Exception as error:  # it is the user's code, and anything may be wrong in it
-        if name in registry.built_in and isinstance(error, ValueError):
-            raise PartError(f"{field} = {name!r}: {error}") from error
+        if ours and isinstance(error, ValueError):
+            raise PartError(f"{where}: {error}") from error
         raise PartError(
-            f"{field} = {name!r}: {found.__name__}({_call(options)}) failed: "
+            f"{where}: {found.__name__}({_call(options)}) failed: "
             f"{type(error).__name__}: {error}. It is called with one context object "
             f"({type(context).__name__}: {', '.join(_names(context))}) and its options."
         ) from error
     if protocol in UNDER_OLD_NAMES:
         part = UNDER_OLD_NAMES[protocol](part)
-    check_part(f"{field} = {name!r}", part, protocol)
+    check_part(where, part, protocol)
     return part
 
 

@@ -18,12 +18,16 @@ PERIODIC = ("square", "sine")
 def reference_sections(
     config: FlightConfig, signals: Signals
 ) -> tuple[tuple[Signal, ReferenceSection | None], ...]:
-    """Return each output with the section of its set-point; that of the first is the one for all."""
+    """Return each output with the section of its set-point, None for one that follows nothing.
+
+    That of the first output is the section itself.
+    """
     section = config.receiver.reference
     check_outputs("receiver.reference", section.by_name, signals)
     rest = (None,) * (len(signals.outputs) - 1)
     pairs = zip(signals.outputs, (section, *rest), strict=True)
-    return tuple([(one, section.by_name.get(one.name, usual)) for one, usual in pairs])
+    found = [(one, section.by_name.get(one.name, usual)) for one, usual in pairs]
+    return tuple([(one, None if own is None or own.kind == "none" else own) for one, own in found])
 
 
 def build_references(config: FlightConfig, signals: Signals) -> References:
@@ -74,3 +78,5 @@ def _about_zero(section: ReferenceSection, tick_s: float, output: Signal) -> Ref
                 return Csv(Path(section.file), tick_s, output.column)
             except ValueError as error:
                 raise ConfigError(f"receiver.reference: {error}") from error
+        case "none":
+            raise ConfigError(f"the output {output.name} follows no reference")

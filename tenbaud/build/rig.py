@@ -81,6 +81,20 @@ def build_plant(config: FlightConfig, step_s: float, signals: Signals | None = N
     """
     signals = signals or configured_signals(config)
     section = config.transmitter.plant
+    context = plant_context(config, step_s, signals)
+    plant: Plant = build_part(config, PLANTS, config.plant_kind, context, section.options, Plant)
+    measured, outputs = len(plant.measured), [one.name for one in signals.outputs]
+    if measured != len(outputs):
+        raise ConfigError(
+            f"transmitter.plant.kind = {config.plant_kind!r} has {measured} output(s), and "
+            f"model.kind = {config.model.kind!r} has {len(outputs)}: {', '.join(outputs)}"
+        )
+    return plant
+
+
+def plant_context(config: FlightConfig, step_s: float, signals: Signals) -> PlantContext:
+    """Return what a simulated plant is built with."""
+    section = config.transmitter.plant
     disturbance = None
     if section.disturbance:
         try:
@@ -105,14 +119,7 @@ def build_plant(config: FlightConfig, step_s: float, signals: Signals | None = N
             f"transmitter.plant.initial has {len(context.initial)} values, and the plant "
             f"{len(signals.outputs)} output(s)"
         )
-    plant: Plant = build_part(config, PLANTS, config.plant_kind, context, section.options, Plant)
-    measured, outputs = len(plant.measured), [one.name for one in signals.outputs]
-    if measured != len(outputs):
-        raise ConfigError(
-            f"transmitter.plant.kind = {config.plant_kind!r} has {measured} output(s), and "
-            f"model.kind = {config.model.kind!r} has {len(outputs)}: {', '.join(outputs)}"
-        )
-    return plant
+    return context
 
 
 def pitch_plant(config: FlightConfig, context: PlantContext) -> PitchPlant:

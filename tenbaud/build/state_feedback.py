@@ -16,6 +16,7 @@ from channel.codec.codec import Model
 from channel.codec.signals import Signal, Signals
 from receiver.controllers.base import ControllerContext
 from receiver.controllers.state_feedback import FeedbackLaw, Rows, StateFeedback
+from tenbaud.bounds.linear import unreached
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig, StateFeedbackSection
 
@@ -25,7 +26,7 @@ STEP = 1e-5
 """By which states and inputs are moved for the derivatives."""
 HELD_ERROR_MAX = 1e-6
 UNSTABLE = 1.0 - 1e-9
-REACH_MIN = 1e-9
+GROWING = 1.0 + 1e-6
 
 
 def state_feedback(config: FlightConfig, context: ControllerContext) -> StateFeedback:
@@ -87,8 +88,21 @@ def _law(
         return _designed(section, plant, context)
     gains = _given("gains", section.gains, inputs, states)
     if not section.integral_gains:
+        _require_held(plant.a - plant.b @ gains, signals)
         return gains, np.zeros((inputs, outputs))
     return gains, _given("integral_gains", section.integral_gains, inputs, outputs)
+
+
+def _require_held(loop: Matrix, signals: Signals) -> None:
+    """Raise ConfigError for gains under which a motion grows."""
+    values, vectors = np.linalg.eig(loop)
+    largest = int(np.argmax(np.abs(values)))
+    if abs(values[largest]) > GROWING:
+        most = signals.states[int(np.argmax(np.abs(vectors[:, largest])))].name
+        raise ConfigError(
+            f"{FIELD}.gains do not hold the plant: under u = -K x a motion grows by the factor "
+            f"{abs(values[largest]):.6g} per tick, mostly of {most}; look at the signs and units of K"
+        )
 
 
 def _given(name: str, rows: Rows, height: int, width: int) -> Matrix:
@@ -142,17 +156,13 @@ def _designed(
 def _require_controllable(a: Matrix, b: Matrix, signals: Signals) -> None:
     """Raise ConfigError where a motion that does not die away is out of reach of the inputs."""
     names = [*(one.name for one in signals.states), *["an integral"] * len(a)]
-    for value in np.linalg.eigvals(a):
-        if abs(value) < UNSTABLE:
-            continue
-        left, sizes, _ = np.linalg.svd(np.hstack([a - value * np.eye(len(a)), b]))
-        if sizes[-1] < REACH_MIN:
-            most = names[int(np.argmax(np.abs(left[:, -1])))]
-            raise ConfigError(
-                f"{FIELD}: the input(s) {', '.join(one.name for one in signals.inputs)} do not reach a "
-                f"motion with the eigenvalue {abs(value):.6g} per tick, mostly of {most}: the pair "
-                "(A, B) is not controllable"
-            )
+    if found := unreached(a, b, UNSTABLE):
+        value, place = found
+        raise ConfigError(
+            f"{FIELD}: the input(s) {', '.join(one.name for one in signals.inputs)} do not reach a "
+            f"motion with the eigenvalue {abs(value):.6g} per tick, mostly of {names[place]}: the pair "
+            "(A, B) is not controllable"
+        )
 
 
 def _set_points(

@@ -104,13 +104,13 @@ class DirectionCoderSection(KindSection):
     """signs per sample"""
     adapts: bool = True
     """follow a disturbance of unknown strength; false: it is as `noise` says"""
-    transition: Square
+    transition: Square = ()
     """F of a sample, of the corrected states"""
-    noise: Square
+    noise: Square = ()
     """Q, covariance of what the disturbance adds in a sample"""
-    worth: Square
+    worth: Square = ()
     """N, what an error costs, now and later"""
-    start: Square
+    start: Square = ()
     """P, covariance before the first word"""
     removed: Annotated[float, Field(ge=0.001, le=0.999)] = 0.67
     """alpha, of the variance along the direction, by a sign"""
@@ -192,6 +192,11 @@ def _history(section: HistoryCoderSection, context: CoderContext) -> Coder:
 
 
 def _direction(section: DirectionCoderSection, context: CoderContext) -> Coder:
+    if not (section.transition and section.noise and section.worth and section.start):
+        raise ValueError(
+            "coder.transition, noise, worth and start are missing: `tenbaud design` finds them, once "
+            "and for both ends"
+        )
     parameters = DirectionParameters(**section.model_dump(exclude={"kind"}))
     coder = DirectionCoder(parameters, readout_of(context.model))
     if coder.correction_size != context.model.correction_size:

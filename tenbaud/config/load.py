@@ -20,6 +20,8 @@ from tenbaud.config.schema import KINDS, FlightConfig
 from tenbaud.config.section import OutsideSection, Section
 
 DEFAULT_PRESET = "paper-10baud"
+OWN = "own"
+"""In place of a preset: a plant of one's own, over nothing but the defaults of the fields."""
 _SPLIT = re.compile(r",\n\s+")
 
 
@@ -72,8 +74,8 @@ def merged_values(
     if not isinstance(base, str):
         raise ConfigError(f"{path}: preset must be a name in quotes, got {base!r}")
     base = current_name("preset", base, source, warn=not recorded)
-    values = _merge(_read_preset(base), from_file)
-    return _merge(values, with_current_names(overrides or {}, "the settings")) | {"preset": base}
+    values = merged(_read_preset(base), from_file)
+    return merged(values, with_current_names(overrides or {}, "the settings")) | {"preset": base}
 
 
 def nested(settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -122,6 +124,8 @@ def toml_text(values: Mapping[str, Any]) -> str:
 
 
 def _read_preset(name: str) -> dict[str, Any]:
+    if name == OWN:
+        return {}
     resource = files("tenbaud") / "presets" / f"{name}.toml"
     if not resource.is_file():
         near = difflib.get_close_matches(name, preset_names(), 1)
@@ -140,17 +144,16 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise ConfigError(f"{path} is not TOML: {error}") from error
 
 
-def _merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
-    merged = dict(base)
+def merged(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
+    """Return nested settings with others laid over them; a section of another kind replaces one."""
+    both = dict(base)
     for key, value in over.items():
-        below = merged.get(key)
-        if _other_kind(key, below, value):
-            merged[key] = value
-        elif isinstance(value, dict) and isinstance(below, dict):
-            merged[key] = _merge(below, value)
+        below = both.get(key)
+        if not isinstance(value, dict) or not isinstance(below, dict) or _other_kind(key, below, value):
+            both[key] = value
         else:
-            merged[key] = value
-    return merged
+            both[key] = merged(below, value)
+    return both
 
 
 def _other_kind(key: str, below: Any, over: Any) -> bool:

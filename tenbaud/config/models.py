@@ -78,21 +78,34 @@ class LinearModelSection(KindSection):
     """what displays draw, its parts turned by the outputs in order; empty: a bar for each output"""
 
     def signals(self, inputs: int) -> Signals:
-        """Return the names and units, numbered names where none are given."""
+        """Return names and units; an output that is a state is called like it, others are numbered."""
 
         def given(what: str, count: int) -> list[tuple[str, str]]:
             names = getattr(self, f"{what}s") or [one.name for one in named(what, count)]
             return list(zip(names, getattr(self, f"{what}_units") or [""] * count, strict=True))
 
         steps = self.input_steps_per_unit or (1000.0,) * inputs
+        states, outputs = given("state", len(self.C[0])), given("output", len(self.C))
+        seen = [_state_of(row) for row in self.C]
+        once = bool(self.states) and not self.outputs and len({*seen}) == len(seen)
+        for number, place in enumerate(seen):
+            if place is None:
+                continue
+            (name, unit), (state, state_unit) = outputs[number], states[place]
+            if unit and state_unit not in ("", unit):
+                raise ValueError(
+                    f"units contradict: the output {name} is the state {state}, and they are in {unit} "
+                    f"and {state_unit}"
+                )
+            outputs[number] = (state if once else name, unit or state_unit)
         return Signals(
-            tuple(Signal(*one) for one in given("state", len(self.C[0]))),
+            tuple(Signal(*one) for one in states),
             tuple(
                 InputSignal(*one, steps_per_unit=step)
                 for one, step in zip(given("input", inputs), steps, strict=True)
             ),
-            tuple(Signal(*one) for one in given("output", len(self.C))),
-            tuple(_state_of(row) for row in self.C),
+            tuple(Signal(*one) for one in outputs),
+            tuple(seen),
             self.picture,
         )
 

@@ -35,7 +35,7 @@ def is_object(kind: str) -> bool:
 
 def object_kind(part: object) -> str:
     """Return the kind that stands for an object in the configuration of its flight."""
-    return f"{OBJECT}:{type(part).__name__}"
+    return f"{OBJECT}:{(part if isinstance(part, type) else type(part)).__name__}"
 
 
 class OutsidePart(NamedTuple):

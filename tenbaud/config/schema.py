@@ -245,7 +245,8 @@ class StateFeedbackSection(Section):
 class ReferenceSection(Section):
     """The set-point of an output."""
 
-    kind: Literal["square", "step", "sine", "constant", "csv"] = "square"
+    kind: Literal["square", "step", "sine", "constant", "csv", "none"] = "square"
+    """none: the output follows nothing"""
     amplitude: Factor = 1.5707963267948966
     """in the unit of the output"""
     offset: Factor = 0.0

@@ -8,15 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Any
+from typing import Any, TypeVar
+
+from pydantic import ValidationError
 
 from plant_sim.zero_order_hold import discretised
 from tenbaud.config.load import ConfigError
 from tenbaud.config.models import LinearModelSection, PitchModelSection
 from tenbaud.config.schema import Timing
-from tenbaud.config.section import KindSection
-from tenbaud.design.described import corrected_part, plant_of
+from tenbaud.config.section import KindSection, Section
+from tenbaud.design.described import corrected_part, plant_of, require_rate, require_seen
 from tenbaud.design.direction import design_direction
+
+SectionKind = TypeVar("SectionKind", bound=Section)
 
 
 def completed(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -25,14 +29,14 @@ def completed(values: Mapping[str, Any]) -> dict[str, Any]:
     A linear model gets F and E from its A and B, and a coder `direction` its constants for the plant;
     both anew where they are there already. Raises ConfigError where nothing can be designed.
     """
-    timing = Timing.model_validate(values.get("timing", {}))
     given, coder = dict(values.get("model", {})), dict(values.get("coder", {}))
     try:
+        timing = _checked("timing", Timing, values.get("timing", {}))
         section = _section(given)
         if isinstance(section, LinearModelSection) and section.A:
             F, E = discretised(section.A, section.B, timing.tick_s)
             given |= {"F": F.tolist(), "E": E.tolist()}
-            section = LinearModelSection.model_validate(given)
+            section = _section(given)
         if coder.get("kind") == "direction":
             coder |= _direction(section, coder, timing)
     except ValueError as error:
@@ -44,8 +48,19 @@ def _section(model: dict[str, Any]) -> KindSection:
     kind = model.get("kind", "pitch")
     if kind not in ("linear", "pitch"):
         raise ValueError(f"model.kind = {kind!r}; designs are for linear and pitch")
-    sort = LinearModelSection if kind == "linear" else PitchModelSection
-    return sort.model_validate(model)
+    return _checked("model", LinearModelSection if kind == "linear" else PitchModelSection, model)
+
+
+def _checked(place: str, sort: type[SectionKind], values: Mapping[str, Any]) -> SectionKind:
+    """Return a section; ValueError that names its fields."""
+    try:
+        return sort.model_validate(values)
+    except ValidationError as error:
+        faults = [
+            f"{'.'.join([place, *map(str, one['loc'])])}: {one['msg'].removeprefix('Value error, ')}"
+            for one in error.errors()
+        ]
+        raise ValueError("; ".join(faults)) from error
 
 
 def _direction(section: KindSection, coder: Mapping[str, Any], timing: Timing) -> dict[str, Any]:
@@ -54,6 +69,8 @@ def _direction(section: KindSection, coder: Mapping[str, Any], timing: Timing) -
         raise ValueError(f"model.kind = {section.kind!r} describes no plant")
     plant = corrected_part(plant, getattr(section, "corrected", 0))
     rate = coder.get("bits", 1) / timing.symbol_period_s
+    require_seen(plant, section)
+    require_rate(plant, rate, section)
     found = asdict(design_direction(plant, rate, timing.symbol_period_s))
     designed = ("transition", "noise", "worth", "start", "removed", "step")
     return {

@@ -12,7 +12,7 @@ from channel.codec.codec import Codec
 from channel.line.uplink import bits_per_symbol
 from plant_sim.zero_order_hold import continuous, discretised
 from tenbaud.bounds.floor import RateTooLow
-from tenbaud.bounds.linear import rate_needed
+from tenbaud.bounds.linear import rate_needed, unreached
 from tenbaud.config.models import LinearModelSection, PendulumModelSection, PitchModelSection
 from tenbaud.config.schema import FlightConfig
 from tenbaud.config.section import KindSection
@@ -72,13 +72,46 @@ def check_plant(config: FlightConfig, codec: Codec) -> None:
         return
     alphabet = codec.coder.alphabet
     bits = alphabet.symbols_per_word * bits_per_symbol(alphabet)
-    rate, needed = bits / (tick_s * codec.ticks_per_sample), rate_needed(plant.A)
-    if not rate > needed:
-        raise RateTooLow(
-            f"{rate:.4g} bit/s are too few: this plant grows by itself, and the data-rate theorem asks "
-            f"for more than {needed:.4g} bit/s; shorten timing.symbol_period_s and raise "
-            "channel.rate_baud"
-        )
+    require_rate(plant, bits / (tick_s * codec.ticks_per_sample), section)
+
+
+def require_rate(plant: LinearPlant, rate_bit_s: float, section: KindSection) -> None:
+    """Raise RateTooLow, with rates and the state that grows fastest, where the bits are too few."""
+    needed = rate_needed(plant.A)
+    if rate_bit_s > needed:
+        return
+    values, vectors = np.linalg.eig(plant.A)
+    fastest = int(np.argmax(values.real))
+    name = state_names(section, plant)[int(np.argmax(np.abs(vectors[:, fastest])))]
+    raise RateTooLow(
+        f"{rate_bit_s:.4g} bit/s are too few: this plant grows by itself, {name} fastest by "
+        f"{values[fastest].real:.4g} 1/s, and the data-rate theorem asks for more than {needed:.4g} "
+        "bit/s; shorten timing.symbol_period_s and raise channel.rate_baud"
+    )
+
+
+def state_names(section: KindSection, plant: LinearPlant) -> list[str]:
+    """Return what the states of a described plant are called."""
+    if isinstance(section, LinearModelSection):
+        return [one.name for one in section.signals(plant.B.shape[1]).states]
+    return ["angle", "rate"]
+
+
+def require_seen(plant: LinearPlant, section: KindSection) -> None:
+    """Raise ValueError, with state and eigenvalue, unless noise and outputs reach every motion."""
+    for reach, pair, found in (
+        ("the disturbance does not reach", "(A, G)", unreached(plant.A, plant.noise)),
+        ("the outputs do not show", "(A, C)", unreached(plant.A.T, plant.C.T * plant.weights)),
+    ):
+        if found is not None:
+            value, place = found
+            lost = f"{value.real:.4g}{f'{value.imag:+.4g}j' if value.imag else ''}"
+            verb = "controllable (G is B where none is given)" if pair == "(A, G)" else "observable"
+            raise ValueError(
+                f"{reach} every state: the motion with the eigenvalue {lost} 1/s, mostly of "
+                f"{state_names(section, plant)[place]}, is left out, as the pair {pair} is not {verb}; "
+                "leave it out of the model, or put such states last, outside `corrected`"
+            )
 
 
 def corrected_part(plant: LinearPlant, states: int) -> LinearPlant:

@@ -127,10 +127,10 @@ def _turn(
     for bit in range(SAMPLES):
         c, v = _direction(N, P)
         flown.append((c, v))
-        P = P - alpha * np.outer(v, v)
+        P = P - (alpha * v)[:, None] * v
         if (bit + 1) % bits == 0:
             if bit >= SAMPLES // 3:
-                cost += float(np.sum(M * P))
+                cost += float((M * P).sum())
             P = _symmetric(F @ P @ F.T + Q)
     ahead = N
     total = np.zeros_like(N)
@@ -140,17 +140,20 @@ def _turn(
         if SAMPLES // 3 <= bit < 2 * SAMPLES // 3:
             total = total + now
         known = now @ v
-        both = np.outer(c, known)
-        ahead = now - alpha * (both + both.T) + alpha * float(v @ known) * np.outer(c, c)
+        # alpha (v' known) c c' - alpha (c known' + known c')
+        half = 0.5 * alpha * float(v @ known) * c - alpha * known
+        both = c[:, None] * half
+        ahead = now + both + both.T
     return Turn(cost * bits / (SAMPLES - SAMPLES // 3), total / (SAMPLES // 3), P)
 
 
 def _direction(N: Matrix, P: Matrix) -> tuple[Matrix, Matrix]:
     """Return c and v as the coder finds them; without a number where P is no covariance any more."""
     power = N @ P
+    power = power / power.trace()
     for _ in range(SQUARINGS):
-        power = power @ power / np.trace(power) ** 2
-    c = power[:, np.argmax(np.diag(power))]
+        power = power @ power
+    c = power[:, power.diagonal().argmax()]
     v = P @ c
     scale = 1.0 / np.sqrt(c @ v)
     return c * scale, v * scale

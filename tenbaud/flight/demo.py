@@ -23,7 +23,7 @@ from tenbaud.flight.ends import run_in_memory
 from tenbaud.flight.lifeline import start_child
 from tenbaud.flight.outcome import ExitCode, Outcome, first_code, outcome_of_status
 from tenbaud.flight.report import write_up
-from tenbaud.flight.status import Status
+from tenbaud.flight.status import Status, StatusMode
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, joined
 from tenbaud.flight.viewing import Viewing, ViewOptions, page_beside
@@ -51,15 +51,17 @@ def fly_demo(
     draw: bool = True,
     view: ViewOptions | None = None,
     pace: float | None = None,
+    status: StatusMode = "auto",
 ) -> DemoResult:
     """Fly once into an existing, empty run folder; write summary and, if wished, figure there.
 
     `view`: serve the live page beside the flight, which may then be steered from it. `pace`: on the
-    virtual clock, at most this factor of real time; not for a link within one process.
+    virtual clock, at most this factor of real time; not for a link within one process. `status`: what a
+    flight within this process writes on the standard error.
     """
     write_whole(folder.config, dump_config(agreement.config))
     if agreement.link.in_process:
-        outcome, upper, lower = run_in_memory(agreement, folder, "auto")
+        outcome, upper, lower = run_in_memory(agreement, folder, status)
         messages = [] if outcome.code is ExitCode.OK else [outcome.text]
         result = DemoResult(joined(upper, lower), outcome.code, messages)
     else:

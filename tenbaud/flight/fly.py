@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from channel.errors import TenbaudError
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from channel.codec.codec import Coder, Model
     from channel.protocol.terms import Clock
     from plant_sim.plant import Plant
     from receiver.controllers.base import Controller
+    from tenbaud.build.flight import Agreement
+    from tenbaud.build.given import Given
     from tenbaud.build.parts import Parts
+    from tenbaud.config.schema import FlightConfig
+    from tenbaud.design.systems import Point, System
+    from tenbaud.recording.folder import RunFolder
     from tenbaud.recording.run import Run
 
 FIELDS = {
@@ -22,6 +33,7 @@ FIELDS = {
     "controller": "receiver.controller",
 }
 """The setting that names each part."""
+REFERENCE_NAME = "reference.csv"
 
 
 class FlightFailed(TenbaudError):
@@ -29,8 +41,12 @@ class FlightFailed(TenbaudError):
 
 
 def fly(
-    preset: str | None = None,
+    preset: str | System | None = None,
     *,
+    rate_baud: float | None = None,
+    controller: Controller | Callable[..., Controller] | ArrayLike | str | None = None,
+    reference: Given | None = None,
+    operating_point: Point | None = None,
     settings: dict[str, Any] | None = None,
     config: str | Path | None = None,
     out: str | Path | None = None,
@@ -39,55 +55,193 @@ def fly(
     draw: bool = False,
     model: Model | str | None = None,
     coder: Coder | str | None = None,
-    plant: Plant | str | None = None,
-    controller: Controller | str | None = None,
+    plant: Plant | Callable[..., Plant] | str | None = None,
 ) -> Run:
-    """Fly once and return the recorded run.
+    """Fly once, a preset or a plant of your own, and return the recorded run.
 
-    `settings` are fields by their full names, as with `--set`: `{"duration_s": 20.0,
-    "coder.decay": 0.9}`. `model`, `coder`, `plant` and `controller` take the place of the configured
-    part: an object, or a name as in the configuration, "pid" or "mine:Law". An object is built by you,
-    for the tick that is flown; a plant and a controller fly once. With the link "memory" both ends are
-    in this process and the flight is as fast as it computes; the others start two processes, as
-    `tenbaud demo` does, and take names only. `out` is a new folder; without it one is made in `runs/`.
+    `preset` is a name, or a plant: a `StateSpace` of python-control or scipy, continuous or discrete,
+    or a `NonlinearIOSystem`, which the codecs predict as linearised at `operating_point` (x0, u0) and
+    which flies as it is. A plant flies at `rate_baud` (10 without) by the coder `direction`.
 
-    Raises ConfigError for settings and parts that make no flight, and FlightFailed for a flight that
-    did not end well.
+    `controller` is a matrix K, for u = -K x and what holds the set-points; an object or a class; or a
+    name as in the configuration, "pid" or "mine:Law". Without it K is designed for a plant. `reference`
+    is the set-point of the first output or of each: a number, an array with a row for each tick, a pair
+    (times, values), a function of the time in seconds; or a table by the names of the outputs.
+
+    `settings` are fields by their full names, as with `--set`: `{"duration_s": 20.0, "coder.decay":
+    0.9}`. `model`, `coder` and `plant` take the place of the configured part: a name as in the
+    configuration, or an object that you build for the tick that is flown; a class of a plant is called
+    with its context. With the link "memory" both ends are in this process and the flight is as fast as
+    it computes; the others start two processes and take names only. `out` is a new folder; without it
+    one is made in `runs/`.
+
+    Raises ConfigError for plants, settings and parts that make no flight, and FlightFailed for a flight
+    that did not end well.
     """
-    from tenbaud.build.ends import check_parts
-    from tenbaud.build.flight import agree
-    from tenbaud.config.load import load_config, nested
+    from tenbaud.build.given import feedback_gains
+    from tenbaud.config.load import nested
     from tenbaud.flight.demo import fly_demo
     from tenbaud.recording.folder import RunFolder, create_run_folder
     from tenbaud.recording.run import Run
 
-    given = {"model": model, "coder": coder, "plant": plant, "controller": controller}
-    names, parts = _names_and_objects(given, link)
-    changes = nested({**(settings or {}), **names, "link.kind": link})
-    loaded = load_config(preset, None if config is None else Path(config), changes, allow_code=True)
-    agreement = agree(loaded, clock, parts)
-    check_parts(agreement.config, parts)
+    settings = dict(settings or {})
+    if _are_gains(controller):
+        settings["receiver.state_feedback.gains"] = feedback_gains(controller)
+        controller = "state_feedback"
+    parts = {"model": model, "coder": coder, "plant": plant, "controller": controller}
+    parts = {name: part for name, part in parts.items() if part is not None}
+    changes = nested({**settings, **_names(parts, link), "link.kind": link})
+    point = (rate_baud, operating_point)
+    loaded, parts = _loaded(preset, None if config is None else Path(config), changes, parts, point)
     folder = RunFolder(create_run_folder(None, loaded.preset, None if out is None else Path(out)))
-    result = fly_demo(agreement, folder, lambda _status: None, draw=draw)
+    with _removed_if_refused(folder):
+        if reference is not None:
+            loaded = _following(loaded, reference, parts, folder)
+        agreement = _agreement(loaded, clock, parts)
+    result = fly_demo(agreement, folder, lambda _status: None, draw=draw, status="none")
     if result.code:
         said = "\n  ".join([str(result.summary["outcome"]), *result.messages])
         raise FlightFailed(f"{said}\n  the recordings are in {folder.path}")
     return Run(folder.path)
 
 
-def _names_and_objects(given: dict[str, Any], link: str) -> tuple[dict[str, str], Parts]:
-    """Return the settings that name each part, and the parts that are objects, checked."""
-    from tenbaud.build.parts import PartError, Parts
+def _are_gains(controller: object) -> bool:
+    """Return whether a controller is a matrix, and not a name, a class or an object."""
+    return isinstance(controller, int | float | list | tuple) or hasattr(controller, "__array__")
+
+
+def _names(parts: Mapping[str, Any], link: str) -> dict[str, str]:
+    """Return the settings that name each part."""
+    from tenbaud.build.parts import PartError
     from tenbaud.config.outside_code import object_kind
 
-    given = {name: part for name, part in given.items() if part is not None}
-    objects = {name: part for name, part in given.items() if not isinstance(part, str)}
-    parts = Parts(**objects)
-    parts.check()
+    objects = [name for name, part in parts.items() if not isinstance(part, str)]
     if objects and link != "memory":
         raise PartError(
             f"{', '.join(objects)}: an object stays in this process, and the link {link!r} starts two "
             'others; use link="memory", or name a class as "module:Class"'
         )
-    kinds = {name: object_kind(part) if name in objects else part for name, part in given.items()}
-    return {FIELDS[name]: kind for name, kind in kinds.items()}, parts
+    return {
+        FIELDS[name]: part if isinstance(part, str) else object_kind(part)
+        for name, part in parts.items()
+    }
+
+
+def _loaded(
+    preset: Any, config: Path | None, changes: dict[str, Any], parts: dict[str, Any], plant: Any
+) -> tuple[FlightConfig, dict[str, Any]]:
+    """Return the configuration, complete if it is of a system, and the parts that are flown.
+
+    `plant` is what only a system has: rate and operating point.
+    """
+    from tenbaud.config.load import OWN, ConfigError, load_config, merged, merged_values, nested
+    from tenbaud.design.complete import completed
+    from tenbaud.design.settings import exact_outputs, settings_of
+    from tenbaud.design.systems import is_system, matrices
+
+    if is_system(preset):
+        if config is not None:
+            raise ConfigError("config describes a plant of its own; lay settings= over this one")
+        rate_baud, point = plant
+        found = matrices(preset, point)
+        if not found.linear and "plant" not in parts:
+            parts = {**parts, "plant": preset}
+            changes = merged(changes, nested(_names(parts, changes["link"]["kind"])))
+        own = merged(settings_of(found, rate_baud, changes), changes)
+        values = completed(merged_values(OWN, None, own))
+        preset, changes = OWN, merged(exact_outputs(values["model"]), values)
+    elif any(one is not None for one in plant):
+        raise ConfigError("rate_baud and operating_point are for a plant; a preset says them itself")
+    elif not isinstance(preset, str | None):
+        raise ConfigError(f"a {type(preset).__name__} is neither the name of a preset nor a plant")
+    return load_config(preset, config, changes, allow_code=True), parts
+
+
+def _following(
+    loaded: FlightConfig, reference: Given, parts: Mapping[str, Any], folder: RunFolder
+) -> FlightConfig:
+    """Return the configuration with other set-points; values over time are in a file in the folder."""
+    from tenbaud.build.given import reference_settings
+    from tenbaud.build.parts import PartError
+    from tenbaud.build.signals import configured_signals
+    from tenbaud.config.load import load_config, merged
+
+    controller = parts.get("controller")
+    if not (controller is None or isinstance(controller, str) or inspect.isclass(controller)):
+        raise PartError(
+            f"the controller ({type(controller).__name__}) is an object with set-points of its own; "
+            "reference= is for a class, which gets them in its context"
+        )
+    tick_s = loaded.timing.tick_s
+    section = reference_settings(
+        reference,
+        configured_signals(loaded, _objects(parts)).outputs,
+        round(loaded.duration_s / tick_s),
+        tick_s,
+        folder.path / REFERENCE_NAME,
+    )
+    values = loaded.model_dump(mode="json", exclude_none=True)
+    over = {"receiver": {"reference": section}}
+    return load_config(loaded.preset, None, merged(values, over), allow_code=True)
+
+
+def _objects(parts: Mapping[str, Any]) -> Parts:
+    """Return the parts that are objects already, checked."""
+    from tenbaud.build.parts import Parts
+    from tenbaud.design.systems import is_system
+
+    made = {
+        name: part
+        for name, part in parts.items()
+        if not (isinstance(part, str) or is_system(part) or _is_built(name, part))
+    }
+    found = Parts(**made)
+    found.check()
+    return found
+
+
+def _is_built(name: str, part: object) -> bool:
+    """Return whether a part is a class that is called with its context."""
+    return name in ("plant", "controller") and inspect.isclass(part)
+
+
+def _agreement(loaded: FlightConfig, clock: Clock, parts: Mapping[str, Any]) -> Agreement:
+    """Return what both ends share, with every part built and checked."""
+    from plant_sim.plant import Plant
+    from receiver.controllers.base import Controller
+    from tenbaud.build.controllers import controller_context
+    from tenbaud.build.ends import check_parts
+    from tenbaud.build.flight import agree
+    from tenbaud.build.plugins import build_class
+    from tenbaud.build.rig import plant_context
+    from tenbaud.design.simulated import system_plant
+    from tenbaud.design.systems import is_system
+
+    agreement = agree(loaded, clock, _objects(parts))
+    plant, controller = parts.get("plant"), parts.get("controller")
+    made = agreement.parts
+    context = plant_context(loaded, loaded.timing.tick_s, agreement.signals)
+    if is_system(plant):
+        made = replace(made, plant=system_plant(plant, context))
+    elif inspect.isclass(plant):
+        made = replace(made, plant=build_class("the plant", plant, context, {}, Plant))
+    if inspect.isclass(controller):
+        asked = controller_context(loaded, agreement.codec.model)
+        made = replace(
+            made, controller=build_class("the controller", controller, asked, {}, Controller)
+        )
+    agreement = replace(agreement, parts=made)
+    check_parts(loaded, made)
+    return agreement
+
+
+@contextmanager
+def _removed_if_refused(folder: RunFolder) -> Iterator[None]:
+    """Remove a new folder where what is done within the `with` shows that nothing can be flown."""
+    from tenbaud.files.whole import remove
+
+    try:
+        yield
+    except BaseException:
+        remove(folder.path)
+        raise

@@ -117,8 +117,11 @@ def _panels(flight: _Flight) -> list[tuple[float, str, _Draw]]:
     plant = flight.plant
     outputs = plant.groups("outputs")[:DRAWN_MAX]
     inputs = plant.groups("inputs")[:DRAWN_MAX]
+    single = [place for _, places in outputs for place in places][:DRAWN_MAX]
     found: list[tuple[float, str, _Draw]] = [
-        (3.0, _plain(label), partial(_draw_values, places=places)) for label, places in outputs
+        (3.0 if len(single) == 1 else 2.2, _plain(one.label), partial(_draw_values, places=[place]))
+        for place in single
+        for one in [plant.outputs[place]]
     ]
     for name, height, curve, draw in (
         ("error", 2.0, "error_coded", _draw_errors),

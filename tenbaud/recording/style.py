@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,7 +29,15 @@ def new_figure(
     """Return a figure with `rows` panels under each other that share their time axis."""
     from matplotlib.figure import Figure  # takes half a second, which other commands need not pay
 
-    figure = Figure(figsize=(width, 0.5 + height * rows), layout="constrained")
+    class FlightFigure(Figure):
+        """A figure that a notebook shows without a magic command."""
+
+        def _repr_png_(self) -> bytes:
+            stream = BytesIO()
+            self.savefig(stream, format="png", dpi=72)
+            return stream.getvalue()
+
+    figure = FlightFigure(figsize=(width, 0.5 + height * rows), layout="constrained")
     grid = figure.subplots(rows, 1, sharex=True, squeeze=False, height_ratios=ratios)
     panels = [row[0] for row in grid]
     for panel in panels:

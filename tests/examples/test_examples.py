@@ -6,7 +6,9 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -74,18 +76,51 @@ def test_a_mujoco_model_is_held_upright(tmp_path: Path) -> None:
     assert told.endswith("desyncs: 0\n")
 
 
-def test_the_notebook_runs_from_top_to_bottom(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def run_notebook(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[Any], list[Any]]:
+    """Run a notebook in a folder of its own and return its outputs."""
     nbclient = pytest.importorskip("nbclient")
-    nbformat = pytest.importorskip("nbformat")
     pytest.importorskip("ipykernel")
     path = os.pathsep.join([str(REPOSITORY), os.environ.get("PYTHONPATH", "")])
     monkeypatch.setenv("PYTHONPATH", path)
+    resources = {"metadata": {"path": str(tmp_path)}}
+
+    def run(notebook: Any) -> list[Any]:
+        settings = {"timeout": 90, "kernel_name": "python3", "resources": resources}
+        nbclient.NotebookClient(notebook, **settings).execute()
+        return [output for cell in notebook.cells for output in cell.get("outputs", [])]
+
+    return run
+
+
+def texts_of(outputs: list[Any]) -> str:
+    return "".join(output["text"] for output in outputs if output.get("name") == "stdout")
+
+
+def test_the_notebook_runs_from_top_to_bottom(run_notebook: Callable[[Any], list[Any]]) -> None:
+    nbformat = pytest.importorskip("nbformat")
     notebook = nbformat.read(EXAMPLES / "read_a_run.ipynb", as_version=4)
     assert not any(cell.get("outputs") for cell in notebook.cells), "clear the outputs first"
-    resources = {"metadata": {"path": str(tmp_path)}}
-    nbclient.NotebookClient(notebook, timeout=90, kernel_name="python3", resources=resources).execute()
-    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
-    text = "".join(output.get("text", "") for output in outputs)
+    outputs = run_notebook(notebook)
+    text = texts_of(outputs)
     assert "of the largest pitch, rms, on 600 bits" in text
     assert "True" in text
     assert any("image/png" in output.get("data", {}) for output in outputs)
+
+
+def test_any_plant_flies_in_the_notebook_with_the_figures_that_it_shows(
+    run_notebook: Callable[[Any], list[Any]],
+) -> None:
+    nbformat = pytest.importorskip("nbformat")
+    notebook = nbformat.read(EXAMPLES / "any_plant.ipynb", as_version=4)
+    kept = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    outputs = run_notebook(notebook)
+    for shown in (kept, outputs):
+        assert "600 equal digests of 600 samples" in texts_of(shown)
+        assert sum("image/png" in output.get("data", {}) for output in shown) == 3
+        assert not any(output.get("name") == "stderr" for output in shown)
+    pattern = r"(?:error|floor|end) (\d\.\d+)"
+    figures, before = (numbers_in(texts_of(one), pattern) for one in (outputs, kept))
+    assert len(figures) == 5
+    assert figures == pytest.approx(before, rel=0.05), "run the notebook again, and keep its outputs"
+    assert figures[0] < 2.0 * figures[1]

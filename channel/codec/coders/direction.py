@@ -37,6 +37,7 @@ from channel.codec.coders.base import (
     SymbolResults,
     Symbols,
 )
+from channel.codec.coders.symmetric import place, variance_of, write_full
 from channel.codec.models.linear import Rows, check, flat
 from channel.codec.words import Alphabet
 
@@ -98,13 +99,6 @@ def size_of(constants: DirectionConstants) -> int:
     return len(constants.largest)
 
 
-def place(row: int, column: int) -> int:
-    """Return where an entry of a symmetric matrix is, of which the lower half is kept row by row."""
-    if row < column:
-        return column * (column + 1) // 2 + row  # integers
-    return row * (row + 1) // 2 + column  # integers
-
-
 def aim(constants: DirectionConstants, coder: Results, c: Results, v: Results) -> bool:
     """Step 1 and 2: let P grow, write the direction and what is known along it.
 
@@ -118,13 +112,15 @@ def aim(constants: DirectionConstants, coder: Results, c: Results, v: Results) -
         for i in range(n):
             for j in range(i + 1):
                 coder[place(i, j)] += growth * (coder[first + i] * coder[first + j])
+    worth = constants.worth
     power = [0.0] * (n * n)
     square = [0.0] * (n * n)
+    write_full(coder, n, square)
     for i in range(n):
         for j in range(n):
             total = 0.0
             for k in range(n):
-                total += constants.worth[i * n + k] * coder[place(k, j)]
+                total += worth[i * n + k] * square[k * n + j]
             power[i * n + j] = total
     for _ in range(SQUARINGS):
         trace = 0.0
@@ -134,13 +130,15 @@ def aim(constants: DirectionConstants, coder: Results, c: Results, v: Results) -
             return False
         scale = 1.0 / (trace * trace)
         for i in range(n):
+            row = i * n
             for j in range(n):
                 total = 0.0
+                at = j
                 for k in range(n):
-                    total += power[i * n + k] * power[k * n + j]
-                square[i * n + j] = total * scale
-        for i in range(n * n):
-            power[i] = square[i]
+                    total += power[row + k] * power[at]
+                    at += n
+                square[row + j] = total * scale
+        power, square = square, power
     best = 0
     for i in range(1, n):
         if power[i * n + i] > power[best * n + best]:
@@ -202,25 +200,30 @@ def wait(constants: DirectionConstants, coder: Results) -> None:
     """Let P and D grow over a sample, within the limits of P."""
     n = size_of(constants)
     first = n * (n + 1) // 2  # integers
+    transition, noise = constants.transition, constants.noise
+    full = [0.0] * (n * n)
     moved = [0.0] * (n * n)
     turned = [0.0] * n
+    write_full(coder, n, full)
     for i in range(n):
         total = 0.0
         for j in range(n):
-            total += constants.transition[i * n + j] * coder[first + j]
+            total += transition[i * n + j] * coder[first + j]
             product = 0.0
             for k in range(n):
-                product += constants.transition[i * n + k] * coder[place(k, j)]
+                product += transition[i * n + k] * full[k * n + j]
             moved[i * n + j] = product
         turned[i] = total
     excess = 1.0
+    at = 0
     for i in range(n):
         for j in range(i + 1):
-            total = constants.noise[i * n + j]
+            total = noise[i * n + j]
             for k in range(n):
-                total += moved[i * n + k] * constants.transition[j * n + k]
-            coder[place(i, j)] = total
-        variance = coder[place(i, i)]
+                total += moved[i * n + k] * transition[j * n + k]
+            coder[at] = total
+            at += 1
+        variance = coder[at - 1]
         if variance > excess * constants.largest[i]:
             excess = variance / constants.largest[i]
     shrink = 1.0 / math.sqrt(excess)
@@ -279,15 +282,6 @@ def direction_decode(
             if aim(constants, after, c, v):
                 learn(constants, after, c, v, symbols[bit], correction)
     wait(constants, after)
-
-
-def variance_of(coder: Numbers, row: Numbers) -> float:
-    """Return the variance of a sum of states, `row` being their factors."""
-    total = 0.0
-    for i in range(len(row)):
-        for j in range(len(row)):
-            total += row[i] * row[j] * coder[place(i, j)]
-    return total
 
 
 class DirectionCoder(FunctionCoder):

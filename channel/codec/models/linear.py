@@ -37,12 +37,12 @@ def linear_row(
 ) -> float:
     """Return one state after a tick."""
     total = constants.constant[row]
-    states = len(state)
+    transition, drive = constants.transition, constants.drive
+    states, inputs = len(state), len(command)
     for index in range(states):
-        total += constants.transition[row * states + index] * state[index]
-    inputs = len(command)
+        total += transition[row * states + index] * state[index]
     for index in range(inputs):
-        total += constants.drive[row * inputs + index] * command[index]
+        total += drive[row * inputs + index] * command[index]
     if row < len(held):
         total += constants.tick_s * held[row]
     return total

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -14,7 +15,7 @@ from channel.codec.signals import signals_of
 from tenbaud.build.codec import build_codec
 from tenbaud.build.flight import agree
 from tenbaud.cli.commands import app
-from tenbaud.config.load import ConfigError, dump_config, load_config
+from tenbaud.config.load import ConfigError, dump_config, load_config, merged_values
 from tenbaud.design.complete import completed
 
 PENDULUM: dict[str, Any] = {
@@ -26,6 +27,13 @@ PENDULUM: dict[str, Any] = {
     "states": ["angle", "rate"],
     "state_units": ["rad", "rad/s"],
 }
+LONG_DESIGNS = (
+    "servo-10baud",
+    "aero-20baud",
+    "furuta-50baud",
+    "heading-1baud",
+    "helicopter-10baud",
+)
 AT_20 = {"timing": {"symbol_period_s": 0.05}, "channel": {"rate_baud": 20.0}}
 FILE = """
 model = {kind = "linear", A = [[0, 1], [53.6, 0]], B = [[0], [1]], C = [[1, 0]], densities = [2e-3]}
@@ -168,3 +176,22 @@ def test_when_a_preset_is_asked_about_then_its_rate_and_words_count() -> None:
     assert "bits in words" in shown.output
     assert CliRunner().invoke(app, ["floor", "--preset", "usual-1000baud"]).exit_code == 2
     assert CliRunner().invoke(app, ["floor", "--plant", "nobody", "--rate", "2"]).exit_code == 2
+
+
+@pytest.mark.parametrize(
+    "preset",
+    [
+        "integrator-10baud",
+        *(pytest.param(name, marks=pytest.mark.soak) for name in LONG_DESIGNS),
+    ],
+)
+def test_the_constants_of_a_preset_are_those_of_the_design(preset: str) -> None:
+    values = merged_values(preset)
+    again = completed(values)
+    for section, names in (
+        ("model", ("F", "E")),
+        ("coder", ("transition", "noise", "worth", "start", "removed", "step")),
+    ):
+        for name in names:
+            carried, designed = (np.array(one[section][name]) for one in (values, again))
+            assert np.abs(carried - designed).max() <= 1e-6 * np.abs(designed).max(), name

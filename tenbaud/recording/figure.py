@@ -344,7 +344,10 @@ def _draw_shares(panel: Axes, flight: _Flight) -> None:
     count = len(times_s) // size * size
     means = shares[:, :count].reshape(len(shares), -1, size).mean(axis=2)
     colours = [COLOURS[place % len(COLOURS)] for place in range(len(shares))]
-    panel.stackplot(times_s[:count:size], means, colors=colours, step="post", linewidth=0.0)
+    means = np.column_stack((means, means[:, -1]))  # to the end of the flight
+    panel.stackplot(
+        [*times_s[:count:size], times_s[-1]], means, colors=colours, step="post", linewidth=0.0
+    )
     _name_outputs(panel, flight)
     _draw_faults(panel, flight, 0.0)
     panel.set_ylim(0.0, 1.0)

@@ -15,10 +15,15 @@ from tests.simulation.world import World
 from transmitter.session.owing import Owing
 from transmitter.session.session import TransmitterSession
 
-SEEDS = 24
+SEEDS = 14
+MORE_SEEDS = 24
+"""`make soak` flies these too, and random ones."""
 
 
-@pytest.mark.parametrize("seed", range(SEEDS))
+@pytest.mark.parametrize(
+    "seed",
+    [*range(SEEDS), *(pytest.param(one, marks=pytest.mark.soak) for one in range(SEEDS, MORE_SEEDS))],
+)
 def test_when_everything_goes_wrong_then_nothing_is_unsafe_and_it_comes_back(seed: int) -> None:
     result = fly_seed(seed)
     assert result.problem is None, result.problem

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from tenbaud import fly
 from tenbaud.config.load import load_config
 from tenbaud.recording.comparison import Verdict
 from tenbaud.recording.diff import compare_runs
@@ -66,14 +67,6 @@ def test_when_the_demo_flies_the_paper_then_every_sample_is_checked(tmp_path: Pa
     assert compare_runs(folder.path).verdict is Verdict.EQUAL, "the two ends' recordings"
 
 
-def test_when_the_tuned_preset_flies_off_its_model_then_it_errs_less_than_two_percent(
-    tmp_path: Path,
-) -> None:
-    ended = run("demo", "--json", "--preset", "tuned-10baud", "--mismatch", "0.1", cwd=tmp_path)
-    assert ended.code == 0, ended.err
-    assert ended.summary["error_live_max_fraction"] <= 0.02
-
-
 def test_when_a_person_runs_it_then_both_plants_are_shown_and_nothing_else_on_stdout(
     tmp_path: Path,
 ) -> None:
@@ -100,8 +93,8 @@ def test_when_a_real_flight_is_replayed_then_its_pitch_is_known_remotely(tmp_pat
 def test_when_the_wire_delivers_at_the_end_of_a_slot_then_it_flies_on_the_provisional_copy(
     tmp_path: Path,
 ) -> None:
-    arguments = ["--delivery", "end", "--preset", "tuned-10baud", "--mismatch", "0.1"]
-    summary = run("demo", "--json", *arguments, cwd=tmp_path).summary
+    settings = {"channel.delivery": "end", "transmitter.plant.mismatch": 0.1}
+    summary = fly("tuned-10baud", settings=settings, out=tmp_path / "run").summary
     assert summary["lead_ticks"] == 13
     assert summary["desyncs"] == summary["erasures"] == summary["commands_late"] == 0
     assert summary["error_live_max_fraction"] > summary["error_coded_max_fraction"]

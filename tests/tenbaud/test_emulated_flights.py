@@ -16,7 +16,7 @@ from tenbaud.config.load import load_config
 from tenbaud.flight import transmit
 from tenbaud.flight.summary import transmitter_part
 from tenbaud.recording.reader import MessageStream
-from tests.tenbaud.confirmed import check_flown
+from tests.tenbaud.confirmed import check_flown, need_idle
 from tests.tenbaud.emulated_flight import PATIENT, RigProcess, demo, fly_emulated
 
 SECONDS = 5.0
@@ -130,6 +130,8 @@ def test_a_minute_of_the_papers_coder_flies_like_the_simulated_one(form: str, tm
         form, tmp_path / "real", seconds=SOAK_SECONDS, rig_arguments=rig, arguments=ends
     )
     assert flown.code == 0, flown.said
+    check_flown(flown.summary, round(10 * SOAK_SECONDS))
+    need_idle(flown.summary)
     expected = simulated_rms(SOAK_SECONDS, flown.summary["lead_ticks"])
     assert flown.summary["error_coded_rms_rad"] == pytest.approx(expected, rel=0.1)
 

@@ -36,7 +36,7 @@ class FmuPlant:
         outputs: Names | None = None,
         start: Mapping[str, float] | None = None,
     ) -> None:
-        if context.mismatch != 0.0 or context.disturbance is not None or any(context.initial):
+        if context.mismatch != 0.0 or context.disturbance_text or any(context.initial):
             raise ValueError(
                 "mismatch, disturbance and initial outputs are of built-in plants; give the FMU's own "
                 "variables as start = { variable = value }"

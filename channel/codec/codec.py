@@ -90,8 +90,8 @@ class Coder(Protocol):
         """Return the range `M` of each measured axis, for display."""
 
     # A coder may have `is_state(coder: Vector) -> bool` too: whether it can be in a state that came
-    # over a line. Without it, any finite one is taken. And `about(coder, word)`: which output each
-    # symbol of a word was about. Without it, the symbols are about the outputs in turn.
+    # over a line. Without it, any finite one is taken. And `about(coder, word, correction)`: which
+    # output each symbol of a word was about. Without it, they are about the outputs in turn.
 
 
 class CodecState(NamedTuple):
@@ -191,15 +191,20 @@ class Codec:
             )
         return CodecState(state.sample + 1, model, opened.coder)
 
-    def about(self, state: CodecState, word: Word) -> tuple[int, ...] | None:
+    def about(self, state: CodecState, word: Word, opened: Vector) -> tuple[int, ...] | None:
         """Return the place of the output that each symbol of a word was about; None for ERASED.
 
-        It follows from shared state, and none follows from it: it is for people.
+        `opened` is the model state after the word's correction. The answer follows from shared state,
+        and none follows from it: it is for people.
         """
         if word is ERASED:
             return None
         find = getattr(self.coder, "about", None)
-        found: tuple[int, ...] = self._in_turn if find is None else find(state.coder, word)
+        if find is None:
+            return self._in_turn
+        size = self.model.correction_size
+        pairs = zip(opened[:size], state.model[:size], strict=True)
+        found: tuple[int, ...] = find(state.coder, word, [after - before for after, before in pairs])
         return found
 
     @cached_property

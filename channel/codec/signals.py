@@ -21,7 +21,7 @@ PICTURES: tuple[tuple[str, tuple[int, ...]], ...] = (
     ("helicopter", (1, 3)),
     ("pendulum", (1,)),
     ("rotary pendulum", (2,)),
-    ("servo", (1,)),
+    ("dial", (1,)),
 )
 """Pictures of plants, and for how many outputs; all are angles. The parts turn in the order of the
 outputs: the helicopter's by pitch, or by travel, elevation and pitch; a rotary pendulum's by arm and

@@ -74,7 +74,7 @@ class LinearModelSection(KindSection):
     output_units: Names = ()
     input_steps_per_unit: tuple[Positive, ...] = ()
     """a command travels in whole steps: 1000 per volt are mV; empty: 1000"""
-    picture: Literal["", "helicopter", "pendulum", "rotary pendulum", "servo"] = ""
+    picture: Literal["", "helicopter", "pendulum", "rotary pendulum", "dial"] = ""
     """what displays draw, its parts turned by the outputs in order; empty: a bar for each output"""
 
     def signals(self, inputs: int) -> Signals:

@@ -117,11 +117,19 @@ def _panels(flight: _Flight) -> list[tuple[float, str, _Draw]]:
     plant = flight.plant
     outputs = plant.groups("outputs")[:DRAWN_MAX]
     inputs = plant.groups("inputs")[:DRAWN_MAX]
-    single = [place for _, places in outputs for place in places][:DRAWN_MAX]
+    # Only what the model puts together shares a panel of values; errors and inputs of one unit do too.
+    values = [
+        shown
+        for label, places in outputs
+        for shown in (
+            [(label, places)]
+            if plant.outputs[places[0]].group
+            else [(plant.outputs[place].label, [place]) for place in places]
+        )
+    ][:DRAWN_MAX]
+    height = 3.0 if len(values) == 1 else 2.2
     found: list[tuple[float, str, _Draw]] = [
-        (3.0 if len(single) == 1 else 2.2, _plain(one.label), partial(_draw_values, places=[place]))
-        for place in single
-        for one in [plant.outputs[place]]
+        (height, _plain(label), partial(_draw_values, places=places)) for label, places in values
     ]
     for name, height, curve, draw in (
         ("error", 2.0, "error_coded", _draw_errors),

@@ -33,8 +33,8 @@ def check_flown(summary: Summary, samples: int, receiver: Summary | None = None)
     unsent = summary["words_missed"] + summary["symbols_refused"]
     symbols = samples - unsent
     assert summary["coder_bits_up"] == symbols, "one bit for each symbol that was sent"
-    late = (receiver or summary)["symbols_late"]
-    assert summary["erasures"] == unsent + late
+    if summary["link"] != "serial":  # a byte that is late by several slots may be taken for another's
+        assert summary["erasures"] == unsent + (receiver or summary)["symbols_late"]
 
 
 def held_up(summary: Summary) -> str | None:

@@ -126,7 +126,7 @@ class Copies:
         self.confirmed = flown.state
         self._keep_provisional(word, taken)
         digest = self.codec.digest(flown.state)
-        about = self.codec.about(before, word)
+        about = self.codec.about(before, word, flown.coded[0])
         return Confirmed(
             before.sample, before, sent, word, flown, live, digest, peer_digest, lag, about
         )

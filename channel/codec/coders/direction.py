@@ -334,8 +334,12 @@ class DirectionCoder(FunctionCoder):
             0.0 <= coder[place(state, state)] <= 2.0 * limit for state, limit in enumerate(largest)
         )
 
-    def about(self, coder: Vector, word: Sequence[int]) -> tuple[int, ...]:
+    def about(self, coder: Vector, word: Sequence[int], correction: Numbers) -> tuple[int, ...]:
         """Return, for each sign, the output whose error correlates most with what was asked."""
+        if len(self.readout) == 1:
+            return (0,) * len(word)
+        if len(word) == 1:  # along v
+            return (self._most_correlated(coder, correction),)
         known = list(coder)
         c, v, correction = ([0.0] * self.correction_size for _ in range(3))
         found = []
@@ -360,11 +364,8 @@ class DirectionCoder(FunctionCoder):
 
     def ranges(self, coder: Vector) -> Vector:
         """Return, for each output, the standard deviation that both ends assume."""
-        sizes = []
-        for row in self.readout:
-            variance = variance_of(coder, row)
-            sizes.append(coder[-1] * math.sqrt(variance if variance > 0.0 else 0.0))
-        return tuple(sizes)
+        variances = [variance_of(coder, row) for row in self.readout]
+        return tuple([coder[-1] * math.sqrt(one if one > 0.0 else 0.0) for one in variances])
 
 
 def check_parameters(parameters: DirectionParameters) -> None:

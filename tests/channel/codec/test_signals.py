@@ -72,8 +72,8 @@ def test_names_that_are_none_or_doubled_and_empty_ranges_are_refused() -> None:
 def test_a_picture_is_one_of_those_drawn_for_that_number_of_outputs() -> None:
     arm, pendulum = Signal("arm", "rad"), Signal("pendulum", "rad")
     assert Signals((), (), (arm, pendulum), (None, None), "rotary pendulum").picture
-    with pytest.raises(ValueError, match=r"'servo' is unknown or not for 2 output.s.; known are heli"):
-        Signals((), (), (arm, pendulum), (None, None), "servo")
+    with pytest.raises(ValueError, match=r"'dial' is unknown or not for 2 output.s.; known are heli"):
+        Signals((), (), (arm, pendulum), (None, None), "dial")
     with pytest.raises(ValueError, match="'cart' is unknown"):
         Signals((), (), (arm,), (None,), "cart")
 

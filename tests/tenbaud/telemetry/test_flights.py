@@ -163,6 +163,7 @@ def test_when_a_flight_is_steered_then_every_command_takes_hold_and_is_written_d
     flight = ("--duration", "300", "--pace", "4")
     how = ("--clock", "virtual", "--allow-control")
     with watched(tmp_path, *how, transmitter=flight) as pair:
+        pair.wait(lambda: pair.newest("receiver"))
         pair.wait(lambda: pair.newest("transmitter") and pair.newest("transmitter").time_s > 0.5)
         pair.send(kind="set_point", value=0.25)
         pair.wait(lambda: pair.newest("receiver").set_points == [0.25])

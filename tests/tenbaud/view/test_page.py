@@ -19,7 +19,7 @@ pytestmark = pytest.mark.skipif(why_no_browser() is not None, reason=str(why_no_
 
 PICTURES = {
     "pendulum": ["160 132"],
-    "servo": ["160 100"],
+    "dial": ["160 100"],
     "rotary pendulum": ["84 70", "238 112"],
 }
 """Pictures, and what their parts turn about."""

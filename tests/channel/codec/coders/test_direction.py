@@ -15,6 +15,7 @@ from channel.codec.words import ERASED
 from tests.golden.regenerate import AERO_DIRECTION, PITCH_DIRECTION
 
 ZERO = (0.0, 0.0)
+NOTHING = (0.0,) * 4
 AXES = [(1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0)]
 
 
@@ -79,14 +80,25 @@ def test_a_sign_is_about_the_output_whose_error_correlates_most_with_what_is_ask
     c, v = [0.0] * 4, [0.0] * 4
     assert aim(coder.constants, list(state), c, v)
     # Nothing couples the two axes yet, so that the direction is all within one.
-    assert coder.about(state, (1, -1)) == ((0, 1) if c[2:] == [0.0, 0.0] else (1, 0))
+    assert coder.about(state, (1, -1), NOTHING) == ((0, 1) if c[2:] == [0.0, 0.0] else (1, 0))
     for _ in range(50):
-        first, second = coder.about(state, (1, -1))
-        assert swapped.about(state, (1, -1)) == (1 - first, 1 - second)
+        first, second = coder.about(state, (1, -1), NOTHING)
+        assert swapped.about(state, (1, -1), NOTHING) == (1 - first, 1 - second)
         counts[first] += 1
         counts[second] += 1
         _, state = coder.decode(state, (0.0,) * 4, (1, -1))
     assert min(counts) > 10
+
+
+def test_one_sign_is_about_the_same_output_as_the_first_of_two() -> None:
+    two = DirectionCoder(AERO_DIRECTION, AXES)
+    one = DirectionCoder(replace(AERO_DIRECTION, bits=1), AXES)
+    state = two.initial()
+    for sample in range(20):
+        sign = 1 if sample % 4 < 2 else -1
+        correction, after = one.decode(state, NOTHING, (sign,))
+        assert one.about(state, (sign,), correction) == two.about(state, (sign, 1), NOTHING)[:1]
+        state = after
 
 
 def test_ranges_are_of_outputs_that_may_be_sums_of_states() -> None:

@@ -78,6 +78,7 @@ def test_when_a_system_names_its_signals_then_the_run_has_these_names_and_units(
     assert {"angle", "estimate_rate", "motor"} <= set(run.names)
     assert (run.units["angle"], run.units["motor"], run.units["estimate_rate"]) == ("rad", "V", "rad/s")
     assert run.config.preset == "own"
+    assert "reference" not in run.names, "without a reference no output follows anything"
     assert audit(tmp_path / "run").passed
 
 

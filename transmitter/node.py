@@ -7,7 +7,7 @@ and calls `actuate`. Nothing here knows which driver it is.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, astuple, replace
 
 from channel.codec.codec import Vector
 from channel.protocol.events import Event, EventKind, write_event
@@ -19,7 +19,7 @@ from transmitter.metrics.gap import GAP_CHANNEL, GAP_EVERY_S, GapGauge
 from transmitter.metrics.scores import Scores
 from transmitter.rigs.base import Reading, Rig
 from transmitter.session.copies import Confirmed
-from transmitter.session.records import DEVICE_CHANNEL, TICK_CHANNEL, device_row
+from transmitter.session.records import DEVICE_CHANNEL, TICK_CHANNEL
 from transmitter.session.session import Phase, TransmitterSession
 
 RESTLESS_SAMPLES_MAX = 32
@@ -80,7 +80,7 @@ class TransmitterNode:
         self._reading = reading
         if reading.device is not None:
             time_ns = tick * self.session.terms.tick_ns
-            self._recorder.write(DEVICE_CHANNEL, time_ns, device_row(tick, reading.device))
+            self._recorder.write(DEVICE_CHANNEL, time_ns, (tick, *astuple(reading.device)))
         self._check(tick, reading)
         self.scores.on_outputs(tick, reading.true or reading.measured)
         if self.gauge is not None:
@@ -213,15 +213,4 @@ class TransmitterNode:
         if self.guard.state is not GuardState.RUNNING:
             reason = self.guard.reason
             event = Event(EventKind.GUARD, state=self.guard.state)
-            if reason is not None:
-                event = replace(
-                    event,
-                    tick=reason.tick,
-                    cause=reason.cause,
-                    axis=reason.axis,
-                    value=reason.value,
-                    limit=reason.limit,
-                    number=reason.number,
-                    detail=reason.detail,
-                )
-            self.tell(event)
+            self.tell(event if reason is None else replace(event, **asdict(reason)))

@@ -22,11 +22,11 @@ import random
 import re
 from collections import Counter
 from dataclasses import dataclass, field, replace
-from typing import Literal, Protocol
+from typing import Any, Literal
 
 from channel.codec.words import Alphabet
 from channel.line.line import CleanLine, Delivery, Line
-from channel.protocol.wire import DATAGRAM
+from channel.protocol.wire import DATAGRAM, SymbolWire
 
 Direction = Literal["up", "down"]
 FOR_EVER_NS = 2**62
@@ -127,14 +127,9 @@ def _with_item(faults: LineFaults, item: str) -> LineFaults:
 def _with_value(one: Impairments, name: str, value: str) -> Impairments:
     first, _, second = value.partition("/")
     match name:
-        case "loss":
-            return replace(one, loss=_probability(value))
-        case "flip":
-            return replace(one, flip=_probability(value))
-        case "raw":
-            return replace(one, raw=_probability(value))
-        case "duplicate":
-            return replace(one, duplicate=_probability(value))
+        case "loss" | "flip" | "raw" | "duplicate":
+            chance: dict[str, Any] = {name: _probability(value)}
+            return replace(one, **chance)
         case "burst":
             enter, leave = _probability(first), _probability(second)
             if leave == 0.0:
@@ -186,16 +181,6 @@ def _time_ns(text: str) -> int:
     if match is None:
         raise ValueError(f"{text!r} is no time from 0 on; write 30ms, 1.5s or 200us")
     return round(float(match[1]) * _UNITS_NS[match[2]])
-
-
-class SymbolWire(Protocol):
-    """The part of a wire that inverts symbols."""
-
-    def is_symbol(self, data: bytes) -> bool:
-        """Return whether a message carries a symbol."""
-
-    def renumbered(self, data: bytes, shift: int, kinds: int) -> bytes:
-        """Return a symbol's message with the number `shift` further on in an alphabet of `kinds`."""
 
 
 @dataclass(slots=True)

@@ -21,7 +21,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
-from channel.codec.codec import Codec, CodecState, is_coder_state, is_estimate
+from channel.codec.codec import Codec, is_coder_state, is_estimate
 from channel.codec.words import WIRE_ERASED
 from channel.protocol.events import Dropped, Event, EventKind, Tell
 from channel.protocol.frames import Bye, Commands, Desync, Echo, Frame, Hello, Refuse, Symbol, Welcome
@@ -163,14 +163,9 @@ class Bounds:
             return str(error)
         if state.sample != welcome.first_sample:
             return f"a state of sample {state.sample} for sample {welcome.first_sample}"
-        if not is_flyable(self._codec, state):
+        if not (is_estimate(state.model) and is_coder_state(self._codec.coder, state.coder)):
             return f"not a state of this codec: {state}"
         return None
-
-
-def is_flyable(codec: Codec, state: CodecState) -> bool:
-    """Return whether a codec can be in this state."""
-    return is_estimate(state.model) and is_coder_state(codec.coder, state.coder)
 
 
 def within_text_bounds(frame: Frame) -> Frame:

@@ -9,7 +9,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum, StrEnum
-from typing import Any
 
 from channel.protocol.endings import End
 from channel.protocol.recording import Field, RecordChannel, Recorder
@@ -161,12 +160,6 @@ def event_row(event: Event) -> tuple[object, ...]:
 def write_event(recorder: Recorder, event: Event) -> None:
     """Record an event under its flight time."""
     recorder.write(EVENT_CHANNEL, event.time_ns, event_row(event))
-
-
-def event_fields(event: Event) -> dict[str, Any]:
-    """Return the same as a mapping, as recordings and telemetry hold it."""
-    names = [field.name for field in EVENT_CHANNEL.fields]
-    return dict(zip(names, event_row(event), strict=True))
 
 
 _NAMES = tuple(field.name for field in EVENT_CHANNEL.fields[2:-3])

@@ -92,6 +92,9 @@ EPOCH_CHANNEL = RecordChannel(
 )
 
 
-def epoch_row(epoch: int, start: CodecState, hold: Vector) -> tuple[object, ...]:
-    """Return the row of `EPOCH_CHANNEL` for the beginning of an epoch."""
-    return (start.sample, epoch, start.model, start.coder, hold)
+def write_epoch(
+    recorder: Recorder, sample_ns: int, epoch: int, start: CodecState, hold: Vector
+) -> None:
+    """Write down from what state an epoch starts."""
+    row = (start.sample, epoch, start.model, start.coder, hold)
+    recorder.write(EPOCH_CHANNEL, start.sample * sample_ns, row)

@@ -24,10 +24,9 @@ from __future__ import annotations
 
 import struct
 from binascii import crc_hqx
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
-from typing import Protocol
+from typing import Any, NamedTuple, Protocol
 
 from channel.errors import FrameError
 from channel.protocol.endings import Ending
@@ -40,9 +39,7 @@ from channel.protocol.frames import (
     ForeignVersion,
     Frame,
     Hello,
-    LocatedSymbol,
     Refuse,
-    ShortSymbol,
     Symbol,
     Unknown,
     Welcome,
@@ -56,20 +53,51 @@ CRC_START = 0xFFFF
 
 _HEAD = struct.Struct("<BBIH")
 _CRC = struct.Struct("<H")
-_HELLO = struct.Struct("<IIIB16s8s")
 _WELCOME = struct.Struct("<IIIB")
-_REFUSE = struct.Struct("<IB")
-_BYE = struct.Struct("<B")
-_NUMBER = struct.Struct("<I")
 _SYMBOL = struct.Struct("<IB")
 _COMMANDS = struct.Struct("<IB")
 _ECHO = struct.Struct("<HQ")
-_DESYNC = struct.Struct("<IQQ")
 _TEXT = struct.Struct("<H")
 _SYMBOL_START = bytes((WIRE_VERSION, 4))
 
 
-class Wire(Protocol):
+class _Body(NamedTuple):
+    """A body of numbers, then texts, then bytes up to the end."""
+
+    kind: int
+    frame: Any
+    layout: struct.Struct
+    numbers: tuple[str, ...]
+    texts: tuple[str, ...] = ()
+    rest: str = ""
+
+
+_HELLO = ("incarnation", "request", "sample", "why", "config_digest", "numerics_probe")
+_DESYNC = ("sample", "transmitter_digest", "receiver_digest")
+_BODIES = (
+    _Body(1, Hello, struct.Struct("<IIIB16s8s"), _HELLO, ("version",)),
+    _Body(3, Refuse, struct.Struct("<IB"), ("incarnation", "ending"), ("text", "config")),
+    _Body(6, Desync, struct.Struct("<IQQ"), _DESYNC, rest="state"),
+    _Body(7, Bye, struct.Struct("<B"), ("ending",), ("text",)),
+    _Body(8, Unknown, struct.Struct("<"), ()),
+    _Body(9, Claim, struct.Struct("<I"), ("by",)),
+)
+"""Those of the frames that are not written out below."""
+_OF_KIND = {one.kind: one for one in _BODIES}
+_OF_FRAME = {one.frame: one for one in _BODIES}
+
+
+class SymbolWire(Protocol):
+    """How a line carries symbols: the paid path of the uplink."""
+
+    def is_symbol(self, data: bytes) -> bool:
+        """Return whether a message of ours carries a symbol."""
+
+    def renumbered(self, data: bytes, shift: int, kinds: int) -> bytes:
+        """Return a symbol's message with the number `shift` further on in an alphabet of `kinds`."""
+
+
+class Wire(SymbolWire, Protocol):
     """How frames look on one kind of line. A link says which it needs."""
 
     def encode(self, frame: Frame) -> bytes:
@@ -80,42 +108,6 @@ class Wire(Protocol):
 
     def size(self, data: bytes) -> int:
         """Return how many bytes a message takes on the line, framing included."""
-
-    def is_symbol(self, data: bytes) -> bool:
-        """Return whether a message of ours carries a symbol: the paid path of the uplink."""
-
-    def renumbered(self, data: bytes, shift: int, kinds: int) -> bytes:
-        """Return a symbol's message with the number `shift` further on in an alphabet of `kinds`."""
-
-
-class DatagramWire:
-    """The frames of this module, one per message: for every line that keeps message boundaries."""
-
-    def encode(self, frame: Frame) -> bytes:
-        """Return the bytes of a frame."""
-        return encode(frame)
-
-    def decode(self, data: bytes) -> Frame:
-        """Return the frame in these bytes."""
-        return decode(data)
-
-    def size(self, data: bytes) -> int:
-        """Return the length: the frame is all that we put on such a line."""
-        return len(data)
-
-    def is_symbol(self, data: bytes) -> bool:
-        """Return whether the head of a frame says that it is a symbol."""
-        return data.startswith(_SYMBOL_START)
-
-    def renumbered(self, data: bytes, shift: int, kinds: int) -> bytes:
-        """Return a symbol's frame with another number, its checksum right again."""
-        frame = decode(data)
-        if not isinstance(frame, Symbol):
-            raise ValueError(f"{frame} is no symbol")
-        return encode(replace(frame, number=(frame.number + shift) % kinds))
-
-
-DATAGRAM = DatagramWire()
 
 
 def foreign_version_text(peer: str, version: int) -> str:
@@ -129,7 +121,8 @@ def foreign_version_text(peer: str, version: int) -> str:
 def encode(frame: Frame) -> bytes:
     """Return the bytes of a frame; ValueError for values that no frame can carry."""
     try:
-        kind, session, epoch, body = _encode_body(frame)
+        kind, body = _encode_body(frame)
+        session, epoch = getattr(frame, "session", 0), getattr(frame, "epoch", 0)
         message = _HEAD.pack(WIRE_VERSION, kind, session, epoch) + body
     except struct.error as error:
         raise ValueError(f"{frame} does not fit a frame: {error}") from error
@@ -150,60 +143,73 @@ def decode(data: bytes) -> Frame:
     version, kind, session, epoch = _HEAD.unpack_from(message)
     if version != WIRE_VERSION:
         return ForeignVersion(version)
-    reader = _READERS.get(kind)
-    if reader is None:
-        raise FrameError(f"unknown kind {kind}")
     try:
-        return reader(session, epoch, message[_HEAD.size :])
+        return _decode_body(kind, session, epoch, message[_HEAD.size :])
     except (struct.error, UnicodeDecodeError) as error:
         raise FrameError(f"malformed frame of kind {kind}: {error}") from error
 
 
-def _encode_body(frame: Frame) -> tuple[int, int, int, bytes]:
+def _encode_body(frame: Frame) -> tuple[int, bytes]:
     match frame:
         case Symbol():
-            body = _SYMBOL.pack(frame.slot, frame.number)
-            return 4, frame.session, frame.epoch, body
+            return 4, _SYMBOL.pack(frame.slot, frame.number)
         case Commands():
-            return 5, frame.session, frame.epoch, _encode_commands(frame)
-        case Hello():
-            return 1, frame.session, frame.epoch, _encode_hello(frame)
+            return 5, _encode_commands(frame)
         case Welcome():
-            return 2, frame.session, frame.epoch, _encode_welcome(frame)
-        case Refuse():
-            body = _REFUSE.pack(frame.incarnation, frame.ending)
-            return 3, 0, 0, body + _text(frame.text) + _text(frame.config)
-        case Desync():
-            body = _DESYNC.pack(frame.sample, frame.transmitter_digest, frame.receiver_digest)
-            return 6, frame.session, frame.epoch, body + frame.state
-        case Bye():
-            return 7, frame.session, 0, _BYE.pack(frame.ending) + _text(frame.text)
-        case Unknown():
-            return 8, frame.session, frame.epoch, b""
-        case Claim():
-            return 9, frame.session, frame.epoch, _NUMBER.pack(frame.by)
-        case ForeignVersion() | ShortSymbol() | LocatedSymbol():
-            raise ValueError(f"{frame} is only ever received")
+            return 2, _encode_welcome(frame)
+        case Hello() if len(frame.config_digest) != 16 or len(frame.numerics_probe) != 8:
+            raise ValueError("a greeting has a digest of 16 bytes and a probe of 8")
+    body = _OF_FRAME.get(type(frame))
+    if body is None:
+        raise ValueError(f"{frame} is only ever received")
+    data = body.layout.pack(*[getattr(frame, name) for name in body.numbers])
+    data += b"".join([_text(getattr(frame, name)) for name in body.texts])
+    return body.kind, data + getattr(frame, body.rest, b"")
 
 
-def _encode_hello(frame: Hello) -> bytes:
-    if len(frame.config_digest) != 16 or len(frame.numerics_probe) != 8:
-        raise ValueError("a greeting has a digest of 16 bytes and a probe of 8")
-    body = _HELLO.pack(
-        frame.incarnation,
-        frame.request,
-        frame.sample,
-        frame.why,
-        frame.config_digest,
-        frame.numerics_probe,
-    )
-    return body + _text(frame.version)
+def _decode_body(kind: int, session: int, epoch: int, data: bytes) -> Frame:
+    match kind:
+        case 2:
+            return _decode_welcome(session, epoch, data)
+        case 4:
+            return Symbol(session, epoch, *_SYMBOL.unpack(data))
+        case 5:
+            return _decode_commands(session, epoch, data)
+    body = _OF_KIND.get(kind)
+    if body is None:
+        raise FrameError(f"unknown kind {kind}")
+    values: dict[str, Any] = {"session": session, "epoch": epoch}
+    values = {name: values[name] for name in values if name in body.frame.__slots__}
+    values |= zip(body.numbers, body.layout.unpack_from(data), strict=True)
+    left = data[body.layout.size :]
+    for name in body.texts:
+        values[name], left = _take_text(left)
+    if body.rest:
+        values[body.rest], left = left, b""
+    if left:
+        raise FrameError(f"{len(left)} bytes too many")
+    if "ending" in values:
+        values["ending"] = Ending(values["ending"])
+    if "why" in values:
+        try:
+            values["why"] = Why(values["why"])
+        except ValueError:
+            raise FrameError(f"hello for the unknown reason {values['why']}") from None
+    frame: Frame = body.frame(**values)
+    return frame
 
 
 def _encode_welcome(frame: Welcome) -> bytes:
     hold = frame.hold_steps
     head = _WELCOME.pack(frame.incarnation, frame.request, frame.first_sample, len(hold))
     return head + struct.pack(f"<{len(hold)}h", *hold) + frame.state
+
+
+def _decode_welcome(session: int, epoch: int, body: bytes) -> Welcome:
+    incarnation, request, first_sample, inputs = _WELCOME.unpack_from(body)
+    hold = struct.unpack_from(f"<{inputs}h", body, _WELCOME.size)
+    state = body[_WELCOME.size + 2 * inputs :]
+    return Welcome(session, epoch, first_sample, incarnation, request, hold, state)
 
 
 def _encode_commands(frame: Commands) -> bytes:
@@ -241,72 +247,6 @@ def _decode_commands(session: int, epoch: int, body: bytes) -> Commands:
     return Commands(session, epoch, tuple(echoes))
 
 
-def _decode_hello(session: int, epoch: int, body: bytes) -> Hello:
-    incarnation, request, sample, why, config_digest, probe = _HELLO.unpack_from(body)
-    version, rest = _take_text(body[_HELLO.size :])
-    _nothing_left(rest)
-    try:
-        reason = Why(why)
-    except ValueError:
-        raise FrameError(f"hello for the unknown reason {why}") from None
-    return Hello(incarnation, version, config_digest, probe, request, session, epoch, sample, reason)
-
-
-def _decode_welcome(session: int, epoch: int, body: bytes) -> Welcome:
-    incarnation, request, first_sample, motors = _WELCOME.unpack_from(body)
-    hold = struct.unpack_from(f"<{motors}h", body, _WELCOME.size)
-    state = body[_WELCOME.size + 2 * motors :]
-    return Welcome(session, epoch, first_sample, incarnation, request, hold, state)
-
-
-def _decode_refuse(session: int, epoch: int, body: bytes) -> Refuse:
-    incarnation, ending = _REFUSE.unpack_from(body)
-    text, rest = _take_text(body[_REFUSE.size :])
-    config, rest = _take_text(rest)
-    _nothing_left(rest)
-    return Refuse(incarnation, Ending(ending), text, config)
-
-
-def _decode_symbol(session: int, epoch: int, body: bytes) -> Symbol:
-    slot, number = _SYMBOL.unpack(body)
-    return Symbol(session, epoch, slot, number)
-
-
-def _decode_desync(session: int, epoch: int, body: bytes) -> Desync:
-    sample, ours, theirs = _DESYNC.unpack_from(body)
-    return Desync(session, epoch, sample, ours, theirs, body[_DESYNC.size :])
-
-
-def _decode_bye(session: int, epoch: int, body: bytes) -> Bye:
-    (ending,) = _BYE.unpack_from(body)
-    text, rest = _take_text(body[_BYE.size :])
-    _nothing_left(rest)
-    return Bye(session, Ending(ending), text)
-
-
-def _decode_unknown(session: int, epoch: int, body: bytes) -> Unknown:
-    _nothing_left(body)
-    return Unknown(session, epoch)
-
-
-def _decode_claim(session: int, epoch: int, body: bytes) -> Claim:
-    (by,) = _NUMBER.unpack(body)
-    return Claim(session, epoch, by)
-
-
-_READERS: dict[int, Callable[[int, int, bytes], Frame]] = {
-    1: _decode_hello,
-    2: _decode_welcome,
-    3: _decode_refuse,
-    4: _decode_symbol,
-    5: _decode_commands,
-    6: _decode_desync,
-    7: _decode_bye,
-    8: _decode_unknown,
-    9: _decode_claim,
-}
-
-
 def _text(text: str) -> bytes:
     data = text.encode()
     return _TEXT.pack(len(data)) + data
@@ -320,6 +260,26 @@ def _take_text(data: bytes) -> tuple[str, bytes]:
     return data[_TEXT.size : end].decode(), data[end:]
 
 
-def _nothing_left(rest: bytes) -> None:
-    if rest:
-        raise FrameError(f"{len(rest)} bytes too many")
+class DatagramWire:
+    """The frames of this module, one per message: for every line that keeps message boundaries."""
+
+    encode = staticmethod(encode)
+    decode = staticmethod(decode)
+
+    def size(self, data: bytes) -> int:
+        """Return the length: the frame is all that we put on such a line."""
+        return len(data)
+
+    def is_symbol(self, data: bytes) -> bool:
+        """Return whether the head of a frame says that it is a symbol."""
+        return data.startswith(_SYMBOL_START)
+
+    def renumbered(self, data: bytes, shift: int, kinds: int) -> bytes:
+        """Return a symbol's frame with another number, its checksum right again."""
+        frame = decode(data)
+        if not isinstance(frame, Symbol):
+            raise ValueError(f"{frame} is no symbol")
+        return encode(replace(frame, number=(frame.number + shift) % kinds))
+
+
+DATAGRAM = DatagramWire()

@@ -11,11 +11,9 @@ from channel.protocol.frames import Desync, Symbol
 from channel.protocol.lockstep import LOCKSTEP_CHANNEL, History
 from channel.protocol.recording import (
     ARRIVED_CHANNEL,
-    EPOCH_CHANNEL,
     Field,
     RecordChannel,
     Recorder,
-    epoch_row,
 )
 from channel.protocol.terms import Terms
 
@@ -88,8 +86,3 @@ def write_symbol(recorder: Recorder, terms: Terms, symbol: Symbol, now_ns: int, 
     """Write down a symbol that came for a slot, in time or for a slot that was settled already."""
     row = (symbol.slot, symbol.number, now_ns, taken)
     recorder.write(ARRIVED_CHANNEL, terms.slot_ns(symbol.slot), row)
-
-
-def write_epoch(recorder: Recorder, terms: Terms, epoch: int, start: CodecState, hold: Vector) -> None:
-    """Write down from what state an epoch starts."""
-    recorder.write(EPOCH_CHANNEL, start.sample * terms.sample_ns, epoch_row(epoch, start, hold))

@@ -28,7 +28,7 @@ from channel.codec.codec import Codec, CodecState, Vector, is_coder_state
 from channel.codec.words import ERASED
 from channel.errors import CodecDiverged
 from channel.protocol.bounds import shown
-from channel.protocol.frames import Desync, Hello, Welcome
+from channel.protocol.frames import Claim, Desync, Frame, Hello, Symbol, Unknown, Welcome
 from channel.protocol.identity import Identity
 from channel.protocol.lockstep import HISTORY_SAMPLES, History
 from channel.protocol.terms import Terms
@@ -227,3 +227,20 @@ def carried_to(
     if paused + silent_samples > KEEP_CODER_SAMPLES or not is_coder_state(codec.coder, state.coder):
         return state._replace(coder=codec.coder.initial())
     return state
+
+
+class Takeover:
+    """Answers the symbols of an unknown session."""
+
+    def __init__(self, session_number: int, take_over: bool) -> None:
+        self._session_number = session_number
+        self._take_over = take_over
+        self.asked = False
+        """whether a transmitter was asked for its flight, so that its refusal is meant for us"""
+
+    def on_symbol(self, symbol: Symbol) -> list[Frame]:
+        """Return the answer to the transmitter of a symbol."""
+        self.asked = True
+        if self._take_over:
+            return [Claim(symbol.session, symbol.epoch, self._session_number)]
+        return [Unknown(symbol.session, symbol.epoch)]

@@ -37,15 +37,14 @@ from channel.protocol.frames import (
 from channel.protocol.identity import Identity
 from channel.protocol.limits import to_steps
 from channel.protocol.lockstep import History, difference_event
-from channel.protocol.recording import NullRecorder, Recorder
+from channel.protocol.recording import NullRecorder, Recorder, write_epoch
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
 from receiver.controllers.base import Controller
 from receiver.session.commander import Commander
-from receiver.session.records import write_epoch, write_failure, write_symbol
-from receiver.session.rejoin import Greeter, Verdict, desync_answer, difference, first_sample
+from receiver.session.records import write_failure, write_symbol
+from receiver.session.rejoin import Greeter, Takeover, Verdict, desync_answer, difference, first_sample
 from receiver.session.schedule import Proven, Schedule, SlotClock, Timing
-from receiver.session.takeover import Takeover
 
 EPOCH_MAX = 0xFFFF
 
@@ -241,7 +240,7 @@ class ReceiverSession:
         welcome = Welcome(self.session_number, self.epoch, first, *asked, told, state)
         self._greeter.answer_with(welcome)
         self._commander.write_down()
-        write_epoch(self._recorder, self.terms, self.epoch, self.state, hold)
+        write_epoch(self._recorder, self.terms.sample_ns, self.epoch, self.state, hold)
         kind = EventKind.STARTED if last is None else EventKind.REJOIN
         self._emit(Event(kind, first, session=self.session_number, epoch=self.epoch))
         return [welcome]

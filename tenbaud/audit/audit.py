@@ -15,7 +15,7 @@ from typing import Any
 from channel.errors import CodecDiverged, TenbaudError
 from channel.line.uplink import bits_per_symbol
 from receiver.controllers.base import Controller
-from tenbaud.audit.base import Evidence, Findings, Place
+from tenbaud.audit.base import Evidence, Place
 from tenbaud.audit.table import CLAIMS
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.notes import version_notes
@@ -25,8 +25,6 @@ from tenbaud.replay.expected import expect
 from tenbaud.replay.record import FlightRecord, epochs_of, load_record
 from tenbaud.replay.refly import Reflown, refly
 from tenbaud.replay.replay import compare
-
-WHOLE = Place("flight", "all topics", "all samples")
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,14 +51,14 @@ def count(evidence: Evidence) -> Counted:
     arrived = evidence.topic("receiver", "symbol")
     paid = [row for row in sent if row.left_ns is not None] if sent.recorded else None
     taken = [row for row in arrived if row.taken] if arrived.recorded else None
-    samples = evidence.topic("receiver" if evidence.end("receiver") else "transmitter", "sample")
+    samples = evidence.topic(evidence.record.consumer, "sample")
     slots = None
     if paid:
         slots = max(row.slot for row in paid) - min(row.slot for row in paid) + 1
     return Counted(
         symbols_sent=None if paid is None else len(paid),
         symbols_refused=None if paid is None else len(sent) - len(paid),
-        bits_per_symbol=bits_per_symbol(evidence.agreement.codec.coder.alphabet),
+        bits_per_symbol=bits_per_symbol(evidence.alphabet),
         slots=slots,
         symbol_bytes=None if paid is None else sum(row.wire_bytes for row in paid),
         symbols_taken=None if taken is None else len(taken),
@@ -109,21 +107,21 @@ def audit(path: Path, other: Path | None = None, *, allow_code: bool = False) ->
 
 def audit_record(record: FlightRecord) -> Audit:
     """Audit what was recorded of a flight."""
-    evidence, findings = Evidence(record), Findings()
-    _fly(evidence, findings)
+    evidence = Evidence(record)
+    _fly(evidence)
     for claim in CLAIMS:
-        claim.check(evidence, findings)
+        claim.check(evidence)
     compared = compare(record, evidence.flown)[1]
     if not compared:
-        findings.gap(WHOLE, "no state could be compared with a recorded one")
+        _whole(evidence).gap("", "no state could be compared with a recorded one")
     codec = record.agreement.codec
     starts = [epoch.start for epoch in evidence.epochs]
     carried = [one for one in starts if one != codec.initial()._replace(sample=one.sample)]
     return Audit(
         record,
         count(evidence),
-        findings.leaks,
-        findings.gaps,
+        evidence.findings.lines(is_gap=False),
+        evidence.findings.lines(is_gap=True),
         _notes(record),
         compared,
         evidence.jittered_states,
@@ -131,21 +129,25 @@ def audit_record(record: FlightRecord) -> Audit:
     )
 
 
-def _fly(evidence: Evidence, findings: Findings) -> None:
+def _whole(evidence: Evidence) -> Place:
+    return evidence.at("flight", "all topics", "all samples")
+
+
+def _fly(evidence: Evidence) -> None:
     """Fly the flight again from its words, if these are all here, as well as that can be done."""
-    record = evidence.record
-    record.consumer.topic("sample")  # or there is nothing to audit
+    record, whole = evidence.record, _whole(evidence)
+    record.tables[record.consumer].topic("sample")  # or there is nothing to audit
     try:
         evidence.epochs = epochs_of(record)
     except RecordingError as error:
-        findings.gap(WHOLE, str(error))
+        whole.gap("", str(error))
         return
     try:
         evidence.steps = steps_by_hand(record)
         rebuilt: Controller | None = controller_of(record.agreement.config, evidence.steps)
     except (TenbaudError, ValueError) as error:
         rebuilt = None
-        findings.gap(WHOLE, "whether the commands follow from the states", str(error))
+        whole.gap("", "whether the commands follow from the states", str(error))
     flown = None if rebuilt is None else _flown(evidence, rebuilt)
     commands = recorded_commands(record)
     if commands is not None and (flown is None or compare(record, flown)[0]):
@@ -153,14 +155,14 @@ def _fly(evidence: Evidence, findings: Findings) -> None:
         alone = _flown(evidence, commands)
         if flown is None:
             flown = alone
-        elif alone is not None and not _states_differ(record, alone):
-            findings.leak(
-                WHOLE,
+        elif alone is not None and not any("state" in one for one in compare(record, alone)[0]):
+            whole.leak(
+                "",
                 "given the recorded commands the states do follow from the symbols",
                 "it is the controller that used something else than the states and the set-point",
             )
     if flown is None:
-        findings.gap(WHOLE, "the flight cannot be flown again from its symbols")
+        whole.gap("", "the flight cannot be flown again from its symbols")
         return
     evidence.flown = flown
     evidence.expected = expect(record.agreement, evidence.epochs, flown)
@@ -174,19 +176,15 @@ def _flown(evidence: Evidence, controller: Controller) -> list[Reflown] | None:
         return None
 
 
-def _states_differ(record: FlightRecord, flown: list[Reflown]) -> bool:
-    return any("state" in found for found in compare(record, flown)[0])
-
-
 def _notes(record: FlightRecord) -> list[str]:
     notes = []
-    if record.transmitter is None:
+    if "transmitter" not in record.tables:
         notes.append("only the receiver's recording is here: when each symbol left is not shown")
-    if record.receiver is None:
+    if "receiver" not in record.tables:
         notes.append("only the transmitter's recording is here: what arrived, and when, is not shown")
     if "transmitter" in record.rows and not record.summaries.get("transmitter"):
         notes.append("there is no summary: how many symbols left in all is not shown")
-    for end, tables in record.ends():
+    for end, tables in record.tables.items():
         notes += version_notes(tables.path, tables.metadata)
         if not tables.end:
             notes.append(f"the {end}'s recording was cut: audited up to the cut")

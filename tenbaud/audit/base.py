@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
+from channel.codec.words import Alphabet
+from channel.protocol.terms import Terms
 from tenbaud.build.flight import Agreement
 from tenbaud.replay.expected import Expected
 from tenbaud.replay.record import Epoch, FlightRecord
@@ -17,66 +20,64 @@ FILED = "(time)"
 """The flight time that a row is filed under, as if it were a field of each topic."""
 
 
-class Place(NamedTuple):
-    """A place in the recordings."""
-
-    end: str
-    topic: str
-    row: str
-    """such as `sample 77`"""
-    field: str = ""
-
-    def __str__(self) -> str:
-        where = f"{self.end}: {self.topic}, {self.row}"
-        return f"{where}, field {self.field}" if self.field else where
-
-
 class Findings:
     """The findings as text: one line for each kind of fault in a field, with its first place."""
 
     def __init__(self) -> None:
         self._first: dict[tuple[bool, str, str, str, str], str] = {}
-        self._count: dict[tuple[bool, str, str, str, str], int] = {}
+        self._count: Counter[tuple[bool, str, str, str, str]] = Counter()
 
-    def leak(self, place: Place, what: str, detail: str = "") -> None:
-        """Tell of something wrong; `what` is the kind of fault, `detail` this one's numbers."""
-        self._add(False, place, what, detail)
-
-    def gap(self, place: Place, what: str, detail: str = "") -> None:
-        """Tell of something that the recordings do not show."""
-        self._add(True, place, what, detail)
-
-    def _add(self, is_gap: bool, place: Place, what: str, detail: str) -> None:
-        kind = (is_gap, place.end, place.topic, place.field, what)
-        self._count[kind] = self._count.get(kind, 0) + 1
+    def add(self, is_gap: bool, place: Place, field: str, what: str, detail: str) -> None:
+        """Add one; see `Place`."""
+        kind = (is_gap, place.end, place.topic, field, what)
+        self._count[kind] += 1
         if kind not in self._first:
-            text = f"{what}: {detail}" if detail else what
-            self._first[kind] = f"{place}: {text}"
+            where = f"{place.end}: {place.topic}, {place.row}" + (f", field {field}" if field else "")
+            self._first[kind] = f"{where}: {what}: {detail}" if detail else f"{where}: {what}"
 
-    def _lines(self, is_gap: bool) -> list[str]:
-        lines = []
-        for kind, text in self._first.items():
-            if kind[0] is is_gap:
-                count = self._count[kind]
-                lines.append(text if count == 1 else f"{text} (the first of {count})")
-        return lines
+    def lines(self, is_gap: bool) -> list[str]:
+        """Return the faults, or the claims that could not be checked."""
+        return [
+            text if self._count[kind] == 1 else f"{text} (the first of {self._count[kind]})"
+            for kind, text in self._first.items()
+            if kind[0] is is_gap
+        ]
 
-    @property
-    def leaks(self) -> list[str]:
-        """The faults."""
-        return self._lines(False)
 
-    @property
-    def gaps(self) -> list[str]:
-        """The claims that could not be checked."""
-        return self._lines(True)
+class Place(NamedTuple):
+    """A row of the recordings, of which something may be found.
+
+    `field` is empty for the row as a whole; `what` is the kind of fault, `detail` this one's numbers.
+    """
+
+    findings: Findings
+    end: str
+    topic: str
+    row: str
+    """such as `sample 77`"""
+
+    def leak(self, field: str, what: str, detail: str = "") -> None:
+        """Note something wrong."""
+        self.findings.add(False, self, field, what, detail)
+
+    def gap(self, field: str, what: str, detail: str = "") -> None:
+        """Note something that the recordings do not show."""
+        self.findings.add(True, self, field, what, detail)
+
+    def compare(self, names: tuple[str, ...], one: Any, other: Any, what: str, words: str) -> None:
+        """Note the fields in which two rows differ; `words` is a form for both values."""
+        for name in names:
+            here, there = getattr(one, name), getattr(other, name)
+            if not is_same(here, there):
+                self.leak(name, what, words.format(here, there))
 
 
 @dataclass
 class Evidence:
-    """All that an audit has of a flight."""
+    """All that an audit has of a flight, and what it finds."""
 
     record: FlightRecord
+    findings: Findings = field(default_factory=Findings)
     epochs: list[Epoch] = field(default_factory=list)
     flown: list[Reflown] = field(default_factory=list)
     """the flight, flown again from its words; empty where it cannot be"""
@@ -97,14 +98,33 @@ class Evidence:
         """The agreement of both ends."""
         return self.record.agreement
 
-    def end(self, name: str) -> EndRows | None:
-        """Return the rows of an end, None if it is not here."""
-        return self.rows.get(name)
+    @property
+    def terms(self) -> Terms:
+        """The timing that they agreed on."""
+        return self.record.agreement.terms
+
+    @property
+    def alphabet(self) -> Alphabet:
+        """The symbols of the coder."""
+        return self.record.agreement.codec.coder.alphabet
+
+    def at(self, end: str, topic: str, row: str) -> Place:
+        """Return a place in the recordings."""
+        return Place(self.findings, end, topic, row)
 
     def topic(self, end: str, name: str) -> Topic:
         """Return a topic; without rows where it or the end was not recorded."""
         rows = self.rows.get(end)
-        return Topic() if rows is None else rows.topic(name)
+        return Topic() if rows is None else rows.topics[name]
+
+    def each(self, end: str, name: str) -> Iterator[tuple[Place, Any]]:
+        """Yield the rows of a topic, each with its place."""
+        for row in self.topic(end, name):
+            yield self.at(end, name, _label(name, row)), row
+
+    def is_whole(self, end: str) -> bool:
+        """Return whether an end was recorded to its end."""
+        return end in self.rows and self.rows[end].complete
 
     def summary(self, end: str) -> dict[str, Any]:
         """Return the figures in the folder of an end."""
@@ -121,7 +141,13 @@ class Evidence:
         return any(event.kind == "control" for end in self.rows for event in self.topic(end, "event"))
 
 
-Check = Callable[[Evidence, Findings], None]
+def _label(topic: str, row: Any) -> str:
+    if topic == "event":
+        return f"time {row.time_s:.3f} s"
+    return f"epoch {row.epoch}" if topic == "epoch" else f"{row._fields[0]} {row[0]}"
+
+
+Check = Callable[[Evidence], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,14 +155,19 @@ class Claim:
     """Something that a recording must show, and the fields that it rests on."""
 
     title: str
+    owns: tuple[tuple[str, ...], ...]
+    """(end, topic, field, field ...)"""
     check: Check
-    owns: tuple[tuple[str, str, tuple[str, ...]], ...]
-    """(end, topic, fields)"""
 
     @property
     def fields(self) -> set[tuple[str, str, str]]:
-        """Each field that it verifies."""
-        return {(end, topic, name) for end, topic, names in self.owns for name in names}
+        """Each (end, topic, field) that it verifies."""
+        return {(end, topic, name) for end, topic, *names in self.owns for name in names}
+
+
+def claim(title: str, *owns: tuple[str, ...]) -> Callable[[Check], Claim]:
+    """Make a check a claim on fields, each given as (end, topic, field, field ...)."""
+    return lambda check: Claim(title, owns, check)
 
 
 def is_same(one: object, other: object) -> bool:

@@ -3,41 +3,43 @@
 from __future__ import annotations
 
 from channel.protocol.events import EventKind
-from tenbaud.audit.base import Claim, Evidence, Findings, Place
+from tenbaud.audit.base import Evidence, claim
 
 KINDS = frozenset(str(kind) for kind in EventKind)
 
 
-def check_events(evidence: Evidence, findings: Findings) -> None:
+@claim(
+    "events of known kinds",
+    ("transmitter", "event", "kind"),
+    ("receiver", "event", "kind", "time_s", "sample"),
+)
+def check_events(evidence: Evidence) -> None:
     """Each event is of a known kind; at the receiver, at the time of the sample that it belongs to."""
-    sample_ns = evidence.agreement.terms.sample_ns
+    sample_ns = evidence.terms.sample_ns
     for end in evidence.rows:
-        for row in evidence.topic(end, "event"):
-            place = Place(end, "event", f"time {row.time_s:.3f} s")
+        for place, row in evidence.each(end, "event"):
             if row.kind not in KINDS:
-                findings.leak(place._replace(field="kind"), "there is no such kind", row.kind)
+                place.leak("kind", "there is no such kind", row.kind)
             if end == "receiver" and row.kind != EventKind.DESYNC:
                 now_s = None if row.sample is None else row.sample * sample_ns / 1e9
                 if row.time_s != now_s:
-                    findings.leak(
-                        place._replace(field="sample"), "its sample is at another time", f"{row.sample}"
-                    )
+                    place.leak("sample", "its sample is at another time", f"{row.sample}")
 
 
-def check_counts(evidence: Evidence, findings: Findings) -> None:
+@claim(
+    "events as many as what they tell of",
+    ("transmitter", "event", "kind"),
+    ("receiver", "event", "kind"),
+)
+def check_counts(evidence: Evidence) -> None:
     """As many events of a kind as there are rows of what they tell of."""
-    for end, rows in evidence.rows.items():
-        if not rows.complete:
-            continue
+    for end in filter(evidence.is_whole, evidence.rows):
         for kinds, wanted in _wanted(evidence, end).items():
-            events = evidence.topic(end, "event")
-            found = sum(row.kind in kinds for row in events)
+            found = sum(row.kind in kinds for row in evidence.topic(end, "event"))
             if found != wanted:
-                findings.gap(
-                    Place(end, "event", f"kind {kinds[0]}", "kind"),
-                    "the other rows tell of another number",
-                    f"{found} events, {wanted} by the other rows",
-                )
+                detail = f"{found} events, {wanted} by the other rows"
+                place = evidence.at(end, "event", f"kind {kinds[0]}")
+                place.gap("kind", "the other rows tell of another number", detail)
 
 
 def _wanted(evidence: Evidence, end: str) -> dict[tuple[str, ...], int]:
@@ -52,9 +54,8 @@ def _wanted(evidence: Evidence, end: str) -> dict[tuple[str, ...], int]:
     # A receiver starts once; every later epoch is a rejoin.
     wanted["started", "rejoin"] = epochs
     symbols = evidence.topic(end, "symbol")
-    taken = {row.slot for row in symbols if row.taken}
-    count = evidence.agreement.terms.symbols_per_word
-    if count == 1:
+    if evidence.terms.symbols_per_word == 1:
+        taken = {row.slot for row in symbols if row.taken}
         samples = {row.sample for row in evidence.topic(end, "sample")}
         wanted["erased",] = len(samples - taken)
     if evidence.agreement.link.carries_slots:
@@ -62,13 +63,14 @@ def _wanted(evidence: Evidence, end: str) -> dict[tuple[str, ...], int]:
     return wanted
 
 
-EVENTS = Claim(
-    "events of known kinds",
-    check_events,
-    (("transmitter", "event", ("kind",)), ("receiver", "event", ("kind", "time_s", "sample"))),
+@claim(
+    "differences are differences",
+    ("transmitter", "lockstep_failure", "digest", "peer_digest"),
+    ("receiver", "lockstep_failure", "digest", "peer_digest"),
 )
-COUNTS = Claim(
-    "events as many as what they tell of",
-    check_counts,
-    (("transmitter", "event", ("kind",)), ("receiver", "event", ("kind",))),
-)
+def check_lockstep(evidence: Evidence) -> None:
+    """Two copies that differ are written down as such; a sample that did not differ is not."""
+    for end in evidence.rows:
+        for place, row in evidence.each(end, "lockstep_failure"):
+            if row.digest == row.peer_digest:
+                place.leak("peer_digest", "the digests do not differ")

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from channel.protocol.terms import Terms
-from tenbaud.audit.base import FILED, Claim, Evidence, Findings, Place
+from tenbaud.audit.base import FILED, Evidence, claim
 from tenbaud.replay.rows import KINDS
-
-Filed = Callable[[Any, Terms], int | None]
 
 KEYED = (
     ("transmitter", "tick"),
@@ -22,102 +19,79 @@ KEYED = (
 )
 """Topics whose rows have a key each; that of every row is larger than the one before."""
 
-
 ONCE = ("started", "rejoin_asked", "rejoin", "ended", "erased", "desync", "guard")
 """Kinds of events of which no two are alike."""
 
 
-def check_shape(evidence: Evidence, findings: Findings) -> None:
+def _key_of(end: str, topic: str) -> str:
+    return KINDS[end][topic].channel.fields[0].name
+
+
+@claim("every row is as the nodes write it")
+def check_shape(evidence: Evidence) -> None:
     """Every row has the fields that the node writes, of their types."""
     for end, rows in evidence.rows.items():
         for misfit in rows.misfits:
-            place = Place(end, misfit.topic, misfit.row, misfit.field)
-            findings.gap(place, "this is not what a node writes", misfit.text)
+            place = evidence.at(end, misfit.topic, misfit.row)
+            place.gap(misfit.field, "this is not what a node writes", misfit.text)
         for topic in rows.foreign:
-            findings.gap(Place(end, topic, "every row"), "no node writes this topic")
+            evidence.at(end, topic, "every row").gap("", "no node writes this topic")
 
 
-def check_order(evidence: Evidence, findings: Findings) -> None:
+@claim(
+    "rows in order, none twice",
+    *((end, topic, _key_of(end, topic)) for end, topic in KEYED),
+    ("receiver", "event", "time_s"),
+)
+def check_order(evidence: Evidence) -> None:
     """Keys rise from row to row."""
     for end, topic in KEYED:
-        key = KINDS[end][topic].channel.fields[0].name
+        key = _key_of(end, topic)
         before: int | None = None
-        for row in evidence.topic(end, topic):
-            place = Place(end, topic, f"{key} {row[0]}", key)
+        for place, row in evidence.each(end, topic):
             if before is not None and row[0] == before:
-                findings.leak(place, "it is recorded twice")
+                place.leak(key, "it is recorded twice")
             elif before is not None and row[0] < before:
-                findings.leak(place, "it is out of order", f"after {before}")
+                place.leak(key, "it is out of order", f"after {before}")
             before = row[0]
     for end in evidence.rows:
         earlier: Any = None
-        for event in evidence.topic(end, "event"):
+        for place, event in evidence.each(end, "event"):
             # The transmitter stamps some of its events with the last tick at which it measured.
             if end == "receiver" and earlier is not None and event.time_s < earlier.time_s:
-                place = Place(end, "event", f"time {event.time_s:.3f} s", "time_s")
-                findings.leak(place, "it is out of order", f"after {earlier.time_s:.3f} s")
+                place.leak("time_s", "it is out of order", f"after {earlier.time_s:.3f} s")
             if earlier == event and event.kind in ONCE:
-                findings.leak(Place(end, "event", f"time {event.time_s:.3f} s"), "it is recorded twice")
+                place.leak("", "it is recorded twice")
             earlier = event
 
 
-def check_filed(evidence: Evidence, findings: Findings) -> None:
+@claim(
+    "rows filed under their flight time",
+    *((end, topic, FILED) for end, topics in KINDS.items() for topic in topics),
+)
+def check_filed(evidence: Evidence) -> None:
     """Each row is filed under the flight time that its key stands for."""
-    terms = evidence.agreement.terms
     for end, topics in KINDS.items():
-        for name, kind in topics.items():
-            filed = FILED_UNDER[name]
-            if end == "transmitter" and name == "symbol":
-                filed = _departure
-            topic = evidence.topic(end, name)
-            for row, time_ns in zip(topic.rows, topic.times_ns, strict=True):
-                due = filed(row, terms)
+        for name in topics:
+            times_ns = evidence.topic(end, name).times_ns
+            for (place, row), time_ns in zip(evidence.each(end, name), times_ns, strict=True):
+                due = _filed_under(end, name, row, evidence.terms)
                 # Times are unsigned in the file: what happens before tick 0 is filed at zero.
                 early = name == "event" and row.time_s < 0.0
                 exact = name != "event" or early or row.time_s == time_ns / 1e9
                 if due is not None and (max(0, due) != time_ns or not exact):
-                    place = Place(end, name, f"{kind.channel.fields[0].name} {row[0]}", FILED)
-                    findings.leak(place, "it is filed under another time", f"{time_ns} ns, not {due}")
+                    place.leak(FILED, "it is filed under another time", f"{time_ns} ns, not {due}")
 
 
-def _tick(row: Any, terms: Terms) -> int:
-    return int(row[0]) * terms.tick_ns
-
-
-def _sample(row: Any, terms: Terms) -> int:
-    return int(row[0]) * terms.sample_ns
-
-
-def _departure(row: Any, terms: Terms) -> int | None:
-    # One that was refused is filed under when it was offered, which nothing else says.
-    return None if row.left_ns is None else int(row.left_ns)
-
-
-FILED_UNDER: dict[str, Filed] = {
-    "tick": _tick,
-    "estimate": _tick,
-    "device": _tick,
-    "sample": _sample,
-    "gap": _sample,
-    "epoch": _sample,
-    "lockstep_failure": _sample,
-    "symbol": lambda row, terms: terms.slot_ns(row.slot),
-    "event": lambda row, _terms: round(row.time_s * 1e9),
-}
-
-_ALL = tuple((end, topic) for end, topics in KINDS.items() for topic in topics)
-
-SHAPE = Claim("every row is as the nodes write it", check_shape, ())
-ORDER = Claim(
-    "rows in order, none twice",
-    check_order,
-    (
-        *((end, topic, (KINDS[end][topic].channel.fields[0].name,)) for end, topic in KEYED),
-        ("receiver", "event", ("time_s",)),
-    ),
-)
-FILED_TIME = Claim(
-    "rows filed under their flight time",
-    check_filed,
-    tuple((end, topic, (FILED,)) for end, topic in _ALL),
-)
+def _filed_under(end: str, topic: str, row: Any, terms: Terms) -> int | None:
+    """Return the time of a row in ns; None for a refused symbol, of which nothing else says when."""
+    match topic:
+        case "tick" | "estimate" | "device":
+            return int(row[0]) * terms.tick_ns
+        case "symbol":
+            if end == "receiver":
+                return terms.slot_ns(row.slot)
+            return None if row.left_ns is None else int(row.left_ns)
+        case "event":
+            return round(row.time_s * 1e9)
+    return terms.sample_ns * int(row[0])

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from typing import Any
 
-from tenbaud.audit.base import Claim, Evidence, Findings, Place, is_same
+from tenbaud.audit.base import Evidence, claim, is_same
 from tenbaud.build.ends import guard_settings
 from tenbaud.build.flight import Agreement
 from tenbaud.build.signals import build_encoders
@@ -22,75 +23,72 @@ FOLLOWS: dict[str, tuple[str, ...]] = {
 """State of the guard -> those of the next tick."""
 
 
-def check_ticks(evidence: Evidence, findings: Findings) -> None:
+@claim("ticks at their times", (*TICK, "tick", "time_s", "lateness_ms", "late"))
+def check_ticks(evidence: Evidence) -> None:
     """Each tick at its own time, none missing that the clock did not miss."""
-    terms = evidence.agreement.terms
+    terms, is_virtual = evidence.terms, evidence.agreement.clock == "virtual"
     rows = evidence.topic(*TICK).rows
     missed = 0
-    for before, row in zip([None, *rows], rows, strict=False):
-        place = _place(row)
+    before: Any = None
+    for place, row in evidence.each(*TICK):
         if row.time_s != row.tick * terms.tick_ns / 1e9:
-            findings.leak(place._replace(field="time_s"), "it is not the tick's", f"{row.time_s!r} s")
-        if evidence.agreement.clock == "virtual" and row.lateness_ms != 0.0:
-            findings.leak(place._replace(field="lateness_ms"), "no tick is late on the virtual clock")
+            place.leak("time_s", "it is not the tick's", f"{row.time_s!r} s")
+        if is_virtual and row.lateness_ms != 0.0:
+            place.leak("lateness_ms", "no tick is late on the virtual clock")
         if before is not None and row.tick > before.tick + 1:
             missed += row.tick - before.tick - 1
-            if evidence.agreement.clock == "virtual":
-                lacking = _place(before, "tick")._replace(row=f"tick {before.tick + 1}")
-                findings.gap(lacking, "it is missing", f"the next one is {row.tick}")
-    end = evidence.end("transmitter")
-    if end is None or not end.complete or not rows:
+            if is_virtual:
+                lacking = evidence.at(*TICK, f"tick {before.tick + 1}")
+                lacking.gap("tick", "it is missing", f"the next one is {row.tick}")
+        before = row
+    if not evidence.is_whole("transmitter") or not rows:
         return
+    every = evidence.at(*TICK, "all ticks")
     summary = evidence.summary("transmitter")
-    said = summary.get("ticks_missed", 0 if evidence.agreement.clock == "virtual" else None)
+    said = summary.get("ticks_missed", 0 if is_virtual else None)
     if said is not None and missed > said:
-        findings.gap(
-            Place(*TICK, "all ticks", "tick"),
-            "more are missing than the clock missed",
-            f"{missed} missing, {said} missed",
-        )
+        detail = f"{missed} missing, {said} missed"
+        every.gap("tick", "more are missing than the clock missed", detail)
     if "duration_s" in summary and "ticks_missed" not in summary:
         flown = round(summary["duration_s"] * 1e9) // terms.tick_ns
         if flown != len(rows):
-            findings.gap(
-                Place(*TICK, "all ticks", "tick"),
-                "not all that were flown are recorded",
-                f"{len(rows)} of {flown}",
-            )
+            every.gap("tick", "not all that were flown are recorded", f"{len(rows)} of {flown}")
     late = sum(row.late for row in rows)
     if "commands_late" in summary and summary["commands_late"] != late:
-        findings.leak(
-            Place(*TICK, "all ticks", "late"),
-            "the summary's commands_late is another",
-            f"{summary['commands_late']} said, {late} recorded",
-        )
+        detail = f"{summary['commands_late']} said, {late} recorded"
+        every.leak("late", "the summary's commands_late is another", detail)
 
 
-def check_commanded(evidence: Evidence, findings: Findings) -> None:
+@claim("commands as the receiver gave them", (*TICK, "commanded"))
+def check_commanded(evidence: Evidence) -> None:
     """A tick's command is the receiver's, or the one that its epoch holds at the beginning."""
     expected = evidence.expected
     if expected is None:
         return
     decided = evidence.topic("receiver", "tick").by_key()
-    for row in evidence.topic(*TICK):
+    covered = range(0)
+    if evidence.is_whole("receiver") and evidence.epochs:
+        first = evidence.epochs[0].start.sample * evidence.terms.ticks_per_sample
+        covered = range(first, max(expected.commands, default=-1) + 1)
+    for place, row in evidence.each(*TICK):
         if row.commanded is None:
             continue
         given = [expected.held[row.tick]] if row.tick in expected.held else []
         if row.tick in expected.commands:
-            given.append(expected.commands[row.tick]["command"])
+            given.append(expected.commands[row.tick].command)
         if row.tick in decided:
             given.append(decided[row.tick].command)
-        if not any(is_same(row.commanded, one) for one in given) and (
-            given or _is_covered(evidence, row.tick)
-        ):
-            findings.leak(
-                _place(row, "commanded"),
-                "the receiver commanded something else",
-                f"{row.commanded}, not {' or '.join(map(str, given)) or 'any'}",
-            )
+        if not any(is_same(row.commanded, one) for one in given) and (given or row.tick in covered):
+            detail = f"{row.commanded}, not {' or '.join(map(str, given)) or 'any'}"
+            place.leak("commanded", "the receiver commanded something else", detail)
 
 
-def check_guard(evidence: Evidence, findings: Findings) -> None:
+@claim(
+    "voltages as the guard let them pass",
+    (*TICK, "commanded", "applied", "guard", "late"),
+    ("transmitter", "event", "time_s", "kind"),
+)
+def check_guard(evidence: Evidence) -> None:
     """The guard's states follow each other as they can, and each lets its own voltage pass.
 
     When the watchdog trips is the guard's own business; that it did is in its state.
@@ -98,44 +96,38 @@ def check_guard(evidence: Evidence, findings: Findings) -> None:
     config = evidence.agreement.config
     by_guard = config.transmitter.rig != "replay" and not config.transmitter.dry_run
     told = {round(row.time_s * 1e9) for row in evidence.topic("transmitter", "event")}
-    tick_ns = evidence.agreement.terms.tick_ns
+    tick_ns = evidence.terms.tick_ns
     passed = _Passed(evidence.agreement)
     changes: list[int] = []
-    for row in evidence.topic(*TICK):
-        place = _place(row, "guard")
+    for place, row in evidence.each(*TICK):
         now_ns = row.tick * tick_ns
         fault = passed.take(row)
         if fault:
-            findings.leak(place, fault, row.guard)
+            place.leak("guard", fault, row.guard)
             return
         if by_guard and not is_same(passed.volts, row.applied):
-            findings.leak(
-                place._replace(field="applied"),
-                "it is not what the guard lets pass",
-                f"recorded {row.applied}, computed {passed.volts}",
-            )
+            detail = f"recorded {row.applied}, computed {passed.volts}"
+            place.leak("applied", "it is not what the guard lets pass", detail)
         if passed.changed and row.guard != "running":
             changes.append(now_ns)
         if passed.armed_again and not {now_ns, now_ns - tick_ns} & told:
-            findings.gap(place, "no event tells that it was armed again", row.guard)
+            place.gap("guard", "no event tells that it was armed again", row.guard)
         if row.late and (row.commanded is not None or passed.stays_stopped):
-            findings.leak(place._replace(field="late"), "no command was owed, or it had come")
-    _check_told(evidence, changes, findings)
+            place.leak("late", "no command was owed, or it had come")
+    _check_told(evidence, changes)
 
 
-def _check_told(evidence: Evidence, changes: list[int], findings: Findings) -> None:
+def _check_told(evidence: Evidence, changes: list[int]) -> None:
     """Each change of the guard, but that to passing commands, is one event, and no other is."""
     guards = [row for row in evidence.topic("transmitter", "event") if row.kind == "guard"]
     told = Counter(round(row.time_s * 1e9) for row in guards)
     changed = Counter(changes)
-    complete = evidence.rows["transmitter"].complete if guards or changes else True
+    complete = evidence.is_whole("transmitter")
     for now_ns in sorted(told.keys() | changed.keys()):
         if told[now_ns] != changed[now_ns] and (complete or now_ns < max(changes, default=0)):
-            findings.gap(
-                Place("transmitter", "event", f"time {now_ns / 1e9:.3f} s", "kind"),
-                "the guard's state in the ticks tells of another number of changes",
-                f"{told[now_ns]} events, {changed[now_ns]} changes",
-            )
+            what = "the guard's state in the ticks tells of another number of changes"
+            place = evidence.at("transmitter", "event", f"time {now_ns / 1e9:.3f} s")
+            place.gap("kind", what, f"{told[now_ns]} events, {changed[now_ns]} changes")
 
 
 class _Passed:
@@ -183,57 +175,19 @@ class _Passed:
         return ""
 
 
-def _number(angle: float | None) -> float:
-    return float("nan") if angle is None else angle
-
-
-def check_angles(evidence: Evidence, findings: Findings) -> None:
+@claim("angles as the encoder reads them", (*TICK, "measured", "true"))
+def check_angles(evidence: Evidence) -> None:
     """On a simulated rig, what the encoder reads is the true angle, rounded."""
-    config = evidence.agreement.config.transmitter
-    if config.rig != "simulated":
+    agreement = evidence.agreement
+    if agreement.config.transmitter.rig != "simulated":
         return
-    encoders = build_encoders(evidence.agreement.config, evidence.agreement.signals)
-    for row in evidence.topic(*TICK):
+    encoders = build_encoders(agreement.config, agreement.signals)
+    for place, row in evidence.each(*TICK):
         if row.true is None:
-            findings.gap(_place(row, "true"), "a simulated rig knows its angle")
+            place.gap("true", "a simulated rig knows its angle")
             continue
-        pairs = zip(encoders, row.true, strict=False)
-        read = tuple(encoder.read(_number(one))[1] for encoder, one in pairs)
+        true = [math.nan if one is None else one for one in row.true]
+        read = tuple(encoder.read(one)[1] for encoder, one in zip(encoders, true, strict=False))
         if not is_same(read, row.measured):
-            findings.leak(
-                _place(row, "measured"),
-                "the encoder reads another angle there",
-                f"recorded {row.measured}, computed {read}",
-            )
-
-
-def _is_covered(evidence: Evidence, tick: int) -> bool:
-    """Whether the receiver's recording covers a tick."""
-    if (
-        evidence.end("receiver") is None
-        or not evidence.epochs
-        or not evidence.rows["receiver"].complete
-    ):
-        return False
-    first = evidence.epochs[0].start.sample * evidence.agreement.terms.ticks_per_sample
-    last = max(evidence.expected.commands, default=-1) if evidence.expected else -1
-    return first <= tick <= last
-
-
-def _place(row: Any, field: str = "") -> Place:
-    return Place(*TICK, f"tick {row.tick}", field)
-
-
-TICKS = Claim(
-    "ticks at their times", check_ticks, ((*TICK, ("tick", "time_s", "lateness_ms", "late")),)
-)
-COMMANDED = Claim("commands as the receiver gave them", check_commanded, ((*TICK, ("commanded",)),))
-GUARD = Claim(
-    "voltages as the guard let them pass",
-    check_guard,
-    (
-        (*TICK, ("commanded", "applied", "guard", "late")),
-        ("transmitter", "event", ("time_s", "kind")),
-    ),
-)
-ANGLES = Claim("angles as the encoder reads them", check_angles, ((*TICK, ("measured", "true")),))
+            detail = f"recorded {row.measured}, computed {read}"
+            place.leak("measured", "the encoder reads another angle there", detail)

@@ -3,133 +3,99 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
 
-from tenbaud.audit.base import Claim, Evidence, Findings, Place, is_same
+from tenbaud.audit.base import Evidence, claim
 from transmitter.metrics.gap import GAP_EVERY_S
 
 DIFFERS = "it is not what the symbols give"
-MISSING = "it is missing"
-ORPHAN = "no sample that was recorded brings it"
+BOTH = "recorded {}, computed {}"
 
 SAMPLE_FIELDS = ("word", "range", "state", "coder", "digest")
 ESTIMATE_FIELDS = ("coded_state", "live_state")
 COMMAND_FIELDS = ("reference", "live_state", "command")
 
 
-def check_samples(evidence: Evidence, findings: Findings) -> None:
+@claim(
+    "states of both ends follow from the words",
+    ("transmitter", "sample", *SAMPLE_FIELDS, "peer_digest", "about"),
+    ("receiver", "sample", *SAMPLE_FIELDS),
+)
+def check_samples(evidence: Evidence) -> None:
     """Words, ranges, states and digests of either end."""
-    expected = evidence.expected
-    if expected is None:
+    if evidence.expected is None:
         return
     for end in evidence.rows:
-        for row in evidence.topic(end, "sample"):
-            wanted = expected.samples.get(row.sample)
-            if wanted is None:
-                continue  # flown with another receiver, or after the receiver's recording was cut
-            fields: tuple[str, ...] = SAMPLE_FIELDS
-            if end == "transmitter":
+        fields = SAMPLE_FIELDS if end == "receiver" else (*SAMPLE_FIELDS, "peer_digest")
+        for place, row in evidence.each(end, "sample"):
+            # None: flown with another receiver, or after the receiver's recording was cut.
+            if (wanted := evidence.expected.samples.get(row.sample)) is not None:
+                place.compare(fields, row, wanted, DIFFERS, BOTH)
                 # Recordings of before do not say what a word was about.
-                says = row.about is not None or row.word is None
-                fields = (*fields, "peer_digest", *(("about",) if says else ()))
-            _compare(Place(end, "sample", f"sample {row.sample}"), row, wanted, fields, findings)
+                if end == "transmitter" and (row.about is not None or row.word is None):
+                    place.compare(("about",), row, wanted, DIFFERS, BOTH)
 
 
-def check_estimates(evidence: Evidence, findings: Findings) -> None:
+@claim(
+    "predicted states of each tick follow from the words", ("transmitter", "estimate", *ESTIMATE_FIELDS)
+)
+def check_estimates(evidence: Evidence) -> None:
     """The transmitter's estimates: one for each tick of each sample that it confirmed."""
-    expected = evidence.expected
-    if expected is None or evidence.end("transmitter") is None:
+    if evidence.expected is None or "transmitter" not in evidence.rows:
         return
-    count = evidence.agreement.terms.ticks_per_sample
+    count = evidence.terms.ticks_per_sample
     confirmed = {row.sample for row in evidence.topic("transmitter", "sample")}
     ticks = (k * count + tick for k in sorted(confirmed) for tick in range(count))
-    _check_keys(evidence, ("transmitter", "estimate", "tick"), ticks, findings)
-    for row in evidence.topic("transmitter", "estimate"):
-        wanted = expected.estimates.get(row.tick)
-        place = Place("transmitter", "estimate", f"tick {row.tick}")
-        if wanted is not None:
-            _compare(place, row, wanted, ESTIMATE_FIELDS, findings)
+    _check_keys(evidence, ("transmitter", "estimate", "tick"), ticks)
+    for place, row in evidence.each("transmitter", "estimate"):
+        if (wanted := evidence.expected.estimates.get(row.tick)) is not None:
+            place.compare(ESTIMATE_FIELDS, row, wanted, DIFFERS, BOTH)
 
 
-def check_commands(evidence: Evidence, findings: Findings) -> None:
+@claim("commands follow from the states and the set-point", ("receiver", "tick", *COMMAND_FIELDS))
+def check_commands(evidence: Evidence) -> None:
     """The receiver's commands, its predicted states and its references: all ticks of all samples."""
-    expected = evidence.expected
-    if expected is None or evidence.end("receiver") is None:
+    if evidence.expected is None or "receiver" not in evidence.rows:
         return
-    _check_keys(evidence, ("receiver", "tick", "tick"), expected.commands, findings)
-    for row in evidence.topic("receiver", "tick"):
-        wanted = expected.commands.get(row.tick)
-        place = Place("receiver", "tick", f"tick {row.tick}")
-        if wanted is not None:
-            _compare(place, row, wanted, COMMAND_FIELDS, findings)
+    _check_keys(evidence, ("receiver", "tick", "tick"), evidence.expected.commands)
+    for place, row in evidence.each("receiver", "tick"):
+        if (wanted := evidence.expected.commands.get(row.tick)) is not None:
+            place.compare(COMMAND_FIELDS, row, wanted, DIFFERS, BOTH)
 
 
-def check_gauge(evidence: Evidence, findings: Findings) -> None:
+@claim("the gauge was read", ("transmitter", "gap", "sample"))
+def check_gauge(evidence: Evidence) -> None:
     """The gauge is read once a second, at confirmed samples, if there is one."""
     if not evidence.topic("transmitter", "gap").recorded:
         return
-    every = max(1, round(GAP_EVERY_S * 1e9 / evidence.agreement.terms.sample_ns))
+    every = max(1, round(GAP_EVERY_S * 1e9 / evidence.terms.sample_ns))
     samples = (row.sample for row in evidence.topic("transmitter", "sample"))
     due = [sample for sample in samples if (sample + 1) % every == 0]
-    _check_keys(evidence, ("transmitter", "gap", "sample"), due, findings)
+    _check_keys(evidence, ("transmitter", "gap", "sample"), due)
 
 
-def check_steering(evidence: Evidence, findings: Findings) -> None:
+@claim("a set-point moved by hand is an event")
+def check_steering(evidence: Evidence) -> None:
     """A set-point that is not the configuration's was given by hand, and that is an event."""
     if evidence.steps and not evidence.is_steered:
         tick, angle = evidence.steps[0]
-        place = Place("receiver", "tick", f"tick {tick}", "reference")
-        findings.leak(place, "nobody was recorded to have moved the set-point", f"{angle!r} rad")
+        place = evidence.at("receiver", "tick", f"tick {tick}")
+        place.leak("reference", "nobody was recorded to have moved the set-point", f"{angle!r} rad")
 
 
-def _check_keys(
-    evidence: Evidence, where: tuple[str, str, str], keys: Iterable[int], findings: Findings
-) -> None:
+def _check_keys(evidence: Evidence, where: tuple[str, str, str], keys: Iterable[int]) -> None:
     """Each of these keys has a row, and no other has; a recording that was cut may end early."""
     end, topic, name = where
     found = set(evidence.topic(end, topic).by_key())
     wanted = set(keys)
-    complete = evidence.rows[end].complete
-    terms = evidence.agreement.terms
-    count, lead = terms.ticks_per_sample, terms.lead_ticks if end == "receiver" else 0
+    complete = evidence.is_whole(end)
+    count, lead = evidence.terms.ticks_per_sample, 0
+    if end == "receiver":
+        lead = evidence.terms.lead_ticks
     last = max(found, default=-1)
     for key in sorted(wanted - found):
         if complete or key < last:
-            findings.gap(Place(end, topic, f"{name} {key}", name), MISSING)
-    for key in sorted(found - wanted):
-        if complete:
-            sample = f"sample {(key - lead) // count}" if name == "tick" else ""
-            findings.leak(Place(end, topic, f"{name} {key}", name), ORPHAN, sample)
-
-
-def _compare(
-    place: Place, row: Any, wanted: dict[str, Any], fields: Iterable[str], findings: Findings
-) -> None:
-    for name in fields:
-        recorded, computed = getattr(row, name), wanted[name]
-        if not is_same(recorded, computed):
-            findings.leak(
-                place._replace(field=name), DIFFERS, f"recorded {recorded}, computed {computed}"
-            )
-
-
-SAMPLES = Claim(
-    "states of both ends follow from the words",
-    check_samples,
-    (
-        ("transmitter", "sample", (*SAMPLE_FIELDS, "peer_digest", "about")),
-        ("receiver", "sample", SAMPLE_FIELDS),
-    ),
-)
-ESTIMATES = Claim(
-    "predicted states of each tick follow from the words",
-    check_estimates,
-    (("transmitter", "estimate", ESTIMATE_FIELDS),),
-)
-COMMANDS = Claim(
-    "commands follow from the states and the set-point",
-    check_commands,
-    (("receiver", "tick", COMMAND_FIELDS),),
-)
-GAUGE = Claim("the gauge was read", check_gauge, (("transmitter", "gap", ("sample",)),))
-STEERING = Claim("a set-point moved by hand is an event", check_steering, ())
+            evidence.at(end, topic, f"{name} {key}").gap(name, "it is missing")
+    for key in sorted(found - wanted) if complete else ():
+        sample = f"sample {(key - lead) // count}" if name == "tick" else ""
+        place = evidence.at(end, topic, f"{name} {key}")
+        place.leak(name, "no sample that was recorded brings it", sample)

@@ -11,10 +11,15 @@ from tenbaud.build.rig import build_axes, build_plant, quarc_commands, quarc_fie
 from tenbaud.build.signals import configured_signals
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
-from transmitter.rigs.emulator.device import Body, EmulatedDevice, RecordedBody, SimulatedBody
+from transmitter.rigs.emulator.device import (
+    Body,
+    EmulatedDevice,
+    RecordedBody,
+    RigEmulator,
+    SimulatedBody,
+)
 from transmitter.rigs.emulator.faults import Faults
 from transmitter.rigs.emulator.line import parse_line
-from transmitter.rigs.emulator.loop import RigEmulator
 from transmitter.rigs.emulator.speech import (
     AsciiSpeech,
     CobsSpeech,

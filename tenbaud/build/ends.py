@@ -11,12 +11,12 @@ from channel.codec.codec import Codec
 from channel.codec.models.linear import LinearModel
 from channel.codec.models.pitch import PitchModel
 from channel.line.clocks import SkewedClock
-from channel.line.impairments import Direction, ImpairedLine, SymbolWire
+from channel.line.impairments import Direction, ImpairedLine
 from channel.line.line import CleanLine, Downlink, Line
 from channel.line.uplink import Uplink, bits_per_symbol
 from channel.protocol.recording import Recorder
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
-from channel.protocol.wire import Wire
+from channel.protocol.wire import SymbolWire, Wire
 from plant_sim.encoder import Encoder
 from receiver.controllers.base import Controller
 from receiver.endpoint import ReceiverEndpoint, SteppedEndpoint
@@ -68,7 +68,7 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
     return TransmitterNode(
         session,
         build_rig(config, agreement.parts.plant, agreement.signals),
-        build_guard(agreement),
+        Guard(terms.limits, guard_settings(agreement)),
         scores,
         recorder,
         rearm_ticks,
@@ -187,11 +187,6 @@ def _check_command(config: FlightConfig, controller: Controller) -> None:
             f"receiver.controller {name}: command(0, {model.initial()}) must return "
             f"{model.input_size} finite value(s), one for each input of the model; it returned {volts}"
         )
-
-
-def build_guard(agreement: Agreement) -> Guard:
-    """Return limiter and watchdog beside the motors."""
-    return Guard(agreement.terms.limits, guard_settings(agreement))
 
 
 def guard_settings(agreement: Agreement) -> GuardSettings:

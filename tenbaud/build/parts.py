@@ -11,7 +11,7 @@ import inspect
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from channel.codec.codec import Codec, Coder, Model, Vector
+from channel.codec.codec import Codec, Coder, Model
 from channel.codec.signals import signals_of
 from channel.codec.words import ERASED
 from plant_sim.plant import Plant, with_measured
@@ -71,7 +71,7 @@ def check_codec(where: str, codec: Codec) -> None:
         signals_of(codec.model)
         command = (0.0,) * codec.model.input_size
         state = codec.initial()
-        word = codec.encode(state, _start_of(codec))
+        word = codec.encode(state, codec.predicted(state))
         codec.coder.alphabet.word_number(word)
         for consumed in (word, ERASED):
             before = len(state.model), len(state.coder)
@@ -82,10 +82,6 @@ def check_codec(where: str, codec: Codec) -> None:
         codec.coder.ranges(state.coder)[0]
     except Exception as error:  # it is the user's code, and anything may be wrong in it
         raise PartError(f"{where} cannot run one sample: {type(error).__name__}: {error}") from error
-
-
-def _start_of(codec: Codec) -> Vector:
-    return codec.predicted(codec.initial())
 
 
 def _attribute_faults(part: object, protocol: type) -> list[str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import sys
 import time
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from tenbaud.build.rig import build_device
@@ -52,10 +52,6 @@ class RigCheck:
     axes: list[AxisCheck] = field(default_factory=list)
     counts: dict[str, Any] = field(default_factory=dict)
     problems: list[str] = field(default_factory=list)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return everything, for `--json`."""
-        return asdict(self)
 
 
 class _Watcher:

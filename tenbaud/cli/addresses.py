@@ -9,8 +9,10 @@ import typer
 from tenbaud.cli import options
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from channel.links.base import Role
-    from channel.links.security import Part, Security
+    from channel.links.security import Credentials, Part, Security
     from tenbaud.config.schema import FlightConfig
     from tenbaud.flight.ends import Endpoints
 
@@ -69,8 +71,6 @@ def endpoints_of(
 def security_of(role: Role, addresses: options.Addresses, session: str) -> Security | None:
     """Return the credentials of `--keys` with all who are invited, or None without keys."""
     from channel.links.security import Invited, Security
-    from tenbaud.keys.authority import NodeRole
-    from tenbaud.keys.store import expiry_warning, usable
 
     if addresses.keys is None:
         if addresses.peer or addresses.viewer:
@@ -81,13 +81,22 @@ def security_of(role: Role, addresses: options.Addresses, session: str) -> Secur
         raise typer.BadParameter(
             f"--keys without --peer refuses every node; name the {other}'s certificate: --peer NAME"
         )
-    node = usable(addresses.keys, NodeRole(role))
-    warning = expiry_warning(node)
-    if warning is not None:
-        typer.echo(f"tenbaud: warning: {warning}", err=True)
+    own_credentials = credentials_of(addresses.keys, role)
     invited = []
     for peer in addresses.peer:
         name, _, own = peer.partition("=")
         invited.append(Invited(name, other, own or session))
     invited += [Invited(name, "viewer", session) for name in addresses.viewer or ()]
-    return Security(node.credentials, tuple(invited))
+    return Security(own_credentials, tuple(invited))
+
+
+def credentials_of(keys: Path, role: str) -> Credentials:
+    """Return the credentials in a key folder of this role; warn of those that expire soon."""
+    from tenbaud.keys.authority import NodeRole
+    from tenbaud.keys.store import expiry_warning, usable
+
+    node = usable(keys, NodeRole(role))
+    warning = expiry_warning(node)
+    if warning is not None:
+        typer.echo(f"tenbaud: warning: {warning}", err=True)
+    return node.credentials

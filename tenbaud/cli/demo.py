@@ -109,7 +109,6 @@ def _fly_all(
     view_options: ViewOptions | None,
     pace: float | None,
 ) -> int:
-    from tenbaud.flight.ends import write_json
     from tenbaud.flight.report import show_summaries
     from tenbaud.recording.folder import RunFolder, create_run_folder
 
@@ -124,7 +123,7 @@ def _fly_all(
         results.append(result)
         folders.append(folder)
         if as_json:
-            write_json(result.summary)
+            options.print_json(result.summary)
         for message in result.messages:
             typer.echo(message, err=True)
         if result.code:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_module
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -70,7 +69,7 @@ def floor(
         raise typer.BadParameter(f"model.kind = {section.kind!r} has no floor: it describes no plant")
     found = _known(floors, described, rate, period)
     if json:
-        typer.echo(json_module.dumps(asdict(found), indent=2))
+        options.print_json(asdict(found))
     else:
         densities = ", ".join(f"{density:g}" for density in described.densities)
         typer.echo(_text(found, outputs, densities))

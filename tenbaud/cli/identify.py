@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tenbaud.cli import options
+from tenbaud.cli.spread import spread
 
 if TYPE_CHECKING:
     from plant_sim.identification.pitch import PitchSettings
@@ -44,13 +45,13 @@ Damping = Annotated[float, typer.Option(help="Damping rho of the filters.", min=
 Forgetting = Annotated[float, typer.Option(help="alpha of (10), 1/s.", min=0.0, max=100.0)]
 
 
+@spread
 def identify(
+    plant: options.PlantOptions,
     source: Annotated[
         Path | None,
         typer.Argument(help="Folder of a run, or a CSV log; not given: the simulated rig is excited."),
     ] = None,
-    preset: options.Preset = None,
-    config: options.ConfigFile = None,
     duration: options.Duration = None,
     excitation: Annotated[
         list[str] | None,
@@ -59,13 +60,6 @@ def identify(
             "chirp:START,END,DURATION,MAGNITUDE in Hz, s, V; repeatable. Not given: two square waves."
         ),
     ] = None,
-    mismatch: Annotated[
-        float | None, typer.Option(help="Model mismatch of the simulated plant, 0.1 for 10 %.")
-    ] = None,
-    disturbance: Annotated[
-        str | None, typer.Option(help='Torque on the plant, such as "q=2e-3,step=0.5@30".')
-    ] = None,
-    seed: options.Seed = None,
     columns: Annotated[
         str, typer.Option(help="Of a log: angle=NAME,front=NAME,rear=NAME,index=NAME,time=NAME.")
     ] = "",
@@ -80,8 +74,6 @@ def identify(
     bandwidth: Bandwidth = 1.0,
     damping: Damping = 0.7,
     forgetting: Forgetting = 0.01,
-    settings: options.Settings = None,
-    allow_code: options.AllowCode = False,
     out: options.Out = None,
     json: options.AsJson = False,
 ) -> None:
@@ -93,13 +85,9 @@ def identify(
     """
     from dataclasses import replace
 
-    from tenbaud.config.load import load_config
     from tenbaud.identify.run import run, settings_of
 
-    changed = options.overrides(
-        seed=seed, mismatch=mismatch, disturbance=disturbance, settings=settings
-    )
-    loaded = load_config(preset, config, changed, allow_code=allow_code)
+    loaded = plant.load()
     records = _records(loaded, source, excitation, duration, columns, unit.value)
     if start > 0.0 or end is not None:
         records = [(name, record.part(start, end or 1e9)) for name, record in records]
@@ -165,10 +153,7 @@ def _write(
         name = "identified.toml" if index == 0 else f"identified-{index + 1}.toml"
         write_config(folder / name, config, one, filters)
     if as_json:
-        import json
-        import sys
-
-        sys.stdout.write(json.dumps([_summary(one) for one in found], indent=2) + "\n")
+        options.print_json([_summary(one) for one in found])
     else:
         _show(found)
         typer.echo(f"written to {folder}; fly with it: --config {folder / 'identified.toml'}")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import gc
 import json
+import math
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,18 +21,11 @@ if TYPE_CHECKING:
     from tenbaud.flight.summary import Summary
 
 
-@dataclass(frozen=True, slots=True)
-class Many:
-    """`--sessions` and its options."""
-
-    sessions: str
-    configs: Path | None
-    rigs_max: int
-    flights: int | None
-
-
 def serve(
-    many: Many, node: options.NodeOptions, addresses: options.Addresses, changed: dict[str, Any]
+    many: options.ManyOptions,
+    node: options.NodeOptions,
+    addresses: options.Addresses,
+    changed: dict[str, Any],
 ) -> None:
     """Serve until interrupted, or until enough flights have ended; see `docs/many-rigs.md`."""
     from channel.links.zenoh.config import SESSIONS_MAX
@@ -49,23 +42,20 @@ def serve(
     from tenbaud.flight.trouble import Certificate
     from tenbaud.recording.folder import create_run_folder
 
+    sessions, most = many.sessions or "", math.inf if many.flights is None else many.flights
     agreement_of = agreements(node.preset, node.config, many.configs, changed, node.clock.value)
     common = agreement_of("")
     if not common.link.serves_many:
         raise typer.BadParameter("--sessions needs Zenoh; other links have one rig at their other end")
     check_parts(common.config)
-    where = endpoints_of("receiver", addresses, common.config, sessions=many.sessions)
+    where = endpoints_of("receiver", addresses, common.config, sessions=sessions)
     places = ", ".join(where.listen + where.connect + where.router)
+    connections_max = max(SESSIONS_MAX, 2 * many.rigs_max)
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     with (
         StopFlag() as stop,
         refusals(where) as refused,
-        ZenohHub(
-            many.sessions,
-            **where.node(),
-            connections_max=max(SESSIONS_MAX, 2 * many.rigs_max),
-            should_stop=stop,
-        ) as hub,
+        ZenohHub(sessions, **where.node(), connections_max=connections_max, should_stop=stop) as hub,
     ):
         certificate = Certificate(where.security)
         root = create_run_folder(None, "receiver-many", node.out)
@@ -73,7 +63,7 @@ def serve(
         host = ManyHost(hub, agreement_of, root, many.rigs_max, lambda text: lines[-1](text))
         service = ManyService(hub, host)
         lines[-1](
-            f"tenbaud {common.identity.version} receiver of {many.sessions}  config "
+            f"tenbaud {common.identity.version} receiver of {sessions}  config "
             f"{common.identity.config_digest.hex()[:12]}  numerics "
             f"{common.identity.numerics_probe.hex()}\n"
             f"  at {places}, recording below {root}"
@@ -82,17 +72,17 @@ def serve(
         gc.collect()
         gc.freeze()
         try:
-            with ManyStatus(service, many.sessions, shown=not node.json) as status:
+            with ManyStatus(service, sessions, shown=not node.json) as status:
                 lines.append(status.tell)
-                service.run(lambda: stop() or certificate.expired() or _enough(host, many.flights))
+                service.run(lambda: stop() or certificate.expired() or len(host.summaries) >= most)
         finally:
             lines[1:] = []
             host.close()
-    summary = _summary(host, service.lateness.percentile_ms, many.sessions)
+    summary = _summary(host, service.lateness.percentile_ms, sessions)
     summary["turned_away"] = dict(refused + hub.counts.refused)
     write_whole(root / "summary.json", json.dumps(summary, indent=2) + "\n")
     if node.json:
-        sys.stdout.write(json.dumps(summary, indent=2) + "\n")
+        options.print_json(summary)
     else:
         _show(host.summaries, root)
     if certificate.expired() and not stop.raised:
@@ -129,10 +119,6 @@ def agreements(
         return known[own][1]
 
     return agreement_of
-
-
-def _enough(host: ManyHost, flights: int | None) -> bool:
-    return flights is not None and len(host.summaries) >= flights
 
 
 def _summary(host: ManyHost, late_ms: Callable[[float], float | None], sessions: str) -> Summary:

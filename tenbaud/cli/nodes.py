@@ -24,9 +24,7 @@ def transmit(
     seed: options.Seed = None,
     rig: options.Rig = None,
     dry_run: options.DryRun = False,
-    mismatch: Annotated[
-        float | None, typer.Option(help="Model mismatch of the simulated plant, 0.1 for 10 %.")
-    ] = None,
+    mismatch: options.Mismatch = None,
     disturbance: options.Disturbance = None,
     on_desync: options.OnDesync = None,
     pace: options.Pace = None,
@@ -59,15 +57,12 @@ def transmit(
 def receive(
     node: options.NodeOptions,
     addresses: options.Addresses,
+    rigs: options.ManyOptions,
     rig: Annotated[
         str | None,
         typer.Option(help="replay:FILE when the transmitter replays: its voltages are used."),
     ] = None,
     take_over: options.TakeOver = False,
-    sessions: options.Sessions = None,
-    configs: options.Configs = None,
-    rigs_max: options.RigsMax = 100,
-    flights: options.Flights = None,
 ) -> None:
     """Run the controller node: estimates from the bits, commands back to the motors.
 
@@ -82,8 +77,8 @@ def receive(
     [dim]tenbaud receive --sessions 'rig/*' --configs rigs/[/dim]
     """
     changed = node.changes(rig=rig, sabotaged_end="receiver")
-    if sessions is None:
-        if configs is not None or flights is not None:
+    if rigs.sessions is None:
+        if rigs.configs is not None or rigs.flights is not None:
             raise typer.BadParameter("--configs and --flights go with --sessions, the names to serve")
         _run("receiver", node, addresses, changed, take_over=take_over)
         return
@@ -98,7 +93,7 @@ def receive(
             "--telemetry and --allow-control are for one rig's flight; among many --sessions the "
             "transmitters have telemetry of their own"
         )
-    many.serve(many.Many(sessions, configs, rigs_max, flights), node, addresses, changed)
+    many.serve(rigs, node, addresses, changed)
 
 
 def _run(
@@ -141,7 +136,7 @@ def _run(
     draw = role == "transmitter" and bool(summary["samples"])
     problems = write_up(folder, config, summary, draw) if whole else []
     if node.json:
-        ends.write_json(summary)
+        options.print_json(summary)
     elif whole and summary["samples"]:
         from tenbaud.flight.report import show_summaries
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tenbaud.cli import rigs
+
+if TYPE_CHECKING:
+    from tenbaud.config.schema import FlightConfig
 
 
 class ClockOption(StrEnum):
@@ -63,33 +66,6 @@ Settings = Annotated[
     list[str] | None,
     typer.Option("--set", help="Any field, such as --set coder.window_signs=3; repeatable."),
 ]
-Session = Annotated[
-    str | None, typer.Option(help="Session name; the same at both ends.", show_default=False)
-]
-Sessions = Annotated[
-    str | None,
-    typer.Option(
-        help="Serve every session whose name matches, such as 'rig/*', in this one process.",
-        show_default=False,
-    ),
-]
-Configs = Annotated[
-    Path | None,
-    typer.Option(
-        help="With --sessions: folder of files for single sessions, rig/7.toml for rig/7.",
-        show_default=False,
-    ),
-]
-RigsMax = Annotated[
-    int,
-    typer.Option(help="With --sessions: maximum number of simultaneous flights.", min=1, max=100_000),
-]
-Flights = Annotated[
-    int | None,
-    typer.Option(
-        help="With --sessions: end after this number of flights.", min=1, max=10**9, show_default=False
-    ),
-]
 Listen = Annotated[list[str] | None, typer.Option(help="Zenoh endpoint to listen on; repeatable.")]
 Connect = Annotated[list[str] | None, typer.Option(help="Zenoh endpoint to connect to; repeatable.")]
 Mismatches = Annotated[
@@ -101,25 +77,9 @@ Mismatches = Annotated[
         show_default=False,
     ),
 ]
-Link = Annotated[
-    str | None,
-    typer.Option(
-        help="zenoh, serial with --port, or a kind from an installed package.", show_default=False
-    ),
-]
-DemoLink = Annotated[
-    str | None,
-    typer.Option(
-        help="zenoh: two processes; serial: two processes and an emulated line between them; memory: "
-        "both ends in this process."
-    ),
-]
-Port = Annotated[
-    str | None,
-    typer.Option(
-        help="Serial port of this end: /dev/ttyUSB0, COM3, socket://HOST:PORT, rfc2217://HOST:PORT.",
-        show_default=False,
-    ),
+Mismatch = Annotated[
+    float | None,
+    typer.Option(help="Model mismatch of the simulated plant, 0.1 for 10 %.", show_default=False),
 ]
 LineRate = Annotated[
     int | None, typer.Option(help="Bits per second on the serial line (115200).", show_default=False)
@@ -165,51 +125,11 @@ Insecure = Annotated[
         help="Allow addresses beyond this machine without encryption or authentication.",
     ),
 ]
-Keys = Annotated[
-    Path | None,
-    typer.Option(help="This node's key folder (`tenbaud keys`): TLS, and only named peers."),
-]
-Peer = Annotated[
-    list[str] | None,
-    typer.Option(
-        help="With --keys: certificate name accepted at the other end; behind a router the router's "
-        "name. Repeatable. With --sessions, NAME=SESSION restricts it to one session."
-    ),
-]
-Viewer = Annotated[
-    list[str] | None,
-    typer.Option(help="With --keys: certificate name that may watch but not send. Repeatable."),
-]
-Router = Annotated[
-    list[str] | None,
-    typer.Option(help="Zenoh router between the ends, instead of --listen and --connect."),
-]
-Scout = Annotated[
-    bool, typer.Option("--scout", help="Look for the other end by multicast in this network.")
-]
 TakeOver = Annotated[
     bool,
     typer.Option(
         "--take-over",
         help="Take over a running flight from its present receiver.",
-    ),
-]
-RunFolder = Annotated[
-    Path | None, typer.Option("--run-folder", hidden=True, help="Existing folder of the run.")
-]
-Telemetry = Annotated[
-    str,
-    typer.Option(
-        help="For viewers: on, off, or a Zenoh endpoint to listen on. Not given: on, on a socket that "
-        "only this user can open; off beside an insecure link that leaves this machine.",
-        show_default=False,
-    ),
-]
-AllowControl = Annotated[
-    bool,
-    typer.Option(
-        "--allow-control",
-        help="Let viewers change set-point, line and codec in flight; every change is recorded.",
     ),
 ]
 Pace = Annotated[
@@ -235,7 +155,6 @@ ViewPort = Annotated[
 OpenBrowser = Annotated[
     bool, typer.Option("--open", help="Open the live page in the browser of this machine.")
 ]
-Status = Annotated[str, typer.Option(hidden=True, help="auto, lines or none.")]
 DryRun = Annotated[
     bool, typer.Option("--dry-run", help="Read the rig only: no command is sent to the motors.")
 ]
@@ -247,61 +166,164 @@ class Addresses:
 
     listen: Listen = None
     connect: Connect = None
-    router: Router = None
-    scout: Scout = False
-    keys: Keys = None
-    peer: Peer = None
-    viewer: Viewer = None
+    router: Annotated[
+        list[str] | None,
+        typer.Option(help="Zenoh router between the ends, instead of --listen and --connect."),
+    ] = None
+    scout: Annotated[
+        bool, typer.Option("--scout", help="Look for the other end by multicast in this network.")
+    ] = False
+    keys: Annotated[
+        Path | None,
+        typer.Option(help="This node's key folder (`tenbaud keys`): TLS, and only named peers."),
+    ] = None
+    peer: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="With --keys: certificate name accepted at the other end; behind a router the "
+            "router's name. Repeatable. With --sessions, NAME=SESSION restricts it to one session."
+        ),
+    ] = None
+    viewer: Annotated[
+        list[str] | None,
+        typer.Option(help="With --keys: certificate name that may watch but not send. Repeatable."),
+    ] = None
     insecure: Insecure = False
 
 
 @dataclass(frozen=True, slots=True)
-class FlightOptions:
-    """What `demo` flies."""
+class ManyOptions:
+    """`--sessions` of `receive`, and its options."""
+
+    sessions: Annotated[
+        str | None,
+        typer.Option(
+            help="Serve every session whose name matches, such as 'rig/*', in this one process.",
+            show_default=False,
+        ),
+    ] = None
+    configs: Annotated[
+        Path | None,
+        typer.Option(
+            help="With --sessions: folder of files for single sessions, rig/7.toml for rig/7.",
+            show_default=False,
+        ),
+    ] = None
+    rigs_max: Annotated[
+        int,
+        typer.Option(
+            help="With --sessions: maximum number of simultaneous flights.", min=1, max=100_000
+        ),
+    ] = 100
+    flights: Annotated[
+        int | None,
+        typer.Option(
+            help="With --sessions: end after this number of flights.",
+            min=1,
+            max=10**9,
+            show_default=False,
+        ),
+    ] = None
+
+
+@dataclass(frozen=True, slots=True)
+class PlantOptions:
+    """A configuration, and the plant in it, of commands that fly without a link."""
 
     preset: Preset = None
     config: ConfigFile = None
-    clock: Clock = ClockOption.VIRTUAL
-    duration: Duration = None
+    mismatch: Mismatch = None
+    disturbance: Disturbance = None
     seed: Seed = None
+    settings: Settings = None
+    allow_code: AllowCode = False
+
+    def load(self, **own: Any) -> FlightConfig:
+        """Return the configuration with these options, and the command's own, over it."""
+        from tenbaud.config.load import load_config
+
+        changes = overrides(**fields_of(self), **own)
+        return load_config(self.preset, self.config, changes, allow_code=self.allow_code)
+
+
+@dataclass(frozen=True, slots=True)
+class _Configured:
+    """What `demo`, `transmit` and `receive` have in common."""
+
+    preset: Preset = None
+    config: ConfigFile = None
     lead: Lead = None
     delivery: Delivery = None
-    link: DemoLink = None
     line_rate: LineRate = None
     downlink: Downlink = None
-    rig: Rig = None
-    dry_run: DryRun = False
-    disturbance: Disturbance = None
     impair: Impair = None
-    on_desync: OnDesync = None
     sabotage: Sabotage = None
     settings: Settings = None
 
 
 @dataclass(frozen=True, slots=True)
-class NodeOptions:
+class FlightOptions(_Configured):
+    """What `demo` flies."""
+
+    clock: Clock = ClockOption.VIRTUAL
+    duration: Duration = None
+    seed: Seed = None
+    link: Annotated[
+        str | None,
+        typer.Option(
+            help="zenoh: two processes; serial: two processes and an emulated line between them; "
+            "memory: both ends in this process."
+        ),
+    ] = None
+    rig: Rig = None
+    dry_run: DryRun = False
+    disturbance: Disturbance = None
+    on_desync: OnDesync = None
+
+
+@dataclass(frozen=True, slots=True)
+class NodeOptions(_Configured):
     """Common options of `transmit` and `receive`, except addresses."""
 
-    preset: Preset = None
-    config: ConfigFile = None
-    session: Session = None
-    link: Link = None
-    port: Port = None
-    line_rate: LineRate = None
-    downlink: Downlink = None
+    session: Annotated[
+        str | None, typer.Option(help="Session name; the same at both ends.", show_default=False)
+    ] = None
+    link: Annotated[
+        str | None,
+        typer.Option(
+            help="zenoh, serial with --port, or a kind from an installed package.", show_default=False
+        ),
+    ] = None
+    port: Annotated[
+        str | None,
+        typer.Option(
+            help="Serial port of this end: /dev/ttyUSB0, COM3, socket://HOST:PORT, rfc2217://HOST:PORT.",
+            show_default=False,
+        ),
+    ] = None
     clock: Clock = ClockOption.REAL
-    lead: Lead = None
-    delivery: Delivery = None
-    impair: Impair = None
-    sabotage: Sabotage = None
-    settings: Settings = None
-    telemetry: Telemetry = ""
-    allow_control: AllowControl = False
+    telemetry: Annotated[
+        str,
+        typer.Option(
+            help="For viewers: on, off, or a Zenoh endpoint to listen on. Not given: on, on a socket "
+            "that only this user can open; off beside an insecure link that leaves this machine.",
+            show_default=False,
+        ),
+    ] = ""
+    allow_control: Annotated[
+        bool,
+        typer.Option(
+            "--allow-control",
+            help="Let viewers change set-point, line and codec in flight; every change is recorded.",
+        ),
+    ] = False
     out: Out = None
     json: AsJson = False
     verbose: Verbose = False
-    run_folder: RunFolder = None
-    status: Status = "auto"
+    run_folder: Annotated[
+        Path | None, typer.Option("--run-folder", hidden=True, help="Existing folder of the run.")
+    ] = None
+    status: Annotated[str, typer.Option(hidden=True, help="auto, lines or none.")] = "auto"
 
     def changes(self, **own: Any) -> dict[str, Any]:
         """Return the configuration that these options, and the command's own, set."""
@@ -327,7 +349,7 @@ FIELDS = {
 """Options that set one field of the configuration."""
 
 
-def fields_of(group: NodeOptions | FlightOptions) -> dict[str, Any]:
+def fields_of(group: NodeOptions | FlightOptions | PlantOptions) -> dict[str, Any]:
     """Return those of a group of options that `overrides` takes."""
     taken = (*FIELDS, "rig", "sabotage", "settings")
     return {one.name: getattr(group, one.name) for one in fields(group) if one.name in taken}
@@ -354,6 +376,13 @@ def overrides(
     if rig is not None:
         values |= rigs.settings_of(rig)
     return nested(values | dict(_parse_setting(setting) for setting in settings or []))
+
+
+def print_json(value: object) -> None:
+    """Print a result on standard output for programs."""
+    import json
+
+    typer.echo(json.dumps(value, indent=2))
 
 
 def _parse_setting(setting: str) -> tuple[str, Any]:

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import json as json_module
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tenbaud.cli import options
+from tenbaud.cli.spread import spread
 from tenbaud.flight.outcome import ExitCode
 
 if TYPE_CHECKING:
-    from transmitter.rigs.emulator.loop import RigEmulator
+    from transmitter.rigs.emulator.device import RigEmulator
 
 FormatOption = Annotated[str, typer.Option("--format", help="ascii, cobs, quarc or qsb.")]
 PortOption = Annotated[
@@ -25,18 +26,11 @@ PortOption = Annotated[
 ]
 
 
+@spread
 def rig(
+    body: options.PlantOptions,
     form: FormatOption = "cobs",
     port: PortOption = "pty",
-    preset: options.Preset = None,
-    config: options.ConfigFile = None,
-    seed: options.Seed = None,
-    mismatch: Annotated[
-        float | None, typer.Option(help="Model mismatch of the body, 0.1 for 10 %.")
-    ] = None,
-    disturbance: Annotated[
-        str | None, typer.Option(help='Torque on the body, such as "q=2e-3,step=0.5@30".')
-    ] = None,
     replay: Annotated[
         str | None, typer.Option(help="Recorded flight that drives the encoder instead of a body.")
     ] = None,
@@ -61,8 +55,6 @@ def rig(
     duration: Annotated[
         float | None, typer.Option(help="Seconds to run; until Ctrl-C if not given.", min=0.0, max=1e7)
     ] = None,
-    settings: options.Settings = None,
-    allow_code: options.AllowCode = False,
     json: options.AsJson = False,
 ) -> None:
     """Emulate a rig in real time: encoders, motors, a watchdog, and faults on request.
@@ -72,19 +64,11 @@ def rig(
     [dim]tenbaud rig --format quarc --port tcp:127.0.0.1:18000 --fault silent@10[/dim]
     """
     from tenbaud.build.emulator import build_emulator
-    from tenbaud.config.load import load_config
 
-    changed = options.overrides(
-        seed=seed,
-        mismatch=mismatch,
-        disturbance=disturbance,
-        rig=None if replay is None else f"replay:{replay}",
-        settings=settings,
-    )
-    if preset is None and config is None and replay is not None:
-        preset = "uiuc-10baud"
+    if body.preset is None and body.config is None and replay is not None:
+        body = replace(body, preset="uiuc-10baud")
     emulator = build_emulator(
-        load_config(preset, config, changed, allow_code=allow_code),
+        body.load(rig=None if replay is None else f"replay:{replay}"),
         form,  # type: ignore[arg-type]
         port,
         line_form=lines,
@@ -151,7 +135,7 @@ def rig_check(
     changed = options.overrides(rig=rig, settings=settings)
     result = check_rig(load_config(preset, config, changed), seconds, live=not json)
     if json:
-        sys.stdout.write(json_module.dumps(result.as_dict(), indent=2) + "\n")
+        options.print_json(asdict(result))
     else:
         show_check(result)
     if result.problems:
@@ -178,7 +162,7 @@ def doctor(
 
     findings = examine(load_config(preset, config, allow_code=allow_code), tuple(connect or ()))
     if json:
-        typer.echo(json_module.dumps([asdict(finding) for finding in findings], indent=2))
+        options.print_json([asdict(finding) for finding in findings])
     else:
         typer.echo(report(findings))
     if any(finding.state == "problem" for finding in findings):

@@ -65,8 +65,7 @@ def router(
 
 def _security(keys: Path | None, flights: list[str]) -> Security | None:
     from channel.links.security import Security
-    from tenbaud.keys.authority import NodeRole
-    from tenbaud.keys.store import expiry_warning, usable
+    from tenbaud.cli.addresses import credentials_of
 
     if keys is None:
         if flights:
@@ -76,11 +75,9 @@ def _security(keys: Path | None, flights: list[str]) -> Security | None:
         raise typer.BadParameter(
             "--keys without --flight refuses every node: --flight SESSION=TRANSMITTER,RECEIVER"
         )
-    node = usable(keys, NodeRole.ROUTER)
-    warning = expiry_warning(node)
-    if warning is not None:
-        typer.echo(f"tenbaud: warning: {warning}", err=True)
-    return Security(node.credentials, tuple(one for text in flights for one in _invited(text)))
+    return Security(
+        credentials_of(keys, "router"), tuple(one for text in flights for one in _invited(text))
+    )
 
 
 def _route(

@@ -11,9 +11,11 @@ import typer
 from tenbaud.cli import options
 from tenbaud.flight.outcome import ExitCode
 
+RunArgument = Annotated[Path, typer.Argument(help="Folder of a run, or one recording.")]
+
 
 def inspect(
-    run: Annotated[Path, typer.Argument(help="Folder of a run, or one recording.")],
+    run: RunArgument,
     json: Annotated[bool, typer.Option("--json", help="The same as JSON.")] = False,
 ) -> None:
     """Show what a run's recordings hold: channels, units, spans, events.
@@ -23,15 +25,13 @@ def inspect(
     from tenbaud.recording.inspect import describe_json, describe_text
 
     if json:
-        import json as json_module
-
-        typer.echo(json_module.dumps(describe_json(run), indent=2))
+        options.print_json(describe_json(run))
         return
     typer.echo(describe_text(run))
 
 
 def diff(
-    run_a: Annotated[Path, typer.Argument(help="Folder of a run, or one recording.")],
+    run_a: RunArgument,
     run_b: Annotated[
         Path | None,
         typer.Argument(help="Another; not given: the two ends of the first are compared."),
@@ -75,9 +75,6 @@ def presets() -> None:
         for name in sorted(plants[plant], key=lambda one: configs[one].channel.rate_baud):
             config = configs[name]
             typer.echo(f"  {name:{width}} {config.channel.rate_baud:7.4g} baud  {config.description}")
-
-
-RunArgument = Annotated[Path, typer.Argument(help="Folder of a run, or one recording.")]
 
 
 class Form(StrEnum):
@@ -168,7 +165,7 @@ def replay(
     from tenbaud.replay.replay import save_symbols
 
     record = load_record(run, other, allow_code=allow_code)
-    for _, tables in record.ends():
+    for tables in record.tables.values():
         for note in tables.notes:
             typer.echo(f"note: {note}", err=True)
     replayed = fly_again(record)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections import Counter
 from pathlib import Path
@@ -40,9 +39,7 @@ def sweep(
     ] = None,
     allow_code: options.AllowCode = False,
     plots: Annotated[bool, typer.Option(help="Draw the plots.")] = True,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Summary on standard output as JSON, nothing else there.")
-    ] = False,
+    as_json: options.AsJson = False,
 ) -> None:
     """Fly a study: settings swept on a grid or sampled, many seeds, results as Parquet and plots.
 
@@ -82,7 +79,7 @@ def sweep(
         "plots": [str(path) for path in drawn],
     }
     if as_json:
-        typer.echo(json.dumps(summary, indent=2))
+        options.print_json(summary)
         return
     _tell(summary, why)
 

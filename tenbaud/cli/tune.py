@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from dataclasses import replace
@@ -31,7 +30,6 @@ Rig = Annotated[
     str | None,
     typer.Option(help="simulated, or replay:FILE to fit on a recorded flight.", show_default=False),
 ]
-Mismatch = Annotated[float | None, typer.Option(help="Model mismatch of the plant, 0.1 for 10 %.")]
 Free = Annotated[
     list[str] | None,
     typer.Option(
@@ -78,7 +76,7 @@ def tune(
     config: options.ConfigFile = None,
     rig: Rig = None,
     duration: options.Duration = None,
-    mismatch: Mismatch = None,
+    mismatch: options.Mismatch = None,
     disturbance: options.Disturbance = None,
     impair: options.Impair = None,
     settings: options.Settings = None,
@@ -159,7 +157,7 @@ def _leave(tuned: Tuned, preset: str, out: Path, as_json: bool) -> None:
     # After the figures, which a full disk must not take along.
     write_whole(out, preset)
     if as_json:
-        typer.echo(json.dumps({**tuned._asdict(), "preset_file": str(out)}, indent=2))
+        options.print_json({**tuned._asdict(), "preset_file": str(out)})
     else:
         typer.echo(f"{out}: fly it with --config {out}")
 

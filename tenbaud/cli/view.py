@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from tenbaud.cli import options
+
 Host = Annotated[
     str | None,
     typer.Option(
@@ -32,9 +34,7 @@ def view(
     session: Annotated[str, typer.Option(help="Session name; any if not given.")] = "**",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Of the page; 0: any free one.")] = 8710,
     host: Host = None,
-    open_browser: Annotated[
-        bool, typer.Option("--open", help="Open the page in the browser of this machine.")
-    ] = False,
+    open_browser: options.OpenBrowser = False,
     insecure: Annotated[
         bool, typer.Option(help="Allow other machines to reach the page, which is not encrypted.")
     ] = False,
@@ -57,11 +57,9 @@ def view(
     [dim]tenbaud view --keys keys/desk --connect tls/10.0.0.2:7448[/dim]
     """
     if schema:
-        import json
-
         from tenbaud.telemetry.schema import schema_json
 
-        typer.echo(json.dumps(schema_json(), indent=2))
+        options.print_json(schema_json())
         return
     from channel.links.endpoints import check_endpoints, loopback_host
     from channel.links.zenoh.hub import is_session_pattern
@@ -77,10 +75,9 @@ def view(
     address = Address(host, port or free_port(host), insecure)
     credentials = None
     if keys is not None:
-        from tenbaud.keys.authority import NodeRole
-        from tenbaud.keys.store import usable
+        from tenbaud.cli.addresses import credentials_of
 
-        credentials = usable(keys, NodeRole.VIEWER).credentials
+        credentials = credentials_of(keys, "viewer")
     protected = tuple(one for one in connect or () if not one.startswith("unixsock"))
     check_endpoints(protected, insecure=True, secured=credentials is not None)
     feed = Feed(tuple(connect or ()), session, credentials)

@@ -122,13 +122,12 @@ class DirectionCoderSection(KindSection):
     maximum_strength: Positive = 1000.0
 
 
-def _gains(gains: tuple[float, float]) -> tuple[tuple[float, ...], ...]:
-    return tuple((gain,) for gain in gains)
-
-
 def _common(section: Any) -> dict[str, Any]:
     """Return what every coder of signs and gains takes."""
-    return {"gains": _gains(section.gains), "impulse": section.correction == "impulse"}
+    return {
+        "gains": tuple((gain,) for gain in section.gains),
+        "impulse": section.correction == "impulse",
+    }
 
 
 def _zoom(section: ZoomCoderSection, context: CoderContext) -> Coder:

@@ -27,9 +27,9 @@ from tenbaud.config.kinds import (
     union_of,
 )
 from tenbaud.config.models import PitchModelSection
-from tenbaud.config.permission import CodePermission
 from tenbaud.config.rig_schema import BridgeSection, HilSection, QuarcSection, SerialSection
 from tenbaud.config.section import (
+    CodePermission,
     Command,
     Counts,
     Factor,

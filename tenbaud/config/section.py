@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, PrivateAttr
 
 Positive = Annotated[float, Field(ge=1e-9, le=1e9)]
 AngleRange = Annotated[float, Field(ge=1e-9, le=1000.0)]
@@ -54,3 +54,27 @@ class OutsideSection(KindSection):
     """module:Class, or the name that a package offers"""
     options: Options = Field(default_factory=dict)
     """what the class is built with"""
+
+
+class CodePermission(Section):
+    """A configuration that remembers whether its classes from outside may run.
+
+    As it is read, they may not. A copy remembers; what goes through text forgets.
+    """
+
+    _code_allowed: bool = PrivateAttr(default=False)
+
+    @property
+    def code_allowed(self) -> bool:
+        """Return whether the classes from outside that it names may be imported."""
+        return self._code_allowed
+
+    def allowing_code(self) -> Self:
+        """Return the same configuration, its classes from outside allowed to run."""
+        allowed = self.model_copy()
+        allowed._code_allowed = True
+        return allowed
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether two configurations say the same; what is allowed is no part of that."""
+        return isinstance(other, CodePermission) and self.model_dump() == other.model_dump()

@@ -78,7 +78,7 @@ def whole_file(path: Path, mode: int | None = None) -> Iterator[BinaryIO]:
     With `mode`, nobody whom it excludes can read the file at any moment. What is no file (/dev/null, a
     pipe) is written to as it is. Raises WriteError for every OSError within the `with`.
     """
-    if _is_device(path):
+    if path.exists() and not path.is_file() and not path.is_dir():
         try:
             with path.open("wb") as stream:
                 yield stream
@@ -132,10 +132,6 @@ def remove(path: Path) -> None:
 
 def _beside(path: Path) -> Path:
     return path.with_name(f".{path.name[:NAME_CHARACTERS]}.{secrets.token_hex(4)}.part")
-
-
-def _is_device(path: Path) -> bool:
-    return path.exists() and not path.is_file() and not path.is_dir()
 
 
 def _flush(part: Path) -> None:

@@ -20,7 +20,7 @@ from tenbaud.build.flight import Agreement
 from tenbaud.config.load import dump_config, flattened
 from tenbaud.files.whole import write_whole
 from tenbaud.flight.ends import run_in_memory
-from tenbaud.flight.lifeline import start_child
+from tenbaud.flight.lifeline import end_child, start_child
 from tenbaud.flight.outcome import ExitCode, Outcome, first_code, outcome_of_status
 from tenbaud.flight.report import write_up
 from tenbaud.flight.status import Status, StatusMode
@@ -203,13 +203,7 @@ class _Child:
 
     def end(self) -> None:
         """Make sure that the process has ended, and read what it left."""
-        if self.process.poll() is None:
-            self.process.terminate()
-            try:
-                self.process.wait(5.0)
-            except subprocess.TimeoutExpired:
-                self.process.kill()
-                self.process.wait()
+        end_child(self.process, 5.0)
         for thread in self._threads:
             thread.join(5.0)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import json
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -21,9 +20,9 @@ from tenbaud.build.ends import build_receiver
 from tenbaud.build.flight import Agreement
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.flight import receive, transmit
-from tenbaud.flight.display import StatusReporter
+from tenbaud.flight.display import StatusMode, StatusReporter
 from tenbaud.flight.outcome import SAFE, Outcome, outcome_of
-from tenbaud.flight.status import Status, StatusMode, outputs_status
+from tenbaud.flight.status import Status, outputs_status
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, gap_part, link_part, receiver_part, transmitter_part
 from tenbaud.flight.trouble import Trouble
@@ -33,8 +32,8 @@ from tenbaud.recording.gather import OverviewRecorder
 from tenbaud.recording.shared import SharedWriter
 from tenbaud.recording.writer import McapRecorder
 from tenbaud.telemetry.compose import ReceiverComposer, TransmitterComposer
-from tenbaud.telemetry.end import DEFAULT_OPTIONS, TelemetryEnd, TelemetryOptions, open_telemetry
-from transmitter.loops.virtual_peer import LinkPeer
+from tenbaud.telemetry.end import DEFAULT_OPTIONS, TelemetryEnd, TelemetryOptions
+from transmitter.loops.virtual import LinkPeer
 
 SWITCH_INTERVAL_S = 0.0002
 """A busy recorder thread may keep the loop waiting this long; Python's default is 5 ms."""
@@ -98,7 +97,11 @@ def run_transmitter(
                 telemetry.publishing(lambda tap: TransmitterComposer(run, tap, live)),
                 StatusReporter(lambda: transmitter_status(run), status),
             ):
-                outcome = _guarded(lambda: _fly(run, link, peer, trouble.should_stop))
+                stopped = trouble.should_stop
+                if peer is None:
+                    outcome = _guarded(lambda: transmit.fly_real(run, link, stopped))
+                else:
+                    outcome = _guarded(lambda: transmit.fly_virtual(run, peer, stopped))
                 outcome = trouble.first_cause(outcome, SAFE)
             run.node.flush_records()
         summary = transmitter_part(run, outcome) | link_part(link, refused) | telemetry.summary()
@@ -241,11 +244,6 @@ def receiver_status(agreement: Agreement, endpoint: ReceiverEndpoint) -> Status:
     }
 
 
-def write_json(summary: Summary) -> None:
-    """Print a summary on standard output."""
-    sys.stdout.write(json.dumps(summary, indent=2) + "\n")
-
-
 @contextmanager
 def _end(
     agreement: Agreement, role: Role, folder: RunFolder
@@ -262,7 +260,7 @@ def _end(
 def _telemetry(
     agreement: Agreement, role: Role, recorder: McapRecorder, endpoints: Endpoints
 ) -> TelemetryEnd:
-    return open_telemetry(
+    return TelemetryEnd(
         agreement,
         role,
         recorder,
@@ -271,12 +269,6 @@ def _telemetry(
         endpoints.insecure,
         endpoints.security,
     )
-
-
-def _fly(run: TransmitterRun, link: Link, peer: LinkPeer | None, stop: Stop) -> Outcome:
-    if peer is None:
-        return transmit.fly_real(run, link, stop)
-    return transmit.fly_virtual(run, peer, stop)
 
 
 def _peer(run: TransmitterRun, link: Link, stop: Stop, recorder: McapRecorder) -> LinkPeer | None:
@@ -288,7 +280,7 @@ def _peer(run: TransmitterRun, link: Link, stop: Stop, recorder: McapRecorder) -
         run.node.flush_records()
         recorder.help_out()
 
-    return transmit.link_peer(run, link, stop, meanwhile)
+    return LinkPeer(link, run.agreement.config.link.peer_timeout_s, stop, meanwhile)
 
 
 def _guarded(fly: Callable[[], Outcome]) -> Outcome:

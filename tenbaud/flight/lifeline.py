@@ -32,6 +32,19 @@ def start_child(*arguments: str, **more: Any) -> subprocess.Popen[str]:
     )
 
 
+def end_child(child: subprocess.Popen[str], timeout_s: float) -> None:
+    """End a child and wait for it: what it held, such as a port, is free then."""
+    if child.poll() is None:
+        child.terminate()
+        if hasattr(signal, "SIGCONT"):
+            child.send_signal(signal.SIGCONT)  # one that was stopped would not hear the other
+    try:
+        child.wait(timeout_s)
+    except subprocess.TimeoutExpired:
+        child.kill()
+        child.wait()
+
+
 def follow_parent() -> None:
     """In a process of `start_child`: ask this process to end when its parent has gone."""
     if os.environ.pop(VARIABLE, None) is not None:

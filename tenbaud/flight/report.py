@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from tenbaud.config.load import flattened
 from tenbaud.config.schema import FlightConfig
 from tenbaud.files.whole import WriteError, write_whole
 from tenbaud.flight.outcome import ExitCode, Outcome, outcome_of
@@ -15,37 +16,6 @@ from tenbaud.recording.folder import RunFolder
 
 if TYPE_CHECKING:
     from rich.table import Table
-
-ROWS: tuple[tuple[str, str, str], ...] = (
-    ("plant", "plant", "{}"),
-    ("outcome", "outcome", "{}"),
-    ("duration", "duration_s", "{:g} s"),
-    ("samples, one word each", "samples", "{}"),
-    ("coder bits up", "coder_bits_up", "{:g}"),
-    ("baud: configured", "baud_configured", "{:g}"),
-    ("baud: measured by the receiver", "baud_measured", "{:.3f}"),
-    ("symbols/s asked for / in time / missing", "rate", "{}"),
-    ("wire bytes up / down", "wire_bytes", "{}"),
-    ("erasures / late symbols", "lost", "{}"),
-    ("bytes on the serial line up / down", "line_bytes", "{}"),
-    ("dropped by the link", "link_dropped", "{}"),
-    ("reconnects", "reconnects", "{}"),
-    ("frames dropped, out of bounds", "out_of_bounds", "{}"),
-    ("digest checks", "digest_checks", "{}"),
-    ("desyncs", "desyncs", "{}"),
-    ("rejoins, and what they cost", "rejoins", "{}"),
-    ("asked to go wrong", "impairments", "{}"),
-    ("went wrong, up / down", "impaired", "{}"),
-    ("", "outputs", ""),
-    ("disturbance found, density q", "disturbance_rad2_per_s3", "{:.2g} rad^2/s^3"),
-    ("rms error over the least possible", "rms_over_floor", "{:.2f}"),
-    ("bits an ideal code would need for it", "ideal_bits", "{:.0f}"),
-    ("command lead", "lead_ticks", "{} ticks"),
-    ("late commands", "commands_late", "{}"),
-    ("loop lateness p50 / p99 / max", "lateness", "{}"),
-    ("times real time", "realtime_factor", "{:.0f}"),
-    ("recording lost", "recording_trouble", "{}"),
-)
 
 
 def write_up(folder: RunFolder, config: FlightConfig, summary: Summary, draw: bool) -> list[Outcome]:
@@ -106,6 +76,7 @@ def show_summaries(
 
 
 def _table(summaries: Sequence[Summary]) -> Table:
+    """Return every figure that a flight has, by its name in `summary.json`, flights side by side."""
     from rich.table import Table
 
     first = summaries[0]
@@ -114,84 +85,15 @@ def _table(summaries: Sequence[Summary]) -> Table:
     table.add_column(style="dim")
     for _ in summaries:
         table.add_column(overflow="fold")
-    for label, name, form in ROWS:
-        if name == "outputs":
-            for output in first.get("outputs") or {}:
-                for row in _output_rows(output, [one["outputs"][output] for one in summaries]):
-                    table.add_row(*row)
-            continue
-        cells = [_cell(summary, name, form) for summary in summaries]
+    flat = [dict(flattened(one)) for one in summaries]
+    for name in dict.fromkeys(name for one in flat for name in one):
+        cells = [_cell(one.get(name)) for one in flat]
         if any(cells):
-            table.add_row(label, *cells)
+            table.add_row(name, *cells)
     return table
 
 
-def _output_rows(name: str, figures: Sequence[Summary]) -> Iterator[list[str]]:
-    """Yield label and cells of what is known of an output."""
-    name = name.replace("_", " ")
-
-    def quantity(one: Summary, key: str) -> str:
-        return "" if one[key] is None else f"{one[key]:.3f} {one['unit']}".rstrip()
-
-    def error(one: Summary, kind: str) -> str:
-        largest, rms = one[f"{kind}_max"], one[f"{kind}_rms"]
-        if largest is None or rms is None or not one["largest"]:
-            return ""
-        return f"{largest / one['largest']:.2%} / {rms / one['largest']:.2%} of the largest {name}"
-
-    yield [f"largest {name} in the window", *(quantity(one, "largest") for one in figures)]
-    yield ["error of the codec: max / rms", *(error(one, "error_coded") for one in figures)]
-    yield ["error of the prediction: max / rms", *(error(one, "error_live") for one in figures)]
-    shares = [one.get("symbols_share") for one in figures]
-    if any(share not in (None, 1.0) for share in shares):
-        yield [f"symbols about {name}", *("" if one is None else f"{one:.1%}" for one in shares)]
-    yield ["tracking, rms", *(quantity(one, "tracking_rms") for one in figures)]
-
-
-def _cell(summary: Summary, name: str, form: str) -> str:
-    value = _value(summary, name)
-    return "" if value is None else form.format(value)
-
-
-def _value(summary: Summary, name: str) -> Any:
-    get = summary.get
-    match name:
-        case "wire_bytes":
-            return f"{get('wire_bytes_up')} / {get('wire_bytes_down')}"
-        case "lost":
-            late = get("symbols_late")
-            return f"{get('erasures')} / {'-' if late is None else late}"
-        case "rate":
-            asked, kept = get("symbols_per_s_asked"), get("symbols_per_s_kept")
-            if kept is None or get("loop_late_ms_p50") is None:
-                return None
-            return f"{asked:g} / {kept:.1f} / {get('symbols_missing_share'):.2%}"
-        case "rejoins":
-            cost = f", {get('rejoin_bytes')} control bytes" if get("rejoin_bytes") is not None else ""
-            return f"{get('rejoins')}{cost}" if get("rejoins") else None
-        case "impairments":
-            return get(name) or None
-        case "impaired":
-            ways = [get("impaired_up") or {}, get("impaired_down") or {}]
-            told = [", ".join(f"{count} {what}" for what, count in way.items()) for way in ways]
-            return " / ".join(text or "-" for text in told) if any(told) else None
-        case "line_bytes":
-            up, down = get("line_bytes_out"), get("line_bytes_in")
-            return f"{up} / {down}" if up else None
-        case "link_dropped":
-            return ", ".join(f"{kind} {n}" for kind, n in (get("link_dropped") or {}).items()) or None
-        case "reconnects" | "out_of_bounds":
-            return get(name) or None
-        case "lateness":
-            if get("loop_late_ms_p50") is None:
-                return None
-            return (
-                f"{get('loop_late_ms_p50'):.2f} / {get('loop_late_ms_p99'):.2f} / "
-                f"{get('loop_late_ms_max'):.2f} ms"
-            )
-        case "recording_trouble":
-            if not get("recording_rows_lost") and not get("recording_error"):
-                return None
-            return f"{get('recording_rows_lost')} rows: {get('recording_error') or 'queue full'}"
-        case _:
-            return get(name)
+def _cell(value: Any) -> str:
+    if isinstance(value, list):
+        return ", ".join(map(str, value))
+    return "" if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -24,7 +24,6 @@ from transmitter.guard import GuardCause
 from transmitter.loops.flight import Flight
 from transmitter.loops.real import RealFlight
 from transmitter.loops.virtual import VirtualFlight
-from transmitter.loops.virtual_peer import LinkPeer
 from transmitter.session.session import Phase
 
 
@@ -91,16 +90,6 @@ def _fly(
             if figures := rig.figures():
                 run.extra["rig"] = figures
     return ending.outcome
-
-
-def link_peer(
-    run: TransmitterRun,
-    link: Link,
-    should_stop: Stop,
-    meanwhile: Callable[[], None] = lambda: None,
-) -> LinkPeer:
-    """Return the receiver at the other end of a link, for the virtual clock."""
-    return LinkPeer(link, run.agreement.config.link.peer_timeout_s, should_stop, meanwhile)
 
 
 def _check_welcome(run: TransmitterRun) -> None:

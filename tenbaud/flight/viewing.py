@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import subprocess
 import sys
 import threading
@@ -15,7 +14,7 @@ from tempfile import TemporaryDirectory
 from typing import IO
 
 from channel.errors import LinkLost
-from tenbaud.flight.lifeline import start_child
+from tenbaud.flight.lifeline import end_child, start_child
 from tenbaud.telemetry.place import SOCKET
 
 START_TIMEOUT_S = 30.0
@@ -65,7 +64,7 @@ def page_beside(options: ViewOptions | None, should_stop: Callable[[], bool]) ->
                 how = _how_ended(process)
                 sys.stderr.write(f"tenbaud: the live page ended before the flight, by {how}\n")
         finally:
-            _end(process)
+            end_child(process, ENDING_TIMEOUT_S)
 
 
 def _start(places: list[str], options: ViewOptions) -> subprocess.Popen[str]:
@@ -85,19 +84,6 @@ def _wait_until_served(process: subprocess.Popen[str], should_stop: Callable[[],
             raise KeyboardInterrupt
         if process.poll() is not None or time.monotonic() > until_s:
             raise LinkLost("the live page could not be served; the lines above say why")
-
-
-def _end(process: subprocess.Popen[str]) -> None:
-    """End the page's process and wait for it, so that its port is free again."""
-    if process.poll() is None:
-        process.terminate()
-        if hasattr(signal, "SIGCONT"):
-            process.send_signal(signal.SIGCONT)  # one that was stopped would not hear the other
-    try:
-        process.wait(ENDING_TIMEOUT_S)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
 
 
 def _how_ended(process: subprocess.Popen[str]) -> str:

@@ -157,13 +157,12 @@ def _samples(recording: Recording, compared: Compared) -> Iterator[_Sample]:
             compared.faults.append(f"sample {sample} is doubled or out of order in {recording.path}")
             continue
         before = sample
-        while index + 1 < len(epochs) and _starts_by(epochs[index + 1], sample):
+        while index + 1 < len(epochs):
+            start = epochs[index + 1][1]
+            if not isinstance(start, int) or start > sample:
+                break
             index += 1
         yield _Sample(epochs[index], sample, time_ns, row)
-
-
-def _starts_by(epoch: Epoch, sample: int) -> bool:
-    return isinstance(epoch[1], int) and epoch[1] <= sample
 
 
 def _are_numbers(row: Row, *names: str) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -61,15 +62,13 @@ def _check_replaceable(run: Run, form: str, target: Path) -> None:
         why = f"it is a {there}, and {form} is a {wanted}"
     elif target.resolve() in [one.resolve() for one in own]:
         why = "it is a part of the run itself"
-    elif is_folder and (others := {one.name for one in target.iterdir()} - _names_written(form)):
+    elif is_folder and (
+        others := {one.name for one in target.iterdir()} - {f"{table}.{form}" for table in TABLES}
+    ):
         why = f"it holds {min(others)}, which no conversion wrote"
     else:
         return
     raise RecordingError(f"{target} is not replaced: {why}. Choose another place with --out.")
-
-
-def _names_written(form: str) -> set[str]:
-    return {f"{table}.{form}" for table in TABLES}
 
 
 def _write_csv(run: Run, folder: Path) -> None:
@@ -77,10 +76,10 @@ def _write_csv(run: Run, folder: Path) -> None:
     folder.mkdir()
     for name, columns in all_columns(run).items():
         with (folder / f"{name}.csv").open("w", encoding="utf-8", newline="") as stream:
-            stream.write(",".join(column.name for column in columns) + "\r\n")
+            writer = csv.writer(stream)
+            writer.writerow([column.name for column in columns])
             for rows in _stretches(columns):
-                cells = [_csv_cells(column, rows) for column in columns]
-                stream.writelines(",".join(row) + "\r\n" for row in zip(*cells, strict=True))
+                writer.writerows(zip(*[_cells(column, rows) for column in columns], strict=True))
 
 
 def _stretches(columns: list[Column]) -> Iterator[slice]:
@@ -90,25 +89,13 @@ def _stretches(columns: list[Column]) -> Iterator[slice]:
         yield slice(start, min(count, start + ROWS_AT_ONCE))
 
 
-def _csv_cells(column: Column, rows: slice) -> list[str]:
-    values = column.values[rows].tolist()
+def _cells(column: Column, rows: slice) -> list[object]:
+    """Return some values as the csv module writes them: None as nothing, others as JSON has them."""
+    values: list[object] = column.values[rows].tolist()
     if column.is_text:
-        return ["" if value is None else _quoted(_text(value)) for value in values]
-    if column.values.dtype == np.float64:
-        return ["" if value != value else repr(value) for value in values]  # NaN is unlike itself
-    return [str(value) for value in values]
-
-
-def _text(value: object) -> str:
-    """Return a cell of an event: a text, or a number or truth value as JSON has it."""
-    return value if isinstance(value, str) else orjson.dumps(value).decode()
-
-
-def _quoted(text: str) -> str:
-    if not any(mark in text for mark in ',"\r\n'):
-        return text
-    doubled = text.replace('"', '""')
-    return f'"{doubled}"'
+        plain = (str, type(None))
+        return [one if isinstance(one, plain) else orjson.dumps(one).decode() for one in values]
+    return [None if value != value else value for value in values]  # NaN is unlike itself
 
 
 def _write_mat(run: Run, path: Path) -> None:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import orjson
 
+from channel.protocol.recording import RecordChannel
+from tenbaud.recording.chunks import Damage, RawMessage
 from tenbaud.recording.rows import KEY_MAX, KEYS
 
 HOLES_METADATA = "holes"
@@ -81,3 +84,90 @@ def _key(value: Any) -> int:
     if type(value) is not int or abs(value) > KEY_MAX:
         raise ValueError("not the number of a tick, sample or slot")
     return value
+
+
+BLOCKS_BEHIND = 64
+"""Within this many blocks behind the damage a topic must continue, or its loss is not estimated."""
+
+Newest = dict[int, RawMessage]
+"""channel id -> a message"""
+
+
+@dataclass(slots=True)
+class _Gap:
+    reason: str
+    start: int
+    end: int
+    before: Newest
+    behind: Newest = field(default_factory=dict)
+    blocks: int = 0
+
+
+class HoleFinder:
+    """Takes damage and messages in the order of the file."""
+
+    def __init__(self) -> None:
+        self._gaps: list[_Gap] = []
+        self._last: Newest = {}
+        self._open: _Gap | None = None
+
+    def on_damage(self, damage: Damage) -> None:
+        """A part of the file could not be read."""
+        if self._open is not None and not self._open.behind:
+            self._open.end = damage.end
+        elif len(self._gaps) < HOLES_MAX:
+            self._open = _Gap(damage.reason, damage.start, damage.end, dict(self._last))
+            self._gaps.append(self._open)
+
+    def on_messages(self, messages: list[RawMessage]) -> None:
+        """A block was read."""
+        if self._open is not None:
+            first = {message[0]: message for message in reversed(messages)}
+            self._open.behind = first | self._open.behind
+            self._open.blocks += 1
+            if (
+                self._open.blocks >= BLOCKS_BEHIND
+                or self._open.before.keys() <= self._open.behind.keys()
+            ):
+                self._open = None
+        self._last.update({message[0]: message for message in messages})
+
+    def holes(
+        self, topics: Mapping[int, str | None], channels: Mapping[str, RecordChannel], ended: bool
+    ) -> list[Hole]:
+        """Return the holes so far.
+
+        Damage with nothing behind it is none in a file that was cut, where everything ends so; it is
+        one if the file has its end (`ended`).
+        """
+        return [_hole(gap, topics, channels) for gap in self._gaps if gap.behind or ended]
+
+
+def _hole(gap: _Gap, topics: Mapping[int, str | None], channels: Mapping[str, RecordChannel]) -> Hole:
+    missing: Missing = {}
+    keys: dict[str, str] = {}
+    for channel_id, message in gap.behind.items():
+        topic = topics.get(channel_id)
+        key = channels[topic].fields[0].name if topic is not None else ""
+        behind = _value(message, key)
+        if topic is None or key not in KEYS or behind is None:
+            continue
+        before = _value(gap.before[channel_id], key) if channel_id in gap.before else None
+        if before is None and behind > 0:
+            missing[topic] = (None, behind - 1)
+        elif before is not None and behind > before + 1:
+            missing[topic] = (before + 1, behind - 1)
+        keys[topic] = key
+    reason = f"{gap.reason}, bytes {gap.start} to {gap.end} of the file"
+    from_s = max((time_ns for _, time_ns, _ in gap.before.values()), default=0) / 1e9
+    behind_s = [time_ns / 1e9 for _, time_ns, _ in gap.behind.values()]
+    to_s = min(behind_s, default=None)
+    return Hole(from_s, to_s, reason, missing, {topic: keys[topic] for topic in missing})
+
+
+def _value(message: RawMessage, key: str) -> int | None:
+    try:
+        value = orjson.loads(message[2])[key]
+    except (ValueError, KeyError, TypeError, IndexError):
+        return None
+    return value if type(value) is int and abs(value) <= KEY_MAX else None

@@ -37,6 +37,10 @@ class MemoryRecorder:
         names = self._names.get(topic, [])
         return [dict(zip(names, row, strict=True)) for row in self._rows.get(topic, [])]
 
+    def taken(self, topic: str) -> list[Sequence[Any]]:
+        """Return the rows of one topic as they were written, and keep them no longer."""
+        return self._rows.pop(topic, [])
+
     def column(self, topic: str, name: str) -> list[Any]:
         """Return one field of every row of a topic; none where nothing was recorded under it."""
         if topic not in self._rows:

@@ -28,8 +28,7 @@ from tenbaud.recording.chunks import (
 )
 from tenbaud.recording.encoding import END_METADATA, RUN_METADATA, channel_from_schema
 from tenbaud.recording.errors import RecordingError
-from tenbaud.recording.gaps import HoleFinder
-from tenbaud.recording.holes import HOLES_METADATA, Hole, unpacked_holes
+from tenbaud.recording.holes import HOLES_METADATA, Hole, HoleFinder, unpacked_holes
 from tenbaud.recording.old_rows import of_today
 from tenbaud.recording.resync import blocks_of_file
 from tenbaud.recording.rows import Row, RowDecoder, channel_of_names, check_channel

@@ -18,9 +18,8 @@ from tenbaud.files.whole import write_error
 from tenbaud.recording.chunk_writer import ChunkWriter
 from tenbaud.recording.encoding import END_METADATA, RUN_METADATA, channel_schema
 from tenbaud.recording.errors import RecordingError
-from tenbaud.recording.folder import find_recordings
+from tenbaud.recording.folder import find_recordings, in_use
 from tenbaud.recording.holes import HOLES_METADATA, Hole, packed_holes
-from tenbaud.recording.lock import in_use
 from tenbaud.recording.reader import MessageStream, open_recording
 from tenbaud.recording.writer import CHUNK_BYTES, PROFILE
 

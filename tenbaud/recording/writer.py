@@ -98,7 +98,7 @@ class McapRecorder:
         self._open = False
         self._finished = threading.Event()
         if shared is not None:
-            shared.add(self)
+            shared.add(self.attend)
         else:
             name = f"record {path.name}"
             threading.Thread(target=self._run, name=name, daemon=True).start()

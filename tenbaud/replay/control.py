@@ -64,7 +64,7 @@ def steps_by_hand(record: FlightRecord) -> tuple[tuple[int, float], ...]:
     reference = build_references(record.agreement.config, record.agreement.signals)[0]
     if reference is None:
         return ()
-    rows = record.rows["receiver"].topic("tick")
+    rows = record.rows["receiver"].topics["tick"]
     told = [(row.tick, row.reference[0]) for row in rows if row.reference[0] is not None]
     first = next(
         (index for index, (tick, angle) in enumerate(told) if angle != reference.value(tick)), None
@@ -90,13 +90,13 @@ def recorded_commands(record: FlightRecord) -> RecordedCommands | None:
     """Return the commands as they were recorded; None if not all of them were."""
     initial = record.agreement.terms.initial_command
     rows = record.rows.get("receiver")
-    if rows is not None and rows.topic("tick").recorded:
-        commands = {row.tick: row.command for row in rows.topic("tick")}
-        references = {row.tick: row.reference for row in rows.topic("tick")}
+    if rows is not None and rows.topics["tick"].recorded:
+        commands = {row.tick: row.command for row in rows.topics["tick"]}
+        references = {row.tick: row.reference for row in rows.topics["tick"]}
         return RecordedCommands(commands, initial, references)
     beside = record.rows.get("transmitter")
-    if beside is None or not beside.topic("tick").recorded:
+    if beside is None or not beside.topics["tick"].recorded:
         return None
-    ticks = beside.topic("tick").rows
+    ticks = beside.topics["tick"].rows
     commands = {row.tick: row.commanded for row in ticks if row.commanded is not None}
     return RecordedCommands(commands, initial, {}) if len(commands) == len(ticks) else None

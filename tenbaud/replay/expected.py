@@ -11,23 +11,24 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from channel.codec.codec import Vector
-from channel.protocol.recording import RecordChannel
 from tenbaud.build.flight import Agreement
+from tenbaud.recording.memory import MemoryRecorder
 from tenbaud.replay.record import Epoch
 from tenbaud.replay.refly import Reflown
+from tenbaud.replay.rows import KINDS
 from transmitter.session.copies import Copies
-from transmitter.session.records import ESTIMATE_CHANNEL, SAMPLE_CHANNEL, write_sample
+from transmitter.session.records import write_sample
 
 
 @dataclass(slots=True)
 class Expected:
-    """The rows by their keys: every field that follows from words and slots."""
+    """The rows by their keys, as `tenbaud.replay.rows` reads them."""
 
-    samples: dict[int, dict[str, Any]] = field(default_factory=dict)
-    """of either end"""
-    estimates: dict[int, dict[str, Any]] = field(default_factory=dict)
+    samples: dict[int, Any] = field(default_factory=dict)
+    """the transmitter's; what it sent, and when echoes came, does not follow from the words"""
+    estimates: dict[int, Any] = field(default_factory=dict)
     """of the transmitter"""
-    commands: dict[int, dict[str, Any]] = field(default_factory=dict)
+    commands: dict[int, Any] = field(default_factory=dict)
     """ticks of the receiver"""
     held: dict[int, Vector] = field(default_factory=dict)
     """first ticks of an epoch, before one was decided in it -> the command that is held"""
@@ -58,34 +59,10 @@ def _hold(agreement: Agreement, epoch: Epoch, expected: Expected) -> None:
 def _add(agreement: Agreement, copies: Copies, one: Reflown, expected: Expected) -> None:
     digest = int(one.digest, 16)
     commands = [command for _, _, _, command in one.ticks]
-    rows = _Rows()
+    rows = MemoryRecorder()
     write_sample(rows, agreement.terms, agreement.codec, copies.confirm(one.word, commands, digest))
-    for channel, row in rows.written:
-        values: dict[str, Any] = {
-            name.name: value for name, value in zip(channel.fields, row, strict=True)
-        }
-        if channel is SAMPLE_CHANNEL:
-            # What was sent, and when its echo came, does not follow from what was consumed.
-            del values["word_sent"], values["lag_samples"]
-            expected.samples[one.sample] = values
-        else:
-            expected.estimates[int(values["tick"])] = values
-    for tick, reference, live, command in one.ticks:
-        expected.commands[tick] = {
-            "tick": tick,
-            "reference": reference,
-            "live_state": live,
-            "command": command,
-        }
-
-
-class _Rows:
-    """A recorder that keeps what it is given."""
-
-    def __init__(self) -> None:
-        self.written: list[tuple[RecordChannel, Sequence[object]]] = []
-
-    def write(self, channel: RecordChannel, time_ns: int, row: Sequence[object]) -> None:
-        """Keep samples and estimates."""
-        if channel in (SAMPLE_CHANNEL, ESTIMATE_CHANNEL):
-            self.written.append((channel, row))
+    for topic, found in (("sample", expected.samples), ("estimate", expected.estimates)):
+        for row in rows.taken(topic):
+            found[row[0]] = KINDS["transmitter"][topic].record._make(row)
+    for row in one.ticks:
+        expected.commands[row[0]] = KINDS["receiver"]["tick"].record._make(row)

@@ -14,7 +14,7 @@ from tenbaud.config.deprecated import with_current_names
 from tenbaud.config.outside_code import require_allowed, require_regular_files
 from tenbaud.config.schema import FlightConfig
 from tenbaud.recording.errors import RecordingError
-from tenbaud.recording.run import Run
+from tenbaud.recording.run import ENDS, Run
 from tenbaud.recording.table import Tables
 from tenbaud.replay.rows import EndRows, read_rows
 
@@ -37,30 +37,17 @@ class FlightRecord:
     """The recordings of a flight with the configuration that was flown."""
 
     agreement: Agreement
-    transmitter: Tables | None
-    receiver: Tables | None
+    tables: dict[str, Tables]
+    """of each end that is here, the transmitter's first"""
     summaries: dict[str, dict[str, Any]]
     """of each end that left one"""
     rows: dict[str, EndRows]
     """of each end that is here"""
 
     @property
-    def consumer_rows(self) -> EndRows:
-        """The same recording's rows."""
-        return self.rows["receiver" if self.receiver is not None else "transmitter"]
-
-    @property
-    def consumer(self) -> Tables:
-        """The recording that the consumed words are taken from: the receiver's, if it is there."""
-        tables = self.receiver or self.transmitter
-        if tables is None:
-            raise RecordingError("There is no recording of either end.")
-        return tables
-
-    def ends(self) -> list[tuple[str, Tables]]:
-        """Return the recordings that are there, by the name of the end."""
-        both = (("transmitter", self.transmitter), ("receiver", self.receiver))
-        return [(name, tables) for name, tables in both if tables is not None]
+    def consumer(self) -> str:
+        """The end whose recording the consumed words are taken from: the receiver, if it is there."""
+        return "receiver" if "receiver" in self.tables else "transmitter"
 
 
 def load_record(path: Path, other: Path | None = None, *, allow_code: bool = False) -> FlightRecord:
@@ -70,20 +57,19 @@ def load_record(path: Path, other: Path | None = None, *, allow_code: bool = Fal
     Raises RecordingError for what cannot be read, and where this machine or this version of the
     configuration is not the one that was flown.
     """
-    tables: dict[str, Tables] = {}
-    summaries: dict[str, dict[str, Any]] = {}
     homes: dict[str, Run] = {}
     for run in [Run(path), *([Run(other)] if other is not None else [])]:
         for end in run.ends:
-            if end in tables:
+            if end in homes:
                 raise RecordingError(f"{path} and {other} both hold a {end}'s recording. Give one.")
-            tables[end], summaries[end], homes[end] = run.tables(end), run.summary, run
+            homes[end] = run
+    tables = {end: homes[end].tables(end) for end in ENDS if end in homes}
     home = homes.get("receiver") or homes["transmitter"]
     agreement = _agreement(home, next(iter(tables.values())), allow_code)
     for end, one in tables.items():
         _check_same(one, agreement, end)
     rows = {end: read_rows(end, one) for end, one in tables.items()}
-    return FlightRecord(agreement, tables.get("transmitter"), tables.get("receiver"), summaries, rows)
+    return FlightRecord(agreement, tables, {end: run.summary for end, run in homes.items()}, rows)
 
 
 def _agreement(run: Run, tables: Tables, allow_code: bool) -> Agreement:
@@ -134,8 +120,12 @@ def epochs_of(record: FlightRecord) -> list[Epoch]:
     within an epoch: what came after cannot be computed.
     """
     agreement, codec = record.agreement, record.agreement.codec
-    tables, samples = record.consumer, record.consumer_rows.topic("sample").rows
-    epochs = [_epoch(row) for row in record.consumer_rows.topic("epoch")]
+    tables, rows = record.tables[record.consumer], record.rows[record.consumer].topics
+    samples = rows["sample"].rows
+    epochs = [
+        Epoch(row.epoch, CodecState(row.sample, row.state, row.coder), row.hold)
+        for row in rows["epoch"]
+    ]
     before = bool(epochs and samples) and samples[0].sample < epochs[0].start.sample
     if before or (tables.holes and not epochs):
         raise RecordingError(
@@ -193,7 +183,3 @@ def check_epoch(epoch: Epoch, agreement: Agreement, where: str) -> None:
 def _is_word(word: tuple[int, ...], agreement: Agreement) -> bool:
     alphabet = agreement.codec.coder.alphabet
     return len(word) == alphabet.symbols_per_word and all(one in alphabet.symbols for one in word)
-
-
-def _epoch(row: Any) -> Epoch:
-    return Epoch(row.epoch, CodecState(row.sample, row.state, row.coder), row.hold)

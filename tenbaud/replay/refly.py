@@ -9,16 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from channel.codec.codec import Codec, CodecState, Vector
 from channel.codec.words import Word
 from channel.protocol.frames import Hello, Symbol, Welcome
-from channel.protocol.recording import RecordChannel
 from receiver.controllers.base import Controller
-from receiver.session.records import SAMPLE_CHANNEL, TICK_CHANNEL
 from receiver.session.session import ReceiverSession
 from tenbaud.build.flight import Agreement
+from tenbaud.recording.memory import MemoryRecorder
 from tenbaud.replay.record import Epoch
 
 Delay = Callable[[int], int]
@@ -62,27 +61,12 @@ class _Starting(Codec):
         return self._start
 
 
-class _Rows:
-    """A recorder that keeps what one sample brings."""
-
-    def __init__(self) -> None:
-        self.samples: list[Sequence[object]] = []
-        self.ticks: list[tuple[int, tuple[float | None, ...], Vector, Vector]] = []
-
-    def write(self, channel: RecordChannel, time_ns: int, row: Sequence[object]) -> None:
-        """Keep samples and ticks."""
-        if channel is SAMPLE_CHANNEL:
-            self.samples.append(row)
-        elif channel is TICK_CHANNEL:
-            self.ticks.append(tuple(row))  # type: ignore[arg-type]
-
-
 def _refly_epoch(
     agreement: Agreement, controller: Controller, place: int, epoch: Epoch, delay: Delay
 ) -> Iterator[Reflown]:
     terms = replace(agreement.terms, initial_command=epoch.hold)
     codec = _Starting(agreement.codec, epoch.start)
-    rows = _Rows()
+    rows = MemoryRecorder()
     session = ReceiverSession(codec, terms, controller, agreement.identity, 1, rows)
     identity = agreement.identity
     hello = Hello(1, identity.version, identity.config_digest, identity.numerics_probe)
@@ -121,11 +105,9 @@ def _let_deadlines_pass(session: ReceiverSession, now_ns: int) -> None:
         session.on_deadline(now_ns - 1)
 
 
-def _taken(rows: _Rows, place: int) -> Iterator[Reflown]:
-    per_sample = len(rows.ticks) // len(rows.samples) if rows.samples else 0
-    for index, row in enumerate(rows.samples):
-        sample, word, _, model, coder, digest, _ = row
-        ticks = rows.ticks[index * per_sample : (index + 1) * per_sample]
-        yield Reflown(place, sample, word, model, coder, digest, ticks)  # type: ignore[arg-type]
-    rows.samples.clear()
-    rows.ticks.clear()
+def _taken(rows: MemoryRecorder, place: int) -> Iterator[Reflown]:
+    samples, ticks = rows.taken("sample"), rows.taken("tick")
+    per_sample = len(ticks) // len(samples) if samples else 0
+    for index, (sample, word, _, model, coder, digest, _) in enumerate(samples):
+        own: Any = [tuple(row) for row in ticks[index * per_sample : (index + 1) * per_sample]]
+        yield Reflown(place, sample, word, model, coder, digest, own)

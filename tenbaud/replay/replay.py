@@ -101,7 +101,7 @@ def _check_shape(record: FlightRecord) -> None:
 
 
 def _compare_samples(end: str, rows: EndRows, flown: Sequence[Reflown]) -> tuple[list[str], int]:
-    by_sample = rows.topic("sample").by_key()
+    by_sample = rows.topics["sample"].by_key()
     unlike = 0
     first = ""
     compared = 0
@@ -135,7 +135,7 @@ def _unlike_field(row: Any, one: Reflown) -> str | None:
 
 
 def _compare_commands(rows: EndRows, flown: Sequence[Reflown]) -> list[str]:
-    by_tick = rows.topic("tick").by_key()
+    by_tick = rows.topics["tick"].by_key()
     unlike, first = 0, ""
     for one in flown:
         for tick, _, live, command in one.ticks:

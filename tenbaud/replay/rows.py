@@ -1,13 +1,13 @@
 """The rows of a recording as typed records, checked one by one as they are read.
 
-A recording may come from anybody. So the types are those that the nodes write, not those that the file
-says it has, and an error names topic, row and field of a row that does not fit.
+A recording may come from anybody. Types are checked when it is read (`tenbaud.recording.rows`); here
+each topic must have the fields that its node writes, and null only where the node writes null. An
+error names topic, row and field of a row that does not fit.
 """
 
 from __future__ import annotations
 
 from collections import namedtuple
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -112,13 +112,10 @@ class EndRows:
     complete: bool
     """whether the recorder finished the file; else what there is ends at a cut"""
     topics: dict[str, Topic]
+    """all of the end's, without rows where it was not recorded"""
     misfits: list[Misfit]
     foreign: list[str]
     """topics that no node writes"""
-
-    def topic(self, name: str) -> Topic:
-        """Return a topic of this end, without rows where it was not recorded."""
-        return self.topics[name]
 
 
 def read_rows(end: str, tables: Tables) -> EndRows:
@@ -144,10 +141,11 @@ def _typed(name: str, kind: Kind, table: Table, misfits: list[Misfit]) -> Topic:
     times_ns = table.times_ns.tolist()
     rows = (row for block in table.blocks() for row in block)
     for index, (row, time_ns) in enumerate(zip(rows, times_ns, strict=True)):
-        values = [_frozen(row.get(one.name)) for one in fields]
-        wrong = next((one for one, value in zip(fields, values, strict=True)
-                      if not _fits(value, one, kind.nullable)), None)  # fmt: skip
-        if wrong is None and not _key_fits(values[0], fields[0]):
+        read = (row.get(one.name) for one in fields)
+        values: list[Any] = [tuple(value) if type(value) is list else value for value in read]
+        pairs = zip(fields, values, strict=True)
+        wrong = next((one for one, value in pairs if not _fits(value, one, kind.nullable)), None)
+        if wrong is None and fields[0].type == "integer" and not 0 <= values[0] <= KEY_MAX:
             wrong = fields[0]
         if wrong is not None:
             value = row.get(wrong.name)
@@ -158,34 +156,8 @@ def _typed(name: str, kind: Kind, table: Table, misfits: list[Misfit]) -> Topic:
     return topic
 
 
-def _frozen(value: Any) -> Any:
-    return tuple(value) if type(value) is list else value
-
-
 def _fits(value: Any, one: Field, nullable: frozenset[str]) -> bool:
+    """Return whether a value, whose type has been checked already, may be null or hold nulls."""
     if value is None:
         return one.name in nullable
-    match one.type:
-        case "integer":
-            return type(value) is int
-        case "number":
-            return type(value) in (int, float)
-        case "string":
-            return type(value) is str
-        case "boolean":
-            return type(value) is bool
-        case "integers":
-            return type(value) is tuple and _all_of(value, int)
-        case _:
-            holes = one.name in WITH_HOLES
-            return type(value) is tuple and all(
-                type(entry) in (int, float) or (holes and entry is None) for entry in value
-            )
-
-
-def _all_of(values: Sequence[Any], kind: type) -> bool:
-    return all(type(value) is kind for value in values)
-
-
-def _key_fits(key: Any, one: Field) -> bool:
-    return one.type != "integer" or 0 <= key <= KEY_MAX
+    return one.type != "numbers" or one.name in WITH_HOLES or None not in value

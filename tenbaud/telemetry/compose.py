@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections import deque
 from math import isfinite
 from typing import Any
@@ -48,7 +49,7 @@ D_TICK, D_REFERENCE, D_LIVE = _at(DECIDED, "tick", "reference", "live_state")
 R_SAMPLE, R_WORD, R_DIGEST = _at(TAKEN, "sample", "word", "digest")
 
 
-class _Composer:
+class Composer(ABC):
     """Common fields of both ends' messages."""
 
     def __init__(self, agreement: Agreement, tap: Tap) -> None:
@@ -73,9 +74,9 @@ class _Composer:
         """Count messages that were not sent."""
         self.skipped += messages
 
-    def watch(self, watched: bool) -> None:
-        """Have rows kept only while anybody watches."""
-        self.tap.watch(watched)
+    @abstractmethod
+    def compose(self) -> dict[str, Any]:
+        """Return the message of this moment."""
 
     def _common(self, session: Any, impairments: str, rows: list[tuple[str, Row]]) -> dict[str, Any]:
         self._number += 1
@@ -96,11 +97,8 @@ class _Composer:
             "dropped": self.tap.dropped + self.skipped,
         }
 
-    def _outputs_of(self, state: Vector | None) -> Vector | None:
-        return None if state is None else self._measured(state)
 
-
-class TransmitterComposer(_Composer):
+class TransmitterComposer(Composer):
     """Composes the transmitter's messages."""
 
     def __init__(self, run: TransmitterRun, tap: Tap, live: LiveTransmitter) -> None:
@@ -164,7 +162,7 @@ class TransmitterComposer(_Composer):
                 if row[E_TICK] % stride == 0:
                     self._estimated_of[row[E_TICK]] = {
                         "coded": self._measured(row[E_CODED]),
-                        "live": self._outputs_of(row[E_LIVE]),
+                        "live": row[E_LIVE] and self._measured(row[E_LIVE]),
                         "range": self._range,
                     }
                     self._join(row[E_TICK], points)
@@ -202,7 +200,7 @@ class TransmitterComposer(_Composer):
         }
 
 
-class ReceiverComposer(_Composer):
+class ReceiverComposer(Composer):
     """Composes the receiver's messages."""
 
     def __init__(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from channel.errors import LinkError
@@ -17,11 +17,11 @@ from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build.flight import Agreement
 from tenbaud.build.references import build_references
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
-from tenbaud.telemetry.commands import CommandQueue
+from tenbaud.telemetry.compose import Composer
 from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
 from tenbaud.telemetry.place import SOCKET, endpoint_for
-from tenbaud.telemetry.publisher import Composer, Publisher
-from tenbaud.telemetry.tap import Tap
+from tenbaud.telemetry.publisher import Publisher
+from tenbaud.telemetry.tap import CommandQueue, Tap
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,23 +46,46 @@ STEERABLE = ("pid", "state_feedback")
 """Controllers whose set-points may be taken over in flight."""
 
 
-@dataclass(slots=True)
 class TelemetryEnd:
-    """The telemetry of one end, from before its parts are built until after its flight."""
+    """The telemetry of one end, from before its parts are built until after its flight.
 
-    agreement: Agreement
-    role: Role
-    recorder: Recorder
-    """what the end records into: the tap, where there is one"""
-    endpoint: str | None
-    queue: CommandQueue | None
-    steering: tuple[SteeredReference | None, ...] | None
-    pace: float | None
-    tap: Tap | None
-    security: Security | None
-    requested: bool = False
-    """whether this telemetry was asked for, so that a flight without it is refused"""
-    publisher: Publisher | None = field(default=None)
+    `addresses`, `insecure` and `security` are those of the flight's link; the viewers invited there may
+    see the telemetry, and steer where the flight allows it. An error only disables the telemetry,
+    unless it was asked for: LinkError for an endpoint that cannot be used.
+    """
+
+    def __init__(
+        self,
+        agreement: Agreement,
+        role: Role,
+        recorder: Recorder,
+        options: TelemetryOptions,
+        addresses: tuple[str, ...] = (),
+        insecure: bool = False,
+        security: Security | None = None,
+    ) -> None:
+        self.agreement = agreement
+        self.role: Role = role
+        self.endpoint: str | None = None
+        self.publisher: Publisher | None = None
+        self.requested = bool(options.endpoint)
+        """whether this telemetry was asked for, so that a flight without it is refused"""
+        with self._optional():
+            secured = security is not None
+            self.endpoint = endpoint_for(options.endpoint, role, addresses, insecure, secured)
+        steerable = agreement.live and self.endpoint is not None
+        if steerable and self.endpoint and not self.endpoint.startswith((SOCKET, "tls/")):
+            sys.stderr.write(
+                f"tenbaud: anyone who reaches {self.endpoint} can steer this flight, every user of "
+                "this machine included; leave --telemetry out, or use tls/, to decide who may\n"
+            )
+        self.tap = None if self.endpoint is None else Tap(recorder)
+        self.recorder: Recorder = self.tap or recorder
+        """what the end records into: the tap, where there is one"""
+        self.queue = CommandQueue() if steerable else None
+        self.steering = _steered(agreement)
+        self.pace = options.pace if agreement.clock == "virtual" else None
+        self.security = None if security is None else _for_viewers(security, agreement.live)
 
     def fly_transmitter(
         self, run: TransmitterRun, stop: Stop, keep_alive: Callable[[], None] | None = None
@@ -112,59 +135,24 @@ class TelemetryEnd:
         on_command = None if self.queue is None else self.queue.offer
         name = self.agreement.config.link.session
         security = self.security if self.endpoint.startswith("tls/") else None
-        try:
+        with self._optional():
             return TelemetryPort(self.role, name, self.endpoint, on_command, security)
+        return None
+
+    @contextmanager
+    def _optional(self) -> Iterator[None]:
+        """Within the `with`, a LinkError is only reported, unless the telemetry was asked for."""
+        try:
+            yield
         except LinkError as error:
             if self.requested:
                 raise
             sys.stderr.write(f"tenbaud: no telemetry: {error}\n")
-            return None
 
 
-def open_telemetry(
-    agreement: Agreement,
-    role: Role,
-    recorder: Recorder,
-    options: TelemetryOptions,
-    addresses: tuple[str, ...] = (),
-    insecure: bool = False,
-    security: Security | None = None,
-) -> TelemetryEnd:
-    """Return the telemetry of one end; unless it was asked for, an error only disables it.
-
-    `addresses`, `insecure` and `security` are those of the flight's link; the viewers invited there may
-    see the telemetry, and steer where the flight allows it. Raises LinkError for an endpoint that
-    was asked for and cannot be used.
-    """
-    try:
-        endpoint = endpoint_for(options.endpoint, role, addresses, insecure, security is not None)
-    except LinkError as error:
-        if options.endpoint:
-            raise
-        sys.stderr.write(f"tenbaud: no telemetry: {error}\n")
-        endpoint = None
-    if agreement.live and endpoint is not None and not endpoint.startswith((SOCKET, "tls/")):
-        sys.stderr.write(
-            f"tenbaud: anyone who reaches {endpoint} can steer this flight, every user of this machine "
-            "included; leave --telemetry out, or use tls/, to decide who may\n"
-        )
-    tap = Tap(recorder) if endpoint is not None else None
-    steerable = agreement.live and agreement.config.receiver.controller in STEERABLE
-    return TelemetryEnd(
-        agreement,
-        role,
-        tap or recorder,
-        endpoint,
-        CommandQueue() if agreement.live and endpoint is not None else None,
-        _steered(agreement) if steerable else None,
-        options.pace if agreement.clock == "virtual" else None,
-        tap,
-        None if security is None else _for_viewers(security, agreement.live),
-        bool(options.endpoint),
-    )
-
-
-def _steered(agreement: Agreement) -> tuple[SteeredReference | None, ...]:
+def _steered(agreement: Agreement) -> tuple[SteeredReference | None, ...] | None:
+    if not (agreement.live and agreement.config.receiver.controller in STEERABLE):
+        return None
     references = build_references(agreement.config, agreement.signals)
     return tuple([None if one is None else SteeredReference(one) for one in references])
 

@@ -25,8 +25,8 @@ from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
 from receiver.controllers.references import SteeredReference
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
-from tenbaud.telemetry.commands import CommandQueue
 from tenbaud.telemetry.schema import Command, Corrupt, Impair, Pace, Pause, SetPoint, Step
+from tenbaud.telemetry.tap import CommandQueue
 
 PAUSE_POLL_S = 0.02
 KEEP_ALIVE_S = 0.5

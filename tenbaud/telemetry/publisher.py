@@ -5,39 +5,15 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
-from typing import Protocol, Self
+from typing import TYPE_CHECKING, Self
 
 import orjson
 
 from channel.errors import LinkError
+from tenbaud.telemetry.compose import Composer
 
-
-class Port(Protocol):
-    """The destination of messages."""
-
-    def is_watched(self) -> bool:
-        """Return whether anybody would get a message."""
-
-    def publish(self, data: bytes) -> None:
-        """Send one message; LinkError when it cannot be."""
-
-    def close(self) -> None:
-        """Give everything back."""
-
-
-class Composer(Protocol):
-    """The source of messages."""
-
-    skipped: int
-
-    def skip(self, messages: int) -> None:
-        """Count messages that were not sent."""
-
-    def watch(self, watched: bool) -> None:
-        """Hear whether anybody watches; while nobody does, no message is asked for."""
-
-    def compose(self) -> dict[str, object]:
-        """Return the message of this moment."""
+if TYPE_CHECKING:
+    from channel.links.zenoh.telemetry import TelemetryPort
 
 
 class Publisher:
@@ -47,7 +23,7 @@ class Publisher:
     the composer's `skipped`. An error ends the telemetry and nothing else; `error` then says why.
     """
 
-    def __init__(self, composer: Composer, port: Port, rate_hz: float) -> None:
+    def __init__(self, composer: Composer, port: TelemetryPort, rate_hz: float) -> None:
         self.sent = 0
         self.error: str | None = None
         self._composer = composer
@@ -85,7 +61,7 @@ class Publisher:
 
     def _send(self) -> None:
         watched = self._port.is_watched()
-        self._composer.watch(watched)
+        self._composer.tap.watch(watched)
         if not watched:
             return
         message = orjson.dumps(self._composer.compose())

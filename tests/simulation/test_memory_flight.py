@@ -14,10 +14,10 @@ from channel.codec.codec import Codec
 from channel.codec.models import pitch
 from channel.errors import ConfigMismatch
 from channel.line.line import CleanLine, Delivery, Line
-from channel.protocol.events import event_fields
 from channel.protocol.frames import Why
 from tenbaud.sentences.events import event_text
 from tests.channel.codec.parts import PAPER, THREE_SIGNS
+from tests.events import event_fields
 from tests.simulation.flight import assert_lockstep, largest_share, pitch_flight
 from tests.simulation.lines import DelayingLine, JitterLine, LossyLine, SlowDownlink
 from transmitter.session.session import Phase

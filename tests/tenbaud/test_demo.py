@@ -74,7 +74,7 @@ def test_when_a_person_runs_it_then_both_plants_are_shown_and_nothing_else_on_st
     assert ended.code == 0, ended.err
     assert ended.out.startswith("✓ Flight finished: 30 s, both codecs equal in 300 of 300 checks")
     assert ended.out.count("Flight finished") == 2
-    assert "digest checks" not in ended.out, "that is for --verbose"
+    assert "digest_checks" not in ended.out, "that is for --verbose"
     assert "+10%" in ended.out
     assert len(list((tmp_path / "runs").iterdir())) == 2
 

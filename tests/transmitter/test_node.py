@@ -8,11 +8,12 @@ import pytest
 
 from channel.codec.codec import Vector
 from channel.protocol.endings import End, Ending
-from channel.protocol.events import EventKind, event_fields
+from channel.protocol.events import EventKind
 from channel.protocol.frames import Commands, Echo, Welcome
 from tenbaud import MemoryRecorder
 from tenbaud.sentences.events import event_text, guard_text
 from tests.channel.codec.parts import identity_of, pitch_codec, terms
+from tests.events import event_fields
 from transmitter.guard import Guard, GuardCause, GuardReason, GuardSettings, GuardState
 from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode

@@ -11,7 +11,7 @@ from channel.codec.codec import Vector
 from channel.codec.models.pitch import PITCH_SIGNALS
 from channel.line.uplink import Uplink
 from channel.protocol.endings import End, Ending
-from channel.protocol.events import EventKind, event_fields
+from channel.protocol.events import EventKind
 from channel.protocol.limits import CommandLimits
 from plant_sim.encoder import Encoder
 from plant_sim.pitch import PitchParameters, PitchPlant
@@ -21,6 +21,7 @@ from receiver.session.session import ReceiverSession
 from tenbaud.sentences.events import event_text
 from tests.channel.codec.parts import THREE_SIGNS, ConstantController, identity_of, pitch_codec, terms
 from tests.channel.links.memory_pair import MemoryLink, memory_pair
+from tests.events import event_fields
 from tests.tenbaud.machine import Pacer
 from transmitter.endpoint import TransmitterEndpoint
 from transmitter.guard import Guard, GuardSettings

@@ -10,7 +10,6 @@ from typing import Any, ClassVar
 
 from plant_sim.encoder import QUANSER_PITCH
 from plant_sim.pitch import PitchParameters, PitchPlant
-from transmitter.rigs.hil_library import HilLibrary
 
 STEP_S = 0.001
 ANALOG_OUTPUTS = 8
@@ -153,8 +152,3 @@ class FakeHIL:
         while self._steps < due:
             self._plant.advance((self.analog[0], self.analog[1]))
             self._steps += 1
-
-
-def fake_library() -> HilLibrary:
-    """Return the double as if it were the vendor's package."""
-    return HilLibrary(FakeHIL, FakeHILError, 0, 2)

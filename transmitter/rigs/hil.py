@@ -20,10 +20,19 @@ from transmitter.rigs.axes import Axis, Motors
 from transmitter.rigs.base import RigError
 from transmitter.rigs.device import DeviceRig, DeviceSettings
 from transmitter.rigs.formats.samples import RawSample, Wraps
-from transmitter.rigs.hil_library import HilLibrary
 
 FAKE_CARD = "fake"
 OPTIONS_LENGTH_MAX = 255
+
+
+@dataclass(frozen=True, slots=True)
+class HilLibrary:
+    """The names that we use of the vendor's package, or of its double."""
+
+    hil: Callable[[str, str], Any]
+    error: type[Exception]
+    hardware_clock: Any
+    overwrite_on_overflow: Any
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,9 +54,9 @@ class HilSettings:
 def load_library(card_type: str) -> HilLibrary:
     """Return the vendor's package, or the double for `card_type` "fake"; RigError without either."""
     if card_type == FAKE_CARD:
-        from transmitter.rigs.fake_hil import fake_library
+        from transmitter.rigs.fake_hil import FakeHIL, FakeHILError
 
-        return fake_library()
+        return HilLibrary(FakeHIL, FakeHILError, 0, 2)
     try:
         from quanser.hardware import (  # type: ignore[import-not-found]
             HIL,

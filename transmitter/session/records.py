@@ -7,7 +7,6 @@ from channel.protocol.frames import Desync
 from channel.protocol.lockstep import LOCKSTEP_CHANNEL, History
 from channel.protocol.recording import Field, RecordChannel, Recorder
 from channel.protocol.terms import Terms
-from transmitter.rigs.base import DeviceNote
 from transmitter.session.copies import Confirmed
 
 TICK_CHANNEL = RecordChannel(
@@ -35,11 +34,6 @@ DEVICE_CHANNEL = RecordChannel(
         Field("lost", "integer", "", "samples missing in the rig's sequence so far", timing=True),
     ),
 )
-
-
-def device_row(tick: int, note: DeviceNote) -> tuple[object, ...]:
-    """Return the row of `DEVICE_CHANNEL` for what a rig said."""
-    return (tick, note.counts, note.device_s, note.age_ms, note.lost)
 
 
 ESTIMATE_CHANNEL = RecordChannel(

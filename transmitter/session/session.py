@@ -35,7 +35,7 @@ from channel.protocol.frames import (
 )
 from channel.protocol.identity import Identity, differing_fields
 from channel.protocol.lockstep import History, difference_event, is_answer
-from channel.protocol.recording import EPOCH_CHANNEL, NullRecorder, Recorder, epoch_row
+from channel.protocol.recording import NullRecorder, Recorder, write_epoch
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
 from transmitter.session.copies import CANNOT_FLY, Confirmed, Copies, EchoOrder
@@ -274,8 +274,7 @@ class TransmitterSession:
         held = self.owing.begin(self.epoch_tick, self._tick, self._asking.why)
         self._due = deque(enumerate([hold] * held, self.epoch_tick))
         self.phase = Phase.FLYING
-        begins_ns = state.sample * self.terms.sample_ns
-        self._recorder.write(EPOCH_CHANNEL, begins_ns, epoch_row(self.epoch, state, hold))
+        write_epoch(self._recorder, self.terms.sample_ns, self.epoch, state, hold)
         self.counts["rejoins"] += again
         kind = EventKind.REJOIN if again else EventKind.STARTED
         self._emit(Event(kind, state.sample, session=welcome.session, epoch=welcome.epoch))

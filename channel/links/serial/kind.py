@@ -12,7 +12,13 @@ from typing import Any
 from channel.codec.codec import Codec
 from channel.links.base import Link
 from channel.links.kind import LinkEnd, LinkKind, LinkSettings, Meeting
-from channel.links.serial.budget import check_slot_counter, serial_budget
+from channel.links.serial.budget import (
+    byte_ns,
+    check_down,
+    check_slot_counter,
+    check_up,
+    command_bytes,
+)
 from channel.links.serial.wire import SerialWire
 from channel.links.zenoh.kind import ZenohKind
 from channel.protocol.terms import Terms
@@ -48,15 +54,15 @@ class SerialKind(LinkKind):
         coder whose symbols do not fit a byte.
         """
         check_slot_counter(terms, _wire(codec))
-        budget = serial_budget(terms, codec.model.input_size)
-        budget.check_up(settings.line_rate_baud)
+        check_up(terms, settings.line_rate_baud)
         if settings.downlink == ZENOH:
             down_ns = 0
         else:
             rate = settings.downlink_rate_baud if settings.downlink else settings.line_rate_baud
-            budget.check_down(rate)
-            down_ns = budget.command_ns(rate)
-        up_ns = budget.symbol_ns(settings.line_rate_baud)
+            frame_bytes = command_bytes(terms, codec.model.input_size)
+            check_down(terms, frame_bytes, rate)
+            down_ns = byte_ns(frame_bytes, rate)
+        up_ns = byte_ns(1, settings.line_rate_baud)
         return replace(terms, uplink_line_ns=up_ns, downlink_line_ns=down_ns)
 
     def open(self, end: LinkEnd) -> Link:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from channel.links.base import Link, LinkCounts, Role
-from channel.protocol.frames import Frame
 from channel.protocol.wire import Wire
 
 DOWNWARD_KINDS = (2, 3, 5, 8, 9)
@@ -14,29 +13,14 @@ class SplitWire:
     """Looks like the upward line's wire; sizes of downward frames are the downward line's."""
 
     def __init__(self, up: Wire, down: Wire) -> None:
-        self._up = up
-        self._down = down
-
-    def encode(self, frame: Frame) -> bytes:
-        """Return the message for a frame."""
-        return self._up.encode(frame)
-
-    def decode(self, data: bytes) -> Frame:
-        """Return the frame in a message."""
-        return self._up.decode(data)
+        self.encode, self.decode = up.encode, up.decode
+        self.is_symbol, self.renumbered = up.is_symbol, up.renumbered
+        self._up, self._down = up, down
 
     def size(self, data: bytes) -> int:
         """Return how many bytes a message takes on its line."""
         downward = len(data) > 1 and data[1] in DOWNWARD_KINDS
         return (self._down if downward else self._up).size(data)
-
-    def is_symbol(self, data: bytes) -> bool:
-        """Return whether a message carries a symbol, as the upward line has them."""
-        return self._up.is_symbol(data)
-
-    def renumbered(self, data: bytes, shift: int, kinds: int) -> bytes:
-        """Return a symbol's message with another number."""
-        return self._up.renumbered(data, shift, kinds)
 
 
 class SplitLink(Link):

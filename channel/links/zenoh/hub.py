@@ -17,9 +17,9 @@ import zenoh
 from channel.errors import LinkError
 from channel.links.base import LinkCounts
 from channel.links.security import KEY_ROOT
+from channel.links.zenoh.config import NodeOptions, is_session_name, open_node
 from channel.links.zenoh.gate import Gate
 from channel.links.zenoh.inbox import ChannelInbox
-from channel.links.zenoh.node import NodeOptions, is_session_name, open_node
 
 CHANNEL_MESSAGES_MAX = 1024
 

@@ -22,9 +22,9 @@ import zenoh
 from channel.errors import LinkError
 from channel.links.base import Link, Role
 from channel.links.security import KEY_ROOT
+from channel.links.zenoh.config import NodeOptions, is_session_name, open_node
 from channel.links.zenoh.gate import Gate
 from channel.links.zenoh.inbox import ChannelInbox
-from channel.links.zenoh.node import NodeOptions, is_session_name, open_node
 
 
 class ZenohLink(Link):

@@ -7,6 +7,7 @@ is trusted with them. With `security` it lets each end send and hear what its pa
 from __future__ import annotations
 
 from collections import Counter
+from contextlib import ExitStack
 from typing import Self
 
 from channel.errors import LinkError
@@ -53,8 +54,9 @@ class ZenohRouter:
         """nodes turned away, by reason"""
         settings = _settings(listen, security, connections_max)
         self._session = open_session(zenoh_config(settings), ", ".join(listen))
-        self._gate = Gate(self._session, security, self.refused)
-        self._closed = False
+        self._parts = ExitStack()
+        self._parts.callback(self._session.close)
+        self._parts.callback(Gate(self._session, security, self.refused).close)
 
     @property
     def connected(self) -> int:
@@ -63,10 +65,7 @@ class ZenohRouter:
 
     def close(self) -> None:
         """Stop routing; may be called more than once."""
-        if not self._closed:
-            self._closed = True
-            self._gate.close()
-            self._session.close()
+        self._parts.close()
 
     def __enter__(self) -> Self:
         return self

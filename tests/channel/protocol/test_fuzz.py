@@ -27,7 +27,7 @@ def test_when_a_decoder_lets_another_error_out_then_fuzzing_finds_it(
 ) -> None:
     from channel.protocol import wire
 
-    monkeypatch.setitem(wire._READERS, 7, lambda _session, _epoch, body: {}[body])
+    monkeypatch.setattr(wire, "_decode_commands", lambda _session, _epoch, body: {}[body])
     with pytest.raises(KeyError):
         fuzz_all(20_000, 5)
 

@@ -10,7 +10,7 @@ import pytest
 from channel.errors import LinkError
 from channel.links.zenoh.telemetry import TelemetryPort
 from tenbaud import MemoryRecorder
-from tenbaud.telemetry.end import TelemetryEnd, TelemetryOptions, open_telemetry
+from tenbaud.telemetry.end import TelemetryEnd, TelemetryOptions
 from tenbaud.telemetry.place import endpoint_for
 from tests.tenbaud.room import agreement
 
@@ -23,7 +23,7 @@ class Silent:
 
 
 def telemetry_end(options: TelemetryOptions) -> TelemetryEnd:
-    return open_telemetry(agreement(), "receiver", MemoryRecorder(), options)  # type: ignore[arg-type]
+    return TelemetryEnd(agreement(), "receiver", MemoryRecorder(), options)  # type: ignore[arg-type]
 
 
 def test_when_the_usual_place_is_taken_then_the_flight_goes_on_without(

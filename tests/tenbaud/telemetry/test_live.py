@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from channel.protocol.events import EventKind, event_fields
+from channel.protocol.events import EventKind
 from channel.protocol.wire import DATAGRAM
 from tenbaud import MemoryRecorder
 from tenbaud.build.ends import build_receiver
@@ -16,8 +16,9 @@ from tenbaud.config.load import load_config
 from tenbaud.flight import transmit
 from tenbaud.flight.outcome import ExitCode
 from tenbaud.sentences.events import event_text
-from tenbaud.telemetry.commands import CommandQueue
 from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
+from tenbaud.telemetry.tap import CommandQueue
+from tests.events import event_fields
 
 
 @pytest.mark.parametrize("end", ["transmitter", "receiver"])

@@ -20,6 +20,10 @@ class Counting:
     def skip(self, messages: int) -> None:
         self.skipped += messages
 
+    @property
+    def tap(self) -> Counting:
+        return self
+
     def watch(self, watched: bool) -> None:
         self.watched = watched
 

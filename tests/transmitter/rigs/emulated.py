@@ -13,7 +13,7 @@ from tenbaud.build.rig import build_device
 from tenbaud.config.load import load_config
 from tenbaud.config.schema import FlightConfig
 from transmitter.rigs.device import DeviceRig
-from transmitter.rigs.emulator.loop import RigEmulator
+from transmitter.rigs.emulator.device import RigEmulator
 
 PATIENCE_S = 0.5
 

@@ -14,7 +14,7 @@ import serial.rfc2217
 
 from tests.transmitter.rigs.emulated import emulated, fly, serial_rig, wait_until
 from transmitter.rigs.base import RigError
-from transmitter.rigs.emulator.loop import RigEmulator
+from transmitter.rigs.emulator.device import RigEmulator
 
 OFF = [0.0, 0.0]
 

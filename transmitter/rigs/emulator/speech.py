@@ -8,6 +8,7 @@ from collections import Counter
 from typing import NamedTuple, Protocol
 
 from transmitter.rigs.formats.ascii import checked, unchecked
+from transmitter.rigs.formats.base import Cutter
 from transmitter.rigs.formats.cobs import (
     COMMAND,
     COMMAND_TYPE,
@@ -18,7 +19,6 @@ from transmitter.rigs.formats.cobs import (
     seal,
     unseal,
 )
-from transmitter.rigs.formats.framing import Cutter
 from transmitter.rigs.formats.qsb import STAMP_US
 from transmitter.rigs.formats.samples import RawSample
 

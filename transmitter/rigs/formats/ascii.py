@@ -14,8 +14,7 @@ from __future__ import annotations
 import re
 from typing import Literal
 
-from transmitter.rigs.formats.base import SerialFormat
-from transmitter.rigs.formats.framing import xor_checksum
+from transmitter.rigs.formats.base import SerialFormat, xor_checksum
 from transmitter.rigs.formats.samples import RawSample
 
 LINE_BYTES_MAX = 200

@@ -11,8 +11,7 @@ from __future__ import annotations
 import struct
 
 from channel.links.serial.cobs import cobs_decode, cobs_encode
-from transmitter.rigs.formats.base import SerialFormat
-from transmitter.rigs.formats.framing import crc16
+from transmitter.rigs.formats.base import SerialFormat, crc16
 from transmitter.rigs.formats.samples import DeviceFlag, RawSample
 
 SAMPLE_TYPE = 0x01

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from channel.links.serial.cobs import cobs_decode, cobs_encode
-from transmitter.rigs.formats.framing import Cutter, crc16, xor_checksum
+from transmitter.rigs.formats.base import Cutter, crc16, xor_checksum
 
 ZEROES_AND_RUNS = st.lists(
     st.one_of(st.just(b"\0"), st.binary(max_size=5), st.integers(250, 260).map(lambda n: b"\x07" * n)),

@@ -37,7 +37,7 @@ def studies_figures() -> list[Figure]:
     """Return the ratios that a study is asked for."""
     point = CompiledPoint(load_config("paper-10baud"))
     figures, _ = point.fly(1)
-    rms = figures.error_coded_rms
+    rms = figures.first.error_coded_rms
     compiled_s = _shortest(lambda: point.fly(1), FLIGHTS)
     noise = {"transmitter": {"plant": {"disturbance": "q=2e-3"}}}
     noisy = CompiledPoint(load_config("paper-10baud", None, noise))
@@ -86,7 +86,11 @@ def _python_control(point: CompiledPoint, sine: Sine) -> tuple[float, float]:
     import control
 
     numbers, signals = point.numbers, point.agreement.signals
-    _, _, plant_c, pid_c = point.constants
+    _, _, plant_c, law = point.constants
+    (pid_c,) = law.loops
+    steady = point.steady
+    place = tuple(steady[name][0].item() for name in ("counts_per_turn", "sign", "zero_counts"))
+    limits = steady["command_max"].tolist()
     codec = point.agreement.codec
     tick_s = point.config.timing.tick_s
 
@@ -94,20 +98,19 @@ def _python_control(point: CompiledPoint, sine: Sine) -> tuple[float, float]:
         body, state = tuple(x[0:4].tolist()), tuple(x[4:8].tolist())
         m, last, e1, e2, integral, tick = x[8:14].tolist()
         if tick % numbers.per_sample == 0:
-            place = (numbers.counts_per_turn, numbers.sign, numbers.zero_counts)
             measured = angle_of(counts_of(body[0], *place), *place)
             word = codec.coder.encode((m, last), state[:1], (measured,))
             (e1, e2), (m, last) = codec.coder.decode((m, last), state, word)
         error = float(u[0]) - state[0]
         total = pid_sum(pid_c, integral, error, state[1])
-        wanted = [bias + share * total for bias, share in zip(numbers.bias, pid_c.mixing, strict=True)]
-        inputs = list(zip(wanted, pid_c.mixing, numbers.command_max, strict=True))
+        wanted = [bias + share * total for bias, share in zip(law.bias, pid_c.mixing, strict=True)]
+        inputs = list(zip(wanted, pid_c.mixing, limits, strict=True))
         stuck = all(is_stuck(value, share * error, most) for value, share, most in inputs)
         integral = pid_integral(pid_c, integral, error, stuck)
         limited = [clamped(value, most) for value, _, most in inputs]
         command = from_steps(to_steps(limited, signals), signals)
         state = codec.model.tick(state, command, (e1, e2))
-        body = pitch_step(body, command, 0.0, plant_c, sine)
+        body = pitch_step(body, command, (0.0,), plant_c, sine)
         return [*body, *state, m, last, e1, e2, integral, tick + 1.0]
 
     def output(t: float, x: Any, u: Any, params: object) -> list[float]:
@@ -116,7 +119,7 @@ def _python_control(point: CompiledPoint, sine: Sine) -> tuple[float, float]:
     system = control.nlsys(update, output, inputs=1, outputs=2, states=14, dt=tick_s)
     times = np.arange(numbers.ticks) * tick_s
     start = [0.0] * 8 + [*codec.initial().coder, 0.0, 0.0, 0.0, 0.0]
-    reference = np.asarray(point.reference[: numbers.ticks])
+    reference = np.asarray(point.targets[: numbers.ticks, 0])
     begun = time.process_time()
     response = control.input_output_response(system, times, reference, start)
     seconds = time.process_time() - begun
@@ -164,18 +167,19 @@ def _shortest_once(fly: Callable[[], object]) -> float:
 def _c_call(loop: Any, point: CompiledPoint) -> tuple[Callable[[], object], Any]:
     """Return what flies the C loop once, and the array that it writes."""
     numbers = point.numbers
-    model_c, coder_c, plant_c, pid_c = point.constants
+    model_c, coder_c, plant_c, law = point.constants
+    (pid_c,) = law.loops
     zoom = [coder_c.decay, coder_c.floor, coder_c.gains[0][0], coder_c.gains[1][0]]
     zoom.append(point.agreement.codec.coder.initial()[0])
     pid = [pid_c.proportional, pid_c.integral_per_tick, pid_c.derivative]
-    pid += [numbers.command_max[0], 2.0 * numbers.bias[0]]
+    pid += [point.steady["command_max"][0], 2.0 * law.bias[0]]
     out = np.zeros(3)
-    reference = np.asarray(point.reference)
+    reference = np.ascontiguousarray(point.targets[:, 0])
     arrays = [np.array(one) for one in (model_c, plant_c, pid, zoom)]
     arrays += [reference, np.zeros(numbers.ticks), out]
     pointers = [array.ctypes.data_as(ctypes.c_void_p) for array in arrays]
     whole = (numbers.ticks // numbers.per_sample, numbers.per_sample, numbers.window_start)
-    head = [ctypes.c_int64(value) for value in (*whole, numbers.counts_per_turn)]
+    head = [ctypes.c_int64(value) for value in (*whole, int(point.steady["counts_per_turn"][0]))]
     loop.restype = None
     # The arrays live as long as what calls the loop.
     return lambda: (loop(*head, *pointers), arrays)[0], out

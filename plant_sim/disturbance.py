@@ -7,7 +7,8 @@ plant step. Every disturbance is a pure function of the step index, so steps may
 from __future__ import annotations
 
 import math
-from typing import Final, Protocol, TypeAlias
+from collections.abc import Sequence
+from typing import Final, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from numpy.random import PCG64, Generator, SeedSequence
@@ -19,6 +20,7 @@ GRAMMAR: Final = (
 )
 
 Torques: TypeAlias = "np.ndarray[tuple[int], np.dtype[np.float64]]"
+Pushes: TypeAlias = "np.ndarray[tuple[int, int], np.dtype[np.float64]]"
 
 # Numbers drawn at once: large enough that numpy's cost per call vanishes, small enough (128 kB as
 # Python floats) that the length of a run costs no memory.
@@ -37,12 +39,19 @@ class Disturbance(Protocol):
         ...
 
 
+@runtime_checkable
 class PlannedDisturbance(Disturbance, Protocol):
     """A disturbance whose torques can be had in advance, as studies ask for them."""
 
     def torques(self, steps: int) -> Torques:
         """The torques of steps `0 ... steps - 1` at once, to the last bit those of `torque`."""
         ...
+
+
+def pushes_of(disturbances: Sequence[Disturbance | None], steps: int) -> Pushes:
+    """Return what pushes a plant in the first steps, a column per place; one row for nothing."""
+    planned = [one.torques(steps) for one in disturbances if isinstance(one, PlannedDisturbance)]
+    return np.column_stack(planned) if planned else np.zeros((1, len(disturbances)))
 
 
 class WhiteTorque:

@@ -21,6 +21,10 @@ def angle_of(
     return sign * (counts - zero_counts) * turn / counts_per_turn
 
 
+EXACT_PER_UNIT: Final = 2.0**40
+"""Counts of an output that is read exactly; they only tell whether it moved."""
+
+
 class OutputReader(Protocol):
     """What reads one output of a plant."""
 
@@ -82,7 +86,7 @@ class Encoder:
 class ExactReader:
     """Reads a value as it is; its counts only tell whether the value moved."""
 
-    counts_per_unit: float = 2.0**40
+    counts_per_unit: float = EXACT_PER_UNIT
 
     def counts(self, value: float) -> int:
         """Return a count that changes with the value."""

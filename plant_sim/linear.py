@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from plant_sim.disturbance import Pushes, pushes_of
 from plant_sim.plant import PlantContext, held_command
 from plant_sim.zero_order_hold import Matrix, continuous, discretised
 
@@ -26,17 +27,30 @@ class LinearStep(NamedTuple):
     drive: Vector
     """of the inputs, then of the places that are disturbed"""
     constant: Vector
+    outputs: Vector
 
 
-def linear_step(state: Vector, held: Vector, constants: LinearStep, row: int) -> float:
+def linear_step(state: Vector, held: Vector, push: Vector, constants: LinearStep, row: int) -> float:
     """Return one state after a step of held inputs and disturbances."""
     total = constants.constant[row]
     transition, drive = constants.transition, constants.drive
-    size, width = len(state), len(held)
+    size, inputs, pushes = len(state), len(held), len(push)
     for index in range(size):
         total += transition[row * size + index] * state[index]
-    for index in range(width):
-        total += drive[row * width + index] * held[index]
+    start = row * (inputs + pushes)
+    for index in range(inputs):
+        total += drive[start + index] * held[index]
+    for index in range(pushes):
+        total += drive[start + inputs + index] * push[index]
+    return total
+
+
+def linear_output(state: Vector, constants: LinearStep, place: int) -> float:
+    """Return one output of a state."""
+    total = 0.0
+    size = len(state)
+    for index in range(size):
+        total += constants.outputs[place * size + index] * state[index]
     return total
 
 
@@ -48,6 +62,9 @@ class SimulatedLinear:
     state at the start; without it the start follows from the configured outputs or, where there are
     none, it is the model's. Disturbances come through G, or where the commands do.
     """
+
+    row_function = staticmethod(linear_step)
+    output_function = staticmethod(linear_output)
 
     def __init__(
         self,
@@ -70,32 +87,39 @@ class SimulatedLinear:
         at = np.array(model.get("operating_state") or [0.0] * size)
         command = np.array(model.get("operating_command") or [0.0] * inputs)
         self.constants = LinearStep(
-            _flat(F), _flat(np.hstack([E, noise])), tuple((at - F @ at - E @ command).tolist())
+            _flat(F),
+            _flat(np.hstack([E, noise])),
+            tuple((at - F @ at - E @ command).tolist()),
+            _flat(c),
         )
         self._command_max = context.command_max
         self._disturbances = context.disturbances(noise.shape[1])
         self._still = (0.0,) * noise.shape[1]
+        self._outputs = range(len(c))
         begin = _matrix("start", [start or model.get("start") or at], 1, size)[0]
         if context.initial and not start:
             rows = c[: len(context.initial)]
             begin = begin + np.linalg.pinv(rows) @ (np.array(context.initial) - rows @ begin)
         self.state: Vector = tuple(begin.tolist())
-        self._outputs: list[list[float]] = c.tolist()
         self._rows = range(size)
         self._steps = 0
 
     @property
     def measured(self) -> Vector:
         """The outputs, C x."""
-        state = self.state
-        return tuple([sum(map(float.__mul__, row, state)) for row in self._outputs])
+        return tuple([linear_output(self.state, self.constants, place) for place in self._outputs])
+
+    def pushes(self, steps: int) -> Pushes:
+        """Return what disturbs the first steps; see `pushes_of`."""
+        return pushes_of(self._disturbances or (None,) * len(self._still), steps)
 
     def advance(self, command: Vector) -> None:
         """Hold a command, clamped, for one step; ValueError for one that is no command."""
         held = held_command(command, self._command_max)
         step = self._steps
-        held += tuple([one.torque(step) for one in self._disturbances]) or self._still
-        self.state = tuple([linear_step(self.state, held, self.constants, row) for row in self._rows])
+        push = tuple([one.torque(step) for one in self._disturbances]) or self._still
+        state, constants = self.state, self.constants
+        self.state = tuple([linear_step(state, held, push, constants, row) for row in self._rows])
         self._steps += 1
 
 

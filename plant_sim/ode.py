@@ -2,15 +2,17 @@
 
 Commands are clamped, motors lag, every place that is disturbed has its own torque, and the state takes
 classical Runge-Kutta steps of order 4. A plant adds its equations: a pure function over numbers by
-index that returns a tuple, so that a study can compile the very same function.
+index that returns a tuple, so that a study can compile the very same function. The step is written so
+too, and what makes a tuple of several as a function of each of its entries (`by_row`).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
+from plant_sim.disturbance import Pushes, pushes_of
 from plant_sim.plant import PlantContext, held_command
 
 Vector = tuple[float, ...]
@@ -19,6 +21,68 @@ Slopes = Callable[[Vector, Vector, Vector, Any, Sine], Vector]
 """From state, lagging commands, torques, constants and a sine to the state's derivative."""
 
 HALF_PI = 0.5 * math.pi
+
+
+def by_row(row: Callable[..., float]) -> Callable[..., Vector]:
+    """Return what makes a tuple, as long as its first argument, of a function of each entry.
+
+    A study compiles `row_function` for it.
+    """
+
+    def whole(first: Vector, *others: Any) -> Vector:
+        return tuple([row(first, *others, index) for index in range(len(first))])
+
+    whole.row_function = row  # type: ignore[attr-defined]
+    return whole
+
+
+class OdeConstants(NamedTuple):
+    """Constants of `ode_step`."""
+
+    equations: Any
+    step_s: float
+    left_half: float
+    left_whole: float
+    """share of a motor's lag that is left after half a step and after a whole one"""
+
+
+def ode_step(
+    slopes: Slopes,
+    state: tuple[Vector, Vector],
+    held: Vector,
+    push: Vector,
+    constants: OdeConstants,
+    sine: Sine,
+) -> tuple[Vector, Vector]:
+    """Return state and motors after a step of a held command, within its limits, and held torques."""
+    begin, motors = state
+    equations, step_s = constants.equations, constants.step_s
+    half, sixth = 0.5 * step_s, step_s / 6.0
+    before = motors if constants.left_whole > 0.0 else held
+    middle = _lagging(held, before, constants.left_half)
+    after = _lagging(held, before, constants.left_whole)
+    k1 = slopes(begin, before, push, equations, sine)
+    k2 = slopes(_moved(begin, k1, half), middle, push, equations, sine)
+    k3 = slopes(_moved(begin, k2, half), middle, push, equations, sine)
+    k4 = slopes(_moved(begin, k3, step_s), after, push, equations, sine)
+    return _averaged(begin, k1, k2, k3, k4, sixth), after
+
+
+@by_row
+def _lagging(held: Vector, before: Vector, left: float, index: int) -> float:
+    return held[index] + (before[index] - held[index]) * left
+
+
+@by_row
+def _moved(state: Vector, slope: Vector, step_s: float, index: int) -> float:
+    return state[index] + step_s * slope[index]
+
+
+@by_row
+def _averaged(
+    state: Vector, k1: Vector, k2: Vector, k3: Vector, k4: Vector, sixth: float, index: int
+) -> float:
+    return state[index] + sixth * (k1[index] + 2.0 * (k2[index] + k3[index]) + k4[index])
 
 
 class OdePlant:
@@ -44,13 +108,11 @@ class OdePlant:
         self.slopes, self.constants = slopes, constants
         self.state: Vector = tuple(map(float, start))
         self.motors: Vector = resting or (0.0,) * len(context.command_max)
-        self.step_s = context.step_s
-        self.left = (
-            (math.exp(-0.5 * self.step_s / motor_lag_s), math.exp(-self.step_s / motor_lag_s))
-            if motor_lag_s
-            else (0.0, 0.0)
-        )
-        """share of a motor's lag that is left after half a step and after a whole one"""
+        left = [
+            math.exp(-share * context.step_s / motor_lag_s) if motor_lag_s else 0.0
+            for share in (0.5, 1.0)
+        ]
+        self.step_constants = OdeConstants(constants, context.step_s, *left)
         self._command_max = context.command_max
         self._disturbances = context.disturbances(places)
         self._still = (0.0,) * places
@@ -66,49 +128,16 @@ class OdePlant:
     def advance(self, command: Vector) -> None:
         """Hold a command, clamped, for one step; ValueError for one that is no command."""
         held = held_command(command, self._command_max)
-        half, whole = self.left
-        before = self.motors if whole else held
-        middle = tuple([now + (one - now) * half for now, one in zip(held, before, strict=True)])
-        self.motors = tuple([now + (one - now) * whole for now, one in zip(held, before, strict=True)])
         step = self._steps
-        torques = tuple([one.torque(step) for one in self._disturbances]) or self._still
+        push = tuple([one.torque(step) for one in self._disturbances]) or self._still
         self._steps += 1
-        self.state = runge_kutta(
-            self.slopes,
-            self.state,
-            (before, middle, self.motors),
-            torques,
-            self.constants,
-            self._sine,
-            self.step_s,
+        self.state, self.motors = ode_step(
+            self.slopes, (self.state, self.motors), held, push, self.step_constants, self._sine
         )
 
-
-def runge_kutta(
-    slopes: Slopes,
-    state: Vector,
-    motors: tuple[Vector, Vector, Vector],
-    torques: Vector,
-    constants: Any,
-    sine: Sine,
-    step_s: float,
-) -> Vector:
-    """Return the state after a classical step of order 4; `motors` at its start, middle and end."""
-    begin, middle, end = motors
-    half, sixth = 0.5 * step_s, step_s / 6.0
-    k1 = slopes(state, begin, torques, constants, sine)
-    at = tuple([x + half * k for x, k in zip(state, k1, strict=True)])
-    k2 = slopes(at, middle, torques, constants, sine)
-    at = tuple([x + half * k for x, k in zip(state, k2, strict=True)])
-    k3 = slopes(at, middle, torques, constants, sine)
-    at = tuple([x + step_s * k for x, k in zip(state, k3, strict=True)])
-    k4 = slopes(at, end, torques, constants, sine)
-    return tuple(
-        [
-            x + sixth * (a + 2.0 * (b + c) + d)
-            for x, a, b, c, d in zip(state, k1, k2, k3, k4, strict=True)
-        ]
-    )
+    def pushes(self, steps: int) -> Pushes:
+        """Return what disturbs the first steps; see `pushes_of`."""
+        return pushes_of(self._disturbances or (None,) * len(self._still), steps)
 
 
 def rub(rate: float, friction: float, slow: float) -> float:

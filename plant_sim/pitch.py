@@ -12,10 +12,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from plant_sim.disturbance import Disturbance
+from plant_sim.disturbance import Disturbance, Pushes, pushes_of
 
 PitchState = tuple[float, float, float, float]
 """Angle (rad), rate (rad/s), lagged front voltage (V), lagged rear voltage (V)."""
@@ -97,11 +95,11 @@ def pitch_constants(parameters: PitchParameters, step_s: float) -> PitchConstant
 def pitch_step(
     state: PitchState,
     volts: tuple[float, float],
-    torque: float,
+    push: tuple[float, ...],
     constants: PitchConstants,
     sine: Sine = math.sin,
 ) -> PitchState:
-    """Advance (11), (12) by one step of held `volts` (front, rear) and held `torque` (rad/s^2).
+    """Advance (11), (12) by one step of held `volts` (front, rear) and `push`: the torque, rad/s^2.
 
     The lag of a held voltage is exact (an exponential); angle and rate take one classical
     Runge-Kutta step of order 4 that sees the exact mu at the start, the middle and the end.
@@ -111,6 +109,7 @@ def pitch_step(
     theta, omega, front, rear = state
     a_w, a_th, k_v, theta_0, volts_max, h, left_half, left_whole = constants
     v_f, v_r = volts
+    torque = push[0]
     if v_f > volts_max:
         v_f = volts_max
     elif v_f < -volts_max:
@@ -150,7 +149,9 @@ class PitchPlant:
     same `step_s`. Without one the torque is 0. The motors start at rest.
     """
 
-    __slots__ = ("_constants", "_disturbance", "_sine", "_state", "_step_index")
+    __slots__ = ("_disturbance", "_sine", "_state", "_step_index", "constants")
+
+    step_function = staticmethod(pitch_step)
 
     def __init__(
         self,
@@ -171,7 +172,7 @@ class PitchPlant:
         ):
             if not math.isfinite(value):
                 raise ValueError(f"{name} is {value}; it must be finite")
-        self._constants = pitch_constants(parameters, step_s)
+        self.constants = pitch_constants(parameters, step_s)
         self._disturbance = disturbance
         self._sine = sine
         self._state: PitchState = (float(initial_angle_rad), float(initial_rate), 0.0, 0.0)
@@ -192,6 +193,10 @@ class PitchPlant:
         """The whole state, as `pitch_step` takes it."""
         return self._state
 
+    def pushes(self, steps: int) -> Pushes:
+        """Return the torques of the first steps; see `pushes_of`."""
+        return pushes_of((self._disturbance,), steps)
+
     @property
     def measured(self) -> tuple[float, ...]:
         """The one angle the encoder sees."""
@@ -209,5 +214,5 @@ class PitchPlant:
             raise ValueError(f"motor voltages are {volts}; they must be finite")
         disturbance = self._disturbance
         torque = 0.0 if disturbance is None else disturbance.torque(self._step_index)
-        self._state = pitch_step(self._state, (front, rear), torque, self._constants, self._sine)
+        self._state = pitch_step(self._state, (front, rear), (torque,), self.constants, self._sine)
         self._step_index += 1

@@ -84,7 +84,7 @@ class TransmitterNode:
         self._check(tick, reading)
         self.scores.on_outputs(tick, reading.true or reading.measured)
         if self.gauge is not None:
-            self.gauge.on_angle(tick, reading.measured[0])
+            self.gauge.on_outputs(tick, reading.measured)
         asking: list[Frame] = []
         if self.guard.stopped:
             if not self._may_rearm:

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol, cast
 
 NAME = re.compile(r"[a-z][a-z0-9_]*")
+NEAR = 1e-9
+"""Difference up to which an output is the sum of states that it seems to be."""
 STEPS_MAX = 32_767
 """Largest number of steps, either way, that a frame carries for an input."""
 
@@ -117,6 +119,9 @@ class Signals:
     """for each output the state that it is, None for another function of the states"""
     picture: str = ""
     """what the plant looks like, one of `PICTURES`; empty: each output is shown as a bar"""
+    output_rows: tuple[tuple[float, ...], ...] = ()
+    """for each output that is a sum of states their coefficients, for another one nothing; without
+    any such output empty"""
     steps_per_unit: tuple[float, ...] = field(init=False)
     """of each input"""
 
@@ -146,6 +151,16 @@ class Signals:
         known = range(len(self.states))
         if wrong := [one for one in self.output_states if one is not None and one not in known]:
             raise ValueError(f"output_states: there is no state {wrong[0]}")
+        sizes = {len(row) for row in self.output_rows} - {0, len(self.states)}
+        if sizes or len(self.output_rows) not in (0, len(self.outputs)):
+            raise ValueError("output_rows have a coefficient per state, and a row per output")
+
+    def row(self, place: int) -> tuple[float, ...]:
+        """Return the coefficients of the states that make an output; () where it is no sum of them."""
+        state = self.output_states[place]
+        if state is None:
+            return self.output_rows[place] if self.output_rows else ()
+        return unit_row(state, len(self.states))
 
     def index(self, what: str, name: str) -> int:
         """Return the place of a signal among the `states`, `inputs` or `outputs`.
@@ -182,6 +197,11 @@ def named(what: str, count: int) -> tuple[Signal, ...]:
     return tuple(Signal(f"{what}_{number}") for number in range(1, count + 1))
 
 
+def unit_row(state: int, count: int) -> tuple[float, ...]:
+    """Return the coefficients that make one of `count` states."""
+    return tuple([1.0 if place == state else 0.0 for place in range(count)])
+
+
 class Sized(Protocol):
     """The sizes of a prediction model (`channel.codec.codec.Model`)."""
 
@@ -205,12 +225,33 @@ def signals_of(model: Sized) -> Signals:
     if found is None:
         inputs = tuple(InputSignal(one.name) for one in named("input", model.input_size))
         states = named("state", model.state_size)
-        return Signals(states, inputs, named("output", outputs), _states_read(model, outputs))
+        read = _states_read(model, outputs)
+        found = Signals(states, inputs, named("output", outputs), read)
     signals = cast(Signals, found)
     _require("states", model.state_size, signals.states)
     _require("inputs", model.input_size, signals.inputs)
     _require("outputs", outputs, signals.outputs)
-    return signals
+    if None not in signals.output_states or signals.output_rows:
+        return signals
+    return replace(signals, output_rows=_sums_read(model, outputs))
+
+
+def _sums_read(model: Sized, outputs: int) -> tuple[tuple[float, ...], ...]:
+    """Return the coefficients of outputs that are sums of states, () for each other one."""
+    count = model.state_size
+    single = [unit_row(at, count) for at in range(count)]
+    probe = tuple(0.125 * (place + 1) for place in range(count))
+    try:
+        columns = [model.measured(state) for state in single]
+        read = model.measured(probe)
+    except (ArithmeticError, ValueError):
+        return ()
+    found = []
+    for row, value in zip(zip(*columns, strict=True), read, strict=True):
+        for share, state in zip(row, probe, strict=True):
+            value -= share * state
+        found.append(row if -NEAR < value < NEAR else ())
+    return tuple(found)
 
 
 def _states_read(model: Sized, outputs: int) -> tuple[int | None, ...]:

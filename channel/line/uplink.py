@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from math import log2
 
+from channel.codec.codec import Codec
 from channel.codec.words import Alphabet
 from channel.line.line import CleanLine, Delivery, Line
 from channel.protocol.frames import Frame, Symbol
@@ -106,3 +107,10 @@ class Uplink:
         size = self.wire.size(data)
         self.meter.count(frame, size)
         return data, size
+
+
+def bit_rate(codec: Codec, tick_s: float) -> float:
+    """Return the bit/s that a codec's words have."""
+    alphabet = codec.coder.alphabet
+    bits = alphabet.symbols_per_word * bits_per_symbol(alphabet)
+    return bits / (tick_s * codec.ticks_per_sample)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, MutableSequence, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from operator import itemgetter
@@ -91,6 +91,39 @@ def is_stuck(value: float, push: float, largest: float) -> bool:
     return push == 0.0 or (value >= largest if push > 0.0 else value <= -largest)
 
 
+def pid_command(
+    loops: Sequence[PidConstants],
+    integrals: MutableSequence[float],
+    errors: Sequence[float],
+    rates: Sequence[float],
+    limits: Sequence[float],
+    wanted: MutableSequence[float],
+) -> bool:
+    """Add all loops to `wanted`, step their integrals, and clamp; False where a sum is not finite.
+
+    Sessions run it as it stands, and studies compile it.
+    """
+    for place in range(len(loops)):
+        constants = loops[place]
+        total = pid_sum(constants, integrals[place], errors[place], rates[place])
+        if not isfinite(total):
+            return False
+        for index in range(len(constants.mixing)):
+            wanted[index] += constants.mixing[index] * total
+    for place in range(len(loops)):
+        constants = loops[place]
+        error = errors[place]
+        stuck = True
+        for index in range(len(constants.mixing)):
+            if not is_stuck(wanted[index], constants.mixing[index] * error, limits[index]):
+                stuck = False
+                break
+        integrals[place] = pid_integral(constants, integrals[place], error, stuck)
+    for index in range(len(limits)):
+        wanted[index] = clamped(wanted[index], limits[index])
+    return True
+
+
 def clamped(value: float, largest: float) -> float:
     """Return the value within its limit."""
     # Comparisons: in plain Python they take a third of the time of `min` and `max`.
@@ -128,6 +161,7 @@ class PidLoops:
         self.bias = bias
         self.integrals = [0.0] * len(self.loops)
         """the integral term of each loop's u"""
+        self._constants = tuple([loop.constants for loop in self.loops])
         self._outputs = 1 + max([loop.output for loop in loops], default=-1)
         self._last_tick: int | None = None
 
@@ -147,29 +181,13 @@ class PidLoops:
         """
         if self._last_tick is not None and tick <= self._last_tick:
             raise ValueError(f"tick is {tick}; it must be above the last one, {self._last_tick}")
-        wanted, limits, integrals = list(self.bias), self.command_max, self.integrals
-        inputs = range(len(limits))
-        errors = []
-        # Indices: this runs at every tick, and strict pairs cost three times as much.
-        for place, loop in enumerate(self.loops):
-            error = loop.reference.value(tick) - loop.value(state)
-            total = pid_sum(loop.constants, integrals[place], error, loop.rate(state))
-            if not isfinite(total):
-                raise ValueError(f"state at tick {tick} is {state}; it must be finite")
-            errors.append(error)
-            mixing = loop.constants.mixing
-            for index in inputs:
-                wanted[index] += mixing[index] * total
+        wanted = list(self.bias)
+        errors = [loop.reference.value(tick) - loop.value(state) for loop in self.loops]
+        rates = [loop.rate(state) for loop in self.loops]
+        if not pid_command(self._constants, self.integrals, errors, rates, self.command_max, wanted):
+            raise ValueError(f"state at tick {tick} is {state}; it must be finite")
         self._last_tick = tick
-        for place, loop in enumerate(self.loops):
-            error, mixing = errors[place], loop.constants.mixing
-            stuck = True
-            for index in inputs:
-                if not is_stuck(wanted[index], mixing[index] * error, limits[index]):
-                    stuck = False
-                    break
-            integrals[place] = pid_integral(loop.constants, integrals[place], error, stuck)
-        return tuple([clamped(wanted[index], limits[index]) for index in inputs])
+        return tuple(wanted)
 
 
 class Pid(PidLoops):

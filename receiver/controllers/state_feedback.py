@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, MutableSequence, Sequence
+from typing import NamedTuple
 
 from receiver.controllers.pid import clamped, is_stuck
 from receiver.controllers.references import Reference
@@ -13,8 +13,7 @@ Vector = tuple[float, ...]
 Rows = tuple[Vector, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class FeedbackLaw:
+class FeedbackLaw(NamedTuple):
     """The numbers of the law; every row is of an input."""
 
     base: Vector
@@ -27,6 +26,47 @@ class FeedbackLaw:
     """K_i: a column for each output; 0 without integral action"""
     conditional: bool = True
     """whether an integral rests while more of it would change no input"""
+
+
+def feedback_command(
+    law: FeedbackLaw,
+    integrals: MutableSequence[float],
+    targets: Sequence[float],
+    outputs: Sequence[float],
+    state: Vector,
+    limits: Sequence[float],
+    tick_s: float,
+    wanted: MutableSequence[float],
+) -> bool:
+    """Write the clamped inputs to `wanted` and step the integrals; False where one is not finite.
+
+    Sessions run it as it stands, and studies compile it.
+    """
+    total = 0.0
+    for index in range(len(law.base)):
+        value = law.base[index]
+        for place in range(len(state)):
+            value -= law.gains[index][place] * state[place]
+        for place in range(len(targets)):
+            value += law.forward[index][place] * targets[place]
+        for place in range(len(targets)):
+            value += law.integral_gains[index][place] * integrals[place]
+        wanted[index] = value
+        total += value
+    if not math.isfinite(total):
+        return False
+    for place in range(len(targets)):
+        error = targets[place] - outputs[place]
+        used, stuck = False, law.conditional
+        for index in range(len(law.base)):
+            gain = law.integral_gains[index][place]
+            used = used or gain != 0.0
+            stuck = stuck and is_stuck(wanted[index], gain * error, limits[index])
+        if used and not stuck:
+            integrals[place] += tick_s * error
+    for index in range(len(law.base)):
+        wanted[index] = clamped(wanted[index], limits[index])
+    return True
 
 
 class StateFeedback:
@@ -50,10 +90,7 @@ class StateFeedback:
         self._references = tuple(references)
         self._outputs = outputs
         self._command_max = command_max
-        self._tick_s = tick_s
-        self._integrated = [
-            place for place in range(len(references)) if any(row[place] for row in law.integral_gains)
-        ]
+        self.tick_s = tick_s
 
     def references(self, tick: int) -> tuple[float | None, ...]:
         """Return the set-point of each output at `tick`."""
@@ -61,33 +98,17 @@ class StateFeedback:
 
     def command(self, tick: int, state: Vector) -> Vector:
         """Return one value for each input; ValueError for a state that is not finite."""
-        law, integrals = self.law, self.integrals
-        wanted_outputs = [0.0 if one is None else one.value(tick) for one in self._references]
-        wanted = []
-        for base, gains, forward, integral in zip(
-            law.base, law.gains, law.forward, law.integral_gains, strict=True
+        targets = [0.0 if one is None else one.value(tick) for one in self._references]
+        wanted = [0.0] * len(self.law.base)
+        if not feedback_command(
+            self.law,
+            self.integrals,
+            targets,
+            self._outputs(state),
+            state,
+            self._command_max,
+            self.tick_s,
+            wanted,
         ):
-            value = base
-            for gain, one in zip(gains, state, strict=True):
-                value -= gain * one
-            for share, one in zip(forward, wanted_outputs, strict=True):
-                value += share * one
-            for share, one in zip(integral, integrals, strict=True):
-                value += share * one
-            wanted.append(value)
-        if not math.isfinite(sum(wanted)):
             raise ValueError(f"state at tick {tick} is {state}; it must be finite")
-        if self._integrated:
-            self._integrate(wanted, wanted_outputs, self._outputs(state))
-        return tuple(map(clamped, wanted, self._command_max))
-
-    def _integrate(self, wanted: Sequence[float], targets: Sequence[float], outputs: Vector) -> None:
-        for place in self._integrated:
-            error = targets[place] - outputs[place]
-            stuck = self.law.conditional
-            for row, value, largest in zip(
-                self.law.integral_gains, wanted, self._command_max, strict=True
-            ):
-                stuck = stuck and is_stuck(value, row[place] * error, largest)
-            if not stuck:
-                self.integrals[place] += self._tick_s * error
+        return tuple(wanted)

@@ -93,15 +93,20 @@ def _paid(model: LinearModel, rate_bit_s: float, erased: float) -> float:
         raise ValueError(f"the rate is {rate_bit_s} bit/s; it must be above 0")
     if not 0.0 <= erased < 1.0:
         raise ValueError(f"the erased fraction is {erased}; it must be at least 0 and below 1")
-    needed = rate_needed(model.dynamics)
-    rate = rate_bit_s * (1.0 - erased)
-    if rate <= needed:
+    require_rate(model.dynamics, rate_bit_s, erased)
+    return rate_bit_s * (1.0 - erased)
+
+
+def require_rate(dynamics: Matrix, rate_bit_s: float, erased: float = 0.0, advice: str = "") -> float:
+    """Return the smallest rate of a plant; RateTooLow, with both numbers, for one that is not above."""
+    needed = rate_needed(dynamics)
+    if not rate_bit_s * (1.0 - erased) > needed:
         lost = f", of which {100.0 * erased:g} % are lost," if erased else ""
         raise RateTooLow(
-            f"{rate_bit_s:g} bit/s{lost} are too few: this plant grows by itself, and the data-rate "
-            f"theorem asks for more than {needed / (1.0 - erased):.4g} bit/s"
+            f"{rate_bit_s:.4g} bit/s{lost} are too few: this plant grows by itself, and the data-rate "
+            f"theorem asks for more than {needed / (1.0 - erased):.4g} bit/s{advice}"
         )
-    return rate
+    return needed
 
 
 class _Scaled:

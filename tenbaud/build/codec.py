@@ -7,10 +7,9 @@ from channel.codec.coders.pcm import PcmCoder
 from channel.codec.models.hold import HoldModel
 from tenbaud.build.parts import Parts, check_codec
 from tenbaud.build.plugins import build_plugin
-from tenbaud.config.kinds import CODERS, MODELS, kind_of
-from tenbaud.config.models import LinearModelSection, PendulumModelSection, PitchModelSection
+from tenbaud.config.kinds import CODERS, MODELS, kind_of, model_kind
 from tenbaud.config.schema import FlightConfig
-from tenbaud.config.section import KindSection, OutsideSection
+from tenbaud.config.section import OutsideSection
 
 
 def build_codec(config: FlightConfig, parts: Parts | None = None) -> Codec:
@@ -26,7 +25,8 @@ def build_codec(config: FlightConfig, parts: Parts | None = None) -> Codec:
             "together: the coder 'pcm' sets angle and rate of the model 'hold', and no other"
         )
     codec = Codec(model, coder, ticks)
-    if parts.model is None and may_grow(config.model):
+    kind = model_kind(config.model)
+    if parts.model is None and kind and kind.linear and kind.may_grow(config.model):
         from tenbaud.design.described import check_plant
 
         check_plant(config, codec)
@@ -34,13 +34,6 @@ def build_codec(config: FlightConfig, parts: Parts | None = None) -> Codec:
         where = f"model.kind = {config.model.kind!r} with coder.kind = {config.coder.kind!r}"
         check_codec(where, codec)
     return codec
-
-
-def may_grow(section: KindSection) -> bool:
-    """Return whether a model may be unstable, so that a rate may be too low for it."""
-    if isinstance(section, PitchModelSection):
-        return section.stiffness_per_s2 < 0.0
-    return isinstance(section, LinearModelSection | PendulumModelSection)
 
 
 def build_model(config: FlightConfig, parts: Parts | None = None) -> Model:

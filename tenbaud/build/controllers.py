@@ -140,10 +140,10 @@ def _rate_of(
     if getattr(context.model, "signals", None) is None and len(names) > 1:
         # A model that names nothing: the angle first, then its rate.
         return itemgetter(1)
-    return _Difference(value, context.tick_s)
+    return Difference(value, context.tick_s)
 
 
-class _Difference:
+class Difference:
     """The change of an output from one tick to the next, per second."""
 
     def __init__(self, value: Reading, tick_s: float) -> None:

@@ -9,11 +9,10 @@ from collections.abc import Callable
 
 from channel.codec.codec import Codec
 from channel.codec.models.linear import LinearModel
-from channel.codec.models.pitch import PitchModel
 from channel.line.clocks import SkewedClock
 from channel.line.impairments import Direction, ImpairedLine
 from channel.line.line import CleanLine, Downlink, Line
-from channel.line.uplink import Uplink, bits_per_symbol
+from channel.line.uplink import Uplink
 from channel.protocol.recording import Recorder
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
 from channel.protocol.wire import SymbolWire, Wire
@@ -21,10 +20,10 @@ from plant_sim.encoder import Encoder
 from receiver.controllers.base import Controller
 from receiver.endpoint import ReceiverEndpoint, SteppedEndpoint
 from receiver.session.session import ReceiverSession
-from tenbaud.bounds.closed import double_integrator_floor, double_integrator_rate
 from tenbaud.build.codec import build_codec
 from tenbaud.build.controllers import build_controller
 from tenbaud.build.flight import Agreement, ticks_of, watchdog_wanted_s
+from tenbaud.build.gauge import build_gauge
 from tenbaud.build.liveness import overtaking_ticks, watchdog_ticks
 from tenbaud.build.parts import Parts
 from tenbaud.build.references import References, build_references, values_of
@@ -34,7 +33,6 @@ from tenbaud.config.kinds import CONTROLLERS
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
 from transmitter.guard import Guard, GuardSettings
-from transmitter.metrics.gap import GapGauge, Limit, StrengthMeter
 from transmitter.metrics.scores import Scores
 from transmitter.node import TransmitterNode
 from transmitter.session.session import TransmitterSession
@@ -60,7 +58,7 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
         agreement.window_start_tick,
         (terms.history_samples + 2) * terms.ticks_per_sample,
         _followed(agreement),
-        gauge.on_error if gauge is not None else lambda _error: None,
+        gauge.on_errors if gauge is not None else lambda _errors: None,
     )
     # Only a rig that hurts nobody is armed again by itself.
     rearm_s = config.link.peer_timeout_s if config.transmitter.rig == "simulated" else None
@@ -200,26 +198,3 @@ def guard_settings(agreement: Agreement) -> GuardSettings:
         soft_limits=soft_limits(agreement.config, agreement.signals),
         outputs=agreement.signals.outputs,
     )
-
-
-def build_gauge(agreement: Agreement) -> GapGauge | None:
-    """Return the gauge; None for a model that does not predict what its commands do.
-
-    The floor is that of the double integrator (see `tenbaud.bounds.closed`) at the rate that is paid:
-    every slot of the grid, whether its symbol arrives or not.
-    """
-    codec, terms, config = agreement.codec, agreement.terms, agreement.config
-    if not isinstance(codec.model, PitchModel):
-        return None
-    tick_s = terms.tick_ns / 1e9
-    alphabet = codec.coder.alphabet
-    bits = alphabet.symbols_per_word * bits_per_symbol(alphabet)
-    rate_bit_s = bits / (terms.sample_ns / 1e9)
-    limit = Limit(
-        double_integrator_floor(1.0, rate_bit_s),
-        lambda per_density: double_integrator_rate(1.0, per_density),
-    )
-    encoder = build_encoders(config, agreement.signals)[0]
-    step_rad = encoder.turn / encoder.counts_per_turn if isinstance(encoder, Encoder) else 0.0
-    strength = StrengthMeter(codec, tick_s, step_rad)
-    return GapGauge(limit, strength, terms.ticks_per_sample, tick_s)

@@ -42,7 +42,7 @@ def floor(
     [dim]tenbaud floor --plant pendulum --rate 20[/dim]
     """
     from channel.codec.signals import signals_of
-    from channel.line.uplink import bits_per_symbol
+    from channel.line.uplink import bit_rate
     from tenbaud.build.codec import build_codec
     from tenbaud.config.load import load_config
     from tenbaud.design.described import plant_of, plant_section
@@ -59,9 +59,7 @@ def floor(
         codec = build_codec(flown)
         outputs = signals_of(codec.model).outputs
         if rate is None:
-            alphabet = codec.coder.alphabet
-            period = flown.timing.symbol_period_s
-            rate = alphabet.symbols_per_word * bits_per_symbol(alphabet) / period
+            period, rate = flown.timing.symbol_period_s, bit_rate(codec, tick_s)
     if rate is None:
         raise typer.BadParameter("give --rate for a plant by name")
     described = plant_of(section, tick_s)

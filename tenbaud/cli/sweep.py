@@ -66,8 +66,9 @@ def sweep(
     if plots:
         from tenbaud.studies.plots import draw_study
 
-        drawn = draw_study(table, what.names, what.file.description or name, folder)
+        drawn = draw_study(table, what.names, what.file.description or name, folder, what.outputs)
     why = Counter(one for one in table["outcome"].to_pylist() if one != "ok")
+    slow = Counter(one for one in table["not_compiled"].to_pylist() if one)
     summary = {
         "study": name,
         "points": len(what.points),
@@ -81,7 +82,7 @@ def sweep(
     if as_json:
         options.print_json(summary)
         return
-    _tell(summary, why)
+    _tell(summary, why, slow)
 
 
 def _fly(what: Study, results: Results, workers: int, scheduler: str | None) -> Any:
@@ -94,12 +95,18 @@ def _fly(what: Study, results: Results, workers: int, scheduler: str | None) -> 
         )
 
 
-def _tell(summary: dict[str, Any], why: Counter[str]) -> None:
-    """Print the summary; `why` flights have no figures, and how often."""
+def _tell(summary: dict[str, Any], why: Counter[str], slow: Counter[str]) -> None:
+    """Print the summary; `why` flights have no figures or were not compiled, and how often."""
     typer.echo(
         f"{summary['flights']} flights ({summary['points']} points, {summary['seeds']} seeds each), "
         f"{summary['flights_compiled']} of them compiled: {summary['results']}"
     )
+    if slow:
+        most, count = slow.most_common(1)[0]
+        typer.echo(
+            f"{slow.total()} were flown by the sessions, which is slower (column not_compiled). "
+            f"{count} of them: {most}"
+        )
     if why:
         most, count = why.most_common(1)[0]
         typer.echo(f"{why.total()} have no figures (column outcome). {count} of them: {most}")

@@ -79,6 +79,12 @@ class Kind:
     """from the section and the context to the part"""
     plant: str = "pitch"
     """of a model: the kind of the plant that it describes"""
+    linear: Callable[[Any], Any] | None = None
+    """of a model: from its section to one of the kind `linear`, the plant at rest, which floors,
+    designs and the gap gauge are of; None: it describes no plant"""
+    may_grow: Callable[[Any], bool] = lambda _section: True
+    """of a model with `linear`: whether the plant of a section may be unstable, so that a rate may be
+    too low for it"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +104,11 @@ class PartName:
         if not re.fullmatch(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*", name):
             raise ValueError("a class from outside is written module:Class")
         return name
+
+
+def model_kind(section: KindSection) -> Kind | None:
+    """Return the kind of a model's section; None for a class that no package offers by name."""
+    return None if ":" in section.kind else kind_of(MODELS, section.kind)
 
 
 @cache

@@ -27,6 +27,10 @@ class PitchModelSection(KindSection):
     motor_lag_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.08
 
 
+ANGLE_DENSITY = 2e-3
+"""rad^2/s^3; of the torque that designs and floors of an angle assume"""
+
+
 class HoldModelSection(KindSection):
     """No model: angle and rate stay as the last word set them. For the coder `words`."""
 
@@ -107,6 +111,7 @@ class LinearModelSection(KindSection):
             tuple(Signal(*one) for one in outputs),
             tuple(seen),
             self.picture,
+            self.C if any(_state_of(row) is None for row in self.C) else (),
         )
 
     @model_validator(mode="after")
@@ -194,7 +199,28 @@ def _pendulum(section: PendulumModelSection, context: ModelContext) -> PendulumM
     return PendulumModel(context, **section.model_dump(exclude={"kind"}))
 
 
-PENDULUM = Kind(PendulumModelSection, _pendulum, "pendulum")
-PITCH = Kind(PitchModelSection, _pitch)
+def _angle(stiffness: float, damping: float) -> LinearModelSection:
+    """Return an angle that a torque pushes."""
+    return LinearModelSection(
+        A=((0.0, 1.0), (-stiffness, -damping)),
+        B=((0.0,), (1.0,)),
+        C=((1.0, 0.0),),
+        densities=(ANGLE_DENSITY,),
+        states=("angle", "rate"),
+    )
+
+
+PENDULUM = Kind(
+    PendulumModelSection,
+    _pendulum,
+    plant="pendulum",
+    linear=lambda section: _angle(-(section.growth_per_s**2), section.damping_per_s),
+)
+PITCH = Kind(
+    PitchModelSection,
+    _pitch,
+    linear=lambda section: _angle(section.stiffness_per_s2, section.rate_damping_per_s),
+    may_grow=lambda section: section.stiffness_per_s2 < 0.0,
+)
 HOLD = Kind(HoldModelSection, _hold)
-LINEAR = Kind(LinearModelSection, _linear, "linear")
+LINEAR = Kind(LinearModelSection, _linear, plant="linear", linear=lambda section: section)

@@ -13,8 +13,9 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from plant_sim.zero_order_hold import discretised
+from tenbaud.config.kinds import MODELS, kind_of
 from tenbaud.config.load import ConfigError
-from tenbaud.config.models import LinearModelSection, PitchModelSection
+from tenbaud.config.models import LinearModelSection
 from tenbaud.config.schema import Timing
 from tenbaud.config.section import KindSection, Section
 from tenbaud.design.described import corrected_part, plant_of, require_rate, require_seen
@@ -32,23 +33,16 @@ def completed(values: Mapping[str, Any]) -> dict[str, Any]:
     given, coder = dict(values.get("model", {})), dict(values.get("coder", {}))
     try:
         timing = _checked("timing", Timing, values.get("timing", {}))
-        section = _section(given)
+        section = _checked("model", kind_of(MODELS, given.get("kind", "pitch")).section, given)
         if isinstance(section, LinearModelSection) and section.A:
             F, E = discretised(section.A, section.B, timing.tick_s)
             given |= {"F": F.tolist(), "E": E.tolist()}
-            section = _section(given)
+            section = _checked("model", LinearModelSection, given)
         if coder.get("kind") == "direction":
             coder |= _direction(section, coder, timing)
     except ValueError as error:
         raise ConfigError(f"this cannot be designed: {error}") from error
     return {**values, "model": given, "coder": coder}
-
-
-def _section(model: dict[str, Any]) -> KindSection:
-    kind = model.get("kind", "pitch")
-    if kind not in ("linear", "pitch"):
-        raise ValueError(f"model.kind = {kind!r}; designs are for linear and pitch")
-    return _checked("model", LinearModelSection if kind == "linear" else PitchModelSection, model)
 
 
 def _checked(place: str, sort: type[SectionKind], values: Mapping[str, Any]) -> SectionKind:
@@ -66,7 +60,7 @@ def _checked(place: str, sort: type[SectionKind], values: Mapping[str, Any]) -> 
 def _direction(section: KindSection, coder: Mapping[str, Any], timing: Timing) -> dict[str, Any]:
     plant = plant_of(section, timing.tick_s)
     if plant is None:
-        raise ValueError(f"model.kind = {section.kind!r} describes no plant")
+        raise ValueError(f"model.kind = {section.kind!r} describes no plant to design for")
     plant = corrected_part(plant, getattr(section, "corrected", 0))
     rate = coder.get("bits", 1) / timing.symbol_period_s
     require_seen(plant, section)

@@ -9,17 +9,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from channel.codec.codec import Codec
-from channel.line.uplink import bits_per_symbol
+from channel.line.uplink import bit_rate
 from plant_sim.zero_order_hold import continuous, discretised
 from tenbaud.bounds.floor import RateTooLow
 from tenbaud.bounds.linear import rate_needed, unreached
-from tenbaud.config.models import LinearModelSection, PendulumModelSection, PitchModelSection
+from tenbaud.config.kinds import model_kind
+from tenbaud.config.models import LinearModelSection
 from tenbaud.config.schema import FlightConfig
 from tenbaud.config.section import KindSection
 from tenbaud.design.plant import LinearPlant, linear_plant
 
-PITCH_DENSITY = 2e-3
-"""rad^2/s^3; of the torque that designs and floors of the pitch assume"""
 FOLDER = files("tenbaud") / "presets" / "plants"
 
 
@@ -36,25 +35,23 @@ def plant_section(name: str) -> LinearModelSection:
     return LinearModelSection.model_validate(values["model"])
 
 
+def linear_of(section: KindSection) -> LinearModelSection | None:
+    """Return the linear model at rest of the plant that a model describes; None without a plant."""
+    kind = model_kind(section)
+    return None if kind is None or kind.linear is None else kind.linear(section)
+
+
 def plant_of(section: KindSection, tick_s: float) -> LinearPlant | None:
     """Return the plant that a model describes, linearised at rest; None for a model that has none."""
-    if isinstance(section, PitchModelSection):
-        stiffness, damping = section.stiffness_per_s2, section.rate_damping_per_s
-        a, b = [[0.0, 1.0], [-stiffness, -damping]], [[0.0], [1.0]]
-        return linear_plant(a, b, [[1.0, 0.0]], densities=PITCH_DENSITY)
-    if isinstance(section, PendulumModelSection):
-        a = [[0.0, 1.0], [section.growth_per_s**2, -section.damping_per_s]]
-        return linear_plant(a, [[0.0], [1.0]], [[1.0, 0.0]], densities=PITCH_DENSITY)
-    if not isinstance(section, LinearModelSection):
+    linear = linear_of(section)
+    if linear is None:
         return None
     dynamics: ArrayLike
     drive: ArrayLike
-    dynamics, drive = section.A, section.B
-    if not section.A:
-        dynamics, drive = continuous(section.F, section.E, tick_s)
-    return linear_plant(
-        dynamics, drive, section.C, section.G or None, section.densities, section.weights
-    )
+    dynamics, drive = linear.A, linear.B
+    if not linear.A:
+        dynamics, drive = continuous(linear.F, linear.E, tick_s)
+    return linear_plant(dynamics, drive, linear.C, linear.G or None, linear.densities, linear.weights)
 
 
 def check_plant(config: FlightConfig, codec: Codec) -> None:
@@ -70,9 +67,7 @@ def check_plant(config: FlightConfig, codec: Codec) -> None:
     plant = plant_of(section, tick_s)
     if plant is None:
         return
-    alphabet = codec.coder.alphabet
-    bits = alphabet.symbols_per_word * bits_per_symbol(alphabet)
-    require_rate(plant, bits / (tick_s * codec.ticks_per_sample), section)
+    require_rate(plant, bit_rate(codec, tick_s), section)
 
 
 def require_rate(plant: LinearPlant, rate_bit_s: float, section: KindSection) -> None:
@@ -92,9 +87,8 @@ def require_rate(plant: LinearPlant, rate_bit_s: float, section: KindSection) ->
 
 def state_names(section: KindSection, plant: LinearPlant) -> list[str]:
     """Return what the states of a described plant are called."""
-    if isinstance(section, LinearModelSection):
-        return [one.name for one in section.signals(plant.B.shape[1]).states]
-    return ["angle", "rate"]
+    linear = linear_of(section)
+    return [] if linear is None else [one.name for one in linear.signals(plant.B.shape[1]).states]
 
 
 def require_seen(plant: LinearPlant, section: KindSection) -> None:

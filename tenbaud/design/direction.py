@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from channel.codec.coders.direction import SQUARINGS, DirectionParameters
-from tenbaud.bounds.floor import RateTooLow, ideal_worth, period_cost
-from tenbaud.bounds.linear import Matrix, rate_needed, sampled
+from tenbaud.bounds.floor import ideal_worth, period_cost, require_rate
+from tenbaud.bounds.linear import Matrix, sampled
 from tenbaud.design.plant import LinearPlant, rows_of
 
 ROUNDS = 25
@@ -52,12 +52,7 @@ def design_direction(
             f"{rate_bit_s:g} bit/s make {rate_bit_s * symbol_period_s:g} bits in a symbol period of "
             f"{symbol_period_s:g} s; a word has a whole number of them"
         )
-    needed = rate_needed(plant.A)
-    if not rate_bit_s > needed:
-        raise RateTooLow(
-            f"{rate_bit_s:g} bit/s are too few: the data-rate theorem asks for more than "
-            f"{needed:.4g} bit/s of this plant"
-        )
+    needed = require_rate(plant.A, rate_bit_s)
     model = plant.model()
     covariance, ideal = ideal_worth(model, rate_bit_s)
     sizes = np.sqrt(np.diag(covariance))

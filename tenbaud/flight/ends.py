@@ -20,9 +20,9 @@ from tenbaud.build.ends import build_receiver
 from tenbaud.build.flight import Agreement
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.flight import receive, transmit
-from tenbaud.flight.display import StatusMode, StatusReporter
+from tenbaud.flight.display import StatusReporter
 from tenbaud.flight.outcome import SAFE, Outcome, outcome_of
-from tenbaud.flight.status import Status, outputs_status
+from tenbaud.flight.status import Status, StatusMode, outputs_status
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, gap_part, link_part, receiver_part, transmitter_part
 from tenbaud.flight.trouble import Trouble

@@ -90,7 +90,7 @@ def _rate(run: TransmitterRun) -> Summary:
 def gap_part(gap: Gap | None) -> Summary:
     """Return the gap gauge, with nothing in it where there is nothing to compare."""
     return {
-        "disturbance_rad2_per_s3": gap and gap.strength_rad2_per_s3,
+        "disturbance_density": gap and gap.density,
         "rms_over_floor": gap and gap.rms_over_floor,
         "ideal_bits": gap and gap.ideal_bits,
     }

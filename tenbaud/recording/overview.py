@@ -16,6 +16,7 @@ import orjson
 
 from channel.codec.signals import Signals
 from tenbaud.recording.envelope import Envelope, Means, Series
+from tenbaud.recording.signals import summed
 
 SYMBOLS_DRAWN_SINGLY = 1200
 """Beyond these the bits of a flight merge into a solid block; their mean is drawn instead."""
@@ -120,11 +121,14 @@ class Overview:
         self._join()
 
     def _outputs(self, states: Sequence[Any]) -> Series:
-        """Return the outputs of model states; NaN for one that is not itself a state."""
-        count = len(self.plant.states)
-        nowhere = np.full((len(states), 1), np.nan)
-        table = np.column_stack((_table(states, count), nowhere))
-        return table[:, [count if one is None else one for one in self.plant.output_states]]
+        """Return the outputs of model states; NaN for one that is no sum of them."""
+        table = _table(states, len(self.plant.states))
+        found = np.full((len(states), len(self.plant.outputs)), np.nan)
+        for place in range(found.shape[1]):
+            values = summed(self.plant.row(place), lambda state: table[:, state])
+            if values is not None:
+                found[:, place] = values
+        return found
 
     def _join(self) -> None:
         """Take the errors of the ticks of which both values and estimates are there."""

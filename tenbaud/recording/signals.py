@@ -6,7 +6,7 @@ ticks. Where nothing was recorded there is NaN. Names and units are those of the
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from channel.codec.signals import Signals, unit_suffix
+from channel.codec.signals import Signals, unit_row, unit_suffix
 from tenbaud.recording.table import Series, Table, Tables
 
 
@@ -72,6 +72,22 @@ def _scattered(keys: NDArray[np.int64], values: Series, first: int, count: int) 
     return placed
 
 
+Row = Sequence[float]
+"""coefficients of the states that make an output"""
+
+
+def summed(row: Row, state: Callable[[int], Series | None]) -> Series | None:
+    """Return the sum of states by their coefficients; None for no coefficient, or without a state."""
+    total: Series | None = None
+    for place, share in enumerate(row):
+        if share:
+            values = state(place)
+            if values is None:
+                return None
+            total = share * values if total is None else total + share * values
+    return total
+
+
 Maker = Callable[["Source"], Series | None]
 
 
@@ -96,14 +112,16 @@ class Source:
             return measured if true is None else true
         return np.where(np.isnan(true), measured, true)
 
-    def coded(self, state: int | None) -> Series | None:
-        """Return the codec's estimate of a state; None for an output that is no state."""
-        return self.ticks("transmitter", "estimate", "coded_state", state)
+    def coded(self, row: Row) -> Series | None:
+        """Return the codec's estimate of a sum of states; None for another output."""
+        return summed(row, partial(self.ticks, "transmitter", "estimate", "coded_state"))
 
-    def live(self, state: int | None) -> Series | None:
-        """Return what the receiver predicted of a state."""
-        live = self.ticks("transmitter", "estimate", "live_state", state)
-        return self.ticks("receiver", "tick", "live_state", state) if live is None else live
+    def live(self, row: Row) -> Series | None:
+        """Return what the receiver predicted of a sum of states."""
+        live = summed(row, partial(self.ticks, "transmitter", "estimate", "live_state"))
+        return (
+            summed(row, partial(self.ticks, "receiver", "tick", "live_state")) if live is None else live
+        )
 
     def error(self, place: int, estimate: Series | None) -> Series | None:
         """Return an output less an estimate of it."""
@@ -183,7 +201,7 @@ class Definition(NamedTuple):
     make: Maker
 
 
-_OfOutput = Callable[[Source, int, int | None], Series | None]
+_OfOutput = Callable[[Source, int, Row], Series | None]
 
 
 def _tick(end: str, name: str) -> _OfOutput:
@@ -194,13 +212,13 @@ _OF_OUTPUT: tuple[tuple[str, str, _OfOutput], ...] = (
     ("reference", "set-point of {}", _tick("receiver", "reference")),
     ("", "{}, true where the rig knows it, else as measured", lambda one, at, _: one.output(at)),
     ("measured", "{} as the sensor gives it", _tick("transmitter", "measured")),
-    ("estimate", "the codec's estimate of {}", lambda one, _, state: one.coded(state)),
-    ("estimate_live", "{} as the receiver predicted it", lambda one, _, state: one.live(state)),
-    ("error_coded", "{} less its estimate", lambda one, at, state: one.error(at, one.coded(state))),
-    ("error_live", "{} less its live estimate", lambda one, at, state: one.error(at, one.live(state))),
+    ("estimate", "the codec's estimate of {}", lambda one, _, row: one.coded(row)),
+    ("estimate_live", "{} as the receiver predicted it", lambda one, _, row: one.live(row)),
+    ("error_coded", "{} less its estimate", lambda one, at, row: one.error(at, one.coded(row))),
+    ("error_live", "{} less its live estimate", lambda one, at, row: one.error(at, one.live(row))),
     ("range", "range M for {} before the word", lambda one, at, _: one.samples("range", at)),
 )
-"""What belongs to an output, its meaning, and what makes it of the output's place and state."""
+"""What belongs to an output, its meaning, and what makes it of the output's place and row."""
 
 _OF_ALL = {
     "symbol": Definition(
@@ -229,14 +247,19 @@ def definitions(plant: Signals) -> dict[str, Definition]:
         found[name] = Definition(unit, meaning, make)
 
     for what, meaning, make in _OF_OUTPUT:
-        for place, (one, state) in enumerate(zip(plant.outputs, plant.output_states, strict=True)):
+        for place, one in enumerate(plant.outputs):
             name = output_name(plant, what, place)
-            add(name, one.unit, meaning.format(one.words), _made(make, place, state))
+            add(name, one.unit, meaning.format(one.words), _made(make, place, plant.row(place)))
     only = f"{plant.outputs[0].name}_" if len(plant.outputs) == 1 else ""
     for state, one in enumerate(plant.states):
         if state not in plant.output_states:
             name, meaning = one.name.removeprefix(only), f"the codec's estimate of {one.words}"
-            add(f"estimate_{name}", one.unit, meaning, partial(Source.coded, state=state))
+            add(
+                f"estimate_{name}",
+                one.unit,
+                meaning,
+                partial(Source.coded, row=unit_row(state, len(plant.states))),
+            )
     for suffix, meaning, of_input in (
         ("_command", "as commanded", Source.command),
         ("", "as applied", Source.applied),
@@ -250,8 +273,8 @@ def definitions(plant: Signals) -> dict[str, Definition]:
     return found | _OF_ALL
 
 
-def _made(make: _OfOutput, place: int, state: int | None) -> Maker:
-    return lambda source: make(source, place, state)
+def _made(make: _OfOutput, place: int, row: Row) -> Maker:
+    return lambda source: make(source, place, row)
 
 
 def output_name(plant: Signals, what: str, place: int) -> str:

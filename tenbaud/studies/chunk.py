@@ -61,19 +61,23 @@ def fly_point(config: FlightConfig, seeds: Sequence[int], engine: str) -> list[F
     """Fly a configuration with these seeds; StudyError where `engine` is one that cannot."""
     from tenbaud.studies.plain import fly_plain
 
-    flown: list[FlightFigures | None] = [None] * len(seeds)
-    if engine != "plain":
-        from tenbaud.studies.flights import CompiledPoint
-        from tenbaud.studies.schedule import Uncommon
+    if engine == "plain":
+        return [fly_plain(config.model_copy(update={"seed": seed})) for seed in seeds]
+    from tenbaud.studies.flights import CompiledPoint
+    from tenbaud.studies.schedule import Uncommon
 
+    try:
+        point = CompiledPoint(config)
+    except Uncommon as error:
+        if engine == "compiled":
+            raise StudyError(f'engine = "compiled" cannot fly {error}; use auto') from error
+        why = str(error)
+        return [fly_plain(config.model_copy(update={"seed": one}), why=why) for one in seeds]
+    flown = []
+    for seed in seeds:
         try:
-            point = CompiledPoint(config)
-            flown = [point.figures(seed) for seed in seeds]
+            flown.append(point.fly(seed)[0])
         except Uncommon as error:
-            if engine == "compiled":
-                raise StudyError(f'engine = "compiled" cannot fly {error}; use auto') from error
-    # Some flights leave the common course: the nodes themselves fly them, slowly.
-    return [
-        figures or fly_plain(config.model_copy(update={"seed": seed}))
-        for figures, seed in zip(flown, seeds, strict=True)
-    ]
+            # It leaves the common course: the nodes themselves fly it, slowly.
+            flown.append(fly_plain(config.model_copy(update={"seed": seed}), why=str(error)))
+    return flown

@@ -33,7 +33,10 @@ OPTIONS = {"fastmath": False, "error_model": "python", "nogil": True}
 """How everything is compiled: divisions by zero are errors and nothing is reordered, as in Python. No
 memory is allocated, and so none is counted, but where a function says so."""
 
-SOURCES = (*PACKAGES[:-1], "tenbaud.build", "tenbaud.config", "tenbaud.flight", "tenbaud.studies")
+SOURCES = (
+    *PACKAGES[:-1],
+    *(f"tenbaud.{name}" for name in ("bounds", "build", "config", "design", "flight", "studies")),
+)
 """Packages that the figures of a flight depend on."""
 
 BESIDE = (
@@ -44,7 +47,7 @@ BESIDE = (
 """Modules of the studies that no figure of a flight depends on."""
 
 Parts = tuple[tuple[str, Any], ...]
-"""Replacements for the placeholders of the flight: (name, compiled function)."""
+"""Replacements for the placeholders of the flight: (name, compiled function, or a number)."""
 
 
 class StudiesMissing(TenbaudError):
@@ -80,6 +83,8 @@ def compiled(
         package, _, rest = value.__module__.partition(".")
         if value is refuse:
             names[name] = _jit(_refuse, inline="never")
+        elif hasattr(value, "row_function"):
+            names[name] = whole_of(value.row_function)
         elif package in PACKAGES:
             ours = rest.startswith("studies")
             # Put into its caller: only so are the functions that it is given known by then.
@@ -89,7 +94,8 @@ def compiled(
     copy = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
     copy.__module__ = function.__module__
     # The cache knows a function by its name: with other parts it is another function.
-    own = "_".join([function.__qualname__, *(part.__name__ for _, part in parts)])
+    named = [getattr(part, "__name__", str(part)) for _, part in parts]
+    own = "_".join([function.__qualname__, *named])
     copy.__qualname__ = copy.__name__ = own
     again = function.__name__ in function.__code__.co_names
     made = _jit(copy, allocates, inline="always" if inline else "never", forceinline=not again)
@@ -108,18 +114,21 @@ def arrays_of(constants: Any) -> Any:
 
 
 @cache
-def tick_of_rows(row_function: Callable[..., float], size: int) -> Any:
-    """Return a compiled tick of a model that is written as a function of each state."""
+def whole_of(row_function: Callable[..., float]) -> Any:
+    """Return what makes a tuple, as long as its first argument, of a function of each entry.
+
+    So is a tick of a model written, or a step of a plant, for any number of states.
+    """
     row = compiled(row_function)
     tuple_setitem: Any = import_module("numba.cpython.unsafe.tuple").tuple_setitem
 
-    def tick(state: Any, command: Any, held: Any, constants: Any) -> Any:
-        after = state
-        for index in range(size):
-            after = tuple_setitem(after, index, row(state, command, held, constants, index))
+    def whole(first: Any, *others: Any) -> Any:
+        after = first
+        for index in range(len(first)):
+            after = tuple_setitem(after, index, row(first, *others, index))
         return after
 
-    return _named(tick, f"tick_{row_function.__name__}_{size}")
+    return named(whole, f"whole_{row_function.__name__}")
 
 
 @cache
@@ -128,9 +137,19 @@ def reader(size: int) -> Any:
     to_fixed_tuple: Any = import_module("numba.np.unsafe.ndarray").to_fixed_tuple
 
     def read(values: Any) -> Any:
-        return to_fixed_tuple(values, size)
+        return to_fixed_tuple(values, size) if size else ()
 
-    return _named(read, f"read_{size}")
+    return named(read, f"read_{size}")
+
+
+@cache
+def states_read(states: tuple[int, ...]) -> Any:
+    """Return a compiled function that reads an output which is a state."""
+
+    def output(state: Any, constants: Any, place: int) -> Any:
+        return state[states[place]]
+
+    return named(output, "output_" + "_".join(map(str, states)))
 
 
 def _refuse(what: str, x: float) -> None:
@@ -138,7 +157,8 @@ def _refuse(what: str, x: float) -> None:
     raise ValueError("an argument of sin, cos or exp is out of range")
 
 
-def _named(function: Callable[..., Any], name: str) -> Any:
+def named(function: Callable[..., Any], name: str) -> Any:
+    """Return a function compiled, under a name by which the cache tells it from others."""
     function.__qualname__ = function.__name__ = name
     return _jit(function, forceinline=True)
 

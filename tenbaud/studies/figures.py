@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from channel.protocol.identity import Identity
@@ -11,22 +12,36 @@ from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
 
 
+class OutputFigures(NamedTuple):
+    """The figures of one output, in its unit; NaN where there is none."""
+
+    error_coded_rms: float = math.nan
+    error_coded_max: float = math.nan
+    error_live_rms: float = math.nan
+    error_live_max: float = math.nan
+    tracking_rms: float = math.nan
+    amplitude: float = math.nan
+
+
 class FlightFigures(NamedTuple):
-    """The figures that a study keeps of one flight. Errors in rad; NaN where there is none."""
+    """The figures that a study keeps of one flight."""
 
     outcome: str
     """ok, or why the flight has no figures"""
     engine: str
     """compiled, or plain: flown by the nodes themselves"""
-    error_coded_rms: float
-    error_coded_max: float
-    error_live_rms: float
-    error_live_max: float
-    tracking_rms: float
-    pitch_amplitude: float
+    not_compiled: str
+    """why the nodes flew it; empty if they did not, or were asked to"""
+    outputs: tuple[OutputFigures, ...]
+    """none of a flight without figures"""
     erasures: int
     commands_late: int
     samples: int
+
+    @property
+    def first(self) -> OutputFigures:
+        """Return the figures of the first output."""
+        return self.outputs[0] if self.outputs else OutputFigures()
 
 
 def shared_parts(config: FlightConfig) -> Agreement:

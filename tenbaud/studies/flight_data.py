@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-DONE, LEFT = 0, 1
-
 
 class Numbers(NamedTuple):
-    """The inputs of a flight, beside the constants of model, coder, plant and PID."""
+    """The inputs of a flight, beside the constants of model, coder, plant and law."""
 
     ticks: int
     per_sample: int
@@ -18,35 +16,18 @@ class Numbers(NamedTuple):
     window_start: int
     impulse: bool
     replay: bool
-    """the rig is a recording: counts, commands and applied voltages are given"""
-    command_max: tuple[float, float]
-    slew: tuple[float, float]
-    """per tick"""
-    steps_per_unit: tuple[float, float]
-    bias: tuple[float, float]
-    """of the inputs, without the controller's loop"""
-    initial_front: float
-    initial_rear: float
-    safe_front: float
-    safe_rear: float
-    guard_timeout: int
-    """ticks"""
-    soft_limit: float
-    """rad; infinite for none"""
-    watch: int
-    """ticks of the window in which the encoder is watched"""
-    counts_per_turn: int
+    """the rig is a recording: counts, commands and applied inputs are given"""
     uses_rates: bool
     """words are formed from all corrected states, which the transmitter observes"""
-    sign: int
-    zero_counts: int
+    watch: int
+    """ticks of the window in which the encoders are watched"""
 
 
 class Given(NamedTuple):
-    """Arrays that a flight reads."""
+    """Arrays that a flight reads; the last index is that of an input or an output."""
 
     start: Any
-    """plant: angle and rate"""
+    """state of the plant"""
     alphabet: Any
     """symbols in the order of their numbers"""
     shifts: Any
@@ -57,16 +38,35 @@ class Given(NamedTuple):
     """per tick: whether its command has not come by then"""
     scored: Any
     """per sample: whether its echo came before the flight was over"""
-    reference: Any
-    """per tick, `D` ticks beyond the flight included; empty without one"""
-    torque: Any
-    """per tick; empty for none"""
+    pushes: Any
+    """per tick: the plant's disturbance; one row for all ticks without any"""
+    targets: Any
+    """per tick, `D` ticks beyond the flight included: set-points, 0 where there is none"""
+    follows: Any
+    """per output: whether it has a set-point"""
+    command_max: Any
+    slew: Any
+    """per tick"""
+    steps_per_unit: Any
+    initial: Any
+    """command of the first ticks"""
+    safe: Any
+    """command of the guard before the first one"""
+    soft_limits: Any
+    """per output; infinite for none"""
+    motions: Any
+    """per output: motion that a standing encoder contradicts"""
+    counts_per_turn: Any
+    """per output; 0: it is read exactly"""
+    sign: Any
+    zero_counts: Any
+    turn: Any
     counts: Any
     """replay: per tick"""
     commands: Any
-    """replay: front and rear volts per tick, `D` ticks beyond the flight included"""
+    """replay: per tick, `D` ticks beyond the flight included"""
     applied: Any
-    """replay: front and rear volts per tick; empty when they were not recorded"""
+    """replay: inputs per tick; empty when they were not recorded"""
     gains: Any
     anew: Any
     largest: Any
@@ -88,47 +88,47 @@ class Work(NamedTuple):
     coder: Any
     spare: Any
     """states of the provisional copy"""
+    predicted: Any
+    """what a measurement is compared with"""
     correction: Any
     nothing: Any
     """no correction"""
     seen: Any
-    """the transmitter's observer; without one, the measured angle"""
-    given_out: Any
-    """front and rear: the last command that the observer knows"""
+    """the transmitter's observer; without one, what is measured"""
+    innovation: Any
+    """of the observer, per output"""
+    true: Any
+    """outputs at the present tick"""
+    measured: Any
+    """what their encoders show"""
+    reading: Any
+    """counts of their encoders"""
+    read_before: Any
+    """counts at the tick before"""
+    still: Any
+    """per output, ticks since its counts changed; then the age of the window that is watched"""
+    known_command: Any
+    """the last command that the observer knows"""
+    held: Any
+    """what the guard passes"""
+    wanted: Any
+    """what the law wants"""
+    memory: Any
+    """of the law: integrals, and the outputs of the tick before"""
+    errors: Any
+    rates: Any
+    """of the law's loops"""
     coded: Any
-    """per tick: the codec's angle"""
+    """per tick: the codec's outputs"""
     live: Any
-    """per tick: the predicted angle"""
-    front: Any
-    rear: Any
+    """per tick: the predicted outputs"""
+    commands: Any
     """per tick: commanded"""
     applied: Any
-    """per tick: on the motors"""
-
-
-class Motion(NamedTuple):
-    """The sensor node's state between ticks."""
-
-    front: float
-    rear: float
-    counts: int
-    still: int
-    """ticks since the counts changed"""
-    age: int
-    """ticks since the last command"""
-    late: int
-    """ticks whose command had not come"""
-
-
-class Errors(NamedTuple):
-    """Running figures as `transmitter.metrics.scores` keeps them."""
-
-    coded_count: int = 0
-    coded_squares: float = 0.0
-    coded_max: float = 0.0
-    live_count: int = 0
-    live_squares: float = 0.0
-    live_max: float = 0.0
-    tracking_count: int = 0
-    tracking_squares: float = 0.0
-    angle_max: float = 0.0
+    """per tick: applied to the plant"""
+    squares: Any
+    """per output: sums of squared errors, coded, live, tracking"""
+    largest: Any
+    """per output: largest error, coded, live; and of the output itself"""
+    counted: Any
+    """ticks whose errors, coded and live, were scored"""

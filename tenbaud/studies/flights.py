@@ -10,37 +10,34 @@ from typing import Any
 
 import numpy as np
 
-from channel.codec.codec import Codec, Vector
+from channel.codec.codec import Codec
 from channel.codec.coders.base import FunctionCoder
-from channel.codec.models.linear import LinearModel
 from channel.codec.numerics import sin
-from channel.codec.signals import Signal
+from channel.codec.signals import Signals, signals_of
 from channel.flight_log import FlightLog
-from plant_sim.disturbance import parse_disturbance
-from plant_sim.encoder import Encoder
-from plant_sim.pitch import pitch_constants
-from receiver.controllers.base import Controller
-from receiver.controllers.pid import PidConstants, PidLoops
-from receiver.controllers.recorded import RecordedController
 from tenbaud.build.controllers import build_controller
 from tenbaud.build.ends import build_observer, guard_settings
 from tenbaud.build.flight import Agreement, kind_of_link, read_flight_log
-from tenbaud.build.references import reference_of, reference_sections
-from tenbaud.build.rig import nominal_plant
-from tenbaud.build.signals import build_encoders
-from tenbaud.config.load import ConfigError
-from tenbaud.config.schema import FlightConfig, FlightLogSection, ReferenceSection
+from tenbaud.build.rig import build_plant
+from tenbaud.config.kinds import PLANTS
+from tenbaud.config.schema import FlightConfig, FlightLogSection
 from tenbaud.flight.verdict import FlightCounts, faults_of
-from tenbaud.studies.compiled import arrays_of, compiled, reader, tick_of_rows
-from tenbaud.studies.figures import FlightFigures, shared_parts
-from tenbaud.studies.flight_data import DONE, Errors, Given, Motion, Numbers, Work
+from tenbaud.studies.arrays import (
+    observer_arrays,
+    recorded_arrays,
+    signal_arrays,
+    targets_of,
+    work_arrays,
+)
+from tenbaud.studies.compiled import arrays_of, compiled, reader, states_read, whole_of
+from tenbaud.studies.figures import FlightFigures, OutputFigures, shared_parts
+from tenbaud.studies.flight_data import Given, Numbers, Work
 from tenbaud.studies.kernel import fly
+from tenbaud.studies.laws import law_of
+from tenbaud.studies.plants import AtRest, PlantParts, plant_parts
 from tenbaud.studies.schedule import Schedule, Uncommon, schedule_of
 from transmitter.encoder_watch import window_ticks
 from transmitter.session.state_observer import StateObserver
-
-NOTHING = np.zeros(0)
-NO_PAIRS = np.zeros((0, 2))
 
 
 @dataclass(slots=True)
@@ -49,10 +46,6 @@ class Trace:
 
     models: Any
     coders: Any
-    coded: Any
-    live: Any
-    front: Any
-    rear: Any
 
 
 @dataclass(slots=True)
@@ -68,36 +61,61 @@ class CompiledPoint:
     agreement: Agreement = field(init=False)
     numbers: Numbers = field(init=False)
     constants: Any = field(init=False)
+    targets: Any = field(init=False)
     _log: FlightLog | None = field(init=False, default=None)
-    reference: Any = field(init=False)
     _clean: Any = field(init=False, default=None)
     _observer: StateObserver | None = field(init=False)
+    _plant: Any = field(init=False)
+    _pushed: bool = field(init=False, default=False)
+    """whether the plant has a disturbance, so that every seed has a plant of its own"""
+    _flight: Any = field(init=False)
+    _start: Any = field(init=False)
+    _timeout_ticks: int = field(init=False)
+    steady: dict[str, Any] = field(init=False)
+    """arrays that do not depend on the seed"""
     _work: Work = field(init=False)
 
     def __post_init__(self) -> None:
         """Build all that does not depend on the seed."""
         config = self.config
-        self.agreement = replace(shared_parts(config), scored_from=self.scored_from)
-        _require_ordinary(config, self.agreement.codec)
+        self.agreement = agreement = replace(shared_parts(config), scored_from=self.scored_from)
+        codec, signals, tick_s = agreement.codec, agreement.signals, config.timing.tick_s
+        _require_ordinary(config, codec)
+        ticks = agreement.flight_ticks
         replay = config.transmitter.rig == "replay"
-        ticks = self.agreement.flight_ticks
+        self._plant = AtRest()
         if replay:
             self._log = recorded_flight(config)
             ticks = min(ticks, len(self._log))
-        controller = build_controller(config, model=self.agreement.codec.model)
-        pid, bias = _pid(controller, self.agreement.codec.model.initial())
-        self.numbers = _numbers(self.agreement, ticks, replay, bias)
-        plant = nominal_plant(config).mismatched(config.transmitter.plant.mismatch)
-        codec = self.agreement.codec
-        self._observer = build_observer(self.agreement)
+        else:
+            self._plant = build_plant(config, tick_s, signals)
+        parts = plant_parts(self._plant, len(signals.outputs))
+        pushes = self._plant.pushes(2)
+        self._pushed = len(pushes) > 1
+        law, law_constants = law_of(build_controller(config, model=codec.model), signals, tick_s)
+        self._observer = build_observer(agreement)
+        self.numbers = Numbers(
+            ticks=ticks,
+            per_sample=agreement.terms.ticks_per_sample,
+            lead=agreement.terms.lead_ticks,
+            window_start=agreement.window_start_tick,
+            impulse=codec.coder.impulse,
+            replay=replay,
+            uses_rates=codec.uses_rates,
+            watch=window_ticks(codec.model, agreement.terms.tick_ns / 1e9),
+        )
         self.constants = (
             arrays_of(codec.model.constants),  # type: ignore[attr-defined]
             arrays_of(codec.coder.constants),  # type: ignore[attr-defined]
-            pitch_constants(plant, config.timing.tick_s),
-            pid,
+            parts.constants,
+            law_constants,
         )
-        self.reference = NOTHING if replay else _reference(self.agreement, self._ahead)
-        self._work = _work(codec, self._samples, ticks, self._ahead)
+        self.targets = targets_of(agreement, self._ahead, replay)
+        self._flight = compiled_flight(codec, signals, law, parts, pushes.shape[1])
+        self._start = np.array(parts.start)
+        self._timeout_ticks = guard_settings(agreement).timeout_ticks
+        self.steady = signal_arrays(agreement) | recorded_arrays(self._log, self._ahead, signals)
+        self._work = work_arrays(codec, signals, self._samples, ticks, self._ahead)
 
     @property
     def _samples(self) -> int:
@@ -121,21 +139,19 @@ class CompiledPoint:
             )
         schedule = self.schedule(agreement)
         work = self._work
-        torque = torque_of(agreement.config, agreement.config.seed, self.numbers.ticks)
-        given = self.given(schedule, torque)
-        flight = compiled_flight(agreement.codec)
+        if schedule.longest_late > self._timeout_ticks:
+            raise Uncommon("a flight whose guard steps in")
         try:
-            status, motion, errors = flight(self.numbers, self.constants, given, work)
+            kept = self._flight(self.numbers, self.constants, self.given(schedule, agreement), work)
         except ValueError as error:
             raise Uncommon(str(error)) from error
-        if status != DONE:
+        if not kept:
             raise Uncommon("the flight left its ordinary course")
-        if faults_of(self._counts(schedule, motion)):
+        if faults_of(self._counts(schedule)):
             raise Uncommon("what does not count as flown, for the reason that the nodes give")
-        figures = flight_figures(errors, motion, schedule.erasures, self._samples)
-        return figures, Trace(work.models, work.coders, work.coded, work.live, work.front, work.rear)
+        return self._figures(schedule), Trace(work.models, work.coders)
 
-    def _counts(self, schedule: Schedule, motion: Motion) -> FlightCounts:
+    def _counts(self, schedule: Schedule) -> FlightCounts:
         """Return what the verdict on a flight rests on; a compiled one has no rejoin and no stop."""
         ticks = self.numbers.ticks
         return FlightCounts(
@@ -144,15 +160,37 @@ class CompiledPoint:
             erased=schedule.erasures,
             rejoins=0,
             ticks=ticks,
-            ticks_commanded=ticks - motion.late,
+            ticks_commanded=ticks - schedule.commands_late,
         )
 
-    def figures(self, seed: int) -> FlightFigures | None:
-        """Fly with one seed; None for a flight that only the nodes can fly."""
-        try:
-            return self.fly(seed)[0]
-        except Uncommon:
-            return None
+    def _figures(self, schedule: Schedule) -> FlightFigures:
+        """Return what a study keeps of the flight."""
+        numbers, work = self.numbers, self._work
+        coded, live = work.counted.tolist()
+        followed = numbers.ticks - numbers.window_start
+        figures = []
+        for squares, largest, follows in zip(
+            work.squares.tolist(), work.largest.tolist(), self.steady["follows"], strict=True
+        ):
+            figures.append(
+                OutputFigures(
+                    error_coded_rms=_rms(squares[0], coded),
+                    error_coded_max=largest[0],
+                    error_live_rms=_rms(squares[1], live),
+                    error_live_max=largest[1],
+                    tracking_rms=_rms(squares[2], followed if follows else 0),
+                    amplitude=largest[2],
+                )
+            )
+        return FlightFigures(
+            outcome="ok",
+            engine="compiled",
+            not_compiled="",
+            outputs=tuple(figures),
+            erasures=schedule.erasures,
+            commands_late=schedule.commands_late,
+            samples=self._samples,
+        )
 
     def schedule(self, agreement: Agreement) -> Schedule:
         """Return what the line does; on one without faults the same for all seeds."""
@@ -161,155 +199,68 @@ class CompiledPoint:
         clean: Schedule = self._clean
         return clean
 
-    def given(self, schedule: Schedule, torque: Any) -> Given:
+    def given(self, schedule: Schedule, agreement: Agreement) -> Given:
         """Return what a flight reads."""
+        plant = self._plant
+        if self._pushed and agreement is not self.agreement:
+            plant = build_plant(agreement.config, agreement.config.timing.tick_s, agreement.signals)
         return Given(
-            np.array([(*self.config.transmitter.plant.initial_outputs, 0.0)[0], 0.0]),
-            np.array(self.agreement.codec.coder.alphabet.symbols, dtype=np.int64),
-            schedule.shifts,
-            schedule.known,
-            schedule.late,
-            schedule.scored,
-            self.reference,
-            torque,
-            *_recorded(self._log, self._ahead),
-            *_observer(self._observer),
+            start=self._start,
+            shifts=schedule.shifts,
+            known=schedule.known,
+            late=schedule.late,
+            scored=schedule.scored,
+            pushes=plant.pushes(self.numbers.ticks),
+            targets=self.targets,
+            **self.steady,
+            **observer_arrays(self._observer),
         )
 
 
-def compiled_flight(codec: Codec) -> Any:
-    """Return the compiled flight for a codec's kinds of model and coder."""
+def compiled_flight(codec: Codec, signals: Signals, law: Any, plant: PlantParts, places: int) -> Any:
+    """Return the compiled flight for the kinds of model, coder, law and plant, pushed in `places`."""
     encode, decode, allocates = codec.coder.functions  # type: ignore[attr-defined]
+    inputs, outputs = len(signals.inputs), len(signals.outputs)
+    row = getattr(codec.model, "row_function", None)
+    output = getattr(codec.model, "output_function", None)
     parts = (
-        ("tick", _compiled_tick(codec.model)),
+        ("INPUTS", inputs),
+        ("OUTPUTS", outputs),
+        ("tick", whole_of(row) if row else compiled(codec.model.tick_function)),  # type: ignore[attr-defined]
+        ("output_of", compiled(output) if output else states_read(signals.output_states)),
         ("encode", compiled(encode, allocates=allocates)),
         ("decode", compiled(decode, allocates=allocates)),
+        ("law", compiled(law, (("INPUTS", inputs),))),
         ("state_of", reader(codec.model.state_size)),
         ("held_of", reader(codec.model.correction_size)),
+        ("command_of", reader(inputs)),
+        ("plant_of", plant.of),
+        ("push_of", reader(places)),
+        ("plant_step", plant.step),
+        ("plant_output", plant.output),
         ("sine", compiled(sin)),
     )
     return compiled(fly, parts)
 
 
-def _compiled_tick(model: Any) -> Any:
-    if hasattr(model, "row_function"):
-        return tick_of_rows(model.row_function, model.state_size)
-    return compiled(model.tick_function)
-
-
-def _observer(observer: StateObserver | None) -> tuple[Any, Any, Any]:
-    """Return gains, gains after a gap and largest states of the transmitter's observer."""
-    if observer is None:
-        return NO_PAIRS, NO_PAIRS, NOTHING
-    return np.array(observer.gains), np.array(observer.anew), np.array(observer.largest)
-
-
 def _require_ordinary(config: FlightConfig, codec: Codec) -> None:
     """Raise Uncommon where parts are configured that only the nodes have."""
-    rig, controller = config.transmitter.rig, config.receiver.controller
-    if (rig, controller) not in (("simulated", "pid"), ("replay", "recorded")):
-        raise Uncommon(f"the rig {rig} with the controller {controller}")
-    if rig == "simulated" and config.plant_kind != "pitch":
+    rig, plant = config.transmitter.rig, config.plant_kind
+    if (rig == "replay") != (config.receiver.controller == "recorded"):
+        raise Uncommon(f"the rig {rig} with the controller {config.receiver.controller}")
+    if rig == "simulated" and plant not in PLANTS.built_in:
         raise Uncommon("a plant from outside")
     if config.transmitter.sabotage or config.receiver.sabotage or config.transmitter.dry_run:
         raise Uncommon("sabotage and dry runs")
     if kind_of_link(config).changes_terms:
         raise Uncommon("a link on which bytes take time, such as a serial line")
     model, coder = codec.model, codec.coder
-    if model.input_size != 2 or len(model.measured(model.initial())) != 1:
-        raise Uncommon("a plant that is not of one output and two inputs")
-    functions = hasattr(model, "tick_function") or hasattr(model, "row_function")
-    if not (functions and isinstance(coder, FunctionCoder)):
+    written = hasattr(model, "tick_function") or hasattr(model, "row_function")
+    if not (written and isinstance(coder, FunctionCoder)):
         raise Uncommon("a model or coder that is not written as functions")
-    if isinstance(model, LinearModel) and model.outputs != ((1.0, *[0.0] * (model.state_size - 1)),):
-        raise Uncommon("a linear model whose output is not its first state")
-
-
-def _numbers(agreement: Agreement, ticks: int, replay: bool, bias: tuple[float, float]) -> Numbers:
-    config, terms = agreement.config, agreement.terms
-    settings = guard_settings(agreement)
-    encoder = build_encoders(config, agreement.signals)[0]
-    if not isinstance(encoder, Encoder):
-        raise Uncommon("an output that is read exactly")
-    return Numbers(
-        ticks=ticks,
-        per_sample=terms.ticks_per_sample,
-        lead=terms.lead_ticks,
-        window_start=agreement.window_start_tick,
-        impulse=agreement.codec.coder.impulse,
-        replay=replay,
-        command_max=_pair(terms.limits.command_max),
-        slew=_pair(terms.limits.slew_per_tick),
-        steps_per_unit=_pair(terms.signals.steps_per_unit),
-        bias=bias,
-        initial_front=float(terms.initial_command[0]),
-        initial_rear=float(terms.initial_command[1]),
-        safe_front=float(settings.safe_command[0]),
-        safe_rear=float(settings.safe_command[1]),
-        guard_timeout=settings.timeout_ticks,
-        soft_limit=float(settings.soft_limits[0]) if settings.soft_limits else math.inf,
-        watch=window_ticks(agreement.codec.model, terms.tick_ns / 1e9),
-        counts_per_turn=int(encoder.counts_per_turn),
-        uses_rates=agreement.codec.uses_rates,
-        sign=encoder.sign,
-        zero_counts=encoder.zero_counts,
-    )
-
-
-def _pair(values: Vector) -> tuple[float, float]:
-    return values[0], values[1]
-
-
-def _pid(controller: Controller, state: Vector) -> tuple[PidConstants, tuple[float, float]]:
-    """Return the one loop of a controller, and the bias; Uncommon for another than the kernel's."""
-    if not isinstance(controller, PidLoops):
-        return PidConstants(0.0, 0.0, 0.0, (0.0, 0.0), False), (0.0, 0.0)
-    places = tuple(float(place) for place in range(len(state)))
-    for loop in controller.loops:
-        if (len(controller.loops), loop.value(places), loop.rate(places)) != (1, 0.0, 1.0):
-            raise Uncommon("a controller that is not one loop on the first state and its rate")
-    return controller.loops[0].constants, _pair(controller.bias)
-
-
-def _work(codec: Codec, samples: int, ticks: int, ahead: int) -> Work:
-    states, coder = codec.model.state_size, codec.initial().coder
-    models = np.empty((samples + 1, states))
-    coders = np.empty((samples + 1, len(coder)))
-    models[0] = codec.model.initial()
-    coders[0] = coder
-    per_word = codec.coder.alphabet.symbols_per_word
-    return Work(
-        models=models,
-        coders=coders,
-        sent=np.zeros(samples * per_word, dtype=np.int64),
-        word=np.zeros(per_word, dtype=np.int64),
-        model=np.empty(states),
-        coder=np.empty(len(coder)),
-        spare=np.empty(len(coder)),
-        correction=np.empty(codec.model.correction_size),
-        nothing=np.zeros(codec.model.correction_size),
-        seen=np.empty(states),
-        given_out=np.empty(2),
-        coded=np.empty(ahead),
-        live=np.empty(ahead),
-        front=np.empty(ahead),
-        rear=np.empty(ahead),
-        applied=np.empty((ticks, 2)),
-    )
-
-
-def _reference(agreement: Agreement, ticks: int) -> Any:
-    output, section = reference_sections(agreement.config, agreement.signals)[0]
-    if section is None:
-        return NOTHING
-    return _values(section.model_dump_json(), agreement.config.timing.tick_s, output, ticks)
-
-
-@lru_cache(maxsize=64)
-def _values(section: str, tick_s: float, output: Signal, ticks: int) -> Any:
-    """Return the set-point of every tick; the section as JSON, so that it can be remembered."""
-    reference = reference_of(ReferenceSection.model_validate_json(section), tick_s, output)
-    return np.array([reference.value(tick) for tick in range(ticks)])
+    unread = None in signals_of(model).output_states and not hasattr(model, "output_function")
+    if unread:
+        raise Uncommon("a model whose outputs are neither states nor written as a function")
 
 
 def recorded_flight(config: FlightConfig) -> FlightLog:
@@ -323,44 +274,6 @@ def recorded_flight(config: FlightConfig) -> FlightLog:
 def _recorded_flight(section: str, changed: int) -> FlightLog:
     log = FlightLogSection.model_validate_json(section)
     return read_flight_log(FlightConfig(flight_log=log))
-
-
-def torque_of(config: FlightConfig, seed: int, ticks: int) -> Any:
-    """Return the torque of every tick; empty without a disturbance."""
-    text = config.transmitter.plant.disturbance
-    if not text or config.transmitter.rig == "replay":
-        return NOTHING
-    try:
-        return parse_disturbance(text, config.timing.tick_s, seed).torques(ticks)
-    except ValueError as error:
-        raise ConfigError(f"transmitter.plant.disturbance: {error}") from error
-
-
-def _recorded(log: FlightLog | None, ahead: int) -> tuple[Any, Any, Any]:
-    """Return counts, commands and applied voltages of a recording; empty without one."""
-    if log is None:
-        return NOTHING.astype(np.int64), NO_PAIRS, NO_PAIRS
-    counts = np.array([row[0] for row in log.counts], dtype=np.int64)
-    controller = RecordedController(log)
-    commands = np.array([controller.command(tick, ()) for tick in range(ahead)])
-    return counts, commands, np.array(log.volts, dtype=float)
-
-
-def flight_figures(errors: Errors, motion: Motion, erasures: int, samples: int) -> FlightFigures:
-    """Return what a study keeps of a compiled flight."""
-    return FlightFigures(
-        outcome="ok",
-        engine="compiled",
-        error_coded_rms=_rms(errors.coded_squares, errors.coded_count),
-        error_coded_max=errors.coded_max,
-        error_live_rms=_rms(errors.live_squares, errors.live_count),
-        error_live_max=errors.live_max,
-        tracking_rms=_rms(errors.tracking_squares, errors.tracking_count),
-        pitch_amplitude=errors.angle_max,
-        erasures=erasures,
-        commands_late=motion.late,
-        samples=samples,
-    )
 
 
 def _rms(squares: float, count: int) -> float:

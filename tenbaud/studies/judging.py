@@ -100,7 +100,7 @@ def judge(tuning: Tuning, values: dict[str, float], *, train: bool) -> Judged:
         figures = fly_point(config, seeds, "auto")
     squares, lost, reason = 0.0, 0, ""
     for one in figures:
-        rms = one.error_live_rms
+        rms = math.hypot(*(output.error_live_rms for output in one.outputs))
         if one.outcome == "ok" and math.isfinite(rms):
             squares += min(rms, PENALTY_RAD) ** 2
         else:

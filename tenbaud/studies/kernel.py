@@ -4,61 +4,69 @@ What the two sessions, the guard and the rig do one message at a time is done he
 the order of cause and effect: the transmitter's word, what the receiver made of it, its commands, the
 plant under them. All arithmetic is that of the nodes, imported, and so is the order of a sample's ticks
 (`fly_ticks`); tests compare with ordinary flights, bit by bit. A flight that leaves the ordinary
-course, by a guard that steps in or an estimate that diverges, is not followed: it comes back with the
-status `LEFT`, and the caller flies it with the nodes themselves.
+course, by a guard that steps in or an estimate that diverges, is not followed: it comes back as False,
+and the caller flies it with the nodes themselves.
 
-The functions that depend on the kinds of model and coder are placeholders here (`parts`) and given
-when the flight is compiled.
+The functions that depend on the kinds of model, coder, plant and controller are placeholders here, and
+so are the numbers of inputs and outputs (`parts`); all are given when the flight is compiled.
 """
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from channel.codec.codec import add_correction, is_estimate
 from channel.codec.lead import fly_ticks
 from channel.protocol.limits import as_carried, limited
-from plant_sim.pitch import pitch_step
-from receiver.controllers.pid import clamped, is_stuck, pid_integral, pid_sum
-from tenbaud.studies.flight_data import DONE, LEFT, Errors, Given, Motion, Numbers, Work
-from tenbaud.studies.parts import decode, encode, held_of, sine, state_of, tick
-from tenbaud.studies.sensor_side import act, angle_at, count_at, guess, look, put, score
+from tenbaud.studies.flight_data import Given, Numbers, Work
+from tenbaud.studies.parts import (
+    INPUTS,
+    OUTPUTS,
+    command_of,
+    decode,
+    encode,
+    held_of,
+    law,
+    output_of,
+    plant_of,
+    plant_step,
+    push_of,
+    sine,
+    state_of,
+    tick,
+)
+from tenbaud.studies.sensor_side import act, guess, look, put, read, score
 
-Carried = tuple[bool, float, tuple[float, float, float, float], Motion, Errors]
-"""Whether all is well, the PID's integral, the plant's state, the sensor node's side, the errors."""
+Carried = tuple[bool, tuple[float, ...]]
+"""Whether all is well, and the plant's state."""
 
 
-def fly(
-    numbers: Numbers,
-    constants: Any,
-    given: Given,
-    work: Work,
-) -> tuple[int, Motion, Errors]:
-    """Fly; return status, what the sensor node's side ended with, and the errors.
+def fly(numbers: Numbers, constants: Any, given: Given, work: Work) -> bool:
+    """Fly; return whether the flight kept its ordinary course.
 
-    `constants` are those of (model, coder, plant, PID).
+    `constants` are those of (model, coder, plant, law).
     """
-    model_constants, coder_constants = constants[0], constants[1]
-    plant = (given.start[0], given.start[1], 0.0, 0.0)
-    motion = Motion(numbers.safe_front, numbers.safe_rear, 0, 0, 0, 0)
-    errors = Errors(0, 0.0, 0.0, 0, 0.0, 0.0, 0, 0.0, 0.0)
-    work.front[: numbers.lead] = numbers.initial_front
-    work.rear[: numbers.lead] = numbers.initial_rear
+    for at in range(numbers.lead):
+        put(given.initial, work.commands[at])
     put(work.models[0], work.seen)
-    work.given_out[0] = numbers.initial_front
-    work.given_out[1] = numbers.initial_rear
-    carried = (True, 0.0, plant, motion, errors)
+    put(given.initial, work.known_command)
+    put(given.safe, work.held)
+    work.memory[:] = 0.0
+    work.still[:] = 0
+    work.squares[:] = 0.0
+    work.largest[:] = 0.0
+    work.counted[:] = 0
+    carried = (True, plant_of(given.start))
     for sample in range(given.scored.shape[0]):
-        well = _measure(sample, carried[2][0], numbers, model_constants, coder_constants, given, work)
+        well = _measure(sample, carried[1], numbers, constants, given, work)
         erased = _receive(sample, given, work)
-        held = _open(sample, erased, numbers, coder_constants, work)
+        held = _open(sample, erased, numbers, constants[1], work)
         carried = fly_ticks(
             _step,
             _close,
             _tick,
             (sample, numbers, constants, given, work),
-            (well, carried[1], carried[2], carried[3], carried[4]),
+            (well, carried[1]),
             state_of(work.model),
             held,
             held_of(work.nothing),
@@ -67,23 +75,22 @@ def fly(
             numbers.lead,
         )
         if not carried[0]:
-            return LEFT, carried[3], carried[4]
-    return DONE, carried[3], carried[4]
+            return False
+    return True
 
 
 def _step(flight: Any, carried: Carried, at: int, within: bool, ahead: bool, state: Any) -> Any:
-    """Keep the state of a tick, and decide its command where that is not known."""
-    _, numbers, constants, given, work = flight
-    well, integral, plant, motion, errors = carried
+    """Keep the outputs of a tick, and decide its command where that is not known."""
+    _, _, constants, given, work = flight
+    well, plant = carried
     if within:
-        work.coded[at] = state[0]
+        for place in range(OUTPUTS):
+            work.coded[at, place] = output_of(state, constants[0], place)
     if ahead:
-        work.live[at] = state[0]
-        decided, integral = _decide(
-            at, state[0], state[1], integral, numbers, constants[3], given, work
-        )
-        well = well and decided
-    return (well, integral, plant, motion, errors), (work.front[at], work.rear[at])
+        for place in range(OUTPUTS):
+            work.live[at, place] = output_of(state, constants[0], place)
+        well = _decide(at, state, constants[3], given, work) and well
+    return (well, plant), command_of(work.commands[at])
 
 
 def _close(flight: Any, carried: Carried, state: Any) -> Carried:
@@ -91,42 +98,35 @@ def _close(flight: Any, carried: Carried, state: Any) -> Carried:
     row = flight[4].models[flight[0] + 1]
     for index in range(len(state)):
         row[index] = state[index]
-    return (carried[0] and is_estimate(state), carried[1], carried[2], carried[3], carried[4])
+    return (carried[0] and is_estimate(state), carried[1])
 
 
 def _tick(
-    flight: Any, carried: Carried, at: int, within: bool, state: Any, volts: Any, held: Any
+    flight: Any, carried: Carried, at: int, within: bool, state: Any, command: Any, held: Any
 ) -> Any:
     """Advance the model, and the plant beside it.
 
     Neither waits for the other within a tick, so that the processor works on both at once.
     """
     sample, numbers, constants, given, work = flight
-    well, integral, plant, motion, errors = carried
-    state = tick(state, volts, held, constants[0])
+    well, plant = carried
+    state = tick(state, command, held, constants[0])
     if within and at < numbers.ticks:
-        if at > sample * numbers.per_sample and numbers.uses_rates:
-            look(at, _read(at, plant[0], numbers, given), numbers, constants[0], given, work)
-        untripped, motion = act(at, plant[0], motion, numbers, constants[0], given, work)
-        well = well and untripped
+        if at > sample * numbers.per_sample:
+            read(at, plant, numbers, constants[2], given, work)
+            if numbers.uses_rates:
+                look(at, constants[0], given, work)
+        well = act(at, numbers, constants[0], given, work) and well
         if at >= numbers.window_start:
-            angle = angle_at(motion.counts, numbers) if numbers.replay else plant[0]
-            errors = score(at, sample, angle, errors, numbers, given, work)
+            score(at, sample, numbers, given, work)
         if not numbers.replay:
-            torque = given.torque[at] if given.torque.shape[0] > 0 else 0.0
-            volts = (motion.front, motion.rear)
-            plant = pitch_step(plant, volts, torque, constants[2], sine)
-    return (well, integral, plant, motion, errors), state
+            push = push_of(given.pushes[at if given.pushes.shape[0] > 1 else 0])
+            plant = plant_step(plant, command_of(work.held), push, constants[2], sine)
+    return (well, plant), state
 
 
 def _measure(
-    sample: int,
-    angle: float,
-    numbers: Numbers,
-    model_constants: Any,
-    coder_constants: Any,
-    given: Given,
-    work: Work,
+    sample: int, plant: Any, numbers: Numbers, constants: Any, given: Given, work: Work
 ) -> bool:
     """Measure at a sample's beginning and send its word; return whether the estimate is one."""
     first = sample * numbers.per_sample
@@ -135,17 +135,20 @@ def _measure(
     put(work.coders[known], work.coder)
     well = True
     if known < sample:
-        well = guess(sample, numbers, model_constants, coder_constants, given, work)
-    look(first, _read(first, angle, numbers, given), numbers, model_constants, given, work)
+        well = guess(sample, numbers, constants[0], constants[1], given, work)
+    read(first, plant, numbers, constants[2], given, work)
+    if numbers.uses_rates:
+        look(first, constants[0], given, work)
+        put(work.model, work.predicted)
+    else:
+        put(work.measured, work.seen)
+        state = state_of(work.model)
+        for place in range(OUTPUTS):
+            work.predicted[place] = output_of(state, constants[0], place)
     size = work.word.shape[0]
     word = work.sent[sample * size : (sample + 1) * size]
-    encode(coder_constants, work.coder, work.model, work.seen, word)
+    encode(constants[1], work.coder, work.predicted, work.seen, word)
     return well
-
-
-def _read(at: int, angle: float, numbers: Numbers, given: Given) -> float:
-    """Return the angle that the encoder shows."""
-    return angle_at(given.counts[at] if numbers.replay else count_at(angle, numbers), numbers)
 
 
 def _receive(sample: int, given: Given, work: Work) -> bool:
@@ -167,13 +170,7 @@ def _receive(sample: int, given: Given, work: Work) -> bool:
     return False
 
 
-def _open(
-    sample: int,
-    erased: bool,
-    numbers: Numbers,
-    coder_constants: Any,
-    work: Work,
-) -> Any:
+def _open(sample: int, erased: bool, numbers: Numbers, coder_constants: Any, work: Work) -> Any:
     """Consume a word on the receiver's copy; return the correction to hold (`Codec.open`)."""
     model = work.models[sample]
     decode(
@@ -192,35 +189,13 @@ def _open(
     return held_of(work.correction)
 
 
-def _decide(
-    at: int,
-    angle: float,
-    rate: float,
-    integral: float,
-    numbers: Numbers,
-    pid_constants: Any,
-    given: Given,
-    work: Work,
-) -> tuple[bool, float]:
-    """Decide the command of a tick as the receiver's session does; return (well, integral)."""
-    if numbers.replay:
-        front, rear = given.commands[at, 0], given.commands[at, 1]
-    else:
-        error = given.reference[at] - angle
-        total = pid_sum(pid_constants, integral, error, rate)
-        if not math.isfinite(total):
-            return False, integral
-        first, second = pid_constants.mixing
-        front = numbers.bias[0] + first * total
-        rear = numbers.bias[1] + second * total
-        stuck = is_stuck(front, first * error, numbers.command_max[0])
-        stuck = is_stuck(rear, second * error, numbers.command_max[1]) and stuck
-        integral = pid_integral(pid_constants, integral, error, stuck)
-        front = clamped(front, numbers.command_max[0])
-        rear = clamped(rear, numbers.command_max[1])
-    front_before = work.front[at - 1] if at > 0 else numbers.initial_front
-    rear_before = work.rear[at - 1] if at > 0 else numbers.initial_rear
-    largest, slew, steps = numbers.command_max, numbers.slew, numbers.steps_per_unit
-    work.front[at] = as_carried(limited(front, front_before, largest[0], slew[0]), steps[0])
-    work.rear[at] = as_carried(limited(rear, rear_before, largest[1], slew[1]), steps[1])
-    return True, integral
+def _decide(at: int, state: Any, law_constants: Any, given: Given, work: Work) -> bool:
+    """Decide the command of a tick as the receiver's session does; return whether all is well."""
+    if not law(at, state, law_constants, given, work):
+        return False
+    for index in range(INPUTS):
+        before = work.commands[at - 1, index] if at > 0 else given.initial[index]
+        most, slew = given.command_max[index], given.slew[index]
+        value = limited(work.wanted[index], before, most, slew)
+        work.commands[at, index] = as_carried(value, given.steps_per_unit[index])
+    return True

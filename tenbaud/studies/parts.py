@@ -1,56 +1,34 @@
-"""The parts of a flight that depend on the kinds of model and coder, as placeholders.
+"""The parts of a flight that depend on the kinds of model, coder, plant and law, as placeholders.
 
-`compiled` puts the functions of the model and the coder in their place. They are here so that the
-flight can be read, and checked, as ordinary source.
+`compiled` puts functions of those kinds, and the numbers of signals, in their place. They are here so
+that the flight can be read, and checked, as ordinary source.
 """
 
 from __future__ import annotations
 
-from collections.abc import MutableSequence, Sequence
 from typing import Any
 
-State = tuple[float, ...]
+INPUTS, OUTPUTS = 0, 0
+"""numbers of them, known when the flight is compiled"""
 
 
-def tick(state: State, command: State, held: State, constants: State) -> State:
-    """Stand for `tick_function` of a model."""
+def _part(*_: Any) -> Any:
     raise AssertionError("a flight is compiled before it is flown")
 
 
-def encode(
-    constants: Any,
-    coder: Sequence[float],
-    predicted: Sequence[float],
-    measurement: Sequence[float],
-    symbols: MutableSequence[int],
-) -> None:
-    """Stand for the `encode` of a coder's functions."""
-    raise AssertionError("a flight is compiled before it is flown")
-
-
-def decode(
-    constants: Any,
-    coder: Sequence[float],
-    model: Sequence[float],
-    symbols: Sequence[int],
-    erased: bool,
-    correction: MutableSequence[float],
-    after: MutableSequence[float],
-) -> None:
-    """Stand for the `decode` of a coder's functions."""
-    raise AssertionError("a flight is compiled before it is flown")
-
-
-def state_of(values: Sequence[float]) -> State:
-    """Stand for what reads a model state out of an array."""
-    raise AssertionError("a flight is compiled before it is flown")
-
-
-def held_of(values: Sequence[float]) -> State:
-    """Stand for what reads a correction out of an array."""
-    raise AssertionError("a flight is compiled before it is flown")
-
-
-def sine(x: float) -> float:
-    """Stand for the plant's sine, that of `channel.codec.numerics`."""
-    raise AssertionError("a flight is compiled before it is flown")
+tick = _part
+"""`tick_function` of the model, or all rows of its `row_function`"""
+output_of = _part
+"""(state, constants, place) -> an output, as the model has it"""
+encode = decode = _part
+"""the coder's functions"""
+plant_step = _part
+"""(state, command, push, constants, sine) -> the plant's state one step later"""
+plant_output = _part
+"""(state, constants, place) -> an output of the plant"""
+law = _part
+"""(tick, live state, constants, given, work) -> whether all is well; see `laws.py`"""
+sine = _part
+"""the plant's sine, that of `channel.codec.numerics`"""
+state_of = held_of = command_of = plant_of = push_of = _part
+"""what reads a model state, a correction, a command, a plant state, a push out of an array"""

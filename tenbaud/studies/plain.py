@@ -13,22 +13,20 @@ from tenbaud.config.schema import FlightConfig
 from tenbaud.flight import transmit
 from tenbaud.flight.outcome import ExitCode, Outcome, outcome_of
 from tenbaud.flight.verdict import NotFlown
-from tenbaud.studies.figures import FlightFigures
+from tenbaud.studies.figures import FlightFigures, OutputFigures
 from transmitter.metrics.scores import ErrorMeter
 
 
-def fly_plain(config: FlightConfig, window_start: int | None = None) -> FlightFigures:
+def fly_plain(config: FlightConfig, window_start: int | None = None, why: str = "") -> FlightFigures:
     """Fly a configuration as `tenbaud demo --link memory` does, and return its figures.
 
-    Errors count from tick `window_start` on; where a flight's usually do, if not given.
+    Errors count from tick `window_start` on; where a flight's usually do, if not given. `why`: the
+    reason that it is not compiled.
     """
     try:
         agreement = replace(agree(config, "virtual"), scored_from=window_start)
     except (TenbaudError, ValueError) as error:
-        nothing = math.nan
-        return FlightFigures(
-            str(error), "plain", *(nothing,) * 6, erasures=0, commands_late=0, samples=0
-        )
+        return FlightFigures(str(error), "plain", "", (), erasures=0, commands_late=0, samples=0)
     run = transmit.prepare(agreement, None, DATAGRAM)
     endpoint = build_receiver(agreement, None, DATAGRAM)
     scores = run.node.scores
@@ -43,12 +41,18 @@ def fly_plain(config: FlightConfig, window_start: int | None = None) -> FlightFi
     return FlightFigures(
         outcome="ok" if _has_flown(outcome) else outcome.text,
         engine="plain",
-        error_coded_rms=_rms(scores.first.coded),
-        error_coded_max=scores.first.coded.largest,
-        error_live_rms=_rms(scores.first.live),
-        error_live_max=scores.first.live.largest,
-        tracking_rms=_rms(scores.first.tracking),
-        pitch_amplitude=scores.first.largest,
+        not_compiled=why,
+        outputs=tuple(
+            OutputFigures(
+                error_coded_rms=_rms(one.coded),
+                error_coded_max=one.coded.largest,
+                error_live_rms=_rms(one.live),
+                error_live_max=one.live.largest,
+                tracking_rms=_rms(one.tracking),
+                amplitude=one.largest,
+            )
+            for one in scores.outputs
+        ),
         erasures=node.session.counts["erasures"] - (heard - flown),
         commands_late=node.commands_late,
         samples=flown,

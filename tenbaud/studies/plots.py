@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from channel.codec.signals import Signal
 from tenbaud.files.whole import whole_file
+
+ANGLE = Signal("output", "rad")
 
 LABELS = {
     "rate": "R in symbols per second (baud)",
@@ -34,8 +38,24 @@ MAPS_MAX = 12
 """Pairs beyond these are left out: nobody reads fifty maps."""
 
 
-def draw_study(table: Any, names: list[str], title: str, folder: Path) -> list[Path]:
+class Drawn(NamedTuple):
+    """What the plots of one output have in common."""
+
+    columns: dict[str, Any]
+    """settings, and the quantities in `unit`"""
+    unit: str
+    title: str
+    folder: Path
+    end: str
+    """of the names of its files"""
+
+
+def draw_study(
+    table: Any, names: list[str], title: str, folder: Path, outputs: Sequence[Signal] = (ANGLE,)
+) -> list[Path]:
     """Draw all plots of a table into a folder; return the files, none where no flight has figures.
+
+    Every output has plots of its own.
 
     A setting with one value has none, unless all have one. The title says how many flights have no
     figures, and so are in none of the medians.
@@ -43,22 +63,30 @@ def draw_study(table: Any, names: list[str], title: str, folder: Path) -> list[P
     good = np.array(table["outcome"].to_pylist()) == "ok"
     if not good.any():
         return []
-    columns = {name: np.array(table[name].to_pylist())[good] for name in (*names, *QUANTITIES)}
+    columns = {name: np.array(table[name].to_pylist())[good] for name in names}
     if missing := int(np.count_nonzero(~good)):
         title = f"{title}\n{missing} of {len(good)} flights have no figures and are left out"
     names = [name for name in names if len(np.unique(columns[name])) > 1] or names
     numeric = [name for name in names if columns[name].dtype.kind in "fiub"]
-    paths = [_curves(columns, name, title, folder) for name in names]
-    for first, second in itertools.islice(itertools.combinations(numeric, 2), MAPS_MAX):
-        paths.append(_map(columns, first, second, title, folder))
+    paths = []
+    for place, output in enumerate(outputs):
+        end = f"_{output.name}" if place else ""
+        scale = np.degrees(1.0) if output.unit == "rad" else 1.0
+        found = {one: scale * np.array(table[one + end].to_pylist())[good] for one in QUANTITIES}
+        unit = "degrees" if output.unit == "rad" else output.unit
+        whose = f"{title}: {output.words}" if len(outputs) > 1 else title
+        drawn = Drawn(columns | found, unit, whose, folder, end)
+        paths += [_curves(drawn, name) for name in names]
+        for first, second in itertools.islice(itertools.combinations(numeric, 2), MAPS_MAX):
+            paths.append(_map(drawn, first, second))
     return paths
 
 
-def _curves(columns: dict[str, Any], name: str, title: str, folder: Path) -> Path:
+def _curves(drawn: Drawn, name: str) -> Path:
     """Draw the errors, and below them the tracking, against one setting."""
     import matplotlib.pyplot as plt
 
-    values = columns[name]
+    values = drawn.columns[name]
     levels = np.unique(values)
     sampled = values.dtype.kind == "f" and len(levels) > LEVELS_MAX
     figure, (upper, lower) = plt.subplots(
@@ -69,8 +97,8 @@ def _curves(columns: dict[str, Any], name: str, title: str, folder: Path) -> Pat
         (lower, ("tracking_rms",)),
     ):
         for quantity in quantities:
-            _quantity(axes, values, columns[quantity], quantity, sampled)
-        axes.set_ylabel("degrees")
+            _quantity(axes, values, drawn.columns[quantity], quantity, sampled)
+        axes.set_ylabel(drawn.unit)
         axes.grid(alpha=0.3)
         if axes.lines:
             axes.legend(loc="best", fontsize=9)
@@ -90,12 +118,11 @@ def _curves(columns: dict[str, Any], name: str, title: str, folder: Path) -> Pat
             lower.minorticks_off()
     lower.set_xlabel(LABELS.get(name, name))
     what = "each dot a flight" if sampled else "medians, and the middle half of all flights"
-    upper.set_title(f"{title}\n{what}", fontsize=10)
-    return _save(figure, folder / f"error_{_file(name)}.png")
+    upper.set_title(f"{drawn.title}\n{what}", fontsize=10)
+    return _save(figure, drawn.folder / f"error_{_file(name)}{drawn.end}.png")
 
 
 def _quantity(axes: Any, values: Any, errors: Any, quantity: str, sampled: bool) -> None:
-    errors = np.degrees(errors)
     if not np.isfinite(errors).any():
         return
     live = quantity == "error_live_rms"
@@ -115,14 +142,14 @@ def _spans(levels: Any) -> bool:
     return bool(levels[0] > 0 and levels[-1] >= 5.0 * levels[0])
 
 
-def _map(columns: dict[str, Any], first: str, second: str, title: str, folder: Path) -> Path:
+def _map(of: Drawn, first: str, second: str) -> Path:
     """Draw the median live error over two settings."""
     import matplotlib.pyplot as plt
     from matplotlib.colors import LogNorm
 
     quantity = "error_live_rms"
-    x, y = columns[first].astype(float), columns[second].astype(float)
-    errors = np.degrees(columns[quantity])
+    x, y = of.columns[first].astype(float), of.columns[second].astype(float)
+    errors = of.columns[quantity]
     figure, axes = plt.subplots(figsize=(6.4, 4.8), layout="constrained")
     xs, ys = np.unique(x), np.unique(y)
     places = np.unique(np.column_stack((x, y)), axis=0)
@@ -144,12 +171,12 @@ def _map(columns: dict[str, Any], first: str, second: str, title: str, folder: P
             set_ticks(shown + 0.5, [f"{levels[index]:.4g}" for index in shown])
         if max(grid.shape) <= LABELLED_MAX:
             _write_medians(axes, grid)
-    bar = figure.colorbar(drawn, ax=axes, label=f"{QUANTITIES[quantity]}, degrees")
+    bar = figure.colorbar(drawn, ax=axes, label=f"{QUANTITIES[quantity]}, {of.unit}")
     _label_decades(bar.ax.yaxis, drawn.norm.vmin, drawn.norm.vmax)
     axes.set_xlabel(LABELS.get(first, first))
     axes.set_ylabel(LABELS.get(second, second))
-    axes.set_title(title)
-    return _save(figure, folder / f"map_{_file(first)}_{_file(second)}.png")
+    axes.set_title(of.title)
+    return _save(figure, of.folder / f"map_{_file(first)}_{_file(second)}{of.end}.png")
 
 
 def _write_medians(axes: Any, grid: Any) -> None:

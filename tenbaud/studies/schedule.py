@@ -9,7 +9,7 @@ and with their seeds. What comes out are arrays that a compiled flight reads.
 from __future__ import annotations
 
 import heapq
-from itertools import count
+from itertools import count, groupby
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,6 +33,9 @@ class Schedule(NamedTuple):
     scored: IntArray
     erasures: int
     """words erased, as far as the transmitter heard of them"""
+    commands_late: int
+    longest_late: int
+    """ticks in a row without their command"""
 
 
 class Uncommon(Exception):
@@ -77,7 +80,9 @@ def _arrays(
     frames = np.maximum(at - terms.lead_ticks, 0) // per_sample
     late = ((-(-echo_ns // tick_ns))[frames] > at) & (at >= terms.lead_ticks)
     heard = int(np.count_nonzero(erased & scored))
-    return Schedule(shifts, known, late, scored, heard)
+    longest = max([len(list(run)) for is_late, run in groupby(late) if is_late], default=0)
+    missed = int(np.count_nonzero(late))
+    return Schedule(shifts, known, late, scored, heard, missed, longest)
 
 
 def _linger_ns(agreement: Agreement) -> int:

@@ -1,4 +1,4 @@
-"""The rest of a compiled flight: the transmitter's second copy, guard, encoder watch and scores."""
+"""The rest of a compiled flight: the transmitter's second copy, rig, guard, watch and scores."""
 
 from __future__ import annotations
 
@@ -7,10 +7,19 @@ from typing import Any
 
 from channel.codec.codec import add_correction, is_estimate
 from channel.protocol.limits import limited
-from plant_sim.encoder import angle_of, counts_of
-from tenbaud.studies.flight_data import Errors, Given, Motion, Numbers, Work
-from tenbaud.studies.parts import decode, held_of, state_of, tick
-from transmitter.encoder_watch import MOTION_RAD
+from plant_sim.encoder import EXACT_PER_UNIT, angle_of, counts_of
+from tenbaud.studies.flight_data import Given, Numbers, Work
+from tenbaud.studies.parts import (
+    INPUTS,
+    OUTPUTS,
+    command_of,
+    decode,
+    held_of,
+    output_of,
+    plant_output,
+    state_of,
+    tick,
+)
 from transmitter.session.state_observer import seen_row
 
 
@@ -20,32 +29,39 @@ def put(values: Any, target: Any) -> None:
         target[index] = values[index]
 
 
-def count_at(angle: float, numbers: Numbers) -> int:
-    """Return what the encoder reads."""
-    return counts_of(angle, numbers.counts_per_turn, numbers.sign, numbers.zero_counts)
+def read(at: int, plant: Any, numbers: Numbers, plant_constants: Any, given: Given, work: Work) -> None:
+    """Read every output at a tick, as the rig does."""
+    for place in range(OUTPUTS):
+        per_turn, sign = given.counts_per_turn[place], given.sign[place]
+        zero, turn = given.zero_counts[place], given.turn[place]
+        if numbers.replay:
+            counts = given.counts[at, place]
+            value = angle_of(counts, per_turn, sign, zero, turn)
+            shown = value
+        else:
+            value = plant_output(plant, plant_constants, place)
+            if per_turn == 0.0:
+                counts = math.floor(value * EXACT_PER_UNIT)
+                shown = value
+            else:
+                counts = counts_of(value, per_turn, sign, zero, turn)
+                shown = angle_of(counts, per_turn, sign, zero, turn)
+        work.reading[place] = counts
+        work.true[place] = value
+        work.measured[place] = shown
 
 
-def angle_at(counts: int, numbers: Numbers) -> float:
-    """Return the angle that counts stand for."""
-    return angle_of(counts, numbers.counts_per_turn, numbers.sign, numbers.zero_counts)
-
-
-def look(
-    at: int, angle: float, numbers: Numbers, model_constants: Any, given: Given, work: Work
-) -> None:
+def look(at: int, model_constants: Any, given: Given, work: Work) -> None:
     """Let the transmitter's observer look at a tick, as `StateObserver.look` does."""
-    if not numbers.uses_rates:
-        work.seen[0] = angle
-        return
     state = state_of(work.seen)
     gains = given.anew
     if at > 0:
-        volts = (work.given_out[0], work.given_out[1])
-        state = tick(state, volts, held_of(work.nothing), model_constants)
+        state = tick(state, command_of(work.known_command), held_of(work.nothing), model_constants)
         gains = given.gains
-    errors = (angle - state[0],)
+    for place in range(OUTPUTS):
+        work.innovation[place] = work.measured[place] - output_of(state, model_constants, place)
     for row in range(len(state)):
-        work.seen[row] = seen_row(state, errors, gains, given.largest, row)
+        work.seen[row] = seen_row(state, work.innovation, gains, given.largest, row)
 
 
 def guess(
@@ -77,108 +93,81 @@ def guess(
         first = one * numbers.per_sample
         for at in range(first, first + numbers.per_sample):
             last = min(at, commands - 1)
-            front = work.front[last] if last >= 0 else numbers.initial_front
-            rear = work.rear[last] if last >= 0 else numbers.initial_rear
-            state = tick(state, (front, rear), held, model_constants)
+            command = command_of(work.commands[last] if last >= 0 else given.initial)
+            state = tick(state, command, held, model_constants)
         good = good and is_estimate(state)
         for index in range(len(state)):
             work.model[index] = state[index]
     return good
 
 
-def act(
-    at: int,
-    angle: float,
-    motion: Motion,
-    numbers: Numbers,
-    model_constants: Any,
-    given: Given,
-    work: Work,
-) -> tuple[bool, Motion]:
-    """Read the encoder and put the tick's command on the motors, as node and guard do.
-
-    Return whether nothing tripped, and what is carried on.
-    """
-    counts = given.counts[at] if numbers.replay else count_at(angle, numbers)
-    still = motion.still + 1 if at > 0 and counts == motion.counts else 0
-    window_over = still > 0 and still % numbers.watch == 0
-    if window_over:
-        start = at - numbers.watch + 1
-        model = work.models[given.known[start]]
-        if is_stuck(start, at, model, work.applied, model_constants, work.nothing):
-            return False, motion
-    if numbers.soft_limit < math.inf and abs(angle_at(counts, numbers)) > numbers.soft_limit:
-        return False, motion
-    front, rear, age, late = motion.front, motion.rear, motion.age, motion.late
-    if not given.late[at]:
-        work.given_out[0] = work.front[at]
-        work.given_out[1] = work.rear[at]
-        largest, slew = numbers.command_max, numbers.slew
-        front = limited(work.front[at], front, largest[0], slew[0])
-        rear = limited(work.rear[at], rear, largest[1], slew[1])
-        age = 0
-    else:
-        age += 1
-        late += 1
-        if age > numbers.guard_timeout:
-            return False, motion
-    if given.applied.shape[0] > 0:
-        work.applied[at, 0] = given.applied[at, 0]
-        work.applied[at, 1] = given.applied[at, 1]
-    else:
-        work.applied[at, 0] = front
-        work.applied[at, 1] = rear
-    return True, Motion(front, rear, counts, still, age, late)
+def act(at: int, numbers: Numbers, model_constants: Any, given: Given, work: Work) -> bool:
+    """Apply the tick's command, as node and guard do; return whether nothing tripped."""
+    if is_stuck(at, numbers, model_constants, given, work):
+        return False
+    well = True
+    for place in range(OUTPUTS):
+        well = well and not abs(work.measured[place]) > given.soft_limits[place]
+    for index in range(INPUTS):
+        if not given.late[at]:
+            command = work.commands[at, index]
+            most, slew = given.command_max[index], given.slew[index]
+            work.held[index] = limited(command, work.held[index], most, slew)
+            work.known_command[index] = command
+        known = given.applied.shape[0] > 0
+        work.applied[at, index] = given.applied[at, index] if known else work.held[index]
+    return well
 
 
-def is_stuck(start: int, at: int, model: Any, applied: Any, model_constants: Any, nothing: Any) -> bool:
-    """Return whether the encoder watch would take the encoder for stuck at the end of a window.
+def is_stuck(at: int, numbers: Numbers, model_constants: Any, given: Given, work: Work) -> bool:
+    """Return whether an encoder is taken for stuck at a tick, as `EncoderWatch.check` does."""
+    still = False
+    for place in range(OUTPUTS):
+        same = at > 0 and work.reading[place] == work.read_before[place]
+        work.still[place] = work.still[place] + 1 if same else 0
+        work.read_before[place] = work.reading[place]
+        still = still or same
+    age = work.still[OUTPUTS]
+    if not still or (age == 0 and given.known[at] == 0):
+        work.still[OUTPUTS] = 0
+        return False
+    age += 1
+    work.still[OUTPUTS] = age if age < numbers.watch else 0
+    return age >= numbers.watch and _moved(at, numbers, model_constants, given, work)
 
-    `model` is the state confirmed at the window's first tick, `applied` the voltages of each tick.
-    """
-    held = held_of(nothing)
-    state = state_of(model)
-    angle = state[0]
+
+def _moved(at: int, numbers: Numbers, model_constants: Any, given: Given, work: Work) -> bool:
+    """Return whether an output should have moved in a window in which its encoder stood."""
+    start = at - numbers.watch + 1
+    before = state_of(work.models[given.known[start]])
+    held = held_of(work.nothing)
+    state = before
     for one in range(start, at + 1):
-        state = tick(state, (applied[one - 1, 0], applied[one - 1, 1]), held, model_constants)
-    return not -MOTION_RAD < state[0] - angle < MOTION_RAD
+        state = tick(state, command_of(work.applied[one - 1]), held, model_constants)
+    for place in range(OUTPUTS):
+        moved = output_of(state, model_constants, place) - output_of(before, model_constants, place)
+        motion = given.motions[place]
+        if work.still[place] >= numbers.watch and not -motion < moved < motion:
+            return True
+    return False
 
 
-def score(
-    at: int,
-    sample: int,
-    angle: float,
-    errors: Errors,
-    numbers: Numbers,
-    given: Given,
-    work: Work,
-) -> Errors:
+def score(at: int, sample: int, numbers: Numbers, given: Given, work: Work) -> None:
     """Add the errors of one tick, in the order in which `transmitter.metrics.scores` adds them."""
-    coded_count, coded_squares, coded_max = errors[0], errors[1], errors[2]
-    live_count, live_squares, live_max = errors[3], errors[4], errors[5]
-    tracking_count, tracking_squares = errors[6], errors[7]
-    if given.scored[sample]:
-        error = angle - work.coded[at]
-        coded_count += 1
-        coded_squares += error * error
-        coded_max = max(coded_max, abs(error))
-        if at >= numbers.lead:
-            error = angle - work.live[at]
-            live_count += 1
-            live_squares += error * error
-            live_max = max(live_max, abs(error))
-    if given.reference.shape[0] > 0:
-        error = given.reference[at] - angle
-        tracking_count += 1
-        tracking_squares += error * error
-    return Errors(
-        coded_count,
-        coded_squares,
-        coded_max,
-        live_count,
-        live_squares,
-        live_max,
-        tracking_count,
-        tracking_squares,
-        max(errors[8], abs(angle)),
-    )
+    scored = given.scored[sample]
+    work.counted[0] += scored
+    work.counted[1] += scored and at >= numbers.lead
+    for place in range(OUTPUTS):
+        value = work.true[place]
+        if scored:
+            error = value - work.coded[at, place]
+            work.squares[place, 0] += error * error
+            work.largest[place, 0] = max(work.largest[place, 0], abs(error))
+            if at >= numbers.lead:
+                error = value - work.live[at, place]
+                work.squares[place, 1] += error * error
+                work.largest[place, 1] = max(work.largest[place, 1], abs(error))
+        if given.follows[place]:
+            error = given.targets[at, place] - value
+            work.squares[place, 2] += error * error
+        work.largest[place, 2] = max(work.largest[place, 2], abs(value))

@@ -30,8 +30,10 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from channel.codec.signals import Signal
 from channel.errors import TenbaudError
 from tenbaud.build.ends import check_parts
+from tenbaud.build.signals import configured_signals
 from tenbaud.config.schema import FlightConfig
 from tenbaud.studies.figures import shared_parts
 from tenbaud.studies.points import FLIGHTS_MAX, names_of, points_of
@@ -73,6 +75,11 @@ class Study:
     def chunks(self) -> int:
         """Return how many chunks they make."""
         return -(-self.flights // self.file.chunk_flights)
+
+    @property
+    def outputs(self) -> tuple[Signal, ...]:
+        """Return the outputs of the plants; where these differ, those of the one that has most."""
+        return max((configured_signals(one).outputs for one in self.configs), key=len)
 
     def chunk(self, index: int) -> range:
         """Return the numbers of a chunk's flights."""

@@ -12,9 +12,11 @@ from typing import Any
 from tenbaud.files.whole import make_folder, whole_file
 from tenbaud.studies.chunk import ChunkResult
 from tenbaud.studies.compiled import require, sources_digest
-from tenbaud.studies.figures import FlightFigures
+from tenbaud.studies.figures import FlightFigures, OutputFigures
 from tenbaud.studies.settings import StudyError
 from tenbaud.studies.study import Study
+
+NONE = OutputFigures()
 
 STUDY_KEY, SOURCES_KEY = b"tenbaud.study", b"tenbaud.sources"
 
@@ -58,10 +60,22 @@ class Results:
             columns["seed"].append(seed)
             for name in self.study.names:
                 columns[name].append(self.study.points[point][name])
-        for field, values in zip(FlightFigures._fields, zip(*result.figures, strict=True), strict=True):
-            columns[field] = list(values)
+        for field in FlightFigures._fields:
+            if field != "outputs":
+                columns[field] = [getattr(one, field) for one in result.figures]
+        columns |= self._of_outputs(result.figures)
         table = pa.table({name: _column(name, values, self.study) for name, values in columns.items()})
         self._store(table, self._path(result.chunk))
+
+    def _of_outputs(self, figures: list[FlightFigures]) -> dict[str, list[Any]]:
+        """Return the columns of the outputs: those of all but the first end in its name."""
+        columns = {}
+        for place, output in enumerate(self.study.outputs):
+            name = f"_{output.name}" if place else ""
+            found = [one.outputs[place] if place < len(one.outputs) else NONE for one in figures]
+            for field in OutputFigures._fields:
+                columns[field + name] = [getattr(one, field) for one in found]
+        return columns
 
     def join(self) -> Any:
         """Write all chunks as one table; return it."""

@@ -51,7 +51,7 @@ def stepped_manoeuvre(step_s: float) -> tuple[float, float, float, float]:
     state = (0.3, -0.2, 0.0, 0.0)
     for volts in MANOEUVRE:
         for _ in range(round(HOLD_S / step_s)):
-            state = pitch_step(state, volts, 0.0, constants)
+            state = pitch_step(state, volts, (0.0,), constants)
     return state
 
 
@@ -77,7 +77,7 @@ def test_motor_lag_is_exact_for_held_voltages_whatever_the_step() -> None:
         constants = pitch_constants(PAPER, 0.35 / steps)
         state = (0.0, 0.0, 1.0, -2.0)
         for _ in range(steps):
-            state = pitch_step(state, (3.0, -0.5), 0.0, constants)
+            state = pitch_step(state, (3.0, -0.5), (0.0,), constants)
         left = math.exp(-0.35 / 0.08)
         assert state[2] == pytest.approx(3.0 + (1.0 - 3.0) * left, rel=1e-12)
         assert state[3] == pytest.approx(-0.5 + (-2.0 + 0.5) * left, rel=1e-12)

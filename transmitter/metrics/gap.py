@@ -9,7 +9,8 @@ the model's own restoring torque are taken out, `z'' = w`, so that over a span `
 
 for white `w` of density `q` (rad^2/s^3): the kernel of a second difference is a triangle of height W
 on a base of 2W. An encoder of step `s` adds `6 s^2/12`, which is subtracted. A model that is wrong
-shows as a disturbance too, and rightly: to the codec it is one.
+shows as a disturbance too, and rightly: to the codec it is one. That is the meter of the pitch, far
+from its rest too; `tenbaud.bounds.strength` has that of any plant that is linear, or near its rest.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import astuple, dataclass
+from typing import Any, Generic, Protocol, TypeVar
 
 from channel.codec.codec import Codec, Vector
 from channel.protocol.recording import Field, RecordChannel
@@ -29,14 +31,14 @@ MEMORY_S = 20.0
 """Time constant with which the running figures forget."""
 ENCODER_SHARE_MAX = 0.5
 """Where the encoder's steps make more of the bend than this, nothing pushes that it could tell."""
-ANGLES_MAX = 1024
+MEASURED_MAX = 1024
 """Samples whose echo may be on its way."""
 
 GAP_CHANNEL = RecordChannel(
     "gap",
     (
         Field("sample", "integer", "", "index of the sample"),
-        Field("strength_rad2_per_s3", "number", "rad^2/s^3", "density q of the disturbing torque"),
+        Field("density", "number", "", "density q of the first disturbance; of a torque in rad^2/s^3"),
         # Which errors have come by then depends on when echoes came.
         Field(
             "rms_over_floor",
@@ -55,25 +57,43 @@ GAP_EVERY_S = 1.0
 class Limit:
     """The error of an ideal code on this line, as `tenbaud.bounds` computes it.
 
-    Both in terms of a mean square error for a disturbance of unit density.
+    Both in terms of a mean square error, over all outputs by their weights, for a disturbance of unit
+    density.
     """
 
-    floor_s3: float
-    """least mean square error per density q at the flight's bit rate, s^3"""
+    floor: float
+    """least mean square error per density q at the flight's bit rate; s^3 for an angle"""
     rate: Callable[[float], float]
-    """mean square error per density q (s^3) -> bit/s that an ideal code needs for it"""
+    """mean square error per density q -> bit/s that an ideal code needs for it"""
+    weights: Vector
+    """of the outputs"""
 
 
 @dataclass(frozen=True, slots=True)
 class Gap:
     """The gauge at one moment."""
 
-    strength_rad2_per_s3: float
-    """q, as estimated"""
+    density: float
+    """q of the first disturbance, as estimated"""
     rms_over_floor: float
     """rms of the live error over the least possible at the same rate; 1 is the limit"""
     ideal_bits: float
     """that an ideal code would have needed so far for the same error"""
+
+
+class Meter(Protocol):
+    """Estimates the density of the first disturbance; without a value where none is seen."""
+
+    @property
+    def value(self) -> float | None:
+        """Return it as a running mean."""
+
+    @property
+    def whole(self) -> float | None:
+        """Return it as the mean over all of the flight."""
+
+    def add(self, done: Confirmed, measured: Vector) -> None:
+        """Take a confirmed sample and the outputs measured at its first tick; samples in order."""
 
 
 class StrengthMeter:
@@ -91,7 +111,7 @@ class StrengthMeter:
         self._per_square = 1.5 / span_s**3
         self._encoder = 6.0 * angle_step_rad**2 / 12.0
         self._idle: Vector = (0.0,) * codec.model.input_size
-        self.squares = Running(self._sample_s)
+        self.squares: Running[float] = Running(self._sample_s)
         self._past: deque[float] = deque(maxlen=2 * self._span + 1)
         self._next_sample = -1
         self._position = 0.0
@@ -107,8 +127,9 @@ class StrengthMeter:
         """Return `q` as the mean over all of the flight."""
         return self._density(self.squares.whole)
 
-    def add(self, done: Confirmed, angle_rad: float) -> None:
+    def add(self, done: Confirmed, measured: Vector) -> None:
         """Take a confirmed sample and the encoder's angle at its first tick; samples in order."""
+        angle_rad = measured[0]
         if done.sample != self._next_sample:
             self._past.clear()
             self._position = self._rate = 0.0
@@ -148,31 +169,34 @@ class StrengthMeter:
 class GapGauge:
     """Compares the live error with the floor for the disturbance that there is."""
 
-    def __init__(self, limit: Limit, strength: StrengthMeter, ticks_per_sample: int, tick_s: float):
+    def __init__(self, limit: Limit, strength: Meter, ticks_per_sample: int, tick_s: float):
         self._limit = limit
         self._strength = strength
         self._ticks_per_sample = ticks_per_sample
         self._tick_s = tick_s
-        self._errors = Running(tick_s)
-        self._angles: deque[tuple[int, float]] = deque(maxlen=ANGLES_MAX)
+        self._errors: Running[float] = Running(tick_s)
+        self._measured: deque[tuple[int, Vector]] = deque(maxlen=MEASURED_MAX)
 
-    def on_angle(self, tick: int, angle_rad: float) -> None:
-        """Take the encoder's angle at a tick."""
+    def on_outputs(self, tick: int, measured: Vector) -> None:
+        """Take what the encoders show at a tick."""
         sample, within = divmod(tick, self._ticks_per_sample)
         if within == 0:
-            self._angles.append((sample, angle_rad))
+            self._measured.append((sample, measured))
 
     def on_confirmed(self, done: Confirmed) -> None:
-        """Take a confirmed sample; its angle has been taken before."""
-        angles = self._angles
-        while angles and angles[0][0] < done.sample:
-            angles.popleft()
-        if angles and angles[0][0] == done.sample:
-            self._strength.add(done, angles.popleft()[1])
+        """Take a confirmed sample; its outputs have been taken before."""
+        measured = self._measured
+        while measured and measured[0][0] < done.sample:
+            measured.popleft()
+        if measured and measured[0][0] == done.sample:
+            self._strength.add(done, measured.popleft()[1])
 
-    def on_error(self, error_rad: float) -> None:
-        """Take the live error of a tick."""
-        self._errors.add(error_rad * error_rad)
+    def on_errors(self, errors: Vector) -> None:
+        """Take the live errors of a tick."""
+        total = 0.0
+        for weight, error in zip(self._limit.weights, errors, strict=True):
+            total += weight * error * error
+        self._errors.add(total)
 
     @property
     def now(self) -> Gap | None:
@@ -189,38 +213,44 @@ class GapGauge:
         gap = self.now
         return (sample, None, None, None) if gap is None else (sample, *astuple(gap))
 
-    def _gap(self, strength: float | None, mean_square: float | None) -> Gap | None:
-        # A strength of 0: an encoder without steps, on a plant that nothing has pushed at all.
-        if not strength or not mean_square:
+    def _gap(self, density: float | None, mean_square: float | None) -> Gap | None:
+        # A density of 0: an encoder without steps, on a plant that nothing has pushed at all.
+        if not density or not mean_square:
             return None
-        per_density = mean_square / strength
+        per_density = mean_square / density
         flown_s = self._errors.count * self._tick_s
-        ratio = math.sqrt(per_density / self._limit.floor_s3)
-        return Gap(strength, ratio, self._limit.rate(per_density) * flown_s)
+        ratio = math.sqrt(per_density / self._limit.floor)
+        return Gap(density, ratio, self._limit.rate(per_density) * flown_s)
 
 
-class Running:
-    """Mean of a stream of numbers, one per period: over all of it, and over the last `MEMORY_S`."""
+Number = TypeVar("Number", float, Any)
+
+
+class Running(Generic[Number]):
+    """Mean of a stream of numbers, one per period: over all of it, and over the last `MEMORY_S`.
+
+    The numbers may be arrays.
+    """
 
     def __init__(self, period_s: float) -> None:
         self.count = 0
-        self._sum = 0.0
-        self._recent = 0.0
+        self._sum: Any = 0.0
+        self._recent: Any = 0.0
         self._least = period_s / MEMORY_S
 
-    def add(self, value: float) -> None:
+    def add(self, value: Number) -> None:
         """Take one number."""
         self.count += 1
-        self._sum += value
+        self._sum = self._sum + value
         # A plain mean until there is enough to forget.
-        self._recent += (value - self._recent) * max(1.0 / self.count, self._least)
+        self._recent = self._recent + (value - self._recent) * max(1.0 / self.count, self._least)
 
     @property
-    def recent(self) -> float | None:
+    def recent(self) -> Number | None:
         """Return the running mean; None without a number."""
         return self._recent if self.count else None
 
     @property
-    def whole(self) -> float | None:
+    def whole(self) -> Number | None:
         """Return the mean of all numbers; None without one."""
         return self._sum / self.count if self.count else None

@@ -64,7 +64,7 @@ class Scores:
     """Collects the errors of a flight from tick `window_start_tick` on, for each output.
 
     `span_ticks` bounds how long a reading waits for its estimate; older ones are forgotten.
-    `on_live_error` gets every live error of the first output in the window.
+    `on_live_errors` gets the live errors of every tick in the window, one per output.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class Scores:
         window_start_tick: int,
         span_ticks: int,
         references: References,
-        on_live_error: Callable[[float], None] = lambda _: None,
+        on_live_errors: Callable[[Vector], None] = lambda _: None,
     ) -> None:
         self.window_start_tick = window_start_tick
         self.outputs = tuple([OutputScores() for _ in model.measured(model.initial())])
@@ -81,7 +81,7 @@ class Scores:
         """the last confirmed words, and the output that each symbol was about"""
         self._model = model
         self._references = references
-        self._on_live_error = on_live_error
+        self._on_live_errors = on_live_errors
         # An estimate may come before its reading (the echo of a sample's first tick speaks of all its
         # ticks) or long after it; each waits for the other.
         self._readings: deque[tuple[int, Vector]] = deque(maxlen=span_ticks)
@@ -146,4 +146,4 @@ class Scores:
                 if live is not None:
                     score.live.add(values[place] - live[place])
         if inside and live is not None:
-            self._on_live_error(values[0] - live[0])
+            self._on_live_errors(tuple([one - other for one, other in zip(values, live, strict=True)]))

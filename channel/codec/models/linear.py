@@ -30,6 +30,8 @@ class LinearConstants(NamedTuple):
     """h"""
     constant: Vector
     """x0 - F x0 - E u0"""
+    outputs: Vector
+    """C"""
 
 
 def linear_row(
@@ -48,6 +50,15 @@ def linear_row(
     return total
 
 
+def linear_output(state: Vector, constants: LinearConstants, place: int) -> float:
+    """Return one output of a state."""
+    total = 0.0
+    states = len(state)
+    for index in range(states):
+        total += constants.outputs[place * states + index] * state[index]
+    return total
+
+
 class LinearModel:
     """Prediction model `x <- F x + E u` with the outputs `C x`.
 
@@ -57,6 +68,7 @@ class LinearModel:
     """
 
     row_function = staticmethod(linear_row)
+    output_function = staticmethod(linear_output)
 
     def __init__(
         self,
@@ -87,7 +99,9 @@ class LinearModel:
             raise ValueError(f"start has {len(self._start)} numbers, one for each state is needed")
         self.signals = signals
         self.outputs = tuple(tuple(row) for row in outputs)
-        nothing = LinearConstants(flat(transition), flat(drive), tick_s, (0.0,) * self.state_size)
+        nothing = LinearConstants(
+            flat(transition), flat(drive), tick_s, (0.0,) * self.state_size, flat(outputs)
+        )
         self.constants = nothing._replace(
             constant=tuple(
                 [rest[row] - linear_row(rest, held, (), nothing, row) for row in range(self.state_size)]
@@ -100,13 +114,8 @@ class LinearModel:
 
     def measured(self, state: Vector) -> Vector:
         """Return the outputs."""
-        measured = []
-        for row in self.outputs:
-            total = 0.0
-            for index in range(len(row)):
-                total += row[index] * state[index]
-            measured.append(total)
-        return tuple(measured)
+        constants = self.constants
+        return tuple([linear_output(state, constants, place) for place in range(len(self.outputs))])
 
     def tick(self, state: Vector, command: Vector, held: Vector) -> Vector:
         """Advance by one tick; see `linear_row`."""

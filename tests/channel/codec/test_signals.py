@@ -88,7 +88,13 @@ def test_a_model_with_other_numbers_than_it_names_is_refused() -> None:
 def test_an_output_that_is_no_state_is_none_and_one_of_a_state_that_is_not_there_is_refused() -> None:
     cart = Cart()
     cart.measured = lambda state: (state[0] + state[1], state[1])  # type: ignore[method-assign, assignment]
-    assert signals_of(cart).output_states == (None, 1)
+    signals = signals_of(cart)
+    assert signals.output_states == (None, 1)
+    assert [signals.row(place) for place in range(2)] == [(1.0, 1.0), (0.0, 1.0)]
+    cart.measured = lambda state: (state[0] * state[1], state[1])  # type: ignore[method-assign, assignment]
+    assert signals_of(cart).row(0) == ()
+    with pytest.raises(ValueError, match="output_rows have a coefficient per state"):
+        Signals((Signal("a"),), (), (Signal("b"),), (None,), output_rows=((1.0, 2.0),))
     angle = Signal("angle")
     with pytest.raises(ValueError, match="there is no state 1"):
         Signals((angle,), (), (angle,), (1,))

@@ -120,7 +120,7 @@ def test_when_nothing_can_be_designed_then_the_error_says_why() -> None:
     for model, text in (
         ({**PENDULUM, "C": [[0.0, 0.0]]}, "not observable"),
         ({**PENDULUM, "G": [[0.0], [0.0]]}, "does not reach every state"),
-        ({"kind": "hold"}, "designs are for linear and pitch"),
+        ({"kind": "hold"}, "describes no plant to design for"),
     ):
         with pytest.raises(ConfigError, match=text):
             completed({**AT_20, "model": model, "coder": {"kind": "direction"}})

@@ -11,7 +11,7 @@ from mcap.reader import make_reader
 from channel.links.endpoints import free_endpoint
 from tenbaud import Run
 from tenbaud.files.whole import WriteError
-from tenbaud.recording import lock
+from tenbaud.recording import folder
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.inspect import describe_text
 from tenbaud.recording.reader import MessageStream
@@ -153,8 +153,8 @@ def test_a_file_in_use_is_refused_and_its_flight_goes_on(
 def test_without_locks_a_file_that_grows_is_in_use(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(lock, "fcntl", None)
-    monkeypatch.setattr(lock, "QUIET_S", 1.3)
+    monkeypatch.setattr(folder, "fcntl", None)
+    monkeypatch.setattr(folder, "QUIET_S", 1.3)
     path = tmp_path / "transmitter.mcap"
     flying = threading.Event()
     with McapRecorder(path, {}) as recorder:

@@ -232,7 +232,7 @@ def test_when_a_recording_is_judged_then_it_is_as_the_nodes_fly_it(
     assert (border, ticks) == ((200, 400) if duration_s == 8.0 else (500, 1000))
     until = border if train else ticks
     plain = fly_plain(config.model_copy(update={"duration_s": until * 0.02}), 0 if train else border)
-    assert judge(tuning, {}, train=train).rms_rad == plain.error_live_rms
+    assert judge(tuning, {}, train=train).rms_rad == plain.first.error_live_rms
 
 
 def test_when_only_the_nodes_can_fly_a_coder_then_a_recording_is_judged_too(log: Path) -> None:

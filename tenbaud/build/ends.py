@@ -167,12 +167,12 @@ def check_parts(config: FlightConfig, parts: Parts | None = None) -> None:
     if parts.controller is None:
         controller = build_controller(config, model=parts.model)
         if config.receiver.controller not in CONTROLLERS.built_in:
-            _check_command(config, controller)
+            _check_command(config, controller, parts)
 
 
-def _check_command(config: FlightConfig, controller: Controller) -> None:
+def _check_command(config: FlightConfig, controller: Controller, parts: Parts) -> None:
     """Ask a controller from outside for its first command; ConfigError if no motor could follow it."""
-    model, name = build_codec(config).model, config.receiver.controller
+    model, name = build_codec(config, parts).model, config.receiver.controller
     try:
         volts = [float(value) for value in controller.command(0, model.initial())]
     except Exception as error:

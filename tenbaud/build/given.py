@@ -73,6 +73,20 @@ def reference_settings(
     return section | {outputs[at].name: {"kind": "csv", "file": str(file)} for at in tables}
 
 
+def kept_set_points(
+    configured: Mapping[str, Any], given: Mapping[str, Any], first: str
+) -> dict[str, Any]:
+    """Return what stays of `receiver.reference` under sections that are given.
+
+    One with a kind replaces the whole set-point of its output, offset included; fields without a kind
+    change it. `first` is the output whose set-point is the section itself.
+    """
+    replaced = {name for name, one in given.items() if isinstance(one, Mapping) and "kind" in one}
+    if "kind" in given:
+        replaced |= {first, *ReferenceSection.model_fields}
+    return {name: one for name, one in configured.items() if name not in replaced}
+
+
 def _constant(value: Any) -> dict[str, Any]:
     try:
         return {"kind": "constant", "amplitude": float(value)}

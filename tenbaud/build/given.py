@@ -73,18 +73,21 @@ def reference_settings(
     return section | {outputs[at].name: {"kind": "csv", "file": str(file)} for at in tables}
 
 
-def kept_set_points(
-    configured: Mapping[str, Any], given: Mapping[str, Any], first: str
-) -> dict[str, Any]:
-    """Return what stays of `receiver.reference` under sections that are given.
+def whole_sections(given: Mapping[str, Any], first: str) -> dict[str, Any]:
+    """Return given sections of `receiver.reference` so that they replace what is configured.
 
-    One with a kind replaces the whole set-point of its output, offset included; fields without a kind
-    change it. `first` is the output whose set-point is the section itself.
+    One with a kind has all its fields then, offset included; fields without a kind only change some.
+    `first` is the output whose set-point is the section itself, unless that is under its name.
     """
-    replaced = {name for name, one in given.items() if isinstance(one, Mapping) and "kind" in one}
+    usual = ReferenceSection().model_dump()
+    named = {name: one for name, one in given.items() if name not in usual}
     if "kind" in given:
-        replaced |= {first, *ReferenceSection.model_fields}
-    return {name: one for name, one in configured.items() if name not in replaced}
+        named = {first: {name: one for name, one in given.items() if name in usual}} | named
+    whole = {
+        name: {**usual, **one} if isinstance(one, Mapping) and "kind" in one else one
+        for name, one in named.items()
+    }
+    return whole if "kind" in given else {**given, **whole}
 
 
 def _constant(value: Any) -> dict[str, Any]:

@@ -165,7 +165,7 @@ def _following(
     loaded: FlightConfig, reference: Given, parts: Mapping[str, Any], folder: RunFolder
 ) -> FlightConfig:
     """Return the configuration with other set-points; values over time are in a file in the folder."""
-    from tenbaud.build.given import kept_set_points, reference_settings
+    from tenbaud.build.given import reference_settings, whole_sections
     from tenbaud.build.parts import PartError
     from tenbaud.build.signals import configured_signals
     from tenbaud.config.load import load_config, merged
@@ -186,9 +186,7 @@ def _following(
         folder.path / REFERENCE_NAME,
     )
     values = loaded.model_dump(mode="json", exclude_none=True)
-    receiver = values["receiver"]
-    receiver["reference"] = kept_set_points(receiver["reference"], section, outputs[0].name)
-    over = {"receiver": {"reference": section}}
+    over = {"receiver": {"reference": whole_sections(section, outputs[0].name)}}
     return load_config(loaded.preset, None, merged(values, over), allow_code=True)
 
 

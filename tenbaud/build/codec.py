@@ -16,7 +16,7 @@ from tenbaud.config.section import OutsideSection
 def build_codec(config: FlightConfig, parts: Parts | None = None) -> Codec:
     """Return the codec of a configuration; ValueError where its parts do not fit each other."""
     parts = parts or Parts()
-    codec = _codec(config, parts)
+    codec = unchecked_codec(config, parts)
     kind = model_kind(config.model)
     if parts.model is None and kind and kind.linear and kind.may_grow(config.model):
         from tenbaud.design.described import check_plant
@@ -28,8 +28,9 @@ def build_codec(config: FlightConfig, parts: Parts | None = None) -> Codec:
     return codec
 
 
-def _codec(config: FlightConfig, parts: Parts) -> Codec:
-    """Return the codec, whatever its plant needs."""
+def unchecked_codec(config: FlightConfig, parts: Parts | None = None) -> Codec:
+    """Return the codec; whether its rate is enough for its plant nobody has looked yet."""
+    parts = parts or Parts()
     ticks = round(config.timing.symbol_period_s / config.timing.tick_s)
     model = build_model(config, parts)
     coder = parts.coder or _build_coder(config, model)
@@ -45,7 +46,7 @@ def _codec(config: FlightConfig, parts: Parts) -> Codec:
 def configured_rate(config: FlightConfig) -> float:
     """Return the bit/s of a configuration's words, be they enough for its plant or not."""
     if isinstance(config.coder, OutsideSection):
-        return bit_rate(_codec(config, Parts()), config.timing.tick_s)
+        return bit_rate(unchecked_codec(config), config.timing.tick_s)
     # Without a codec: a linear model and its coder may not have been designed yet.
     return float(getattr(config.coder, "bits", 1)) / config.timing.symbol_period_s
 

@@ -73,7 +73,7 @@ def test_when_the_bits_are_too_few_for_a_plant_then_the_error_has_both_numbers()
     for model, state in ((PENDULUM, "rate"), (growing, "pitch_rate")):
         values = completed({"model": model})
         config = load_config("paper-10baud", None, values)
-        text = rf"10 bit/s are too few.*, {state} fastest by 7\.321 1/s.*more than 10\.56 bit/s; shorten"
+        text = rf"10 bit/s are too few.*, {state} fastest by 7\.32.*more than 10\.56 bit/s; shorten"
         with pytest.raises(ConfigError, match=text):
             agree(config, "virtual")
 

@@ -76,6 +76,23 @@ def test_words_of_many_symbols_and_other_coders_pass(
     assert result.passed, result.leaks + result.gaps
 
 
+def test_a_recording_of_before_passes(tmp_path: Path) -> None:
+    run = flown(tmp_path / "run", "servo-10baud", duration_s=4.0)
+    signals = json.loads(run.metadata["signals"])
+    assert signals.pop("picture") == "dial"
+    signals["outputs"] = [{"name": "output_1"}]
+
+    def of_before(row: Row) -> list[Row]:
+        return [{**row, "range": [0.5, 0.5], "about": None}]
+
+    old = ("transmitter", "sample", of_before)
+    result = audit(doctored(run.path, tmp_path / "old", *old, signals=json.dumps(signals)))
+    assert result.passed, result.leaks + result.gaps
+    signals["states"][1]["unit"] = "V"
+    result = audit(doctored(run.path, tmp_path / "other", *old, signals=json.dumps(signals)))
+    assert "transmitter: head, signals: it is another" in told(result)
+
+
 def test_a_serial_line_in_real_time_passes_too(tmp_path: Path) -> None:
     flight = ("--link", "serial", "--clock", "real", "--duration", "3", "--out", "run")
     assert run_command("demo", "--json", *flight, cwd=tmp_path).code == 0

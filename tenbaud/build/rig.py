@@ -124,7 +124,10 @@ def plant_context(config: FlightConfig, step_s: float, signals: Signals) -> Plan
 
 def pitch_plant(config: FlightConfig, context: PlantContext) -> PitchPlant:
     """Return the pitch axis."""
-    (disturbance,) = context.disturbances(1) or (None,)
+    try:
+        (disturbance,) = context.disturbances(1) or (None,)
+    except ValueError as error:
+        raise ConfigError(f"transmitter.plant.disturbance: {error}") from error
     return PitchPlant(
         nominal_plant(config, context.command_max[0]).mismatched(config.transmitter.plant.mismatch),
         context.step_s,

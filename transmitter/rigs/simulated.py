@@ -22,7 +22,7 @@ class SimulatedRig(Rig):
         plant: Plant,
         encoders: tuple[OutputReader, ...],
         safe_command: Vector,
-        outputs: Sequence[str],
+        outputs: Sequence[str] = (),
     ) -> None:
         """`outputs` are their names, for what is said of them."""
         self._plant = plant
@@ -46,9 +46,9 @@ class SimulatedRig(Rig):
         true = self._plant.measured
         for place, value in enumerate(true):
             if not math.isfinite(value):
+                name = self._names[place] if place < len(self._names) else place + 1
                 raise RigError(
-                    f"the simulated plant's output {self._names[place]} is {value} at tick {tick}; "
-                    "it must be finite"
+                    f"the simulated plant's output {name} is {value} at tick {tick}; it must be finite"
                 )
         if len(true) == 1 and self._encoder is not None:
             count, value = self._encoder.read(true[0])

@@ -83,13 +83,18 @@ def test_a_recording_of_before_passes(tmp_path: Path) -> None:
     signals["outputs"] = [{"name": "output_1"}]
 
     def of_before(row: Row) -> list[Row]:
-        return [{**row, "range": [0.5, 0.5], "about": None}]
+        about = {"about": None} if "about" in row else {}
+        return [{**row, "range": [0.5, 0.5], **about}]
 
-    old = ("transmitter", "sample", of_before)
-    result = audit(doctored(run.path, tmp_path / "old", *old, signals=json.dumps(signals)))
+    path = run.path
+    for end in ("transmitter", "receiver"):
+        text = json.dumps(signals)
+        path = doctored(path, tmp_path / end, end, "sample", of_before, signals=text)
+    result = audit(path)
     assert result.passed, result.leaks + result.gaps
     signals["states"][1]["unit"] = "V"
-    result = audit(doctored(run.path, tmp_path / "other", *old, signals=json.dumps(signals)))
+    old = ("transmitter", "sample", lambda row: [row])
+    result = audit(doctored(path, tmp_path / "other", *old, signals=json.dumps(signals)))
     assert "transmitter: head, signals: it is another" in told(result)
 
 

@@ -93,7 +93,7 @@ def test_a_dry_run_wraps_any_rig() -> None:
     reading = rig.read(100)
     assert reading is not None
     assert reading.applied_volts == (0.0, 0.0)
-    driven = SimulatedRig(rig._rig._plant, (), (0.0, 0.0), ())  # type: ignore[attr-defined]
+    driven = SimulatedRig(rig._rig._plant, (), (0.0, 0.0))  # type: ignore[attr-defined]
     assert driven._plant.state[2:] == (0.0, 0.0), "no voltage reached its motors"  # type: ignore[attr-defined]
 
 

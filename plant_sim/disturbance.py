@@ -180,8 +180,8 @@ def parse_disturbance(text: str, step_s: float, seed: int, place: int = 0) -> Pl
                 if has_density:
                     raise ValueError("q is given twice")
                 has_density = True
-                density = _of_place(value, place, for_all=True)
-                parts.append(WhiteTorque(_number(density, "q"), step_s, seed, place))
+                density = _of_place(value, "q", place, for_all=True)
+                parts.append(WhiteTorque(density, step_s, seed, place))
             elif kind == "step":
                 parts.append(_parse_step(value, step_s, place))
             else:
@@ -204,12 +204,12 @@ def require_places(text: str, places: int) -> None:
             )
 
 
-def _of_place(values: str, place: int, *, for_all: bool = False) -> str:
-    """Return the value of one place, "0" where it has none."""
-    given = values.split(":")
+def _of_place(values: str, name: str, place: int, *, for_all: bool = False) -> float:
+    """Return the value of one place, 0 where it has none; every value must be a number."""
+    given = [_number(value, name) for value in values.split(":")]
     if for_all and len(given) == 1:
         return given[0]
-    return given[place] if place < len(given) else "0"
+    return given[place] if place < len(given) else 0.0
 
 
 def _parse_step(value: str, step_s: float, place: int) -> StepTorque:
@@ -219,7 +219,7 @@ def _parse_step(value: str, step_s: float, place: int) -> StepTorque:
     start_text, dots, end_text = times.partition("..")
     return StepTorque(
         start_s=_number(start_text, "START"),
-        torque_rad_s2=_number(_of_place(torque_text, place), "TORQUE"),
+        torque_rad_s2=_of_place(torque_text, "TORQUE", place),
         step_s=step_s,
         end_s=_number(end_text, "END") if dots else None,
     )

@@ -159,4 +159,5 @@ def _end(fmu: Any) -> None:
     """Let go of an FMU."""
     with suppress(Exception):  # one that refused a step may refuse this too
         fmu.terminate()
+    with suppress(Exception):
         fmu.freeInstance()

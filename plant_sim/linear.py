@@ -76,16 +76,20 @@ class SimulatedLinear:
         start: Sequence[float] = (),
     ) -> None:
         given = {"A": A, "B": B, "C": C, "G": G}
-        model = {**context.model, **{name: value for name, value in given.items() if value}}
-        if "C" not in model:
+        options = {name: value for name, value in given.items() if value}
+        model = {**context.model, **options}
+        if "C" not in model or not (model.get("A") or model.get("F") or "B" in options):
             raise ValueError(
                 "the codec's model has no matrices; give A, B and C in transmitter.plant.options"
             )
+        if not (model.get("A") and model.get("B")) and {"A", "B"} & options.keys():
+            raise ValueError("the codec's model has no A and B; give both, or neither of them")
         F, E, noise = _stepped(model, context)
         size, inputs = E.shape
-        c = _matrix("C", model["C"], None, size)
-        at = np.array(model.get("operating_state") or [0.0] * size)
-        command = np.array(model.get("operating_command") or [0.0] * inputs)
+        c = _matrix("C", model["C"], len(context.outputs) or None, size)
+        at = _matrix("operating_state", model.get("operating_state") or [0.0] * size, 1, size)[0]
+        rest = model.get("operating_command") or [0.0] * inputs
+        command = _matrix("operating_command", rest, 1, inputs)[0]
         self.constants = LinearStep(
             _flat(F),
             _flat(np.hstack([E, noise])),
@@ -128,7 +132,7 @@ def _stepped(model: Mapping[str, Any], context: PlantContext) -> tuple[Matrix, .
     step_s, off = context.step_s, context.mismatch
     names = "AB" if model.get("A") else "FE"
     a = _matrix(names[0], model[names[0]], None, len(model[names[0]]))
-    b = _matrix(names[1], model[names[1]], len(a), None)
+    b = _matrix(names[1], model[names[1]], len(a), len(context.command_max))
     if names == "FE":
         if not context.disturbance_text and not np.any(off):
             return a, b, np.zeros((len(a), 0))
@@ -154,7 +158,10 @@ def _mismatched(a: Matrix, b: Matrix, off: Sequence[float]) -> tuple[Matrix, Mat
 
 def _matrix(name: str, given: Any, height: int | None, width: int | None) -> Matrix:
     """Return a matrix of this many rows and columns; ValueError for any other."""
-    matrix = np.atleast_2d(np.array(given, dtype=float))
+    try:
+        matrix = np.atleast_2d(np.array(given, dtype=float))
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name} must be rows of numbers, all of one length, got {given}") from error
     wanted = (height or len(matrix), width or matrix.shape[1])
     if matrix.shape != wanted or not np.isfinite(matrix).all():
         raise ValueError(f"{name} must be {wanted[0]} x {wanted[1]} finite numbers, got {given}")

@@ -35,7 +35,7 @@ class ServoPlant(OdePlant):
         winding_lag_s: float = 0.002,
         friction_rad_per_s2: float = 0.5,
     ) -> None:
-        require_at_least_zero(friction_rad_per_s2=friction_rad_per_s2)
+        require_at_least_zero(friction_rad_per_s2=friction_rad_per_s2, winding_lag_s=winding_lag_s)
         if not time_constant_s > 0.0:
             raise ValueError(f"time_constant_s is {time_constant_s}; it must be above 0")
         damping, _, gain = fractions(context)

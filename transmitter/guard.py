@@ -12,6 +12,7 @@ The age of a command counts the ticks that were owed one (`transmitter.session.o
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -147,23 +148,23 @@ class Guard:
         self.reason = None
         self._age_ticks = 0
 
-    def apply(self, tick: int, command: Vector | None, owed: bool = True) -> Vector:
+    def apply(self, tick: int, command: Vector | None, owed_ticks: int = sys.maxsize) -> Vector:
         """Return what is applied at this tick; `command` is None when none has come.
 
-        `owed`: whether one should have come by now. Where it should not, none is missed.
+        `owed_ticks`: for how many ticks, up to this one, one should have come. No other is missed.
         """
         if command is not None:
             for value in command:
                 if not math.isfinite(value):
                     self.trip(GuardReason(GuardCause.BAD_COMMAND, tick, value=value))
         if not self.stopped:
-            self._take(tick, command, owed)
+            self._take(tick, command, owed_ticks)
         if self.state is GuardState.RAMPING:
             self._ramp()
         self._tick = tick
         return self.command
 
-    def _take(self, tick: int, command: Vector | None, owed: bool) -> None:
+    def _take(self, tick: int, command: Vector | None, owed_ticks: int) -> None:
         if command is not None:
             self.state = GuardState.RUNNING
             self._age_ticks = 0
@@ -171,7 +172,7 @@ class Guard:
             return
         # Ticks that were missed pass as well: the watchdog counts time.
         passed_ticks = 1 if self._tick is None else tick - self._tick
-        self._age_ticks = self._age_ticks + passed_ticks if owed else 0
+        self._age_ticks = min(self._age_ticks + passed_ticks, owed_ticks)
         if self.state is GuardState.RUNNING:
             self.state = GuardState.HOLDING
         if self._age_ticks > self._settings.timeout_ticks:

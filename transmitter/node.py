@@ -134,7 +134,7 @@ class TransmitterNode:
         owed = session.phase is Phase.FLYING and tick >= session.epoch_tick
         late = command is None and owed and not self.guard.stopped
         self.commands_late += late
-        volts = self.guard.apply(tick, command, session.owing.is_owed(tick))
+        volts = self.guard.apply(tick, command, session.owing.owed_ticks(tick))
         self.ticks_down += self.guard.stopped
         self.ticks_commanded += command is not None and not self.guard.stopped
         self.rig.write(tick, volts)

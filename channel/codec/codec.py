@@ -195,7 +195,7 @@ class Codec:
         """Return the place of the output that each symbol of a word was about; None for ERASED.
 
         `opened` is the model state after the word's correction. The answer follows from shared state,
-        and none follows from it: it is for people.
+        and none follows from it: it is for people. None also where the coder fails to give one.
         """
         if word is ERASED:
             return None
@@ -204,14 +204,22 @@ class Codec:
             return self._in_turn
         size = self.model.correction_size
         pairs = zip(opened[:size], state.model[:size], strict=True)
-        found: tuple[int, ...] = find(state.coder, word, [after - before for after, before in pairs])
-        return found
+        correction = [after - before for after, before in pairs]
+        try:
+            found = tuple([int(place) for place in find(state.coder, word, correction)])
+        except Exception:  # a coder from outside may fail in any way
+            return None
+        is_whole = len(found) == len(word) and all(0 <= place < self._outputs for place in found)
+        return found if is_whole else None
+
+    @cached_property
+    def _outputs(self) -> int:
+        return len(self.model.measured(self.model.initial()))
 
     @cached_property
     def _in_turn(self) -> tuple[int, ...]:
-        outputs = len(self.model.measured(self.model.initial()))
         count = self.coder.alphabet.symbols_per_word
-        return tuple([place * outputs // count for place in range(count)])  # integers
+        return tuple([place * self._outputs // count for place in range(count)])  # integers
 
     def step(self, state: CodecState, word: Word, commands: Sequence[Vector]) -> CodecState:
         """Run one whole sample: its word, then the commands of its `N` ticks."""

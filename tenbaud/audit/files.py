@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from tenbaud.audit.base import Evidence, claim
-from tenbaud.recording.encoding import SIGNALS_KEY, signals_text
+from tenbaud.recording.encoding import SIGNALS_KEY, recorded_signals, signals_text
 from tenbaud.recording.notes import hole_notes, stray_notes
+from tenbaud.recording.old_rows import is_same_plant
 from tenbaud.recording.recover import RECOVERED_NOTE
 
 
@@ -21,8 +22,9 @@ def check_heads(evidence: Evidence) -> None:
             "role": end,
             "config_digest": recorded.config_digest.hex(),
             "tick_s": repr(evidence.agreement.config.timing.tick_s),
-            SIGNALS_KEY: signals_text(evidence.agreement.signals),
         }
+        if not is_same_plant(recorded_signals(tables.metadata), evidence.agreement.signals):
+            wanted[SIGNALS_KEY] = signals_text(evidence.agreement.signals)
         for name, value in wanted.items():
             said = tables.metadata.get(name)
             if said is not None and said != value:

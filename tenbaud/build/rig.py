@@ -124,10 +124,14 @@ def plant_context(config: FlightConfig, step_s: float, signals: Signals) -> Plan
 
 def pitch_plant(config: FlightConfig, context: PlantContext) -> PitchPlant:
     """Return the pitch axis."""
+    try:
+        (disturbance,) = context.disturbances(1) or (None,)
+    except ValueError as error:
+        raise ConfigError(f"transmitter.plant.disturbance: {error}") from error
     return PitchPlant(
         nominal_plant(config, context.command_max[0]).mismatched(config.transmitter.plant.mismatch),
         context.step_s,
-        context.disturbance,
+        disturbance,
         initial_angle_rad=context.initial_angle_rad,
         sine=context.sine,
     )
@@ -150,7 +154,8 @@ def _build_other(config: FlightConfig, plant: Plant | None, signals: Signals) ->
         return ReplayRig(read_flight_log(config), encoders)
     if plant is None:
         plant = build_plant(config, config.timing.tick_s, signals)
-    return SimulatedRig(plant, encoders, safe_command(config, signals))
+    names = [one.name for one in signals.outputs]
+    return SimulatedRig(plant, encoders, safe_command(config, signals), names)
 
 
 def build_axes(config: FlightConfig, signals: Signals | None = None) -> tuple[Axis, ...]:
@@ -161,6 +166,11 @@ def build_axes(config: FlightConfig, signals: Signals | None = None) -> tuple[Ax
     names = bridge.axes
     if names is None:
         names = THREE_AXES if outputs.keys() <= sections.keys() else tuple(outputs)
+    unused = [name for name in bridge.by_name if name not in names]
+    if bridge.axes is None:
+        unused += [name for name, own in sections.items() if name not in names and own != type(own)()]
+    if unused:
+        raise ConfigError(f"transmitter.bridge.{unused[0]}: the wired axes are {', '.join(names)}")
     sections = {name: AxisSection(channel=at) for at, name in enumerate(names)} | sections
     sections |= bridge.by_name
     if config.transmitter.rig == "serial" and config.transmitter.serial.format == "qsb":

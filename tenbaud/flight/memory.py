@@ -131,7 +131,9 @@ class MemoryFlight:
         timeout_ticks = watchdog_ticks(None, terms, trip) - (-delay_ns // terms.tick_ns)
         return TransmitterNode(
             self.transmitter,
-            SimulatedRig(self.plant, encoders, safe_command),
+            SimulatedRig(
+                self.plant, encoders, safe_command, [one.name for one in terms.signals.outputs]
+            ),
             Guard(terms.limits, GuardSettings(timeout_ticks, RAMP_TICKS, safe_command)),
             Scores(
                 self.codec.model,

@@ -23,6 +23,8 @@ except ImportError:  # not a system with POSIX locks
     fcntl = None  # type: ignore[assignment]
 
 QUIET_S = 3.0
+"""Where there are no locks, a recording that grew within this time counts as in use: a recorder writes
+at least once a second while its flight goes on."""
 
 
 def hold(handle: int) -> bool:

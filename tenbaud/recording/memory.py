@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from typing import Any
 
 from channel.protocol.recording import NullRecorder, RecordChannel, Recorder
@@ -11,20 +11,25 @@ Row = dict[str, Any]
 
 
 class MemoryRecorder:
-    """Keeps every row, by topic, and hands each on to the recorder `also`, if there is one."""
+    """Keeps every row, by topic, and hands each on to the recorder `also`, if there is one.
 
-    def __init__(self, also: Recorder | None = None) -> None:
+    With `topics` it keeps the rows of these alone.
+    """
+
+    def __init__(self, also: Recorder | None = None, topics: Container[str] | None = None) -> None:
         self._also = also or NullRecorder()
+        self._topics = topics
         self._names: dict[str, list[str]] = {}
         self._rows: dict[str, list[Sequence[Any]]] = {}
 
     def write(self, channel: RecordChannel, time_ns: int, row: Sequence[object]) -> None:
         """Keep one row, its values in the order of `channel.fields`."""
-        rows = self._rows.get(channel.topic)
-        if rows is None:
-            rows = self._rows[channel.topic] = []
-            self._names[channel.topic] = [field.name for field in channel.fields]
-        rows.append(row)
+        if self._topics is None or channel.topic in self._topics:
+            rows = self._rows.get(channel.topic)
+            if rows is None:
+                rows = self._rows[channel.topic] = []
+                self._names[channel.topic] = [field.name for field in channel.fields]
+            rows.append(row)
         self._also.write(channel, time_ns, row)
 
     @property

@@ -2,7 +2,8 @@
 
 Up to wire version 1 an event was kind, sample and a sentence. The fields of today are filled from it,
 and the sentence stays, as `text`, for people. Fields of ticks and epochs had units in their
-names, and there was one set-point. A sample did not say what its symbols were about.
+names, and there was one set-point. A sample did not say what its symbols were about. Outputs that are
+states had numbers for names and no unit, and signals no picture and no sums of states.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from dataclasses import replace
 from typing import Any
 
 from channel.codec.models.pitch import PITCH_SIGNALS
+from channel.codec.signals import Signal, Signals
 from channel.protocol.events import EVENT_CHANNEL
 from channel.protocol.recording import Field, RecordChannel
 
@@ -24,8 +26,10 @@ NEW_NAMES = {
     "reference_rad": "reference",
     "command_volts": "command",
     "hold_volts": "hold",
+    "strength_rad2_per_s3": "density",
 }
-"""Field of a tick or an epoch -> its name today."""
+"""Field of a tick, an epoch or the gauge -> its name today."""
+RENAMED_TOPICS = ("tick", "epoch", "gap")
 
 SIGNALS_WITHOUT = PITCH_SIGNALS
 """Of a recording that does not describe its signals: all flights were of the pitch."""
@@ -54,7 +58,7 @@ def of_today(channel: RecordChannel) -> RecordChannel:
         return _FILLED
     if channel.topic == "sample" and _lacks_about([one.name for one in channel.fields]):
         return RecordChannel("sample", (*channel.fields, Field("about", "integers")))
-    if channel.topic not in ("tick", "epoch"):
+    if channel.topic not in RENAMED_TOPICS:
         return channel
     return RecordChannel(channel.topic, tuple(_field_of_today(one) for one in channel.fields))
 
@@ -83,9 +87,29 @@ def rows_of_today(topic: str, rows: list[dict[str, Any]]) -> list[dict[str, Any]
         return [_filled(row) for row in rows]
     if topic == "sample" and rows and _lacks_about(rows[0]):
         return [{**row, "about": None} for row in rows]
-    if topic in ("tick", "epoch") and rows and not NEW_NAMES.keys().isdisjoint(rows[0]):
+    if topic in RENAMED_TOPICS and rows and not NEW_NAMES.keys().isdisjoint(rows[0]):
         return [_renamed(row) for row in rows]
     return rows
+
+
+def is_same_plant(recorded: Signals, today: Signals) -> bool:
+    """Return whether recorded signals are these, as far as the version that wrote them could say."""
+    if len(recorded.outputs) != len(today.outputs):
+        return False
+    outputs = zip(recorded.outputs, today.outputs, strict=True)
+    states = zip(recorded.output_states, today.output_states, strict=True)
+    return (
+        (recorded.states, recorded.inputs) == (today.states, today.inputs)
+        and recorded.picture in ("", today.picture)
+        and recorded.output_rows in ((), today.output_rows)
+        and all(then in (None, now) for then, now in states)
+        and all(_is_same_output(at, then, now) for at, (then, now) in enumerate(outputs, 1))
+    )
+
+
+def _is_same_output(number: int, then: Signal, now: Signal) -> bool:
+    name = now.name if then.name == f"output_{number}" else then.name
+    return replace(then, name=name, unit=then.unit or now.unit) == now
 
 
 def _renamed(row: dict[str, Any]) -> dict[str, Any]:

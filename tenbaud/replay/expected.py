@@ -60,7 +60,8 @@ def _add(agreement: Agreement, copies: Copies, one: Reflown, expected: Expected)
     digest = int(one.digest, 16)
     commands = [command for _, _, _, command in one.ticks]
     rows = MemoryRecorder()
-    write_sample(rows, agreement.terms, agreement.codec, copies.confirm(one.word, commands, digest))
+    done = copies.explained(copies.confirm(one.word, commands, digest))
+    write_sample(rows, agreement.terms, agreement.codec, done)
     for topic, found in (("sample", expected.samples), ("estimate", expected.estimates)):
         for row in rows.taken(topic):
             found[row[0]] = KINDS["transmitter"][topic].record._make(row)

@@ -66,7 +66,7 @@ def _refly_epoch(
 ) -> Iterator[Reflown]:
     terms = replace(agreement.terms, initial_command=epoch.hold)
     codec = _Starting(agreement.codec, epoch.start)
-    rows = MemoryRecorder()
+    rows = MemoryRecorder(topics=("sample", "tick"))
     session = ReceiverSession(codec, terms, controller, agreement.identity, 1, rows)
     identity = agreement.identity
     hello = Hello(1, identity.version, identity.config_digest, identity.numerics_probe)

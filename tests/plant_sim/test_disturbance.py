@@ -115,6 +115,8 @@ def test_parser_builds_what_the_text_says() -> None:
         ("step=1@2..", "'step=1@2..'", "END is ''"),
         ("step=1@2..1", "'step=1@2..1'", "above start_s = 2.0"),
         ("step=1@-2", "'step=1@-2'", "at least 0"),
+        ("q=1e-3:abc", "'q=1e-3:abc'", "q is 'abc', not a number"),
+        ("step=1:@0", "'step=1:@0'", "TORQUE is '', not a number"),
     ],
 )
 def test_parser_names_the_bad_piece_and_the_grammar(text: str, piece: str, fault: str) -> None:

@@ -183,5 +183,12 @@ def test_unpacked_files_go_with_the_plant(fmu: Path, monkeypatch: pytest.MonkeyP
     plant = FmuPlant(PlantContext(TICK_S, 0, (10.0,), 0.0, None, (), **names), str(fmu))
     plant.advance((1.0,))
     assert plant.measured != (0.01,)
+    freed, free = [], plant._fmu.freeInstance
+
+    def refuse() -> None:
+        raise RuntimeError("after a step that was refused")
+
+    monkeypatch.setattr(plant._fmu, "terminate", refuse)
+    monkeypatch.setattr(plant._fmu, "freeInstance", lambda: freed.append(free()))
     del plant
-    assert len(removed) == 1
+    assert len(removed) == len(freed) == 1

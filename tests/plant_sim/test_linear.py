@@ -94,10 +94,34 @@ def test_when_options_give_matrices_then_they_are_the_plant() -> None:
     assert own.state == other.state
     with pytest.raises(ValueError, match="no matrices; give A, B and C"):
         plant({})
-    with pytest.raises(ValueError, match="B must be 2 x 1 finite numbers"):
-        plant(options={"B": [[1.0]]})
-    with pytest.raises(ValueError, match="start must be 1 x 2"):
-        plant(options={"start": [1.0]})
+
+
+DISCRETE = {"F": ((1.0, 0.02), (0.0, 1.0)), "E": ((0.0,), (0.02,)), "C": MODEL["C"]}
+
+
+@pytest.mark.parametrize(
+    ("model", "options", "text"),
+    [
+        (MODEL, {"B": [[1.0]]}, "B must be 2 x 1 finite numbers"),
+        (MODEL, {"B": [[1.0, 0.0], [0.0, 1.0]]}, "B must be 2 x 1 finite numbers"),
+        (MODEL, {"A": [[1.0], [0.0, 1.0]]}, "A must be rows of numbers, all of one length"),
+        (MODEL, {"start": [1.0]}, "start must be 1 x 2"),
+        (MODEL, {"C": [[1.0, 0.0], [0.0, 1.0]]}, "C must be 1 x 2 finite numbers"),
+        (DISCRETE, {"B": MODEL["B"]}, "model has no A and B; give both, or neither"),
+        (DISCRETE, {"A": MODEL["A"]}, "model has no A and B; give both, or neither"),
+        ({}, {"C": MODEL["C"]}, "no matrices; give A, B and C"),
+        (
+            MODEL | {"operating_state": (0.4, 0.0)},
+            {"A": [[-1.0]], "B": [[1.0]], "C": [[1.0]]},
+            "operating_state must be 1 x 1 finite numbers",
+        ),
+    ],
+)
+def test_when_options_do_not_fit_the_model_then_they_are_refused(
+    model: dict[str, Any], options: dict[str, Any], text: str
+) -> None:
+    with pytest.raises(ValueError, match=text):
+        plant(model, options=options, outputs=("angle",))
 
 
 def test_when_several_places_are_disturbed_then_each_has_a_torque_of_its_own() -> None:

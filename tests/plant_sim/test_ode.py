@@ -169,6 +169,7 @@ def test_when_friction_holds_a_servo_then_it_is_slower() -> None:
         (ServoPlant, {"time_constant_s": 0.0}, "time_constant_s is 0.0; it must be above 0"),
         (FurutaPlant, {"friction": -1.0}, "friction is -1.0; it must be finite and at least 0"),
         (HelicopterPlant, {"motor_lag_s": math.inf}, "motor_lag_s is inf"),
+        (ServoPlant, {"winding_lag_s": -1.0}, "winding_lag_s is -1.0"),
     ],
 )
 def test_when_an_option_makes_no_plant_then_it_is_refused(

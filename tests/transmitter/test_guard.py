@@ -71,13 +71,23 @@ def test_when_no_command_is_owed_then_the_last_one_is_held_and_does_not_age() ->
     one = guard()
     one.apply(0, (1.0, 1.0))
     for tick in range(1, 50):
-        assert one.apply(tick, None, owed=False) == (1.0, 1.0)
+        assert one.apply(tick, None, owed_ticks=0) == (1.0, 1.0)
     assert one.state is GuardState.HOLDING
     for tick in range(50, 53):
         assert one.apply(tick, None) == (1.0, 1.0)
     one.apply(53, None)
     assert one.state is GuardState.RAMPING
     assert one.reason == GuardReason(GuardCause.TIMED_OUT, 53, number=4)
+
+
+def test_when_the_loop_stalls_until_commands_are_owed_then_only_owed_ticks_are_missed() -> None:
+    one = guard()
+    one.apply(0, (1.0, 1.0))
+    one.apply(1, None, owed_ticks=0)
+    for owed_ticks in (2, 3):
+        assert one.apply(58 + owed_ticks, None, owed_ticks) == (1.0, 1.0)
+    one.apply(62, None, owed_ticks=4)
+    assert one.reason == GuardReason(GuardCause.TIMED_OUT, 62, number=4)
 
 
 def test_when_it_ramps_or_is_latched_then_no_command_passes_any_more() -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 from channel.codec.codec import Vector
 from channel.flight_log import FlightLog
 from plant_sim.encoder import OutputReader, angles_rad
@@ -14,8 +17,16 @@ class SimulatedRig(Rig):
 
     name = "simulated"
 
-    def __init__(self, plant: Plant, encoders: tuple[OutputReader, ...], safe_command: Vector) -> None:
+    def __init__(
+        self,
+        plant: Plant,
+        encoders: tuple[OutputReader, ...],
+        safe_command: Vector,
+        outputs: Sequence[str] = (),
+    ) -> None:
+        """`outputs` are their names, for what is said of them."""
         self._plant = plant
+        self._names = outputs
         self._encoders = encoders
         self._encoder = encoders[0] if len(encoders) == 1 else None
         self._safe_command = safe_command
@@ -33,6 +44,12 @@ class SimulatedRig(Rig):
                 ) from error
             self._tick += 1
         true = self._plant.measured
+        for place, value in enumerate(true):
+            if not math.isfinite(value):
+                name = self._names[place] if place < len(self._names) else place + 1
+                raise RigError(
+                    f"the simulated plant's output {name} is {value} at tick {tick}; it must be finite"
+                )
         if len(true) == 1 and self._encoder is not None:
             count, value = self._encoder.read(true[0])
             return Reading((count,), (value,), true)

@@ -45,8 +45,8 @@ class Confirmed(NamedTuple):
     """of the receiver's"""
     lag_samples: int
     """samples that had been sent beyond this one when its echo came"""
-    about: tuple[int, ...] | None
-    """the output that each symbol was about; None for an erased word"""
+    about: tuple[int, ...] | None = None
+    """the output that each symbol was about, once `Copies.explained` has said so"""
 
 
 class Copies:
@@ -126,10 +126,11 @@ class Copies:
         self.confirmed = flown.state
         self._keep_provisional(word, taken)
         digest = self.codec.digest(flown.state)
-        about = self.codec.about(before, word, flown.coded[0])
-        return Confirmed(
-            before.sample, before, sent, word, flown, live, digest, peer_digest, lag, about
-        )
+        return Confirmed(before.sample, before, sent, word, flown, live, digest, peer_digest, lag)
+
+    def explained(self, done: Confirmed) -> Confirmed:
+        """Return a confirmed sample with what its symbols were about, on which no state depends."""
+        return done._replace(about=self.codec.about(done.before, done.word, done.flown.coded[0]))
 
     def _keep_provisional(self, word: Word, taken: list[Vector]) -> None:
         """Start the provisional copy anew unless all that it assumed still stands."""
@@ -194,8 +195,8 @@ class EchoOrder:
         self._end_sample = sample
 
     def is_lost(self, expected: int, tick: int) -> bool:
-        """Return whether the echo of this sample can no longer come."""
-        return self._missing == expected and tick >= self._until_tick
+        """Return whether the echo of this sample, which was flown, can no longer come."""
+        return self._missing == expected < self._end_sample and tick >= self._until_tick
 
     def clear(self) -> None:
         """Forget everything: a new epoch begins."""

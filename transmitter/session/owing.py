@@ -30,9 +30,9 @@ class Owing:
         self._pauses = 0
         """in a row, without a command between them"""
 
-    def is_owed(self, tick: int) -> bool:
-        """Return whether a tick should have a command by now."""
-        return tick >= self._since_tick
+    def owed_ticks(self, tick: int) -> int:
+        """Return for how many ticks, up to this one, commands are owed; 0: none is yet."""
+        return max(0, tick - self._since_tick + 1)
 
     def on_confirmed(self) -> None:
         """Note that commands have come."""

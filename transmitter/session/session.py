@@ -192,7 +192,7 @@ class TransmitterSession:
 
     def take_confirmed(self) -> list[Confirmed]:
         """Write down and return what was confirmed since the last call; the next symbol goes first."""
-        taken = list(self.confirmed)
+        taken = [self.copies.explained(done) for done in self.confirmed]
         self.confirmed.clear()
         for done in taken:
             write_sample(self._recorder, self.terms, self.codec, done)

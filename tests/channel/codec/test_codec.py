@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import random
 import struct
+from typing import Any
 
 import pytest
 
@@ -53,6 +54,17 @@ def last_bit_flipped(value: float) -> float:
 
 def replaced(values: Vector, index: int, value: float) -> Vector:
     return (*values[:index], value, *values[index + 1 :])
+
+
+@pytest.mark.parametrize("found", [(2,), (-1,), (0, 0), None, ("x",)])
+def test_when_a_coder_does_not_say_what_a_word_is_about_then_nobody_says(found: Any) -> None:
+    class Told(ZoomCoder):
+        def about(self, *_given: object) -> Any:
+            return found
+
+    codec = Codec(pitch_codec().model, Told(PAPER), 10)
+    state = codec.initial()
+    assert codec.about(state, (1,), state.model) is None
 
 
 @every_codec

@@ -16,14 +16,14 @@ Edit = Callable[[Row], list[Row]]
 """A row as it was -> the rows that take its place: none, one or several."""
 
 
-def doctored(run: Path, folder: Path, end: str, topic: str, edit: Edit) -> Path:
-    """Return a copy of a run in which one topic of one end was edited row by row."""
+def doctored(run: Path, folder: Path, end: str, topic: str, edit: Edit, **head: str) -> Path:
+    """Return a copy of a run in which one topic of one end, and its head, were edited."""
     shutil.copytree(run, folder)
     path = folder / f"{end}.mcap"
     stream = MessageStream(path)
     messages = list(stream)
     path.unlink()
-    with McapRecorder(path, stream.metadata[RUN_METADATA], wait_when_full=True) as recorder:
+    with McapRecorder(path, {**stream.metadata[RUN_METADATA], **head}, wait_when_full=True) as recorder:
         for name, time_ns, row in messages:
             channel = stream.channels[name]
             for kept in edit(row) if name == topic else [row]:

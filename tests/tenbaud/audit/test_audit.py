@@ -76,6 +76,28 @@ def test_words_of_many_symbols_and_other_coders_pass(
     assert result.passed, result.leaks + result.gaps
 
 
+def test_a_recording_of_before_passes(tmp_path: Path) -> None:
+    run = flown(tmp_path / "run", "servo-10baud", duration_s=4.0)
+    signals = json.loads(run.metadata["signals"])
+    assert signals.pop("picture") == "dial"
+    signals["outputs"] = [{"name": "output_1"}]
+
+    def of_before(row: Row) -> list[Row]:
+        about = {"about": None} if "about" in row else {}
+        return [{**row, "range": [0.5, 0.5], **about}]
+
+    path = run.path
+    for end in ("transmitter", "receiver"):
+        text = json.dumps(signals)
+        path = doctored(path, tmp_path / end, end, "sample", of_before, signals=text)
+    result = audit(path)
+    assert result.passed, result.leaks + result.gaps
+    signals["states"][1]["unit"] = "V"
+    old = ("transmitter", "sample", lambda row: [row])
+    result = audit(doctored(path, tmp_path / "other", *old, signals=json.dumps(signals)))
+    assert "transmitter: head, signals: it is another" in told(result)
+
+
 def test_a_serial_line_in_real_time_passes_too(tmp_path: Path) -> None:
     flight = ("--link", "serial", "--clock", "real", "--duration", "3", "--out", "run")
     assert run_command("demo", "--json", *flight, cwd=tmp_path).code == 0

@@ -1,16 +1,19 @@
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pytest
 import typer
 
+from plant_sim.encoder import Encoder
 from tenbaud.build.emulator import build_emulator
 from tenbaud.build.flight import agree
 from tenbaud.build.rig import build_axes, build_rig, quarc_commands, quarc_fields
 from tenbaud.cli import options
 from tenbaud.config.load import ConfigError, dump_config, load_config
 from tenbaud.design.complete import completed
+from transmitter.rigs.base import RigError
 from transmitter.rigs.quarc import QuarcBridge
 from transmitter.rigs.serial_bridge import SerialBridge
 from transmitter.rigs.simulated import DryRig, SimulatedRig
@@ -47,6 +50,42 @@ def test_setting_one_field_of_an_axis_keeps_its_others() -> None:
     assert (travel.channel, travel.counts_per_turn, travel.sign, travel.zero_counts) == (0, 8192, 1, 3)
     assert (pitch.channel, pitch.counts_per_turn, pitch.sign) == (1, 4096, -1)
     assert (elevation.channel, elevation.sign) == (2, -1)
+
+
+@pytest.mark.parametrize("rig", ["cobs:X", "hil", "quarc:h:1"])
+def test_an_output_that_is_a_state_is_wired_under_its_name(rig: str) -> None:
+    model = {"kind": "linear", "F": [[1.0, 0.01], [0.0, 1.0]], "E": [[0.0], [0.01]], "C": [[1.0, 0.0]]}
+    values = options.overrides(rig=rig) | {"model": {**model, "states": ["arm", "rate"]}}
+
+    def axes(**sections: Any) -> list[tuple[str, int, int]]:
+        values["transmitter"]["bridge"] = sections
+        found = build_axes(load_config(None, None, {**values, "coder": {"kind": "direction"}}))
+        return [(axis.name, axis.channel, axis.sign) for axis in found]
+
+    assert axes() == [("arm", 0, 1)]
+    assert axes(arm={"channel": 2, "sign": -1}) == [("arm", 2, -1)]
+    for name in ("pitch", "output_1"):
+        with pytest.raises(ConfigError, match=rf"bridge\.{name}: the wired axes are arm"):
+            axes(**{name: {"sign": -1}})
+
+
+def test_a_pitch_axis_is_disturbed_in_one_place() -> None:
+    plant = {"disturbance": "q=1e-3:2e-6"}
+    with pytest.raises(ConfigError, match="2 values, and this plant is disturbed in 1 place"):
+        build_rig(load_config(None, None, {"transmitter": {"plant": plant}}))
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_a_simulated_output_that_is_no_number_is_named_with_its_tick(value: float) -> None:
+    class Diverged:
+        measured = (0.0, value)
+
+        def advance(self, volts: tuple[float, ...]) -> None:
+            pass
+
+    rig = SimulatedRig(Diverged(), (Encoder(4096),) * 2, (0.0,), ("arm", "pole"))
+    with pytest.raises(RigError, match=rf"output pole is {value} at tick 7"):
+        rig.read(7)
 
 
 def test_a_dry_run_wraps_any_rig() -> None:

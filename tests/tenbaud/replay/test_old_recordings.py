@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from tenbaud import Run
 from tenbaud.audit.audit import audit
 from tenbaud.recording.comparison import Verdict
@@ -29,6 +31,7 @@ def test_it_opens() -> None:
     assert run.table("transmitter", "tick")["measured"].shape == (400, 1)
     assert run.table("receiver", "tick")["reference"][0].tolist() == [run.reference[5]]
     assert run.table("receiver", "tick")["command"].shape[1] == 2
+    assert run.table("transmitter", "gap")["density"][-1] == pytest.approx(0.00666499)
     assert run.config.timing.lead_ticks == 5
     assert run.summary["rejoins"] == 1
 

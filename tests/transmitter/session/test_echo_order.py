@@ -37,6 +37,8 @@ def test_when_more_frames_are_lost_than_each_repeats_then_the_echo_is_lost_at_on
     assert taken(order, 5) == [5, 6, 7]
     order.add(frame(11), 8, 110, 11)
     assert order.is_lost(8, 110)
+    order.end_before(8)
+    assert not order.is_lost(8, 110), "it was not flown"
 
 
 def test_when_frames_may_overtake_each_other_then_an_echo_is_lost_when_it_can_no_longer_come() -> None:

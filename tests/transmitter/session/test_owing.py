@@ -16,7 +16,7 @@ def owing() -> Owing:
 
 
 def first_owed(one: Owing) -> int:
-    return next(tick for tick in range(10_000) if one.is_owed(tick))
+    return next(tick for tick in range(10_000) if one.owed_ticks(tick) == 1)
 
 
 def test_when_a_flight_begins_then_the_first_decided_command_is_owed() -> None:

@@ -184,6 +184,8 @@ def test_when_the_last_samples_first_tick_was_missed_then_its_erasure_is_confirm
     assert (session.counts["digest_checks"], session.counts["erasures"]) == (2, 1)
     session.on_frame(frame(far.echo(ERASED)))
     assert session.counts["digest_checks"] == 2, "that one was not flown"
+    assert session.on_frame(frame(far.echo(ERASED))) == [], "nor was this one, so none is lost"
+    assert session.counts["out_of_bounds"] == 0
     assert session.counts["desyncs"] == 0
 
 

@@ -168,9 +168,6 @@ class EmulatedDevice:
         self._boot_ns = now_ns
 
 
-NS = 1_000_000_000
-
-
 class RigEmulator:
     """One device on one line; see `run`."""
 

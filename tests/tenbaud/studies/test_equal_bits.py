@@ -27,7 +27,7 @@ from tenbaud.flight import transmit
 from tenbaud.studies import compiled as compiling
 from tenbaud.studies.chunk import fly_point
 from tenbaud.studies.compiled import compiled
-from tenbaud.studies.flights import CompiledPoint, compiled_flight
+from tenbaud.studies.flights import CompiledPoint
 from tenbaud.studies.plain import fly_plain
 from tenbaud.studies.schedule import Uncommon
 from tenbaud.studies.settings import StudyError, put
@@ -113,7 +113,7 @@ def digests_of(config: FlightConfig) -> list[str]:
 @pytest.fixture
 def uncached(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], None]]:
     """Return what makes everything compile anew."""
-    remembered = (compiling.compiled, compiling.reader)
+    remembered = (compiling.compiled, compiling.reader, compiling.whole_of, compiling.states_read)
 
     def forget() -> None:
         monkeypatch.setattr(compiling, "_cache_folder", lambda: None)
@@ -130,11 +130,11 @@ def uncached(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], None]]:
 def test_when_the_machine_code_is_read_then_nothing_is_fused(uncached: Callable[[], None]) -> None:
     point = CompiledPoint(config_of("paper-10baud", CLEAN))
     point.fly(1)
-    if compiled_flight(point.agreement.codec).stats.cache_hits:
+    if point._flight.stats.cache_hits:
         uncached()  # numba does not show machine code that it has read from a file
         point = CompiledPoint(config_of("paper-10baud", CLEAN))
         point.fly(1)
-    code = "\n".join(compiled_flight(point.agreement.codec).inspect_asm().values())
+    code = "\n".join(point._flight.inspect_asm().values())
     assert re.search(r"\bv?mul[sp]d\b", code), "this is not the machine code of the flight"
     assert re.search(r"\bv?f(n)?m(add|sub)", code) is None
 
@@ -158,9 +158,16 @@ def test_when_a_flight_is_compiled_then_no_bit_differs(preset: str, changes: dic
     compare(point)
 
 
+COMPILED_LONG = (
+    *("integrator-10baud", "heading-1baud", "servo-10baud", "aero-20baud"),
+    *("helicopter-10baud", "furuta-50baud"),
+)
+"""Few samples each, but machine code of its own for every number of states, inputs and outputs."""
+
+
 @pytest.mark.soak
-@pytest.mark.parametrize("preset", ["helicopter-10baud", "furuta-50baud"])
-def test_when_a_plant_of_several_axes_is_compiled_then_no_bit_differs(preset: str) -> None:
+@pytest.mark.parametrize("preset", COMPILED_LONG)
+def test_when_any_other_plant_is_compiled_then_no_bit_differs(preset: str) -> None:
     compare(CompiledPoint(config_of(preset, CLEAN)))
 
 

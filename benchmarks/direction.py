@@ -165,7 +165,7 @@ def behind_encoders(plant: LinearPlant, rate: float, coder: DirectionCoder) -> R
     _, noise = van_loan(plant.A, plant.noise, tick_s)
     predicts = LinearModel(F.tolist(), E.tolist(), plant.C.tolist(), tick_s)
     observer = kalman_observer(predicts, noise, np.array([STEP]))
-    states = plant.cost + 1e-6 * np.trace(plant.cost) * np.eye(len(F))
+    states = model.cost + 1e-6 * np.trace(model.cost) * np.eye(len(F))
     inputs = 1e-2 * np.eye(E.shape[1])
     X = solve_discrete_are(F, E, states, inputs)
     law = np.linalg.solve(inputs + E.T @ X @ E, E.T @ X @ F)

@@ -20,7 +20,8 @@ class FunctionPlant:
     """A `Plant` that does not change with time, from its `start` under `command`.
 
     `substeps` of Runge and Kutta (fourth order) make a step; 0: `dynamics` returns the state after it.
-    The disturbance acts like the commands, or through `noise`, a column for each place.
+    The disturbance acts like the commands, or through `noise`, a column for each place. ValueError for
+    a mismatch: functions have no constants to be changed.
     """
 
     def __init__(
@@ -33,6 +34,11 @@ class FunctionPlant:
         substeps: int,
         noise: NDArray[np.float64] | None = None,
     ) -> None:
+        if np.any(context.mismatch):
+            raise ValueError(
+                "transmitter.plant.mismatch is for plants with constants, and this one is a function; "
+                "change its own parameters"
+            )
         self._dynamics = dynamics
         self._output = output
         self._noise = noise

@@ -18,6 +18,7 @@ With `b` bits at a time, one word per period T, the error is the mean over the p
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.linalg import solve_continuous_are
@@ -97,14 +98,30 @@ def _paid(model: LinearModel, rate_bit_s: float, erased: float) -> float:
     return rate_bit_s * (1.0 - erased)
 
 
-def require_rate(dynamics: Matrix, rate_bit_s: float, erased: float = 0.0, advice: str = "") -> float:
-    """Return the smallest rate of a plant; RateTooLow, with both numbers, for one that is not above."""
+def require_rate(
+    dynamics: Matrix,
+    rate_bit_s: float,
+    erased: float = 0.0,
+    *,
+    states: Sequence[str] = (),
+    advice: str = "",
+) -> float:
+    """Return the smallest rate of a plant; RateTooLow, with both numbers, for one that is not above.
+
+    With the names of the `states` its text says which of them grows fastest; `advice` ends it.
+    """
     needed = rate_needed(dynamics)
     if not rate_bit_s * (1.0 - erased) > needed:
         lost = f", of which {100.0 * erased:g} % are lost," if erased else ""
+        fastest = ""
+        if states:
+            values, vectors = np.linalg.eig(dynamics)
+            place = int(np.argmax(values.real))
+            name = states[int(np.argmax(np.abs(vectors[:, place])))]
+            fastest = f", {name} fastest by {values[place].real:.4g} 1/s"
         raise RateTooLow(
-            f"{rate_bit_s:.4g} bit/s{lost} are too few: this plant grows by itself, and the data-rate "
-            f"theorem asks for more than {needed / (1.0 - erased):.4g} bit/s{advice}"
+            f"{rate_bit_s:.4g} bit/s{lost} are too few: this plant grows by itself{fastest}, and the "
+            f"data-rate theorem asks for more than {needed / (1.0 - erased):.4g} bit/s{advice}"
         )
     return needed
 

@@ -77,8 +77,14 @@ def reached(
 ) -> tuple[LinearModel, Matrix]:
     """Return the part of a plant that the noise reaches, and its basis: x = basis z.
 
-    The rest is known to both ends from the commands. ValueError where the outputs do not show it all.
+    The rest is known to both ends from the commands. ValueError where the outputs do not show it all,
+    or the noise reaches nothing.
     """
+    if not np.any(noise):
+        raise ValueError(
+            "no disturbance reaches the plant (its densities, or G, are all 0), so both ends know all "
+            "of it from the commands: no rate is needed, and no error is the least"
+        )
     powers = _powers(dynamics, noise)
     left, sizes, _ = np.linalg.svd(powers)
     rank = int(np.count_nonzero(sizes > RANK_TOLERANCE * max(1.0, float(sizes[0]))))

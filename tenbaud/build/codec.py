@@ -5,6 +5,7 @@ from __future__ import annotations
 from channel.codec.codec import Codec, Coder, CoderContext, Model, ModelContext
 from channel.codec.coders.pcm import PcmCoder
 from channel.codec.models.hold import HoldModel
+from channel.line.uplink import bit_rate
 from tenbaud.build.parts import Parts, check_codec
 from tenbaud.build.plugins import build_plugin
 from tenbaud.config.kinds import CODERS, MODELS, kind_of, model_kind
@@ -15,16 +16,7 @@ from tenbaud.config.section import OutsideSection
 def build_codec(config: FlightConfig, parts: Parts | None = None) -> Codec:
     """Return the codec of a configuration; ValueError where its parts do not fit each other."""
     parts = parts or Parts()
-    ticks = round(config.timing.symbol_period_s / config.timing.tick_s)
-    model = build_model(config, parts)
-    coder = parts.coder or _build_coder(config, model)
-    needs_hold = isinstance(coder, PcmCoder)
-    if needs_hold != isinstance(model, HoldModel):
-        raise ValueError(
-            f"coder.kind = {config.coder.kind!r} and model.kind = {config.model.kind!r} do not go "
-            "together: the coder 'pcm' sets angle and rate of the model 'hold', and no other"
-        )
-    codec = Codec(model, coder, ticks)
+    codec = unchecked_codec(config, parts)
     kind = model_kind(config.model)
     if parts.model is None and kind and kind.linear and kind.may_grow(config.model):
         from tenbaud.design.described import check_plant
@@ -34,6 +26,29 @@ def build_codec(config: FlightConfig, parts: Parts | None = None) -> Codec:
         where = f"model.kind = {config.model.kind!r} with coder.kind = {config.coder.kind!r}"
         check_codec(where, codec)
     return codec
+
+
+def unchecked_codec(config: FlightConfig, parts: Parts | None = None) -> Codec:
+    """Return the codec; whether its rate is enough for its plant nobody has looked yet."""
+    parts = parts or Parts()
+    ticks = round(config.timing.symbol_period_s / config.timing.tick_s)
+    model = build_model(config, parts)
+    coder = parts.coder or _build_coder(config, model)
+    needs_hold = isinstance(coder, PcmCoder)
+    if needs_hold != isinstance(model, HoldModel):
+        raise ValueError(
+            f"coder.kind = {config.coder.kind!r} and model.kind = {config.model.kind!r} do not go "
+            "together: the coder 'pcm' sets angle and rate of the model 'hold', and no other"
+        )
+    return Codec(model, coder, ticks)
+
+
+def configured_rate(config: FlightConfig) -> float:
+    """Return the bit/s of a configuration's words, be they enough for its plant or not."""
+    if isinstance(config.coder, OutsideSection):
+        return bit_rate(unchecked_codec(config), config.timing.tick_s)
+    # Without a codec: a linear model and its coder may not have been designed yet.
+    return float(getattr(config.coder, "bits", 1)) / config.timing.symbol_period_s
 
 
 def build_model(config: FlightConfig, parts: Parts | None = None) -> Model:

@@ -7,11 +7,13 @@ from typing import Literal
 
 from plant_sim.encoder import Encoder
 from tenbaud.build.flight import read_flight_log
-from tenbaud.build.rig import build_axes, build_plant, quarc_commands, quarc_fields
+from tenbaud.build.rig import build_axes, build_plant, quarc_commands, quarc_fields, wired_outputs
 from tenbaud.build.signals import configured_signals
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
+from transmitter.rigs.axes import Axis
 from transmitter.rigs.emulator.device import (
+    PITCH_CHANNEL,
     Body,
     EmulatedDevice,
     RecordedBody,
@@ -58,28 +60,40 @@ def build_emulator(
     rate = DEFAULT_RATES[form] if samples_per_s is None else samples_per_s
     if not 1.0 <= rate <= 5000.0:
         raise ConfigError(f"{rate:g} samples/s: from 1 to 5000")
+    axis = _axis(config, form)
     try:
         device = EmulatedDevice(
-            _body(config), time.monotonic_ns(), watchdog_s, Faults(faults, config.seed)
+            _body(config, axis), time.monotonic_ns(), watchdog_s, Faults(faults, config.seed)
         )
         line = parse_line(port, config.transmitter.serial.line_baud)
-        speech = _speech(config, form, line_form, polled)
+        speech = _speech(config, form, line_form, polled, axis)
     except ValueError as error:
         raise ConfigError(str(error)) from error
     return RigEmulator(device, speech, line, rate)
 
 
-def _body(config: FlightConfig) -> Body:
-    section = config.transmitter
-    if section.rig == "replay":
+def _axis(config: FlightConfig, form: EmulatedFormat) -> Axis:
+    """Return the encoder of the one output, whatever it is called."""
+    (name,) = wired_outputs(configured_signals(config))
+    axis = next(one for one in build_axes(config) if one.name == name)
+    if form != "qsb" and axis.channel != PITCH_CHANNEL:
+        raise ConfigError(
+            f"the rig emulator turns the encoder at channel {PITCH_CHANNEL}, and that of the output "
+            f"{name} is at {axis.channel}: set transmitter.bridge.{name}.channel = {PITCH_CHANNEL}"
+        )
+    return axis
+
+
+def _body(config: FlightConfig, axis: Axis) -> Body:
+    if config.transmitter.rig == "replay":
         return RecordedBody(read_flight_log(config), round(config.timing.tick_s * 1e9))
-    pitch = section.bridge.pitch
-    zero = 0 if pitch.zero_counts == "first" else pitch.zero_counts
-    encoder = Encoder(pitch.counts_per_turn, pitch.sign, zero)
+    encoder = Encoder(axis.counts_per_turn, axis.sign, axis.zero_counts or 0, axis.turn)
     return SimulatedBody(build_plant(config, STEP_S), round(STEP_S * 1e9), encoder)
 
 
-def _speech(config: FlightConfig, form: EmulatedFormat, line_form: str, polled: bool) -> Speech:
+def _speech(
+    config: FlightConfig, form: EmulatedFormat, line_form: str, polled: bool, axis: Axis
+) -> Speech:
     match form:
         case "cobs":
             return CobsSpeech()
@@ -88,10 +102,9 @@ def _speech(config: FlightConfig, form: EmulatedFormat, line_form: str, polled: 
         case "qsb":
             return QsbSpeech()
     section = config.transmitter.quarc
-    pitch = next(axis for axis in build_axes(config) if axis.name == "pitch")
     return DoublesSpeech(
         quarc_fields(config),
         quarc_commands(config),
         section.byte_order,
-        scale_of(section.unit, int(pitch.counts_per_turn)),
+        scale_of(section.unit, int(axis.counts_per_turn)),
     )

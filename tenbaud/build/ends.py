@@ -16,7 +16,6 @@ from channel.line.uplink import Uplink
 from channel.protocol.recording import Recorder
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
 from channel.protocol.wire import SymbolWire, Wire
-from plant_sim.encoder import Encoder
 from receiver.controllers.base import Controller
 from receiver.endpoint import ReceiverEndpoint, SteppedEndpoint
 from receiver.session.session import ReceiverSession
@@ -28,7 +27,7 @@ from tenbaud.build.liveness import overtaking_ticks, watchdog_ticks
 from tenbaud.build.parts import Parts
 from tenbaud.build.references import References, build_references, values_of
 from tenbaud.build.rig import build_rig
-from tenbaud.build.signals import build_encoders, configured_signals, safe_command, soft_limits
+from tenbaud.build.signals import configured_signals, encoder_steps, safe_command, soft_limits
 from tenbaud.config.kinds import CONTROLLERS
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
@@ -93,10 +92,7 @@ def build_observer(agreement: Agreement) -> StateObserver | None:
         if isinstance(codec.model, LinearModel):
             from tenbaud.design.observer import configured_observer
 
-            readers = build_encoders(config, agreement.signals)
-            steps = [
-                one.turn / one.counts_per_turn if isinstance(one, Encoder) else 0.0 for one in readers
-            ]
+            steps = encoder_steps(config, agreement.signals)
             return configured_observer(codec.model, config, steps)
         return rate_observer(codec.model, tick_s, config.transmitter.rate_observer_bandwidth_rad_s)
     except ValueError as error:
@@ -167,12 +163,12 @@ def check_parts(config: FlightConfig, parts: Parts | None = None) -> None:
     if parts.controller is None:
         controller = build_controller(config, model=parts.model)
         if config.receiver.controller not in CONTROLLERS.built_in:
-            _check_command(config, controller)
+            _check_command(config, controller, parts)
 
 
-def _check_command(config: FlightConfig, controller: Controller) -> None:
+def _check_command(config: FlightConfig, controller: Controller, parts: Parts) -> None:
     """Ask a controller from outside for its first command; ConfigError if no motor could follow it."""
-    model, name = build_codec(config).model, config.receiver.controller
+    model, name = build_codec(config, parts).model, config.receiver.controller
     try:
         volts = [float(value) for value in controller.command(0, model.initial())]
     except Exception as error:

@@ -8,10 +8,9 @@ from functools import partial
 
 from channel.codec.models.pitch import PitchModel
 from channel.line.uplink import bit_rate
-from plant_sim.encoder import Encoder
 from tenbaud.bounds.closed import double_integrator_floor, double_integrator_rate
 from tenbaud.build.flight import Agreement
-from tenbaud.build.signals import build_encoders
+from tenbaud.build.signals import encoder_steps
 from tenbaud.config.kinds import model_kind
 from transmitter.metrics.gap import GapGauge, Limit, StrengthMeter
 
@@ -27,8 +26,7 @@ def build_gauge(agreement: Agreement) -> GapGauge | None:
     """
     codec, terms = agreement.codec, agreement.terms
     tick_s = terms.tick_ns / 1e9
-    readers = build_encoders(agreement.config, agreement.signals)
-    steps = [one.turn / one.counts_per_turn if isinstance(one, Encoder) else 0.0 for one in readers]
+    steps = encoder_steps(agreement.config, agreement.signals)
     if isinstance(codec.model, PitchModel):
         limit = Limit(
             double_integrator_floor(1.0, bit_rate(codec, tick_s)),

@@ -73,6 +73,23 @@ def reference_settings(
     return section | {outputs[at].name: {"kind": "csv", "file": str(file)} for at in tables}
 
 
+def whole_sections(given: Mapping[str, Any], first: str) -> dict[str, Any]:
+    """Return given sections of `receiver.reference` so that they replace what is configured.
+
+    One with a kind has all its fields then, offset included; fields without a kind only change some.
+    `first` is the output whose set-point is the section itself, unless that is under its name.
+    """
+    usual = ReferenceSection().model_dump()
+    named = {name: one for name, one in given.items() if name not in usual}
+    if "kind" in given:
+        named = {first: {name: one for name, one in given.items() if name in usual}} | named
+    whole = {
+        name: {**usual, **one} if isinstance(one, Mapping) and "kind" in one else one
+        for name, one in named.items()
+    }
+    return whole if "kind" in given else {**given, **whole}
+
+
 def _constant(value: Any) -> dict[str, Any]:
     try:
         return {"kind": "constant", "amplitude": float(value)}

@@ -161,7 +161,7 @@ def _build_other(config: FlightConfig, plant: Plant | None, signals: Signals) ->
 def build_axes(config: FlightConfig, signals: Signals | None = None) -> tuple[Axis, ...]:
     """Return the encoders that are wired; ConfigError where an output of the model has none."""
     bridge = config.transmitter.bridge
-    outputs = _wired(signals or configured_signals(config))
+    outputs = wired_outputs(signals or configured_signals(config))
     sections: dict[str, AxisSection] = {name: getattr(bridge, name) for name in THREE_AXES}
     names = bridge.axes
     if names is None:
@@ -237,14 +237,14 @@ def serial_format(config: FlightConfig) -> SerialFormat:
     return AsciiFormat(section.columns, section.poll, section.command_style, section.pulse_full_volts)
 
 
-def _wired(signals: Signals) -> dict[str, str]:
+def wired_outputs(signals: Signals) -> dict[str, str]:
     """Return the name and unit of each output; the one of a model that names none is the pitch."""
     outputs = {one.name: one.unit or "rad" for one in signals.outputs}
     return {"pitch": "rad"} if list(outputs) == ["output_1"] else outputs
 
 
 def _measured(signals: Signals) -> tuple[str, ...]:
-    return tuple(_wired(signals))
+    return tuple(wired_outputs(signals))
 
 
 def _build_serial(config: FlightConfig, settings: DeviceSettings, signals: Signals) -> DeviceRig:
@@ -283,7 +283,7 @@ def quarc_fields(config: FlightConfig, signals: Signals | None = None) -> tuple[
                 f"transmitter.quarc.fields: {name!r} is no wired axis, c0 to c9, seq, time_s, "
                 "flags or -"
             )
-    for name in _wired(signals):
+    for name in wired_outputs(signals):
         if axes[name] not in fields:
             raise ConfigError(f"transmitter.quarc.fields: the output {name} is not among them")
     return fields

@@ -92,6 +92,12 @@ def build_encoders(config: FlightConfig, signals: Signals) -> tuple[OutputReader
     return tuple([_encoder(section.by_name.get(one.name, section), one) for one in signals.outputs])
 
 
+def encoder_steps(config: FlightConfig, signals: Signals) -> list[float]:
+    """Return the step of what reads each output, in the output's unit; 0 where it is read exactly."""
+    readers = build_encoders(config, signals)
+    return [one.turn / one.counts_per_turn if isinstance(one, Encoder) else 0.0 for one in readers]
+
+
 def _check_units(field: str, section: EncoderSection, output: Signal) -> None:
     if section.counts_per_turn is not None and output.unit not in TURNS:
         raise ConfigError(

@@ -41,36 +41,32 @@ def floor(
 
     [dim]tenbaud floor --plant pendulum --rate 20[/dim]
     """
-    from channel.codec.signals import signals_of
-    from channel.line.uplink import bit_rate
-    from tenbaud.build.codec import build_codec
+    from tenbaud.build.codec import configured_rate
     from tenbaud.config.load import load_config
-    from tenbaud.design.described import plant_of, plant_section
+    from tenbaud.design.described import linear_of, plant_of, plant_section
     from tenbaud.design.floors import floors
 
     period = None
     if plant is not None:
         section: Any = _known(plant_section, plant)
         tick_s = 0.01
-        outputs = section.signals(len((section.B or section.E)[0])).outputs
     else:
+        # Its codec is not built: that refuses a rate that is too low, which is what may be asked about.
         flown = load_config(preset, config)
         section, tick_s = flown.model, flown.timing.tick_s
-        codec = build_codec(flown)
-        outputs = signals_of(codec.model).outputs
         if rate is None:
-            period, rate = flown.timing.symbol_period_s, bit_rate(codec, tick_s)
+            period, rate = flown.timing.symbol_period_s, configured_rate(flown)
     if rate is None:
         raise typer.BadParameter("give --rate for a plant by name")
-    described = plant_of(section, tick_s)
-    if described is None:
+    linear, described = linear_of(section), _known(plant_of, section, tick_s)
+    if linear is None:
         raise typer.BadParameter(f"model.kind = {section.kind!r} has no floor: it describes no plant")
     found = _known(floors, described, rate, period)
     if json:
         options.print_json(asdict(found))
     else:
         densities = ", ".join(f"{density:g}" for density in described.densities)
-        typer.echo(_text(found, outputs, densities))
+        typer.echo(_text(found, linear.signals(described.B.shape[1]).outputs, densities))
     if found.rms is None:
         raise typer.Exit(int(ExitCode.FAILED))
 

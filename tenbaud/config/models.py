@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 from pydantic import Field, model_validator
 
@@ -11,7 +11,7 @@ from channel.codec.models.hold import HoldModel
 from channel.codec.models.linear import LinearModel
 from channel.codec.models.pendulum import PendulumModel
 from channel.codec.models.pitch import PitchModel, PitchParameters
-from channel.codec.signals import InputSignal, Signal, Signals, named
+from channel.codec.signals import PICTURES, InputSignal, Signal, Signals, named
 from tenbaud.config.kinds import Kind
 from tenbaud.config.section import Factor, KindSection, NotNegative, Positive
 
@@ -39,6 +39,10 @@ class HoldModelSection(KindSection):
 
 Matrix = tuple[tuple[Factor, ...], ...]
 Names = tuple[str, ...]
+if TYPE_CHECKING:
+    Picture: TypeAlias = str
+else:
+    Picture = Literal[("", *dict(PICTURES))]
 
 
 class LinearModelSection(KindSection):
@@ -78,7 +82,7 @@ class LinearModelSection(KindSection):
     output_units: Names = ()
     input_steps_per_unit: tuple[Positive, ...] = ()
     """a command travels in whole steps: 1000 per volt are mV; empty: 1000"""
-    picture: Literal["", "helicopter", "pendulum", "rotary pendulum", "dial"] = ""
+    picture: Picture = ""
     """what displays draw, its parts turned by the outputs in order; empty: a bar for each output"""
 
     def signals(self, inputs: int) -> Signals:
@@ -199,14 +203,15 @@ def _pendulum(section: PendulumModelSection, context: ModelContext) -> PendulumM
     return PendulumModel(context, **section.model_dump(exclude={"kind"}))
 
 
-def _angle(stiffness: float, damping: float) -> LinearModelSection:
+def _angle(name: str, stiffness: float, damping: float) -> LinearModelSection:
     """Return an angle that a torque pushes."""
     return LinearModelSection(
         A=((0.0, 1.0), (-stiffness, -damping)),
         B=((0.0,), (1.0,)),
         C=((1.0, 0.0),),
         densities=(ANGLE_DENSITY,),
-        states=("angle", "rate"),
+        states=(name, f"{name}_rate"),
+        state_units=("rad", "rad/s"),
     )
 
 
@@ -214,12 +219,12 @@ PENDULUM = Kind(
     PendulumModelSection,
     _pendulum,
     plant="pendulum",
-    linear=lambda section: _angle(-(section.growth_per_s**2), section.damping_per_s),
+    linear=lambda section: _angle("angle", -(section.growth_per_s**2), section.damping_per_s),
 )
 PITCH = Kind(
     PitchModelSection,
     _pitch,
-    linear=lambda section: _angle(section.stiffness_per_s2, section.rate_damping_per_s),
+    linear=lambda section: _angle("pitch", section.stiffness_per_s2, section.rate_damping_per_s),
     may_grow=lambda section: section.stiffness_per_s2 < 0.0,
 )
 HOLD = Kind(HoldModelSection, _hold)

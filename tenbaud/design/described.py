@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from channel.codec.codec import Codec
 from channel.line.uplink import bit_rate
 from plant_sim.zero_order_hold import continuous, discretised
-from tenbaud.bounds.floor import RateTooLow
-from tenbaud.bounds.linear import rate_needed, unreached
+from tenbaud.bounds import floor
+from tenbaud.bounds.linear import unreached
 from tenbaud.config.kinds import model_kind
 from tenbaud.config.models import LinearModelSection
 from tenbaud.config.schema import FlightConfig
@@ -71,17 +71,12 @@ def check_plant(config: FlightConfig, codec: Codec) -> None:
 
 
 def require_rate(plant: LinearPlant, rate_bit_s: float, section: KindSection) -> None:
-    """Raise RateTooLow, with rates and the state that grows fastest, where the bits are too few."""
-    needed = rate_needed(plant.A)
-    if rate_bit_s > needed:
-        return
-    values, vectors = np.linalg.eig(plant.A)
-    fastest = int(np.argmax(values.real))
-    name = state_names(section, plant)[int(np.argmax(np.abs(vectors[:, fastest])))]
-    raise RateTooLow(
-        f"{rate_bit_s:.4g} bit/s are too few: this plant grows by itself, {name} fastest by "
-        f"{values[fastest].real:.4g} 1/s, and the data-rate theorem asks for more than {needed:.4g} "
-        "bit/s; shorten timing.symbol_period_s and raise channel.rate_baud"
+    """Raise RateTooLow, with the state that grows fastest and advice, where the bits are too few."""
+    floor.require_rate(
+        plant.A,
+        rate_bit_s,
+        states=state_names(section, plant),
+        advice="; shorten timing.symbol_period_s and raise channel.rate_baud",
     )
 
 

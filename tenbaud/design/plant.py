@@ -30,11 +30,6 @@ class LinearPlant:
         """Return G diag(q) G'."""
         return self.G * self.densities @ self.G.T
 
-    @property
-    def cost(self) -> Matrix:
-        """Return C' diag(w) C."""
-        return self.C.T * self.weights @ self.C
-
     def model(self) -> LinearModel:
         """Return what the floors are of; ValueError where there is none."""
         return linear_model(self.A, self.noise, self.C, self.weights)

@@ -8,16 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from channel.codec.signals import STEPS_MAX
-from channel.protocol.limits import COMMAND_MAX
+from channel.codec.codec import Vector
+from channel.codec.signals import STEPS_MAX, InputSignal, Signals, named
+from channel.protocol.limits import COMMAND_MAX, per_input
 from plant_sim.zero_order_hold import continuous
-from tenbaud.config.load import ConfigError
+from tenbaud.config.load import OWN, ConfigError, load_config
 from tenbaud.config.models import LinearModelSection
+from tenbaud.config.schema import EncoderSection
 from tenbaud.design.systems import Matrices, Names, name_and_unit
 
 RATE_BAUD = 10.0
 TICK_S_MAX = 0.01
 """longest tick that is chosen for a continuous plant"""
+TICK_S_LIMIT = 1.0
+BITS_MAX = 15
+"""what `timing.tick_s` and `coder.bits` may be at most"""
 DISTURBED = 0.02
 """assumed disturbance of an input: rms of its mean over a symbol period, by the largest command"""
 SLEWED = 200.0
@@ -29,18 +34,23 @@ def settings_of(plant: Matrices, rate_baud: float | None, over: Mapping[str, Any
     """Return nested settings: timing, channel, model, coder, plant and controller; not designed yet.
 
     `over` are the settings that will be laid over them, as far as the others follow from these.
+    ConfigError, naming the field, for a value that cannot be used.
     """
-    rate = float(over.get("channel", {}).get("rate_baud") or rate_baud or RATE_BAUD)
+    rate = _rate(rate_baud, over)
     timing, bits = _timing(over, plant.dt, rate)
     model = _model(plant, timing["tick_s"])
     given = over.get("model", {})
-    most = over.get("limits", {}).get("command_max") or np.maximum(COMMAND_MAX, 2.0 * abs(plant.u0))
-    largest = np.broadcast_to(np.asarray(most, dtype=float), plant.u0.shape)
+    most = load_config(OWN, None, {"limits": over.get("limits", {})}).limits.command_max
+    if most is None:
+        most = tuple(np.maximum(COMMAND_MAX, 2.0 * abs(plant.u0)).tolist())
+    largest = np.array(_per_input("limits.command_max", most, model, len(plant.u0)))
     model["input_steps_per_unit"] = [10.0 ** math.floor(math.log10(STEPS_MAX / one)) for one in largest]
     if not given.keys() & {"densities", "G"}:
         assumed = (DISTURBED * largest) ** 2 * timing["symbol_period_s"]
         model["densities"] = [float(f"{one:.3g}") for one in assumed]
     densities = given.get("densities", model.get("densities", [1.0]))
+    if not isinstance(densities, list | tuple):
+        raise ConfigError(f"model.densities = {densities!r}: give a list, [{densities}]")
     rest = plant.u0.tolist()
     return {
         "timing": timing,
@@ -53,7 +63,7 @@ def settings_of(plant: Matrices, rate_baud: float | None, over: Mapping[str, Any
             "initial_command": rest,
         },
         "transmitter": {
-            "plant": {"disturbance": "q=" + ":".join(map(repr, densities))},
+            "plant": {"disturbance": "q=" + ":".join(map(str, densities))},
             "safe_command": rest,
         },
         "receiver": {
@@ -64,11 +74,37 @@ def settings_of(plant: Matrices, rate_baud: float | None, over: Mapping[str, Any
     }
 
 
-def exact_outputs(model: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the settings by which an output without a unit is read exactly: it may be no angle."""
+def _rate(rate_baud: float | None, over: Mapping[str, Any]) -> float:
+    """Return the rate that is given, as an argument or as a setting."""
+    set_rate = over.get("channel", {}).get("rate_baud")
+    rates = [one for one in (rate_baud, set_rate) if one is not None]
+    if len(rates) == 2 and rate_baud != set_rate:
+        raise ConfigError(f"rate_baud = {rate_baud} and channel.rate_baud = {set_rate}: give one rate")
+    checked = load_config(OWN, None, {"channel": {"rate_baud": rates[0] if rates else RATE_BAUD}})
+    return checked.channel.rate_baud
+
+
+def _per_input(field: str, value: float | Vector, model: Mapping[str, Any], inputs: int) -> Vector:
+    names = model.get("inputs") or [one.name for one in named("input", inputs)]
+    try:
+        return per_input(field, value, Signals((), tuple([InputSignal(name) for name in names]), ()))
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+
+
+def exact_outputs(model: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the settings by which an output without a unit is read exactly: it may be no angle.
+
+    Where the settings `over` them have an encoder, for it or for all outputs, that stays.
+    """
+    encoders = over.get("transmitter", {}).get("encoders", {})
+    if encoders.keys() & EncoderSection.model_fields.keys():
+        return {}
     section = LinearModelSection.model_validate(model)
     outputs = section.signals(len((section.B or section.E)[0])).outputs
-    exact = {one.name: {"quantised": False} for one in outputs if not one.unit}
+    exact = {
+        one.name: {"quantised": False} for one in outputs if not one.unit and one.name not in encoders
+    }
     return {"transmitter": {"encoders": exact}}
 
 
@@ -105,13 +141,17 @@ def _timing(over: Mapping[str, Any], dt: float, rate: float) -> tuple[dict[str, 
     """Return tick and symbol period, and the bits of a word: several where a discrete plant is slow."""
     given = over.get("timing", {})
     tick_s, period_s = given.get("tick_s"), given.get("symbol_period_s")
-    bits = over.get("coder", {}).get("bits") or max(1, math.floor(rate * dt + WHOLE))
+    bits = over.get("coder", {}).get("bits") or min(max(1, math.floor(rate * dt + WHOLE)), BITS_MAX)
+    for name, value in (("timing.tick_s", tick_s), ("timing.symbol_period_s", period_s)):
+        if value is not None and not 0.0 < value < math.inf:
+            raise ConfigError(f"{name} = {value}: it must be above 0 and finite")
     least_s = bits / rate
     if tick_s is None:
         span_s = period_s or least_s
         # Whole nanoseconds, rounded up: the line carries no more than its rate.
         ticks = math.ceil(span_s / TICK_S_MAX - WHOLE)
-        tick_s = dt or math.ceil(span_s / ticks * 1e9 - WHOLE) / 1e9
+        steps = math.ceil(dt / TICK_S_LIMIT - WHOLE)
+        tick_s = dt / steps if dt else math.ceil(span_s / ticks * 1e9 - WHOLE) / 1e9
     if period_s is None:
         period_s = round(tick_s * max(1, math.ceil(least_s / tick_s - WHOLE)), 9)
     return {"tick_s": tick_s, "symbol_period_s": period_s}, bits

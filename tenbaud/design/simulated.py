@@ -10,7 +10,9 @@ import numpy as np
 from plant_sim.dynamics import FunctionPlant
 from plant_sim.linear import SimulatedLinear
 from plant_sim.plant import Plant, PlantContext
-from tenbaud.design.systems import matrices
+from plant_sim.zero_order_hold import continuous
+from tenbaud.config.load import ConfigError
+from tenbaud.design.systems import Matrices, matrices
 
 SUBSTEP = 0.2
 """longest step of an integration, in time constants of the fastest motion"""
@@ -20,15 +22,32 @@ SUBSTEPS_MAX = 100
 def system_plant(system: Any, context: PlantContext) -> Plant:
     """Return a plant that starts where the codec's model does, or from the configured outputs.
 
-    ConfigError for a system that is no plant of autonomous states.
+    ConfigError for a system that is no plant of autonomous states, or not in ticks of the flight.
     """
+    if not hasattr(system, "A") and hasattr(system, "to_ss"):
+        system = system.to_ss()
     model = context.model
     point = None
     if not hasattr(system, "A") and model.get("operating_state"):
         point = (model["operating_state"], model["operating_command"])
     found = matrices(system, point)
-    if found.linear and not found.dt:
-        return SimulatedLinear(context, found.A.tolist(), found.B.tolist(), found.C.tolist())
+    try:
+        if not found.linear:
+            return _function_plant(system, found, context)
+        A, B = continuous(found.A, found.B, found.dt) if found.dt else (found.A, found.B)
+        return SimulatedLinear(context, A.tolist(), B.tolist(), found.C.tolist())
+    except ValueError as error:
+        raise ConfigError(f"the plant ({type(system).__name__}): {error}") from error
+
+
+def _function_plant(system: Any, found: Matrices, context: PlantContext) -> FunctionPlant:
+    """Return a system that is not linear; ValueError for one that steps otherwise than in ticks."""
+    model = context.model
+    if found.dt and not math.isclose(found.dt, context.step_s, rel_tol=1e-6):
+        raise ValueError(
+            f"its dt is {found.dt:g} s and timing.tick_s = {context.step_s:g} s; of a discrete system "
+            "that is not linear a step must be a tick"
+        )
     substeps = 0
     if not found.dt:
         fastest = float(np.abs(np.linalg.eigvals(found.A)).max())

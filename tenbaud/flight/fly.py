@@ -134,6 +134,7 @@ def _loaded(
 
     `plant` is what only a system has: rate and operating point.
     """
+    from tenbaud.config.deprecated import with_current_names
     from tenbaud.config.load import OWN, ConfigError, load_config, merged, merged_values, nested
     from tenbaud.design.complete import completed
     from tenbaud.design.settings import exact_outputs, settings_of
@@ -144,12 +145,15 @@ def _loaded(
             raise ConfigError("config describes a plant of its own; lay settings= over this one")
         rate_baud, point = plant
         found = matrices(preset, point)
+        changes = with_current_names(changes, "the settings")
         if not found.linear and "plant" not in parts:
             parts = {**parts, "plant": preset}
             changes = merged(changes, nested(_names(parts, changes["link"]["kind"])))
         own = merged(settings_of(found, rate_baud, changes), changes)
-        values = completed(merged_values(OWN, None, own))
-        preset, changes = OWN, merged(exact_outputs(values["model"]), values)
+        designed = completed(merged_values(OWN, None, own))
+        # Whatever was designed: what is given stays as it is given.
+        values = merged(designed, changes)
+        preset, changes = OWN, merged(exact_outputs(values["model"], changes), values)
     elif any(one is not None for one in plant):
         raise ConfigError("rate_baud and operating_point are for a plant; a preset says them itself")
     elif not isinstance(preset, str | None):
@@ -161,7 +165,7 @@ def _following(
     loaded: FlightConfig, reference: Given, parts: Mapping[str, Any], folder: RunFolder
 ) -> FlightConfig:
     """Return the configuration with other set-points; values over time are in a file in the folder."""
-    from tenbaud.build.given import reference_settings
+    from tenbaud.build.given import reference_settings, whole_sections
     from tenbaud.build.parts import PartError
     from tenbaud.build.signals import configured_signals
     from tenbaud.config.load import load_config, merged
@@ -173,15 +177,16 @@ def _following(
             "reference= is for a class, which gets them in its context"
         )
     tick_s = loaded.timing.tick_s
+    outputs = configured_signals(loaded, _objects(parts)).outputs
     section = reference_settings(
         reference,
-        configured_signals(loaded, _objects(parts)).outputs,
+        outputs,
         round(loaded.duration_s / tick_s),
         tick_s,
         folder.path / REFERENCE_NAME,
     )
     values = loaded.model_dump(mode="json", exclude_none=True)
-    over = {"receiver": {"reference": section}}
+    over = {"receiver": {"reference": whole_sections(section, outputs[0].name)}}
     return load_config(loaded.preset, None, merged(values, over), allow_code=True)
 
 

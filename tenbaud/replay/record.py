@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any
 
 from channel.codec.codec import CodecState, Vector
@@ -75,6 +75,7 @@ def load_record(path: Path, other: Path | None = None, *, allow_code: bool = Fal
 def _agreement(run: Run, tables: Tables, allow_code: bool) -> Agreement:
     config = run.config.allowing_code() if allow_code else run.config
     require_allowed(config)
+    config = _with_files_of(run.folder.path, config)
     require_regular_files(config)
     clock = tables.metadata.get("clock", "")
     if clock == "real":
@@ -82,6 +83,24 @@ def _agreement(run: Run, tables: Tables, allow_code: bool) -> Agreement:
     if clock == "virtual":
         return agree(config, "virtual")
     raise RecordingError(f"{tables.path} does not say on which clock it was flown.")
+
+
+def _with_files_of(folder: Path, config: FlightConfig) -> FlightConfig:
+    """Return a configuration whose set-points are read from the run's folder, if their file is there.
+
+    A path in it is of the place and the working folder of the flight; the run may have been moved.
+    """
+    reference = config.receiver.reference
+    sections: dict[str, Any] = {}
+    for name, one in {"": reference, **reference.by_name}.items():
+        # Both kinds of separators: the flight may have been on another system.
+        beside = folder / PureWindowsPath(one.file).name
+        if one.kind == "csv" and one.file and beside.is_file():
+            changed = {"file": str(beside)}
+            sections |= {name: one.model_copy(update=changed)} if name else changed
+    found = reference.model_copy(update=sections)
+    receiver = config.receiver.model_copy(update={"reference": found})
+    return config.model_copy(update={"receiver": receiver})
 
 
 def _check_same(tables: Tables, agreement: Agreement, end: str) -> None:

@@ -3,18 +3,20 @@
 On simulated flights, one set of seeds is for the fit and another for the judgement. On a recorded
 flight, the first part is for the fit and the rest for the judgement; there the codec flies through the
 whole recording and only the rest counts. The measure is the rms error of the receiver's predicted
-estimate.
+estimate, of several outputs together by the weights of the model.
 """
 
 from __future__ import annotations
 
 import math
+import operator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from tenbaud.build.flight import ticks_of
 from tenbaud.config.schema import FlightConfig
+from tenbaud.design.described import linear_of
 from tenbaud.studies.chunk import fly_point
 from tenbaud.studies.figures import FlightFigures
 from tenbaud.studies.flights import CompiledPoint, recorded_flight
@@ -26,7 +28,7 @@ from tenbaud.studies.study_file import Range
 Method = Literal["differential-evolution", "nelder-mead"]
 
 PENALTY_RAD = 100.0
-"""The error that counts for a flight without figures: larger than any error of an angle."""
+"""The error that counts for a flight without figures: larger than any error of an angle of weight 1."""
 
 
 class Split(NamedTuple):
@@ -93,6 +95,8 @@ def judge(tuning: Tuning, values: dict[str, float], *, train: bool) -> Judged:
     ConfigError, StudyError and the like where these constants make no flight at all.
     """
     config = tuning.config(values)
+    linear = linear_of(config.model)
+    weights = (1.0,) if linear is None else linear.weights
     if config.transmitter.rig == "replay":
         figures = [_fly_part(config, tuning.split.train_share, train=train)]
     else:
@@ -100,7 +104,10 @@ def judge(tuning: Tuning, values: dict[str, float], *, train: bool) -> Judged:
         figures = fly_point(config, seeds, "auto")
     squares, lost, reason = 0.0, 0, ""
     for one in figures:
-        rms = math.hypot(*(output.error_live_rms for output in one.outputs))
+        # One weight serves all outputs.
+        each = weights * len(one.outputs) if len(weights) == 1 else weights
+        errors = [output.error_live_rms for output in one.outputs]
+        rms = math.hypot(*map(operator.mul, map(math.sqrt, each), errors))
         if one.outcome == "ok" and math.isfinite(rms):
             squares += min(rms, PENALTY_RAD) ** 2
         else:

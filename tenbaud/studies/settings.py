@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 
 from channel.errors import TenbaudError
-from tenbaud.build.codec import build_codec
+from tenbaud.build.codec import unchecked_codec
 from tenbaud.config.load import load_config
 from tenbaud.config.outside_code import require_allowed
 from tenbaud.config.schema import KINDS, FlightConfig
@@ -112,7 +112,7 @@ def configured(
         return config
     _put_texts(config, values, texts)
     if "rate" in swept:
-        words = build_codec(config).coder.alphabet.symbols_per_word
+        words = unchecked_codec(config).coder.alphabet.symbols_per_word
         put(values, "timing.symbol_period_s", words / float(swept["rate"]))
     for name, value in entries.items():
         field, _, index = name.rpartition(".")

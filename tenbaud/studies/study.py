@@ -33,7 +33,6 @@ from pydantic import ValidationError
 from channel.codec.signals import Signal
 from channel.errors import TenbaudError
 from tenbaud.build.ends import check_parts
-from tenbaud.build.signals import configured_signals
 from tenbaud.config.schema import FlightConfig
 from tenbaud.studies.figures import shared_parts
 from tenbaud.studies.points import FLIGHTS_MAX, names_of, points_of
@@ -64,6 +63,8 @@ class Study:
         self.points = points_of(file)
         if self.flights > FLIGHTS_MAX:
             raise StudyError(f"{self.flights} flights; at most {FLIGHTS_MAX} make one study")
+        self.outputs: tuple[Signal, ...] = ()
+        """of the plant, alike at every point: results are columns by their names"""
         self.configs = [self._config(point) for point in self.points]
 
     @property
@@ -75,11 +76,6 @@ class Study:
     def chunks(self) -> int:
         """Return how many chunks they make."""
         return -(-self.flights // self.file.chunk_flights)
-
-    @property
-    def outputs(self) -> tuple[Signal, ...]:
-        """Return the outputs of the plants; where these differ, those of the one that has most."""
-        return max((configured_signals(one).outputs for one in self.configs), key=len)
 
     def chunk(self, index: int) -> range:
         """Return the numbers of a chunk's flights."""
@@ -103,10 +99,18 @@ class Study:
             config = configured(
                 self.file.preset, path, self.file.set, point, allow_code=self._allow_code
             )
-            shared_parts(config)
+            outputs = shared_parts(config).signals.outputs
             _check_parts(config.model_dump_json(include=PARTS))
         except (TenbaudError, ValueError) as error:
             raise StudyError(f"the point {in_words(point)} is no flight: {error}") from error
+        self.outputs = self.outputs or outputs
+        first, other = ([one.label for one in each] for each in (self.outputs, outputs))
+        if first != other:
+            raise StudyError(
+                f"the point {in_words(point)} flies a plant with the outputs {'; '.join(other)}, and "
+                f"the first point, {in_words(self.points[0])}, one with {'; '.join(first)}: the "
+                "columns of a study are of one plant, so make a study of each"
+            )
         if config.duration_s / config.timing.tick_s > TICKS_MAX:
             raise StudyError(
                 f"the point {in_words(point)}: duration_s = {config.duration_s:g} is more than "

@@ -76,7 +76,16 @@ def values(frame: Any) -> dict[str, Any]:
 
 
 def test_when_the_page_is_read_then_every_kind_of_frame_has_its_table() -> None:
-    assert {int(title.split()[0]) for title in TITLES} == set(wire._READERS)
+    known = set()
+    for kind in range(256):
+        head = struct.pack("<BBIH", wire.WIRE_VERSION, kind, 0, 0)
+        try:
+            wire.decode(head + struct.pack("<H", crc_hqx(head, wire.CRC_START)))
+        except FrameError as error:
+            if "unknown kind" in str(error):
+                continue
+        known.add(kind)
+    assert {int(title.split()[0]) for title in TITLES} == known
     assert f"| 0 | u8 | wire version, {wire.WIRE_VERSION} |" in PAGE
     assert f"{wire.FRAME_BYTES_MAX:,}".replace(",", " ") in PAGE
 

@@ -156,7 +156,7 @@ function drawGauges(id, most, signals, each) {
 // Turns every part of the picture: `data-turn` has the place of its output and its centre.
 function turn(values) {
   for (const part of picture.querySelectorAll("[data-turn]")) {
-    const [place, ...centre] = part.dataset.turn.split(" "), angle = values[part.classList[0]][place] ?? null;
+    const [place, ...centre] = JSON.parse(part.dataset.turn), angle = values[part.classList[0]][place] ?? null;
     part.style.display = angle === null ? "none" : "";
     if (angle !== null) part.setAttribute("transform", `rotate(${(-angle * DEGREES).toFixed(2)} ${centre.join(" ")})`);
   }

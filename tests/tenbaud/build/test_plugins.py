@@ -13,6 +13,7 @@ from tenbaud.audit.audit import audit
 from tenbaud.build.controllers import build_controller
 from tenbaud.build.ends import check_parts
 from tenbaud.build.flight import agree
+from tenbaud.build.preset import load_preset
 from tenbaud.config.load import ConfigError, load_config, nested
 from tenbaud.config.schema import FlightConfig
 from tenbaud.flight.fly import fly
@@ -164,6 +165,14 @@ def test_options_reach_the_class_and_count_in_the_handshake(outside: Path) -> No
     (set_point,) = controller.references(0)
     assert set_point is not None
     assert controller.command(0, (set_point, 0.0)) == (0.05, -0.05)
+
+
+def test_a_named_controller_is_tried_on_the_model_that_is_an_object(outside: Path) -> None:
+    model = load_preset("tuned-10baud").codec.model
+    given: dict[str, Any] = {"settings": {"duration_s": 1.0}, "out": outside / "run"}
+    with pytest.warns(FutureWarning, match="reference_rad"):
+        run = fly("tuned-10baud", model=model, controller="outside:Law", **given)
+    assert run.summary["desyncs"] == 0
 
 
 def test_a_coder_that_uses_rates_is_given_them(outside: Path) -> None:

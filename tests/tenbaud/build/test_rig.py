@@ -7,10 +7,12 @@ import pytest
 import typer
 
 from plant_sim.encoder import Encoder
+from tenbaud.build.emulator import build_emulator
 from tenbaud.build.flight import agree
 from tenbaud.build.rig import build_axes, build_rig, quarc_commands, quarc_fields
 from tenbaud.cli import options
 from tenbaud.config.load import ConfigError, dump_config, load_config
+from tenbaud.design.complete import completed
 from transmitter.rigs.base import RigError
 from transmitter.rigs.quarc import QuarcBridge
 from transmitter.rigs.serial_bridge import SerialBridge
@@ -118,6 +120,16 @@ def test_quarc_vectors_follow_the_wiring() -> None:
 def test_a_vector_or_wiring_without_the_pitch_is_refused(changes: dict[str, Any], text: str) -> None:
     with pytest.raises(ConfigError, match=text):
         build_rig(configured("quarc:h:1", **changes))
+
+
+def test_an_emulated_rig_has_the_encoder_of_its_output_whatever_it_is_called() -> None:
+    model = {"kind": "linear", "C": [[1.0, 0.0]], "outputs": ["tilt"], "output_units": ["rad"]}
+    model |= {"A": [[0.0, 1.0], [-0.5, -0.1]], "B": [[0.0, 0.0], [0.35, -0.35]]}
+    values = completed({"model": model})
+    with pytest.raises(ConfigError, match=r"set transmitter\.bridge\.tilt\.channel = 1"):
+        build_emulator(load_config(None, None, values), "quarc", "pty")
+    values["transmitter"] = {"bridge": {"tilt": {"channel": 1}}}
+    assert build_emulator(load_config(None, None, values), "quarc", "pty")
 
 
 def test_columns_that_make_no_sample_name_the_section() -> None:

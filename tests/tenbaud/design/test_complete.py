@@ -12,10 +12,17 @@ from typer.testing import CliRunner
 
 from channel.codec.models.linear import LinearModel
 from channel.codec.signals import signals_of
-from tenbaud.build.codec import build_codec
+from channel.line.uplink import bit_rate
+from tenbaud.build.codec import build_codec, configured_rate
 from tenbaud.build.flight import agree
 from tenbaud.cli.commands import app
-from tenbaud.config.load import ConfigError, dump_config, load_config, merged_values
+from tenbaud.config.load import (
+    ConfigError,
+    dump_config,
+    load_config,
+    merged_values,
+    preset_names,
+)
 from tenbaud.design.complete import completed
 
 PENDULUM: dict[str, Any] = {
@@ -62,10 +69,12 @@ def test_when_a_configuration_is_completed_then_both_ends_read_the_same_bits() -
 
 
 def test_when_the_bits_are_too_few_for_a_plant_then_the_error_has_both_numbers() -> None:
-    for model in (PENDULUM, {"kind": "pitch", "stiffness_per_s2": -53.6, "rate_damping_per_s": 0.0}):
+    growing = {"kind": "pitch", "stiffness_per_s2": -53.6, "rate_damping_per_s": 0.0}
+    for model, state in ((PENDULUM, "rate"), (growing, "pitch_rate")):
         values = completed({"model": model})
         config = load_config("paper-10baud", None, values)
-        with pytest.raises(ConfigError, match=r"10 bit/s are too few.*more than 10\.56 bit/s"):
+        text = rf"10 bit/s are too few.*, {state} fastest by 7\.32.*more than 10\.56 bit/s; shorten"
+        with pytest.raises(ConfigError, match=text):
             agree(config, "virtual")
 
 
@@ -141,9 +150,26 @@ def test_when_the_command_completes_a_file_then_it_flies(tmp_path: Path) -> None
     assert done.exit_code == 0, done.output
     codec = build_codec(load_config(None, made))
     assert codec.coder.alphabet.symbols_per_word == 1
-    shown = CliRunner().invoke(app, ["floor", "--config", str(made)])
-    assert "10.56 bit/s, by the data-rate theorem" in shown.output
-    assert "20 bit/s" in shown.output
+    for file in (source, made):
+        shown = CliRunner().invoke(app, ["floor", "--config", str(file)])
+        assert "10.56 bit/s, by the data-rate theorem" in shown.output
+        assert "20 bit/s" in shown.output
+
+
+def test_when_a_configuration_is_too_slow_for_its_plant_then_its_floor_says_what_is_needed(
+    tmp_path: Path,
+) -> None:
+    low = tmp_path / "low.toml"
+    low.write_text(FILE.replace("0.05", "0.1").replace("20.0", "10.0"))
+    shown = CliRunner().invoke(app, ["floor", "--config", str(low)])
+    assert (shown.exit_code, "none: at this rate it grows" in shown.output) == (1, True)
+    found = CliRunner().invoke(app, ["floor", "--config", str(low), "--json"])
+    assert (found.exit_code, json.loads(found.output)["rms"]) == (1, None)
+    enough = CliRunner().invoke(app, ["floor", "--config", str(low), "--rate", "20"])
+    assert (enough.exit_code, "least rms output_1" in enough.output) == (0, True)
+    low.write_text(FILE.replace("2e-3", "0"))
+    still = CliRunner().invoke(app, ["floor", "--config", str(low)])
+    assert (still.exit_code, "no disturbance reaches the plant" in still.output) == (2, True)
 
 
 def test_when_a_floor_is_asked_for_then_every_output_has_its_own() -> None:
@@ -176,6 +202,12 @@ def test_when_a_preset_is_asked_about_then_its_rate_and_words_count() -> None:
     assert "bits in words" in shown.output
     assert CliRunner().invoke(app, ["floor", "--preset", "usual-1000baud"]).exit_code == 2
     assert CliRunner().invoke(app, ["floor", "--plant", "nobody", "--rate", "2"]).exit_code == 2
+
+
+def test_the_rate_of_a_configuration_is_that_of_its_codec() -> None:
+    for config in map(load_config, preset_names()):
+        rate = bit_rate(build_codec(config), config.timing.tick_s)
+        assert configured_rate(config) == pytest.approx(rate), config.preset
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Plants from python-control and scipy, flown and refused; gains, classes and set-points."""
+"""Plants from python-control and scipy, flown; gains, classes and set-points."""
 
 from __future__ import annotations
 
@@ -14,42 +14,16 @@ import scipy.signal
 
 from channel.codec.signals import InputSignal, Signal, Signals
 from receiver.controllers.base import ControllerContext
-from tenbaud import Run, fly
 from tenbaud.audit.audit import audit
 from tenbaud.build.given import reference_settings
 from tenbaud.build.references import build_references
 from tenbaud.config.load import load_config
 from tenbaud.design.settings import settings_of
 from tenbaud.design.systems import matrices
-from tenbaud.errors import ConfigError, PartError
-
-A, B, C = [[0.0, 1.0], [-2.0, -0.5]], [[0.0], [1.0]], [[1.0, 0.0]]
-SECONDS = 4.0
-NAMED = {
-    "states": ["Angle [rad]", "rate (rad/s)"],
-    "inputs": ["motor, V"],
-    "outputs": ["angle [rad]"],
-}
-UNDISTURBED = {"transmitter.plant.disturbance": ""}
-
-
-def flown(system: Any, folder: Path, **given: Any) -> Run:
-    settings = {"duration_s": SECONDS, **given.pop("settings", {})}
-    return fly(system, settings=settings, out=folder / "run", **given)
-
-
-def pendulum(gravity: float = 9.81, drift: float = 0.0) -> Any:
-    """A pendulum that hangs, with friction; `drift` turns its gravity with time."""
-
-    def dynamics(t: float, x: Any, u: Any, params: Any) -> list[float]:
-        return [x[1], -gravity * math.sin(x[0] + drift * t) - 0.2 * x[1] + u[0]]
-
-    signals = {
-        "inputs": ["torque [N m]"],
-        "outputs": ["angle [rad]"],
-        "states": ["angle [rad]", "rate"],
-    }
-    return control.nlsys(dynamics, lambda t, x, u, params: x[:1], **signals)
+from tenbaud.errors import PartError
+from tenbaud.replay.record import load_record
+from tenbaud.replay.replay import replay
+from tests.tenbaud.flight.systems import MASSES, NAMED, UNDISTURBED, A, B, C, flown, pendulum
 
 
 @pytest.mark.parametrize(
@@ -83,6 +57,34 @@ def test_when_a_system_names_its_signals_then_the_run_has_these_names_and_units(
 
 
 @pytest.mark.parametrize(
+    ("field", "value", "step", "right_is_exact"),
+    [("left.counts_per_unit", 1e4, 1e-4, True), ("counts_per_turn", 1024, math.tau / 1024, False)],
+)
+def test_when_an_encoder_is_given_then_the_outputs_that_it_is_for_are_read_by_it(
+    field: str, value: float, step: float, right_is_exact: bool, tmp_path: Path
+) -> None:
+    run = flown(MASSES, tmp_path, settings={f"transmitter.encoders.{field}": value})
+    counts = run.measured_left / step
+    assert abs(counts - counts.round()).max() < 1e-6
+    assert (run.measured_right == run.right).all() == right_is_exact
+
+
+def test_when_coder_constants_are_given_then_they_are_flown(tmp_path: Path) -> None:
+    coder = flown(control.ss(A, B, C, 0), tmp_path, settings={"coder.step": 0.9}).config.coder
+    assert coder.model_dump()["step"] == 0.9
+
+
+def test_when_a_run_is_moved_then_its_set_points_move_with_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    flown(control.ss(A, B, C, 0), Path("here"), reference=lambda t: 0.1 * t)
+    Path("here").rename("there")
+    assert replay(load_record(Path("there/run"))).equal
+    assert audit(Path("there/run")).passed
+
+
+@pytest.mark.parametrize(
     ("dt", "rate_baud", "over", "tick_s", "period_s", "bits"),
     [
         (0.0, None, {}, 0.01, 0.1, 1),
@@ -91,6 +93,9 @@ def test_when_a_system_names_its_signals_then_the_run_has_these_names_and_units(
         (0.0, None, {"timing": {"tick_s": 0.02}, "coder": {"bits": 3}}, 0.02, 0.3, 3),
         (0.03, None, {}, 0.03, 0.12, 1),
         (0.5, None, {}, 0.5, 0.5, 5),
+        (0.5, 40.0, {}, 0.5, 0.5, 15),
+        (3.0, None, {}, 1.0, 2.0, 15),
+        (0.0, 20.0, {"channel": {"rate_baud": 20}}, 0.01, 0.05, 1),
         (0.05, None, {"timing": {"tick_s": 0.01}}, 0.01, 0.1, 1),
     ],
 )
@@ -151,96 +156,36 @@ def test_when_a_preset_flies_another_plant_then_only_the_plant_is_exchanged(tmp_
     assert 0.0 < abs(run.angle[-100:]).max() < 0.02
 
 
+MOTOR = control.ss([[0.0, 1.0], [0.0, -4.0]], [[0.0], [4.0]], [[1.0, 0.0]], 0)
+STEPPED = control.c2d(MOTOR, 0.01)
+
+
 @pytest.mark.parametrize(
-    ("system", "given", "text"),
+    "system",
     [
-        (
-            control.ss(A, B, C, [[0.5]], **NAMED),
-            {},
-            r"D is not zero: output angle \[rad\] has 0\.5 of inp",
+        control.sample_system(MOTOR, 0.03),
+        scipy.signal.StateSpace(STEPPED.A, STEPPED.B, STEPPED.C, STEPPED.D, dt=0.01),
+        scipy.signal.TransferFunction([4.0], [1.0, 4.0, 0.0]),
+        control.nlsys(
+            lambda t, x, u, params: STEPPED.A @ x + STEPPED.B @ u,
+            lambda t, x, u, params: x[:1],
+            inputs=1,
+            outputs=1,
+            states=2,
+            dt=0.01,
         ),
-        (control.ss(A, B, C, 0, True), {}, "discrete and its dt is not given"),
-        (control.ss([], [], [], [[1.0]]), {}, "no states"),
-        (control.ss(A, B, C, 0, states=["a", "a"]), {}, r"2 state\(s\) and names 1: a"),
-        (control.ss(A, B, C, 0, states=["a b", "A_b"]), {}, "states: a_b is named twice"),
-        (control.ss(A, B, C, 0, states=["a!", "b"]), {}, "'a!' is no name of a signal"),
-        (
-            control.ss(A, B, C, 0, states=["a [rad]", "b"], outputs=["y [deg]"]),
-            {},
-            "units contradict: the output y is the state a, and they are in deg and rad",
-        ),
-        (
-            control.ss([[0.0, 1.0], [0.0, -1.0]], B, [[0.0, 1.0]], 0),
-            {},
-            r"eigenvalue 0 1/s, mostly of state_1, .*\(A, C\) is not observable",
-        ),
-        (
-            control.ss([[1.0, 0.0], [0.0, -1.0]], B, [[1.0, 1.0]], 0, states=["up", "down"]),
-            {},
-            r"eigenvalue 1 1/s, mostly of up, .*\(A, G\) is not controllable",
-        ),
-        (
-            control.ss([[1.0, 0.0], [0.0, -1.0]], B, [[1.0, 1.0]], 0, states=["up", "down"]),
-            {"settings": {"model.G": [[1.0], [1.0]], "model.densities": [1e-3]}},
-            r"eigenvalue 1\.01\d+ per tick, mostly of up: the pair \(A, B\) is not controllable",
-        ),
-        (
-            control.ss([[0.0, 1.0], [53.6, 0.0]], B, C, 0, states=["angle", "rate"]),
-            {},
-            r"10 bit/s are too few: .* rate fastest by 7\.321 1/s, .*more than 10\.56 bit/s",
-        ),
-        (
-            control.sample_system(control.ss(A, B, C, 0), 0.05),
-            {"settings": {"timing.tick_s": 0.02}},
-            r"dt = 0\.05 s .* is 2\.5 ticks of timing\.tick_s = 0\.02 s",
-        ),
-        (pendulum(drift=0.1), {}, r"not autonomous: d/dt of state rate is .* at 0 s and .* at 0\.37 s"),
-        (
-            pendulum(),
-            {"operating_point": ([0.5, 0.0], [0.0])},
-            r"no rest: state rate moves by -4\.70316 a second",
-        ),
-        (pendulum(), {"operating_point": ([0.5], [0.0])}, r"states \[0\.5\]; 2 finite numbers"),
-        (pendulum(), {"operating_point": 3.0}, "must be a pair"),
-        (control.ss(A, B, C, 0), {"operating_point": ([0, 0], [0])}, "this one has matrices"),
-        (control.ss(A, B, C, 0), {"controller": [[1.0, 2.0, 3.0]]}, "1 row.* of 3 .* a row needs 2"),
-        (
-            control.ss(A, B, C, 0),
-            {"controller": [-1.0, -2.0]},
-            r"do not hold the plant: .* factor 1\.00\d+ per tick, mostly of state_1",
-        ),
-        (
-            control.ss(A, B, C, 0),
-            {"controller": {"k": 1.0}},
-            "dict. is no controller: it has no method",
-        ),
-        (control.ss(A, B, C, 0), {"reference": "up"}, "reference: could not convert"),
-        (control.ss(A, B, C, 0), {"reference": {"yaw": 1.0}}, "'yaw' is none of the outputs: output_1"),
-        (
-            control.ss(A, B, C, 0),
-            {"reference": ([0, 1], [1.0])},
-            "2 rising times are needed for 1 rows",
-        ),
-        (
-            control.ss(A, B, C, 0),
-            {"reference": np.zeros((9, 2))},
-            "2 values at a time, and there are 1 output",
-        ),
-        (
-            control.ss(A, B, C, 0),
-            {"reference": lambda t: math.nan if t > 1.0 else 0.0},
-            r"reference of output_1 is nan at 1\.01 s",
-        ),
-        ("tuned-10baud", {"rate_baud": 20.0}, "a preset says them itself"),
-        (3.0, {}, "a float is neither the name of a preset nor a plant"),
     ],
+    ids=["step of three ticks", "scipy", "transfer function", "not linear"],
 )
-def test_when_a_plant_cannot_be_flown_then_the_error_names_signal_and_number(
-    system: Any, given: dict[str, Any], text: str, tmp_path: Path
+def test_when_a_plant_is_discrete_then_it_moves_at_the_speed_of_its_own_time(
+    system: Any, tmp_path: Path
 ) -> None:
-    with pytest.raises(ConfigError, match=text):
-        flown(system, tmp_path, **given)
-    assert not (tmp_path / "run").exists()
+    exact = {"transmitter.encoders.quantised": False}
+    run = flown("servo-10baud", tmp_path, plant=system, settings={**UNDISTURBED, **exact})
+    held = np.concatenate([run.voltage[:-1], [0.0]])
+    expected = control.forced_response(STEPPED, np.arange(len(held)) * 0.01, held)
+    assert abs(expected.outputs).max() > 0.1
+    assert abs(expected.outputs - run.angle).max() < 1e-9
 
 
 class Law:
@@ -297,13 +242,6 @@ def test_when_an_object_controls_then_it_has_set_points_of_its_own(tmp_path: Pat
         flown(system, tmp_path / "again", controller=Own(), reference=1.0)
 
 
-MASSES = control.ss(
-    [[0, 1, 0, 0], [-3, -1, 1, 0], [0, 0, 0, 1], [1, 0, -3, -1]],
-    [[0, 0], [1, 0], [0, 0], [0, 1]],
-    [[1, 0, 0, 0], [0, 0, 1, 0]],
-    0,
-    states=["left", "left_rate", "right", "right_rate"],
-)
 RAMP = np.linspace(0.0, 1.0, 400)
 
 
@@ -334,6 +272,22 @@ def test_when_set_points_are_given_in_any_form_then_each_output_follows_its_own(
     assert first is not None
     assert first.value(200) == pytest.approx(left, abs=1e-9)
     assert (None if second is None else second.value(200)) == (right and pytest.approx(right, abs=1e-9))
+
+
+@pytest.mark.parametrize(
+    ("given", "travel", "elevation"),
+    [
+        ({"elevation": 0.1}, 0.0, 0.1),
+        ({"elevation": {"amplitude": 0.0}}, 0.0, math.radians(10.0)),
+        ({"kind": "constant", "amplitude": 0.3}, 0.3, math.radians(10.0)),
+    ],
+)
+def test_when_a_set_point_replaces_that_of_a_preset_then_nothing_of_it_stays(
+    given: dict[str, Any], travel: float, elevation: float, tmp_path: Path
+) -> None:
+    run = flown("helicopter-10baud", tmp_path, reference=given, settings={"duration_s": 0.5})
+    assert run.reference_travel[0] == travel
+    assert run.reference_elevation[0] == pytest.approx(elevation, abs=1e-12)
 
 
 def test_when_two_processes_fly_it_then_values_over_time_reach_both(tmp_path: Path) -> None:

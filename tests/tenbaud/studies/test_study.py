@@ -146,6 +146,13 @@ def test_when_an_example_is_read_then_it_is_a_study(name: str) -> None:
             {"sample": {"points": 4, "settings": {"mismatch": {"from": 0.0, "to": 0.2}}}},
             "on the grid and sampled",
         ),
+        (
+            {
+                "set": {"receiver": {"controller": "state_feedback"}},
+                "grid": {"rate": [20], "model.kind": ["pitch", "pendulum"]},
+            },
+            "model.kind = 'pendulum' flies a plant with the outputs angle, rad, .* pitch, rad",
+        ),
     ],
     ids=str,
 )

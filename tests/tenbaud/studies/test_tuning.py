@@ -235,6 +235,15 @@ def test_when_a_recording_is_judged_then_it_is_as_the_nodes_fly_it(
     assert judge(tuning, {}, train=train).rms_rad == plain.first.error_live_rms
 
 
+def test_when_a_plant_has_several_outputs_then_the_weights_of_its_model_count() -> None:
+    # A dry run is flown by the nodes, so that nothing needs to be compiled.
+    changes = {"duration_s": 3.0, "transmitter": {"dry_run": True}, "model": {"weights": [4.0, 0.0]}}
+    tuning = tuning_of({}, preset="aero-20baud", overrides=changes, split=Split((1,), (2,), 0.5))
+    pitch, yaw = fly_plain(tuning.config({}).model_copy(update={"seed": 1})).outputs
+    assert yaw.error_live_rms > 0.0
+    assert judge(tuning, {}, train=True).rms_rad == pytest.approx(2.0 * pitch.error_live_rms, rel=1e-12)
+
+
 def test_when_only_the_nodes_can_fly_a_coder_then_a_recording_is_judged_too(log: Path) -> None:
     tuning = tuning_of({}, preset="uiuc-history-10baud", overrides=replayed(log, duration_s=6.0))
     first, second = judge(tuning, {}, train=True), judge(tuning, {}, train=False)

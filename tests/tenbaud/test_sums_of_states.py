@@ -15,25 +15,11 @@ from tenbaud.design.complete import completed
 from tenbaud.replay.record import load_record
 from tenbaud.replay.replay import replay
 from tests.tenbaud.processes import run as run_command
-
-PLANT = {
-    "kind": "linear",
-    "A": [[0.0, 1.0, 0.0], [-0.5, -0.1, 0.1], [0.0, 0.0, -0.3]],
-    "B": [[0.0, 0.0], [0.35, -0.35], [0.1, 0.2]],
-    "C": [[1.0, 0.0, 0.0], [0.5, 0.0, 1.0]],
-    "G": [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]],
-    "densities": [2e-3],
-    "states": ["angle", "rate", "drift"],
-    "state_units": ["rad", "rad/s", "rad"],
-    "inputs": ["front", "rear"],
-    "input_units": ["V", "V"],
-    "outputs": ["angle", "sum"],
-    "output_units": ["rad", "rad"],
-}
+from tests.tenbaud.sum_of_states import SUM_OF_STATES
 
 
 def test_its_estimate_is_the_sum_of_the_estimates_of_states_everywhere(tmp_path: Path) -> None:
-    values = completed({"model": PLANT, "coder": {"kind": "direction"}})
+    values = completed({"model": SUM_OF_STATES, "coder": {"kind": "direction"}})
     values |= {
         "transmitter": {"plant": {"disturbance": "q=2e-3"}},
         "receiver": {

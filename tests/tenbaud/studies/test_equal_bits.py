@@ -31,6 +31,7 @@ from tenbaud.studies.flights import CompiledPoint
 from tenbaud.studies.plain import fly_plain
 from tenbaud.studies.schedule import Uncommon
 from tenbaud.studies.settings import StudyError, put
+from tests.tenbaud.sum_of_states import SUM_OF_STATES
 from transmitter.session.records import SAMPLE_CHANNEL
 
 PRESETS = (
@@ -38,18 +39,9 @@ PRESETS = (
     *("history-10baud", "direction", "linear", "pendulum-30baud"),
 )
 LINEAR = {
-    "kind": "linear",
-    "A": [[0.0, 1.0, 0.0], [-0.5, -0.1, 0.1], [0.0, 0.0, -0.3]],
-    "B": [[0.0, 0.0], [0.35, -0.35], [0.1, 0.2]],
-    "C": [[1.0, 0.0, 0.0], [0.5, 0.0, 1.0]],
-    "G": [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]],
-    "densities": [2e-3],
+    **SUM_OF_STATES,
     "states": ["pitch", "pitch_rate", "drift"],
-    "state_units": ["rad", "rad/s", "rad"],
-    "inputs": ["front", "rear"],
-    "input_units": ["V", "V"],
     "outputs": ["pitch", "sum"],
-    "output_units": ["rad", "rad"],
 }
 """Two outputs, of which one is no state."""
 LOOPS = {
@@ -126,7 +118,7 @@ def uncached(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], None]]:
             one.cache_clear()
 
 
-# The first test here, so that it compiles what the next ones fly, where nobody has done so before.
+# The first test here, so that it compiles what the next ones fly, unless it is compiled already.
 def test_when_the_machine_code_is_read_then_nothing_is_fused(uncached: Callable[[], None]) -> None:
     point = CompiledPoint(config_of("paper-10baud", CLEAN))
     point.fly(1)

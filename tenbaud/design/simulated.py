@@ -12,7 +12,7 @@ from plant_sim.linear import SimulatedLinear
 from plant_sim.plant import Plant, PlantContext
 from plant_sim.zero_order_hold import continuous
 from tenbaud.config.load import ConfigError
-from tenbaud.design.systems import Matrices, matrices
+from tenbaud.design.systems import Matrices, matrices, state_space
 
 SUBSTEP = 0.2
 """longest step of an integration, in time constants of the fastest motion"""
@@ -24,8 +24,7 @@ def system_plant(system: Any, context: PlantContext) -> Plant:
 
     ConfigError for a system that is no plant of autonomous states, or not in ticks of the flight.
     """
-    if not hasattr(system, "A") and hasattr(system, "to_ss"):
-        system = system.to_ss()
+    system = state_space(system)
     model = context.model
     point = None
     if not hasattr(system, "A") and model.get("operating_state"):

@@ -29,7 +29,7 @@ LATER_S = (0.37, 11.3)
 """times at which an autonomous system does what it does at time 0"""
 LABEL = re.compile(r"(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\)|,\s*(.*))?")
 NUMBERED = re.compile(r"[A-Za-z]+\[\d+\]")
-"""How python-control calls what nobody has named."""
+"""A name that python-control gives to a signal without one."""
 
 
 class StateSpace(Protocol):
@@ -99,13 +99,17 @@ def is_system(given: object) -> bool:
     return any(all(hasattr(given, name) for name in names) for names in kinds)
 
 
+def state_space(system: Any) -> Any:
+    """Return a system that has states; a transfer function becomes one."""
+    return system.to_ss() if not hasattr(system, "A") and hasattr(system, "to_ss") else system
+
+
 def matrices(system: Any, point: Any = None) -> Matrices:
     """Return the matrices of a system, at the operating point (x0, u0) if it is not linear.
 
     Raises ConfigError, with signal and number, for a system that cannot be flown.
     """
-    if not hasattr(system, "A") and hasattr(system, "to_ss"):
-        system = system.to_ss()
+    system = state_space(system)
     dt = _period_s(system)
     if hasattr(system, "A"):
         if point is not None:

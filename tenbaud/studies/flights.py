@@ -37,7 +37,6 @@ from tenbaud.studies.laws import law_of
 from tenbaud.studies.plants import AtRest, PlantParts, plant_parts
 from tenbaud.studies.schedule import Schedule, Uncommon, schedule_of
 from transmitter.encoder_watch import window_ticks
-from transmitter.session.state_observer import StateObserver
 
 
 @dataclass(slots=True)
@@ -64,7 +63,6 @@ class CompiledPoint:
     targets: Any = field(init=False)
     _log: FlightLog | None = field(init=False, default=None)
     _clean: Any = field(init=False, default=None)
-    _observer: StateObserver | None = field(init=False)
     _plant: Any = field(init=False)
     _pushed: bool = field(init=False, default=False)
     """whether the plant has a disturbance, so that every seed has a plant of its own"""
@@ -93,7 +91,6 @@ class CompiledPoint:
         pushes = self._plant.pushes(2)
         self._pushed = len(pushes) > 1
         law, law_constants = law_of(build_controller(config, model=codec.model), signals, tick_s)
-        self._observer = build_observer(agreement)
         self.numbers = Numbers(
             ticks=ticks,
             per_sample=agreement.terms.ticks_per_sample,
@@ -114,7 +111,11 @@ class CompiledPoint:
         self._flight = compiled_flight(codec, signals, law, parts, pushes.shape[1])
         self._start = np.array(parts.start)
         self._timeout_ticks = guard_settings(agreement).timeout_ticks
-        self.steady = signal_arrays(agreement) | recorded_arrays(self._log, self._ahead, signals)
+        self.steady = (
+            signal_arrays(agreement)
+            | observer_arrays(build_observer(agreement))
+            | recorded_arrays(self._log, self._ahead, signals)
+        )
         self._work = work_arrays(codec, signals, self._samples, ticks, self._ahead)
 
     @property
@@ -213,7 +214,6 @@ class CompiledPoint:
             pushes=plant.pushes(self.numbers.ticks),
             targets=self.targets,
             **self.steady,
-            **observer_arrays(self._observer),
         )
 
 

@@ -55,7 +55,7 @@ class FmuPlant:
         self._steps = 0
         self._is_fmi3 = description.fmiVersion.startswith("3")
         folder = fmpy.extract(file)
-        # Also when nobody closes the plant: the folder holds the FMU's unpacked files.
+        # Also for a plant that is never closed: the folder holds the FMU's unpacked files.
         finalize(self, shutil.rmtree, folder, ignore_errors=True)
         self._fmu = fmpy.instantiate_fmu(folder, description, "CoSimulation")
         finalize(self, _end, self._fmu)

@@ -29,7 +29,7 @@ def build_codec(config: FlightConfig, parts: Parts | None = None) -> Codec:
 
 
 def unchecked_codec(config: FlightConfig, parts: Parts | None = None) -> Codec:
-    """Return the codec; whether its rate is enough for its plant nobody has looked yet."""
+    """Return the codec without checking that its rate is enough for its plant."""
     parts = parts or Parts()
     ticks = round(config.timing.symbol_period_s / config.timing.tick_s)
     model = build_model(config, parts)

@@ -114,7 +114,6 @@ class SimulatedLinear:
         return tuple([linear_output(self.state, self.constants, place) for place in self._outputs])
 
     def pushes(self, steps: int) -> Pushes:
-        """Return what disturbs the first steps; see `pushes_of`."""
         return pushes_of(self._disturbances or (None,) * len(self._still), steps)
 
     def advance(self, command: Vector) -> None:

@@ -122,7 +122,6 @@ class OdePlant:
 
     @property
     def measured(self) -> Vector:
-        """The outputs."""
         return self.state[: self._outputs]
 
     def advance(self, command: Vector) -> None:

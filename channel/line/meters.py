@@ -15,7 +15,6 @@ class LatenessMeter:
         self._bins = [0] * (self.BINS + 1)
 
     def add(self, lateness_ns: int) -> None:
-        """Take one lateness."""
         self.count += 1
         self.largest_ns = max(self.largest_ns, lateness_ns)
         self._bins[min(max(lateness_ns, 0) // self.BIN_NS, self.BINS)] += 1

@@ -69,12 +69,10 @@ class _OfOneReference:
         self._controller = controller
 
     def command(self, tick: int, state: tuple[float, ...]) -> tuple[float, ...]:
-        """Return the controller's command."""
         command: tuple[float, ...] = self._controller.command(tick, state)
         return command
 
     def references(self, tick: int) -> tuple[float | None, ...]:
-        """Return the controller's set-point."""
         return (self._controller.reference_rad(tick),)
 
 

@@ -31,7 +31,6 @@ class PidGains:
     unit: str
 
     def __post_init__(self) -> None:
-        """Refuse gains that would push away from the reference, and units that are none."""
         for name in ("proportional", "integral", "derivative"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):

@@ -42,12 +42,10 @@ class Constant(AngleReference):
     tick_s: float
 
     def __post_init__(self) -> None:
-        """Refuse values out of range."""
         _require_finite("level", self.level)
         _require_positive("tick_s", self.tick_s)
 
     def value(self, tick: int) -> float:
-        """Return the level."""
         return self.level
 
 
@@ -59,11 +57,9 @@ class Shifted(AngleReference):
     offset: float
 
     def __post_init__(self) -> None:
-        """Refuse values out of range."""
         _require_finite("offset", self.offset)
 
     def value(self, tick: int) -> float:
-        """Return the set-point at `tick`."""
         return self.offset + self.about.value(tick)
 
 
@@ -76,14 +72,12 @@ class Step(AngleReference):
     tick_s: float
 
     def __post_init__(self) -> None:
-        """Refuse values out of range."""
         _require_finite("amplitude", self.amplitude)
         _require_positive("tick_s", self.tick_s)
         if not (math.isfinite(self.start_s) and self.start_s >= 0.0):
             raise ValueError(f"start_s is {self.start_s}; it must be finite and at least 0")
 
     def value(self, tick: int) -> float:
-        """Return the set-point at `tick`."""
         return self.amplitude if tick >= _first_tick(self.start_s, self.tick_s) else 0.0
 
 
@@ -119,11 +113,9 @@ class Sine(AngleReference):
     tick_s: float
 
     def __post_init__(self) -> None:
-        """Refuse values out of range."""
         _require_wave(self.amplitude, self.period_s, self.tick_s)
 
     def value(self, tick: int) -> float:
-        """Return the set-point at `tick`."""
         return self.amplitude * math.sin(math.tau * tick * self.tick_s / self.period_s)
 
 
@@ -156,7 +148,6 @@ class Csv(AngleReference):
             raise ValueError(f"{path}, line 2: no rows; a reference needs at least 1")
 
     def value(self, tick: int) -> float:
-        """Return the set-point at `tick`."""
         return self._values[max(bisect_right(self._first_ticks, tick) - 1, 0)]
 
 
@@ -176,7 +167,6 @@ class SteeredReference(AngleReference):
         self.by_hand = value
 
     def value(self, tick: int) -> float:
-        """Return the set-point at `tick`."""
         return self._programme.value(tick) if self.by_hand is None else self.by_hand
 
 

@@ -31,7 +31,6 @@ class LinearModel:
 
     @property
     def states(self) -> int:
-        """Return how many states there are."""
         return len(self.cost)
 
 

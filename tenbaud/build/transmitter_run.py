@@ -41,7 +41,6 @@ class TransmitterRun:
 
     @property
     def node(self) -> TransmitterNode:
-        """Return the sensor node."""
         return self.endpoint.node
 
     @property

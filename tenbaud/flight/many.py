@@ -124,7 +124,6 @@ class ManyHost:
         return [_closed(answer, number)]
 
     def ready(self) -> Iterable[tuple[str, Served]]:
-        """Return the services that have become ready since the last call."""
         while self._ready:
             name, served = self._ready.popleft()
             self._opening.discard(name)

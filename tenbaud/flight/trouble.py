@@ -32,7 +32,6 @@ class Certificate:
             self._end_s = end_of(security.credentials.certificate.read_bytes()).timestamp()
 
     def expired(self) -> bool:
-        """Return whether it has expired."""
         return time.time() >= self._end_s
 
     def text(self) -> str:

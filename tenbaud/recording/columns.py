@@ -31,7 +31,6 @@ class Column:
 
     @property
     def is_text(self) -> bool:
-        """Whether the values are texts or None."""
         return self.values.dtype == object
 
 

@@ -86,7 +86,6 @@ class Compared:
 
     @property
     def verdict(self) -> Verdict:
-        """The verdict."""
         if self.differences:
             return Verdict.DIFFERENT
         if self.missing or self.faults or not self.rows:

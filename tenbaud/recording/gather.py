@@ -31,7 +31,6 @@ class OverviewRecorder:
         return channel.topic in FIELDS
 
     def add(self, topic: str, time_ns: int, row: Sequence[object]) -> None:
-        """Keep one row."""
         times, rows = self._rows[topic]
         times.append(time_ns)
         rows.append(row)

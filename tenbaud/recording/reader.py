@@ -220,7 +220,6 @@ class Recording:
         return self.metadata_record(RUN_METADATA)
 
     def metadata_record(self, name: str) -> dict[str, str]:
-        """A metadata record by name; empty if there is none."""
         return self._survey.metadata.get(name, {})
 
     @property

@@ -133,7 +133,6 @@ class Source:
         return self.ticks("transmitter", "tick", name, None)
 
     def applied(self, place: int) -> Series | None:
-        """Return what an input was given."""
         return self.ticks("transmitter", "tick", "applied", place)
 
     def command(self, place: int) -> Series | None:

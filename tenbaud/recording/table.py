@@ -64,7 +64,6 @@ class Table:
 
     @property
     def names(self) -> list[str]:
-        """The names of the columns."""
         return [one.name for one in self.channel.fields]
 
     @property

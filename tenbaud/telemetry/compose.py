@@ -112,7 +112,6 @@ class TransmitterComposer(Composer):
         self._applied: Vector | None = None
 
     def compose(self) -> dict[str, Any]:
-        """Return the message of this moment."""
         run, config, terms = self._run, self.agreement.config, self.agreement.terms
         node, session = run.node, run.node.session
         rows = self.tap.take()
@@ -211,7 +210,6 @@ class ReceiverComposer(Composer):
         self._live = live
 
     def compose(self) -> dict[str, Any]:
-        """Return the message of this moment."""
         session, terms = self._endpoint.session, self.agreement.terms
         rows: list[tuple[str, Row]] = self.tap.take()
         stride = self._stride

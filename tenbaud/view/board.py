@@ -55,7 +55,6 @@ class Board:
         return any(head["takes_commands"] for head in self.heads.values())
 
     def take(self, messages: list[bytes], now_s: float) -> bool:
-        """Take messages in; return whether there is news."""
         for data in messages:
             try:
                 self._one(orjson.loads(data), now_s)

@@ -205,11 +205,9 @@ class GapGauge:
 
     @property
     def whole(self) -> Gap | None:
-        """Return the gauge over all that was flown."""
         return self._gap(self._strength.whole, self._errors.whole)
 
     def row(self, sample: int) -> tuple[object, ...]:
-        """Return the row of `GAP_CHANNEL`."""
         gap = self.now
         return (sample, None, None, None) if gap is None else (sample, *astuple(gap))
 
@@ -239,7 +237,6 @@ class Running(Generic[Number]):
         self._least = period_s / MEMORY_S
 
     def add(self, value: Number) -> None:
-        """Take one number."""
         self.count += 1
         self._sum = self._sum + value
         # A plain mean until there is enough to forget.

@@ -184,11 +184,9 @@ class DeviceRig(Rig):
 
     @property
     def latest(self) -> DeviceSample | None:
-        """Return the newest sample."""
         return self._latest
 
     def angles_rad(self, sample: DeviceSample, axes: list[Axis] | None = None) -> tuple[float, ...]:
-        """Return the angles of these axes, or of all."""
         first = self._first or sample
         chosen = self.axes if axes is None else axes
         return tuple(

@@ -19,7 +19,6 @@ class FakeHILError(Exception):
     """The error of the vendor's package."""
 
     def get_error_message(self) -> str:
-        """Return the text."""
         return str(self)
 
 
@@ -55,7 +54,6 @@ class FakeHIL:
         self.expired = False
 
     def set_card_specific_options(self, options: str, length_max: int) -> None:
-        """Take the options."""
         self.calls.append(f"options {options}")
 
     def write_analog(self, channels: Any, count: int, volts: Any) -> None:
@@ -76,7 +74,6 @@ class FakeHIL:
         self.digital.update(zip((int(one) for one in channels), map(int, states), strict=True))
 
     def task_create_encoder_reader(self, samples_in_buffer: int, channels: Any, count: int) -> int:
-        """Return a task."""
         self.calls.append("create")
         return 1
 
@@ -84,7 +81,6 @@ class FakeHIL:
         """Take the mode."""
 
     def task_start(self, task: int, clock: Any, frequency: float, samples: int) -> None:
-        """Start the hardware clock."""
         self.calls.append("start")
         self._period_s = 1.0 / frequency
         self._due = time.monotonic()
@@ -103,11 +99,9 @@ class FakeHIL:
         return 1
 
     def task_stop(self, task: int) -> None:
-        """Stop the clock."""
         self.calls.append("stop")
 
     def task_delete(self, task: int) -> None:
-        """Forget the task."""
         self.calls.append("delete")
 
     def watchdog_set_analog_expiration_state(self, channels: Any, count: int, volts: Any) -> None:
@@ -115,7 +109,6 @@ class FakeHIL:
         raise FakeHILError("not supported by this card")
 
     def watchdog_start(self, timeout_s: float) -> None:
-        """Start it."""
         self._watchdog_s, self._fed = timeout_s, time.monotonic()
 
     def watchdog_reload(self) -> bool:
@@ -129,11 +122,9 @@ class FakeHIL:
         self.expired, self._watchdog_s = False, None
 
     def watchdog_stop(self) -> None:
-        """Stop it."""
         self._watchdog_s = None
 
     def close(self) -> None:
-        """Give the board back."""
         self._look()
         self.calls.append("close")
         self.closed = True

@@ -227,7 +227,6 @@ class SerialBridge(DeviceRig):
         return " and not one byte that could be one: is it the right port, and the device running?"
 
     def figures(self) -> dict[str, object]:
-        """Return every count of device, line and format."""
         return {
             **super().figures(),
             **self._format.counts,

@@ -77,7 +77,6 @@ class Copies:
 
     @property
     def next_sample(self) -> int:
-        """Return the sample whose word is to be sent next."""
         return self.confirmed.sample + len(self._sent)
 
     @property

@@ -100,9 +100,7 @@ class OpenLoopZoomCoder(FunctionCoder):
         return (self.parameters.initial_range,) * self.axes
 
     def is_state(self, coder: Vector) -> bool:
-        """Return whether these are ranges."""
         return all(0.0 <= value < STATE_MAX for value in coder)
 
     def ranges(self, coder: Vector) -> Vector:
-        """Return the range `M_k` of each axis."""
         return coder

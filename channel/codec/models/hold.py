@@ -29,9 +29,7 @@ class HoldModel:
         return (0.0, 0.0)
 
     def measured(self, state: Vector) -> Vector:
-        """Return the angle, the one measured axis."""
         return state[:1]
 
     def tick(self, state: Vector, command: Vector, held: Vector) -> Vector:
-        """Advance by one tick; see `hold_tick`."""
         return hold_tick(state, command, held, self.constants)

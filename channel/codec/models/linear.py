@@ -109,11 +109,9 @@ class LinearModel:
         )
 
     def initial(self) -> Vector:
-        """Return the state that both ends start from."""
         return self._start
 
     def measured(self, state: Vector) -> Vector:
-        """Return the outputs."""
         constants = self.constants
         return tuple([linear_output(state, constants, place) for place in range(len(self.outputs))])
 

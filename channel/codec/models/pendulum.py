@@ -70,9 +70,7 @@ class PendulumModel:
         return (0.0, 0.0)
 
     def measured(self, state: Vector) -> Vector:
-        """Return the angle, the one output."""
         return state[:1]
 
     def tick(self, state: Vector, command: Vector, held: Vector) -> Vector:
-        """Advance by one tick; see `pendulum_tick`."""
         return pendulum_tick(state, command, held, self.constants)

@@ -44,7 +44,6 @@ class _Direction:
         return QUEUE_BYTES_MAX - len(self._queue)
 
     def put(self, data: bytes, now: float) -> None:
-        """Put bytes on the line."""
         if not self._queue:
             self._due = now + self._byte_s
         self._queue += data

@@ -38,7 +38,6 @@ class SerialKind(LinkKind):
         return settings.downlink == ZENOH
 
     def where(self, settings: LinkSettings) -> tuple[str, ...]:
-        """Return the ports."""
         return tuple(filter(None, (settings.port, settings.downlink)))
 
     def check(self, settings: LinkSettings, insecure: bool) -> None:

@@ -101,7 +101,6 @@ class ZenohLink(Link):
         self.counts.bytes_out += len(data)
 
     def receive(self, timeout_s: float) -> bytes | None:
-        """Return the next message, or None after `timeout_s` seconds."""
         data = self._inbox.get(timeout_s)
         if data is None:
             return None

@@ -64,7 +64,6 @@ class ZenohRouter:
         return len(list(self._session.info.transports()))
 
     def close(self) -> None:
-        """Stop routing; may be called more than once."""
         self._parts.close()
 
     def __enter__(self) -> Self:

@@ -43,7 +43,6 @@ class _Handled:
     handle = -1
 
     def wait(self, timeout_s: float) -> None:
-        """Wait for bytes."""
         _wait(self.handle, timeout_s)
 
     def read(self) -> bytes:
@@ -87,7 +86,6 @@ class SerialLine(_Handled):
         os.set_blocking(self.handle, False)
 
     def unplug(self) -> None:
-        """Close it."""
         self.handle = -1
         self._port.close()
 
@@ -136,7 +134,6 @@ class TcpLine:
         _wait(-1 if handle is None else handle.fileno(), timeout_s)
 
     def read(self) -> bytes:
-        """Return what has come."""
         if self._peer is None and not self._meet():
             return b""
         assert self._peer is not None

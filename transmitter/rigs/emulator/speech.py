@@ -58,12 +58,10 @@ class CobsSpeech:
         self._cutter = Cutter(b"\0", COMMAND_BYTES_MAX)
 
     def encode(self, sample: RawSample) -> bytes:
-        """Return a SAMPLE frame."""
         sequence, time_us = (sample.sequence or 0) & 0xFFFF, (sample.device_us or 0) & 0xFFFFFFFF
         return seal(SAMPLE.pack(SAMPLE_TYPE, sample.flags, sequence, time_us, *sample.counts))
 
     def feed(self, data: bytes) -> tuple[list[DeviceCommand], int]:
-        """Return the COMMAND frames."""
         commands = []
         for piece in self._cutter.feed(data):
             try:
@@ -90,7 +88,6 @@ class AsciiSpeech:
         self._rest = b""
 
     def encode(self, sample: RawSample) -> bytes:
-        """Return a sample line."""
         cells = list(sample.counts)
         if self._form == "counts":
             return " ".join(map(str, cells)).encode() + b"\r\n"
@@ -183,7 +180,6 @@ class DoublesSpeech:
         self._rest = b""
 
     def encode(self, sample: RawSample) -> bytes:
-        """Return one unit."""
         known: dict[str, float] = {
             "seq": sample.sequence or 0,
             "time_s": (sample.device_us or 0) / 1e6,

@@ -34,8 +34,10 @@ def compare_ends(first: Recording, second: Recording, compared: Compared) -> Non
     if not _is_transmitter(first) and _is_transmitter(second):
         ends.reverse()
     upper, lower = ends
-    # An end that recorded no sample at all cannot be checked, and `schema` says so.
-    names = [[field.name for field in end.schema(TOPIC).fields if not field.timing] for end in ends]
+    # An end that recorded no sample at all cannot be checked, and `topic` says so.
+    names = [
+        [field.name for field in end.topic(TOPIC).channel.fields if not field.timing] for end in ends
+    ]
     fields = [name for name in names[0] if name in names[1]]
     shared = set(_epochs(upper)) & set(_epochs(lower))
     walk = _Walk(upper, lower, shared, fields, compared)

@@ -87,7 +87,7 @@ def _check_whole(recording: Recording, compared: Compared) -> None:
     end = recording.metadata_record(END_METADATA)
     if not recording.complete:
         compared.faults.append(f"{recording.path} was cut or damaged: rows after that are missing")
-    held = sum(topic.rows for topic in recording.topics.values())
+    held = sum(len(topic) for topic in recording.topics.values())
     written = end.get("rows_written", "")
     if written.isdecimal() and int(written) != held:
         compared.faults.append(f"{recording.path} holds {held} rows of {written} that were written")
@@ -99,7 +99,7 @@ def _check_whole(recording: Recording, compared: Compared) -> None:
 
 def _compare_files(first: Recording, second: Recording, compared: Compared) -> None:
     for topic in sorted((first.topics.keys() | second.topics.keys()) - {IGNORED_TOPIC}):
-        channels = [side.schema(topic) for side in (first, second) if topic in side.topics]
+        channels = [side.topics[topic].channel for side in (first, second) if topic in side.topics]
         _compare_topic(first, second, channels[0], _fields(channels), compared)
 
 

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from channel.codec.signals import Signals, unit_row, unit_suffix
-from tenbaud.recording.table import Series, Table, Tables
+from tenbaud.recording.reader import Recording
+from tenbaud.recording.table import Series, Table
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,8 +97,8 @@ class Source:
     """The sources of signals. An end that was not recorded is None."""
 
     base: TimeBase
-    transmitter: Tables | None
-    receiver: Tables | None
+    transmitter: Recording | None
+    receiver: Recording | None
 
     def ticks(self, end: str, topic: str, name: str, axis: int | None) -> Series | None:
         """Return a per-tick field on the time base; None where it was not recorded."""
@@ -177,8 +178,8 @@ class Source:
         return held
 
     def _table(self, end: str, topic: str) -> Table | None:
-        tables = self.transmitter if end == "transmitter" else self.receiver
-        return tables.topics.get(topic) if tables is not None else None
+        recording = self.transmitter if end == "transmitter" else self.receiver
+        return recording.topics.get(topic) if recording is not None else None
 
     def _column(self, end: str, topic: str, name: str, axis: int | None) -> tuple[Table, Series] | None:
         table = self._table(end, topic)

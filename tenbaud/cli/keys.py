@@ -51,9 +51,7 @@ def init(folder: Folder = DEFAULT_FOLDER) -> None:
 @app.command()
 def add(
     name: Name,
-    role: Annotated[
-        str | None, typer.Option(help="transmitter, receiver, router or viewer.", show_default=False)
-    ] = None,
+    role: Annotated[str | None, typer.Option(help="transmitter, receiver, router or viewer.")] = None,
     host: Hosts = None,
     days: Days = 365.0,
     folder: Folder = DEFAULT_FOLDER,

@@ -133,9 +133,7 @@ def recover(
 
 OtherRun = Annotated[
     Path | None,
-    typer.Argument(
-        help="Run folder of the other machine, if each recorded its own end.", show_default=False
-    ),
+    typer.Argument(help="Run folder of the other machine, if each recorded its own end."),
 ]
 
 

@@ -25,13 +25,11 @@ def sweep(
     ] = None,
     workers: Annotated[
         int | None,
-        typer.Option(
-            min=1, max=1024, help="Processes on this machine; default: all cores.", show_default=False
-        ),
+        typer.Option(min=1, max=1024, help="Processes on this machine; default: all cores."),
     ] = None,
     scheduler: Annotated[
         str | None,
-        typer.Option(help="Dask scheduler to fly on, such as tcp://HOST:8786.", show_default=False),
+        typer.Option(help="Dask scheduler to fly on, such as tcp://HOST:8786."),
     ] = None,
     seeds: Annotated[
         int | None,

@@ -30,7 +30,7 @@ from tenbaud.recording.folder import open_new_recording
 from tenbaud.recording.shared import SharedWriter
 
 if TYPE_CHECKING:
-    from tenbaud.recording.gather import OverviewRecorder
+    from tenbaud.recording.overview import OverviewRecorder
 
 PROFILE = "tenbaud"
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from channel.codec.models.pitch import PITCH_SIGNALS
-from tenbaud.recording.gather import OverviewRecorder
+from tenbaud.recording.overview import OverviewRecorder
 from tenbaud.recording.reader import stored_metadata
 from tenbaud.recording.writer import McapRecorder
 from tests.tenbaud.processes import REPOSITORY

@@ -42,7 +42,6 @@ class PitchParameters:
     volts_max: float = 5.0
 
     def __post_init__(self) -> None:
-        """Refuse constants that make no plant."""
         for name in ("rate_damping_per_s", "stiffness_per_s2"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
@@ -194,12 +193,10 @@ class PitchPlant:
         return self._state
 
     def pushes(self, steps: int) -> Pushes:
-        """Return the torques of the first steps; see `pushes_of`."""
         return pushes_of((self._disturbance,), steps)
 
     @property
     def measured(self) -> tuple[float, ...]:
-        """The one angle the encoder sees."""
         return (self._state[0],)
 
     def advance(self, volts: tuple[float, ...]) -> None:

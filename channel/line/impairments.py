@@ -55,7 +55,6 @@ class Impairments:
 
     @property
     def any(self) -> bool:
-        """Return whether anything is set."""
         return self != Impairments()
 
     def is_cut(self, now_ns: int) -> bool:
@@ -75,7 +74,6 @@ class LineFaults:
 
     @property
     def any(self) -> bool:
-        """Return whether anything is set."""
         return self != LineFaults()
 
     @property

@@ -62,7 +62,6 @@ class Outbox:
         self._order = 0
 
     def __len__(self) -> int:
-        """Return how many messages wait."""
         return len(self._waiting)
 
     @property

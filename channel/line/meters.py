@@ -40,7 +40,6 @@ class BaudMeter:
         self._last_ns = 0
 
     def on_symbol(self, now_ns: int) -> None:
-        """Count one symbol that arrived in time."""
         if self.symbols == 0:
             self._first_ns = now_ns
         self._last_ns = now_ns

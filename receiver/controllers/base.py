@@ -30,7 +30,6 @@ class ControllerContext:
 
     @property
     def reference(self) -> Any:
-        """Return the set-point of the first output."""
         return self.references[0] or Constant(0.0, self.tick_s)
 
     @property

@@ -165,7 +165,6 @@ class PidLoops:
         self._last_tick: int | None = None
 
     def references(self, tick: int) -> tuple[float | None, ...]:
-        """Return the set-point of each output at `tick`."""
         found: list[float | None] = [None] * self._outputs
         for loop in self.loops:
             found[loop.output] = loop.reference.value(tick)

@@ -93,11 +93,9 @@ class Square(AngleReference):
     tick_s: float
 
     def __post_init__(self) -> None:
-        """Refuse values out of range."""
         _require_wave(self.amplitude, self.period_s, self.tick_s)
 
     def value(self, tick: int) -> float:
-        """Return the set-point at `tick`."""
         half_periods = tick * self.tick_s / (0.5 * self.period_s)
         tolerance = _TICK_TOLERANCE * self.tick_s / self.period_s
         odd = math.floor(half_periods + tolerance) % 2

@@ -56,7 +56,6 @@ class Place(NamedTuple):
     """such as `sample 77`"""
 
     def leak(self, field: str, what: str, detail: str = "") -> None:
-        """Note something wrong."""
         self.findings.add(False, self, field, what, detail)
 
     def gap(self, field: str, what: str, detail: str = "") -> None:
@@ -93,12 +92,10 @@ class Evidence:
 
     @property
     def agreement(self) -> Agreement:
-        """The agreement of both ends."""
         return self.record.agreement
 
     @property
     def terms(self) -> Terms:
-        """The timing that they agreed on."""
         return self.record.agreement.terms
 
     @property

@@ -45,5 +45,4 @@ class TransmitterRun:
 
     @property
     def uplink(self) -> Uplink:
-        """Return its way out."""
         return self.endpoint.uplink

@@ -35,7 +35,6 @@ class Certificate:
         return time.time() >= self._end_s
 
     def text(self) -> str:
-        """Return what to do about it."""
         when = time.strftime("%Y-%m-%d %H:%M:%S", time.gmtime(self._end_s))
         return (
             f"the certificate of {self._name} expired in flight, at {when} UTC; where the authority "

@@ -234,7 +234,6 @@ class Recording:
 
     @property
     def topics(self) -> dict[str, Table]:
-        """The topics, in the order of their first row."""
         return self._survey.topics
 
     def topic(self, name: str) -> Table:

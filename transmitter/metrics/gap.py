@@ -192,7 +192,6 @@ class GapGauge:
             self._strength.add(done, measured.popleft()[1])
 
     def on_errors(self, errors: Vector) -> None:
-        """Take the live errors of a tick."""
         total = 0.0
         for weight, error in zip(self._limit.weights, errors, strict=True):
             total += weight * error * error

@@ -95,7 +95,6 @@ class Scores:
         self._references = lambda _tick: ()
 
     def on_word(self, word: Word, about: tuple[int, ...] | None) -> None:
-        """Note a confirmed word and what its symbols were about."""
         self.last_words.append((word, about))
         for place in about or ():
             self.outputs[place].symbols += 1

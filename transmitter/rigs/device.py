@@ -204,7 +204,6 @@ class DeviceRig(Rig):
     # The reader's side
 
     def _take(self, raw: RawSample, host_ns: int) -> None:
-        """Take one sample from the reader thread."""
         needed = max(axis.channel for axis in self.axes) + 1
         if len(raw.counts) < needed:
             self.counts["short_samples"] += 1

@@ -69,7 +69,6 @@ class FakeHIL:
             self._moving_since = time.monotonic()
 
     def write_digital(self, channels: Any, count: int, states: Any) -> None:
-        """Switch digital outputs."""
         self.calls.append(f"digital {[int(state) for state in states]} at {self.analog[:2]}")
         self.digital.update(zip((int(one) for one in channels), map(int, states), strict=True))
 
@@ -118,7 +117,6 @@ class FakeHIL:
         return not self.expired
 
     def watchdog_clear(self) -> None:
-        """Allow access again."""
         self.expired, self._watchdog_s = False, None
 
     def watchdog_stop(self) -> None:

@@ -64,7 +64,6 @@ class BytePort:
 
     @property
     def is_open(self) -> bool:
-        """Return whether there is a device at present."""
         return self._port is not None
 
     def reopen(self) -> bool:
@@ -119,7 +118,6 @@ class BytePort:
             return False
 
     def close(self) -> None:
-        """Give the port back."""
         port, self._port = self._port, None
         if port is not None:
             # What was written last says that the motors are off: let it out before the port closes.

@@ -104,7 +104,6 @@ class ReplayRig(Rig):
         self._encoders = encoders
 
     def read(self, tick: int) -> Reading | None:
-        """Return the row of a tick, None past the last."""
         if tick >= len(self._log):
             return None
         counts = self._log.counts[tick]

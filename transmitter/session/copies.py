@@ -95,7 +95,6 @@ class Copies:
         return self._provisional
 
     def sent(self, word: Word) -> None:
-        """Note the word that was sent for `next_sample`."""
         self._sent.append(word)
 
     def skip_to(self, sample: int) -> int:

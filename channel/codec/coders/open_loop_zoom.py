@@ -71,7 +71,6 @@ class OpenLoopZoomCoder(SignCoder):
         self.constants = OpenLoopZoomConstants(parameters.decay, floor, parameters.gains)
 
     def initial(self) -> Vector:
-        """Return `M_0` for every axis."""
         return (self.parameters.initial_range,) * self.axes
 
     def is_state(self, coder: Vector) -> bool:

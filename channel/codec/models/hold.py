@@ -25,7 +25,6 @@ class HoldModel:
         self.constants: Vector = (tick_s,)
 
     def initial(self) -> Vector:
-        """Return the body at angle zero, at rest."""
         return (0.0, 0.0)
 
     def measured(self, state: Vector) -> Vector:

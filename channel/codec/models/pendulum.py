@@ -66,7 +66,6 @@ class PendulumModel:
         self.constants: Vector = (growth, damping_per_s, torque_gain_rad_per_v_s2, context.tick_s)
 
     def initial(self) -> Vector:
-        """Return the pendulum upright and at rest."""
         return (0.0, 0.0)
 
     def measured(self, state: Vector) -> Vector:

@@ -108,7 +108,6 @@ class EmulatedLine:
         self.unplug()
 
     def carried(self, way: Way) -> int:
-        """Return how many bytes have gone in this direction."""
         with self._lock:  # else a byte may be read at its end before it is counted
             return self._ways[way].carried
 

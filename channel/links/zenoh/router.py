@@ -60,7 +60,6 @@ class ZenohRouter:
 
     @property
     def connected(self) -> int:
-        """Return how many nodes are connected now."""
         return len(list(self._session.info.transports()))
 
     def close(self) -> None:

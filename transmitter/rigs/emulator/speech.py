@@ -145,7 +145,6 @@ class QsbSpeech(Speech):
         self._stamped = False
 
     def encode(self, sample: RawSample) -> bytes:
-        """Return the counter as the adapter streams it."""
         text = f"s0E{sample.counts[1] & 0xFFFFFFFF:08X}"
         if self._stamped:
             text += f"{(sample.device_us or 0) // STAMP_US & 0xFFFFFFFF:08X}"

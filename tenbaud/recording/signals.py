@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +21,16 @@ from tenbaud.recording.table import Series, Table
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """One signal: values on the common time base, their unit and what they mean."""
+    """One signal or column: float64 values (NaN where there is none), whole numbers, or texts."""
 
     name: str
-    values: Series
-    unit: str
-    description: str
+    values: NDArray[Any]
+    unit: str = ""
+    description: str = ""
+
+    @property
+    def is_text(self) -> bool:
+        return self.values.dtype == object
 
     @property
     def column(self) -> str:

@@ -49,11 +49,6 @@ class Board:
         self._index = 0
         self._fresh = self._nothing()
 
-    @property
-    def takes_commands(self) -> bool:
-        """Return whether the flight shown may be steered."""
-        return any(head["takes_commands"] for head in self.heads.values())
-
     def take(self, messages: list[bytes], now_s: float) -> bool:
         for data in messages:
             try:

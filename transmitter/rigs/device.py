@@ -46,31 +46,33 @@ class DeviceSettings:
     """False: never send a command, not even a zero"""
 
 
-class DeviceRig(Rig):
-    """Base of the rigs that talk to a device.
+@dataclass(frozen=True, slots=True)
+class Wiring:
+    """What hangs on a device, and within which limits it is used."""
 
-    `axes` are all encoders; `measured` are the names of those that the codec measures, in its order.
-    """
+    axes: tuple[Axis, ...]
+    """all encoders"""
+    measured: tuple[str, ...]
+    """names of those that the codec measures, in its order"""
+    motors: Motors
+    settings: DeviceSettings
+
+
+class DeviceRig(Rig):
+    """Base of the rigs that talk to a device."""
 
     is_real = True
     ramps_down = True
 
-    def __init__(
-        self,
-        axes: tuple[Axis, ...],
-        measured: tuple[str, ...],
-        motors: Motors,
-        settings: DeviceSettings,
-        wraps: Wraps,
-    ) -> None:
-        self.axes = axes
-        self.motors = motors
-        self.settings = settings
+    def __init__(self, wiring: Wiring, wraps: Wraps) -> None:
+        axes = self.axes = wiring.axes
+        self.motors = wiring.motors
+        self.settings = wiring.settings
         self.timeline = Timeline(wraps)
         self.counts: Counter[str] = Counter()
         """reads, samples_skipped, writes, writes_lost, sign_reversals"""
         self.hard_fault: str | None = None
-        self._measured = [axis for name in measured for axis in axes if axis.name == name]
+        self._measured = [axis for name in wiring.measured for axis in axes if axis.name == name]
         self._first: DeviceSample | None = None
         self._latest: DeviceSample | None = None
         self._arrived = threading.Condition()

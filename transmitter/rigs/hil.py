@@ -16,9 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from transmitter.rigs.axes import Axis, Motors
 from transmitter.rigs.base import RigError
-from transmitter.rigs.device import DeviceRig, DeviceSettings
+from transmitter.rigs.device import DeviceRig, Wiring
 from transmitter.rigs.formats.samples import RawSample, Wraps
 
 FAKE_CARD = "fake"
@@ -80,13 +79,10 @@ class HilRig(DeviceRig):
     def __init__(
         self,
         hil: HilSettings,
-        axes: tuple[Axis, ...],
-        measured: tuple[str, ...],
-        motors: Motors,
-        settings: DeviceSettings,
+        wiring: Wiring,
         library: HilLibrary | None = None,
     ) -> None:
-        super().__init__(axes, measured, motors, settings, Wraps(1 << 62, 1 << 62))
+        super().__init__(wiring, Wraps(1 << 62, 1 << 62))
         self.name = f"Quanser {hil.card_type} {hil.card_identifier}"
         self._hil = hil
         self._library = library
@@ -94,7 +90,7 @@ class HilRig(DeviceRig):
         self._task: Any = None
         self._watchdog = False
         self._switched_on = False
-        self._wanted: tuple[float, ...] = motors.off()
+        self._wanted: tuple[float, ...] = wiring.motors.off()
         self._wanted_enable = False
         self._wanted_ns = 0
         self._encoders = np.array(hil.encoder_channels, dtype=np.uint32)

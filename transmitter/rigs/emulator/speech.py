@@ -21,6 +21,7 @@ from transmitter.rigs.formats.cobs import (
     seal,
     unseal,
 )
+from transmitter.rigs.formats.doubles import doubles
 from transmitter.rigs.formats.qsb import STAMP_US
 from transmitter.rigs.formats.samples import RawSample
 
@@ -173,13 +174,12 @@ class DoublesSpeech(Speech):
         self, fields: tuple[str, ...], commands: tuple[str, ...], byte_order: str, scale: float
     ) -> None:
         super().__init__()
-        mark = "<" if byte_order == "little" else ">"
         self._fields = fields
         self._commands = commands
         self._scale = scale
         """turns a pitch count into the unit that is sent"""
-        self._out = struct.Struct(f"{mark}{len(fields)}d")
-        self._in = struct.Struct(f"{mark}{len(commands)}d")
+        self._out = doubles(len(fields), byte_order)
+        self._in = doubles(len(commands), byte_order)
 
     def encode(self, sample: RawSample) -> bytes:
         known: dict[str, float] = {

@@ -18,7 +18,23 @@ from tenbaud.config.kinds import Kind
 from tenbaud.config.section import AngleRange, Factor, KindSection, NotNegative, Positive
 
 
-class ZoomCoderSection(KindSection):
+class _GainsSection(KindSection):
+    correction: Literal["held", "impulse"] = "held"
+    """held over the sample as in (22), or added to the state at once"""
+    gains: tuple[Factor, Factor] = (4.1, 8.6)
+    """l1 and l2 of (23): 1/s and 1/s^2 when held, per unit when impulse"""
+
+
+class OpenLoopZoomCoderSection(_GainsSection):
+    """One sign per sample and a range that shrinks with time: time-based zooming."""
+
+    kind: Literal["open-loop-zoom"] = "open-loop-zoom"
+    initial_range_rad: AngleRange = 0.5
+    minimum_range_rad: AngleRange = 0.05
+    decay: Annotated[float, Field(ge=1e-6, le=1.0)] = 0.95
+
+
+class ZoomCoderSection(_GainsSection):
     """The paper's coder (16)-(22) and the observer gains."""
 
     kind: Literal["zoom"] = "zoom"
@@ -27,41 +43,22 @@ class ZoomCoderSection(KindSection):
     initial_range_rad: AngleRange = 0.5
     minimum_range_rad: AngleRange = 0.05
     decay: Annotated[float, Field(ge=1e-6, le=1.0)] = 0.95
-    correction: Literal["held", "impulse"] = "held"
-    """held over the sample as in (22), or added to the state at once"""
-    gains: tuple[Factor, Factor] = (4.1, 8.6)
-    """l1 and l2 of (23): 1/s and 1/s^2 when held, per unit when impulse"""
 
 
-class FixedCoderSection(KindSection):
+class FixedCoderSection(_GainsSection):
     """One sign per sample and a range that never changes."""
 
     kind: Literal["fixed"] = "fixed"
     range_rad: AngleRange = 0.1
-    correction: Literal["held", "impulse"] = "held"
-    gains: tuple[Factor, Factor] = (4.1, 8.6)
 
 
-class OpenLoopZoomCoderSection(KindSection):
-    """One sign per sample and a range that shrinks with time: time-based zooming."""
-
-    kind: Literal["open-loop-zoom"] = "open-loop-zoom"
-    initial_range_rad: AngleRange = 0.5
-    minimum_range_rad: AngleRange = 0.05
-    decay: Annotated[float, Field(ge=1e-6, le=1.0)] = 0.95
-    correction: Literal["held", "impulse"] = "held"
-    gains: tuple[Factor, Factor] = (4.1, 8.6)
-
-
-class StaticCoderSection(KindSection):
+class StaticCoderSection(_GainsSection):
     """The measurement itself in a few bits, without memory (16)."""
 
     kind: Literal["static"] = "static"
     bits: Annotated[int, Field(ge=1, le=15)] = 1
     range_rad: AngleRange = 3.141592653589793
     """half the width that the cells cover"""
-    correction: Literal["held", "impulse"] = "held"
-    gains: tuple[Factor, Factor] = (4.1, 8.6)
 
 
 class PcmCoderSection(KindSection):

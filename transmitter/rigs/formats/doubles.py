@@ -22,7 +22,7 @@ WRAPS = Wraps(sequence=1 << 53, device_us=1 << 62)
 
 
 def doubles(count: int, byte_order: str) -> struct.Struct:
-    """Return the layout of so many doubles."""
+    """Return the layout of `count` doubles in a row."""
     return struct.Struct(f"{'<' if byte_order == 'little' else '>'}{count}d")
 
 

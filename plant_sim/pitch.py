@@ -165,10 +165,7 @@ class PitchPlant:
 
         `sine` is `math.sin` or one whose bits do not depend on the machine.
         """
-        for name, value in (
-            ("initial_angle_rad", initial_angle_rad),
-            ("initial_rate", initial_rate),
-        ):
+        for name, value in (("initial_angle_rad", initial_angle_rad), ("initial_rate", initial_rate)):
             if not math.isfinite(value):
                 raise ValueError(f"{name} is {value}; it must be finite")
         self.constants = pitch_constants(parameters, step_s)

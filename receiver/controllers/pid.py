@@ -45,11 +45,7 @@ class PidGains:
                 + (" or per deg, such as 'V/rad' or 'V/deg'" if output_unit == "rad" else "")
             )
         scale = math.degrees(1.0) if over != output_unit else 1.0
-        return (
-            self.proportional * scale,
-            self.integral * scale * tick_s,
-            self.derivative * scale,
-        )
+        return (self.proportional * scale, self.integral * scale * tick_s, self.derivative * scale)
 
 
 # The paper prints no unit. In V/rad the loop cannot reach the reference at all; in V/deg it behaves

@@ -61,12 +61,7 @@ class ManyHost:
     """
 
     def __init__(
-        self,
-        hub: ZenohHub,
-        agreement_of: AgreementOf,
-        root: Path,
-        rigs_max: int,
-        log: Log,
+        self, hub: ZenohHub, agreement_of: AgreementOf, root: Path, rigs_max: int, log: Log
     ) -> None:
         self._hub = hub
         self._agreement_of = agreement_of

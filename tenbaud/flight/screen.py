@@ -149,11 +149,7 @@ def _lockstep(status: Status) -> Text:
 
 def _counts(status: Status) -> str:
     words = []
-    for name, form in (
-        ("baud", "{:.2f} baud"),
-        ("erasures", "{} erased"),
-        ("guard", "guard {}"),
-    ):
+    for name, form in (("baud", "{:.2f} baud"), ("erasures", "{} erased"), ("guard", "guard {}")):
         if status.get(name) is not None:
             words.append(form.format(status[name]))
     return "  ".join(words)

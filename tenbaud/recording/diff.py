@@ -112,11 +112,7 @@ def _fields(channels: list[RecordChannel]) -> list[str]:
 
 
 def _compare_topic(
-    first: Recording,
-    second: Recording,
-    channel: RecordChannel,
-    fields: list[str],
-    compared: Compared,
+    first: Recording, second: Recording, channel: RecordChannel, fields: list[str], compared: Compared
 ) -> None:
     topic, key_name = channel.topic, channel.fields[0].name
     left, right = _keyed(first, topic, key_name), _keyed(second, topic, key_name)

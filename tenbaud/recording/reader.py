@@ -19,13 +19,7 @@ from mcap.records import Channel, Footer, Metadata, MetadataIndex, Schema
 from mcap.writer import MCAP0_MAGIC
 
 from channel.protocol.recording import RecordChannel
-from tenbaud.recording.chunks import (
-    Damage,
-    Described,
-    RawMessage,
-    metadata_at,
-    summary_of_file,
-)
+from tenbaud.recording.chunks import Damage, Described, RawMessage, metadata_at, summary_of_file
 from tenbaud.recording.encoding import END_METADATA, RUN_METADATA, channel_from_schema
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.holes import HOLES_METADATA, Hole, HoleFinder, unpacked_holes

@@ -41,11 +41,7 @@ GAP_CHANNEL = RecordChannel(
         Field("density", "number", "", "density q of the first disturbance; of a torque in rad^2/s^3"),
         # Which errors have come by then depends on when echoes came.
         Field(
-            "rms_over_floor",
-            "number",
-            "",
-            "running rms of the live error over its floor",
-            timing=True,
+            "rms_over_floor", "number", "", "running rms of the live error over its floor", timing=True
         ),
         Field("ideal_bits", "number", "bit", "an ideal code's, for the same error", timing=True),
     ),

@@ -57,12 +57,7 @@ def load_library(card_type: str) -> HilLibrary:
 
         return HilLibrary(FakeHIL, FakeHILError, 0, 2)
     try:
-        from quanser.hardware import (  # type: ignore[import-not-found]
-            HIL,
-            BufferOverflowMode,
-            Clock,
-            HILError,
-        )
+        from quanser.hardware import HIL, BufferOverflowMode, Clock, HILError  # type: ignore[import-not-found]
     except ImportError as error:
         raise RigError(
             "the package quanser.hardware is not installed. It is Quanser's own and comes with its "
@@ -76,12 +71,7 @@ def load_library(card_type: str) -> HilLibrary:
 class HilRig(DeviceRig):
     """Encoders and analogue outputs of one board; every call to it comes from one thread."""
 
-    def __init__(
-        self,
-        hil: HilSettings,
-        wiring: Wiring,
-        library: HilLibrary | None = None,
-    ) -> None:
+    def __init__(self, hil: HilSettings, wiring: Wiring, library: HilLibrary | None = None) -> None:
         super().__init__(wiring, Wraps(1 << 62, 1 << 62))
         self.name = f"Quanser {hil.card_type} {hil.card_identifier}"
         self._hil = hil

@@ -221,8 +221,4 @@ class SerialBridge(DeviceRig):
         return " and not one byte that could be one: is it the right port, and the device running?"
 
     def figures(self) -> dict[str, object]:
-        return {
-            **super().figures(),
-            **self._format.counts,
-            "reconnects": self._port.reconnects,
-        }
+        return {**super().figures(), **self._format.counts, "reconnects": self._port.reconnects}

@@ -88,10 +88,7 @@ class EmulatedLine:
     def __init__(self, folder: Path, rate_baud: float | None = 115_200) -> None:
         self.transmitter_port = folder / "transmitter"
         self.receiver_port = folder / "receiver"
-        self._ways: dict[Way, _Direction] = {
-            "up": _Direction(rate_baud),
-            "down": _Direction(rate_baud),
-        }
+        self._ways: dict[Way, _Direction] = {"up": _Direction(rate_baud), "down": _Direction(rate_baud)}
         self._ends = (PseudoTerminal(self.transmitter_port), PseudoTerminal(self.receiver_port))
         self._lock = threading.Lock()
         self._stop = threading.Event()

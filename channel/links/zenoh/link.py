@@ -40,12 +40,7 @@ class ZenohLink(Link):
     name = "zenoh"
 
     def __init__(
-        self,
-        role: Role,
-        session_name: str,
-        *,
-        best_effort: bool = False,
-        **node: Unpack[NodeOptions],
+        self, role: Role, session_name: str, *, best_effort: bool = False, **node: Unpack[NodeOptions]
     ) -> None:
         super().__init__()
         if not is_session_name(session_name):

@@ -13,13 +13,7 @@ from typing import Self
 from channel.errors import LinkError
 from channel.links.endpoints import check_endpoints
 from channel.links.security import Security
-from channel.links.zenoh.config import (
-    SESSIONS_MAX,
-    as_file,
-    open_session,
-    zenoh_config,
-    zenoh_settings,
-)
+from channel.links.zenoh.config import SESSIONS_MAX, as_file, open_session, zenoh_config, zenoh_settings
 from channel.links.zenoh.gate import Gate
 
 

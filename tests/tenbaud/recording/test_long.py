@@ -63,9 +63,9 @@ def test_the_stored_overview_of_a_long_flight_is_that_of_its_rows(
 ) -> None:
     import numpy as np
 
-    from tenbaud.recording import figure, gather
+    from tenbaud.recording import figure, overview
 
-    monkeypatch.setattr(gather, "ROWS_OF_LONG_FLIGHT", 50_000)
+    monkeypatch.setattr(overview, "ROWS_OF_LONG_FLIGHT", 50_000)
     path = tmp_path / "transmitter.mcap"
     with McapRecorder(
         path, {}, wait_when_full=True, overview=OverviewRecorder(PITCH_SIGNALS)

@@ -25,10 +25,13 @@ class HoldModel:
         self.constants: Vector = (tick_s,)
 
     def initial(self) -> Vector:
+        """Return the body at angle zero, at rest."""
         return (0.0, 0.0)
 
     def measured(self, state: Vector) -> Vector:
+        """Return the angle, the one measured axis."""
         return state[:1]
 
     def tick(self, state: Vector, command: Vector, held: Vector) -> Vector:
+        """Advance by one tick; see `hold_tick`."""
         return hold_tick(state, command, held, self.constants)

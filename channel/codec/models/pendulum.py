@@ -66,10 +66,13 @@ class PendulumModel:
         self.constants: Vector = (growth, damping_per_s, torque_gain_rad_per_v_s2, context.tick_s)
 
     def initial(self) -> Vector:
+        """Return the pendulum upright and at rest."""
         return (0.0, 0.0)
 
     def measured(self, state: Vector) -> Vector:
+        """Return the angle, the one output."""
         return state[:1]
 
     def tick(self, state: Vector, command: Vector, held: Vector) -> Vector:
+        """Advance by one tick; see `pendulum_tick`."""
         return pendulum_tick(state, command, held, self.constants)

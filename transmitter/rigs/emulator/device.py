@@ -59,6 +59,7 @@ class RecordedBody:
         self._tick_ns = tick_ns
 
     def counts_at(self, time_ns: int, volts: tuple[float, float]) -> int:
+        """Return the row of this time."""
         return self._log.counts[min(max(0, time_ns) // self._tick_ns, len(self._log) - 1)][0]
 
 
@@ -131,6 +132,7 @@ class EmulatedDevice:
         self.enabled, self.volts = True, volts
 
     def sample(self, now_ns: int) -> RawSample:
+        """Return the sample of this moment."""
         self.advance(now_ns)
         self.counts["samples"] += 1
         self._sequence += 1

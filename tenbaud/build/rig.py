@@ -146,7 +146,7 @@ def nominal_plant(config: FlightConfig, volts_max: float | None = None) -> Pitch
     plant = config.transmitter.plant
     follows = isinstance(model, PitchModelSection) and plant.relative_to == "model"
     section = model if follows else plant.pitch
-    return PitchParameters(**section.model_dump(exclude={"kind"}), volts_max=volts_max)
+    return PitchParameters(**section.model_dump(exclude={"kind", "start"}), volts_max=volts_max)
 
 
 def _build_other(config: FlightConfig, plant: Plant | None, signals: Signals) -> Rig:

@@ -60,8 +60,8 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
         gauge.on_errors if gauge is not None else lambda _errors: None,
     )
     # Only a rig that hurts nobody is armed again by itself.
-    rearm_s = config.link.peer_timeout_s if config.transmitter.rig == "simulated" else None
-    rearm_ticks = None if rearm_s is None else ticks_of(rearm_s, config)
+    harmless = config.transmitter.rig in ("simulated", "replay")
+    rearm_ticks = ticks_of(config.link.peer_timeout_s, config) if harmless else None
     return TransmitterNode(
         session,
         build_rig(config, agreement.parts.plant, agreement.signals),
@@ -184,13 +184,20 @@ def _check_command(config: FlightConfig, controller: Controller, parts: Parts) -
 
 
 def guard_settings(agreement: Agreement) -> GuardSettings:
-    """Return when the guard steps in, and how."""
+    """Return when the guard steps in, and how.
+
+    On a recording there is nothing to protect: only a receiver that is gone ends the flight.
+    """
     section = agreement.config.transmitter
     terms = agreement.terms
+    recorded = section.rig == "replay"
+    timeout_ticks = watchdog_ticks(watchdog_wanted_s(agreement.config), terms, agreement.trip)
+    if recorded:
+        timeout_ticks = ticks_of(agreement.config.link.peer_timeout_s, agreement.config)
     return GuardSettings(
-        timeout_ticks=watchdog_ticks(watchdog_wanted_s(agreement.config), terms, agreement.trip),
+        timeout_ticks=timeout_ticks,
         ramp_ticks=ticks_of(section.ramp_s, agreement.config),
         safe_command=safe_command(agreement.config, agreement.signals),
-        soft_limits=soft_limits(agreement.config, agreement.signals),
+        soft_limits=() if recorded else soft_limits(agreement.config, agreement.signals),
         outputs=agreement.signals.outputs,
     )

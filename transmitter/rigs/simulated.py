@@ -71,7 +71,7 @@ class DryRig(Rig):
 
     def __init__(self, rig: Rig, motors: int = 2) -> None:
         self.name = f"{rig.name} (dry run)"
-        self.is_real = rig.is_real
+        self.is_real, self.is_recorded = rig.is_real, rig.is_recorded
         self._rig = rig
         self._nothing = (0.0,) * motors
 
@@ -102,6 +102,7 @@ class ReplayRig(Rig):
     """Reads one row per tick; what is written to it changes nothing."""
 
     name = "replay"
+    is_recorded = True
 
     def __init__(self, log: FlightLog, encoders: tuple[OutputReader, ...]) -> None:
         self._log = log

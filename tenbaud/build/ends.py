@@ -22,12 +22,13 @@ from receiver.session.session import ReceiverSession
 from tenbaud.build.codec import build_codec
 from tenbaud.build.controllers import build_controller
 from tenbaud.build.flight import Agreement, ticks_of, watchdog_wanted_s
+from tenbaud.build.flight_log import output_steps
 from tenbaud.build.gauge import build_gauge
 from tenbaud.build.liveness import overtaking_ticks, watchdog_ticks
 from tenbaud.build.parts import Parts
 from tenbaud.build.references import References, build_references, values_of
 from tenbaud.build.rig import build_rig
-from tenbaud.build.signals import configured_signals, encoder_steps, safe_command, soft_limits
+from tenbaud.build.signals import configured_signals, safe_command, soft_limits
 from tenbaud.config.kinds import CONTROLLERS
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
@@ -92,7 +93,7 @@ def build_observer(agreement: Agreement) -> StateObserver | None:
         if isinstance(codec.model, LinearModel):
             from tenbaud.design.observer import configured_observer
 
-            steps = encoder_steps(config, agreement.signals)
+            steps = output_steps(config, agreement.signals)
             return configured_observer(codec.model, config, steps)
         return rate_observer(codec.model, tick_s, config.transmitter.rate_observer_bandwidth_rad_s)
     except ValueError as error:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json as json_module
 import sys
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -65,8 +65,6 @@ def rig(
     """
     from tenbaud.build.emulator import build_emulator
 
-    if body.preset is None and body.config is None and replay is not None:
-        body = replace(body, preset="uiuc-10baud")
     emulator = build_emulator(
         body.load(rig=None if replay is None else f"replay:{replay}"),
         form,  # type: ignore[arg-type]

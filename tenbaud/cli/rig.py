@@ -29,6 +29,7 @@ PortOption = Annotated[
 @spread
 def rig(
     body: options.PlantOptions,
+    log: options.LogOptions,
     form: FormatOption = "cobs",
     port: PortOption = "pty",
     replay: Annotated[
@@ -66,7 +67,7 @@ def rig(
     from tenbaud.build.emulator import build_emulator
 
     emulator = build_emulator(
-        body.load(rig=None if replay is None else f"replay:{replay}"),
+        body.load(rig=None if replay is None else f"replay:{replay}", log=log),
         form,  # type: ignore[arg-type]
         port,
         line_form=lines,

@@ -18,6 +18,11 @@ TRUE = PitchParameters(0.4, 4.0, 0.2, equilibrium_rad=0.0, volts_max=12.0)
 """The plant of the flight; its files hold rad to five digits, s, V."""
 
 
+Fields = dict[str, object]
+Dialect = tuple[list[str], str, str, Fields]
+"""Lines, encoding, line end, and the fields of the section that reads it."""
+
+
 @cache
 def flight() -> tuple[Array, Array, Array, Array]:
     """Return time, angle, front and rear voltage of 30 s: rest, then voltages that switch."""
@@ -59,22 +64,15 @@ def write(path: Path, text: str | list[str], encoding: str = "utf-8", end: str =
     return path
 
 
-def dialects() -> dict[str, tuple[list[str], str, str, dict[str, object]]]:
-    """Return each way to write the flight: lines, encoding, line end, and the section that reads it."""
+def dialects() -> dict[str, Dialect]:
+    """Return each way to write the flight."""
     rows = table()
-    named: dict[str, object] = {
-        "columns": {"angle": "angle", "front": "u1", "rear": "u2", "time": "time"}
-    }
+    named: Fields = {"columns": {"angle": "angle", "front": "u1", "rear": "u2", "time": "time"}}
     header, comma = "time,angle,u1,u2", lines(rows)
     german = table(np.degrees)
-    numbers: dict[str, object] = {"columns": {"time": "1", "angle": "2", "front": "3", "rear": "4"}}
-    in_rad: dict[str, object] = {"units": {"angles": "rad"}}
+    numbers: Fields = {"columns": {"time": "1", "angle": "2", "front": "3", "rear": "4"}}
+    in_rad: Fields = {"units": {"angles": "rad"}}
     lost = {"columns": {"angle": "a, measured", "front": "u1", "rear": "u2", "time": "time"}}
-    milli = rows * (1000.0, 1000.0, 1000.0, 1000.0) + (5000.0, 0.0, 0.0, 0.0)
-    dates = [
-        f"2024-05-06 07:{int(t // 60):02}:{t % 60:06.3f},{','.join(rest)}"
-        for t, rest in zip(rows[:, 0], (line.split(",")[1:] for line in comma), strict=True)
-    ]
     return {
         "plain": ([header, *comma], "utf-8", "\n", named | in_rad),
         "guessed": ([header, *comma], "utf-8", "\n", {}),
@@ -115,12 +113,25 @@ def dialects() -> dict[str, tuple[list[str], str, str, dict[str, object]]]:
         "titles": (["Recorder 2000", "Run;7;of 9", "", header, *comma], "utf-8", "\n", named),
         "units row": ([header, "s,rad,V,V", *comma], "utf-8", "\n", named),
         "units row in degrees": ([header, "[s],[deg],[V],[V]", *lines(german)], "utf-8", "\n", named),
-        "milli": (["time_ms,angle_mrad,u1 (mV),u2 (mV)", *lines(milli)], "utf-8", "\n", {}),
         "no header": (comma, "utf-8", "\n", numbers | in_rad),
         "short header": (['"Time","data"', *comma], "utf-8", "\n", numbers | in_rad),
         "commas in names": (['time,"a, measured",u1,u2', *comma], "utf-8", "\n", lost | in_rad),
         "text beside": ([f"{header},note", *(f"{one},ok" for one in comma)], "utf-8", "\n", named),
         "comma at the end": ([f"{header},", *(f"{one}," for one in comma)], "utf-8", "\n", named),
+    } | numbers_of_other_kinds(named)
+
+
+def numbers_of_other_kinds(named: Fields) -> dict[str, Dialect]:
+    """Return files whose clock or angle is written in another way."""
+    rows = table()
+    header, comma = "time,angle,u1,u2", lines(rows)
+    milli = np.add(rows * 1000.0, (5000.0, 0.0, 0.0, 0.0))
+    dates = [
+        f"2024-05-06 07:{int(t // 60):02}:{t % 60:06.3f},{','.join(rest)}"
+        for t, rest in zip(rows[:, 0], (line.split(",")[1:] for line in comma), strict=True)
+    ]
+    return {
+        "milli": (["time_ms,angle_mrad,u1 (mV),u2 (mV)", *lines(milli)], "utf-8", "\n", {}),
         "dates": ([header, *dates], "utf-8", "\n", named),
         "wrapped": (["time,angle_deg,u1,u2", *lines(table(wrapped))], "utf-8", "\n", {}),
         "epoch": ([header, *lines(np.add(rows, (1.7e9, 0, 0, 0)))], "utf-8", "\n", named),

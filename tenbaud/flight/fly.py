@@ -22,6 +22,7 @@ from tenbaud.build.flight import Agreement, agree
 from tenbaud.build.given import Given, feedback_gains, reference_settings, whole_sections
 from tenbaud.build.parts import PartError, Parts
 from tenbaud.build.plugins import build_class
+from tenbaud.build.recorded import flight_config
 from tenbaud.build.rig import plant_context
 from tenbaud.build.signals import configured_signals
 from tenbaud.config.deprecated import with_current_names
@@ -154,7 +155,7 @@ def _loaded(
         raise ConfigError("rate_baud and operating_point are for a plant; a preset says them itself")
     elif not isinstance(preset, str | None):
         raise ConfigError(f"a {type(preset).__name__} is neither the name of a preset nor a plant")
-    return load_config(preset, config, changes, allow_code=True), parts
+    return flight_config(preset, config, changes, allow_code=True), parts
 
 
 def _following(

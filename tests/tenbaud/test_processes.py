@@ -145,7 +145,7 @@ def test_when_one_end_is_stopped_or_killed_then_the_other_ends_safely(
     lower = Recording(tmp_path / "lower" / "receiver.mcap")
     assert upper.complete == (codes["transmit"] != -9)
     assert lower.complete == (codes["receive"] != -9)
-    assert upper.topics["tick"].rows > 100
+    assert len(upper.topics["tick"]) > 100
     if codes["transmit"] != -9:
         last = list(upper.rows("tick"))[-1][1]
         assert last["applied"] == [0.0, 0.0]

@@ -159,8 +159,7 @@ def test_a_step_and_its_noise_are_no_spikes(tmp_path: Path) -> None:
     assert not any("spike" in note for note in read(tmp_path, rows).notes)
 
 
-def test_counts_are_what_the_encoder_of_the_configuration_reads(tmp_path: Path) -> None:
+def test_angles_without_an_encoder_count_in_the_steps_of_the_file(tmp_path: Path) -> None:
     log = read(tmp_path, lab_files.table())
-    encoder = Encoder(4096)
-    rounded = np.round(angles(), 5).tolist()
-    assert log.counts[:, 0].tolist() == [encoder.counts(angle) for angle in rounded]
+    assert log.counts[:, 0].tolist() == np.round(angles() * 1e5).astype(int).tolist()
+    assert log.steps[0] == pytest.approx(1e-5)

@@ -195,8 +195,9 @@ class _Reading:
             return encoder.turn / encoder.counts_per_turn
         by = self._factor(unit, signal)
         measured[:, at] = clock.line(values) * by
-        counts[:, at] = counts_of(measured[:, at], encoder)
-        return step_of(values) * by
+        step = step_of(values) * by
+        counts[:, at] = counts_of(measured[:, at], Encoder(1.0 / step, turn=1.0) if step else None)
+        return step
 
     def _unit_of(self, column: int, values: Array, signal: Signal) -> str:
         unit = unit_named(self.table.units[column]) or split_unit(self.table.names[column])[1]

@@ -11,6 +11,7 @@ from tenbaud.cli import (
     design,
     identify,
     keys,
+    log,
     nodes,
     rig,
     router,
@@ -61,7 +62,7 @@ for panel, commands in (
     ("Rigs and machines", (rig.doctor, rig.rig, rig.rig_check, router.router)),
     (
         "Models, coders, studies",
-        (design.floor, design.design, identify.identify, sweep.sweep, tune.tune),
+        (design.floor, design.design, log.log, identify.identify, sweep.sweep, tune.tune),
     ),
 ):
     for command in commands:

@@ -58,6 +58,7 @@ class Roles:
 
     def choose(self, names: Sequence[str], units: Sequence[str], known: Mapping[str, str]) -> Chosen:
         """Return the columns; LogError where one is missing, or none can be found."""
+        self.notes.clear()  # a file of several sets of signals asks for each
         given = self._given(known)
         clock = {name: self._clock(name, given, names) for name in CLOCKS}
         if clock["time"] is not None and "index" not in given:
@@ -234,7 +235,7 @@ def _input_words(signal: InputSignal, at: int, count: int) -> list[str]:
 
 
 def _stem(name: str) -> str:
-    return re.sub(r"[^\w]+", "_", bare_name(name).strip().casefold()).strip("_")
+    return re.sub(r"[^\w]+", "_", bare_name(name).strip().casefold().rpartition(".")[2]).strip("_")
 
 
 def _numbered(name: str) -> bool:

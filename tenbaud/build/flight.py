@@ -59,18 +59,15 @@ class Agreement:
 
     @property
     def flight_ticks(self) -> int:
-        """Return the ticks of the flight: whole samples, at least one."""
         samples = round(self.config.duration_s * 1e9) // self.terms.sample_ns
         return max(1, samples) * self.terms.ticks_per_sample
 
     @property
     def link(self) -> LinkKind:
-        """Return what the configured kind of link says about itself."""
         return kind_of_link(self.config)
 
     @property
     def faults(self) -> LineFaults:
-        """Return what goes wrong on the line, on purpose."""
         return parse_impairments(self.config.link.impairments)
 
     @property
@@ -123,9 +120,9 @@ def agree(config: FlightConfig, clock: Clock, parts: Parts | None = None) -> Agr
 
 
 def watchdog_wanted_s(config: FlightConfig) -> float | None:
-    """Return the watchdog's time-out as configured, None where it is "auto"."""
+    """Return the watchdog's time-out as configured, None where it is "auto" or a recording flies."""
     wanted = config.transmitter.watchdog_s
-    return None if wanted == "auto" else wanted
+    return None if wanted == "auto" or config.transmitter.rig == "replay" else wanted
 
 
 def checked_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:

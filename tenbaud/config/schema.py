@@ -367,7 +367,6 @@ class FlightConfig(CodePermission):
 
     @property
     def plant_kind(self) -> str:
-        """Return the kind of the simulated plant."""
         kind = self.transmitter.plant.kind
         if kind != "auto":
             return kind
@@ -378,5 +377,7 @@ class FlightConfig(CodePermission):
         """Return the shared part as canonical JSON, with the command lead that was chosen."""
         shared = self.model_dump(mode="json", include=set(SHARED_SECTIONS))
         shared["timing"]["lead_ticks"] = lead_ticks
+        if not shared["model"].get("start") and self.model.kind != "linear":
+            shared["model"].pop("start", None)  # recordings from before it have the same digest
         shared["coder"]["kind"] = DIGEST_KINDS.get(self.coder.kind, self.coder.kind)
         return json.dumps(shared, sort_keys=True, separators=(",", ":"))

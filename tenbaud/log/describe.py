@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from channel.flight_log import FlightLog
 from tenbaud.config.schema import FlightLogSection
 from tenbaud.log.angles import without_spikes
 from tenbaud.log.beside import with_file_beside
+from tenbaud.log.join import read_joined
 from tenbaud.log.look import Look, looks_of
 from tenbaud.log.read import read_log
 from tenbaud.log.reader import read_table
@@ -143,7 +143,11 @@ class Description:
 def describe(section: FlightLogSection) -> tuple[Description, Table]:
     """Return what is said about the log of a section, and its columns. LogError: it holds no table."""
     section = with_file_beside(section)
-    table = read_table(Path(section.file))
+    if section.join:
+        time = section.columns.get("time", section.time)
+        table, _ = read_joined((section.file, *section.join), read_table, time, None)
+    else:
+        table = read_table(section.file)
     looks = looks_of(table)
     suggestion = suggest(section, table, looks)
     section = suggestion.section

@@ -52,7 +52,7 @@ def load_matlab(path: Path) -> tuple[str, dict[str, Any]]:
             contents = None if major == 2 else loadmat(path)
             if contents is None or "__function_workspace__" in contents:
                 contents = _with_objects(path)
-    except (MatReadError, ValueError, TypeError, KeyError, OSError, NotImplementedError) as error:
+    except (MatReadError, ValueError, TypeError, KeyError, OSError, RuntimeError) as error:
         raise LogError(
             f"{path} cannot be read as a MATLAB file: {error}. If MATLAB itself opens it, save the "
             "signals anew: save(file, 'name', ..., '-v7')."

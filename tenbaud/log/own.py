@@ -17,7 +17,6 @@ from tenbaud.recording.encoding import recorded_signals
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import find_recordings
 from tenbaud.recording.reader import Recording
-from tenbaud.recording.table import Table as Topic
 
 
 def read_run(path: Path, wanted: Wanted | None = None) -> Table:
@@ -35,11 +34,11 @@ def read_run(path: Path, wanted: Wanted | None = None) -> Table:
     if not topics:
         return read_messages(path, wanted)
     if "flight" in topics:
-        flight = Topic(recording, "flight")
+        flight = topics["flight"]
         return flat_table(
             path, "flight exported to MCAP", flight.units, lambda name: flight.read(name)[0], wanted
         )
-    if "tick" not in topics or "measured" not in Topic(recording, "tick").names:
+    if "tick" not in topics or "measured" not in topics["tick"].names:
         raise LogError(
             f"{recording.path} holds no measured angles; give the folder of the run, or its "
             "transmitter.mcap"
@@ -53,7 +52,7 @@ def _of_ticks(path: Path, recording: Recording, wanted: Wanted | None) -> Table:
     except (KeyError, ValueError):
         raise LogError(f"{recording.path} does not say how long its ticks are") from None
     plant = recorded_signals(recording.metadata)
-    ticks, measured, applied = Topic(recording, "tick").read("tick", "measured", "applied")
+    ticks, measured, applied = recording.topics["tick"].read("tick", "measured", "applied")
     signals: list[tuple[str, Signal]] = [("out", one) for one in plant.outputs]
     signals += [("in", one) for one in plant.inputs]
     columns: list[Array] = [ticks, *measured.T, *applied.T]

@@ -25,7 +25,7 @@ app = typer.Typer(
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        from tenbaud.build.flight import software_version
+        from tenbaud.config.version import software_version
 
         typer.echo(f"tenbaud {software_version()}")
         raise typer.Exit

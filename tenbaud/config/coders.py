@@ -92,7 +92,7 @@ class HistoryCoderSection(KindSection):
     lookahead: Annotated[int, Field(ge=0, le=6)] = 1
     """samples that the transmitter looks ahead"""
     floor_gain: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
-    """g, share per sample by which the slow mean of the range follows it; 0: the smallest range stays"""
+    """g, share per sample by which a slow mean of the range follows it; 0: the smallest range stays"""
     floor_exponent: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
     """c; the smallest range is minimum_range_rad times (slow mean / minimum_range_rad)^c"""
 

@@ -131,5 +131,5 @@ def recorded_arrays(log: FlightLog | None, ahead: int, signals: Signals) -> dict
     if log is None:
         counts = np.zeros((0, len(signals.outputs)), dtype=np.int64)
         return {"counts": counts, "commands": NO_ROWS, "applied": NO_ROWS}
-    last = np.minimum(np.arange(ahead), len(log) - 1)
-    return {"counts": log.counts, "commands": log.commands[last], "applied": log.commands}
+    rows = np.minimum(np.arange(ahead), len(log) - 1)
+    return {"counts": log.counts, "commands": log.commands[rows], "applied": log.commands}

@@ -87,7 +87,8 @@ class DirectionFamily:
         model = type(config.model).model_validate(done["model"])
         self._coder = DirectionCoderSection.model_validate(done["coder"])
         self._config = config.model_copy(update={"model": model, "coder": self._coder})
-        self.scan: Sequence[Sequence[float]] = tuple((size / 20.0, 0.5, 0.5, 0.5) for size in range(2, 19))
+        self.scan: Sequence[Sequence[float]]
+        self.scan = tuple((size / 20.0, 0.5, 0.5, 0.5) for size in range(2, 19))
 
     def at(self, shares: Sequence[float]) -> FlightConfig:
         """Return the coder of four shares."""

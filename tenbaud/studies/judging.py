@@ -21,13 +21,13 @@ import numpy as np
 from channel.errors import TenbaudError
 from tenbaud.build.codec import build_codec
 from tenbaud.build.flight import ticks_of
+from tenbaud.build.flight_log import read_flight_log
 from tenbaud.config.schema import FlightConfig
 from tenbaud.design.described import linear_of
 from tenbaud.studies.bench import Bench
 from tenbaud.studies.chunk import fly_point
 from tenbaud.studies.constants import changed
 from tenbaud.studies.figures import FlightFigures
-from tenbaud.studies.flights import recorded_flight
 from tenbaud.studies.plain import fly_plain
 from tenbaud.studies.records import Augment, Variant, phases_of, rows, variants_of
 from tenbaud.studies.schedule import Uncommon
@@ -147,12 +147,12 @@ class Judge:
     @cached_property
     def _train(self) -> Bench | None:
         config, augment = self._tuning.config({}), self._tuning.augment
-        log = rows(recorded_flight(config), 0, self._border)
+        log = rows(read_flight_log(config), 0, self._border)
         return self._bench(variants_of(config, build_codec(config), log, augment), augment.phases, 0)
 
     @cached_property
     def _test(self) -> Bench | None:
-        log = rows(recorded_flight(self._tuning.config({})), 0, self._ticks)
+        log = rows(read_flight_log(self._tuning.config({})), 0, self._ticks)
         return self._bench([Variant(log, 1.0, 1.0)], PHASES_MAX, self._border)
 
     def _bench(self, variants: list[Variant], phases: int, scored_from: int) -> Bench | None:
@@ -198,7 +198,7 @@ def split_ticks(config: FlightConfig, share: float) -> tuple[int, int]:
 
     StudyError when a part of it has nothing to score.
     """
-    ticks = min(len(recorded_flight(config)), ticks_of(config.duration_s, config))
+    ticks = min(len(read_flight_log(config)), ticks_of(config.duration_s, config))
     border = math.floor(share * ticks)
     timing = config.timing
     # Every phase leaves at least a sample of each part.

@@ -14,12 +14,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from channel.flight_log import FlightLog
+from tenbaud.build.flight_log import read_flight_log
 from tenbaud.config.schema import FlightConfig
 from tenbaud.studies.bench import Bench
 from tenbaud.studies.constants import BANDWIDTH, changed
 from tenbaud.studies.families import Family, family_of
 from tenbaud.studies.figures import shared_parts
-from tenbaud.studies.flights import recorded_flight
 from tenbaud.studies.judging import NO_CONSTANTS, PHASES_MAX, score, weights_of
 from tenbaud.studies.records import Augment, Variant, phases_of, rows, variants_of
 from tenbaud.studies.schedule import Uncommon
@@ -63,7 +63,7 @@ def quick_coder(
     ConfigError, in words, where no constants are found.
     """
     config = changed(config, {"transmitter.rig": "replay", "receiver.controller": "recorded"})
-    log, timing = recorded_flight(config), config.timing
+    log, timing = read_flight_log(config), config.timing
     if until_s is not None:
         log = rows(log, 0, max(0, round(until_s / timing.tick_s)))
     log = _liveliest(log)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -37,9 +36,6 @@ class Bench:
         """Make every flight ready. `phases`: rows that are left out before the first word."""
         ticks = max(len(one.log) for one in variants)
         point = CompiledPoint(config.model_copy(update={"duration_s": ticks * config.timing.tick_s}))
-        # What a record does cannot be prevented any more, so nothing guards it.
-        point.numbers = point.numbers._replace(watch=2**62)
-        point.steady["soft_limits"] = point.steady["soft_limits"] + math.inf
         self.sizes: list[float] = []
         """of each flight's motion, in units of the recorded one"""
         self._points: list[CompiledPoint] = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -99,7 +100,7 @@ class CompiledPoint:
             impulse=codec.coder.impulse,
             replay=replay,
             uses_rates=codec.uses_rates,
-            watch=window_ticks(codec.model, agreement.terms.tick_ns / 1e9),
+            watch=sys.maxsize if replay else window_ticks(codec.model, agreement.terms.tick_ns / 1e9),
         )
         self.constants = (
             arrays_of(codec.model.constants),  # type: ignore[attr-defined]

@@ -156,6 +156,6 @@ def _liveliest(log: FlightLog) -> FlightLog:
     if len(log) <= WINDOW_TICKS:
         return log
     starts = range(0, len(log) - WINDOW_TICKS + 1, WINDOW_TICKS // 2)
-    moved = [float(log.counts[at : at + WINDOW_TICKS].std(axis=0).sum()) for at in starts]
+    moved = [float(log.measured[at : at + WINDOW_TICKS].std(axis=0).sum()) for at in starts]
     first = starts[int(np.argmax(moved))]
     return rows(log, first, first + WINDOW_TICKS)

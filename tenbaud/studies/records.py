@@ -7,7 +7,7 @@ degrees of freedom) that has passed through the plant of the model.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -18,12 +18,11 @@ from scipy.signal import dlsim
 from channel.codec.codec import Codec
 from channel.codec.signals import signals_of
 from channel.flight_log import FlightLog
-from plant_sim.encoder import Encoder
+from plant_sim.encoder import Encoder, OutputReader
 from tenbaud.bounds.linear import Matrix
 from tenbaud.build.signals import build_encoders
 from tenbaud.config.schema import FlightConfig
 from tenbaud.design.described import plant_of
-from tenbaud.studies.schedule import Uncommon
 from tenbaud.studies.settings import StudyError
 
 DEGREES = 2.0
@@ -65,13 +64,8 @@ class Variant(NamedTuple):
 
 def variants_of(config: FlightConfig, codec: Codec, log: FlightLog, augment: Augment) -> list[Variant]:
     """Return the variants of a record, the same for the same seed."""
-    readers = build_encoders(config, signals_of(codec.model))
-    encoders = [one for one in readers if isinstance(one, Encoder)]
-    if len(encoders) < len(readers):
-        raise Uncommon("a recorded output that is read exactly")
-    steps = np.array([one.turn / one.counts_per_turn * one.sign for one in encoders])
-    zeros = np.array([one.zero_counts for one in encoders])
-    measured = (log.counts - zeros) * steps
+    encoders = build_encoders(config, signals_of(codec.model))
+    measured = log.measured
     rest = np.array(codec.model.measured(codec.model.initial()))
     motion = measured - measured.mean(axis=0)
     own = float(np.sqrt(np.mean(motion**2)))
@@ -81,8 +75,7 @@ def variants_of(config: FlightConfig, codec: Codec, log: FlightLog, augment: Aug
         for added in _added(config, motion, augment, random):
             values = rest + scale * (measured - rest + added)
             moved = float(np.sqrt(np.mean((scale * (motion + added)) ** 2)))
-            counts = np.rint(values / steps).astype(np.int64) + zeros
-            changed = replace(log, counts=counts, commands=scale * log.commands)
+            changed = replace(log, measured=_read(encoders, values), commands=scale * log.commands)
             found.append(Variant(changed, moved / own if own else scale, scale))
     return found
 
@@ -97,6 +90,16 @@ def rows(log: FlightLog, first: int, last: int) -> FlightLog:
     """Return the rows of a record from `first` to before `last`."""
     parts = {name: getattr(log, name)[first:last] for name in ("measured", "counts", "commands")}
     return replace(log, **parts)
+
+
+def _read(encoders: Sequence[OutputReader], values: Matrix) -> Matrix:
+    """Return outputs as their encoders read them."""
+    read = values.copy()
+    for one, column in zip(encoders, read.T, strict=True):
+        if isinstance(one, Encoder):
+            step = one.turn / one.counts_per_turn
+            column[:] = np.rint(column / step) * step
+    return read
 
 
 def _added(

@@ -111,7 +111,7 @@ def tune(
     method: Method = MethodOption.EVOLUTION,
     evaluations: Evaluations = 600,
     scales: Scales = "0.6,1,2",
-    shoves: Shoves = 0.5,
+    shoves: Shoves = 1.0,
     phases: Phases = 5,
     seed: Seed = 1,
     allow_code: options.AllowCode = False,

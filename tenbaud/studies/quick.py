@@ -63,6 +63,8 @@ def quick_coder(
     ConfigError, in words, where no constants are found.
     """
     config = changed(config, {"transmitter.rig": "replay", "receiver.controller": "recorded"})
+    family = family_of(config)
+    config = family.at(family.scan[len(family.scan) // 2])
     log, timing = read_flight_log(config), config.timing
     if until_s is not None:
         log = rows(log, 0, max(0, round(until_s / timing.tick_s)))
@@ -73,7 +75,6 @@ def quick_coder(
             f"the record has {samples:.0f} samples of {timing.symbol_period_s:g} s; {SAMPLES_MIN} are "
             "needed to fit coder constants"
         )
-    family = family_of(config)
     try:
         found = _Fit(config, log, family, on_evaluation, cores).best()
         bench = Bench(found, [Variant(log, 1.0, 1.0)], phases_of(found, PHASES_MAX), 0, cores)
@@ -111,9 +112,8 @@ class _Fit:
     ) -> None:
         self._family = family
         self._on_evaluation = on_evaluation
-        first = family.at(family.scan[len(family.scan) // 2])
-        variants = variants_of(first, shared_parts(first).codec, log, AUGMENT)
-        self._bench = Bench(first, variants, phases_of(first, AUGMENT.phases), 0, cores)
+        variants = variants_of(config, shared_parts(config).codec, log, AUGMENT)
+        self._bench = Bench(config, variants, phases_of(config, AUGMENT.phases), 0, cores)
         self._weights = weights_of(config)
         budget = BUDGET_TICKS // (len(log) * len(self._bench.sizes))
         self._left = max(2 * len(family.scan), min(budget, EVALUATIONS_MAX))

@@ -37,7 +37,7 @@ class Augment:
 
     scales: tuple[float, ...] = (0.6, 1.0, 2.0)
     """sizes that it is flown at"""
-    shoves: float = 0.5
+    shoves: float = 1.0
     """rms of the shoves added to the record at each size once more, as a share of its own motion; 0:
     none"""
     phases: int = 5

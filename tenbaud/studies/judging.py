@@ -106,6 +106,10 @@ class Judged(NamedTuple):
     """why the first of those has none"""
     each: tuple[float, ...] = ()
     """rms error of each flight: of each seed, or of each sample phase of a recording"""
+    largest: float = math.nan
+    """error of the first output, over all flights"""
+    amplitude: float = math.nan
+    """largest value of that output"""
 
 
 def is_worse(before: Judged, after: Judged) -> bool:
@@ -189,8 +193,15 @@ def score(
             error = PENALTY_RAD
         errors.append(min(error, PENALTY_RAD))
     total = math.fsum(error if mean else error * error for error in errors) / len(errors)
-    reason = lost[0] if lost else ""
-    return Judged(total if mean else math.sqrt(total), len(lost), len(errors), reason, tuple(errors))
+    return Judged(
+        rms_rad=total if mean else math.sqrt(total),
+        lost=len(lost),
+        flights=len(errors),
+        reason=lost[0] if lost else "",
+        each=tuple(errors),
+        largest=max(one.first.error_live_max for one in figures),
+        amplitude=max(one.first.amplitude for one in figures),
+    )
 
 
 def split_ticks(config: FlightConfig, share: float) -> tuple[int, int]:

@@ -46,6 +46,11 @@ class Tuned(NamedTuple):
     """flights that count as `PENALTY_RAD` in one of the four errors, by its name"""
     train_what: str
     test_what: str
+    test_each: tuple[float, ...]
+    """rms errors after the fit, of each flight of the validation"""
+    test_largest: float
+    test_amplitude: float
+    """largest error of the first output there, after the fit, and largest value of that output"""
     over_fitted: bool
     """whether the error of the validation rose by more than its spread over the flights explains"""
     failure: str
@@ -93,6 +98,9 @@ def tune(
         without_figures={name: one.lost for name, one in judged.items() if one.lost},
         train_what=train_what,
         test_what=test_what,
+        test_each=after_test.each,
+        test_largest=after_test.largest,
+        test_amplitude=after_test.amplitude,
         over_fitted=is_worse(before_test, after_test),
         failure=trials.failure if trials.values == start else "",
     )
@@ -204,6 +212,12 @@ def report(tuned: Tuned) -> Iterator[str]:
     ):
         before, after = (math.degrees(getattr(tuned, f"{part}_{when}")) for when in ("before", "after"))
         yield f"{what}: rms error {before:.4g} -> {after:.4g} degrees"
+    worst, largest = (math.degrees(one) for one in (max(tuned.test_each), tuned.test_largest))
+    yield (
+        f"validated: rms error {math.degrees(min(tuned.test_each)):.4g} ... {worst:.4g} degrees by flight, "
+        f"largest error {largest:.4g} degrees, {100.0 * tuned.test_largest / tuned.test_amplitude:.3g} % "
+        "of the largest value"
+    )
     if tuned.failure:
         yield f"the fit failed: {tuned.failure}"
     elif tuned.over_fitted:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tenbaud.config.load import load_config
+from tenbaud.config.load import load_config, merged
 from tenbaud.studies import quick
 from tenbaud.studies.plain import fly_plain
 from tenbaud.studies.quick import quick_coder

@@ -2,8 +2,8 @@
 
     python -m reproduction.recordings DATA [FILE ANGLE RATE]
 
-For each angle and rate, `quick_coder` finds coder constants for a model that knows nothing of the body, and
-`tune` fits model and coder to variants of the first half. The second half is then flown once, from every
+For each angle and rate, `quick_coder` finds coder constants for a model that knows nothing of the body,
+and `tune` fits model and coder to variants of the first half. The second half is then flown from every
 sample phase.
 """
 
@@ -115,9 +115,8 @@ def row_of(data: Path, angle: Angle, rate: int) -> str:
 def main(arguments: list[str]) -> None:
     """Print the rows that are asked for."""
     data, *only = arguments
-    print(
-        "| file | angle | bit/s | rms %, mean of phases | worst phase | largest error % | largest angle | | |"
-    )
+    print("| file | angle | bit/s | rms %, mean of phases | worst phase | largest error % ", end="")
+    print("| largest angle, rad | quick_coder, first half, rms % | seconds |")
     print("|---|---|---|---|---|---|---|---|---|", flush=True)
     for angle in ANGLES:
         for rate in RATES:

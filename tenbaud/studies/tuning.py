@@ -212,11 +212,13 @@ def report(tuned: Tuned) -> Iterator[str]:
     ):
         before, after = (math.degrees(getattr(tuned, f"{part}_{when}")) for when in ("before", "after"))
         yield f"{what}: rms error {before:.4g} -> {after:.4g} degrees"
-    worst, largest = (math.degrees(one) for one in (max(tuned.test_each), tuned.test_largest))
+    least, worst, largest = (
+        math.degrees(one) for one in (min(tuned.test_each), max(tuned.test_each), tuned.test_largest)
+    )
+    share = 100.0 * tuned.test_largest / tuned.test_amplitude
     yield (
-        f"validated: rms error {math.degrees(min(tuned.test_each)):.4g} ... {worst:.4g} degrees by flight, "
-        f"largest error {largest:.4g} degrees, {100.0 * tuned.test_largest / tuned.test_amplitude:.3g} % "
-        "of the largest value"
+        f"the {len(tuned.test_each)} flights of the validation: rms error {least:.4g} ... {worst:.4g} "
+        f"degrees, largest error {largest:.4g} degrees ({share:.3g} % of the largest value)"
     )
     if tuned.failure:
         yield f"the fit failed: {tuned.failure}"

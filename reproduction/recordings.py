@@ -11,20 +11,21 @@ from __future__ import annotations
 
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from channel.errors import TenbaudError
 from tenbaud.build.recorded import flight_config
 from tenbaud.config.load import merged
 from tenbaud.studies.constants import free_ranges
 from tenbaud.studies.judging import Split, Tuning
 from tenbaud.studies.quick import quick_coder
 from tenbaud.studies.study_file import Range
-from tenbaud.studies.tuning import tune
+from tenbaud.studies.tuning import preset_text, tune
 
 RATES = (10, 20, 25)
-EVALUATIONS = 1500
+EVALUATIONS = 600
 UNKNOWN_BODY = {
     "rate_damping_per_s": 1.0,
     "stiffness_per_s2": 1.0,
@@ -50,15 +51,20 @@ class Angle:
     section: dict[str, Any]
     """of the flight log"""
     counts_per_turn: int = 4096
+    timing: dict[str, float] = field(default_factory=dict)
 
 
 def _uiuc(name: str, counts_per_turn: int, **section: Any) -> Angle:
-    log = {"outputs": {"pitch": f"{name}_counts"}, "units": {"angles": "counts"}, **section}
+    # The file counts its rows; they are 0.02 s apart.
+    log = {"outputs": {"pitch": f"{name}_counts"}, "units": {"angles": "counts"}, "period_s": 0.02}
+    log |= section
     return Angle("uiuc_closed_loop.csv", name, log, counts_per_turn)
 
 
 def _ntnu(file: str, name: str, unit: str) -> Angle:
-    return Angle(file, name, {"outputs": {"pitch": f"{name}_{unit}"}, "inputs": NO_INPUT})
+    log = {"outputs": {"pitch": f"{name}_{unit}"}, "inputs": NO_INPUT}
+    # Recorded at 500 Hz; a fifth of it shows these motions as well.
+    return Angle(file, name, log, timing={"tick_s": 0.01})
 
 
 MOTORS = {"front": "right_volts", "rear": "left_volts"}
@@ -78,7 +84,7 @@ ANGLES = (
 def settings_of(data: Path, angle: Angle, rate: int) -> dict[str, Any]:
     """Return the settings of a replay of one angle by a model that knows nothing of the body."""
     return {
-        "timing": {"symbol_period_s": 1.0 / rate},
+        "timing": {"symbol_period_s": 1.0 / rate, **angle.timing},
         "channel": {"rate_baud": float(rate)},
         "model": UNKNOWN_BODY,
         "transmitter": {"rig": "replay", "encoders": {"counts_per_turn": angle.counts_per_turn}},
@@ -101,8 +107,8 @@ def row_of(data: Path, angle: Angle, rate: int) -> str:
         for name, (first, last, scale) in BODY_RANGES.items()
     }
     tuning.free.update(free_ranges(tuning.config({}), {}, model=False) | ranges)
-    tuned = tune(tuning, lambda count, error: None)
-    print(tuned.values, file=sys.stderr, flush=True)
+    tuned = tune(tuning, _progress)
+    print(angle, rate, preset_text(tuning, tuned), file=sys.stderr, flush=True)
     largest = tuned.test_amplitude
     shares = (tuned.test_after, max(tuned.test_each), tuned.test_largest)
     figures = " | ".join(f"{100.0 * share / largest:.2f}" for share in shares)
@@ -110,6 +116,18 @@ def row_of(data: Path, angle: Angle, rate: int) -> str:
         f"| {angle.file} | {angle.name} | {rate} | {figures} | {largest:.3f} | "
         f"{100.0 * quick.rms[0] / largest:.2f} | {time.monotonic() - begun:.0f} |"
     )
+
+
+def _progress(count: int, error: float) -> None:
+    if count % 100 == 0:
+        print(count, f"{error:.5f}", file=sys.stderr, flush=True)
+
+
+def _row_or_reason(data: Path, angle: Angle, rate: int) -> str:
+    try:
+        return row_of(data, angle, rate)
+    except TenbaudError as error:
+        return f"| {angle.file} | {angle.name} | {rate} | {error} |"
 
 
 def main(arguments: list[str]) -> None:
@@ -122,7 +140,7 @@ def main(arguments: list[str]) -> None:
         for rate in RATES:
             chosen = (angle.file.partition("_")[0], angle.name, str(rate))
             if all(one in chosen or one in angle.file for one in only):
-                print(row_of(Path(data), angle, rate), flush=True)
+                print(_row_or_reason(Path(data), angle, rate), flush=True)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -134,7 +133,7 @@ def tune(
 
     require("numba", "cma")
     from tenbaud.studies.constants import free_ranges
-    from tenbaud.studies.judging import Split, Tuning
+    from tenbaud.studies.judging import Tuning, split_of
     from tenbaud.studies.records import Augment
     from tenbaud.studies.tuning import preset_text
     from tenbaud.studies.tuning import tune as fit
@@ -149,20 +148,14 @@ def tune(
         impair=impair,
         settings=settings,
     )
-    first = seeds + 1
-    split = Split(tuple(range(1, first)), tuple(range(first, first + test_seeds)), train_share)
+    split = split_of(seeds, test_seeds, train_share)
     augment = Augment(_sizes(scales), shoves, phases, seed)
     tuning = Tuning(
         preset, config, overrides, {}, split, method.value, evaluations, seed, allow_code, augment
     )
-    ranges = free_ranges(tuning.config({}), _named(free or []), model=model)
-    tuning = replace(tuning, free=ranges)
+    tuning.free.update(free_ranges(tuning.config({}), _named(free or []), model=model))
     with StopFlag() as stop, progress_bar("tune", counted=True) as update:
-        tuned = fit(
-            tuning,
-            lambda count, error: update(count, evaluations, f"best {math.degrees(error):.4g}°"),
-            stop,
-        )
+        tuned = fit(tuning, lambda n, error: update(n, evaluations, _best(error)), stop)
     _leave(tuned, preset_text(tuning, tuned), out, as_json)
     if stop.raised:
         typer.echo(f"stopped after {tuned.evaluations} of {evaluations} evaluations", err=True)
@@ -202,6 +195,10 @@ def _tell(tuned: Tuned) -> None:
         typer.echo(f"{name:36} {value:.6g}")
     for line in report(tuned):
         typer.echo(line)
+
+
+def _best(error_rad: float) -> str:
+    return f"best {math.degrees(error_rad):.4g}°"
 
 
 def _sizes(text: str) -> tuple[float, ...]:

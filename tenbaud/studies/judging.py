@@ -55,6 +55,12 @@ class Split(NamedTuple):
     """of a recorded flight"""
 
 
+def split_of(seeds: int, test_seeds: int, train_share: float) -> Split:
+    """Return the split with the first seeds for the fit and the next ones for the validation."""
+    border = seeds + 1
+    return Split(tuple(range(1, border)), tuple(range(border, border + test_seeds)), train_share)
+
+
 @dataclass(frozen=True)
 class Tuning:
     """A fit: of which constants, on which flights, how."""

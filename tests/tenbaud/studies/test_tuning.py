@@ -22,7 +22,7 @@ from tenbaud.build.rig import nominal_plant
 from tenbaud.cli.commands import app
 from tenbaud.config.load import load_config
 from tenbaud.flight.outcome import ExitCode
-from tenbaud.studies.constants import changed, free_ranges, present
+from tenbaud.studies.constants import free_ranges
 from tenbaud.studies.flights import CompiledPoint
 from tenbaud.studies.judging import PENALTY_RAD, Judge, Judged, Split, Tuning, is_worse, split_ticks
 from tenbaud.studies.plain import fly_plain
@@ -116,22 +116,6 @@ def test_when_no_constants_help_then_those_before_are_kept() -> None:
     assert tuned.test_after == tuned.test_before
 
 
-def test_when_the_model_is_asked_for_then_its_constants_are_fitted_too() -> None:
-    free = free_ranges(load_config("paper-10baud"), {}, model=True)
-    assert "model.growth_per_s" in free_ranges(load_config("pendulum-30baud"), {}, model=True)
-    assert {"coder.decay", "coder.gains.1", "model.stiffness_per_s2", "model.equilibrium_rad"} <= {
-        *free
-    }
-
-
-def test_when_a_constant_does_not_exist_then_the_nearest_is_named() -> None:
-    one = Range.model_validate({"from": 0.1, "to": 1.0})
-    with pytest.raises(StudyError, match=r"did you mean coder.decay\?"):
-        free_ranges(load_config("paper-10baud"), {"coder.decoy": one}, model=False)
-    with pytest.raises(StudyError, match="no usual constants"):
-        free_ranges(load_config("usual-1000baud"), {}, model=False)
-
-
 @pytest.mark.parametrize("method", ["cma-es", "nelder-mead"])
 @pytest.mark.parametrize("evaluations", [1, 2, 7, 33, 40])
 def test_when_evaluations_are_bounded_then_no_more_are_flown(method: Any, evaluations: int) -> None:
@@ -186,34 +170,6 @@ def test_when_the_model_is_fitted_then_the_simulated_plant_stays() -> None:
     assert CompiledPoint(after).constants[0] != CompiledPoint(before).constants[0]
     plain = fly_plain(after.model_copy(update={"seed": 1}))
     assert plain._replace(engine="") == CompiledPoint(after).fly(1)[0]._replace(engine="")
-
-
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("transmitter.plant.mismatch", "no constant of coder or model"),
-        ("rate", "no constant of coder or model"),
-        ("coder.window_signs", "whole number"),
-        ("coder.correction", "no number"),
-        ("coder.gains.2", "not a constant"),
-        ("coder.weights.0", "not a constant"),
-    ],
-)
-def test_when_something_else_is_to_be_fitted_then_it_is_refused(name: str, text: str) -> None:
-    one = Range.model_validate({"from": 0.1, "to": 1.0})
-    with pytest.raises(StudyError, match=text):
-        free_ranges(load_config("paper-10baud"), {name: one}, model=False)
-
-
-def test_when_a_usual_constant_is_zero_then_it_stays_zero() -> None:
-    config = load_config("paper-10baud", None, {"model": {"motor_lag_s": 0.0}})
-    assert "model.motor_lag_s" not in free_ranges(config, {}, model=True)
-
-
-def test_when_a_usual_constant_is_negative_then_its_sign_stays() -> None:
-    config = load_config("paper-10baud", None, {"model": {"torque_gain_rad_per_v_s2": -0.4}})
-    one = free_ranges(config, {}, model=True)["model.torque_gain_rad_per_v_s2"]
-    assert (one.first, one.last, one.scale) == (-0.2, -0.8, "linear")
 
 
 @pytest.fixture(name="log")
@@ -291,28 +247,6 @@ def test_when_the_validation_is_no_worse_than_its_spread_then_nothing_is_over_fi
 ) -> None:
     judged = [Judged(sum(each) / len(each), 0, len(each), "", each) for each in (before, after)]
     assert is_worse(*judged) is worse
-
-
-def test_when_a_part_comes_from_outside_then_its_options_are_fitted() -> None:
-    coder = {"kind": "tests.outside:Coder", "options": {"gain": 0.5, "table": [1.0, 2.0]}}
-    config = load_config("paper-10baud", None, {"coder": coder})
-    one = Range.model_validate({"from": 0.1, "to": 3.0})
-    names = {"coder.options.gain": one, "coder.options.table.1": one}
-    assert free_ranges(config, names, model=False) == names
-    assert present(config, "coder.options.table.1") == 2.0
-    found = changed(config, {"coder.options.gain": 0.7, "coder.options.table.1": 2.5})
-    assert found.coder.model_dump()["options"] == {"gain": 0.7, "table": [1.0, 2.5]}
-    with pytest.raises(StudyError, match="not a constant"):
-        free_ranges(config, {"coder.options.size": one}, model=False)
-
-
-def test_when_a_matrix_is_fitted_then_the_ticks_of_the_model_follow() -> None:
-    config = load_config("servo-10baud")
-    assert config.model.kind == "linear"
-    found = changed(config, {"model.A.1.1": -7.5}).model.model_dump()
-    assert found["A"][1][1] == -7.5
-    assert found["F"] != config.model.model_dump()["F"]
-    build_codec(config.model_copy(update={"model": changed(config, {"model.A.1.1": -7.5}).model}))
 
 
 def test_when_nothing_better_is_found_then_the_report_says_that_the_fit_failed() -> None:

@@ -33,11 +33,11 @@ UNKNOWN_BODY = {
     "motor_lag_s": 0.2,
 }
 BODY_RANGES = {
-    "model.rate_damping_per_s": (0.02, 10.0, "log"),
-    "model.stiffness_per_s2": (-5.0, 20.0, "linear"),
-    "model.torque_gain_rad_per_v_s2": (-5.0, 5.0, "linear"),
+    "model.rate_damping_per_s": (0.1, 10.0, "log"),
+    "model.stiffness_per_s2": (-2.0, 10.0, "linear"),
+    "model.torque_gain_rad_per_v_s2": (-3.0, 3.0, "linear"),
     "model.motor_lag_s": (0.02, 1.0, "log"),
-    "model.equilibrium_rad": (-1.5, 1.5, "linear"),
+    "model.equilibrium_rad": (-0.5, 0.5, "linear"),
 }
 NO_INPUT = {"front": "0", "rear": "0"}
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 
-SPREAD = 0.15
-"""standard deviation of the first candidates, as a share of the ranges"""
+SPREAD = 0.3
+"""distance of the first candidates from the start, with ranges of length 1"""
 
 
 def minimise(error_at: Callable[[Any], float], start: Sequence[float], seed: int) -> None:
@@ -19,7 +20,7 @@ def minimise(error_at: Callable[[Any], float], start: Sequence[float], seed: int
     search = cma.CMAEvolutionStrategy(
         # It wants two dimensions at least; what is beyond the constants changes nothing.
         [*start, 0.5] if len(start) == 1 else list(start),
-        SPREAD,
+        SPREAD / math.sqrt(max(len(start), 4)),
         {
             "bounds": [0.0, 1.0],
             "seed": seed + 1,

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
+from pydantic import ValidationError
+
+from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
+from tenbaud.design.complete import completed
 from tenbaud.studies.settings import StudyError, check_name
-from tenbaud.studies.study_file import Range
+from tenbaud.studies.study_file import Range, described
+
+BANDWIDTH = "transmitter.rate_observer_bandwidth_rad_s"
+"""of what the transmitter makes of a coder that uses rates; it may be fitted too"""
 
 GAINS = {"coder.gains.0": (0.2, 3.0, "log"), "coder.gains.1": (0.2, 3.0, "log")}
 
@@ -29,18 +37,28 @@ CODER_RANGES = {
         "coder.weights.0": (0.5, 2.0, "log"),
         "coder.weights.2": (0.5, 2.0, "log"),
     },
+    "direction": {
+        "coder.step": (0.7, 1.4, "log"),
+        "coder.removed": (0.75, 1.25, "log"),
+        "coder.initial_strength": (0.01, 100.0, "log"),
+        "coder.minimum_strength": (0.1, 100.0, "log"),
+    },
     "static": {"coder.gains.0": (0.1, 5.0, "log"), "coder.gains.1": (0.1, 5.0, "log")},
 }
 """Constants that are fitted unless others are named; log: the ends are multiples of what is set."""
 
-MODEL_FACTORS = (
-    "model.rate_damping_per_s",
-    "model.stiffness_per_s2",
-    "model.torque_gain_rad_per_v_s2",
-    "model.motor_lag_s",
-)
-
-EQUILIBRIUM_RAD = Range.model_validate({"from": -0.4, "to": 0.4})
+MODEL_RANGES = {
+    "pitch": {
+        **dict.fromkeys(("model.rate_damping_per_s", "model.stiffness_per_s2"), (0.5, 2.0, "log")),
+        **dict.fromkeys(("model.torque_gain_rad_per_v_s2", "model.motor_lag_s"), (0.5, 2.0, "log")),
+        "model.equilibrium_rad": (-0.4, 0.4, "linear"),
+    },
+    "pendulum": {
+        "model.growth_per_s": (0.8, 1.25, "log"),
+        "model.damping_per_s": (0.5, 2.0, "log"),
+        "model.torque_gain_rad_per_v_s2": (0.5, 2.0, "log"),
+    },
+}
 
 
 def free_ranges(config: FlightConfig, names: dict[str, Range], *, model: bool) -> dict[str, Range]:
@@ -59,14 +77,54 @@ def free_ranges(config: FlightConfig, names: dict[str, Range], *, model: bool) -
                 f"the coder {config.coder.kind!r} has no usual constants: name some with --free"
             )
         free = _usual(config, usual)
+        if config.coder.kind == "history" and config.transmitter.rig == "replay":
+            free |= _whole_table(config)
     if model:
-        if config.model.kind != "pitch":
-            raise StudyError(f"the model {config.model.kind!r} has no constants to fit")
-        factors = dict.fromkeys(MODEL_FACTORS, (0.5, 2.0, "log"))
-        free = _usual(config, factors) | {"model.equilibrium_rad": EQUILIBRIUM_RAD} | free
+        if config.model.kind not in MODEL_RANGES:
+            raise StudyError(
+                f"the model {config.model.kind!r} has no usual constants: name some with --free"
+            )
+        free = _usual(config, MODEL_RANGES[config.model.kind]) | free
     if not free:
         raise StudyError("every usual constant is 0 here: name some with --free")
     return free
+
+
+def changed(config: FlightConfig, values: Mapping[str, float | str]) -> FlightConfig:
+    """Return a configuration with other constants, by their dotted names; ConfigError for none such.
+
+    A linear model whose A or B changes gets the F and E of its ticks.
+    """
+    sections: dict[str, Any] = {}
+    for name, value in values.items():
+        top, *path, last = name.split(".")
+        here = sections.setdefault(top, getattr(config, top).model_dump(mode="json"))
+        for part in path:
+            here = here[int(part) if isinstance(here, list) else part]
+        here[int(last) if isinstance(here, list) else last] = value
+    if any(name.startswith(("model.A.", "model.B.")) for name in values):
+        del sections["model"]["F"], sections["model"]["E"]
+        given = {"timing": config.timing.model_dump(), "model": sections["model"]}
+        sections["model"] = completed(given)["model"]
+    try:
+        checked = {top: type(getattr(config, top)).model_validate(sections[top]) for top in sections}
+    except ValidationError as error:
+        raise ConfigError(described(error)) from error
+    return config.model_copy(update=checked)
+
+
+def _whole_table(config: FlightConfig) -> dict[str, Range]:
+    """Return what else of the coder `history` a recording says: its table, floor and observer."""
+    spreads = {
+        f"coder.rows.{row}.{place}": (0.4, 2.5, "log")
+        for row in range(len(config.coder.rows))  # type: ignore[attr-defined]
+        for place in range(3)
+    }
+    ranges = _usual(config, {**spreads, BANDWIDTH: (0.25, 2.5, "log")})
+    floor = {"coder.floor_gain": (0.01, 0.3, "log"), "coder.floor_exponent": (0.0, 0.7, "linear")}
+    for name, (first, last, scale) in floor.items():
+        ranges[name] = Range.model_validate({"from": first, "to": last, "scale": scale})
+    return ranges
 
 
 def _usual(config: FlightConfig, spreads: dict[str, tuple[float, float, str]]) -> dict[str, Range]:
@@ -81,8 +139,9 @@ def _usual(config: FlightConfig, spreads: dict[str, tuple[float, float, str]]) -
 
 
 def _check_constant(config: FlightConfig, name: str) -> None:
-    check_name(name)
-    if name.partition(".")[0] not in ("coder", "model"):
+    if name.split(".")[:2] not in (["coder", "options"], ["model", "options"]):
+        check_name(name)
+    if name.partition(".")[0] not in ("coder", "model") and name != BANDWIDTH:
         raise StudyError(
             f"{name} is no constant of coder or model, so it is not fitted; set it, or sweep it"
         )
@@ -94,8 +153,11 @@ def present(config: FlightConfig, name: str) -> float:
     here: Any = config
     for part in name.split("."):
         try:
-            here = here[int(part)] if part.isdigit() else getattr(here, part, None)
-        except (IndexError, TypeError):
+            if isinstance(here, dict):
+                here = here[part]
+            else:
+                here = here[int(part)] if part.isdigit() else getattr(here, part, None)
+        except (IndexError, KeyError, TypeError):
             here = None
         if here is None:
             raise StudyError(f"{name} is not a constant of the coder and model that are configured")

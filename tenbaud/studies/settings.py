@@ -166,7 +166,10 @@ def check_name(name: str) -> None:
     if name in SHORT_NAMES:
         return
     known = {*SHORT_NAMES, *field_names()}
-    if name in known or (name.rpartition(".")[0] in known and name.rpartition(".")[2].isdigit()):
+    field = name
+    while field.rpartition(".")[2].isdigit():  # an entry of a list, or of a list within it
+        field = field.rpartition(".")[0]
+    if field in known:
         return
     near = difflib.get_close_matches(name, sorted(known), 1)
     hint = f"did you mean {near[0]}?" if near else f"short names are {', '.join(SHORT_NAMES)}"

@@ -76,6 +76,7 @@ Shoves = Annotated[
     float,
     typer.Option(
         min=0.0,
+        max=100.0,
         help="Recorded flights: rms of the random shoves added for the fit, as a share of the record's "
         "motion; 0: none.",
     ),
@@ -84,6 +85,7 @@ Phases = Annotated[
     int,
     typer.Option(
         min=1,
+        max=10_000,
         help="Recorded flights: sample phases flown for the fit, at most. The validation flies all.",
     ),
 ]

@@ -67,7 +67,7 @@ def make_figures(
     results.flown, others = fly_all(jobs, folder / "flights", tasks, on_done)
     if tasks:
         clean = [others[f"clean-{text}"] for text in EXCITATIONS]
-        errors = [largest_error(one.result.estimates) for one in clean]
+        errors = [largest_error(one.found.regression) for one in clean]
         noisy = [pair for name, pair in others.items() if name.startswith("noisy-")]
         results.trials = Trials(clean, errors, noisy)
     on_progress(done, total, "drawing")

@@ -10,7 +10,9 @@ from scipy.signal import detrend, welch
 
 from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.filters import Array
+from plant_sim.identification.pitch import PitchStructure
 from plant_sim.identification.record import Record
+from plant_sim.identification.structures import Structure
 
 VOLTS_MAX = 60.0
 COUNTS = (360, 400, 500, 512, 720, 1000, 1440, 2000, 2500, 3600, 4000, 5000, 8000, 10_000, 20_000)
@@ -104,11 +106,17 @@ def unwrapped(record: Record) -> tuple[Record, list[str]]:
     return replace(record, outputs=outputs), notes
 
 
-def dominant_rad_s(record: Record) -> float:
-    """Return the frequency at which the outputs move most, by their spectrum."""
+def dominant_rad_s(record: Record, structure: Structure) -> float:
+    """Return the frequency at which the outputs move most, by their spectrum.
+
+    Of an angle that turns over it is that of its sine, which the turns do not drown.
+    """
     length = min(len(record), SPECTRUM_SAMPLES)
     found = np.zeros(length // 2 + 1)
-    for values in record.outputs.T:
+    outputs = record.outputs
+    if isinstance(structure, PitchStructure) and float(np.ptp(outputs)) > math.pi:
+        outputs = np.sin(outputs)
+    for values in outputs.T:
         frequencies, power = welch(detrend(values), 1.0 / record.step_s, nperseg=length)
         found += frequencies * power / max(float(np.var(values)), 1e-300)
     # A decade has the more power the wider it is: times the frequency, the peak is of the motion.

@@ -37,6 +37,11 @@ UNCERTAINTY_MAX = 0.25
 IMMATERIAL = 0.1
 """unless it moves the equation by less than this share."""
 AGREEMENT = 0.1
+FOLLOWED = 0.995
+"""share of the motion that a fit should explain; below it shorter segments are tried"""
+EXPLAINED = 0.9
+"""share below which something else moves the plant"""
+SHORTER = (1.0, 4.0, 16.0)
 COARSE = 100
 """blocks of a regression of which only the last estimate counts"""
 
@@ -93,7 +98,7 @@ def identify(record: Record, structure: Structure, options: Options | None = Non
             f"the {what} never changes, so its gain cannot be found: are these the right columns?"
         )
     notes: list[str] = []
-    bandwidth = _bandwidth(record, options, notes)
+    bandwidth = _bandwidth(record, structure, options, notes)
     filters = Filters(
         bandwidth,
         options.damping,
@@ -106,27 +111,23 @@ def identify(record: Record, structure: Structure, options: Options | None = Non
     segments: Segments | None = None
     check: SimulationFit | None = None
     try:
-        segments = simulation.cut(record, structure, simulation.SEGMENT_S / bandwidth)
-        lag_s = _rough_lag(record, structure, filters, segments, options)
-        start = regress(record, structure, replace(filters, lag_s=lag_s), blocks=COARSE)
-        check = simulation.fit(
-            segments, structure, start.values, lag_s, estimate_lag=options.lag_s is None
-        )
-        negligible = check.lag_s < max(0.25 * record.step_s, 2.0 * check.lag_deviation_s)
-        if options.lag_s is None and negligible:
-            check = simulation.fit(segments, structure, check.values, 0.0)
-        structure, check = _held(structure, check, segments, notes)
+        segments, check = _simulated(record, structure, filters, options)
         filters = replace(filters, lag_s=check.lag_s)
     except (IdentificationError, np.linalg.LinAlgError) as error:
         warnings.append(f"no cross-check: {error}")
     regression = regress(record, structure, filters)
-    values, covariance, by_simulation = regression.values, regression.covariance, False
-    if check is not None and segments is not None:
-        found = list(disagreements(regression, check))
-        by_simulation = _predicts_better(structure, check, regression, segments)
-        if by_simulation:
-            values, covariance = check.values, check.covariance
-        warnings += found
+    values, covariance, by_simulation = _decided(structure, regression, check, segments)
+    if check is not None and segments is not None and _is_zero(structure, values, covariance):
+        value, deviation = values["a_w"], math.sqrt(covariance[0, 0])
+        notes.append(f"a_w = {value:.2g} +- {deviation:.2g} is 0 within its uncertainty: held at 0")
+        structure = holding(structure, {"a_w"})
+        start = {name: check.values[name] for name in names_of(structure)}
+        fitted = simulation.fit(segments, structure, start, check.lag_s)
+        check = replace(fitted, lag_deviation_s=check.lag_deviation_s)
+        regression = regress(record, structure, filters)
+        values, covariance, by_simulation = _decided(structure, regression, check, segments)
+    if check is not None:
+        warnings += disagreements(regression, check)
     deviation = 0.0 if check is None else check.lag_deviation_s
     result = Identification(
         structure,
@@ -145,9 +146,11 @@ def identify(record: Record, structure: Structure, options: Options | None = Non
     return replace(result, warnings=(*warnings, *_doubts(result)), refused=refused)
 
 
-def _bandwidth(record: Record, options: Options, notes: list[str]) -> float:
+def _bandwidth(
+    record: Record, structure: Structure, options: Options, notes: list[str]
+) -> float:
     """Return the pass band, near the frequency at which the outputs move."""
-    found = dominant_rad_s(record)
+    found = dominant_rad_s(record, structure)
     usual = Filters().bandwidth_rad_s
     given = options.bandwidth_rad_s
     if given is None:
@@ -182,22 +185,51 @@ def _error(structure: Structure, values: dict[str, float], lag_s: float, segment
     return float(np.mean(errors**2))
 
 
-def _held(
-    structure: Structure, check: SimulationFit, segments: Segments, notes: list[str]
-) -> tuple[Structure, SimulationFit]:
-    """Hold a damping at 0 that is negative only within its uncertainty, and fit the others again."""
-    if not isinstance(structure, PitchStructure) or check.values["a_w"] >= 0.0:
-        return structure, check
-    value = check.values["a_w"]
-    deviation = math.sqrt(check.covariance[0, 0])
-    stiffness = abs(structure.constants(check.values)[1])
-    if -value > 3.0 * deviation and -value > 0.02 * math.sqrt(stiffness):
-        return structure, check
-    notes.append(f"a_w = {value:.2g} +- {deviation:.2g} is 0 within its uncertainty: held at 0")
-    structure = holding(structure, {"a_w"})
-    start = {name: check.values[name] for name in names_of(structure)}
-    fitted = simulation.fit(segments, structure, start, check.lag_s)
-    return structure, replace(fitted, lag_deviation_s=check.lag_deviation_s)
+def _simulated(
+    record: Record, structure: Structure, filters: Filters, options: Options
+) -> tuple[Segments, SimulationFit]:
+    """Return the simulation-error fit with its lag, over segments that the model can follow."""
+    best: tuple[Segments, SimulationFit] | None = None
+    for shorter in SHORTER:
+        length_s = simulation.SEGMENT_S / filters.bandwidth_rad_s / shorter
+        if best is not None and length_s < 16.0 * record.step_s:
+            break
+        segments = simulation.cut(record, structure, length_s)
+        lag_s = _rough_lag(record, structure, filters, segments, options)
+        start = regress(record, structure, replace(filters, lag_s=lag_s), blocks=COARSE)
+        free = options.lag_s is None
+        check = simulation.fit(segments, structure, start.values, lag_s, estimate_lag=free)
+        if free and check.lag_s < max(0.25 * record.step_s, 2.0 * check.lag_deviation_s):
+            check = simulation.fit(segments, structure, check.values, 0.0)
+        if best is None or check.explained > best[1].explained:
+            best = segments, check
+        if check.explained > FOLLOWED:
+            break
+    assert best is not None
+    return best
+
+
+def _is_zero(structure: Structure, values: dict[str, float], covariance: Array) -> bool:
+    """Return whether a damping is negative, and 0 within its uncertainty."""
+    if not isinstance(structure, PitchStructure) or values.get("a_w", 0.0) >= 0.0:
+        return False
+    stiffness = abs(structure.constants(values)[1])
+    deviation = math.sqrt(max(0.0, covariance[0, 0]))
+    return -values["a_w"] < max(3.0 * deviation, 0.02 * math.sqrt(stiffness))
+
+
+def _decided(
+    structure: Structure,
+    regression: Regression,
+    check: SimulationFit | None,
+    segments: Segments | None,
+) -> tuple[dict[str, float], Array, bool]:
+    """Return the values that count, their covariance, and whether they are those of the fit."""
+    if check is None or segments is None:
+        return regression.values, regression.covariance, False
+    if _predicts_better(structure, check, regression, segments):
+        return check.values, check.covariance, True
+    return regression.values, regression.covariance, False
 
 
 def _predicts_better(
@@ -240,7 +272,7 @@ def _doubts(found: Identification) -> Iterable[str]:
         for name in gains_of(structure, len(structure.inputs)):
             if found.values.get(name, 0.0) < 0.0:
                 yield f"{name} is negative: the sign of the input or of the encoder is turned (--sign)"
-    if found.check is not None and found.check.explained < 0.5:
+    if found.check is not None and found.check.explained < EXPLAINED:
         yield (
             f"the model explains {max(0.0, found.check.explained):.0%} of the motion between the "
             "recording's stretches; the rest are pushes that the file does not hold"
@@ -285,7 +317,7 @@ def _unsupported(found: Identification, record: Record) -> Iterable[str]:
 
 def advice(record: Record, structure: Structure) -> str:
     """Return the experiment that would support a model."""
-    slow = math.tau / dominant_rad_s(record)
+    slow = math.tau / dominant_rad_s(record, structure)
     less = f"integrator:{structure.order}"
     return (
         f"record at least {max(60.0, 20.0 * slow):.0f} s in which the input is moved on purpose, such as "

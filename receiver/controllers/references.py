@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
-from os import PathLike
 from typing import Final, Protocol
-
-from channel.flight_log import column_names, parse_number, read_columns
 
 # A time within this share of a tick after the tick counts as the tick itself.
 _TICK_TOLERANCE: Final = 1e-6
@@ -127,33 +125,16 @@ class Sine(AngleReference):
         return self.amplitude * math.sin(math.tau * tick * self.tick_s / self.period_s)
 
 
-class Csv(AngleReference):
-    """Values from a file with the columns `time_s` and `column`; each row holds until the next.
+class Listed(AngleReference):
+    """Values at times of their own, which rise and are at least 0; each holds until the next.
 
-    Times rise from row to row and are at least 0. Before the first row its value holds, after the
-    last one the last. A file without `column` may have `angle_rad` instead.
+    Before the first time its value holds, after the last one the last.
     """
 
-    def __init__(self, path: str | PathLike[str], tick_s: float, column: str = "angle_rad") -> None:
-        """Read the whole file; ValueError with file and line for anything wrong in it."""
+    def __init__(self, times_s: Sequence[float], values: Sequence[float], tick_s: float) -> None:
         _require_positive("tick_s", tick_s)
-        self._first_ticks: list[int] = []
-        self._values: list[float] = []
-        last_time_s = -math.inf
-        if column not in (present := column_names(path)) and "angle_rad" in present:
-            column = "angle_rad"
-        for line, (time_text, text) in read_columns(path, ("time_s", column)):
-            time_s = parse_number(time_text, path, line, "time_s")
-            if time_s < 0.0 or time_s <= last_time_s:
-                floor = "at least 0" if last_time_s < 0.0 else f"above {last_time_s}"
-                raise ValueError(
-                    f"{path}, line {line}, column time_s: {time_s} found; it must be {floor}"
-                )
-            last_time_s = time_s
-            self._first_ticks.append(_first_tick(time_s, tick_s))
-            self._values.append(parse_number(text, path, line, column))
-        if not self._values:
-            raise ValueError(f"{path}, line 2: no rows; a reference needs at least 1")
+        self._first_ticks = [_first_tick(time_s, tick_s) for time_s in times_s]
+        self._values = list(values)
 
     def value(self, tick: int) -> float:
         """Return the set-point at `tick`."""

@@ -62,7 +62,7 @@ def identify_first_half(data: Path) -> FirstHalf:
     0.6 s, with a damping of 0.
     """
     log = {"file": str(data / UIUC_FILE), "end_s": HALF_S}
-    record = from_log(load_config("uiuc-10baud", None, {"flight_log": log}), None)
+    record, _ = from_log(load_config("uiuc-10baud", None, {"flight_log": log}))
     options = Options(MOTOR_LAG_S, BANDWIDTH_RAD_S)
     whole = identify(record, PitchStructure(), options)
     structure = holding(PitchStructure(), {"a_w"})

@@ -6,7 +6,7 @@ import time
 from typing import Literal
 
 from plant_sim.encoder import Encoder
-from tenbaud.build.flight import read_flight_log
+from tenbaud.build.flight_log import read_flight_log
 from tenbaud.build.rig import build_axes, build_plant, quarc_commands, quarc_fields, wired_outputs
 from tenbaud.build.signals import configured_signals
 from tenbaud.config.load import ConfigError

@@ -6,12 +6,9 @@ import math
 from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 
 from channel.codec.codec import Codec
 from channel.codec.signals import Signals, signals_of
-from channel.errors import TenbaudError
-from channel.flight_log import FlightColumns, FlightLog
 from channel.line.impairments import LineFaults, parse_impairments
 from channel.links.kind import LinkKind
 from channel.links.registry import LINKS, link_kind
@@ -176,26 +173,6 @@ def kind_of_link(config: FlightConfig) -> LinkKind:
         return link_kind(config.link.kind)
     except RegistryError as error:
         raise ConfigError(str(error)) from error
-
-
-def read_flight_log(config: FlightConfig) -> FlightLog:
-    """Read the recorded flight that the configuration names."""
-    section = config.flight_log
-    if not section.file:
-        raise ConfigError("flight_log.file names no recording; give --rig replay:FILE")
-    columns = FlightColumns(
-        index_column=section.index_column,
-        counts_columns=(section.counts_column,),
-        volts_columns=section.volts_columns,
-    )
-    try:
-        return FlightLog.read(Path(section.file), columns)
-    except ValueError as error:
-        raise RecordingUnusable(str(error)) from error
-
-
-class RecordingUnusable(TenbaudError):
-    """A recorded flight that cannot be replayed; the text names file, line and column."""
 
 
 def ticks_of(seconds: float, config: FlightConfig) -> int:

@@ -7,7 +7,8 @@ from channel.codec.signals import Signals
 from plant_sim.disturbance import parse_disturbance
 from plant_sim.pitch import PitchParameters, PitchPlant
 from plant_sim.plant import Plant, PlantContext
-from tenbaud.build.flight import REAL_RIGS, read_flight_log
+from tenbaud.build.flight import REAL_RIGS
+from tenbaud.build.flight_log import read_flight_log
 from tenbaud.build.plugins import build_part
 from tenbaud.build.signals import (
     TURNS,
@@ -151,7 +152,7 @@ def nominal_plant(config: FlightConfig, volts_max: float | None = None) -> Pitch
 def _build_other(config: FlightConfig, plant: Plant | None, signals: Signals) -> Rig:
     encoders = build_encoders(config, signals)
     if config.transmitter.rig == "replay":
-        return ReplayRig(read_flight_log(config), encoders)
+        return ReplayRig(read_flight_log(config, signals), encoders)
     if plant is None:
         plant = build_plant(config, config.timing.tick_s, signals)
     names = [one.name for one in signals.outputs]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from tenbaud.cli import options
+from tenbaud.cli.log_options import LogOptions
 from tenbaud.cli.spread import spread
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ VIEW_DURATION_S = 3600.0
 @spread
 def demo(
     flight: options.FlightOptions,
+    log: LogOptions,
     mismatch: options.Mismatches = None,
     view: options.View = False,
     view_port: options.ViewPort = 8710,
@@ -52,7 +54,7 @@ def demo(
         flights = [None] if single else list(DEFAULT_MISMATCHES)
     if flight.preset is None and flight.config is None and rig.startswith("replay"):
         flight = replace(flight, preset="uiuc-10baud")
-    changes = [options.overrides(**options.fields_of(flight), mismatch=off) for off in flights]
+    changes = [options.overrides(**options.fields_of(flight), mismatch=off, log=log) for off in flights]
     agreements = _agree_all(flight, changes)
     pace = _checked_pace(agreements[0], pace, view)
     view_options = _view_options(agreements, view, view_port, open_browser)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tenbaud.cli import options
+from tenbaud.cli.log_options import LogOptions
 from tenbaud.cli.spread import spread
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 def transmit(
     node: options.NodeOptions,
     addresses: options.Addresses,
+    log: LogOptions,
     duration: options.Duration = None,
     seed: options.Seed = None,
     rig: options.Rig = None,
@@ -43,6 +45,7 @@ def transmit(
         duration=duration,
         seed=seed,
         rig=rig,
+        log=log,
         dry_run=dry_run,
         mismatch=mismatch,
         disturbance=disturbance,
@@ -58,6 +61,7 @@ def receive(
     node: options.NodeOptions,
     addresses: options.Addresses,
     rigs: options.ManyOptions,
+    log: LogOptions,
     rig: Annotated[
         str | None,
         typer.Option(help="replay:FILE when the transmitter replays: its voltages are used."),
@@ -76,7 +80,7 @@ def receive(
 
     [dim]tenbaud receive --sessions 'rig/*' --configs rigs/[/dim]
     """
-    changed = node.changes(rig=rig, sabotaged_end="receiver")
+    changed = node.changes(rig=rig, log=log, sabotaged_end="receiver")
     if rigs.sessions is None:
         if rigs.configs is not None or rigs.flights is not None:
             raise typer.BadParameter("--configs and --flights go with --sessions, the names to serve")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tenbaud.cli import rigs
+from tenbaud.cli.log_options import LogOptions
 
 if TYPE_CHECKING:
     from tenbaud.config.schema import FlightConfig
@@ -358,6 +359,7 @@ def fields_of(group: NodeOptions | FlightOptions | PlantOptions) -> dict[str, An
 def overrides(
     *,
     rig: str | None = None,
+    log: LogOptions | None = None,
     sabotage: str | None = None,
     sabotaged_end: str = "transmitter",
     settings: list[str] | None = None,
@@ -375,6 +377,7 @@ def overrides(
         values[f"{sabotaged_end}.sabotage"] = sabotage
     if rig is not None:
         values |= rigs.settings_of(rig)
+    values |= {} if log is None else log.settings()
     return nested(values | dict(_parse_setting(setting) for setting in settings or []))
 
 

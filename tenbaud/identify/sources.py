@@ -1,61 +1,50 @@
-"""Sources of a pitch record: the configured rig, the folder of a run, or a CSV log."""
+"""Sources of a record: the configured rig, the folder of a run, a log, or arrays."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from channel.flight_log import parse_number, read_columns
+from channel.codec.signals import Signals
 from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.excitation import excite, parse_excitation
-from plant_sim.identification.record import PitchRecord
+from plant_sim.identification.record import Record
+from tenbaud.build.flight_log import read_flight_log
 from tenbaud.build.rig import build_rig
-from tenbaud.build.signals import build_encoders, configured_signals
+from tenbaud.build.signals import configured_signals
 from tenbaud.config.schema import FlightConfig
 from tenbaud.recording.folder import find_recordings
 from tenbaud.recording.reader import Recording
 
-AngleUnit = Literal["counts", "rad", "deg"]
+if TYPE_CHECKING:
+    from channel.flight_log import FlightLog
+
+ALIASES = ("angle", "output", "input", "time", "index", "front", "rear")
 
 
-@dataclass(frozen=True, slots=True)
-class LogColumns:
-    """The columns of a log; a time column, if there is one, is in seconds."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Source:
+    """A record, its name, and what was done to the file that it is from."""
 
-    angle: str = "pitch_counts"
-    front: str = "right_volts"
-    rear: str = "left_volts"
-    index: str = "step"
-    time: str = ""
-    unit: AngleUnit = "counts"
+    name: str
+    record: Record
+    notes: tuple[str, ...] = ()
+    file: Path | None = None
 
 
-def parse_columns(text: str, unit: AngleUnit, base: LogColumns) -> LogColumns:
-    """Return the columns of a command line such as `angle=pitch,front=u1,rear=u2,time=t`."""
-    values = {
-        "angle": base.angle,
-        "front": base.front,
-        "rear": base.rear,
-        "index": base.index,
-        "time": base.time,
-    }
-    for piece in filter(None, text.split(",")):
-        name, equals, column = piece.partition("=")
-        if name.strip() not in values or not equals:
-            raise IdentificationError(
-                f"--columns: '{piece}' is not NAME=COLUMN with a name of {', '.join(values)}"
-            )
-        values[name.strip()] = column.strip()
-    return LogColumns(**values, unit=unit)
-
-
-def from_rig(config: FlightConfig, excitation: str, duration_s: float) -> PitchRecord:
+def from_rig(config: FlightConfig, excitation: str, duration_s: float) -> Record:
     """Excite the configured rig and return what its encoder saw."""
     tick_s = config.timing.tick_s
+    signals = configured_signals(config)
+    if len(signals.outputs) != 1 or len(signals.inputs) != 2:
+        raise IdentificationError(
+            "only a pitch axis is excited by this command; record a flight of this rig, with its "
+            "commands, and give the file or the folder of the run"
+        )
     with build_rig(config) as rig:
 
         def step(tick: int, front: float, rear: float) -> float | None:
@@ -68,18 +57,20 @@ def from_rig(config: FlightConfig, excitation: str, duration_s: float) -> PitchR
         return excite(step, signal, tick_s, duration_s, normal_force_volts=force)
 
 
-def from_run(folder: Path) -> PitchRecord:
-    """Return the measured angles and applied voltages of a run's transmitter."""
+def from_run(folder: Path, signals: Signals) -> Record:
+    """Return the measured outputs and applied commands of a run's transmitter."""
     recording = Recording(find_recordings(folder)[0])
     ticks, rows = [], []
+    outputs, inputs = len(signals.outputs), len(signals.inputs)
     for _, row in recording.rows("tick"):
-        if not row.get("measured") or len(row.get("applied") or ()) != 2:
+        if not row.get("measured") or len(row.get("applied") or ()) != inputs:
             continue  # a tick without a reading: a gap, reported below
         ticks.append(row["tick"])
-        rows.append((row["measured"][0], *row["applied"]))
+        rows.append((*row["measured"][:outputs], *row["applied"]))
     if not ticks:
         raise IdentificationError(
-            f"{recording.path} holds no measured angles; give the run's transmitter.mcap"
+            f"{recording.path} holds no measured outputs with {inputs} commands; give the run's "
+            "transmitter.mcap, and the preset or the configuration that it was flown with"
         )
     for before, after in pairwise(ticks):
         if after != before + 1:
@@ -92,55 +83,51 @@ def from_run(folder: Path) -> PitchRecord:
         step_s = float(recording.metadata["tick_s"])
     except (KeyError, ValueError):
         raise IdentificationError(f"{recording.path} does not say how long its ticks are") from None
-    return PitchRecord(step_s, columns[:, 0], columns[:, 1], columns[:, 2])
+    return record_of(step_s, columns[:, :outputs], columns[:, outputs:], signals)
 
 
-def from_csv(path: Path, columns: LogColumns, config: FlightConfig) -> PitchRecord:
-    """Return the record in a CSV file; FlightLogError or IdentificationError name line and fault.
+def from_log(config: FlightConfig, structure: str = "") -> tuple[Record, tuple[str, ...]]:
+    """Return the record in the log that a configuration names, and what was done to the file.
 
-    Without a time column the rows are one tick of the configuration apart, and the index column, if
-    the file has it, must count them by ones.
+    The signals are those of the model, or the file's own where the structure is none of the model.
+    LogError where the file cannot be used.
     """
-    clock = columns.time or columns.index
-    values = (columns.angle, columns.front, columns.rear)
-    names = (clock, *values) if clock else values
-    lines, rows = [], []
-    for line, cells in read_columns(path, names):
-        named = zip(cells, names, strict=True)
-        rows.append([parse_number(cell, path, line, name) for cell, name in named])
-        lines.append(line)
-    table = np.array(rows, dtype=np.float64)
-    if not len(table):
-        raise IdentificationError(f"{path} has a header and no rows")
-    step_s = config.timing.tick_s
-    if clock:
-        step_s = _even_step(path, table[:, 0], lines, clock, step_s, timed=bool(columns.time))
-        table = table[:, 1:]
-    angle = table[:, 0]
-    if columns.unit == "counts":
-        encoder = build_encoders(config, configured_signals(config))[0]
-        angle = np.array([encoder.angle_rad(round(count)) for count in angle.tolist()])
-    elif columns.unit == "deg":
-        angle = np.radians(angle)
-    return PitchRecord(step_s, angle, table[:, 1], table[:, 2])
+    if _own_signals(config, structure):
+        from tenbaud.log.read import read_log
+
+        log = read_log(config.flight_log, None, (), config.timing.tick_s)
+    else:
+        log = read_flight_log(config)
+    return record_of_log(log, config), log.notes
 
 
-def _even_step(
-    path: Path, clock: np.ndarray, lines: list[int], name: str, tick_s: float, *, timed: bool
-) -> float:
-    """Return the sampling time, or raise where the clock column jumps."""
-    if len(clock) < 2:
-        raise IdentificationError(f"{path} has a single row")
-    steps = np.diff(clock)
-    usual = float(np.median(steps)) if timed else 1.0
-    if usual <= 0.0:
-        raise IdentificationError(f"{path}, column {name}: the times do not rise")
-    bad = np.flatnonzero(np.abs(steps - usual) > 0.1 * usual)
-    if len(bad):
-        row = int(bad[0])
-        raise IdentificationError(
-            f"{path}, line {lines[row + 1]}, column {name}: {clock[row + 1]:g} after {clock[row]:g}, "
-            f"where the usual step is {usual:g}; a gap cannot be identified across: choose a stretch "
-            "with --from and --to before or after it, as a separate file"
-        )
-    return usual if timed else tick_s
+def record_of_log(log: FlightLog, config: FlightConfig) -> Record:
+    """Return a flight log as a record."""
+    signals = log.signals or configured_signals(config)
+    return record_of(log.tick_s, log.measured, log.commands, signals)
+
+
+def record_of(step_s: float, outputs: np.ndarray, inputs: np.ndarray, signals: Signals) -> Record:
+    """Return a record with the names and units of signals."""
+    taken = signals.inputs[: inputs.shape[1]]
+    return Record(
+        step_s,
+        outputs,
+        inputs,
+        tuple([one.name for one in signals.outputs]),
+        tuple([one.name for one in taken]),
+        tuple([one.unit for one in signals.outputs]),
+        tuple([one.unit for one in taken]),
+    )
+
+
+def _own_signals(config: FlightConfig, structure: str) -> bool:
+    """Return whether a log's signals are its own, and not those of the configured model."""
+    if structure and structure != "pitch":
+        return config.model.kind in ("pitch", "hold", "pendulum")
+    log = config.flight_log
+    signals = configured_signals(config)
+    known = {one.name for one in (*signals.outputs, *signals.inputs)}
+    named = {*log.columns, *log.outputs, *log.inputs}
+    return any(name not in known and name not in ALIASES and not name.isdigit() for name in named)
+

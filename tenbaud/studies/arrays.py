@@ -12,7 +12,6 @@ from channel.codec.codec import Codec
 from channel.codec.signals import Signal, Signals
 from channel.flight_log import FlightLog
 from plant_sim.encoder import Encoder
-from receiver.controllers.recorded import RecordedController
 from tenbaud.build.ends import guard_settings
 from tenbaud.build.flight import Agreement
 from tenbaud.build.references import reference_of, reference_sections
@@ -132,9 +131,5 @@ def recorded_arrays(log: FlightLog | None, ahead: int, signals: Signals) -> dict
     if log is None:
         counts = np.zeros((0, len(signals.outputs)), dtype=np.int64)
         return {"counts": counts, "commands": NO_ROWS, "applied": NO_ROWS}
-    controller = RecordedController(log)
-    return {
-        "counts": np.array(log.counts, dtype=np.int64),
-        "commands": np.array([controller.command(tick, ()) for tick in range(ahead)]),
-        "applied": np.array(log.volts, dtype=float),
-    }
+    rows = np.minimum(np.arange(ahead), len(log) - 1)
+    return {"counts": log.counts, "commands": log.commands[rows], "applied": log.commands}

@@ -111,8 +111,8 @@ class ReplayRig(Rig):
         """Return the row of a tick, None past the last."""
         if tick >= len(self._log):
             return None
-        counts = self._log.counts[tick]
-        volts = self._log.volts[tick] if self._log.volts else None
+        counts = tuple(self._log.counts[tick].tolist())
+        volts = tuple(self._log.commands[tick].tolist()) or None
         return Reading(counts, angles_rad(self._encoders, counts), applied_volts=volts)
 
     def write(self, tick: int, volts: Vector) -> None:

@@ -1,14 +1,19 @@
-"""Replaying the voltages of a recorded flight."""
+"""Replaying the commands of a recorded flight."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from channel.flight_log import FlightLog
 from receiver.controllers.base import Controller
 from receiver.controllers.recorded import RecordedController
 
-LOG = FlightLog(counts=((0,), (1,), (2,)), volts=((0.5, -0.5), (1.0, 2.0), (3.0, 4.0)))
+LOG = FlightLog(
+    0.01, np.zeros((3, 1)), np.array([[0.5, -0.5], [1.0, 2.0], [3.0, 4.0]]), np.zeros((3, 1), np.int64)
+)
 
 
 def test_each_tick_gets_its_row_and_the_last_row_stays() -> None:
@@ -31,6 +36,6 @@ def test_a_tick_below_zero_is_refused() -> None:
         RecordedController(LOG).command(-1, ())
 
 
-def test_a_log_without_voltages_is_refused() -> None:
-    with pytest.raises(ValueError, match="no voltages"):
-        RecordedController(FlightLog(counts=((0,), (1,)), volts=((), ())))
+def test_a_log_without_inputs_is_refused() -> None:
+    with pytest.raises(ValueError, match="no inputs"):
+        RecordedController(replace(LOG, commands=np.empty((3, 0))))

@@ -60,7 +60,7 @@ class RecordedBody:
 
     def counts_at(self, time_ns: int, volts: tuple[float, float]) -> int:
         """Return the row of this time."""
-        return self._log.counts[min(max(0, time_ns) // self._tick_ns, len(self._log) - 1)][0]
+        return int(self._log.counts[min(max(0, time_ns) // self._tick_ns, len(self._log) - 1), 0])
 
 
 class EmulatedDevice:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from channel.flight_log import FlightLog
@@ -86,7 +87,7 @@ def test_a_jump_shifts_the_counts_for_good() -> None:
 
 
 def test_a_recorded_flight_comes_again_and_stays_at_its_end() -> None:
-    log = FlightLog(((5,), (6,), (7,)), ())
+    log = FlightLog(0.01, np.zeros((3, 1)), np.empty((3, 0)), np.array([[5], [6], [7]]))
     one = EmulatedDevice(RecordedBody(log, 10 * MS), 0, 0.1)
     one.command(S, (1.0, 1.0), True)
     read = [one.sample(S + ms * MS).counts[1] for ms in (0, 9, 10, 20, 500)]

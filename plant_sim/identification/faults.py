@@ -45,17 +45,15 @@ def require_units(record: Record) -> None:
         step = encoder_step(values)
         if unit in ("rad", "") and step is not None and _counts(360.0 / step):
             raise IdentificationError(
-                f"the {name} moves in steps of {step:.6g} = 360/{round(360.0 / step)}: the column is in "
-                "degrees and is read as rad, a factor of 57.3. Say --units deg"
+                f"the {name} moves in steps of {step:.6g} = 360/{round(360.0 / step)}: the column is "
+                "in degrees and is read as rad, a factor of 57.3. Say --units deg"
             )
         if unit == "deg" and step is not None and _counts(math.tau / step):
             raise IdentificationError(
-                f"the {name} moves in steps of {step:.6g} = 2 pi/{round(math.tau / step)}: the column is "
-                "in rad and is read as degrees, a factor of 57.3. Say --units rad"
+                f"the {name} moves in steps of {step:.6g} = 2 pi/{round(math.tau / step)}: the column "
+                "is in rad and is read as degrees, a factor of 57.3. Say --units rad"
             )
-    for name, unit, values in zip(
-        record.input_names, record.input_units, record.inputs.T, strict=True
-    ):
+    for name, unit, values in zip(record.input_names, record.input_units, record.inputs.T, strict=True):
         largest = float(np.abs(values).max())
         if unit == "V" and largest > VOLTS_MAX:
             raise IdentificationError(
@@ -100,8 +98,8 @@ def unwrapped(record: Record) -> tuple[Record, list[str]]:
             outputs = outputs.copy()
             outputs[:, index] = np.unwrap(outputs[:, index], period=turn)
             notes.append(
-                f"the {name} jumps by a turn at sample {jumps[0] + 1} and {len(jumps) - 1} more: it was "
-                "unwrapped"
+                f"the {name} jumps by a turn at sample {jumps[0] + 1} and {len(jumps) - 1} more: it "
+                "was unwrapped"
             )
     return replace(record, outputs=outputs), notes
 

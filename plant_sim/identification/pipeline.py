@@ -1,8 +1,8 @@
 """From a record to parameters that can be trusted, or to the reasons why there are none.
 
-The motor lag is found by the smallest simulation error; the regression (9), (10) then runs with it over
-the whole record, and the simulation-error fit is the second opinion. Where the two agree, the regression
-counts; elsewhere the one that predicts better over stretches shorter than those of the fit.
+The motor lag is found by the smallest simulation error; the regression (9), (10) then runs with it
+over the whole record, and the simulation-error fit is the second opinion. Of the two, the one counts
+that predicts better over stretches of half the length of those of the fit.
 """
 
 from __future__ import annotations
@@ -146,9 +146,7 @@ def identify(record: Record, structure: Structure, options: Options | None = Non
     return replace(result, warnings=(*warnings, *_doubts(result)), refused=refused)
 
 
-def _bandwidth(
-    record: Record, structure: Structure, options: Options, notes: list[str]
-) -> float:
+def _bandwidth(record: Record, structure: Structure, options: Options, notes: list[str]) -> float:
     """Return the pass band, near the frequency at which the outputs move."""
     found = dominant_rad_s(record, structure)
     usual = Filters().bandwidth_rad_s
@@ -300,9 +298,7 @@ def _unsupported(found: Identification, record: Record) -> Iterable[str]:
     for equation, one in zip(structure.equations, regression.estimates, strict=True):
         for term, level in zip(equation.terms, one.levels, strict=False):
             value, deviation = found.values[term.name], spread[term.name]
-            small = deviation * level <= IMMATERIAL * one.target and not (
-                alone and term.name in gains
-            )
+            small = deviation * level <= IMMATERIAL * one.target and not (alone and term.name in gains)
             if not math.isfinite(deviation):
                 yield f"{term.name}: the record is too short to say how sure the estimate is"
             elif deviation > UNCERTAINTY_MAX * abs(value) and not small:
@@ -320,7 +316,7 @@ def advice(record: Record, structure: Structure) -> str:
     slow = math.tau / dominant_rad_s(record, structure)
     less = f"integrator:{structure.order}"
     return (
-        f"record at least {max(60.0, 20.0 * slow):.0f} s in which the input is moved on purpose, such as "
-        f"a square wave of {2.0 * slow:.2g} s as large as the plant allows; or ask for less: "
+        f"record at least {max(60.0, 20.0 * slow):.0f} s in which the input is moved on purpose, such "
+        f"as a square wave of {2.0 * slow:.2g} s as large as the plant allows; or ask for less: "
         f"--structure {less if structure.kind != less else 'first-order'}"
     )

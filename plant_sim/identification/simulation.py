@@ -64,7 +64,7 @@ class Segments:
     def scale(self) -> Array:
         """Return the usual size of each output's motion within a segment."""
         moved = self.outputs - self.outputs.mean(axis=0)
-        return np.maximum(np.sqrt(np.mean(moved**2, axis=(0, 1))), 1e-12)
+        return np.asarray(np.maximum(np.sqrt(np.mean(moved**2, axis=(0, 1))), 1e-12))
 
 
 def cut(record: Record, structure: Structure, segment_s: float) -> Segments:
@@ -90,7 +90,7 @@ def simulation_residuals(
 ) -> Array:
     """Return (samples, segments, outputs): simulated minus recorded, from the best initial states."""
     size = structure.order * len(structure.equations)
-    samples, count, outputs = segments.outputs.shape
+    samples, count, _ = segments.outputs.shape
     acting = _acting(segments, lag_s)
     start = np.zeros((count, size))
     nudge = 1.0

@@ -154,8 +154,10 @@ class LinearStructure:
                 name = self._own(output, other, derivative)
                 terms.append(Term(name, other, derivative, 1.0 if self.coupled else -1.0))
         for index in range(len(self.inputs)):
-            for derivative in range(self.input_order, -1, -1):
-                terms.append(Term(self._gain(output, index, derivative), count + index, derivative))
+            terms += [
+                Term(self._gain(output, index, derivative), count + index, derivative)
+                for derivative in range(self.input_order, -1, -1)
+            ]
         terms.append(Term(self._offset(output), constant, 0))
         kept = tuple(term for term in terms if term.name not in self.without)
         return Equation(output, self.n, kept)
@@ -193,7 +195,7 @@ class LinearStructure:
         ]
 
     def state_space(self, values: Mapping[str, float]) -> StateSpace:
-        """Return the matrices; the states of an output are it and its rates where no input jumps them."""
+        """Return the matrices; states are outputs and rates, where no input makes the rates jump."""
         n, count = self.n, len(self.outputs)
         A, B = np.zeros((n * count, n * count)), np.zeros((n * count, len(self.inputs)))
         C, offset = np.zeros((count, n * count)), np.zeros(n * count)

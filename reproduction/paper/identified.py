@@ -52,9 +52,7 @@ def clean_trial(excitation: str) -> Identified:
         gain=PAPER_FILTERS.gain,
         rests=True,
     )
-    return run(
-        excitation, record_of(excitation, CLEAN_S), Wanted(equilibrium="quiet", options=options)
-    )
+    return run(excitation, record_of(excitation, CLEAN_S), Wanted(equilibrium="quiet", options=options))
 
 
 def noisy_trial(excitation: str, seed: int) -> tuple[float, float]:

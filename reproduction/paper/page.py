@@ -11,6 +11,7 @@ from tenbaud.files.whole import write_whole
 
 LETTERS = (("a_w", "1/s"), ("a_th", "1/s^2"), ("k_v", "rad/(V s^2)"), ("theta_0", "rad"))
 
+
 def write_page(path: Path, results: Results) -> None:
     """Write the page; its pictures are expected in `figures/` beside it."""
     parts = [_head(), _claims(results), _identification(results), _loop(results)]
@@ -161,9 +162,10 @@ def _first_half(first: real.FirstHalf) -> str:
         f"`{letter}` = {first.model[field]:.2f} (+- {spread:.2f}) {unit}"
         for (field, spread), (letter, unit) in zip(first.deviations.items(), LETTERS, strict=True)
     )
+    damping, stiffness = regression["rate_damping_per_s"], regression["stiffness_per_s2"]
     return f"""The paper's coder flies with a model identified on the first half: {numbers}.
-It is the simulation-error fit over stretches of {real.SEGMENT_S:g} s, with `a_w` held at 0. The regression (9)-(15) alone
-gives `a_w` = {regression["rate_damping_per_s"]:.2f} and `a_th` = {regression["stiffness_per_s2"]:.2f}, and
+It is the simulation-error fit over stretches of {real.SEGMENT_S:g} s, with `a_w` held at 0. The
+regression (9)-(15) alone gives `a_w` = {damping:.2f} and `a_th` = {stiffness:.2f}, and
 warns: hands push the body, and the controller answers, so that the voltage depends on the pushes. The
 pushes cause the largest errors; no model can predict them. The tuned presets are
 `uiuc-10baud`, `uiuc-16baud`, `uiuc-25baud` and `uiuc-50baud`."""

@@ -92,7 +92,7 @@ def identify(
     loaded = plant.load(log=log)
     request = Request(structure, lag, equilibrium, bandwidth, damping, forgetting, fly=fly)
     if duration is not None and duration / loaded.timing.tick_s > 10_000_000:
-        raise typer.BadParameter(f"--duration: {duration / loaded.timing.tick_s:.3g} ticks are too many")
+        raise typer.BadParameter(f"--duration: {duration / loaded.timing.tick_s:.3g} ticks")
     sources = sources_of(loaded, source, request, excitation, duration)
     result = identify_sources(loaded, sources, request)
     _write(result, out, request, json)
@@ -115,7 +115,9 @@ def _write(result: Result, out: Path | None, request: Request, as_json: bool) ->
         for text in one.identified.found.refused:
             typer.echo(f"not supported, {one.identified.name}: {text}", err=True)
         if one.identified.advice:
-            typer.echo(f"no model was written of {one.identified.name}: {one.identified.advice}", err=True)
+            typer.echo(
+                f"no model was written of {one.identified.name}: {one.identified.advice}", err=True
+            )
     if as_json:
         return
     for one in result.each:
@@ -140,7 +142,9 @@ def _show(result: Result) -> None:
         table = Table(title=title, title_justify="left")
         table.add_column("after")
         for item in found.parameters:
-            table.add_column(f"{item.letter}, {item.unit}" if item.unit else item.letter, justify="right")
+            table.add_column(
+                f"{item.letter}, {item.unit}" if item.unit else item.letter, justify="right"
+            )
         times = regression.times_s
         every = max(PRINTED_EVERY_S, record.duration_s / 12)
         marks = [mark * every for mark in range(1, int(times[-1] / every) + 1)]

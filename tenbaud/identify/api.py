@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,7 @@ from plant_sim.identification.pipeline import Options
 from plant_sim.identification.record import Record
 from plant_sim.identification.regression import Filters
 from tenbaud.build.signals import build_limits, configured_signals
-from tenbaud.config.load import load_config, nested, toml_text
+from tenbaud.config.load import load_config, nested
 from tenbaud.config.schema import FlightConfig
 from tenbaud.identify import written
 from tenbaud.identify.closed_loop import require_commands
@@ -311,14 +311,18 @@ def _of_arrays(
     units: Mapping[str, str],
 ) -> Source:
     if tick_s is None or not outputs:
-        raise IdentificationError("arrays need tick_s, the time between two rows, and outputs=(name, ...)")
+        raise IdentificationError(
+            "arrays need tick_s, the time between two rows, and outputs=(name, ...)"
+        )
     missing = [name for name in (*outputs, *inputs) if name not in arrays]
     if missing:
         raise IdentificationError(f"no array is called {missing[0]}; there are {', '.join(arrays)}")
     columns = {name: np.asarray(arrays[name], dtype=np.float64) for name in (*outputs, *inputs)}
     lengths = {values.shape for values in columns.values()}
     if len(lengths) != 1 or len(next(iter(lengths))) != 1:
-        raise IdentificationError(f"the arrays differ in shape: {sorted(lengths)}; give vectors of one length")
+        raise IdentificationError(
+            f"the arrays differ in shape: {sorted(lengths)}; give vectors of one length"
+        )
     rows = len(columns[outputs[0]])
     record = Record(
         tick_s,
@@ -330,6 +334,3 @@ def _of_arrays(
         tuple(units.get(name, "") for name in inputs),
     )
     return Source("arrays", record)
-
-
-__all__ = ["Each", "Request", "Result", "identify", "replace", "toml_text"]

@@ -41,8 +41,8 @@ def require_commands(record: Record) -> None:
     raise IdentificationError(
         "\n  ".join(
             [
-                f"{missing}: no model of the plant follows, as any plant under its own controller moves "
-                "alike. The record says:",
+                f"{missing}: no model of the plant follows, as any plant under its own controller "
+                "moves alike. The record says:",
                 *lines,
                 "log the voltages (or currents, torques) beside the outputs, and name them with "
                 "--columns; without them it can still be flown: tenbaud demo --rig replay:FILE",

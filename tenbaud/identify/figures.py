@@ -28,7 +28,7 @@ def draw_excitation(runs: Sequence[Identified], paths: Sequence[Path]) -> None:
         if not pitch:
             names = (_named(record.output_names[0], record.output_units[0]), "filtered input")
         every = max(1, len(record) // 20_000)
-        times = np.arange(0, len(record), every) * record.step_s
+        times = record.step_s * np.arange(0, len(record), every, dtype=np.float64)
         panel.plot(*decimated(times, record.outputs[::every, 0]), color=LINE_A, label=names[0])
         panel.plot(
             *decimated(regression.times_s, regression.filtered_input),
@@ -52,10 +52,7 @@ def history_of(regression: Regression, rows: Sequence[int]) -> Array:
     nothing = np.zeros_like(regression.covariance)
     return np.array(
         [
-            [
-                item.value
-                for item in regression.structure.parameters(regression.values_at(row), nothing)
-            ]
+            [item.value for item in regression.structure.parameters(regression.values_at(row), nothing)]
             for row in rows
         ]
     )

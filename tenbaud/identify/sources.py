@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,9 +18,6 @@ from tenbaud.build.signals import configured_signals
 from tenbaud.config.schema import FlightConfig
 from tenbaud.recording.folder import find_recordings
 from tenbaud.recording.reader import Recording
-
-if TYPE_CHECKING:
-    from channel.flight_log import FlightLog
 
 ALIASES = ("angle", "output", "input", "time", "index", "front", "rear")
 
@@ -95,16 +91,11 @@ def from_log(config: FlightConfig, structure: str = "") -> tuple[Record, tuple[s
     if _own_signals(config, structure):
         from tenbaud.log.read import read_log
 
-        log = read_log(config.flight_log, None, (), config.timing.tick_s)
-    else:
-        log = read_flight_log(config)
-    return record_of_log(log, config), log.notes
-
-
-def record_of_log(log: FlightLog, config: FlightConfig) -> Record:
-    """Return a flight log as a record."""
-    signals = log.signals or configured_signals(config)
-    return record_of(log.tick_s, log.measured, log.commands, signals)
+        own = read_log(config.flight_log, None, (), config.timing.tick_s)
+        return record_of(own.tick_s, own.measured, own.commands, own.signals), own.notes
+    log = read_flight_log(config)
+    signals = configured_signals(config)
+    return record_of(log.tick_s, log.measured, log.commands, signals), log.notes
 
 
 def record_of(step_s: float, outputs: np.ndarray, inputs: np.ndarray, signals: Signals) -> Record:
@@ -130,4 +121,3 @@ def _own_signals(config: FlightConfig, structure: str) -> bool:
     known = {one.name for one in (*signals.outputs, *signals.inputs)}
     named = {*log.columns, *log.outputs, *log.inputs}
     return any(name not in known and name not in ALIASES and not name.isdigit() for name in named)
-

@@ -1,4 +1,4 @@
-"""The configuration of an identified plant: everything that a flight of it needs, and nothing assumed."""
+"""The configuration of an identified plant: all that a flight of it needs."""
 
 from __future__ import annotations
 
@@ -93,6 +93,7 @@ def _linear(one: Identified, values: dict[str, Any]) -> dict[str, Any]:
     space = structure.state_space(one.found.values)
     size, inputs = space.B.shape
     rest = np.linalg.lstsq(np.hstack((space.A, space.B)), -space.offset, rcond=None)[0]
+    rest = np.asarray(rest, dtype=np.float64)
     x0, u0 = rest[:size], rest[size:]
     A, B, C = space.A, space.B, space.C
     states = space.states
@@ -148,10 +149,10 @@ def write(path: Path, values: Mapping[str, Any], one: Identified, said: str = ""
     load_config(None, None, dict(values))
     found = one.found
     head = [f"# Identified from {one.name}: structure {found.structure.kind}, {one.chosen.why}."]
-    for item in found.parameters:
-        head.append(
-            f"# {item.letter} = {item.value:.5g} +- {item.deviation:.2g} {item.unit} (standard error)"
-        )
+    head += [
+        f"# {item.letter} = {item.value:.5g} +- {item.deviation:.2g} {item.unit} (standard error)"
+        for item in found.parameters
+    ]
     head.append(f"# motor lag {found.lag_s:.4g} +- {found.lag_deviation_s:.2g} s")
     if one.chosen.equilibrium:
         head.append(f"# theta_0: {one.chosen.equilibrium}")

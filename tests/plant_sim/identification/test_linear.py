@@ -196,9 +196,7 @@ def test_when_a_signal_is_filtered_in_pieces_then_every_derivative_is_that_of_th
         assert np.concatenate(pieces) == pytest.approx(np.asarray(wanted).ravel(), abs=1e-9)
 
 
-def step_by_step(
-    regressors: Array, targets: Array, alpha: float, gain: float
-) -> tuple[Array, Array]:
+def step_by_step(regressors: Array, targets: Array, alpha: float, gain: float) -> tuple[Array, Array]:
     """Run (9), (10) as recursive least squares, a row at a time: Omega over time, and Gamma."""
     size = regressors.shape[1]
     gamma, omega = np.eye(size) * gain, np.zeros(size)

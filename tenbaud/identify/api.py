@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -167,7 +167,8 @@ def _finish(one: Each, folder: Path, number: str, fly: bool) -> None:
         log = written.write_record(folder / f"record{number}.csv", one.identified.record)
         one.settings["flight_log"] = log
     if fly:
-        one.settings = with_coder(one.settings, one.identified)
+        one.settings, note = with_coder(one.settings)
+        one.identified = replace(one.identified, notes=(*one.identified.notes, *filter(None, [note])))
         one.flown = fly_record(one.settings)
     one.config_file = folder / f"identified{number}.toml"
     said = one.flown.sentence() if one.flown is not None else ""

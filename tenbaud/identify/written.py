@@ -117,7 +117,7 @@ def _linear(one: Identified, values: dict[str, Any]) -> dict[str, Any]:
     }
     over = {**values, "model": model}
     names = Names(tuple(states), record.input_names, record.output_names)
-    plant = Matrices(A, B, C, 0.0, names, x0, u0, linear=True)
+    plant = Matrices(A, B, C, 0.0, names, np.array(x0, float), np.array(u0, float), linear=True)
     own = merged(settings_of(plant, None, over), over)
     own["model"].pop("state_units", None)
     density = ":".join(f"{value:g}" for value in own["model"]["densities"])

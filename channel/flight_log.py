@@ -27,6 +27,8 @@ class FlightLog:
     """the file's clock at row 0"""
     notes: tuple[str, ...] = ()
     """what was done to the file, for people"""
+    steps: tuple[float, ...] = ()
+    """of each output, how far its values lie apart; 0: as fine as numbers are"""
 
     def __len__(self) -> int:
         """Return the number of rows."""

@@ -53,7 +53,7 @@ def controller_context(
 
 def recorded(config: FlightConfig, context: ControllerContext) -> RecordedController:
     """Return what gives the commands of a recorded flight again."""
-    return RecordedController(read_flight_log(config, context.signals))
+    return RecordedController(read_flight_log(config, context.signals), len(context.signals.inputs))
 
 
 def pid(config: FlightConfig, context: ControllerContext) -> PidLoops:

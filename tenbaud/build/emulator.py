@@ -85,9 +85,9 @@ def _axis(config: FlightConfig, form: EmulatedFormat) -> Axis:
 
 
 def _body(config: FlightConfig, axis: Axis) -> Body:
-    if config.transmitter.rig == "replay":
-        return RecordedBody(read_flight_log(config), round(config.timing.tick_s * 1e9))
     encoder = Encoder(axis.counts_per_turn, axis.sign, axis.zero_counts or 0, axis.turn)
+    if config.transmitter.rig == "replay":
+        return RecordedBody(read_flight_log(config), round(config.timing.tick_s * 1e9), encoder)
     return SimulatedBody(build_plant(config, STEP_S), round(STEP_S * 1e9), encoder)
 
 

@@ -123,9 +123,9 @@ def agree(config: FlightConfig, clock: Clock, parts: Parts | None = None) -> Agr
 
 
 def watchdog_wanted_s(config: FlightConfig) -> float | None:
-    """Return the watchdog's time-out as configured, None where it is "auto"."""
+    """Return the watchdog's time-out as configured, None where it is "auto" or a recording flies."""
     wanted = config.transmitter.watchdog_s
-    return None if wanted == "auto" else wanted
+    return None if wanted == "auto" or config.transmitter.rig == "replay" else wanted
 
 
 def checked_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:

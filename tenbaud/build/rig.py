@@ -146,17 +146,16 @@ def nominal_plant(config: FlightConfig, volts_max: float | None = None) -> Pitch
     plant = config.transmitter.plant
     follows = isinstance(model, PitchModelSection) and plant.relative_to == "model"
     section = model if follows else plant.pitch
-    return PitchParameters(**section.model_dump(exclude={"kind"}), volts_max=volts_max)
+    return PitchParameters(**section.model_dump(exclude={"kind", "start"}), volts_max=volts_max)
 
 
 def _build_other(config: FlightConfig, plant: Plant | None, signals: Signals) -> Rig:
-    encoders = build_encoders(config, signals)
     if config.transmitter.rig == "replay":
-        return ReplayRig(read_flight_log(config, signals), encoders)
+        return ReplayRig(read_flight_log(config, signals))
     if plant is None:
         plant = build_plant(config, config.timing.tick_s, signals)
     names = [one.name for one in signals.outputs]
-    return SimulatedRig(plant, encoders, safe_command(config, signals), names)
+    return SimulatedRig(plant, build_encoders(config, signals), safe_command(config, signals), names)
 
 
 def build_axes(config: FlightConfig, signals: Signals | None = None) -> tuple[Axis, ...]:

@@ -113,8 +113,9 @@ def _run(
 
     from tenbaud.build.ends import check_parts
     from tenbaud.build.flight import agree
+    from tenbaud.build.recorded import flight_config
     from tenbaud.cli.addresses import endpoints_of
-    from tenbaud.config.load import dump_config, load_config
+    from tenbaud.config.load import dump_config
     from tenbaud.files.whole import write_whole
     from tenbaud.flight import ends
     from tenbaud.flight.outcome import ExitCode, first_code
@@ -122,7 +123,7 @@ def _run(
     from tenbaud.recording.folder import RunFolder, create_run_folder
     from tenbaud.telemetry.end import TelemetryOptions
 
-    config = load_config(node.preset, node.config, changed, allow_code=True)
+    config = flight_config(node.preset, node.config, changed, allow_code=True)
     _check_link(config, addresses.insecure)
     telemetry = TelemetryOptions(node.telemetry, node.allow_control, pace)
     agreement = replace(agree(config, node.clock.value), live=telemetry.control)
@@ -170,6 +171,7 @@ def _introduce(
     role: Role, identity: Any, config: FlightConfig, endpoints: Endpoints, folder: RunFolder
 ) -> None:
     from tenbaud.build.flight import kind_of_link
+    from tenbaud.build.recorded import replay_notes
 
     own = kind_of_link(config).where(config.link)
     places = [*own, *endpoints.listen, *endpoints.connect, *endpoints.router]
@@ -181,3 +183,5 @@ def _introduce(
         f"  at {', '.join(places)}, recording into {folder.path}",
         err=True,
     )
+    for note in replay_notes(config):
+        typer.echo(f"  {note}", err=True)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tenbaud.cli import rigs
-from tenbaud.cli.log_options import LogOptions
+from tenbaud.cli.log_options import LogOptions as LogOptions
 
 if TYPE_CHECKING:
     from tenbaud.config.schema import FlightConfig
@@ -241,10 +241,10 @@ class PlantOptions:
 
     def load(self, **own: Any) -> FlightConfig:
         """Return the configuration with these options, and the command's own, over it."""
-        from tenbaud.config.load import load_config
+        from tenbaud.build.recorded import flight_config
 
         changes = overrides(**fields_of(self), **own)
-        return load_config(self.preset, self.config, changes, allow_code=self.allow_code)
+        return flight_config(self.preset, self.config, changes, allow_code=self.allow_code)
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 class MethodOption(StrEnum):
     """How to search."""
 
-    EVOLUTION = "differential-evolution"
+    EVOLUTION = "cma-es"
     SIMPLEX = "nelder-mead"
 
 
@@ -69,6 +69,25 @@ Evaluations = Annotated[
         "flights for the fit.",
     ),
 ]
+Scales = Annotated[
+    str,
+    typer.Option(help="Recorded flights: sizes at which the record is flown for the fit."),
+]
+Shoves = Annotated[
+    float,
+    typer.Option(
+        min=0.0,
+        help="Recorded flights: rms of the random shoves added for the fit, as a share of the record's "
+        "motion; 0: none.",
+    ),
+]
+Phases = Annotated[
+    int,
+    typer.Option(
+        min=1,
+        help="Recorded flights: sample phases flown for the fit, at most. The validation flies all.",
+    ),
+]
 Seed = Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Seed of the search.")]
 
 
@@ -91,6 +110,9 @@ def tune(
     train_share: TrainShare = 0.5,
     method: Method = MethodOption.EVOLUTION,
     evaluations: Evaluations = 600,
+    scales: Scales = "0.6,1,2",
+    shoves: Shoves = 0.5,
+    phases: Phases = 5,
     seed: Seed = 1,
     allow_code: options.AllowCode = False,
     as_json: options.AsJson = False,
@@ -98,8 +120,9 @@ def tune(
     """Fit a coder's constants, and with --model the model's, on flights; validate them on others.
 
     Minimises the receiver's rms estimation error. Simulated flights: --seeds seeds for the fit, and
-    --test-seeds others for validation. Recorded flights: the first --train-share for the fit, the
-    rest for validation. Both errors are reported, before and after.
+    --test-seeds others for validation. Recorded flights: the first --train-share for the fit, at
+    several sizes, with shoves added and from several sample phases; the rest for validation, as it was
+    recorded, mean over all phases. Both errors are reported, before and after.
 
     The preset written to --out has the sections timing, channel, model and coder over the preset that
     the fit started from. It does not contain plant, disturbance, line and recording. Ctrl-C ends the
@@ -109,9 +132,10 @@ def tune(
     from tenbaud.flight.stop import StopFlag
     from tenbaud.studies.compiled import require
 
-    require("numba")
+    require("numba", "cma")
     from tenbaud.studies.constants import free_ranges
     from tenbaud.studies.judging import Split, Tuning
+    from tenbaud.studies.records import Augment
     from tenbaud.studies.tuning import preset_text
     from tenbaud.studies.tuning import tune as fit
 
@@ -127,7 +151,10 @@ def tune(
     )
     first = seeds + 1
     split = Split(tuple(range(1, first)), tuple(range(first, first + test_seeds)), train_share)
-    tuning = Tuning(preset, config, overrides, {}, split, method.value, evaluations, seed, allow_code)
+    augment = Augment(_sizes(scales), shoves, phases, seed)
+    tuning = Tuning(
+        preset, config, overrides, {}, split, method.value, evaluations, seed, allow_code, augment
+    )
     ranges = free_ranges(tuning.config({}), _named(free or []), model=model)
     tuning = replace(tuning, free=ranges)
     with StopFlag() as stop, progress_bar("tune", counted=True) as update:
@@ -175,8 +202,13 @@ def _tell(tuned: Tuned) -> None:
         typer.echo(f"{name:36} {value:.6g}")
     for line in report(tuned):
         typer.echo(line)
-    if tuned.test_after > tuned.test_before:
-        typer.echo("The fit does not hold on flights that it has not seen: it is over-fitted.")
+
+
+def _sizes(text: str) -> tuple[float, ...]:
+    try:
+        return tuple([float(one) for one in text.split(",")])
+    except ValueError as error:
+        raise typer.BadParameter(f"--scales {text}: write numbers, such as 0.6,1,2") from error
 
 
 def _named(texts: list[str]) -> dict[str, Any]:

@@ -91,6 +91,10 @@ class HistoryCoderSection(KindSection):
     """of the error that is left after the look-ahead: angle, angle times T rate, T rate"""
     lookahead: Annotated[int, Field(ge=0, le=6)] = 1
     """samples that the transmitter looks ahead"""
+    floor_gain: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    """g, share per sample by which a slow mean of the range follows it; 0: the smallest range stays"""
+    floor_exponent: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
+    """c; the smallest range is minimum_range_rad times (slow mean / minimum_range_rad)^c"""
 
 
 Square = Annotated[tuple[tuple[Factor, ...], ...], Field(min_length=1, max_length=64)]
@@ -186,6 +190,8 @@ def _history(section: HistoryCoderSection, context: CoderContext) -> Coder:
             period_s=context.symbol_period_s,
             weights=section.weights,
             lookahead=section.lookahead,
+            floor_gain=section.floor_gain,
+            floor_exponent=section.floor_exponent,
         )
     )
 

@@ -378,5 +378,9 @@ class FlightConfig(CodePermission):
         """Return the shared part as canonical JSON, with the command lead that was chosen."""
         shared = self.model_dump(mode="json", include=set(SHARED_SECTIONS))
         shared["timing"]["lead_ticks"] = lead_ticks
+        if not shared["coder"].get("floor_gain", True):  # recordings from before have the same digest
+            del shared["coder"]["floor_gain"], shared["coder"]["floor_exponent"]
+        if not shared["model"].get("start") and self.model.kind != "linear":
+            shared["model"].pop("start", None)  # recordings from before it have the same digest
         shared["coder"]["kind"] = DIGEST_KINDS.get(self.coder.kind, self.coder.kind)
         return json.dumps(shared, sort_keys=True, separators=(",", ":"))

@@ -134,8 +134,9 @@ def _loaded(
 
     `plant` is what only a system has: rate and operating point.
     """
+    from tenbaud.build.recorded import flight_config
     from tenbaud.config.deprecated import with_current_names
-    from tenbaud.config.load import OWN, ConfigError, load_config, merged, merged_values, nested
+    from tenbaud.config.load import OWN, ConfigError, merged, merged_values, nested
     from tenbaud.design.complete import completed
     from tenbaud.design.settings import exact_outputs, settings_of
     from tenbaud.design.systems import is_system, matrices
@@ -158,7 +159,7 @@ def _loaded(
         raise ConfigError("rate_baud and operating_point are for a plant; a preset says them itself")
     elif not isinstance(preset, str | None):
         raise ConfigError(f"a {type(preset).__name__} is neither the name of a preset nor a plant")
-    return load_config(preset, config, changes, allow_code=True), parts
+    return flight_config(preset, config, changes, allow_code=True), parts
 
 
 def _following(

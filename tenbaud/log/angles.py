@@ -16,6 +16,12 @@ JUMP = 0.75
 SPIKE = 20.0
 """Times the usual bend of a signal from which a single row is a spike."""
 SPIKES_MAX_SHARE = 0.02
+STEP_ROWS = 100_000
+"""Rows at the beginning in which the step of a quantised signal is looked for."""
+STEP_NEAR = 10.0
+"""Smallest steps between two values that tell the step."""
+STEP_ERROR = 0.05
+"""Share of a step by which numbers with few digits may be off it."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +80,18 @@ def values_of(counts: npt.NDArray[np.int64], encoder: Encoder) -> Array:
     """Return the values that counts stand for: the arithmetic of `Encoder.angle_rad`."""
     whole: Array = (encoder.sign * (counts - encoder.zero_counts)).astype(np.float64)
     return whole * encoder.turn / encoder.counts_per_turn
+
+
+def step_of(values: Array) -> float:
+    """Return how far the values of a quantised signal lie apart; 0 where no step shows."""
+    seen = np.unique(values[:STEP_ROWS])
+    gaps = np.diff(seen)
+    if not len(gaps):
+        return 0.0
+    near = gaps[gaps < STEP_NEAR * gaps.min()]
+    steps = np.round(near / gaps.min())
+    step = float(near.sum() / steps.sum())
+    return step if np.all(np.abs(near / step - steps) < STEP_ERROR * steps) else 0.0
 
 
 def turn_of(unit: str, encoder: OutputReader | None) -> float | None:

@@ -12,7 +12,7 @@ from channel.codec.signals import Signal, Signals
 from channel.flight_log import FlightLog
 from plant_sim.encoder import Encoder, OutputReader
 from tenbaud.config.schema import FlightLogSection
-from tenbaud.log.angles import counts_of, turn_of, unwrapped, values_of, without_spikes
+from tenbaud.log.angles import counts_of, step_of, turn_of, unwrapped, values_of, without_spikes
 from tenbaud.log.beside import with_file_beside
 from tenbaud.log.clock import Clock, by_index, by_period, by_time
 from tenbaud.log.reader import read_table
@@ -89,8 +89,10 @@ class _Reading:
         outputs, inputs = self.chosen.outputs, self.chosen.inputs
         measured = np.empty((clock.count, len(outputs)))
         counts = np.empty((clock.count, len(outputs)), dtype=np.int64)
-        for at, (signal, place) in enumerate(outputs):
+        steps = [
             self._output(at, signal, self.at[place], clock, measured, counts)
+            for at, (signal, place) in enumerate(outputs)
+        ]
         commands = np.zeros((clock.count, len(inputs)))
         for at, (signal, found) in enumerate(inputs):
             if found is not None:
@@ -104,6 +106,7 @@ class _Reading:
             counts,
             clock.start_s,
             tuple(self.notes),
+            tuple(steps),
             signals=self._signals(),
         )
 
@@ -160,7 +163,8 @@ class _Reading:
 
     def _output(
         self, at: int, signal: Signal, column: int, clock: Clock, measured: Array, counts: np.ndarray
-    ) -> None:
+    ) -> float:
+        """Fill in one output; return how far its values lie apart."""
         role = f"out:{signal.name}"
         values = self._values(column, role, "angle", clock)
         unit = self._told_unit(role, "angle") or self._unit_of(column, values, signal)
@@ -173,9 +177,12 @@ class _Reading:
             self._check_whole(values, column, clock)
             counts[:, at] = np.round(clock.line(values)).astype(np.int64)
             measured[:, at] = values_of(counts[:, at], encoder)
-            return
-        measured[:, at] = clock.line(values) * self._factor(unit, signal)
-        counts[:, at] = counts_of(measured[:, at], encoder)
+            return encoder.turn / encoder.counts_per_turn
+        by = self._factor(unit, signal)
+        measured[:, at] = clock.line(values) * by
+        step = step_of(values) * by
+        counts[:, at] = counts_of(measured[:, at], Encoder(1.0 / step, turn=1.0) if step else None)
+        return step
 
     def _unit_of(self, column: int, values: Array, signal: Signal) -> str:
         unit = unit_named(self.table.units[column]) or split_unit(self.table.names[column])[1]

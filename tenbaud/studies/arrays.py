@@ -18,7 +18,6 @@ from tenbaud.build.references import reference_of, reference_sections
 from tenbaud.build.signals import build_encoders
 from tenbaud.config.schema import ReferenceSection
 from tenbaud.studies.flight_data import Work
-from tenbaud.studies.schedule import Uncommon
 from transmitter.encoder_watch import motion_of
 from transmitter.session.state_observer import StateObserver
 
@@ -44,8 +43,6 @@ def signal_arrays(agreement: Agreement) -> dict[str, Any]:
     readers = build_encoders(config, signals)
     encoders = [one if isinstance(one, Encoder) else Encoder(1.0) for one in readers]
     exact = [not isinstance(one, Encoder) for one in readers]
-    if any(exact) and config.transmitter.rig == "replay":
-        raise Uncommon("a recorded output that is read exactly")
     outputs = len(signals.outputs)
     replay = config.transmitter.rig == "replay"
     sections = reference_sections(config, signals)
@@ -127,9 +124,12 @@ def _values(section: str, tick_s: float, output: Signal, ticks: int) -> Any:
 
 
 def recorded_arrays(log: FlightLog | None, ahead: int, signals: Signals) -> dict[str, Any]:
-    """Return counts, commands and applied inputs of a recording; empty without one."""
+    """Return outputs, commands and applied inputs of a recording; empty without one."""
     if log is None:
-        counts = np.zeros((0, len(signals.outputs)), dtype=np.int64)
-        return {"counts": counts, "commands": NO_ROWS, "applied": NO_ROWS}
-    rows = np.minimum(np.arange(ahead), len(log) - 1)
-    return {"counts": log.counts, "commands": log.commands[rows], "applied": log.commands}
+        return {"recorded": NO_ROWS, "commands": NO_ROWS, "applied": NO_ROWS}
+    given = {"recorded": log.measured, "commands": log.commands[:ahead], "applied": log.commands}
+    if not log.commands.shape[1]:
+        return given | {"commands": np.zeros((ahead, len(signals.inputs))), "applied": NO_ROWS}
+    if ahead > len(log):
+        given["commands"] = np.pad(log.commands, ((0, ahead - len(log)), (0, 0)), mode="edge")
+    return given

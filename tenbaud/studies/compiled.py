@@ -40,7 +40,8 @@ SOURCES = (
 """Packages that the figures of a flight depend on."""
 
 BESIDE = (
-    *("constants.py", "judging.py", "tuning.py"),
+    *("constants.py", "judging.py", "tuning.py", "records.py", "bench.py"),
+    *("families.py", "quick.py", "search.py"),
     *("plots.py", "run.py", "table.py", "study.py", "study_file.py", "points.py", "settings.py"),
     "progress.py",
 )

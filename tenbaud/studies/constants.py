@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
+from pydantic import ValidationError
+
+from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
 from tenbaud.studies.settings import StudyError, check_name
-from tenbaud.studies.study_file import Range
+from tenbaud.studies.study_file import Range, described
+
+BANDWIDTH = "transmitter.rate_observer_bandwidth_rad_s"
+"""of what the transmitter makes of a coder that uses rates; it may be fitted too"""
 
 GAINS = {"coder.gains.0": (0.2, 3.0, "log"), "coder.gains.1": (0.2, 3.0, "log")}
 
@@ -69,6 +76,22 @@ def free_ranges(config: FlightConfig, names: dict[str, Range], *, model: bool) -
     return free
 
 
+def changed(config: FlightConfig, values: Mapping[str, float | str]) -> FlightConfig:
+    """Return a configuration with other constants, by their dotted names; ConfigError for none such."""
+    sections: dict[str, Any] = {}
+    for name, value in values.items():
+        top, *path, last = name.split(".")
+        here = sections.setdefault(top, getattr(config, top).model_dump(mode="json"))
+        for part in path:
+            here = here[int(part) if isinstance(here, list) else part]
+        here[int(last) if isinstance(here, list) else last] = value
+    try:
+        checked = {top: type(getattr(config, top)).model_validate(sections[top]) for top in sections}
+    except ValidationError as error:
+        raise ConfigError(described(error)) from error
+    return config.model_copy(update=checked)
+
+
 def _usual(config: FlightConfig, spreads: dict[str, tuple[float, float, str]]) -> dict[str, Range]:
     ranges = {}
     for name, (low, high, scale) in spreads.items():
@@ -81,8 +104,9 @@ def _usual(config: FlightConfig, spreads: dict[str, tuple[float, float, str]]) -
 
 
 def _check_constant(config: FlightConfig, name: str) -> None:
-    check_name(name)
-    if name.partition(".")[0] not in ("coder", "model"):
+    if name.split(".")[:2] not in (["coder", "options"], ["model", "options"]):
+        check_name(name)
+    if name.partition(".")[0] not in ("coder", "model") and name != BANDWIDTH:
         raise StudyError(
             f"{name} is no constant of coder or model, so it is not fitted; set it, or sweep it"
         )
@@ -94,8 +118,11 @@ def present(config: FlightConfig, name: str) -> float:
     here: Any = config
     for part in name.split("."):
         try:
-            here = here[int(part)] if part.isdigit() else getattr(here, part, None)
-        except (IndexError, TypeError):
+            if isinstance(here, dict):
+                here = here[part]
+            else:
+                here = here[int(part)] if part.isdigit() else getattr(here, part, None)
+        except (IndexError, KeyError, TypeError):
             here = None
         if here is None:
             raise StudyError(f"{name} is not a constant of the coder and model that are configured")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import sys
+from copy import copy
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -98,7 +100,7 @@ class CompiledPoint:
             impulse=codec.coder.impulse,
             replay=replay,
             uses_rates=codec.uses_rates,
-            watch=window_ticks(codec.model, agreement.terms.tick_ns / 1e9),
+            watch=sys.maxsize if replay else window_ticks(codec.model, agreement.terms.tick_ns / 1e9),
         )
         self.constants = (
             arrays_of(codec.model.constants),  # type: ignore[attr-defined]
@@ -150,6 +152,32 @@ class CompiledPoint:
         if faults_of(self._counts(schedule)):
             raise Uncommon("what does not count as flown, for the reason that the nodes give")
         return self._figures(schedule), Trace(work.models, work.coders)
+
+    def on(self, log: FlightLog, scored_from: int) -> CompiledPoint:
+        """Return this point on another record, which is no longer than its own."""
+        agreement, ticks = replace(self.agreement, scored_from=scored_from), len(log)
+        codec, signals = agreement.codec, agreement.signals
+        other = copy(self)
+        other.agreement, other.scored_from = agreement, scored_from
+        other._log, other._clean = log, None
+        other.numbers = self.numbers._replace(ticks=ticks, window_start=scored_from)
+        other.steady = self.steady | recorded_arrays(log, other._ahead, signals)
+        other._work = work_arrays(codec, signals, other._samples, ticks, other._ahead)
+        return other
+
+    def use(self, agreement: Agreement, observer: dict[str, Any]) -> None:
+        """Fly with another model and coder of the same kinds, and arrays of their observer."""
+        self.agreement = replace(agreement, scored_from=self.scored_from)
+        self.config, codec = agreement.config, agreement.codec
+        model: Any = codec.model
+        coder: Any = codec.coder
+        self.constants = (arrays_of(model.constants), arrays_of(coder.constants), *self.constants[2:])
+        self.steady = self.steady | observer
+        state = codec.initial()
+        if self._work.coders.shape[1] != len(state.coder):
+            ticks, signals = self.numbers.ticks, agreement.signals
+            self._work = work_arrays(codec, signals, self._samples, ticks, self._ahead)
+        self._work.models[0], self._work.coders[0] = state.model, state.coder
 
     def _counts(self, schedule: Schedule) -> FlightCounts:
         """Return what the verdict on a flight rests on; a compiled one has no rejoin and no stop."""

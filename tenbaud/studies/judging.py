@@ -1,35 +1,49 @@
 """Flights on which constants are fitted, and others on which they are judged.
 
 On simulated flights, one set of seeds is for the fit and another for the judgement. On a recorded
-flight, the first part is for the fit and the rest for the judgement; there the codec flies through the
-whole recording and only the rest counts. The measure is the rms error of the receiver's predicted
-estimate, of several outputs together by the weights of the model.
+flight, the first part is for the fit, at several sizes, with shoves added and from several sample
+phases (`records`); the rest is for the judgement, as it was recorded and from every phase: there the
+codec flies through the whole recording and only the rest counts. The measure is the rms error of the
+receiver's predicted estimate, of several outputs together by the weights of the model.
 """
 
 from __future__ import annotations
 
 import math
 import operator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
+import numpy as np
+
+from channel.errors import TenbaudError
+from tenbaud.build.codec import build_codec
 from tenbaud.build.flight import ticks_of
 from tenbaud.build.flight_log import read_flight_log
 from tenbaud.config.schema import FlightConfig
 from tenbaud.design.described import linear_of
+from tenbaud.studies.bench import Bench
 from tenbaud.studies.chunk import fly_point
+from tenbaud.studies.constants import changed
 from tenbaud.studies.figures import FlightFigures
-from tenbaud.studies.flights import CompiledPoint
 from tenbaud.studies.plain import fly_plain
+from tenbaud.studies.records import Augment, Variant, phases_of, rows, variants_of
 from tenbaud.studies.schedule import Uncommon
 from tenbaud.studies.settings import StudyError, configured
 from tenbaud.studies.study_file import Range
 
-Method = Literal["differential-evolution", "nelder-mead"]
+Method = Literal["cma-es", "nelder-mead"]
 
 PENALTY_RAD = 100.0
 """The error that counts for a flight without figures: larger than any error of an angle of weight 1."""
+PHASES_MAX = 50
+"""sample phases of the judgement"""
+NO_CONSTANTS = (TenbaudError, ValueError, ArithmeticError, np.linalg.LinAlgError)
+"""what a corner of the ranges that makes no coder, model or observer may raise"""
+NOTABLE = 0.005
+"""share by which an error must rise to be another one"""
 
 
 class Split(NamedTuple):
@@ -41,7 +55,7 @@ class Split(NamedTuple):
     """of a recorded flight"""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Tuning:
     """A fit: of which constants, on which flights, how."""
 
@@ -50,12 +64,13 @@ class Tuning:
     overrides: dict[str, Any]
     free: dict[str, Range]
     split: Split
-    method: Method = "differential-evolution"
+    method: Method = "cma-es"
     evaluations: int = 600
     """sets of constants to fly at most, those that are configured included"""
     seed: int = 1
     allow_code: bool = False
     """whether classes from outside that the configuration names may be imported"""
+    augment: Augment = field(default_factory=Augment)
 
     def config(self, values: dict[str, float]) -> FlightConfig:
         """Return the configuration with these constants; ConfigError where there is none.
@@ -63,19 +78,20 @@ class Tuning:
         A simulated plant stays what it is when the model is moved.
         """
         fitted = any(name.startswith("model.") for name in values)
-        plant = self._plant() if fitted else {}
-        settings = {**plant, **values}
-        return configured(self.preset, self.file, self.overrides, settings, allow_code=self.allow_code)
+        return changed(self._with_own_plant if fitted else self._configured, values)
 
-    def _plant(self) -> dict[str, Any]:
-        config = self.config({})
+    @cached_property
+    def _configured(self) -> FlightConfig:
+        return configured(self.preset, self.file, self.overrides, {}, allow_code=self.allow_code)
+
+    @cached_property
+    def _with_own_plant(self) -> FlightConfig:
+        config = self._configured
         if config.model.kind != "pitch" or config.transmitter.plant.relative_to == "pitch":
-            return {}
-        where = "transmitter.plant"
-        return {
-            f"{where}.relative_to": "pitch",
-            **{f"{where}.pitch.{name}": value for name, value in config.model.model_dump().items()},
-        }
+            return config
+        plant = {"relative_to": "pitch", "pitch": config.model.model_dump()}
+        overrides = {f"transmitter.plant.{name}": value for name, value in plant.items()}
+        return configured(self.preset, self.file, self.overrides, overrides, allow_code=self.allow_code)
 
 
 class Judged(NamedTuple):
@@ -88,47 +104,93 @@ class Judged(NamedTuple):
     flights: int
     reason: str
     """why the first of those has none"""
+    each: tuple[float, ...] = ()
+    """rms error of each flight: of each seed, or of each sample phase of a recording"""
 
 
-def judge(tuning: Tuning, values: dict[str, float], *, train: bool) -> Judged:
-    """Fly constants on the flights for the fit, or on those for the judgement.
+def is_worse(before: Judged, after: Judged) -> bool:
+    """Return whether an error rose by more than its digits and its spread over the flights explain."""
+    more = np.subtract(after.each, before.each)
+    spread = float(more.std(ddof=1)) / math.sqrt(len(more)) if len(more) > 1 else 0.0
+    return after.rms_rad - before.rms_rad > max(2.0 * spread, NOTABLE * before.rms_rad)
 
-    ConfigError, StudyError and the like where these constants make no flight at all.
-    """
-    config = tuning.config(values)
+
+class Judge:
+    """Flies constants on the flights for the fit, or on those for the judgement."""
+
+    def __init__(self, tuning: Tuning) -> None:
+        """Read the recording, if it is one; StudyError where a part of it has nothing to score."""
+        self._tuning = tuning
+        config = tuning.config({})
+        self._weights = weights_of(config)
+        self.recorded = config.transmitter.rig == "replay"
+        self._border = self._ticks = 0
+        if self.recorded:
+            self._border, self._ticks = split_ticks(config, tuning.split.train_share)
+
+    def __call__(self, values: dict[str, float], *, train: bool) -> Judged:
+        """Fly constants; ConfigError, StudyError and the like where they make no flight at all."""
+        config = self._tuning.config(values)
+        if not self.recorded:
+            split = self._tuning.split
+            seeds = split.train_seeds if train else split.test_seeds
+            return score(fly_point(config, seeds, "auto"), None, self._weights)
+        bench = self._train if train else self._test
+        if bench is not None:
+            return score(
+                bench.fly(config), bench.sizes if train else None, self._weights, mean=not train
+            )
+        until = self._border if train else self._ticks
+        config = config.model_copy(update={"duration_s": until * config.timing.tick_s})
+        return score([fly_plain(config, 0 if train else self._border)], None, self._weights)
+
+    @cached_property
+    def _train(self) -> Bench | None:
+        config, augment = self._tuning.config({}), self._tuning.augment
+        log = rows(read_flight_log(config), 0, self._border)
+        return self._bench(variants_of(config, build_codec(config), log, augment), augment.phases, 0)
+
+    @cached_property
+    def _test(self) -> Bench | None:
+        log = rows(read_flight_log(self._tuning.config({})), 0, self._ticks)
+        return self._bench([Variant(log, 1.0, 1.0)], PHASES_MAX, self._border)
+
+    def _bench(self, variants: list[Variant], phases: int, scored_from: int) -> Bench | None:
+        """Return the flights of a part; None where only the nodes can fly them."""
+        config = self._tuning.config({})
+        try:
+            return Bench(config, variants, phases_of(config, phases), scored_from)
+        except Uncommon:
+            return None
+
+
+def weights_of(config: FlightConfig) -> tuple[float, ...]:
+    """Return the weights of the outputs' squared errors; one for all, where the model has no others."""
     linear = linear_of(config.model)
-    weights = (1.0,) if linear is None else linear.weights
-    if config.transmitter.rig == "replay":
-        figures = [_fly_part(config, tuning.split.train_share, train=train)]
-    else:
-        seeds = tuning.split.train_seeds if train else tuning.split.test_seeds
-        figures = fly_point(config, seeds, "auto")
-    squares, lost, reason = 0.0, 0, ""
-    for one in figures:
+    return (1.0,) if linear is None else linear.weights
+
+
+def score(
+    figures: list[FlightFigures],
+    sizes: list[float] | None,
+    weights: tuple[float, ...],
+    *,
+    mean: bool = False,
+) -> Judged:
+    """Return the error of flights, each in units of its size; `mean`: of their errors, not squares."""
+    errors, lost = [], []
+    for one, size in zip(figures, sizes or [1.0] * len(figures), strict=True):
         # One weight serves all outputs.
         each = weights * len(one.outputs) if len(weights) == 1 else weights
-        errors = [output.error_live_rms for output in one.outputs]
-        rms = math.hypot(*map(operator.mul, map(math.sqrt, each), errors))
-        if one.outcome == "ok" and math.isfinite(rms):
-            squares += min(rms, PENALTY_RAD) ** 2
-        else:
-            squares += PENALTY_RAD**2
-            why = "nothing of it was scored" if one.outcome == "ok" else one.outcome
-            reason = reason or why
-            lost += 1
-    return Judged(math.sqrt(squares / len(figures)), lost, len(figures), reason)
-
-
-def _fly_part(config: FlightConfig, share: float, *, train: bool) -> FlightFigures:
-    """Fly a recording's first part; or fly through all of it and score the rest."""
-    border, ticks = split_ticks(config, share)
-    until = border if train else ticks
-    config = config.model_copy(update={"duration_s": until * config.timing.tick_s})
-    start = 0 if train else border
-    try:
-        return CompiledPoint(config, start).fly(config.seed)[0]
-    except Uncommon:
-        return fly_plain(config, start)
+        rms = [output.error_live_rms for output in one.outputs]
+        error = math.hypot(*map(operator.mul, map(math.sqrt, each), rms)) / size
+        if one.outcome != "ok" or not math.isfinite(error):
+            lost.append("nothing of it was scored" if one.outcome == "ok" else one.outcome)
+            error = PENALTY_RAD
+        errors.append(min(error, PENALTY_RAD))
+    total = math.fsum(error if mean else error * error for error in errors) / len(errors)
+    reason = lost[0] if lost else ""
+    return Judged(total if mean else math.sqrt(total), len(lost), len(errors), reason, tuple(errors))
 
 
 def split_ticks(config: FlightConfig, share: float) -> tuple[int, int]:
@@ -138,8 +200,11 @@ def split_ticks(config: FlightConfig, share: float) -> tuple[int, int]:
     """
     ticks = min(len(read_flight_log(config)), ticks_of(config.duration_s, config))
     border = math.floor(share * ticks)
-    lead = config.timing.lead_ticks
-    if min(border, ticks - border) <= (0 if lead == "auto" else lead):
+    timing = config.timing
+    # Every phase leaves at least a sample of each part.
+    least = 2 * round(timing.symbol_period_s / timing.tick_s)
+    least += 0 if timing.lead_ticks == "auto" else timing.lead_ticks
+    if min(border, ticks - border) < least:
         raise StudyError(
             f"{ticks} ticks of the recording are too few to be split at {100.0 * share:g} %: fly more "
             "of it (duration_s), or change --train-share"

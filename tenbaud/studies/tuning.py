@@ -9,25 +9,22 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from channel.errors import TenbaudError
 from tenbaud.config.load import flattened
 from tenbaud.config.schema import FlightConfig
-from tenbaud.studies.constants import present
+from tenbaud.studies.constants import BANDWIDTH, present
 from tenbaud.studies.figures import shared_parts
 from tenbaud.studies.judging import (
+    NO_CONSTANTS,
     PENALTY_RAD,
+    Judge,
     Judged,
     Tuning,
-    judge,
+    is_worse,
     split_ticks,
 )
+from tenbaud.studies.search import minimise
 from tenbaud.studies.settings import StudyError
 from tenbaud.studies.study_file import Range
-
-POPULATION = 8
-"""Candidates per constant in differential evolution."""
 
 OnEvaluation = Callable[[int, float], None]
 """(sets of constants flown, smallest error so far in rad)"""
@@ -49,6 +46,10 @@ class Tuned(NamedTuple):
     """flights that count as `PENALTY_RAD` in one of the four errors, by its name"""
     train_what: str
     test_what: str
+    over_fitted: bool
+    """whether the error of the validation rose by more than its spread over the flights explains"""
+    failure: str
+    """why the search found nothing; empty: it did"""
 
 
 def tune(
@@ -64,18 +65,19 @@ def tune(
     config = tuning.config({})
     shared_parts(config)
     start = {name: present(config, name) for name in tuning.free}
-    before = judge(tuning, start, train=True)
+    judge = Judge(tuning)
+    before = judge(start, train=True)
     if before.lost == before.flights:
         raise StudyError(
             f"no flight with the constants as configured has figures, so there is nothing to start "
             f"from: {before.reason}"
         )
-    before_test = judge(tuning, start, train=False)
-    trials = _Trials(tuning, on_evaluation, should_stop, start, before)
+    before_test = judge(start, train=False)
+    trials = _Trials(tuning, judge, on_evaluation, should_stop, start, before)
     trials.note(start, before)
     with suppress(_Spent):
         _search(trials.error_at, [_share(tuning.free[name], start[name]) for name in start], tuning)
-    after_test = judge(tuning, trials.values, train=False)
+    after_test = judge(trials.values, train=False)
     judged = {
         "train_before": before,
         "test_before": before_test,
@@ -91,6 +93,8 @@ def tune(
         without_figures={name: one.lost for name, one in judged.items() if one.lost},
         train_what=train_what,
         test_what=test_what,
+        over_fitted=is_worse(before_test, after_test),
+        failure=trials.failure if trials.values == start else "",
     )
 
 
@@ -103,12 +107,15 @@ class _Trials:
     """The trials of the search, and the best one."""
 
     tuning: Tuning
+    judge: Judge
     on_evaluation: OnEvaluation
     should_stop: Callable[[], bool]
     values: dict[str, float]
     best: Judged
     count: int = 0
     penalised: int = 0
+    last_reason: str = ""
+    """why the last of those had no figures"""
     names: list[str] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -125,8 +132,8 @@ class _Trials:
             for name, share in zip(self.names, shares, strict=True)
         }
         try:
-            judged = judge(self.tuning, values, train=True)
-        except TenbaudError as error:
+            judged = self.judge(values, train=True)
+        except NO_CONSTANTS as error:
             # Some corners of the ranges are no coder at all; how many, the report says.
             judged = Judged(PENALTY_RAD, 1, 1, str(error))
         self.note(values, judged)
@@ -136,31 +143,29 @@ class _Trials:
         """Count one set of constants, and keep it if it is the best."""
         self.count += 1
         self.penalised += judged.lost > 0
+        self.last_reason = judged.reason or self.last_reason
         if judged.rms_rad < self.best.rms_rad:
             self.best, self.values = judged, values
         self.on_evaluation(self.count, self.best.rms_rad)
 
+    @property
+    def failure(self) -> str:
+        """Return why nothing better than the start was found."""
+        tried = self.count - 1
+        if tried and self.penalised >= tried:
+            return f"none of the {tried} parameter sets tried has figures: {self.last_reason}"
+        return f"none of the {tried} parameter sets tried is better than the one configured"
+
 
 def _search(error_at: Callable[[Any], float], start: list[float], tuning: Tuning) -> None:
     """Search until nothing gets better; `error_at` ends it where enough has been flown."""
-    optimize: Any = import_module("scipy.optimize")
-    size = len(start)
     if tuning.method == "nelder-mead":
+        optimize: Any = import_module("scipy.optimize")
         options = {"maxfev": tuning.evaluations, "xatol": 1e-4, "fatol": 1e-7}
-        optimize.minimize(
-            error_at, start, method="Nelder-Mead", bounds=[(0.0, 1.0)] * size, options=options
-        )
+        bounds = [(0.0, 1.0)] * len(start)
+        optimize.minimize(error_at, start, method="Nelder-Mead", bounds=bounds, options=options)
         return
-    optimize.differential_evolution(
-        error_at,
-        [(0.0, 1.0)] * size,
-        x0=start,
-        rng=np.random.default_rng(tuning.seed),
-        popsize=POPULATION,
-        maxiter=tuning.evaluations,
-        polish=False,
-        tol=0.0,
-    )
+    minimise(error_at, start, tuning.seed)
 
 
 def _share(one: Range, value: float) -> float:
@@ -179,7 +184,12 @@ def _described(config: FlightConfig, tuning: Tuning) -> tuple[str, str]:
     if config.transmitter.rig != "replay":
         return f"seeds {_listed(split.train_seeds)}", f"seeds {_listed(split.test_seeds)}"
     border, last = (tick * config.timing.tick_s for tick in split_ticks(config, split.train_share))
-    return f"0 ... {border:g} s of the recording", f"{border:g} ... {last:g} s of it"
+    sizes = ", ".join(f"{scale:g}" for scale in tuning.augment.scales)
+    shoves = " with and without shoves" if tuning.augment.shoves else ""
+    return (
+        f"0 ... {border:g} s of the recording at the sizes {sizes}{shoves}",
+        f"{border:g} ... {last:g} s of it, mean of all sample phases",
+    )
 
 
 def _listed(seeds: tuple[int, ...]) -> str:
@@ -194,6 +204,10 @@ def report(tuned: Tuned) -> Iterator[str]:
     ):
         before, after = (math.degrees(getattr(tuned, f"{part}_{when}")) for when in ("before", "after"))
         yield f"{what}: rms error {before:.4g} -> {after:.4g} degrees"
+    if tuned.failure:
+        yield f"the fit failed: {tuned.failure}"
+    elif tuned.over_fitted:
+        yield "the fit does not hold on flights that it has not seen: it is over-fitted"
     for name, lost in tuned.without_figures.items():
         part, when = name.split("_")
         flights = "flights for the fit" if part == "train" else "flights for validation"
@@ -215,6 +229,8 @@ def preset_text(tuning: Tuning, tuned: Tuned) -> str:
     config = tuning.config(tuned.values)
     after = config.model_dump(mode="json", exclude_none=True)
     sections = {name: after[name] for name in ("timing", "channel", "model", "coder")}
+    if BANDWIDTH in tuned.values:
+        sections["transmitter"] = {BANDWIDTH.partition(".")[2]: tuned.values[BANDWIDTH]}
     file = [] if tuning.file is None else [f"--config {tuning.file}"]
     flown_with = [*file, *(f"{name}={value!r}" for name, value in flattened(tuning.overrides))]
     lines = [

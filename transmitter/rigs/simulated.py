@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from channel.codec.codec import Vector
 from channel.flight_log import FlightLog
-from plant_sim.encoder import OutputReader, angles_rad
+from plant_sim.encoder import OutputReader
 from plant_sim.plant import Plant
 from transmitter.rigs.base import Reading, Rig, RigError
 
@@ -71,7 +71,7 @@ class DryRig(Rig):
 
     def __init__(self, rig: Rig, motors: int = 2) -> None:
         self.name = f"{rig.name} (dry run)"
-        self.is_real = rig.is_real
+        self.is_real, self.is_recorded = rig.is_real, rig.is_recorded
         self._rig = rig
         self._nothing = (0.0,) * motors
 
@@ -102,18 +102,20 @@ class ReplayRig(Rig):
     """Reads one row per tick; what is written to it changes nothing."""
 
     name = "replay"
+    is_recorded = True
 
-    def __init__(self, log: FlightLog, encoders: tuple[OutputReader, ...]) -> None:
+    def __init__(self, log: FlightLog) -> None:
         self._log = log
-        self._encoders = encoders
 
     def read(self, tick: int) -> Reading | None:
         """Return the row of a tick, None past the last."""
         if tick >= len(self._log):
             return None
-        counts = tuple(self._log.counts[tick].tolist())
-        volts = tuple(self._log.commands[tick].tolist()) or None
-        return Reading(counts, angles_rad(self._encoders, counts), applied_volts=volts)
+        log = self._log
+        applied = tuple(log.commands[tick].tolist()) or None
+        return Reading(
+            tuple(log.counts[tick].tolist()), tuple(log.measured[tick].tolist()), applied_volts=applied
+        )
 
     def write(self, tick: int, volts: Vector) -> None:
         """Do nothing: this flight is over."""

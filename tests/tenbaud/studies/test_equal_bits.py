@@ -150,6 +150,13 @@ def test_when_a_flight_is_compiled_then_no_bit_differs(preset: str, changes: dic
     compare(point)
 
 
+def test_when_the_smallest_range_follows_the_range_then_no_bit_differs() -> None:
+    floor = {"coder": {"floor_gain": 0.1, "floor_exponent": 0.4}}
+    point = CompiledPoint(config_of("history-10baud", {**REAL_WIRE, **floor}))
+    compare(point)
+    assert point._work.coders[-1, 2] > 0.1
+
+
 COMPILED_LONG = (
     *("integrator-10baud", "heading-1baud", "servo-10baud", "aero-20baud"),
     *("helicopter-10baud", "furuta-50baud"),

@@ -82,7 +82,7 @@ def test_when_ctrl_c_ends_the_command_then_the_preset_is_there(
     assert load_config(None, out).coder.kind == "zoom"
 
 
-@pytest.mark.parametrize("method", ["differential-evolution", "nelder-mead"])
+@pytest.mark.parametrize("method", ["cma-es", "nelder-mead"])
 def test_when_constants_are_fitted_then_both_errors_are_those_of_the_flights(method: Any) -> None:
     tuning = usual(method=method)
     counts: list[int] = []
@@ -119,7 +119,7 @@ def test_when_a_constant_does_not_exist_then_the_nearest_is_named() -> None:
         free_ranges(load_config("usual-1000baud"), {}, model=False)
 
 
-@pytest.mark.parametrize("method", ["differential-evolution", "nelder-mead"])
+@pytest.mark.parametrize("method", ["cma-es", "nelder-mead"])
 @pytest.mark.parametrize("evaluations", [1, 2, 7, 33, 40])
 def test_when_evaluations_are_bounded_then_no_more_are_flown(method: Any, evaluations: int) -> None:
     counts: list[int] = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from itertools import product
 
@@ -12,11 +13,12 @@ from channel.codec.coders.history import (
     HistoryParameters,
     history_decode,
     history_encode,
-    least_cost,
 )
 from channel.codec.words import ERASED
+from tenbaud.studies.compiled import compiled
 
 ROWS = ((0.5, 0.3, 0.6), (0.7, 0.9, 1.1), (0.4, 1.1, 0.7), (1.2, 1.0, 1.5))
+FLOOR = {"floor_gain": 0.1, "floor_exponent": 0.3}
 
 
 def coder_of(rows=ROWS, lookahead: int = 1, **changes) -> HistoryCoder:  # type: ignore[no-untyped-def]
@@ -106,6 +108,7 @@ def cost_of(coder, state, angle, rate, signs) -> float:  # type: ignore[no-untyp
         ({"period_s": 0.0}, "period_s"),
         ({"lookahead": 7}, "lookahead"),
         ({"weights": (1.0, 2.0, 1.0)}, "never negative"),
+        ({"floor_gain": 1.5}, "floor_gain"),
     ],
 )
 def test_when_parameters_make_no_coder_then_the_error_names_them(changes: dict, text: str) -> None:  # type: ignore[type-arg]
@@ -113,38 +116,53 @@ def test_when_parameters_make_no_coder_then_the_error_names_them(changes: dict, 
         coder_of(**changes)
 
 
-def test_when_the_functions_are_compiled_then_every_bit_is_the_same() -> None:
-    numba = pytest.importorskip("numba")
+@pytest.mark.parametrize("floor", [{}, FLOOR], ids=["constant floor", "slow floor"])
+def test_when_the_functions_are_compiled_then_every_bit_is_the_same(floor: dict) -> None:  # type: ignore[type-arg]
     numpy = pytest.importorskip("numpy")
-    import channel.codec.coders.history as module
-
-    constants = coder_of(lookahead=2).constants
+    pytest.importorskip("numba")
+    coder = coder_of(lookahead=2, **floor)
     chooser = random.Random(6)
-    cases = [
-        (
-            numpy.array([chooser.uniform(0.02, 0.4), float(chooser.randrange(4))]),
-            numpy.array([chooser.uniform(-0.5, 0.5), chooser.uniform(-4.0, 4.0)]),
-            chooser.choice((-1, 1)),
-        )
-        for _ in range(200)
-    ]
-    plain = [results(history_encode, history_decode, constants, *case) for case in cases]
-    original = (module.least_cost, module.history_after)
-    try:
-        module.history_after = numba.njit(module.history_after)
-        module.least_cost = numba.njit(least_cost)
-        compiled = (numba.njit(history_encode), numba.njit(history_decode))
-        assert [results(*compiled, constants, *case) for case in cases] == plain
-    finally:
-        module.least_cost, module.history_after = original
+    cases = []
+    for _ in range(200):
+        state = [chooser.uniform(0.02, 0.4), float(chooser.randrange(4)), chooser.uniform(0.0, 2.0)]
+        seen = [chooser.uniform(-0.5, 0.5), chooser.uniform(-4.0, 4.0)]
+        cases.append((numpy.array(state[: len(coder.initial())]), numpy.array(seen)))
+    plain = [results(history_encode, history_decode, coder.constants, *case) for case in cases]
+    ours = (compiled(history_encode), compiled(history_decode))
+    assert [results(*ours, coder.constants, *case) for case in cases] == plain
 
 
-def results(encode, decode, constants, coder, measurement, sign):  # type: ignore[no-untyped-def]
+def results(encode, decode, constants, coder, measurement):  # type: ignore[no-untyped-def]
     import numpy
 
     symbols = numpy.zeros(1, dtype=numpy.int64)
-    correction, after = numpy.zeros(2), numpy.zeros(2)
+    correction, after = numpy.zeros(2), numpy.zeros(len(coder))
     encode(constants, coder, numpy.zeros(2), measurement, symbols)
-    word = numpy.array([sign], dtype=numpy.int64)
-    decode(constants, coder, numpy.zeros(4), word, False, correction, after)
+    decode(constants, coder, numpy.zeros(4), symbols, False, correction, after)
     return int(symbols[0]), [value.hex() for value in (*correction.tolist(), *after.tolist())]
+
+
+def test_when_the_floor_has_no_gain_then_there_is_no_more_state() -> None:
+    assert coder_of().initial() == (0.1, 1.0)
+    assert coder_of(**FLOOR).initial() == (0.1, 1.0, 0.0)
+
+
+def test_when_the_range_was_large_for_long_then_the_smallest_range_stays_up_for_a_while() -> None:
+    coder = coder_of(**FLOOR)
+    state = coder.initial()
+    for _ in range(200):
+        _, state = coder.decode(state, (), (1,))
+    slow = state[2]
+    assert slow == pytest.approx(math.log(0.4 / 0.02), rel=1e-6)
+    assert coder.decode(state, (), ERASED)[1] == state
+    for sample in range(8):
+        before = state[2]
+        _, state = coder.decode(state, (), (1 if sample % 2 else -1,))
+        assert coder.is_state(state)
+    # All ranges had time to shrink to 0.02; the floor holds this one.
+    assert state[0] == pytest.approx(0.02 * math.exp(0.3 * before), rel=1e-12)
+    assert 0.02 < state[0] < 0.05
+    for sample in range(600):
+        _, state = coder.decode(state, (), (1 if sample % 2 else -1,))
+    assert coder.is_state(state)
+    assert state[0] == pytest.approx(0.02, rel=1e-3)

@@ -1,0 +1,74 @@
+"""Records that are flown compiled with one set of constants after another, on all cores."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+from tenbaud.build.ends import build_observer
+from tenbaud.build.flight import Agreement
+from tenbaud.config.schema import FlightConfig
+from tenbaud.studies.arrays import observer_arrays
+from tenbaud.studies.figures import FlightFigures, shared_parts
+from tenbaud.studies.flights import CompiledPoint
+from tenbaud.studies.records import Variant, rows
+from tenbaud.studies.schedule import Uncommon
+
+CORES = os.cpu_count() or 1
+
+
+class Bench:
+    """Variants of a record, each from several sample phases.
+
+    Building it raises Uncommon where only the nodes can fly the configuration.
+    """
+
+    def __init__(
+        self,
+        config: FlightConfig,
+        variants: Sequence[Variant],
+        phases: Sequence[int],
+        scored_from: int,
+        cores: int = CORES,
+    ) -> None:
+        """Make every flight ready. `phases`: rows that are left out before the first word."""
+        ticks = max(len(one.log) for one in variants)
+        point = CompiledPoint(config.model_copy(update={"duration_s": ticks * config.timing.tick_s}))
+        self.sizes: list[float] = []
+        """of each flight's motion, in units of the recorded one"""
+        self._points: list[CompiledPoint] = []
+        self._cores = cores
+        for log, size, scale in variants:
+            for phase in phases:
+                one = point.on(rows(log, phase, len(log)), max(scored_from - phase, 0))
+                for name in ("command_max", "slew"):
+                    one.steady[name] = one.steady[name] * max(1.0, scale)
+                self._points.append(one)
+                self.sizes.append(size)
+
+    def fly(self, config: FlightConfig) -> list[FlightFigures]:
+        """Fly every record with the constants of a configuration; ConfigError where they are none."""
+        agreement = shared_parts(config)
+        observer = observer_arrays(build_observer(agreement))
+        parts = [self._points[core :: self._cores] for core in range(self._cores)]
+        flown = [_fly(parts[0], agreement, observer)] if self._cores == 1 else []
+        if not flown:
+            with ThreadPoolExecutor(self._cores) as pool:
+                flown = list(pool.map(lambda part: _fly(part, agreement, observer), parts))
+        places = range(len(self._points))
+        return [flown[place % self._cores][place // self._cores] for place in places]
+
+
+def _fly(
+    points: Sequence[CompiledPoint], agreement: Agreement, observer: dict[str, Any]
+) -> list[FlightFigures]:
+    flown = []
+    for point in points:
+        point.use(agreement, observer)
+        try:
+            flown.append(point.fly(agreement.config.seed)[0])
+        except Uncommon as error:
+            flown.append(FlightFigures(str(error), "compiled", "", (), 0, 0, 0))
+    return flown

@@ -15,8 +15,8 @@ from plant_sim.identification.regression import Filters, Regression, regress
 from plant_sim.pitch import PitchPlant
 from tenbaud.build.rig import nominal_plant
 from tenbaud.config.load import load_config
-from tenbaud.identify.run import Identified, Wanted, run
-from tenbaud.identify.sources import from_rig
+from tenbaud.identification.run import Identified, Wanted, run
+from tenbaud.identification.sources import from_rig
 
 EXCITATIONS = ("square:0.2,0,2.5", "square:0.25,0.1,3")
 """Frequency (Hz), bias (V), magnitude (V) of (a) and (b); the paper gives none of them."""

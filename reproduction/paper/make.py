@@ -20,7 +20,7 @@ from reproduction.paper.identified import (
 from tenbaud.build.rig import nominal_plant
 from tenbaud.config.load import load_config
 from tenbaud.files.whole import make_folder
-from tenbaud.identify.figures import draw_estimates, draw_excitation
+from tenbaud.identification.figures import draw_estimates, draw_excitation
 
 NUMBERS = ("3", "4", "5", "6", "7", "8")
 OnProgress = Callable[[float, float, str], None]

@@ -25,7 +25,7 @@ from reproduction.paper.flights import Job, Overrides
 from reproduction.paper.identified import MOTOR_LAG_S
 from tenbaud.config.load import load_config
 from tenbaud.files.whole import write_whole
-from tenbaud.identify.sources import from_log
+from tenbaud.identification.sources import from_log
 
 UIUC_FILE = "uiuc_closed_loop.csv"
 NTNU_FILES = ("ntnu_travel_step.csv", "ntnu_elevation_obstacle.csv")

@@ -13,7 +13,7 @@ from tenbaud.cli.spread import spread
 from tenbaud.flight.outcome import ExitCode
 
 if TYPE_CHECKING:
-    from tenbaud.identify.api import Request, Result
+    from tenbaud.identification.api import Request, Result
 
 PRINTED_EVERY_S = 10.0
 
@@ -87,7 +87,7 @@ def identify(
 
     [dim]tenbaud identify flight.csv --columns angle=pitch,front=u1,rear=u2,time=t --unit deg[/dim]
     """
-    from tenbaud.identify.api import Request, identify_sources, sources_of
+    from tenbaud.identification.api import Request, identify_sources, sources_of
 
     loaded = plant.load(log=log)
     request = Request(structure, lag, equilibrium, bandwidth, damping, forgetting, fly=fly)
@@ -132,7 +132,7 @@ def _show(result: Result) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from tenbaud.identify.figures import history_of
+    from tenbaud.identification.figures import history_of
 
     console = Console()
     for each in result.each:

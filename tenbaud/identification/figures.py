@@ -10,7 +10,7 @@ import numpy as np
 from plant_sim.identification.filters import Array
 from plant_sim.identification.pitch import PitchStructure
 from plant_sim.identification.regression import Regression
-from tenbaud.identify.run import Identified
+from tenbaud.identification.run import Identified
 from tenbaud.recording.style import LINE_A, LINE_B, decimated, legend_above, new_figure, save
 
 PITCH_ORDER = (1, 2, 0)

@@ -14,7 +14,7 @@ from plant_sim.identification.pipeline import Identification, Options
 from plant_sim.identification.pitch import PitchStructure
 from plant_sim.identification.record import Record
 from plant_sim.identification.regression import regress
-from tenbaud.identify.structure import Chosen, choose
+from tenbaud.identification.structure import Chosen, choose
 
 DRIFT_EXPLAINED = 0.98
 UNIT_SCALES = {

@@ -20,7 +20,7 @@ from tenbaud.design.complete import completed
 from tenbaud.design.settings import settings_of
 from tenbaud.design.systems import Matrices, Names
 from tenbaud.files.whole import write_whole
-from tenbaud.identify.run import Identified, model_section
+from tenbaud.identification.run import Identified, model_section
 
 WHOLE = 1e-6
 DENSITY_LEAST = 1e-3

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from channel.errors import TenbaudError
 from tenbaud.config.load import load_config, merged
 
 
@@ -16,13 +17,11 @@ def with_coder(values: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
     settings = dict(values)
     try:
         from tenbaud.studies.quick import quick_coder
-        from tenbaud.studies.settings import StudyError
-    except ImportError as error:
-        return settings, (
-            f"the coder was not fitted to the record, as {error.name} is missing: install tenbaud[studies]"
-        )
-    try:
+
         found = quick_coder(load_config(None, None, settings))
-    except StudyError as error:
+    except ImportError as error:
+        missing = f"{error.name} is missing: install tenbaud[studies]"
+        return settings, f"the coder was not fitted to the record, as {missing}"
+    except TenbaudError as error:
         return settings, f"the coder was not fitted to the record: {error}"
     return merged(settings, found.sections), ""

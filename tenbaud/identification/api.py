@@ -16,12 +16,12 @@ from plant_sim.identification.regression import Filters
 from tenbaud.build.signals import build_limits, configured_signals
 from tenbaud.config.load import load_config, nested
 from tenbaud.config.schema import FlightConfig
-from tenbaud.identify import written
-from tenbaud.identify.closed_loop import require_commands
-from tenbaud.identify.coder import with_coder
-from tenbaud.identify.flown import Flown, fly_record
-from tenbaud.identify.run import Identified, Wanted, run
-from tenbaud.identify.sources import Source, from_log, from_rig, from_run
+from tenbaud.identification import written
+from tenbaud.identification.closed_loop import require_commands
+from tenbaud.identification.coder import with_coder
+from tenbaud.identification.flown import Flown, fly_record
+from tenbaud.identification.run import Identified, Wanted, run
+from tenbaud.identification.sources import Source, from_log, from_rig, from_run
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -149,7 +149,7 @@ class Result:
 
     def save(self, folder: Path, *, fly: bool = True) -> None:
         """Write figures and configurations, and fly each record with its own."""
-        from tenbaud.identify.figures import draw_estimates, draw_excitation
+        from tenbaud.identification.figures import draw_estimates, draw_excitation
 
         found = [one.identified for one in self.each]
         draw_excitation(found, [folder / "figure-3.png", folder / "figure-3.svg"])

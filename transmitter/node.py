@@ -190,14 +190,12 @@ class TransmitterNode:
         self.guard.trip(GuardReason(GuardCause.STOPPED, self.tick))
 
     def tell(self, event: Event) -> None:
-        """Report something at the present tick."""
         time_ns = self.tick * self.session.terms.tick_ns
         event = replace(event, time_ns=time_ns, sample=self.session.copies.confirmed.sample)
         self.session.events.append(event)
         write_event(self._recorder, event)
 
     def on_malformed(self, why: str) -> None:
-        """Report a message that came and was no frame."""
         self.tell(Event(EventKind.MALFORMED, detail=why))
 
     def _check(self, tick: int, reading: Reading) -> None:

@@ -12,7 +12,7 @@ class RecordedController:
     """
 
     def __init__(self, log: FlightLog, inputs: int) -> None:
-        """Replay `log` on a plant of so many inputs, which are zero where it has none."""
+        """Replay `log`; `inputs` of the plant are zero where it has none."""
         self._commands = log.commands
         self._zero = (0.0,) * inputs
         self._last_row = len(log) - 1

@@ -40,12 +40,10 @@ class Constant(AngleReference):
     tick_s: float
 
     def __post_init__(self) -> None:
-        """Refuse values out of range."""
         _require_finite("level", self.level)
         _require_positive("tick_s", self.tick_s)
 
     def value(self, tick: int) -> float:
-        """Return the level."""
         return self.level
 
 
@@ -57,11 +55,9 @@ class Shifted(AngleReference):
     offset: float
 
     def __post_init__(self) -> None:
-        """Refuse values out of range."""
         _require_finite("offset", self.offset)
 
     def value(self, tick: int) -> float:
-        """Return the set-point at `tick`."""
         return self.offset + self.about.value(tick)
 
 
@@ -74,14 +70,12 @@ class Step(AngleReference):
     tick_s: float
 
     def __post_init__(self) -> None:
-        """Refuse values out of range."""
         _require_finite("amplitude", self.amplitude)
         _require_positive("tick_s", self.tick_s)
         if not (math.isfinite(self.start_s) and self.start_s >= 0.0):
             raise ValueError(f"start_s is {self.start_s}; it must be finite and at least 0")
 
     def value(self, tick: int) -> float:
-        """Return the set-point at `tick`."""
         return self.amplitude if tick >= _first_tick(self.start_s, self.tick_s) else 0.0
 
 
@@ -97,11 +91,9 @@ class Square(AngleReference):
     tick_s: float
 
     def __post_init__(self) -> None:
-        """Refuse values out of range."""
         _require_wave(self.amplitude, self.period_s, self.tick_s)
 
     def value(self, tick: int) -> float:
-        """Return the set-point at `tick`."""
         half_periods = tick * self.tick_s / (0.5 * self.period_s)
         tolerance = _TICK_TOLERANCE * self.tick_s / self.period_s
         odd = math.floor(half_periods + tolerance) % 2
@@ -117,11 +109,9 @@ class Sine(AngleReference):
     tick_s: float
 
     def __post_init__(self) -> None:
-        """Refuse values out of range."""
         _require_wave(self.amplitude, self.period_s, self.tick_s)
 
     def value(self, tick: int) -> float:
-        """Return the set-point at `tick`."""
         return self.amplitude * math.sin(math.tau * tick * self.tick_s / self.period_s)
 
 
@@ -137,7 +127,6 @@ class Listed(AngleReference):
         self._values = list(values)
 
     def value(self, tick: int) -> float:
-        """Return the set-point at `tick`."""
         return self._values[max(bisect_right(self._first_ticks, tick) - 1, 0)]
 
 
@@ -157,7 +146,6 @@ class SteeredReference(AngleReference):
         self.by_hand = value
 
     def value(self, tick: int) -> float:
-        """Return the set-point at `tick`."""
         return self._programme.value(tick) if self.by_hand is None else self.by_hand
 
 

@@ -59,18 +59,15 @@ class Agreement:
 
     @property
     def flight_ticks(self) -> int:
-        """Return the ticks of the flight: whole samples, at least one."""
         samples = round(self.config.duration_s * 1e9) // self.terms.sample_ns
         return max(1, samples) * self.terms.ticks_per_sample
 
     @property
     def link(self) -> LinkKind:
-        """Return what the configured kind of link says about itself."""
         return kind_of_link(self.config)
 
     @property
     def faults(self) -> LineFaults:
-        """Return what goes wrong on the line, on purpose."""
         return parse_impairments(self.config.link.impairments)
 
     @property

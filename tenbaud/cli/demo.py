@@ -140,7 +140,6 @@ def _fly_all(
 def _fly_shown(
     agreement: Agreement, folder: RunFolder, view_options: ViewOptions | None, pace: float | None
 ) -> DemoResult:
-    """Fly once, and show how it goes."""
     from tenbaud.flight.demo import fly_demo
     from tenbaud.flight.display import StatusDisplay
 

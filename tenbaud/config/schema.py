@@ -367,7 +367,6 @@ class FlightConfig(CodePermission):
 
     @property
     def plant_kind(self) -> str:
-        """Return the kind of the simulated plant."""
         kind = self.transmitter.plant.kind
         if kind != "auto":
             return kind

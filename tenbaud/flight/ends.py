@@ -29,7 +29,7 @@ from tenbaud.flight.summary import Summary, gap_part, link_part, receiver_part, 
 from tenbaud.flight.trouble import Trouble
 from tenbaud.recording.encoding import SIGNALS_KEY, signals_text
 from tenbaud.recording.folder import RunFolder
-from tenbaud.recording.gather import OverviewRecorder
+from tenbaud.recording.overview import OverviewRecorder
 from tenbaud.recording.shared import SharedWriter
 from tenbaud.recording.writer import McapRecorder
 from tenbaud.telemetry.compose import ReceiverComposer, TransmitterComposer

@@ -12,6 +12,8 @@ from tenbaud.log.units import DATE_TIME, factor
 
 EVEN = 0.05
 """Deviation from even sampling, in steps, up to which rows are taken as they are."""
+ROUND = 0.005
+"""Share by which the tick of resampled rows may differ from their mean step, to be round."""
 GAP = 2.5
 """Steps between two rows from which they are no longer joined by interpolation."""
 STRETCHES_MAX = 6
@@ -103,7 +105,7 @@ def by_time(
             "say in which unit: --units time=ms, us, ns or s"
         )
     _check_gaps(table, column, rows, times, steps, usual)
-    return _even(rows, times, steps, usual, unit)
+    return _even(rows, times, unit)
 
 
 def _cut(table: Table, times: Array, start_s: float | None, end_s: float | None) -> slice:
@@ -131,11 +133,7 @@ def _check_rising(table: Table, column: int, rows: slice, steps: Array, usual: f
     back = np.flatnonzero(steps <= 0.0)
     if len(back):
         row = int(back[0]) + 1
-        what = (
-            "the time of the row before is there again"
-            if steps[row - 1] == 0.0
-            else "the time runs back"
-        )
+        what = "the same time as in the row before" if steps[row - 1] == 0.0 else "the time runs back"
         more = f" (and at {len(back) - 1} other rows)" if len(back) > 1 else ""
         raise table.fault(
             rows.start + row,
@@ -166,23 +164,27 @@ def _check_gaps(
     )
 
 
-def _even(rows: slice, times: Array, steps: Array, usual: float, unit: str) -> Clock:
+def _even(rows: slice, times: Array, unit: str) -> Clock:
     """Return the clock with an even tick; resampled where the rows are too far from it."""
-    count = len(times)
-    mean = float(times[-1] - times[0]) / (count - 1)
+    count, start = len(times), float(times[0])
+    mean = float(times[-1] - start) / (count - 1)
     tick_s = float(f"{mean:.3g}")
     if abs(tick_s - mean) * (count - 1) > 0.5 * mean:
         tick_s = round(mean, 9) or mean
-    start = float(times[0])
-    notes = (
-        ("the clock is a column of dates: its seconds count from the first",)
-        if unit == DATE_TIME
-        else ()
-    )
+    notes = []
+    if unit == DATE_TIME:
+        notes.append("the clock is a column of dates: its seconds count from the first")
     off = float(np.max(np.abs(times - start - np.arange(count) * tick_s)))
     if off <= EVEN * tick_s:
-        return Clock(rows, None, tick_s, start, count, notes)
-    jitter = float(np.max(np.abs(steps - usual)))
+        return Clock(rows, None, tick_s, start, count, tuple(notes))
+    # Rows are put on a grid of their own times, so that the tick may be a round one.
+    near = [float(f"{mean:.{digits}g}") for digits in (1, 2, 3)]
+    tick_s = next((one for one in near if abs(one - mean) <= ROUND * mean), mean)
     ticks = int((times[-1] - start) / tick_s + 1e-6) + 1
-    text = f"resampled to {tick_s:g} s: the times of the rows jitter by up to {jitter:.2g} s"
-    return Clock(rows, times, tick_s, start, ticks, (*notes, text))
+    places = (times - start) / tick_s
+    jitter = float(np.max(np.abs(places - np.round(places)))) * tick_s
+    if jitter > EVEN * tick_s:
+        notes.append(f"resampled to {tick_s:g} s: the times of the rows jitter by up to {jitter:.2g} s")
+    if ticks > count:
+        notes.append(f"{ticks - count} row(s) lost, filled by interpolation")
+    return Clock(rows, times, tick_s, start, ticks, tuple(notes))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import cast
 
 import numpy as np
@@ -15,6 +14,7 @@ from tenbaud.config.schema import FlightLogSection
 from tenbaud.log.angles import counts_of, step_of, turn_of, unwrapped, values_of, without_spikes
 from tenbaud.log.beside import with_file_beside
 from tenbaud.log.clock import Clock, by_index, by_period, by_time
+from tenbaud.log.join import read_joined
 from tenbaud.log.reader import read_table
 from tenbaud.log.roles import Chosen, Roles
 from tenbaud.log.table import Array, LogError, Table
@@ -54,8 +54,13 @@ def read_log(
         chosen.append(roles.choose(names, units, known))  # type: ignore[arg-type]
         return chosen[-1].places
 
-    table = read_table(Path(section.file), wanted)
-    return _Reading(table, chosen[-1], roles, encoders, tick_s).log()
+    notes: tuple[str, ...] = ()
+    if section.join:
+        time = section.columns.get("time", section.time)
+        table, notes = read_joined((section.file, *section.join), read_table, time, wanted)
+    else:
+        table = read_table(section.file, wanted)
+    return _Reading(table, chosen[-1], roles, encoders, tick_s, notes).log()
 
 
 class _Reading:
@@ -68,6 +73,7 @@ class _Reading:
         roles: Roles,
         encoders: tuple[OutputReader, ...],
         tick_s: float | None,
+        notes: tuple[str, ...],
     ) -> None:
         self.table, self.chosen, self.roles = table, chosen, roles
         self.section = roles.section
@@ -75,7 +81,7 @@ class _Reading:
         self.tick_s = tick_s
         self.at = {place: at for at, place in enumerate(chosen.places)}
         """place in the file to place in the table"""
-        self.notes = [table.source, *chosen.notes]
+        self.notes = [table.source, *notes, *chosen.notes]
 
     def log(self) -> Log:
         """Return the flight log."""
@@ -107,7 +113,7 @@ class _Reading:
             clock.start_s,
             tuple(self.notes),
             tuple(steps),
-            signals=self._signals(),
+            signals=cast(Signals, self.roles.signals),
         )
 
     def _has_inputs(self) -> bool:
@@ -116,17 +122,11 @@ class _Reading:
         )
         return named or any(place is not None for _, place in self.chosen.inputs)
 
-    def _signals(self) -> Signals:
-        if self.roles.signals is not None:
-            return self.roles.signals
-        outputs = tuple([one for one, _ in self.chosen.outputs])
-        return Signals(outputs, tuple([one for one, _ in self.chosen.inputs]), outputs)
-
     def _clock(self) -> Clock:
         section, chosen, table = self.section, self.chosen, self.table
         if chosen.time is not None:
             column = self.at[chosen.time]
-            unit = self._told_unit("time", "time") or table.units[column]
+            unit = self._given_unit("time", "time") or table.units[column]
             scale, offset = self._linear("time", "time")
             return by_time(table, column, scale, offset, unit, section.start_s, section.end_s)
         period_s = section.period_s or table.period_s
@@ -143,7 +143,7 @@ class _Reading:
             return by_index(table, column, period_s, section.start_s, section.end_s)
         return by_period(len(table), period_s, section.start_s, section.end_s)
 
-    def _told_unit(self, role: str, kind: str) -> str:
+    def _given_unit(self, role: str, kind: str) -> str:
         given = self.roles.setting(self.section.units, role, kind)
         return "" if given is None else unit_named(str(given)) or str(given)
 
@@ -167,7 +167,7 @@ class _Reading:
         """Fill in one output; return how far its values lie apart."""
         role = f"out:{signal.name}"
         values = self._values(column, role, "angle", clock)
-        unit = self._told_unit(role, "angle") or self._unit_of(column, values, signal)
+        unit = self._given_unit(role, "angle") or self._unit_of(column, values, signal)
         encoder = self.encoders[at] if self.encoders else None
         values = self._straight(values, turn_of(unit, encoder), column, clock, signal)
         if unit == COUNTS:
@@ -249,5 +249,5 @@ class _Reading:
     def _input(self, signal: Signal, column: int, clock: Clock) -> Array:
         role = f"in:{signal.name}"
         values = self._values(column, role, "input", clock)
-        unit = self._told_unit(role, "input") or unit_named(self.table.units[column])
+        unit = self._given_unit(role, "input") or unit_named(self.table.units[column])
         return values * self._factor(unit, signal)

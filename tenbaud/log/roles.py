@@ -12,8 +12,11 @@ from tenbaud.log.table import LogError, find_column, listed
 from tenbaud.log.units import COUNTS, bare_name, split_unit, unit_named
 
 NO_COLUMN = "0"
+EVERY = {"angle": ("angles", "outputs"), "input": ("inputs",)}
+"""Names of all signals of a kind, in tables such as `units`."""
+ALL = ("angles", "outputs", "inputs")
 CLOCKS = ("time", "index")
-_TIME = ("time", "t", "zeit", "timestamp", "clock", "seconds", "sec", "stamp", "temps", "tid")
+CLOCK_WORDS = ("time", "t", "zeit", "timestamp", "clock", "seconds", "sec", "stamp", "temps", "tid")
 _INDEX = ("step", "index", "sample", "n", "k", "tick", "row")
 _ANGLES = (
     *("pitch", "angle", "theta", "winkel", "pos", "position", "y", "output", "measured", "encoder"),
@@ -87,18 +90,15 @@ class Roles:
         if not kind and name in CLOCKS:
             return name
         if self.signals is None:
-            if kind:
-                return f"{kind}:{name}"
-            words = (*_INPUTS, *_FRONT, *_REAR)
-            return f"{'in' if _stem(name) in words or _numbered(name) else 'out'}:{name}"
+            return f"{kind or ('in' if _is_input(name) else 'out')}:{name}"
         outputs = [one.name for one in self.signals.outputs]
         inputs = [one.name for one in self.signals.inputs]
         for own, signals, aliases in (
             ("out", outputs, ("angle", "output")),
             ("in", inputs, ("input",)),
         ):
-            if kind in ("", own) and name in signals:
-                return f"{own}:{name}"
+            if kind in ("", own) and (name in signals or identifier(name) in signals):
+                return f"{own}:{name if name in signals else identifier(name)}"
             if kind in ("", own) and name in aliases and signals:
                 return f"{own}:{signals[0]}"
             if kind == own and name.isdigit() and 1 <= int(name) <= len(signals):
@@ -110,26 +110,25 @@ class Roles:
 
     def setting(self, values: Mapping[str, object], role: str, kind: str) -> object | None:
         """Return what a table such as `units` says about a signal; None where it says nothing."""
-        own = [value for name, value in values.items() if self._means(name, role)]
-        every = [value for name, value in values.items() if name == f"{kind}s"]
-        return (own or every or [None])[-1]
-
-    def _means(self, name: str, role: str) -> bool:
-        return name not in ("angles", "outputs", "inputs") and self.role(name, "") == role
+        every = EVERY.get(kind, ())
+        own = [
+            value for name, value in values.items() if name not in ALL and self.role(name, "") == role
+        ]
+        return (own or [value for name, value in values.items() if name in every] or [None])[-1]
 
     def _clock(self, name: str, given: Mapping[str, str], names: Sequence[str]) -> int | None:
         if name in given:
             return find_column(self.path, names, given[name])
         if self.section.period_s is not None or any(one in given for one in CLOCKS):
             return None
-        words = _TIME if name == "time" else _INDEX
+        words = CLOCK_WORDS if name == "time" else _INDEX
         return self._guess(name, words, names, set())
 
     def _guess(
         self, what: str, words: Sequence[str], names: Sequence[str], taken: set[int]
     ) -> int | None:
         """Return the first column whose name is one of some words, in the order of the words."""
-        stems = [_stem(name) for name in names]
+        stems = [stem_of(name) for name in names]
         for word in words:
             for place, stem in enumerate(stems):
                 if stem == word and place not in taken:
@@ -168,9 +167,8 @@ class Roles:
             if column and (column != NO_COLUMN or NO_COLUMN in names):
                 place = find_column(self.path, names, column)
             elif not column and not named:
-                place = self._guess(
-                    one.name, _input_words(one, at, len(self.signals.inputs)), names, taken
-                )
+                words = _input_words(one, at, len(self.signals.inputs), names)
+                place = self._guess(one.name, words, names, taken)
             if place is not None:
                 taken.add(place)
             inputs.append((one, place))
@@ -192,9 +190,9 @@ class Roles:
         rest = [place for place in range(len(names)) if place not in taken]
         for kind, words in (("out", _ANGLES), ("in", (*_INPUTS, *_FRONT, *_REAR))):
             for place in rest if not found[kind] else ():
-                stem = _stem(names[place])
+                stem = stem_of(names[place])
                 what = "output" if kind == "out" else "input"
-                if stem in words or (kind == "in" and _numbered(names[place])):
+                if stem in words or (kind == "in" and _is_input(names[place])):
                     found[kind][stem] = place
                     self.notes.append(f"{what} {stem}: column {names[place]}, by its name")
         if not found["out"]:
@@ -202,18 +200,24 @@ class Roles:
                 f"{self.path}: which column is the output? Give --columns out:NAME=COLUMN,"
                 f"in:NAME=COLUMN; present: {listed(names)}"
             )
+        places = {kind: {identifier(name): at for name, at in found[kind].items()} for kind in found}
+        bare = tuple([Signal(name) for name in places["out"]])
+        # From here on `units` and its like may name them, or say `angle` and `input`.
+        self.signals = Signals(bare, tuple([InputSignal(name) for name in places["in"]]), bare)
         outputs = [
-            (Signal(_identifier(name), self._unit(f"out:{name}", "angle", units[place])), place)
-            for name, place in found["out"].items()
+            (Signal(name, self._unit(f"out:{name}", "angle", units[place])), place)
+            for name, place in places["out"].items()
             if place is not None
         ]
         inputs = [
-            (
-                InputSignal(_identifier(name), self._unit(f"in:{name}", "input", units[place or 0])),
-                place,
-            )
-            for name, place in found["in"].items()
+            (InputSignal(name, self._unit(f"in:{name}", "input", "" if at is None else units[at])), at)
+            for name, at in places["in"].items()
         ]
+        self.signals = Signals(
+            tuple([one for one, _ in outputs]),
+            tuple([one for one, _ in inputs]),
+            tuple([one for one, _ in outputs]),
+        )
         return outputs, inputs
 
     def _unit(self, role: str, kind: str, in_file: str) -> str:
@@ -224,24 +228,29 @@ class Roles:
         )
 
 
-def _input_words(signal: InputSignal, at: int, count: int) -> list[str]:
-    words = [signal.column, signal.name]
-    if count == 2:
-        words += (_FRONT, _REAR)[at]
-    stems = [*_INPUTS, "u_motor"]
-    words += [f"{stem}{mark}{at + 1}" for stem in stems for mark in ("", "_")]
-    return words + (stems if not at else [])
+def _input_words(signal: InputSignal, at: int, count: int, names: Sequence[str]) -> list[str]:
+    """Return the names that an input may have in a file, the likeliest first."""
+    words = [stem_of(signal.column), signal.name, *((_FRONT, _REAR)[at] if count == 2 else ())]
+    stems = {stem_of(name) for name in names}
+    for word in _INPUTS:
+        for mark in ("", "_"):
+            first = 0 if f"{word}{mark}0" in stems else 1
+            words.append(f"{word}{mark}{at + first}")
+    return words + ([] if at else list(_INPUTS))
 
 
-def _stem(name: str) -> str:
+def stem_of(name: str) -> str:
+    """Return a column's name without unit, case and signs, for comparisons."""
     return re.sub(r"[^\w]+", "_", bare_name(name).strip().casefold()).strip("_")
 
 
-def _numbered(name: str) -> bool:
-    stem = re.sub(r"_?\d+$", "", _stem(name))
-    return stem in _INPUTS and stem != "v"
+def _is_input(name: str) -> bool:
+    stem = stem_of(name)
+    numbered = re.sub(r"_?\d+$", "", stem)
+    return stem in (*_INPUTS, *_FRONT, *_REAR) or (numbered in _INPUTS and numbered != "v")
 
 
-def _identifier(name: str) -> str:
+def identifier(name: str) -> str:
+    """Return the name of a signal for the name of a column."""
     text = re.sub(r"[^a-z0-9_]+", "_", split_unit(name)[0].casefold()).strip("_")
     return text if text[:1].isalpha() else f"column_{text or 1}"

@@ -62,7 +62,6 @@ class SimulatedRig(Rig):
         self._volts = volts
 
     def safe_stop(self) -> None:
-        """Put the safe voltage on the motors."""
         self._volts = self._safe_command
 
 
@@ -76,7 +75,6 @@ class DryRig(Rig):
         self._nothing = (0.0,) * motors
 
     def open(self) -> None:
-        """Open the rig."""
         self._rig.open()
 
     def read(self, tick: int) -> Reading | None:
@@ -90,11 +88,9 @@ class DryRig(Rig):
         """Do nothing."""
 
     def close(self) -> None:
-        """Give the rig back."""
         self._rig.close()
 
     def figures(self) -> dict[str, object]:
-        """Return what the rig counted."""
         return {**self._rig.figures(), "dry_run": True}
 
 
@@ -108,7 +104,6 @@ class ReplayRig(Rig):
         self._log = log
 
     def read(self, tick: int) -> Reading | None:
-        """Return the row of a tick, None past the last."""
         if tick >= len(self._log):
             return None
         log = self._log

@@ -20,6 +20,7 @@ from tenbaud.config.load import ConfigError, dump_config, merged, nested
 from tenbaud.config.schema import FlightConfig
 from tenbaud.flight.fly import fly
 from tenbaud.log.angles import step_of
+from tenbaud.recording.convert import convert
 from tenbaud.studies.flights import CompiledPoint
 from tenbaud.studies.plain import fly_plain
 
@@ -146,7 +147,7 @@ def test_a_setting_that_contradicts_the_recording_is_refused(
         flight_config("uiuc-10baud", None, replay(pitch_log(tmp_path), **{setting: value}))
 
 
-def test_what_is_given_stays_and_is_told(tmp_path: Path) -> None:
+def test_what_is_given_stays_and_a_start_that_is_off_is_named(tmp_path: Path) -> None:
     given = {
         "timing__tick_s": 0.01,
         "limits__command_max": 20.0,
@@ -181,7 +182,7 @@ def test_small_commands_travel_in_finer_steps(tmp_path: Path) -> None:
     assert agreed(config).terms.limits.command_max == (0.02,)
 
 
-def test_without_commands_zero_is_commanded_and_told(tmp_path: Path) -> None:
+def test_without_commands_zero_is_commanded_and_said(tmp_path: Path) -> None:
     file = written(tmp_path / "angle.csv", "angle", lambda time_s: (0.1 * math.sin(time_s),))
     config = flight_config(None, None, replay(file))
     assert config.preset == "uiuc-10baud"
@@ -208,6 +209,14 @@ def test_the_emulator_turns_its_encoder_as_a_log_in_rad_says(tmp_path: Path) -> 
     emulator = build_emulator(config, "cobs", "pty")
     emulator.device.command(0, (0.0, 0.0), True)
     assert emulator.device.sample(1).counts[1] == round(0.5 / math.tau * 4096)
+
+
+def test_an_export_of_a_flight_is_replayed(tmp_path: Path) -> None:
+    first = fly("paper-10baud", settings={"duration_s": 3.0}, out=tmp_path / "first")
+    convert(first, "csv", tmp_path / "csv")
+    again = fly(settings=flat(replay(tmp_path / "csv" / "flight.csv")), out=tmp_path / "again")
+    assert np.array_equal(again.pitch, first.pitch)
+    assert np.array_equal(again.front_command, first.front_command)
 
 
 @pytest.mark.parametrize("step", [math.tau / 4096.0, 0.1, 1e-4])

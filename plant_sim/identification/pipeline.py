@@ -152,11 +152,13 @@ def _bandwidth(record: Record, structure: Structure, options: Options, notes: li
     usual = Filters().bandwidth_rad_s
     given = options.bandwidth_rad_s
     if given is None:
-        fits = 0.5 <= found / usual <= 2.0
-        given = usual if fits else min(float(f"{0.7 * found:.2g}"), 0.5 / record.step_s)
+        # A slow input, such as steps, shows the plant's faster motion as well.
+        fits = 0.1 <= found / usual <= 2.0
+        share = 0.7 if found > usual else 3.0
+        given = usual if fits else min(float(f"{share * found:.2g}"), 0.5 / record.step_s)
         if not fits:
             notes.append(f"the outputs move most at {found:.3g} rad/s: filters of {given:g} rad/s")
-    elif not 0.2 <= found / given <= 5.0:
+    elif not 0.05 <= found / given <= 5.0:
         notes.append(
             f"the outputs move most at {found:.3g} rad/s, far from the filters' {given:g} rad/s: "
             f"--bandwidth {0.7 * found:.2g} suits them, or leave it out"

@@ -30,6 +30,8 @@ STEPS_MAX = 600
 """samples of a segment that are compared"""
 DRAWS_MIN = 12
 LAG_MAX_S = 10.0
+NUDGE = 1e-4
+"""by which initial states are moved for their derivatives"""
 WILD = 1e3
 """times the usual motion: where a wild guess of the parameters is cut off"""
 
@@ -89,14 +91,29 @@ def simulation_residuals(
     structure: Structure, values: Mapping[str, float], lag_s: float, segments: Segments
 ) -> Array:
     """Return (samples, segments, outputs): simulated minus recorded, from the best initial states."""
-    size = structure.order * len(structure.equations)
-    samples, count, _ = segments.outputs.shape
     acting = _acting(segments, lag_s)
-    start = np.zeros((count, size))
-    nudge = 1.0
-    if isinstance(structure, PitchStructure):
-        start, nudge = _start(segments), 1e-4
-    starts = np.concatenate([start, *(start + nudge * row for row in np.eye(size))])
+    if not isinstance(structure, PitchStructure):
+        states = np.zeros((segments.outputs.shape[1], structure.order * len(structure.equations)))
+        return _from_best_states(structure, values, lag_s, segments, acting, states, 1.0)[0]
+    # The sine bends what a change of the initial state does: a second step from the better one.
+    states = _start(segments)
+    _, moved = _from_best_states(structure, values, lag_s, segments, acting, states, NUDGE)
+    return _from_best_states(structure, values, lag_s, segments, acting, states - moved, NUDGE)[0]
+
+
+def _from_best_states(
+    structure: Structure,
+    values: Mapping[str, float],
+    lag_s: float,
+    segments: Segments,
+    acting: Array,
+    states: Array,
+    nudge: float,
+) -> tuple[Array, Array]:
+    """Return the residuals from initial states that fit best to first order, and their change."""
+    size = states.shape[1]
+    samples, count, _ = segments.outputs.shape
+    starts = np.concatenate([states, *(states + nudge * row for row in np.eye(size))])
     run = _pitch if isinstance(structure, PitchStructure) else _linear
     with np.errstate(all="ignore"):
         found = run(structure, values, lag_s, segments, acting, starts)  # type: ignore[arg-type]
@@ -110,7 +127,7 @@ def simulation_residuals(
     pulled = np.einsum("tisp,tsp,p->si", slopes, errors, weights)
     ridge = 1e-12 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(size)
     moved = np.linalg.solve(normal + ridge + 1e-300 * np.eye(size), pulled[:, :, None])[:, :, 0]
-    return np.asarray(errors - np.einsum("tisp,si->tsp", slopes, moved))
+    return np.asarray(errors - np.einsum("tisp,si->tsp", slopes, moved)), moved
 
 
 def _acting(segments: Segments, lag_s: float) -> Array:

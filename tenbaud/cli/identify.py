@@ -45,7 +45,10 @@ Structure = Annotated[
     ),
 ]
 Lag = Annotated[
-    str, typer.Option(help="Motor lag: auto (model.motor_lag_s if that is set, else found), or s.")
+    str,
+    typer.Option(
+        help="Motor lag: auto (model.motor_lag_s where it differs from the preset, else found), or s."
+    ),
 ]
 
 

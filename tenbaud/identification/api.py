@@ -14,7 +14,7 @@ from plant_sim.identification.pipeline import Options
 from plant_sim.identification.record import Record
 from plant_sim.identification.regression import Filters
 from tenbaud.build.signals import build_limits, configured_signals
-from tenbaud.config.load import load_config, nested
+from tenbaud.config.load import OWN, load_config, nested
 from tenbaud.config.schema import FlightConfig
 from tenbaud.identification import written
 from tenbaud.identification.closed_loop import require_commands
@@ -167,8 +167,11 @@ def _finish(one: Each, folder: Path, number: str, fly: bool) -> None:
         log = written.write_record(folder / f"record{number}.csv", one.identified.record)
         one.settings["flight_log"] = log
     if fly:
-        one.settings, note = with_coder(one.settings)
-        one.identified = replace(one.identified, notes=(*one.identified.notes, *filter(None, [note])))
+        # An experiment that this command made shows the plant, and not what flights are like.
+        if one.source.file is not None:
+            one.settings, note = with_coder(one.settings)
+            notes = (*one.identified.notes, *filter(None, [note]))
+            one.identified = replace(one.identified, notes=notes)
         one.flown = fly_record(one.settings)
     one.config_file = folder / f"identified{number}.toml"
     said = one.flown.sentence() if one.flown is not None else ""
@@ -227,7 +230,10 @@ def identify_sources(config: FlightConfig, sources: Sequence[Source], request: R
 
 def _wanted(config: FlightConfig, source: Source, request: Request) -> Wanted:
     excited = source.name.partition(":")[0] in ("square", "prbs", "chirp") and source.file is None
-    set_lag = "motor_lag_s" in config.model.model_fields_set
+    # What a preset says is of the preset's plant.
+    preset = {} if config.preset == OWN else load_config(config.preset).model.model_dump()
+    known = getattr(config.model, "motor_lag_s", None)
+    set_lag = known is not None and known != preset.get("motor_lag_s", known)
     lag_s: float | None = None
     if request.lag != "auto":
         try:
@@ -235,7 +241,7 @@ def _wanted(config: FlightConfig, source: Source, request: Request) -> Wanted:
         except ValueError:
             raise IdentificationError(f"--lag {request.lag}: give auto or seconds") from None
     elif set_lag or (excited and config.transmitter.rig == "simulated"):
-        lag_s = getattr(config.model, "motor_lag_s", None)
+        lag_s = known
     forgetting = request.forgetting_per_s
     paper = Filters()
     if forgetting is None:

@@ -10,6 +10,10 @@ from tenbaud.config.schema import FlightConfig
 from tenbaud.studies.figures import FlightFigures
 
 
+PLAIN_TICKS = 10_000
+"""flown faster by the sessions than a flight is compiled"""
+
+
 class Flown(NamedTuple):
     """What came of the flight."""
 
@@ -58,6 +62,8 @@ def fly_record(values: Mapping[str, Any]) -> Flown:
 def _fly(config: FlightConfig) -> FlightFigures:
     from tenbaud.studies.plain import fly_plain
 
+    if config.duration_s <= PLAIN_TICKS * config.timing.tick_s:
+        return fly_plain(config)
     try:
         from tenbaud.studies.flights import CompiledPoint
         from tenbaud.studies.schedule import Uncommon

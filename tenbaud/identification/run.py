@@ -151,7 +151,7 @@ def _without_drift(
         lambda rate: -_explained(without(rate), found),
         bounds=(guess - width, guess + width),
         method="bounded",
-        options={"maxiter": 20, "xatol": 1e-4},
+        options={"maxiter": 12, "xatol": 1e-3},
     )
     straight = without(float(best.x))
     again = pipeline.identify(straight, structure, wanted.options)

@@ -162,7 +162,7 @@ def write_columns(path: Path, names: str, *columns: np.ndarray) -> Path:
 
 
 def test_when_a_log_drifts_over_turns_then_it_is_identified_with_a_warning(tmp_path: Path) -> None:
-    record = swing(0.02, random_volts(1500, 5.0, 60), 0.4, 4.0, 0.2)
+    record = swing(0.02, random_volts(1000, 5.0, 60), 0.4, 4.0, 0.2)
     times = np.arange(len(record))[:, None] * record.step_s
     angles = record.outputs + 0.5 * times
     log = write_columns(tmp_path / "log.csv", "t,pitch,uf,ur", times, angles, record.inputs)
@@ -175,6 +175,7 @@ def test_when_a_log_drifts_over_turns_then_it_is_identified_with_a_warning(tmp_p
     assert "drifts by 0." in warnings
 
 
+@pytest.mark.soak
 def test_when_a_motor_is_identified_then_what_is_written_flies_its_record(tmp_path: Path) -> None:
     record = record_of(CASES[1], 1, 3000)
     times = np.arange(len(record))[:, None] * record.step_s

@@ -12,9 +12,8 @@ from channel.codec.signals import Signals
 from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.excitation import excite, parse_excitation
 from plant_sim.identification.record import Record
-from tenbaud.build.flight_log import read_flight_log
 from tenbaud.build.rig import build_rig
-from tenbaud.build.signals import configured_signals
+from tenbaud.build.signals import build_encoders, configured_signals
 from tenbaud.config.schema import FlightConfig
 from tenbaud.recording.folder import find_recordings
 from tenbaud.recording.reader import Recording
@@ -88,14 +87,13 @@ def from_log(config: FlightConfig, structure: str = "") -> tuple[Record, tuple[s
     The signals are those of the model, or the file's own where the structure is none of the model.
     LogError where the file cannot be used.
     """
-    if _own_signals(config, structure):
-        from tenbaud.log.read import read_log
+    from tenbaud.log.read import read_log
 
-        own = read_log(config.flight_log, None, (), config.timing.tick_s)
-        return record_of(own.tick_s, own.measured, own.commands, own.signals), own.notes
-    log = read_flight_log(config)
-    signals = configured_signals(config)
-    return record_of(log.tick_s, log.measured, log.commands, signals), log.notes
+    # On the file's own clock: a flight may resample it, an identification need not.
+    signals = None if _own_signals(config, structure) else configured_signals(config)
+    encoders = () if signals is None else build_encoders(config, signals)
+    log = read_log(config.flight_log, signals, encoders, config.timing.tick_s)
+    return record_of(log.tick_s, log.measured, log.commands, log.signals), log.notes
 
 
 def record_of(step_s: float, outputs: np.ndarray, inputs: np.ndarray, signals: Signals) -> Record:

@@ -9,7 +9,6 @@ from tenbaud.config.load import load_config, merged
 from tenbaud.config.schema import FlightConfig
 from tenbaud.studies.figures import FlightFigures
 
-
 PLAIN_TICKS = 10_000
 """flown faster by the sessions than a flight is compiled"""
 

@@ -58,7 +58,7 @@ def identify(
     log: LogOptions,
     source: Annotated[
         Path | None,
-        typer.Argument(help="Folder of a run, or a log; not given: the simulated rig is excited."),
+        typer.Argument(help="A log or the folder of a run; not given: the simulated rig is excited."),
     ] = None,
     structure: Structure = "",
     lag: Lag = "auto",

@@ -21,7 +21,7 @@ from tenbaud.identification.closed_loop import require_commands
 from tenbaud.identification.coder import with_coder
 from tenbaud.identification.flown import Flown, fly_record
 from tenbaud.identification.run import Identified, Wanted, run
-from tenbaud.identification.sources import Source, from_log, from_rig, from_run
+from tenbaud.identification.sources import Source, from_log, from_rig
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -193,7 +193,6 @@ def sources_of(
     duration_s: float | None = None,
 ) -> list[Source]:
     """Return the records: of the excited rig, of a run, or of a log."""
-    section = config.flight_log
     if source is None:
         rest = config.transmitter.plant.model_copy(
             update={"initial": getattr(config.model, "equilibrium_rad", 0.0)}
@@ -203,12 +202,7 @@ def sources_of(
         )
         signals = list(excitation or EXCITATIONS)
         return [Source(one, from_rig(at_rest, one, duration_s or DURATION_S)) for one in signals]
-    if source.is_dir() or source.suffix == ".mcap":
-        record = from_run(source, configured_signals(config))
-        if section.start_s is not None or section.end_s is not None:
-            record = record.part(section.start_s or 0.0, section.end_s or 1e9)
-        return [Source(source.name, record)]
-    named = section.model_copy(update={"file": str(source)})
+    named = config.flight_log.model_copy(update={"file": str(source)})
     config = config.model_copy(update={"flight_log": named})
     record, notes = from_log(config, request.structure)
     return [Source(source.name, record, notes, source)]

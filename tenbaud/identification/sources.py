@@ -1,9 +1,8 @@
-"""Sources of a record: the configured rig, the folder of a run, a log, or arrays."""
+"""Sources of a record: the configured rig, a log or a run, or arrays."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +14,6 @@ from plant_sim.identification.record import Record
 from tenbaud.build.rig import build_rig
 from tenbaud.build.signals import build_encoders, configured_signals
 from tenbaud.config.schema import FlightConfig
-from tenbaud.recording.folder import find_recordings
-from tenbaud.recording.reader import Recording
 
 ALIASES = ("angle", "output", "input", "time", "index", "front", "rear")
 
@@ -50,35 +47,6 @@ def from_rig(config: FlightConfig, excitation: str, duration_s: float) -> Record
         signal = parse_excitation(excitation, tick_s)
         force = config.receiver.pid.normal_force_volts
         return excite(step, signal, tick_s, duration_s, normal_force_volts=force)
-
-
-def from_run(folder: Path, signals: Signals) -> Record:
-    """Return the measured outputs and applied commands of a run's transmitter."""
-    recording = Recording(find_recordings(folder)[0])
-    ticks, rows = [], []
-    outputs, inputs = len(signals.outputs), len(signals.inputs)
-    for _, row in recording.rows("tick"):
-        if not row.get("measured") or len(row.get("applied") or ()) != inputs:
-            continue  # a tick without a reading: a gap, reported below
-        ticks.append(row["tick"])
-        rows.append((*row["measured"][:outputs], *row["applied"]))
-    if not ticks:
-        raise IdentificationError(
-            f"{recording.path} holds no measured outputs with {inputs} commands; give the run's "
-            "transmitter.mcap, and the preset or the configuration that it was flown with"
-        )
-    for before, after in pairwise(ticks):
-        if after != before + 1:
-            raise IdentificationError(
-                f"{recording.path}: after tick {before} comes {after}; a record with gaps cannot be "
-                "identified across them: choose a stretch with --from and --to"
-            )
-    columns = np.array(rows, dtype=np.float64)
-    try:
-        step_s = float(recording.metadata["tick_s"])
-    except (KeyError, ValueError):
-        raise IdentificationError(f"{recording.path} does not say how long its ticks are") from None
-    return record_of(step_s, columns[:, :outputs], columns[:, outputs:], signals)
 
 
 def from_log(config: FlightConfig, structure: str = "") -> tuple[Record, tuple[str, ...]]:

@@ -31,6 +31,7 @@ Flights
     ReceiverSession     the controller node's half
 
 Configured flights and their recordings
+    identify            a model, and a configuration that flies it, from a log or arrays
     fly                 flies a preset, a configuration or objects; leaves a run folder
     Run                 reads a run: its signals as numpy arrays on one time base
     Preset              the parts of a preset, from load_preset
@@ -57,6 +58,7 @@ if TYPE_CHECKING:
     from tenbaud.flight.fly import fly
     from tenbaud.flight.memory import MemoryFlight
     from tenbaud.flight.memory_result import FlightResult
+    from tenbaud.identification.api import identify
     from tenbaud.recording.memory import MemoryRecorder
     from tenbaud.recording.run import Run
     from transmitter.session.session import TransmitterSession
@@ -75,6 +77,7 @@ __all__ = [
     "controllers",
     "errors",
     "fly",
+    "identify",
     "load_preset",
     "models",
     "plants",
@@ -92,6 +95,7 @@ _HOMES = {
     "Terms": "channel.protocol.terms",
     "TransmitterSession": "transmitter.session.session",
     "fly": "tenbaud.flight.fly",
+    "identify": "tenbaud.identification.api",
     "load_preset": "tenbaud.build.preset",
     "preset_names": "tenbaud.config.load",
 }

@@ -5,7 +5,8 @@
 
 (10) is the same as (Gamma^-1)' = phi phi' - alpha Gamma^-1, which over one step of length h has the
 solution Gamma^-1 <- exp(-alpha h) Gamma^-1 + h phi phi'. That is recursive least squares with
-forgetting; taken in this form it cannot lose its positive definiteness as a plain Euler step can.
+forgetting. The sums of h phi phi' and h phi xi are taken over blocks of samples, of one sample each
+unless the record is long.
 
 When the excitation fades, (10) lets Gamma grow like exp(alpha t) without bound, and the first noise
 afterwards throws the estimates away. Here alpha is scaled by 1 - |Gamma| / bound, so that Gamma stays
@@ -19,144 +20,167 @@ Gamma (sum of blocks squared) Gamma.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from plant_sim.identification.errors import IdentificationError
+from plant_sim.identification.filters import Array
 
-Array = NDArray[np.float64]
+BLOCKS_MAX = 20_000
+"""blocks of a record at most: the length of the estimates' history"""
 
 CONDITION_MIN = 1e-3
 """Smallest eigenvalue of the regressors' correlation matrix that still tells them apart; 1 would be
 regressors without anything in common."""
 
-UNCERTAINTY_MAX = 0.25
-"""A standard error above this share of the estimate makes the estimate useless."""
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Moments:
+    """Sums over each block of samples, times the step."""
+
+    block_s: float
+    regressors: Array
+    """(blocks, parameters, parameters): phi phi'"""
+    products: Array
+    """(blocks, parameters): phi xi"""
+    targets: Array
+    """(blocks,): xi^2"""
 
 
-class Estimator:
-    """Estimates `size` parameters from one regression per step.
+def moments_of(regressors: Array, targets: Array, step_s: float, block: int) -> Moments:
+    """Return the sums over blocks of `block` samples; the last block may be shorter."""
+    short = -len(regressors) % block
+    if short:
+        regressors = np.concatenate((regressors, np.zeros((short, regressors.shape[1]))))
+        targets = np.concatenate((targets, np.zeros(short)))
+    rows = regressors.reshape(-1, block, regressors.shape[1])
+    turned = rows.transpose(0, 2, 1)
+    aims = targets.reshape(-1, block)
+    return Moments(
+        block * step_s,
+        step_s * (turned @ rows),
+        step_s * (turned @ aims[:, :, None])[:, :, 0],
+        step_s * (aims * aims).sum(axis=1),
+    )
 
-    `forgetting_per_s` is alpha, `gain` the diagonal of Gamma(0), `gain_bound` what the norm of Gamma
-    may not exceed (ten times Gamma(0) if not given), `block_s` longer than the noise's memory.
-    """
 
-    def __init__(
-        self,
-        size: int,
-        step_s: float,
-        *,
-        forgetting_per_s: float = 0.01,
-        gain: float = 1e3,
-        gain_bound: float | None = None,
-        block_s: float = 6.0,
-    ) -> None:
-        bound = 10.0 * gain * math.sqrt(size) if gain_bound is None else gain_bound
-        for name, value in (
-            ("step_s", step_s),
-            ("gain", gain),
-            ("gain_bound", bound),
-            ("block_s", block_s),
-        ):
-            if not (math.isfinite(value) and value > 0.0):
-                raise IdentificationError(f"{name} is {value}; it must be finite and above 0")
-        if not 0.0 <= forgetting_per_s < math.inf:
-            raise IdentificationError(f"forgetting_per_s is {forgetting_per_s}; it must be at least 0")
-        if bound < gain * math.sqrt(size):
-            raise IdentificationError(f"gain_bound is {bound:g}, below Gamma(0) itself; raise it")
-        self.estimates: Array = np.zeros(size)
-        self.gain: Array = np.eye(size) * gain
-        self._initial_gain = gain
-        self._step_s = step_s
-        self._forgetting = forgetting_per_s
-        self._bound = bound
-        self._moments: Array = np.zeros((size, size))
-        self._weight = 0.0
-        self._block_steps = max(1, round(block_s / step_s))
-        self._block: Array = np.zeros(size)
-        self._in_block = 0
-        self._meat: Array = np.zeros((size, size))
-        self.steps = 0
+def joined(pieces: list[Moments]) -> Moments:
+    """Return the blocks of several pieces of one record."""
+    return Moments(
+        pieces[0].block_s,
+        np.concatenate([one.regressors for one in pieces]),
+        np.concatenate([one.products for one in pieces]),
+        np.concatenate([one.targets for one in pieces]),
+    )
 
-    def update(self, regressor: Array, target: float) -> None:
-        """Take one row: `target` = `regressor` . parameters. ValueError if it is not finite."""
-        if not (np.all(np.isfinite(regressor)) and math.isfinite(target)):
-            raise IdentificationError(f"sample {self.steps} of the data is not finite")
-        h = self._step_s
-        size = float(np.sqrt((self.gain * self.gain).sum()))
-        forgetting = self._forgetting * max(0.0, 1.0 - size / self._bound)
-        kept = math.exp(-forgetting * h)
-        pushed = self.gain @ regressor
-        gain = pushed / (kept / h + float(regressor @ pushed))
-        error = target - float(regressor @ self.estimates)
-        self.estimates = self.estimates + gain * error
-        updated = (self.gain - np.outer(gain, pushed)) / kept
-        self.gain = 0.5 * (updated + updated.T)
-        outer = np.outer(regressor, regressor)
-        self._moments = kept * self._moments + h * outer
-        self._weight = kept * self._weight + h
-        self._note_score(regressor * (target - float(regressor @ self.estimates)), kept)
-        self.steps += 1
 
-    def _note_score(self, score: Array, kept: float) -> None:
-        self._block = kept * self._block + self._step_s * score
-        self._meat = kept * kept * self._meat
-        self._in_block += 1
-        if self._in_block == self._block_steps:
-            self._meat = self._meat + np.outer(self._block, self._block)
-            self._block = np.zeros_like(self._block)
-            self._in_block = 0
+@dataclass(frozen=True, slots=True, eq=False)
+class Estimate:
+    """The estimates over time, and the last ones with their uncertainty."""
+
+    history: Array
+    """(blocks, parameters)"""
+    values: Array
+    covariance: Array
+    """infinite while there are too few data"""
+    levels: Array
+    """root mean square of every regressor over the data still remembered"""
+    condition: float
+    """persistent-excitation measure: how far the regressors differ, 0 to 1"""
+    residual: float
+    """root mean square of xi - phi' Omega"""
+    target: float
+    """root mean square of xi"""
 
     @property
     def deviations(self) -> Array:
-        """Return the standard errors of the estimates; infinite while there are too few data."""
-        blocks = self.steps // self._block_steps
-        free = blocks - len(self.estimates)
-        if free < 1:
-            return np.full(len(self.estimates), math.inf)
-        # Few blocks flatter themselves: the estimate was fitted to the very errors they sum.
-        covariance = self.gain @ self._meat @ self.gain * (blocks / free)
-        return np.asarray(np.sqrt(np.maximum(np.diag(covariance), 0.0)))
+        """Return the standard errors."""
+        return np.asarray(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)))
 
-    @property
-    def condition(self) -> float:
-        """Return the persistent-excitation measure: how far the regressors differ, 0 to 1.
 
-        It is the smallest eigenvalue of their correlation matrix over the data still remembered; 0
-        when a regressor is missing or follows from the others.
-        """
-        levels = self.levels
-        if self._weight == 0.0 or np.any(levels <= 0.0):
-            return 0.0
-        correlation = self._moments / self._weight / np.outer(levels, levels)
-        return float(max(0.0, np.linalg.eigvalsh(correlation)[0]))
+def estimate(
+    moments: Moments,
+    *,
+    forgetting_per_s: float = 0.01,
+    gain: float | None = 1e3,
+    gain_bound: float | None = None,
+    memory_s: float = 6.0,
+    shown: int | None = None,
+) -> Estimate:
+    """Run (9), (10) over all blocks.
 
-    @property
-    def levels(self) -> Array:
-        """Return the root mean square of every regressor over the data still remembered."""
-        if self._weight == 0.0:
-            return np.zeros(len(self.estimates))
-        return np.asarray(np.sqrt(np.diag(self._moments) / self._weight))
+    `forgetting_per_s` is alpha, `gain` the diagonal of Gamma(0) (None: large, by the size of each
+    regressor), `gain_bound` what the norm of Gamma may not exceed (ten times Gamma(0) if not given),
+    `memory_s` longer than the noise's memory. The first `shown` parameters count for the condition;
+    the others describe how the record begins.
+    """
+    if not 0.0 <= forgetting_per_s < math.inf:
+        raise IdentificationError(f"forgetting_per_s is {forgetting_per_s}; it must be at least 0")
+    size = moments.regressors.shape[1]
+    shown = size if shown is None else shown
+    if gain is None:
+        total = np.einsum("kii->i", moments.regressors)
+        start = np.where(total > 0.0, total, 1.0) * 1e-9
+    else:
+        if not (math.isfinite(gain) and gain > 0.0):
+            raise IdentificationError(f"gain is {gain}; it must be finite and above 0")
+        start = np.full(size, 1.0 / gain)
+    norm = float(np.sqrt(np.sum(start**-2.0)))
+    bound = 10.0 * norm if gain_bound is None else gain_bound
+    if bound < norm:
+        raise IdentificationError(f"gain_bound is {bound:g}, below Gamma(0) itself; raise it")
+    information, product = np.diag(start), np.zeros(size)
+    inverse = np.diag(1.0 / start)
+    history = np.empty((len(moments.products), size))
+    kept = np.empty(len(history))
+    for index, (more, pulled) in enumerate(zip(moments.regressors, moments.products, strict=True)):
+        share = max(0.0, 1.0 - math.sqrt(float((inverse * inverse).sum())) / bound)
+        kept[index] = left = math.exp(-forgetting_per_s * share * moments.block_s)
+        information = left * information + more
+        product = left * product + pulled
+        inverse = np.linalg.inv(information)
+        history[index] = inverse @ product
+    values = history[-1]
+    weights = np.append(np.cumprod(kept[:0:-1])[::-1], 1.0)
+    covariance = _covariance(moments, values, inverse, weights, memory_s)
+    summed = np.einsum("k,kij->ij", weights, moments.regressors)
+    remembered = float(weights.sum()) * moments.block_s
+    levels = np.sqrt(np.diag(summed) / remembered)
+    errors = (
+        moments.targets
+        - 2.0 * moments.products @ values
+        + np.einsum("i,kij,j->k", values, moments.regressors, values)
+    )
+    return Estimate(
+        history,
+        values,
+        covariance,
+        levels,
+        _condition(summed[:shown, :shown] / remembered, levels[:shown]),
+        math.sqrt(max(0.0, float(weights @ errors)) / remembered),
+        math.sqrt(float(weights @ moments.targets) / remembered),
+    )
 
-    def warnings(self, names: tuple[str, ...]) -> list[str]:
-        """Return what is wrong with the estimates, named; empty when the data support them."""
-        found = []
-        condition = self.condition
-        if condition < CONDITION_MIN:
-            levels = ", ".join(
-                f"{name} {level:.2g}" for name, level in zip(names, self.levels, strict=True)
-            )
-            found.append(
-                f"the data are not exciting enough to tell the parameters apart (measure "
-                f"{condition:.1e}, at least {CONDITION_MIN:g} is needed; root mean square of the "
-                f"regressor of each: {levels}); move the input more, or longer"
-            )
-        for name, value, deviation in zip(names, self.estimates, self.deviations, strict=True):
-            if not math.isfinite(deviation):
-                found.append(f"{name}: too short a record to say how sure the estimate is")
-            elif deviation > UNCERTAINTY_MAX * abs(value):
-                found.append(
-                    f"{name} = {value:.4g} is uncertain: its standard error is {deviation:.2g}"
-                )
-        return found
+
+def _covariance(
+    moments: Moments, values: Array, inverse: Array, weights: Array, memory_s: float
+) -> Array:
+    """Return Gamma (sum of blocks squared) Gamma, the blocks being longer than the noise's memory."""
+    count = max(1, round(memory_s / moments.block_s))
+    whole = len(weights) // count
+    free = whole - len(values)
+    if free < 1:
+        return np.diag(np.full(len(values), math.inf))
+    scores = moments.products - np.einsum("kij,j->ki", moments.regressors, values)
+    edges = np.arange(0, whole * count, count)
+    blocks = np.add.reduceat(weights[:, None] * scores, edges)
+    # Few blocks flatter themselves: the estimate was fitted to the very errors they sum.
+    return np.asarray(inverse @ (blocks.T @ blocks) @ inverse * (whole / free))
+
+
+def _condition(mean: Array, levels: Array) -> float:
+    """Return the smallest eigenvalue of a correlation matrix; 0 when a regressor is missing."""
+    if not np.all(levels > 0.0):
+        return 0.0
+    return float(max(0.0, np.linalg.eigvalsh(mean / np.outer(levels, levels))[0]))

@@ -17,7 +17,7 @@ from typing import Protocol
 import numpy as np
 
 from plant_sim.identification.errors import IdentificationError
-from plant_sim.identification.record import PitchRecord
+from plant_sim.identification.record import Record
 
 GRAMMAR = (
     "square:FREQUENCY,BIAS,MAGNITUDE or prbs:BIT_S,BIAS,MAGNITUDE or "
@@ -129,7 +129,7 @@ def excite(
     *,
     rest_s: float = REST_S,
     normal_force_volts: float = 0.0,
-) -> PitchRecord:
+) -> Record:
     """Return the record of the whole experiment of `duration_s`, the rest at its beginning included.
 
     The rest belongs to it: the state filters must have seen that the body was quiet before.
@@ -149,4 +149,12 @@ def excite(
         if angle is None:
             raise IdentificationError(f"the rig ended at tick {tick} of {total}")
         rows[tick] = angle, front, rear
-    return PitchRecord(step_s, rows[:, 0], rows[:, 1], rows[:, 2])
+    return Record(
+        step_s,
+        rows[:, :1],
+        rows[:, 1:],
+        ("pitch",),
+        ("front", "rear"),
+        ("rad",),
+        ("V", "V"),
+    )

@@ -1,179 +1,140 @@
-"""Identification of the pitch model: (11)-(15) on the general algorithm.
+"""The pitch model (11), (12) as a structure.
 
     theta'' = -a_w theta' - a_th sin(theta - theta_0) + k_v mu                       (11)
     T_m vbar_i' + vbar_i = v_i,   mu = vbar_front - vbar_rear                        (12)
 
-theta, s = sin(theta - theta_0) and mu pass through three equal filters (13)-(15); the regressors are
-the filtered rate, s_f and mu_f. The bias theta_0 is measured beforehand in a quiescent stretch, as in
-the paper. Where there is none, or where it is not to be trusted (a body leaning on something on the
-ground), it can be estimated with the others: a_th sin(theta - theta_0) = c sin(theta) - d cos(theta)
-is linear in c = a_th cos(theta_0) and d = a_th sin(theta_0).
+The bias theta_0 is measured beforehand in a quiescent stretch, as in the paper. Where there is none, or
+where it is not to be trusted (a body leaning on something on the ground), it can be estimated with the
+others: a_th sin(theta - theta_0) = c sin(theta) - d cos(theta) is linear in c = a_th cos(theta_0) and
+d = a_th sin(theta_0).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
-from plant_sim.identification.errors import IdentificationError
-from plant_sim.identification.estimator import Estimator
-from plant_sim.identification.state_filter import StateFilter, second_order
+from plant_sim.identification.filters import Array
+from plant_sim.identification.record import Record
+from plant_sim.identification.structures import Equation, Parameter, Term
 
-NAMES = ("a_w", "a_th", "k_v")
+COSINE, SINE = "a_th cos(theta_0)", "a_th sin(theta_0)"
+QUIET_S = 2.0
+
+
+@dataclass(frozen=True)
+class PitchStructure:
+    """The pitch model; `equilibrium_rad` is theta_0, or None to estimate it with the others."""
+
+    equilibrium_rad: float | None = None
+    volts_max: float = math.inf
+    """where each motor saturates: what is commanded beyond it does not act"""
+    without: frozenset[str] = frozenset()
+    kind: str = "pitch"
+    order: int = 2
+
+    @property
+    def equations(self) -> tuple[Equation, ...]:
+        """Return (11)."""
+        pulls: tuple[Term, ...] = (Term("a_th", 1, 0, -1.0),)
+        if self.equilibrium_rad is None:
+            pulls = (Term(COSINE, 1, 0, -1.0), Term(SINE, 2, 0))
+        terms = (Term("a_w", 0, 1, -1.0), *pulls, Term("k_v", 1 + len(pulls), 0))
+        return (Equation(0, 2, tuple(term for term in terms if term.name not in self.without)),)
+
+    def signals(self, outputs: Array) -> Array:
+        """Return theta and sin(theta - theta_0), or theta, its sine and its cosine."""
+        angle = outputs[:, :1]
+        if self.equilibrium_rad is not None:
+            return np.hstack((angle, np.sin(angle - self.equilibrium_rad)))
+        return np.hstack((angle, np.sin(angle), np.cos(angle)))
+
+    def acting(self, inputs: Array) -> Array:
+        """Return v_front - v_rear, each as far as its motor follows; a single input is v_front."""
+        volts = np.clip(inputs, -self.volts_max, self.volts_max)
+        return volts[:, :1] - volts[:, 1:2] if inputs.shape[1] > 1 else volts
+
+    def constants(self, values: Mapping[str, float]) -> tuple[float, float, float, float]:
+        """Return a_w, a_th, k_v and theta_0."""
+        damping, gain = values.get("a_w", 0.0), values.get("k_v", 0.0)
+        if self.equilibrium_rad is not None:
+            return damping, values.get("a_th", 0.0), gain, self.equilibrium_rad
+        cosine, sine = values.get(COSINE, 0.0), values.get(SINE, 0.0)
+        return damping, math.hypot(cosine, sine), gain, math.atan2(sine, cosine)
+
+    def parameters(self, values: Mapping[str, float], covariance: Array) -> list[Parameter]:
+        """Return the fields of the model's section; 0 is the error of a theta_0 that was given."""
+        found = self.constants(values)
+        order = list(values)
+        turn = np.zeros((4, len(order)))
+        for row, name in ((0, "a_w"), (1, "a_th"), (2, "k_v")):
+            if name in values:
+                turn[row, order.index(name)] = 1.0
+        if self.equilibrium_rad is None and COSINE in values:
+            # To first order, by the derivatives of size and angle.
+            stiffness, angle = max(found[1], 1e-12), found[3]
+            for name, along, across in (
+                (COSINE, math.cos(angle), -math.sin(angle)),
+                (SINE, math.sin(angle), math.cos(angle)),
+            ):
+                turn[1, order.index(name)], turn[3, order.index(name)] = along, across / stiffness
+        with np.errstate(invalid="ignore"):
+            spread = np.sqrt(np.maximum(np.diag(turn @ covariance @ turn.T), 0.0))
+        spread = np.where(np.isnan(spread), math.inf, spread)
+        fields = (
+            ("rate_damping_per_s", "a_w", "1/s"),
+            ("stiffness_per_s2", "a_th", "1/s^2"),
+            ("torque_gain_rad_per_v_s2", "k_v", "rad/(V s^2)"),
+            ("equilibrium_rad", "theta_0", "rad"),
+        )
+        return [
+            Parameter(*field, value, float(deviation))
+            for field, value, deviation in zip(fields, found, spread, strict=True)
+        ]
 
 
 @dataclass(frozen=True, slots=True)
-class PitchSettings:
-    """Constants of the algorithm; the defaults are the paper's."""
+class QuietStretch:
+    """The angle of the body at rest with its motors off."""
 
-    filter_bandwidth_rad_s: float = 1.0
-    """w_f"""
-    filter_damping: float = 0.7
-    """rho of the filters"""
-    forgetting_per_s: float = 0.01
-    """alpha"""
-    gain: float = 1e3
-    """diagonal of Gamma(0)"""
-    motor_lag_s: float = 0.08
-    """T_m, known"""
-    volts_max: float = 5.0
-    """where each motor saturates: what is commanded beyond it does not act"""
-    settle_s: float = 0.0
-    """data at the beginning that only fill the filters; 0 for a body that starts at rest"""
+    start_s: float
+    end_s: float
+    angle_rad: float
+    """mean angle there: theta_0"""
 
 
-class PitchEstimates(NamedTuple):
-    """The estimate after a sample."""
+def quiescent_angle(
+    record: Record, *, volts: float = 0.05, spread_rad: float = 0.02, seconds: float = QUIET_S
+) -> QuietStretch | None:
+    """Return the longest stretch in which the body rests and the motors pull equally; None if none.
 
-    rate_damping_per_s: float
-    """a_w"""
-    stiffness_per_s2: float
-    """a_th"""
-    torque_gain_rad_per_v_s2: float
-    """k_v"""
-    equilibrium_rad: float
-    """theta_0, given or estimated"""
-
-
-class PitchIdentifier:
-    """On-line: voltages and angle of one tick in, estimates out.
-
-    `equilibrium_rad` is theta_0; None has it estimated with the others. The voltages of a tick are
-    those held from it to the next one. Before the first tick the motors are taken to be off and the
-    body to rest; of a record that begins otherwise, set `settle_s` to the filters' memory.
+    It rests while its angle stays within `spread_rad` over `seconds` and the voltages differ by at
+    most `volts`.
     """
+    steps = max(2, round(seconds / record.step_s))
+    if len(record) < steps:
+        return None
+    difference = np.abs(PitchStructure().acting(record.inputs)[:, 0])
+    angle = record.outputs[:, 0]
+    quiet = (_largest(angle, steps) + _largest(-angle, steps) <= spread_rad) & (
+        _largest(difference, steps) <= volts
+    )
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], quiet, [False])).astype(np.int8)))
+    if not len(edges):
+        return None
+    starts, ends = edges[::2], edges[1::2]
+    best = int(np.argmax(ends - starts))
+    start, end = int(starts[best]), int(ends[best]) - 1 + steps
+    mean = float(angle[start:end].mean())
+    return QuietStretch(start * record.step_s, end * record.step_s, mean)
 
-    def __init__(
-        self, step_s: float, equilibrium_rad: float | None, settings: PitchSettings | None = None
-    ) -> None:
-        self.settings = settings = settings or PitchSettings()
-        bandwidth = settings.filter_bandwidth_rad_s
-        if not (bandwidth > 0.0 and settings.filter_damping > 0.0):
-            raise IdentificationError(
-                f"filter bandwidth {bandwidth:g} rad/s and damping {settings.filter_damping:g} must "
-                "both be above 0, or the state filters do not settle"
-            )
-        if settings.motor_lag_s < 0.0:
-            raise IdentificationError(f"motor_lag_s is {settings.motor_lag_s}; it must be at least 0")
-        count = 3 if equilibrium_rad is not None else 4
-        self.equilibrium_rad = equilibrium_rad
-        self.estimator = Estimator(
-            count,
-            step_s,
-            forgetting_per_s=settings.forgetting_per_s,
-            gain=settings.gain,
-            block_s=6.0 / bandwidth,
-        )
-        self._filter = StateFilter(
-            second_order(bandwidth, settings.filter_damping),
-            step_s,
-            scale=bandwidth * bandwidth,
-            count=count,
-        )
-        lag = settings.motor_lag_s
-        self._left = math.exp(-step_s / lag) if lag > 0.0 else 0.0
-        self._mu = 0.0
-        self._settle_steps = round(settings.settle_s / step_s)
-        self.samples = 0
-        self.samples_saturated = 0
-        self.regressor_mu = 0.0
-        """mu_f of the last sample, for Fig. 3"""
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Return the names of the estimator's parameters."""
-        if self.equilibrium_rad is not None:
-            return NAMES
-        return ("a_w", "a_th cos(theta_0)", "a_th sin(theta_0)", "k_v")
-
-    def take(self, front_volts: float, rear_volts: float, angle_rad: float) -> PitchEstimates:
-        """Take one tick and return the estimates after it."""
-        if not all(map(math.isfinite, (front_volts, rear_volts, angle_rad))):
-            raise IdentificationError(
-                f"sample {self.samples}: voltages ({front_volts}, {rear_volts}) and angle {angle_rad} "
-                "must be finite"
-            )
-        front, rear = self._acting(front_volts), self._acting(rear_volts)
-        mu = self._mu
-        angle = angle_rad if self.equilibrium_rad is None else angle_rad - self.equilibrium_rad
-        pull = [math.sin(angle)]
-        if self.equilibrium_rad is None:
-            pull.append(math.cos(angle))
-        self._filter.take(np.array((angle_rad, *pull, mu), dtype=np.float64))
-        states = self._filter.states
-        self.regressor_mu = float(states[0, -1])
-        if self.samples >= self._settle_steps:
-            signs = (-1.0,) if self.equilibrium_rad is not None else (-1.0, 1.0)
-            pulls = states[0, 1:-1] * np.array(signs)
-            regressor = np.concatenate(((-states[1, 0],), pulls, (states[0, -1],)))
-            self.estimator.update(regressor, float(self._filter.highest[0]))
-        # (12) over the tick, exactly: the voltage is held.
-        self._mu = front - rear + (mu - (front - rear)) * self._left
-        self.samples += 1
-        return self.estimates
-
-    @property
-    def estimates(self) -> PitchEstimates:
-        """Return the parameters as estimated so far."""
-        values = [float(value) for value in self.estimator.estimates]
-        if self.equilibrium_rad is not None:
-            return PitchEstimates(values[0], values[1], values[2], self.equilibrium_rad)
-        damping, cosine, sine, gain = values
-        return PitchEstimates(damping, math.hypot(cosine, sine), gain, math.atan2(sine, cosine))
-
-    @property
-    def deviations(self) -> PitchEstimates:
-        """Return the standard errors of the estimates; 0 for a theta_0 that was given."""
-        values = [float(value) for value in self.estimator.deviations]
-        if self.equilibrium_rad is not None:
-            return PitchEstimates(values[0], values[1], values[2], 0.0)
-        # c and d share one magnitude and one angle: to first order their errors carry over as they are.
-        stiffness = self.estimates.stiffness_per_s2
-        angle = values[2] / stiffness if stiffness > 0.0 else math.inf
-        return PitchEstimates(values[0], values[1], values[3], angle)
-
-    def warnings(self) -> list[str]:
-        """Return what is wrong with the data or the estimates; empty when all is well."""
-        found = self.estimator.warnings(self.names)
-        if self.samples_saturated > 0.02 * self.samples:
-            share = self.samples_saturated / self.samples
-            found.append(
-                f"the motors were commanded beyond +-{self.settings.volts_max:g} V in {share:.0%} of "
-                "the samples; the voltages were clamped there, as the motors do: if they saturate "
-                "elsewhere, say so, or the gain k_v comes out wrong"
-            )
-        if self.estimates.torque_gain_rad_per_v_s2 < 0.0:
-            found.append("k_v is negative: front and rear voltage are exchanged, or the encoder's sign")
-        if self.estimates.rate_damping_per_s < 0.0:
-            found.append("a_w is negative: the data show a body that gains energy by itself")
-        return found
-
-    def _acting(self, volts: float) -> float:
-        limit = self.settings.volts_max
-        if -limit <= volts <= limit:
-            return volts
-        self.samples_saturated += 1
-        return limit if volts > 0.0 else -limit
+def _largest(values: Array, steps: int) -> Array:
+    """Return the largest value of each whole window, by its first sample."""
+    first = steps // 2
+    whole = maximum_filter1d(values, steps)
+    return np.asarray(whole[first : first + len(values) - steps + 1])

@@ -8,13 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from plant_sim.identification.excitation import REST_S, excite, parse_excitation
-from plant_sim.identification.pitch import PitchSettings
-from plant_sim.identification.record import PitchRecord, identify
+from plant_sim.identification.pipeline import Options
+from plant_sim.identification.pitch import PitchStructure
+from plant_sim.identification.record import Record
+from plant_sim.identification.regression import Filters, Regression, regress
 from plant_sim.pitch import PitchPlant
 from tenbaud.build.rig import nominal_plant
 from tenbaud.config.load import load_config
-from tenbaud.identify.run import Identified, run
-from tenbaud.identify.sources import from_rig
+from tenbaud.identification.run import Identified, Wanted, run
+from tenbaud.identification.sources import from_rig
 
 EXCITATIONS = ("square:0.2,0,2.5", "square:0.25,0.1,3")
 """Frequency (Hz), bias (V), magnitude (V) of (a) and (b); the paper gives none of them."""
@@ -22,7 +24,10 @@ EXCITATIONS = ("square:0.2,0,2.5", "square:0.25,0.1,3")
 SEEDS = (1, 2, 3)
 NOISE_DENSITY = 2e-3
 NOISE = f"q={NOISE_DENSITY}"
-NOISY_SETTINGS = PitchSettings(filter_bandwidth_rad_s=3.0, forgetting_per_s=0.002)
+MOTOR_LAG_S = 0.08
+"""T_m, which the paper takes as known"""
+NOISY_FILTERS = Filters(3.0, forgetting_per_s=0.002, lag_s=MOTOR_LAG_S)
+PAPER_FILTERS = Filters(lag_s=MOTOR_LAG_S)
 CLEAN_S = 60.0
 NOISY_S = 180.0
 
@@ -40,17 +45,24 @@ class Trials:
 
 def clean_trial(excitation: str) -> Identified:
     """Run one experiment without noise, on the simulated rig with a ten-bit encoder."""
-    return run(excitation, record_of(excitation, CLEAN_S), "quiet", PitchSettings())
+    options = Options(
+        MOTOR_LAG_S,
+        PAPER_FILTERS.bandwidth_rad_s,
+        forgetting_per_s=PAPER_FILTERS.forgetting_per_s,
+        gain=PAPER_FILTERS.gain,
+        rests=True,
+    )
+    return run(excitation, record_of(excitation, CLEAN_S), Wanted(equilibrium="quiet", options=options))
 
 
 def noisy_trial(excitation: str, seed: int) -> tuple[float, float]:
     """Return the largest relative error after 60 s and after 180 s, under white torque."""
     record = record_of(excitation, NOISY_S, NOISE, seed)
     # The body is never at rest here; the mean of its first 5 s has to do for theta_0.
-    rest = float(record.angle_rad[: round(REST_S / record.step_s)].mean())
-    history = identify(record, rest, NOISY_SETTINGS).history
-    early = history[round(CLEAN_S / record.step_s) - 1]
-    return largest_error(tuple(early)), largest_error(tuple(history[-1]))
+    rest = float(record.outputs[: round(REST_S / record.step_s)].mean())
+    found = regress(record, PitchStructure(rest), NOISY_FILTERS)
+    early = int(np.searchsorted(found.times_s, CLEAN_S - 1.5 * record.step_s))
+    return largest_error(found, early), largest_error(found)
 
 
 def best_possible_damping_error(excitation: str, duration_s: float = CLEAN_S) -> float:
@@ -77,7 +89,7 @@ def best_possible_damping_error(excitation: str, duration_s: float = CLEAN_S) ->
     return deviation / true.rate_damping_per_s
 
 
-def record_of(excitation: str, duration_s: float, disturbance: str = "", seed: int = 1) -> PitchRecord:
+def record_of(excitation: str, duration_s: float, disturbance: str = "", seed: int = 1) -> Record:
     """Return one experiment on the paper's plant, resting at first."""
     model = load_config("paper-10baud").model
     rest = getattr(model, "equilibrium_rad", 0.0)
@@ -90,9 +102,13 @@ def record_of(excitation: str, duration_s: float, disturbance: str = "", seed: i
     return from_rig(config, excitation, duration_s)
 
 
-def largest_error(estimates: tuple[float, ...]) -> float:
-    """Return the largest relative error of a_w, a_th and k_v."""
+def largest_error(found: Regression, row: int = -1) -> float:
+    """Return the largest relative error of a_w, a_th and k_v at a row of the estimates' history."""
     true = nominal_plant(load_config("paper-10baud"))
-    values = (true.rate_damping_per_s, true.stiffness_per_s2, true.torque_gain_rad_per_v_s2)
-    pairs = zip(estimates, values, strict=False)
-    return max(abs(found / wanted - 1.0) for found, wanted in pairs)
+    values = found.values_at(row)
+    pairs = (
+        ("a_w", true.rate_damping_per_s),
+        ("a_th", true.stiffness_per_s2),
+        ("k_v", true.torque_gain_rad_per_v_s2),
+    )
+    return max(abs(values[name] / wanted - 1.0) for name, wanted in pairs)

@@ -20,7 +20,7 @@ from reproduction.paper.identified import (
 from tenbaud.build.rig import nominal_plant
 from tenbaud.config.load import load_config
 from tenbaud.files.whole import make_folder
-from tenbaud.identify.figures import draw_estimates, draw_excitation
+from tenbaud.identification.figures import draw_estimates, draw_excitation
 
 NUMBERS = ("3", "4", "5", "6", "7", "8")
 OnProgress = Callable[[float, float, str], None]
@@ -67,7 +67,7 @@ def make_figures(
     results.flown, others = fly_all(jobs, folder / "flights", tasks, on_done)
     if tasks:
         clean = [others[f"clean-{text}"] for text in EXCITATIONS]
-        errors = [largest_error(one.result.estimates) for one in clean]
+        errors = [largest_error(one.found.regression) for one in clean]
         noisy = [pair for name, pair in others.items() if name.startswith("noisy-")]
         results.trials = Trials(clean, errors, noisy)
     on_progress(done, total, "drawing")

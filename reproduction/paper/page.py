@@ -8,7 +8,8 @@ from reproduction.paper import draw, identified, plan, real, tables
 from reproduction.paper.make import Results
 from reproduction.paper.misprints import MISPRINTS
 from tenbaud.files.whole import write_whole
-from tenbaud.identify.run import FIELDS
+
+LETTERS = (("a_w", "1/s"), ("a_th", "1/s^2"), ("k_v", "rad/(V s^2)"), ("theta_0", "rad"))
 
 
 def write_page(path: Path, results: Results) -> None:
@@ -156,15 +157,15 @@ Two recordings from NTNU hold no voltages: the commands are unknown and no torqu
 
 
 def _first_half(first: real.FirstHalf) -> str:
-    model, regression = first.model, first.regression.estimates
-    spread = first.fitted.deviations
+    regression = first.regression
     numbers = ", ".join(
-        f"`{letter}` = {model[field]:.2f} (+- {getattr(spread, field):.2f}) {unit}"
-        for field, letter, unit in FIELDS
+        f"`{letter}` = {first.model[field]:.2f} (+- {spread:.2f}) {unit}"
+        for (field, spread), (letter, unit) in zip(first.deviations.items(), LETTERS, strict=True)
     )
+    damping, stiffness = regression["rate_damping_per_s"], regression["stiffness_per_s2"]
     return f"""The paper's coder flies with a model identified on the first half: {numbers}.
-It is the simulation-error fit over stretches of {real.SEGMENT_S:g} s. The regression (9)-(15) alone
-gives `a_w` = {regression.rate_damping_per_s:.2f} and `a_th` = {regression.stiffness_per_s2:.2f}, and
+It is the simulation-error fit over stretches of {real.SEGMENT_S:g} s, with `a_w` held at 0. The
+regression (9)-(15) alone gives `a_w` = {damping:.2f} and `a_th` = {stiffness:.2f}, and
 warns: hands push the body, and the controller answers, so that the voltage depends on the pushes. The
 pushes cause the largest errors; no model can predict them. The tuned presets are
 `uiuc-10baud`, `uiuc-16baud`, `uiuc-25baud` and `uiuc-50baud`."""

@@ -16,14 +16,16 @@ from typing import Any
 
 import numpy as np
 
-from plant_sim.identification.crosscheck import CrossCheck, fit
-from plant_sim.identification.pitch import PitchEstimates, PitchSettings
-from plant_sim.identification.record import PitchIdentification, identify
+from plant_sim.identification import simulation
+from plant_sim.identification.pipeline import Options, identify
+from plant_sim.identification.pitch import PitchStructure
+from plant_sim.identification.regression import regress
+from plant_sim.identification.structures import holding
 from reproduction.paper.flights import Job, Overrides
+from reproduction.paper.identified import MOTOR_LAG_S
 from tenbaud.config.load import load_config
 from tenbaud.files.whole import write_whole
-from tenbaud.identify.run import model_section
-from tenbaud.identify.sources import from_log
+from tenbaud.identification.sources import from_log
 
 UIUC_FILE = "uiuc_closed_loop.csv"
 NTNU_FILES = ("ntnu_travel_step.csv", "ntnu_elevation_obstacle.csv")
@@ -43,27 +45,42 @@ WORD_BITS = 10
 class FirstHalf:
     """The model identified from the first half of the recording."""
 
-    regression: PitchIdentification
-    fitted: CrossCheck
+    regression: dict[str, float]
+    """by field of the model, of the regression alone"""
+    warnings: tuple[str, ...]
+    """what is said about it"""
+    deviations: dict[str, float]
+    """of the model's fields"""
     model: dict[str, Any]
 
 
 def identify_first_half(data: Path) -> FirstHalf:
     """Identify the body on the first half.
 
-    People push it, so the regression is disturbed by torques that the log does not hold, and says so.
-    The model is therefore that of the simulation-error fit over stretches of 0.6 s.
+    People push it, so the regression is disturbed by torques that the log does not hold, and its
+    damping is negative. The model is therefore that of the simulation-error fit over stretches of
+    0.6 s, with a damping of 0.
     """
     log = {"file": str(data / UIUC_FILE), "end_s": HALF_S}
-    record = from_log(load_config("uiuc-10baud", None, {"flight_log": log}))
-    settings = PitchSettings(filter_bandwidth_rad_s=BANDWIDTH_RAD_S, settle_s=5.0 / BANDWIDTH_RAD_S)
-    regression = identify(record, None, settings)
-    start = PitchEstimates(1.0, 1.0, regression.estimates.torque_gain_rad_per_v_s2, 0.0)
-    fitted = fit(record, start, estimate_equilibrium=True, settings=settings, segment_s=SEGMENT_S)
-    physical = fitted.estimates._replace(
-        rate_damping_per_s=max(0.0, fitted.estimates.rate_damping_per_s)
+    record, _ = from_log(load_config("uiuc-10baud", None, {"flight_log": log}))
+    options = Options(MOTOR_LAG_S, BANDWIDTH_RAD_S)
+    whole = identify(record, PitchStructure(), options)
+    structure = holding(PitchStructure(), {"a_w"})
+    segments = simulation.cut(record, structure, SEGMENT_S)
+    start = regress(record, structure, whole.regression.filters)
+    fitted = simulation.fit(segments, structure, start.values, MOTOR_LAG_S)
+    found = structure.parameters(fitted.values, fitted.covariance)
+    alone = whole.structure.parameters(whole.regression.values, whole.regression.covariance)
+    return FirstHalf(
+        {one.name: one.value for one in alone},
+        (*whole.warnings, *whole.refused),
+        {one.name: one.deviation for one in found},
+        {
+            "kind": "pitch",
+            **{one.name: round(one.value, 6) for one in found},
+            "motor_lag_s": MOTOR_LAG_S,
+        },
     )
-    return FirstHalf(regression, fitted, model_section(physical, settings))
 
 
 def replayed(file: Path, **sections: Any) -> Overrides:

@@ -1,4 +1,4 @@
-"""`tenbaud identify`: the model's parameters from a rig, a run or a log."""
+"""`tenbaud identify`: a plant's parameters from a rig, a run or a log."""
 
 from __future__ import annotations
 
@@ -10,25 +10,46 @@ import typer
 from tenbaud.cli import options
 from tenbaud.cli.log_options import LogOptions
 from tenbaud.cli.spread import spread
+from tenbaud.flight.outcome import ExitCode
 
 if TYPE_CHECKING:
-    from plant_sim.identification.pitch import PitchSettings
-    from plant_sim.identification.record import PitchRecord
-    from tenbaud.config.schema import FlightConfig
-    from tenbaud.identify.run import Identified
+    from tenbaud.identification.api import Request, Result
 
-EXCITATIONS = ("square:0.2,0,2.5", "square:0.25,0.1,3")
 PRINTED_EVERY_S = 10.0
-DURATION_S = 60.0
-TICKS_MAX = 10_000_000
-"""of an experiment, which is in memory as a whole"""
-
 
 Bandwidth = Annotated[
-    float, typer.Option(help="Pass band w_f of the filters, rad/s.", min=0.001, max=1000.0)
+    float | None,
+    typer.Option(
+        help="Pass band w_f of the filters, rad/s; near the frequency of the motion if not given.",
+        min=1e-6,
+        max=1000.0,
+        show_default=False,
+    ),
 ]
 Damping = Annotated[float, typer.Option(help="Damping rho of the filters.", min=0.01, max=100.0)]
-Forgetting = Annotated[float, typer.Option(help="alpha of (10), 1/s.", min=0.0, max=100.0)]
+Forgetting = Annotated[
+    float | None,
+    typer.Option(
+        help="alpha of (10), 1/s; 0.01 for an experiment, 0 for a record, if not given.",
+        min=0.0,
+        max=100.0,
+        show_default=False,
+    ),
+]
+Structure = Annotated[
+    str,
+    typer.Option(
+        help="pitch, first-order, integrator, integrator:ORDER, siso:N,M or linear; one that suits "
+        "model and signals if not given.",
+        show_default=False,
+    ),
+]
+Lag = Annotated[
+    str,
+    typer.Option(
+        help="Motor lag: auto (model.motor_lag_s where it differs from the preset, else found), or s."
+    ),
+]
 
 
 @spread
@@ -39,6 +60,8 @@ def identify(
         Path | None,
         typer.Argument(help="A log or the folder of a run; not given: the simulated rig is excited."),
     ] = None,
+    structure: Structure = "",
+    lag: Lag = "auto",
     duration: options.Duration = None,
     excitation: Annotated[
         list[str] | None,
@@ -50,134 +73,96 @@ def identify(
     equilibrium: Annotated[
         str, typer.Option(help="theta_0: auto, quiet (a stretch at rest), estimate, or rad.")
     ] = "auto",
-    bandwidth: Bandwidth = 1.0,
+    bandwidth: Bandwidth = None,
     damping: Damping = 0.7,
-    forgetting: Forgetting = 0.01,
+    forgetting: Forgetting = None,
+    fly: Annotated[
+        bool, typer.Option("--fly/--no-fly", help="Fly the record with what was identified.")
+    ] = True,
     out: options.Out = None,
     json: options.AsJson = False,
 ) -> None:
-    """Identify the pitch model on-line and write a configuration with it, and Figs. 3 and 4.
+    """Identify a plant, write a configuration that flies it, and Figs. 3 and 4.
+
+    Exit code 1, and no configuration, where the data support no model.
 
     [dim]tenbaud identify[/dim]
 
-    [dim]tenbaud identify flight.csv --set timing.tick_s=0.02 --to 60 --equilibrium estimate[/dim]
+    [dim]tenbaud identify flight.csv --columns angle=pitch,front=u1,rear=u2,time=t --unit deg[/dim]
     """
-    from dataclasses import replace
-
-    from tenbaud.identify.run import run, settings_of
+    from tenbaud.identification.api import Request, identify_sources, sources_of
 
     loaded = plant.load(log=log)
-    records = _records(loaded, source, excitation, duration)
-    # A log or a run may begin in motion; the filters must forget what they did not see.
-    settle_s = 5.0 / bandwidth if source is not None and bandwidth > 0.0 else 0.0
-    filters = replace(
-        settings_of(loaded, settle_s),
-        filter_bandwidth_rad_s=bandwidth,
-        filter_damping=damping,
-        forgetting_per_s=forgetting,
-    )
-    found = [run(name, record, equilibrium, filters) for name, record in records]
-    _write(loaded, found, filters, out, source is None, json)
+    request = Request(structure, lag, equilibrium, bandwidth, damping, forgetting, fly=fly)
+    if duration is not None and duration / loaded.timing.tick_s > 10_000_000:
+        raise typer.BadParameter(f"--duration: {duration / loaded.timing.tick_s:.3g} ticks")
+    sources = sources_of(loaded, source, request, excitation, duration)
+    result = identify_sources(loaded, sources, request)
+    _write(result, out, request, json)
+    if not result.supported:
+        raise typer.Exit(int(ExitCode.FAILED))
 
 
-def _records(
-    config: FlightConfig,
-    source: Path | None,
-    excitation: list[str] | None,
-    duration: float | None,
-) -> list[tuple[str, PitchRecord]]:
-    from tenbaud.identify.sources import from_log, from_rig
-
-    if source is None:
-        rest = config.transmitter.plant.model_copy(
-            update={"initial": getattr(config.model, "equilibrium_rad", 0.0)}
-        )
-        at_rest = config.model_copy(
-            update={"transmitter": config.transmitter.model_copy(update={"plant": rest})}
-        )
-        signals = excitation or list(EXCITATIONS)
-        ticks = (duration or DURATION_S) / config.timing.tick_s
-        if ticks > TICKS_MAX:
-            raise typer.BadParameter(f"--duration: {ticks:.3g} ticks; at most {TICKS_MAX:.3g}")
-        return [(signal, from_rig(at_rest, signal, duration or DURATION_S)) for signal in signals]
-    named = config.flight_log.model_copy(update={"file": str(source)})
-    return [(source.name, from_log(config.model_copy(update={"flight_log": named})))]
-
-
-def _write(
-    config: FlightConfig,
-    found: list[Identified],
-    filters: PitchSettings,
-    out: Path | None,
-    simulated: bool,
-    as_json: bool,
-) -> None:
-    from tenbaud.identify.figures import draw_estimates, draw_excitation
-    from tenbaud.identify.run import write_config
+def _write(result: Result, out: Path | None, request: Request, as_json: bool) -> None:
     from tenbaud.recording.folder import create_run_folder
 
     folder = create_run_folder(None, "identify", out)
-    true = _true_values(config) if simulated else None
-    draw_excitation(found, [folder / "figure-3.png", folder / "figure-3.svg"])
-    draw_estimates(found, [folder / "figure-4.png", folder / "figure-4.svg"], true)
-    for index, one in enumerate(found):
-        name = "identified.toml" if index == 0 else f"identified-{index + 1}.toml"
-        write_config(folder / name, config, one, filters)
+    result.save(folder, fly=request.fly)
     if as_json:
-        options.print_json([_summary(one) for one in found])
+        options.print_json([one.summary() for one in result.each])
     else:
-        _show(found)
-        typer.echo(f"written to {folder}; fly with it: --config {folder / 'identified.toml'}")
-    for one in found:
-        for text in one.warnings:
-            typer.echo(f"warning, {one.name}: {text}", err=True)
+        _show(result)
+    for one in result.each:
+        for text in one.identified.warnings:
+            typer.echo(f"warning, {one.identified.name}: {text}", err=True)
+        for text in one.identified.found.refused:
+            typer.echo(f"not supported, {one.identified.name}: {text}", err=True)
+        if one.identified.advice:
+            typer.echo(
+                f"no model was written of {one.identified.name}: {one.identified.advice}", err=True
+            )
+    if as_json:
+        return
+    for one in result.each:
+        if one.config_file is not None and one.flown is not None:
+            typer.echo(f"{one.identified.name}: {one.flown.sentence()}")
+    written = [one.config_file for one in result.each if one.config_file is not None]
+    said = f"; fly with it: --config {written[0]}" if written else "; no model is in it"
+    typer.echo(f"written to {folder}{said}")
 
 
-def _true_values(config: FlightConfig) -> tuple[float, ...]:
-    from tenbaud.build.rig import nominal_plant
-
-    plant = nominal_plant(config).mismatched(config.transmitter.plant.mismatch)
-    return plant.rate_damping_per_s, plant.stiffness_per_s2, plant.torque_gain_rad_per_v_s2
-
-
-def _summary(one: Identified) -> dict[str, object]:
-    from tenbaud.identify.run import FIELDS
-
-    return {
-        "source": one.name,
-        "estimates": {field: getattr(one.result.estimates, field) for field, _, _ in FIELDS},
-        "standard_errors": {field: getattr(one.result.deviations, field) for field, _, _ in FIELDS},
-        "cross_check": None
-        if one.check is None
-        else {field: getattr(one.check.estimates, field) for field, _, _ in FIELDS},
-        "excitation": one.result.condition,
-        "equilibrium_source": one.equilibrium_source,
-        "warnings": list(one.warnings),
-    }
-
-
-def _show(found: list[Identified]) -> None:
+def _show(result: Result) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from tenbaud.identify.run import FIELDS
+    from tenbaud.identification.figures import history_of
 
     console = Console()
-    for one in found:
-        result = one.result
-        title = f"{one.name}: {one.record.duration_s:.1f} s, excitation {result.condition:.3f}"
+    for each in result.each:
+        one, record = each.identified, each.identified.record
+        found, regression = one.found, one.found.regression
+        title = f"{one.name}: {record.duration_s:.1f} s, excitation {regression.condition:.3f}"
         table = Table(title=title, title_justify="left")
         table.add_column("after")
-        for _, letter, unit in FIELDS:
-            table.add_column(f"{letter}, {unit}", justify="right")
-        every = max(1, round(max(PRINTED_EVERY_S, one.record.duration_s / 12) / one.record.step_s))
-        for index in range(every, len(one.record), every):
-            cells = [f"{value:.4f}" for value in result.history[index]]
-            table.add_row(f"{result.times_s[index]:.0f} s", *cells)
+        for item in found.parameters:
+            table.add_column(
+                f"{item.letter}, {item.unit}" if item.unit else item.letter, justify="right"
+            )
+        times = regression.times_s
+        every = max(PRINTED_EVERY_S, record.duration_s / 12)
+        marks = [mark * every for mark in range(1, int(times[-1] / every) + 1)]
+        rows = [min(len(times) - 1, int(times.searchsorted(mark))) for mark in marks]
+        for row, values in zip(rows, history_of(regression, rows), strict=True):
+            table.add_row(f"{times[row]:.0f} s", *(f"{value:.4f}" for value in values))
         table.add_section()
-        table.add_row("estimate", *(f"{value:.4f}" for value in result.estimates))
-        table.add_row("std. error", *(f"{value:.4f}" for value in result.deviations))
-        if one.check is not None:
-            table.add_row("cross-check", *(f"{value:.4f}" for value in one.check.estimates))
+        table.add_row("estimate", *(f"{item.value:.4f}" for item in found.parameters))
+        table.add_row("std. error", *(f"{item.deviation:.4f}" for item in found.parameters))
+        if found.check is not None:
+            other = found.structure.parameters(found.check.values, found.check.covariance)
+            if found.by_simulation:
+                other = found.structure.parameters(regression.values, regression.covariance)
+            name = "regression" if found.by_simulation else "simulation fit"
+            table.add_row(name, *(f"{item.value:.4f}" for item in other))
         console.print(table)
-        console.print(f"theta_0: {one.equilibrium_source}")
+        for line in each.lines():
+            console.print(line, highlight=False, markup=False)

@@ -7,13 +7,17 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
+import tenbaud
 from plant_sim.identification.errors import IdentificationError
 from tenbaud.cli.commands import app
 from tenbaud.config.load import load_config
 from tests.plant_sim.identification.experiments import EXCITATION_A, experiment
+from tests.plant_sim.identification.test_linear import CASES, COUPLED, record_of
+from tests.plant_sim.identification.test_pitch import random_volts, swing
 
 TRUE = {"rate_damping_per_s": 0.1, "stiffness_per_s2": 0.5, "torque_gain_rad_per_v_s2": 0.35}
 
@@ -32,7 +36,8 @@ def test_when_the_simulated_rig_is_identified_then_both_ends_can_fly_with_the_re
     tmp_path: Path,
 ) -> None:
     out = tmp_path / "out"
-    result = run("--set", "transmitter.encoders.counts_per_turn=1024", "--json", "--out", str(out))
+    counts = "transmitter.encoders.counts_per_turn=1024"
+    result = run("--set", counts, "--json", "--no-fly", "--out", str(out))
     for index in (0, 1):
         estimates = found(result, index)
         for name, true in TRUE.items():
@@ -47,7 +52,7 @@ def test_when_a_run_is_identified_then_its_own_plant_is_found(tmp_path: Path) ->
     flown = tmp_path / "flown"
     arguments = ["demo", "--link", "memory", "--mismatch", "0.1", "--json", "--out", str(flown)]
     assert CliRunner().invoke(app, arguments).exit_code == 0
-    estimates = found(run(str(flown), "--json", "--out", str(tmp_path / "out")))
+    estimates = found(run(str(flown), "--json", "--no-fly", "--out", str(tmp_path / "out")))
     for name, true in TRUE.items():
         assert estimates[name] == pytest.approx(1.1 * true, rel=0.03)
 
@@ -57,12 +62,8 @@ Cells = list[list[float]]
 
 def write_log(path: Path, change: Callable[[Cells], None] = lambda rows: None) -> Path:
     record = experiment(EXCITATION_A, 30.0)
-    rows: Cells = [
-        [index * record.step_s, float(angle), float(front), float(rear)]
-        for index, (angle, front, rear) in enumerate(
-            zip(record.angle_rad, record.front_volts, record.rear_volts, strict=True)
-        )
-    ]
+    times = np.arange(len(record))[:, None] * record.step_s
+    rows: Cells = np.hstack((times, record.outputs, record.inputs)).tolist()
     change(rows)
     lines = [",".join(f"{value:.6f}" for value in row) for row in rows]
     path.write_text("\n".join(["t,pitch,uf,ur", *lines]) + "\n")
@@ -72,16 +73,21 @@ def write_log(path: Path, change: Callable[[Cells], None] = lambda rows: None) -
 COLUMNS = ("--columns", "time=t,angle=pitch,front=uf,rear=ur")
 
 
-def test_when_a_log_is_identified_then_time_unit_and_columns_are_as_given(tmp_path: Path) -> None:
-    def degrees(rows: Cells) -> None:
-        for row in rows:
-            row[1] = math.degrees(row[1])
+def in_degrees(rows: Cells) -> None:
+    for row in rows:
+        row[1] = math.degrees(row[1])
 
-    log = write_log(tmp_path / "log.csv", degrees)
-    out = str(tmp_path / "out")
-    estimates = found(run(str(log), *COLUMNS, "--unit", "deg", "--json", "--out", out))
+
+def test_when_a_log_is_identified_then_time_unit_and_columns_are_as_given(tmp_path: Path) -> None:
+    log = write_log(tmp_path / "log.csv", in_degrees)
+    out = tmp_path / "out"
+    result = run(str(log), *COLUMNS, "--unit", "deg", "--json", "--no-fly", "--out", str(out))
+    estimates = found(result)
     for name, true in TRUE.items():
         assert estimates[name] == pytest.approx(true, rel=0.03)
+    said = json.loads(result.stdout)[0]
+    assert said["structure"] == "pitch"
+    assert said["motor_lag_s"] == pytest.approx(0.08, abs=0.02)
 
 
 def still(rows: Cells) -> None:
@@ -89,32 +95,17 @@ def still(rows: Cells) -> None:
         row[2] = row[3] = 0.0
 
 
-def in_degrees(rows: Cells) -> None:
-    for row in rows:
-        row[1] = math.degrees(row[1])
-
-
 def in_millivolts(rows: Cells) -> None:
     for row in rows:
         row[2] *= 1000.0
-
-
-def with_gap(rows: Cells) -> None:
-    del rows[700:750]
-
-
-def not_finite(rows: Cells) -> None:
-    rows[10][1] = math.nan
 
 
 @pytest.mark.parametrize(
     ("change", "text"),
     [
         (still, "voltage difference of the motors never changes"),
-        (in_degrees, "in degrees"),
-        (in_millivolts, "millivolts"),
-        (with_gap, "line 702, column t: 7.5 s after 6.99 s"),
-        (not_finite, "line 12, column pitch"),
+        (in_degrees, "360/1024: the column is in degrees and is read as rad, a factor of 57.3"),
+        (in_millivolts, "in millivolts (a factor of 1000)"),
     ],
 )
 def test_when_a_log_is_no_good_then_the_error_names_the_cause(
@@ -130,22 +121,22 @@ def test_when_a_log_is_no_good_then_the_error_names_the_cause(
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("--columns", "time=t,angle=yaw,front=uf,rear=ur"), "column yaw is missing"),
-        (("--columns", "when=t"), "when is no signal of the model"),
-        ((*COLUMNS, "--equilibrium", "later"), "--equilibrium later"),
-        ((*COLUMNS, "--from", "29.9"), "too few"),
+        (("--equilibrium", "later"), "--equilibrium later"),
+        (("--lag", "much"), "--lag much"),
+        (("--structure", "cubic"), "--structure cubic: give pitch"),
+        (("--from", "29.9"), "too few"),
     ],
 )
 def test_when_an_option_is_no_good_then_the_error_names_it(
     arguments: tuple[str, ...], text: str, tmp_path: Path
 ) -> None:
     log = write_log(tmp_path / "log.csv")
-    result = run(str(log), *arguments, "--unit", "rad", "--out", str(tmp_path / "out"))
+    result = run(str(log), *COLUMNS, *arguments, "--unit", "rad", "--out", str(tmp_path / "out"))
     assert isinstance(result.exception, ValueError)
     assert text in str(result.exception)
 
 
-def test_when_a_log_is_of_a_body_at_rest_then_a_warning_is_written_beside_the_estimate(
+def test_when_a_log_is_of_a_body_at_rest_then_no_model_is_written_and_the_experiment_is_named(
     tmp_path: Path,
 ) -> None:
     def quiet(rows: Cells) -> None:
@@ -155,13 +146,115 @@ def test_when_a_log_is_of_a_body_at_rest_then_a_warning_is_written_beside_the_es
 
     log = write_log(tmp_path / "log.csv", quiet)
     out = tmp_path / "out"
-    result = run(str(log), *COLUMNS, "--unit", "rad", "--json", "--out", str(out))
-    assert result.exit_code == 0
-    assert json.loads(result.stdout)[0]["warnings"]
-    assert "# Warning" in (out / "identified.toml").read_text()
+    result = run(str(log), *COLUMNS, "--unit", "rad", "--out", str(out))
+    assert result.exit_code == 1
+    assert "not supported" in result.output
+    assert "square wave" in result.output
+    assert "fly with it" not in result.output
+    assert not (out / "identified.toml").exists()
+
+
+def write_columns(path: Path, names: str, *columns: np.ndarray) -> Path:
+    rows = np.hstack(columns)
+    lines = [",".join(f"{value:.6f}" for value in row) for row in rows.tolist()]
+    path.write_text("\n".join([names, *lines]) + "\n")
+    return path
+
+
+def test_when_a_log_drifts_over_turns_then_it_is_identified_with_a_warning(tmp_path: Path) -> None:
+    record = swing(0.02, random_volts(1000, 5.0, 60), 0.4, 4.0, 0.2)
+    times = np.arange(len(record))[:, None] * record.step_s
+    angles = record.outputs + 0.5 * times
+    log = write_columns(tmp_path / "log.csv", "t,pitch,uf,ur", times, angles, record.inputs)
+    out = tmp_path / "out"
+    result = run(str(log), *COLUMNS, "--unit", "rad", "--json", "--no-fly", "--out", str(out))
+    estimates = found(result)
+    assert estimates["stiffness_per_s2"] == pytest.approx(4.0, rel=0.05)
+    assert estimates["torque_gain_rad_per_v_s2"] == pytest.approx(0.2, rel=0.05)
+    warnings = " ".join(json.loads(result.stdout)[0]["warnings"])
+    assert "drifts by 0." in warnings
+
+
+@pytest.mark.soak
+def test_when_a_motor_is_identified_then_what_is_written_flies_its_record(tmp_path: Path) -> None:
+    record = record_of(CASES[1], 1, 3000)
+    times = np.arange(len(record))[:, None] * record.step_s
+    names = "time,speed (rad/s),u (V)"
+    log = write_columns(tmp_path / "motor.csv", names, times, record.outputs, record.inputs)
+    out = tmp_path / "out"
+    columns = "out:speed=2,in:u=3,time=1"
+    result = run(str(log), "--columns", columns, "--json", "--out", str(out))
+    estimates = found(result)
+    assert [estimates["a"], estimates["b"]] == pytest.approx([2.0, 10.0], rel=0.05)
+    said = json.loads(result.stdout)[0]
+    assert said["structure"] == "first-order"
+    assert said["flown"]["outcome"] == "ok"
+    (flown,) = said["flown"]["outputs"].values()
+    assert flown["largest_error"] < 0.2 * flown["largest"]
+    config = load_config(None, out / "identified.toml")
+    assert config.timing.tick_s == pytest.approx(0.01)
+    assert config.limits.command_max == (3.0,)
+
+
+def test_when_two_axes_are_identified_then_the_whole_coupled_model_is_written(tmp_path: Path) -> None:
+    record = record_of(COUPLED, 2)
+    times = np.arange(len(record))[:, None] * record.step_s
+    log = write_columns(
+        tmp_path / "axes.csv", "time,pitch,yaw,u1,u2", times, record.outputs, record.inputs
+    )
+    out = tmp_path / "out"
+    columns = "out:pitch=pitch,out:yaw=yaw,in:u1=u1,in:u2=u2,time=time"
+    result = run(
+        str(log), "--columns", columns, "--unit", "rad", "--json", "--no-fly", "--out", str(out)
+    )
+    estimates = found(result)
+    assert estimates["pitch''/pitch"] == pytest.approx(-1.74, rel=0.05)
+    assert estimates["yaw''/u2"] == pytest.approx(0.25, rel=0.05)
+    model = load_config(None, out / "identified.toml").model.model_dump()
+    assert np.array(model["A"])[1, :4] == pytest.approx([-1.74, -0.33, 0.3, 0.1], rel=0.05)
+    assert model["F"]
+    assert model["outputs"] == ("pitch", "yaw")
+
+
+@pytest.mark.parametrize("named", ["", ",in:setpoint=setpoint"])
+def test_when_no_command_was_logged_then_what_the_record_can_say_is_said(
+    named: str, tmp_path: Path
+) -> None:
+    times = np.arange(6000)[:, None] * 0.01
+    wanted = np.where(times % 12.0 < 6.0, 0.3, -0.3)
+    state, rows = np.zeros(2), []
+    for aim in wanted[:, 0]:
+        rows.append(state[0])
+        state = state + 0.01 * np.array([state[1], 4.0 * (aim - state[0]) - 2.4 * state[1]])
+    log = write_columns(
+        tmp_path / "loop.csv", "time,angle,setpoint", times, np.array(rows)[:, None], wanted
+    )
+    out = tmp_path / "out"
+    columns = f"time=time,out:angle=angle{named}"
+    result = run(str(log), "--columns", columns, "--unit", "rad", "--out", str(out))
+    assert result.exit_code != 0
+    text = str(result.exception)
+    assert "log the voltages" in text
+    if named:
+        assert "own frequency 2" in text or "own frequency 1.9" in text
+        assert "damping ratio 0.6" in text or "damping ratio 0.59" in text
+    assert not out.exists()
 
 
 def test_when_the_excitation_is_not_understood_then_the_grammar_is_shown() -> None:
     result = run("--excitation", "triangle:1,2,3")
     assert isinstance(result.exception, IdentificationError)
     assert "square:FREQUENCY" in str(result.exception)
+
+
+def test_when_arrays_are_identified_then_the_model_is_that_of_the_command(tmp_path: Path) -> None:
+    record = swing(0.02, random_volts(1500, 5.0, 60), 0.4, 4.0, 0.2)
+    arrays = {"angle": record.outputs[:, 0], "u": record.inputs[:, 0]}
+    result = tenbaud.identify(
+        arrays, outputs=["angle"], inputs=["u"], tick_s=0.02, structure="pitch", units={"angle": "rad"}
+    )
+    assert result.refused == ()
+    assert result.estimates["rate_damping_per_s"] == pytest.approx(0.4, rel=0.05)
+    assert result.config.timing.tick_s == 0.02
+    with pytest.raises(IdentificationError, match="no array is called v"):
+        tenbaud.identify(arrays, outputs=["angle"], inputs=["v"], tick_s=0.02)

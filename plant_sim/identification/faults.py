@@ -1,0 +1,123 @@
+"""Faults that records have before anything is identified: units, wraps, signals that never move."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from scipy.signal import detrend, welch
+
+from plant_sim.identification.errors import IdentificationError
+from plant_sim.identification.filters import Array
+from plant_sim.identification.pitch import PitchStructure
+from plant_sim.identification.record import Record
+from plant_sim.identification.structures import Structure
+
+VOLTS_MAX = 60.0
+COUNTS = (360, 400, 500, 512, 720, 1000, 1440, 2000, 2500, 3600, 4000, 5000, 8000, 10_000, 20_000)
+"""Counts per turn of usual encoders, beside the powers of two."""
+LOOKED_AT = 20_000
+"""samples that are looked at for the step of an encoder"""
+SPECTRUM_SAMPLES = 65_536
+
+
+def require_motion(record: Record) -> None:
+    """Raise IdentificationError for a record without inputs, or with a signal that never changes."""
+    if not record.inputs.shape[1]:
+        raise IdentificationError(
+            "the record has no input, so nothing can be said about what moves the plant: name the "
+            "columns of what was commanded"
+        )
+    still = np.ptp(record.outputs, axis=0) == 0.0
+    if np.any(still):
+        name = record.output_names[int(np.argmax(still))]
+        raise IdentificationError(
+            f"the {name} never changes: the encoder is not connected, or the column is a wrong one"
+        )
+
+
+def require_units(record: Record) -> None:
+    """Raise IdentificationError where angles are not in rad, or voltages not in volts."""
+    for name, unit, values in zip(
+        record.output_names, record.output_units, record.outputs.T, strict=True
+    ):
+        step = encoder_step(values)
+        if unit in ("rad", "") and step is not None and _counts(360.0 / step):
+            raise IdentificationError(
+                f"the {name} moves in steps of {step:.6g} = 360/{round(360.0 / step)}: the column is "
+                "in degrees and is read as rad, a factor of 57.3. Say --units deg"
+            )
+        if unit == "deg" and step is not None and _counts(math.tau / step):
+            raise IdentificationError(
+                f"the {name} moves in steps of {step:.6g} = 2 pi/{round(math.tau / step)}: the column "
+                "is in rad and is read as degrees, a factor of 57.3. Say --units rad"
+            )
+    for name, unit, values in zip(record.input_names, record.input_units, record.inputs.T, strict=True):
+        largest = float(np.abs(values).max())
+        if unit == "V" and largest > VOLTS_MAX:
+            raise IdentificationError(
+                f"{name} reaches {largest:.4g} V; is the column in millivolts (a factor of 1000) or in "
+                f"counts? Say --units {name}=mV, or --scale {name}=FACTOR"
+            )
+
+
+def encoder_step(values: Array) -> float | None:
+    """Return the step of which all differences are multiples; None for values that have none."""
+    levels = np.unique(values[:LOOKED_AT])
+    if len(levels) < 3:
+        return None
+    gaps = np.diff(levels)
+    gaps = gaps[gaps > 1e-6 * (levels[-1] - levels[0])]
+    if not len(gaps):
+        return None
+    step = float(gaps.min())
+    multiples = gaps / step
+    # A file prints its numbers with few digits: a step of 0.0015 differs from the true one.
+    if np.mean(np.abs(multiples - np.round(multiples)) < 0.1) < 0.95:
+        return None
+    return float(gaps.sum() / np.round(multiples).sum())
+
+
+def _counts(value: float) -> bool:
+    """Return whether a number is that of a usual encoder's counts per turn."""
+    whole = round(value)
+    usual = whole in COUNTS or (whole >= 64 and whole & (whole - 1) == 0)
+    return usual and abs(value - whole) < 2e-3 * whole
+
+
+def unwrapped(record: Record) -> tuple[Record, list[str]]:
+    """Return a record whose angles do not jump by a turn, and what was done."""
+    outputs, notes = record.outputs, []
+    for index, (name, unit) in enumerate(zip(record.output_names, record.output_units, strict=True)):
+        turn = 360.0 if unit == "deg" else math.tau
+        steps = np.abs(np.diff(outputs[:, index]))
+        jumps = np.flatnonzero(np.abs(steps - turn) < 0.2 * turn)
+        usual = float(np.median(steps))
+        if unit in ("rad", "deg", "") and len(jumps) and usual < 0.1 * turn:
+            outputs = outputs.copy()
+            outputs[:, index] = np.unwrap(outputs[:, index], period=turn)
+            notes.append(
+                f"the {name} jumps by a turn at sample {jumps[0] + 1} and {len(jumps) - 1} more: it "
+                "was unwrapped"
+            )
+    return replace(record, outputs=outputs), notes
+
+
+def dominant_rad_s(record: Record, structure: Structure) -> float:
+    """Return the frequency at which the outputs move most, by their spectrum.
+
+    Of an angle that turns over it is that of its sine, which the turns do not drown.
+    """
+    length = min(len(record), SPECTRUM_SAMPLES)
+    found = np.zeros(length // 2 + 1)
+    outputs = record.outputs
+    if isinstance(structure, PitchStructure) and float(np.ptp(outputs)) > math.pi:
+        outputs = np.sin(outputs)
+    for values in outputs.T:
+        frequencies, power = welch(detrend(values), 1.0 / record.step_s, nperseg=length)
+        found += frequencies * power / max(float(np.var(values)), 1e-300)
+    # A decade has the more power the wider it is: times the frequency, the peak is of the motion.
+    spread = max(1, length // 2048)
+    smooth = np.convolve(found, np.ones(spread) / spread, "same")
+    return math.tau * float(frequencies[max(1, int(np.argmax(smooth)))])

@@ -1,0 +1,324 @@
+"""From a record to parameters that can be trusted, or to the reasons why there are none.
+
+The motor lag is found by the smallest simulation error; the regression (9), (10) then runs with it
+over the whole record, and the simulation-error fit is the second opinion. Of the two, the one counts
+that predicts better over stretches of half the length of those of the fit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from plant_sim.identification import simulation
+from plant_sim.identification.errors import IdentificationError
+from plant_sim.identification.estimator import CONDITION_MIN
+from plant_sim.identification.faults import dominant_rad_s, require_motion
+from plant_sim.identification.filters import Array
+from plant_sim.identification.pitch import PitchStructure
+from plant_sim.identification.record import Record
+from plant_sim.identification.regression import Filters, Regression, regress
+from plant_sim.identification.simulation import Segments, SimulationFit
+from plant_sim.identification.structures import (
+    LinearStructure,
+    Parameter,
+    Structure,
+    gains_of,
+    holding,
+    names_of,
+)
+
+LAGS_S = (0.0, 0.02, 0.05, 0.1, 0.2, 0.5)
+UNCERTAINTY_MAX = 0.25
+"""A standard error above this share of the estimate makes the estimate useless,"""
+IMMATERIAL = 0.1
+"""unless it moves the equation by less than this share."""
+AGREEMENT = 0.1
+FOLLOWED = 0.995
+"""share of the motion that a fit should explain; below it shorter segments are tried"""
+EXPLAINED = 0.9
+"""share below which something else moves the plant"""
+SHORTER = (1.0, 4.0, 16.0)
+COARSE = 100
+"""blocks of a regression of which only the last estimate counts"""
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """What is asked of an identification; None: found from the data."""
+
+    lag_s: float | None = None
+    bandwidth_rad_s: float | None = None
+    damping: float = 0.7
+    forgetting_per_s: float = 0.0
+    gain: float | None = None
+    rests: bool = False
+    """the record begins at rest with its inputs at 0"""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Identification:
+    """The result: two opinions, the parameters that count, and what is to be said about them."""
+
+    structure: Structure
+    regression: Regression
+    check: SimulationFit | None
+    lag_s: float
+    lag_deviation_s: float
+    values: dict[str, float]
+    covariance: Array
+    by_simulation: bool
+    """whether the parameters are those of the simulation-error fit"""
+    notes: tuple[str, ...]
+    warnings: tuple[str, ...]
+    refused: tuple[str, ...]
+    """why the data support no model; empty when they do"""
+    parameters: tuple[Parameter, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Name the parameters."""
+        found = self.structure.parameters(self.values, self.covariance)
+        object.__setattr__(self, "parameters", tuple(found))
+
+
+def identify(record: Record, structure: Structure, options: Options | None = None) -> Identification:
+    """Identify a structure; IdentificationError where a record cannot be used at all."""
+    options = options or Options()
+    require_motion(record)
+    acting = structure.acting(record.inputs)
+    still = np.ptp(acting, axis=0) == 0.0
+    if np.any(still):
+        what = record.input_names[int(np.argmax(still))]
+        if isinstance(structure, PitchStructure):
+            what = "voltage difference of the motors"
+        raise IdentificationError(
+            f"the {what} never changes, so its gain cannot be found: are these the right columns?"
+        )
+    notes: list[str] = []
+    bandwidth = _bandwidth(record, structure, options, notes)
+    filters = Filters(
+        bandwidth,
+        options.damping,
+        options.forgetting_per_s,
+        options.gain,
+        options.lag_s or 0.0,
+        options.rests,
+    )
+    warnings: list[str] = []
+    segments: Segments | None = None
+    check: SimulationFit | None = None
+    try:
+        segments, check = _simulated(record, structure, filters, options)
+        filters = replace(filters, lag_s=check.lag_s)
+    except (IdentificationError, np.linalg.LinAlgError) as error:
+        warnings.append(f"no cross-check: {error}")
+    regression = regress(record, structure, filters)
+    values, covariance, by_simulation = _decided(structure, regression, check, segments)
+    if check is not None and segments is not None and _is_zero(structure, values, covariance):
+        value, deviation = values["a_w"], math.sqrt(covariance[0, 0])
+        notes.append(f"a_w = {value:.2g} +- {deviation:.2g} is 0 within its uncertainty: held at 0")
+        structure = holding(structure, {"a_w"})
+        start = {name: check.values[name] for name in names_of(structure)}
+        fitted = simulation.fit(segments, structure, start, check.lag_s)
+        check = replace(fitted, lag_deviation_s=check.lag_deviation_s)
+        regression = regress(record, structure, filters)
+        values, covariance, by_simulation = _decided(structure, regression, check, segments)
+    if check is not None:
+        warnings += disagreements(regression, check)
+    deviation = 0.0 if check is None else check.lag_deviation_s
+    result = Identification(
+        structure,
+        regression,
+        check,
+        filters.lag_s,
+        deviation if filters.lag_s else 0.0,
+        values,
+        covariance,
+        by_simulation,
+        tuple(notes),
+        (),
+        (),
+    )
+    refused = tuple(_unsupported(result, record))
+    return replace(result, warnings=(*warnings, *_doubts(result)), refused=refused)
+
+
+def _bandwidth(record: Record, structure: Structure, options: Options, notes: list[str]) -> float:
+    """Return the pass band, near the frequency at which the outputs move."""
+    found = dominant_rad_s(record, structure)
+    usual = Filters().bandwidth_rad_s
+    given = options.bandwidth_rad_s
+    if given is None:
+        # A slow input, such as steps, shows the plant's faster motion as well.
+        fits = 0.1 <= found / usual <= 2.0
+        share = 0.7 if found > usual else 3.0
+        given = usual if fits else min(float(f"{share * found:.2g}"), 0.5 / record.step_s)
+        if not fits:
+            notes.append(f"the outputs move most at {found:.3g} rad/s: filters of {given:g} rad/s")
+    elif not 0.05 <= found / given <= 5.0:
+        notes.append(
+            f"the outputs move most at {found:.3g} rad/s, far from the filters' {given:g} rad/s: "
+            f"--bandwidth {0.7 * found:.2g} suits them, or leave it out"
+        )
+    return given
+
+
+def _rough_lag(
+    record: Record, structure: Structure, filters: Filters, segments: Segments, options: Options
+) -> float:
+    """Return the lag with the smallest simulation error, of a few."""
+    if options.lag_s is not None:
+        return options.lag_s
+    few = record.part(0.0, simulation.SAMPLES_MAX * record.step_s)
+    errors = {}
+    for lag_s in LAGS_S:
+        values = regress(few, structure, replace(filters, lag_s=lag_s), blocks=COARSE).values
+        errors[lag_s] = _error(structure, values, lag_s, segments)
+    return min(errors, key=errors.__getitem__)
+
+
+def _error(structure: Structure, values: dict[str, float], lag_s: float, segments: Segments) -> float:
+    errors = simulation.simulation_residuals(structure, values, lag_s, segments) / segments.scale
+    return float(np.mean(errors**2))
+
+
+def _simulated(
+    record: Record, structure: Structure, filters: Filters, options: Options
+) -> tuple[Segments, SimulationFit]:
+    """Return the simulation-error fit with its lag, over segments that the model can follow."""
+    best: tuple[Segments, SimulationFit] | None = None
+    for shorter in SHORTER:
+        length_s = simulation.SEGMENT_S / filters.bandwidth_rad_s / shorter
+        if best is not None and length_s < 16.0 * record.step_s:
+            break
+        segments = simulation.cut(record, structure, length_s)
+        lag_s = _rough_lag(record, structure, filters, segments, options)
+        start = regress(record, structure, replace(filters, lag_s=lag_s), blocks=COARSE)
+        free = options.lag_s is None
+        check = simulation.fit(segments, structure, start.values, lag_s, estimate_lag=free)
+        if free and check.lag_s < max(0.25 * record.step_s, 2.0 * check.lag_deviation_s):
+            check = simulation.fit(segments, structure, check.values, 0.0)
+        if best is None or check.explained > best[1].explained:
+            best = segments, check
+        if check.explained > FOLLOWED:
+            break
+    assert best is not None
+    return best
+
+
+def _is_zero(structure: Structure, values: dict[str, float], covariance: Array) -> bool:
+    """Return whether a damping is negative, and 0 within its uncertainty."""
+    if not isinstance(structure, PitchStructure) or values.get("a_w", 0.0) >= 0.0:
+        return False
+    stiffness = abs(structure.constants(values)[1])
+    deviation = math.sqrt(max(0.0, covariance[0, 0]))
+    return -values["a_w"] < max(3.0 * deviation, 0.02 * math.sqrt(stiffness))
+
+
+def _decided(
+    structure: Structure,
+    regression: Regression,
+    check: SimulationFit | None,
+    segments: Segments | None,
+) -> tuple[dict[str, float], Array, bool]:
+    """Return the values that count, their covariance, and whether they are those of the fit."""
+    if check is None or segments is None:
+        return regression.values, regression.covariance, False
+    if _predicts_better(structure, check, regression, segments):
+        return check.values, check.covariance, True
+    return regression.values, regression.covariance, False
+
+
+def _predicts_better(
+    structure: Structure, check: SimulationFit, regression: Regression, segments: Segments
+) -> bool:
+    """Return whether the fit beats the regression over stretches of half the length as well."""
+    if not np.all(np.isfinite(np.diag(regression.covariance))):
+        return True
+    half = max(4, len(segments.outputs) // 2)
+    shorter = replace(segments, outputs=segments.outputs[:half], inputs=segments.inputs[:half])
+    errors = [
+        _error(structure, values, regression.filters.lag_s, shorter)
+        for values in (check.values, regression.values)
+    ]
+    return errors[0] < errors[1]
+
+
+def disagreements(regression: Regression, check: SimulationFit) -> Iterable[str]:
+    """Yield where the two opinions differ by more than both uncertainties and 10 % explain."""
+    theirs = regression.structure.parameters(regression.values, regression.covariance)
+    ours = regression.structure.parameters(check.values, check.covariance)
+    for one, other in zip(theirs, ours, strict=True):
+        spread = math.hypot(one.deviation, other.deviation)
+        floor = 0.02 if one.letter == "theta_0" else 0.0
+        small = one.letter == "a_w" and 0.02 * math.sqrt(abs(ours[1].value))
+        if abs(one.value - other.value) > 3.0 * spread + AGREEMENT * abs(other.value) + floor + small:
+            yield (
+                f"{one.letter}: the regression says {one.value:.4g}, the simulation-error fit "
+                f"{other.value:.4g}; the model does not describe these data well, or something else "
+                "pushes the plant"
+            )
+
+
+def _doubts(found: Identification) -> Iterable[str]:
+    """Yield what is strange about the parameters themselves."""
+    structure = found.structure
+    if isinstance(structure, PitchStructure) and found.values.get("k_v", 0.0) < 0.0:
+        yield "k_v is negative: front and rear voltage are exchanged, or the encoder's sign"
+    elif isinstance(structure, LinearStructure) and structure.kind in ("first-order", "integrator"):
+        for name in gains_of(structure, len(structure.inputs)):
+            if found.values.get(name, 0.0) < 0.0:
+                yield f"{name} is negative: the sign of the input or of the encoder is turned (--sign)"
+    if found.check is not None and found.check.explained < EXPLAINED:
+        yield (
+            f"the model explains {max(0.0, found.check.explained):.0%} of the motion between the "
+            "recording's stretches; the rest are pushes that the file does not hold"
+        )
+
+
+def _unsupported(found: Identification, record: Record) -> Iterable[str]:
+    """Yield why the data support no model, with the experiment that would."""
+    regression, structure = found.regression, found.structure
+    if regression.condition < CONDITION_MIN:
+        levels = ", ".join(
+            f"{term.name} {level:.2g}"
+            for equation, one in zip(structure.equations, regression.estimates, strict=True)
+            for term, level in zip(equation.terms, one.levels, strict=False)
+        )
+        yield (
+            f"the data are not exciting enough to tell the parameters apart (measure "
+            f"{regression.condition:.1e}, at least {CONDITION_MIN:g} is needed; root mean square of "
+            f"the regressor of each: {levels})"
+        )
+    deviations = np.sqrt(np.maximum(np.diag(found.covariance), 0.0)).tolist()
+    spread = dict(zip(found.values, deviations, strict=True))
+    gains = gains_of(structure, structure.acting(record.inputs[:1]).shape[1])
+    alone = len(gains) == 1
+    for equation, one in zip(structure.equations, regression.estimates, strict=True):
+        for term, level in zip(equation.terms, one.levels, strict=False):
+            value, deviation = found.values[term.name], spread[term.name]
+            small = deviation * level <= IMMATERIAL * one.target and not (alone and term.name in gains)
+            if not math.isfinite(deviation):
+                yield f"{term.name}: the record is too short to say how sure the estimate is"
+            elif deviation > UNCERTAINTY_MAX * abs(value) and not small:
+                yield f"{term.name} = {value:.4g} is uncertain: its standard error is {deviation:.2g}"
+    if isinstance(structure, PitchStructure) and found.values.get("a_w", 0.0) < 0.0:
+        yield (
+            f"a_w = {found.values['a_w']:.4g} is negative: the data show a body that gains energy by "
+            "itself; is the sign of the angle or of the voltages turned, or does the command act later "
+            "than it is logged?"
+        )
+
+
+def advice(record: Record, structure: Structure) -> str:
+    """Return the experiment that would support a model."""
+    slow = math.tau / dominant_rad_s(record, structure)
+    less = f"integrator:{structure.order}"
+    return (
+        f"record at least {max(60.0, 20.0 * slow):.0f} s in which the input is moved on purpose, such "
+        f"as a square wave of {2.0 * slow:.2g} s as large as the plant allows; or ask for less: "
+        f"--structure {less if structure.kind != less else 'first-order'}"
+    )

@@ -1,0 +1,254 @@
+"""Structures: what a model's equations may be, each linear in its parameters.
+
+An equation says that a derivative of an output is a sum of terms: a parameter times a derivative of a
+signal. The signals are functions of the outputs, then the inputs, then the constant 1.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple, Protocol, TypeVar
+
+import numpy as np
+
+from plant_sim.identification.errors import IdentificationError
+from plant_sim.identification.filters import Array
+
+GRAMMAR = "pitch, first-order, integrator, integrator:ORDER, siso:N,M or linear"
+ORDER_MAX = 4
+
+
+class Term(NamedTuple):
+    """A parameter times a derivative of a signal."""
+
+    name: str
+    signal: int
+    derivative: int
+    sign: float = 1.0
+
+
+class Equation(NamedTuple):
+    """The derivative of a signal as a sum of terms."""
+
+    signal: int
+    derivative: int
+    terms: tuple[Term, ...]
+
+
+class Parameter(NamedTuple):
+    """A parameter as it is reported."""
+
+    name: str
+    letter: str
+    unit: str
+    value: float
+    deviation: float
+
+
+class StateSpace(NamedTuple):
+    """dx/dt = A x + B u + d, y = C x; the names of the states."""
+
+    A: Array
+    B: Array
+    C: Array
+    offset: Array
+    states: tuple[str, ...]
+
+
+class Structure(Protocol):
+    """The equations of a model, and what its parameters mean."""
+
+    @property
+    def kind(self) -> str:
+        """Return its name, as the command line takes it."""
+        ...
+
+    @property
+    def order(self) -> int:
+        """Return the highest derivative, which the state filters must reach."""
+        ...
+
+    @property
+    def equations(self) -> tuple[Equation, ...]:
+        """Return one equation for each output."""
+        ...
+
+    @property
+    def without(self) -> frozenset[str]:
+        """Return the parameters that are held at 0."""
+        ...
+
+    def signals(self, outputs: Array) -> Array:
+        """Return the functions of the outputs."""
+        ...
+
+    def acting(self, inputs: Array) -> Array:
+        """Return the inputs of the equations."""
+        ...
+
+    def parameters(self, values: Mapping[str, float], covariance: Array) -> list[Parameter]:
+        """Return what is reported of the values, those held at 0 included."""
+        ...
+
+
+Held = TypeVar("Held", bound="Structure")
+
+
+def holding(structure: Held, names: set[str]) -> Held:
+    """Return a structure with more parameters held at 0."""
+    return replace(structure, without=structure.without | names)  # type: ignore[type-var]
+
+
+def names_of(structure: Structure) -> tuple[str, ...]:
+    """Return the names of all parameters, equation by equation."""
+    return tuple(term.name for equation in structure.equations for term in equation.terms)
+
+
+def gains_of(structure: Structure, inputs: int) -> set[str]:
+    """Return the names of the parameters that an input acts through."""
+    first = structure.signals(np.zeros((1, len(structure.equations)))).shape[1]
+    return {
+        term.name
+        for equation in structure.equations
+        for term in equation.terms
+        if first <= term.signal < first + inputs
+    }
+
+
+@dataclass(frozen=True)
+class LinearStructure:
+    """Any linear structure: `orders` of the equations, `input_order` of the input's derivatives.
+
+    With `coupled`, every output's equation has all outputs and rates in it. An offset, the constant
+    force d, is estimated with the others.
+    """
+
+    kind: str
+    outputs: tuple[str, ...]
+    inputs: tuple[str, ...]
+    n: int
+    input_order: int = 0
+    integrates: bool = False
+    """the outputs' own terms are 0"""
+    coupled: bool = False
+    without: frozenset[str] = frozenset()
+
+    @property
+    def order(self) -> int:
+        """Return the highest derivative."""
+        return self.n
+
+    @property
+    def equations(self) -> tuple[Equation, ...]:
+        """Return one equation for each output."""
+        return tuple(self._equation(index) for index in range(len(self.outputs)))
+
+    def _equation(self, output: int) -> Equation:
+        count, constant = len(self.outputs), len(self.outputs) + len(self.inputs)
+        others = range(count) if self.coupled else (output,)
+        terms = []
+        for derivative in range(self.n - 1, -1, -1) if not self.integrates else ():
+            for other in others:
+                name = self._own(output, other, derivative)
+                terms.append(Term(name, other, derivative, 1.0 if self.coupled else -1.0))
+        for index in range(len(self.inputs)):
+            terms += [
+                Term(self._gain(output, index, derivative), count + index, derivative)
+                for derivative in range(self.input_order, -1, -1)
+            ]
+        terms.append(Term(self._offset(output), constant, 0))
+        kept = tuple(term for term in terms if term.name not in self.without)
+        return Equation(output, self.n, kept)
+
+    def _own(self, output: int, other: int, derivative: int) -> str:
+        if not self.coupled:
+            return "a" if self.n == 1 else f"a_{self.n - derivative}"
+        return f"{self.outputs[output]}''/{self.outputs[other]}" + "'" * derivative
+
+    def _gain(self, output: int, index: int, derivative: int) -> str:
+        if self.coupled:
+            return f"{self.outputs[output]}''/{self.inputs[index]}"
+        number = f"_{self.input_order - derivative}" if self.input_order or self.n > 1 else ""
+        if self.integrates:
+            number = ""
+        return f"b{number}" if len(self.inputs) == 1 else f"b{number}/{self.inputs[index]}"
+
+    def _offset(self, output: int) -> str:
+        return f"{self.outputs[output]}''/1" if self.coupled else "d"
+
+    def signals(self, outputs: Array) -> Array:
+        """Return the outputs themselves."""
+        return outputs
+
+    def acting(self, inputs: Array) -> Array:
+        """Return the inputs themselves."""
+        return inputs
+
+    def parameters(self, values: Mapping[str, float], covariance: Array) -> list[Parameter]:
+        """Return the parameters by their names."""
+        spread = dict(zip(values, np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist(), strict=True))
+        whole = names_of(replace(self, without=frozenset()))
+        return [
+            Parameter(name, name, "", values.get(name, 0.0), spread.get(name, 0.0)) for name in whole
+        ]
+
+    def state_space(self, values: Mapping[str, float]) -> StateSpace:
+        """Return the matrices; states are outputs and rates, where no input makes the rates jump."""
+        n, count = self.n, len(self.outputs)
+        A, B = np.zeros((n * count, n * count)), np.zeros((n * count, len(self.inputs)))
+        C, offset = np.zeros((count, n * count)), np.zeros(n * count)
+        states: list[str] = []
+        for output, name in enumerate(self.outputs):
+            first, last = n * output, n * output + n - 1
+            A[first:last, first + 1 : last + 1] = np.eye(n - 1)
+            C[output, first] = 1.0
+            offset[last] = values.get(self._offset(output), 0.0)
+            for index in range(len(self.inputs)):
+                for derivative in range(self.input_order + 1):
+                    gain = values.get(self._gain(output, index, derivative), 0.0)
+                    B[last - derivative, index] = gain
+            for other in range(count) if self.coupled else (output,):
+                for derivative in range(n):
+                    if self.integrates:
+                        continue
+                    value = values.get(self._own(output, other, derivative), 0.0)
+                    if self.coupled:
+                        A[last, n * other + derivative] = value
+                    elif self.input_order:
+                        # Observer form: the input's derivatives need none of the input itself.
+                        A[last - derivative, first] = -value
+                    else:
+                        A[last, first + derivative] = -value
+            rates = ("", "_rate", "_acceleration", "_jerk") if not self.input_order else ("",)
+            states += [
+                name + (rates[place] if place < len(rates) else f"_state{place + 1}")
+                for place in range(n)
+            ]
+        return StateSpace(A, B, C, offset, tuple(states))
+
+
+def parse_linear(text: str, outputs: tuple[str, ...], inputs: tuple[str, ...]) -> LinearStructure:
+    """Return the linear structure that a command line names; IdentificationError."""
+    kind, _, numbers = text.partition(":")
+    if kind == "first-order" and not numbers:
+        found = LinearStructure(text, outputs, inputs, 1)
+    elif kind == "integrator" and re.fullmatch(r"\d*", numbers):
+        found = LinearStructure(text, outputs, inputs, int(numbers or 1), integrates=True)
+    elif kind == "siso" and (match := re.fullmatch(r"(\d+),(\d+)", numbers)):
+        found = LinearStructure(text, outputs, inputs, int(match[1]), int(match[2]))
+    elif text == "linear":
+        return LinearStructure(text, outputs, inputs, 2, coupled=True)
+    else:
+        raise IdentificationError(f"--structure {text}: give {GRAMMAR}")
+    if not 1 <= found.n <= ORDER_MAX or found.input_order >= found.n:
+        raise IdentificationError(
+            f"--structure {text}: the order must be 1 to {ORDER_MAX}, and that of the input below it"
+        )
+    if len(outputs) != 1:
+        raise IdentificationError(
+            f"--structure {text} has one output, and the record has {len(outputs)} "
+            f"({', '.join(outputs)}): choose one with --columns, or take linear"
+        )
+    return found

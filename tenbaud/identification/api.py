@@ -1,0 +1,337 @@
+"""`tenbaud.identify`: from a file or arrays to a model, and to a configuration that flies it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from plant_sim.identification.errors import IdentificationError
+from plant_sim.identification.pipeline import Options
+from plant_sim.identification.record import Record
+from plant_sim.identification.regression import Filters
+from tenbaud.build.signals import build_limits, configured_signals
+from tenbaud.config.load import OWN, load_config, nested
+from tenbaud.config.schema import FlightConfig
+from tenbaud.identification import written
+from tenbaud.identification.closed_loop import require_commands
+from tenbaud.identification.coder import with_coder
+from tenbaud.identification.flown import Flown, fly_record
+from tenbaud.identification.run import Identified, Wanted, run
+from tenbaud.identification.sources import Source, from_log, from_rig
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+EXCITATIONS = ("square:0.2,0,2.5", "square:0.25,0.1,3")
+DURATION_S = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What is asked for, as on the command line."""
+
+    structure: str = ""
+    lag: str = "auto"
+    equilibrium: str = "auto"
+    bandwidth_rad_s: float | None = None
+    damping: float = 0.7
+    forgetting_per_s: float | None = None
+    fly: bool = True
+
+
+@dataclass(slots=True, eq=False)
+class Each:
+    """The result for one record."""
+
+    identified: Identified
+    source: Source
+    settings: dict[str, Any]
+    """a whole configuration; empty where the data support no model"""
+    flown: Flown | None = None
+    config_file: Path | None = None
+
+    @property
+    def config(self) -> FlightConfig:
+        """Return the configuration that flies what was identified; IdentificationError without one."""
+        if not self.settings:
+            raise IdentificationError("; ".join(self.identified.found.refused))
+        return load_config(None, None, self.settings)
+
+    @property
+    def model(self) -> dict[str, Any]:
+        """Return the section [model]."""
+        return dict(self.settings.get("model", {}))
+
+    @property
+    def estimates(self) -> dict[str, float]:
+        """Return the parameters by name."""
+        return {item.name: item.value for item in self.identified.found.parameters}
+
+    @property
+    def deviations(self) -> dict[str, float]:
+        """Return their standard errors."""
+        return {item.name: item.deviation for item in self.identified.found.parameters}
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Return what is doubtful."""
+        return self.identified.warnings
+
+    @property
+    def refused(self) -> tuple[str, ...]:
+        """Return why the data support no model; empty when they do."""
+        return self.identified.found.refused
+
+    def lines(self) -> list[str]:
+        """Return what was found and done, for people."""
+        one = self.identified
+        found = one.found
+        lag = "none" if not found.lag_s else f"{found.lag_s:.4g} s"
+        lag += f" +- {found.lag_deviation_s:.2g} s, found" if found.lag_deviation_s else ""
+        lines = [f"structure: {found.structure.kind}, {one.chosen.why}", f"motor lag: {lag}"]
+        lines += [f"theta_0: {one.chosen.equilibrium}"] * bool(one.chosen.equilibrium)
+        return [*lines, *(f"note: {text}" for text in (*self.source.notes, *one.notes))]
+
+    def summary(self) -> dict[str, Any]:
+        """Return the result for programs."""
+        one = self.identified
+        found = one.found
+        check = None
+        if found.check is not None:
+            items = found.structure.parameters(found.check.values, found.check.covariance)
+            check = {item.name: item.value for item in items}
+        flown = None
+        if self.flown is not None:
+            flown = {
+                "outcome": self.flown.outcome,
+                "rate_bit_s": self.flown.rate_bit_s,
+                "outputs": {
+                    name: {"rms_error": rms, "largest_error": most, "largest": largest}
+                    for name, rms, most, largest in self.flown.outputs
+                },
+            }
+        return {
+            "source": one.name,
+            "structure": found.structure.kind,
+            "estimates": self.estimates,
+            "standard_errors": self.deviations,
+            "motor_lag_s": found.lag_s,
+            "motor_lag_standard_error_s": found.lag_deviation_s,
+            "cross_check": check,
+            "excitation": found.regression.condition,
+            "filter_bandwidth_rad_s": found.regression.filters.bandwidth_rad_s,
+            "equilibrium_source": one.chosen.equilibrium,
+            "notes": [*self.source.notes, *one.notes],
+            "warnings": list(one.warnings),
+            "not_supported": list(found.refused),
+            "advice": one.advice,
+            "config": None if self.config_file is None else str(self.config_file),
+            "flown": flown,
+        }
+
+
+@dataclass(slots=True, eq=False)
+class Result:
+    """The results of all records of one command."""
+
+    each: list[Each]
+    base: FlightConfig
+    simulated: bool
+
+    @property
+    def supported(self) -> bool:
+        """Return whether every record supports a model."""
+        return all(one.identified.supported for one in self.each)
+
+    def save(self, folder: Path, *, fly: bool = True) -> None:
+        """Write figures and configurations, and fly each record with its own."""
+        from tenbaud.identification.figures import draw_estimates, draw_excitation
+
+        found = [one.identified for one in self.each]
+        draw_excitation(found, [folder / "figure-3.png", folder / "figure-3.svg"])
+        true = _true_values(self.base) if self.simulated else None
+        draw_estimates(found, [folder / "figure-4.png", folder / "figure-4.svg"], true)
+        for index, one in enumerate(self.each):
+            number = "" if index == 0 else f"-{index + 1}"
+            if one.settings:
+                _finish(one, folder, number, fly)
+
+
+def _finish(one: Each, folder: Path, number: str, fly: bool) -> None:
+    """Choose the coder, fly the record, and write what flew."""
+    if "file" not in one.settings.get("flight_log", {}):
+        log = written.write_record(folder / f"record{number}.csv", one.identified.record)
+        one.settings["flight_log"] = log
+    if fly:
+        # An experiment that this command made shows the plant, and not what flights are like.
+        if one.source.file is not None:
+            one.settings, note = with_coder(one.settings)
+            notes = (*one.identified.notes, *filter(None, [note]))
+            one.identified = replace(one.identified, notes=notes)
+        one.flown = fly_record(one.settings)
+    one.config_file = folder / f"identified{number}.toml"
+    said = one.flown.sentence() if one.flown is not None else ""
+    written.write(one.config_file, one.settings, one.identified, said)
+
+
+def _true_values(config: FlightConfig) -> tuple[float, ...]:
+    from tenbaud.build.rig import nominal_plant
+
+    plant = nominal_plant(config).mismatched(config.transmitter.plant.mismatch)
+    return plant.rate_damping_per_s, plant.stiffness_per_s2, plant.torque_gain_rad_per_v_s2
+
+
+def sources_of(
+    config: FlightConfig,
+    source: Path | None,
+    request: Request,
+    excitation: Sequence[str] | None = None,
+    duration_s: float | None = None,
+) -> list[Source]:
+    """Return the records: of the excited rig, of a run, or of a log."""
+    if source is None:
+        rest = config.transmitter.plant.model_copy(
+            update={"initial": getattr(config.model, "equilibrium_rad", 0.0)}
+        )
+        at_rest = config.model_copy(
+            update={"transmitter": config.transmitter.model_copy(update={"plant": rest})}
+        )
+        signals = list(excitation or EXCITATIONS)
+        return [Source(one, from_rig(at_rest, one, duration_s or DURATION_S)) for one in signals]
+    named = config.flight_log.model_copy(update={"file": str(source)})
+    config = config.model_copy(update={"flight_log": named})
+    record, notes = from_log(config, request.structure)
+    return [Source(source.name, record, notes, source)]
+
+
+def identify_sources(config: FlightConfig, sources: Sequence[Source], request: Request) -> Result:
+    """Identify every record, and work out the settings that fly it."""
+    excited = all(source.file is None and not source.notes for source in sources)
+    each = []
+    for source in sources:
+        require_commands(source.record)
+        wanted = _wanted(config, source, request)
+        one = run(source.name, source.record, wanted)
+        settings = written.settings(config, one, source.file) if one.supported else {}
+        each.append(Each(one, source, settings))
+    simulated = excited and sources[0].name.partition(":")[0] in ("square", "prbs", "chirp")
+    return Result(each, config, simulated)
+
+
+def _wanted(config: FlightConfig, source: Source, request: Request) -> Wanted:
+    excited = source.name.partition(":")[0] in ("square", "prbs", "chirp") and source.file is None
+    # What a preset says is of the preset's plant.
+    preset = {} if config.preset == OWN else load_config(config.preset).model.model_dump()
+    known = getattr(config.model, "motor_lag_s", None)
+    set_lag = known is not None and known != preset.get("motor_lag_s", known)
+    lag_s: float | None = None
+    if request.lag != "auto":
+        try:
+            lag_s = float(request.lag)
+        except ValueError:
+            raise IdentificationError(f"--lag {request.lag}: give auto or seconds") from None
+    elif set_lag or (excited and config.transmitter.rig == "simulated"):
+        lag_s = known
+    forgetting = request.forgetting_per_s
+    paper = Filters()
+    if forgetting is None:
+        forgetting = paper.forgetting_per_s if excited else 0.0
+    options = Options(
+        lag_s,
+        request.bandwidth_rad_s if not excited else request.bandwidth_rad_s or paper.bandwidth_rad_s,
+        request.damping,
+        forgetting,
+        paper.gain if excited else None,
+        rests=excited,
+    )
+    limited = excited or config.limits.command_max is not None
+    volts_max = float("inf")
+    pitches = config.model.kind == "pitch" and _is_pitch(source.record)
+    if limited and pitches:
+        volts_max = build_limits(config, configured_signals(config)).command_max[0]
+    return Wanted(request.structure, request.equilibrium, volts_max, pitches, options)
+
+
+def _is_pitch(record: Record) -> bool:
+    return record.output_names == ("pitch",) or (
+        record.outputs.shape[1] == 1 and record.output_units[0] in ("rad", "")
+    )
+
+
+def identify(
+    source: str | Path | Mapping[str, ArrayLike],
+    *,
+    outputs: Sequence[str] = (),
+    inputs: Sequence[str] = (),
+    tick_s: float | None = None,
+    units: Mapping[str, str] | None = None,
+    structure: str = "",
+    lag: float | str = "auto",
+    equilibrium: float | str = "auto",
+    bandwidth_rad_s: float | None = None,
+    preset: str | None = None,
+    config: str | Path | None = None,
+    settings: Mapping[str, Any] | None = None,
+    out: str | Path | None = None,
+    fly: bool = True,
+) -> Each:
+    """Identify a plant from a file or from arrays, and return its model and its configuration.
+
+    `source` is the path of a log or of a run folder, or a table of arrays by name, of which `outputs`
+    and `inputs` name the signals and `tick_s` is the time between two rows. The other arguments are
+    those of `tenbaud identify`: `structure`, `lag`, `equilibrium`, `bandwidth_rad_s`; `settings` are
+    fields by their full names, `{"flight_log.columns": {"angle": "pitch_deg"}, ...}`.
+
+    The result has `estimates`, `deviations`, `warnings`, `refused`, the section `model` and, where the
+    data support a model, `config`. With `out`, a new folder, figures and `identified.toml` are written,
+    and the record is flown with it. Raises IdentificationError and LogError for data of no use.
+    """
+    from tenbaud.recording.folder import create_run_folder
+
+    loaded = load_config(preset, None if config is None else Path(config), nested(settings or {}))
+    request = Request(structure, str(lag), str(equilibrium), bandwidth_rad_s, fly=fly)
+    if isinstance(source, Mapping):
+        sources = [_of_arrays(source, tuple(outputs), tuple(inputs), tick_s, units or {})]
+    else:
+        sources = sources_of(loaded, Path(source), request)
+    result = identify_sources(loaded, sources, request)
+    if out is not None:
+        result.save(create_run_folder(None, "identify", Path(out)), fly=fly)
+    return result.each[0]
+
+
+def _of_arrays(
+    arrays: Mapping[str, ArrayLike],
+    outputs: tuple[str, ...],
+    inputs: tuple[str, ...],
+    tick_s: float | None,
+    units: Mapping[str, str],
+) -> Source:
+    if tick_s is None or not outputs:
+        raise IdentificationError(
+            "arrays need tick_s, the time between two rows, and outputs=(name, ...)"
+        )
+    missing = [name for name in (*outputs, *inputs) if name not in arrays]
+    if missing:
+        raise IdentificationError(f"no array is called {missing[0]}; there are {', '.join(arrays)}")
+    columns = {name: np.asarray(arrays[name], dtype=np.float64) for name in (*outputs, *inputs)}
+    lengths = {values.shape for values in columns.values()}
+    if len(lengths) != 1 or len(next(iter(lengths))) != 1:
+        raise IdentificationError(
+            f"the arrays differ in shape: {sorted(lengths)}; give vectors of one length"
+        )
+    rows = len(columns[outputs[0]])
+    record = Record(
+        tick_s,
+        np.stack([columns[name] for name in outputs], axis=1),
+        np.stack([columns[name] for name in inputs], axis=1) if inputs else np.empty((rows, 0)),
+        outputs,
+        inputs,
+        tuple(units.get(name, "") for name in outputs),
+        tuple(units.get(name, "") for name in inputs),
+    )
+    return Source("arrays", record)

@@ -1,0 +1,74 @@
+"""The record, flown with what was identified from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from tenbaud.config.load import load_config, merged
+from tenbaud.config.schema import FlightConfig
+from tenbaud.studies.figures import FlightFigures
+
+PLAIN_TICKS = 10_000
+"""flown faster by the sessions than a flight is compiled"""
+
+
+class Flown(NamedTuple):
+    """What came of the flight."""
+
+    outcome: str
+    """ok, or why there are no figures"""
+    rate_bit_s: float
+    outputs: tuple[tuple[str, float, float, float], ...]
+    """name, rms and largest error, and largest value of each output, in its unit"""
+
+    def sentence(self) -> str:
+        """Return the figures for people."""
+        if self.outcome != "ok":
+            return f"the record could not be flown with it: {self.outcome}"
+        parts = [
+            f"{name}: rms error {100.0 * rms / largest:.2g} %, largest {100.0 * most / largest:.2g} % "
+            f"of the largest value {largest:.4g}"
+            for name, rms, most, largest in self.outputs
+            if largest
+        ]
+        return f"flown over the record at {self.rate_bit_s:g} bit/s: {'; '.join(parts)}"
+
+
+def fly_record(values: Mapping[str, Any]) -> Flown:
+    """Fly the log that settings name with the model and the coder in them."""
+    from tenbaud.build.codec import configured_rate
+    from tenbaud.build.signals import configured_signals
+
+    over = {
+        "transmitter": {"rig": "replay"},
+        "receiver": {"controller": "recorded"},
+        "link": {"kind": "memory"},
+    }
+    config = load_config(None, None, merged(dict(values), over))
+    figures = _fly(config)
+    names = [one.name for one in configured_signals(config).outputs]
+    return Flown(
+        figures.outcome,
+        configured_rate(config),
+        tuple(
+            (name, one.error_live_rms, one.error_live_max, one.amplitude)
+            for name, one in zip(names, figures.outputs, strict=False)
+        ),
+    )
+
+
+def _fly(config: FlightConfig) -> FlightFigures:
+    from tenbaud.studies.plain import fly_plain
+
+    if config.duration_s <= PLAIN_TICKS * config.timing.tick_s:
+        return fly_plain(config)
+    try:
+        from tenbaud.studies.flights import CompiledPoint
+        from tenbaud.studies.schedule import Uncommon
+    except ImportError:  # numba is an extra
+        return fly_plain(config)
+    try:
+        return CompiledPoint(config).fly(config.seed)[0]
+    except Uncommon:
+        return fly_plain(config)

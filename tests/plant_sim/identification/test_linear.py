@@ -132,7 +132,7 @@ def test_when_an_input_never_moves_then_it_is_named_and_no_model_is_made() -> No
         found_in(COUPLED, still)
 
 
-def test_when_two_inputs_move_alike_then_their_gains_are_not_told_apart() -> None:
+def test_when_two_inputs_move_alike_then_their_gains_cannot_be_separated() -> None:
     record = record_of(COUPLED, 1)
     alike = Record(H, record.outputs, record.inputs[:, :1] * [1.0, 1.0])
     assert any("not exciting enough" in text for text in found_in(COUPLED, alike).refused)
@@ -254,7 +254,7 @@ def test_when_a_record_is_long_then_blocks_give_the_estimates_of_single_samples(
     assert few.times_s[-1] == one.times_s[-1]
 
 
-def test_when_filters_are_far_from_the_motion_then_both_frequencies_are_told() -> None:
+def test_when_filters_are_far_from_the_motion_then_both_frequencies_are_named() -> None:
     signal = PseudoRandom(H, 0.05, 0.0, 3.0)
     u = np.array([[signal.volts(tick)] for tick in range(3000)])
     system = cont2discrete(([80.0], [1.0, 0.4, 80.0]), H)

@@ -23,6 +23,11 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return flown(tmp_path_factory.mktemp("runs") / "pitch", duration_s=3.0)
 
 
+@pytest.fixture(scope="module")
+def two(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return flown(tmp_path_factory.mktemp("runs") / "two", "aero-20baud", duration_s=1.0)
+
+
 def check(path: Path, run: Run) -> None:
     """The columns that the roles name are the flight's own signals: outputs as measured."""
     table = read_table(path)
@@ -41,9 +46,10 @@ def check(path: Path, run: Run) -> None:
     np.testing.assert_allclose(times, run.time_s, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["", "transmitter.mcap"])
-def test_a_run_as_measured_and_applied(run: Run, name: str) -> None:
-    check(run.path / name, run)
+def test_a_run_as_measured_and_applied(run: Run, two: Run) -> None:
+    check(run.path, run)
+    check(run.path / "transmitter.mcap", run)
+    check(two.path, two)
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -53,11 +59,9 @@ def test_every_export(run: Run, form: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_every_export_of_two_outputs(form: str, tmp_path: Path) -> None:
-    two = flown(tmp_path / "two", "aero-20baud", duration_s=1.0)
+def test_every_export_of_two_outputs(two: Run, form: str, tmp_path: Path) -> None:
     convert(two, form, tmp_path / f"flight.{form}")
     check(tmp_path / f"flight.{form}", two)
-    check(two.path, two)
 
 
 def test_ticks_without_a_reading_are_left_out_and_the_index_shows_it(run: Run, tmp_path: Path) -> None:

@@ -37,7 +37,7 @@ print(json.dumps([*read, time.perf_counter() - started - read[0], peak_mb()]))
 
 
 def log_figures(rows: int = ROWS) -> list[Figure]:
-    """Write a log, read and replay it in a new process; return what that takes."""
+    """Write a log, read and replay it in another process; return what that takes."""
     with tempfile.TemporaryDirectory() as name:
         file = Path(name) / "day.csv"
         _write(file, rows)

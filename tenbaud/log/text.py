@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tenbaud.log.dialect import DATE, MIXED, Dialect, find_dialect
+from tenbaud.log.export import export_roles
 from tenbaud.log.table import Array, LogError, Table, Wanted
 from tenbaud.log.units import DATE_TIME
 
@@ -24,7 +25,7 @@ def read_text(path: Path, wanted: Wanted | None = None) -> Table:
     """Return the table in a file of text; LogError where there is none."""
     dialect = find_dialect(path)
     names, units = dialect.names, list(dialect.units)
-    places = list(wanted(names, units, {}) if wanted else range(len(names)))
+    places = list(wanted(names, units, export_roles(names, units)) if wanted else range(len(names)))
     columns = [_Column(names[place], place) for place in places]
     for chunk in _chunks(path, dialect):
         for column in columns:
@@ -42,6 +43,7 @@ def read_text(path: Path, wanted: Wanted | None = None) -> Table:
         tuple([column.values()[:rows] for column in columns]),
         _places(path, dialect),
         {column.name: tuple(column.faults) for column in columns if column.faults},
+        roles=export_roles(names, units),
     )
 
 

@@ -64,6 +64,12 @@ def by_index(
     """Return the clock of rows that an index counts; LogError where it does not count evenly."""
     clock = by_period(len(table), period_s, start_s, end_s)
     index = table.check(column, clock.rows)
+    if np.any(index != np.floor(index)):
+        name = table.names[column]
+        raise LogError(
+            f"{table.path}, column {name}: it counts no rows, as its values are not whole; if it is "
+            f"the clock, give --columns time={name}"
+        )
     step = float(np.median(np.diff(index))) if len(index) > 1 else 1.0
     wrong = np.flatnonzero(np.diff(index) != step)
     if len(wrong) or step <= 0.0:

@@ -15,6 +15,7 @@ from tenbaud.log.units import split_unit, unit_named
 SAMPLE_BYTES = 1 << 16
 LINE_END = re.compile(r"\r\n|\n|\r")
 COMMENTS = ("#", "%", "//")
+MIXED = "are decimal signs or separators mixed?"
 _SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "blanks"}
 _NUMBERS = {
     decimal: re.compile(
@@ -88,6 +89,10 @@ def find_dialect(path: Path) -> Dialect:
             above = []
     width = median_low([len(row) for _, row in rows[first:]] or [0])
     names, units = _header(above, width)
+    if first < len(rows) and (found := len(rows[first][1])) > len(names):
+        raise LogError(
+            f"{path}, line {skipped + 1}: {found} cells found, {len(names)} expected; {MIXED}"
+        )
     return Dialect(encoding, separator, decimal, comment, skipped, names, units)
 
 

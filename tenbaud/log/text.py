@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tenbaud.log.dialect import DATE, Dialect, find_dialect
+from tenbaud.log.dialect import DATE, MIXED, Dialect, find_dialect
 from tenbaud.log.export import export_roles
 from tenbaud.log.table import Array, LogError, Table, Wanted
 from tenbaud.log.units import DATE_TIME
@@ -69,11 +69,12 @@ class _Column:
             filled = np.flatnonzero(~np.isnan(values))
         else:
             texts = cells.astype(str).str.strip()
-            if self.began is None and not self._rows and len(texts) and DATE.fullmatch(texts.iloc[0]):
-                first: Any = pd.to_datetime(texts.iloc[0], errors="coerce")
+            head = str(texts.iloc[0]) if len(texts) and not self._rows else ""
+            if DATE.fullmatch(head):
+                first: Any = pd.to_datetime(head, errors="coerce", utc=True)
                 self.began = None if first is pd.NaT else first
             if self.began is not None:
-                times = pd.to_datetime(texts, errors="coerce", format="mixed")
+                times = pd.to_datetime(texts, errors="coerce", format="mixed", utc=True)
                 values = (times - self.began).dt.total_seconds().to_numpy(np.float64)
             else:
                 values = pd.to_numeric(texts, errors="coerce").to_numpy(np.float64)
@@ -120,10 +121,8 @@ def _chunks(path: Path, dialect: Dialect) -> Any:
     except (pd.errors.ParserError, UnicodeError) as error:
         text = str(error).removeprefix("Error tokenizing data. C error: ").strip()
         if found := re.search(r"Expected (\d+) fields in line (\d+), saw (\d+)", text):
-            raise LogError(
-                f"{path}, line {found[2]}: {found[3]} cells found, {found[1]} expected; are decimal "
-                "signs or separators mixed?"
-            ) from error
+            told = f"{found[3]} cells found, {found[1]} expected; {MIXED}"
+            raise LogError(f"{path}, line {found[2]}: {told}") from error
         raise LogError(f"{path}: no table: {text[:1].lower()}{text[1:]}") from error
 
 

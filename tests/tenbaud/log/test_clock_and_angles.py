@@ -110,6 +110,11 @@ def test_from_and_to_are_on_the_clock_of_the_file(tmp_path: Path) -> None:
         read(tmp_path, rows, start_s=5.0, end_s=25.0)
 
 
+def test_a_clock_that_is_given_as_a_counter_of_rows_is_pointed_out(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="if it is the clock, give --columns time=time"):
+        read(tmp_path, lab_files.table(), index="time")
+
+
 def test_a_file_without_a_clock_takes_the_period_that_is_given(tmp_path: Path) -> None:
     log = read(tmp_path, lab_files.table()[:, 1:], "angle,u1,u2", period_s=0.05, start_s=1.0)
     assert (log.tick_s, log.start_s, len(log)) == (0.05, 1.0, lab_files.ROWS - 20)

@@ -29,6 +29,7 @@ def demo(
     view_port: options.ViewPort = 8710,
     open_browser: options.OpenBrowser = False,
     pace: options.Pace = None,
+    figure: options.Draw = True,
     out: options.Out = None,
     json: options.AsJson = False,
     verbose: options.Verbose = False,
@@ -56,7 +57,7 @@ def demo(
     agreements = _agree_all(flight, changes)
     pace = _checked_pace(agreements[0], pace, view)
     view_options = _view_options(agreements, view, view_port, open_browser)
-    raise typer.Exit(_fly_all(agreements, out, json, verbose, view_options, pace))
+    raise typer.Exit(_fly_all(agreements, out, json, verbose, figure, view_options, pace))
 
 
 def _checked_pace(agreement: Agreement, pace: float | None, view: bool) -> float | None:
@@ -106,6 +107,7 @@ def _fly_all(
     out: options.Out,
     as_json: bool,
     verbose: bool,
+    figure: bool,
     view_options: ViewOptions | None,
     pace: float | None,
 ) -> int:
@@ -119,7 +121,7 @@ def _fly_all(
         if out is not None and index:
             explicit = out.with_name(f"{out.name}-{index + 1}")
         folder = RunFolder(create_run_folder(None, agreement.config.preset, explicit))
-        result = _fly_shown(agreement, folder, view_options, pace)
+        result = _fly_shown(agreement, folder, figure, view_options, pace)
         results.append(result)
         folders.append(folder)
         if as_json:
@@ -134,11 +136,15 @@ def _fly_all(
 
 
 def _fly_shown(
-    agreement: Agreement, folder: RunFolder, view_options: ViewOptions | None, pace: float | None
+    agreement: Agreement,
+    folder: RunFolder,
+    figure: bool,
+    view: ViewOptions | None,
+    pace: float | None,
 ) -> DemoResult:
     """Fly once, and show how it goes."""
     from tenbaud.flight.demo import fly_demo
     from tenbaud.flight.display import StatusDisplay
 
     with StatusDisplay() as display:
-        return fly_demo(agreement, folder, display.show, view=view_options, pace=pace)
+        return fly_demo(agreement, folder, display.show, draw=figure, view=view, pace=pace)

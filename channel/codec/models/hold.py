@@ -21,12 +21,14 @@ class HoldModel:
     signals = Signals(PITCH_SIGNALS.states[:2], PITCH_SIGNALS.inputs, PITCH_SIGNALS.outputs)
     tick_function = staticmethod(hold_tick)
 
-    def __init__(self, tick_s: float) -> None:
+    def __init__(self, tick_s: float, start: Vector = ()) -> None:
+        """`start` is the initial state; empty: at angle zero and at rest."""
         self.constants: Vector = (tick_s,)
+        self._start = start or (0.0, 0.0)
 
     def initial(self) -> Vector:
-        """Return the body at angle zero, at rest."""
-        return (0.0, 0.0)
+        """Return the state that both ends begin with."""
+        return self._start
 
     def measured(self, state: Vector) -> Vector:
         """Return the angle, the one measured axis."""

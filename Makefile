@@ -27,7 +27,7 @@ demo: $(FLY) ## fly: both processes on this machine, the plant simulated
 # about the times of a flight comes after them, two at once; what needs both cores sees to it itself.
 test: chromium $(DEVELOP) ## run the tests: most of them first, then those of times on the real clock
 	$(BIN)/python -m pytest -n 4 -m "not soak and not real_time"
-	$(BIN)/python -m pytest -n 2 -m "not soak and real_time"
+	$(BIN)/python -m pytest -n 2 -m "not soak and real_time" $$(grep -rl --include='test_*.py' real_time tests)
 
 check: $(DEVELOP) ## lint, format, types, and the project's own rules
 	$(BIN)/ruff check .

@@ -20,6 +20,8 @@ sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 # Beside other tests the threads of the linear algebra mostly wait for each other, and wait by spinning.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# A figure takes longer than most flights; what looks at one asks for it.
+os.environ.setdefault("TENBAUD_FIGURE", "0")
 # A run that a shell started in the background ignores Ctrl-C; so would each process that it starts.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import solve_continuous_are
@@ -47,7 +48,18 @@ def floor(model: LinearModel, rate_bit_s: float, erased: float = 0.0) -> float:
 
 def floor_covariance(model: LinearModel, rate_bit_s: float, erased: float = 0.0) -> Matrix:
     """Return the covariance P of the errors whose weighted mean square is least."""
-    scaled = _Scaled(model, _paid(model, rate_bit_s, erased))
+    matrices = (np.asarray(one, float) for one in (model.dynamics, model.noise, model.cost))
+    paid = _paid(model, rate_bit_s, erased)
+    return _floor_covariance(tuple(one.tobytes() for one in matrices), paid).copy()
+
+
+@lru_cache(maxsize=64)
+def _floor_covariance(matrices: tuple[bytes, ...], rate_bit_s: float) -> Matrix:
+    """Solve for it once: all flights of a plant ask for the same, which takes longer than they do."""
+    states = math.isqrt(len(matrices[0]) // 8)
+    scaled = _Scaled(
+        LinearModel(*(np.frombuffer(one).reshape(states, states) for one in matrices)), rate_bit_s
+    )
     nats = scaled.rate_nats
     return scaled.back(minimise(_Flow(scaled.model), _start(scaled.model, nats), nats))
 

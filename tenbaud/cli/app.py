@@ -35,14 +35,14 @@ def main() -> None:
 def run(arguments: list[str]) -> int:
     """Run one command in this process, say what went wrong, and return its exit code."""
     from channel.errors import TenbaudError
-    from tenbaud.cli.commands import app
+    from tenbaud.cli.commands import app_for
     from tenbaud.flight.outcome import ExitCode, outcome_of
     from tenbaud.flight.stop import Interruptions
 
     interruptions = Interruptions()
     try:
         with interruptions:
-            app(arguments, prog_name="tenbaud")
+            app_for(arguments)(arguments, prog_name="tenbaud")
     except SystemExit as ended:
         code = ended.code if isinstance(ended.code, int) else int(ExitCode.FAILED)
     except KeyboardInterrupt:

@@ -7,8 +7,6 @@ from importlib.util import find_spec
 
 import typer
 
-from tenbaud.config.load import ConfigError
-
 PANEL = "Models, coders, studies"
 
 
@@ -32,6 +30,8 @@ def add_commands(app: typer.Typer) -> None:
 def _needs_checkout(command: str) -> Callable[[], None]:
     def refuse() -> None:
         """Make pages of the project's own documentation; needs a checkout of the repository."""
+        from tenbaud.config.load import ConfigError
+
         raise ConfigError(
             f"`tenbaud {command}` makes pages of the project's own documentation and works in a "
             "checkout of it only: clone the repository, run `pip install --editable .` in it, and "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Annotated
 
 import typer
@@ -50,6 +51,19 @@ for panel, commands in (
     ),
 ):
     for command in commands:
-        app.command(rich_help_panel=panel)(command)
+        app.command(command.__name__.replace("_", "-"), rich_help_panel=panel)(command)
 app.add_typer(keys.app, name="keys", rich_help_panel="Rigs and machines")
 add_commands(app)
+
+
+def app_for(arguments: list[str]) -> typer.Typer:
+    """Return the app with the one command that is asked for: the others take time to build.
+
+    Where the first argument is no command of its own, it is the whole app.
+    """
+    commands = [one for one in app.registered_commands if [one.name] == arguments[:1]]
+    if not commands:
+        return app
+    small = copy(app)
+    small.registered_commands, small.registered_groups = commands, []
+    return small

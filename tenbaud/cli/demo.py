@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -31,6 +33,7 @@ def demo(
     view_port: options.ViewPort = 8710,
     open_browser: options.OpenBrowser = False,
     pace: options.Pace = None,
+    figure: options.Draw = True,
     out: options.Out = None,
     json: options.AsJson = False,
     verbose: options.Verbose = False,
@@ -56,7 +59,10 @@ def demo(
     agreements = _agree_all(flight, changes)
     pace = _checked_pace(agreements[0], pace, view)
     view_options = _view_options(agreements, view, view_port, open_browser)
-    raise typer.Exit(_fly_all(agreements, out, json, verbose, view_options, pace))
+    from tenbaud.flight.demo import fly_demo
+
+    fly = partial(fly_demo, draw=figure, view=view_options, pace=pace)
+    raise typer.Exit(_fly_all(agreements, out, json, verbose, fly))
 
 
 def _checked_pace(agreement: Agreement, pace: float | None, view: bool) -> float | None:
@@ -110,9 +116,9 @@ def _fly_all(
     out: options.Out,
     as_json: bool,
     verbose: bool,
-    view_options: ViewOptions | None,
-    pace: float | None,
+    fly: Callable[..., DemoResult],
 ) -> int:
+    from tenbaud.flight.display import StatusDisplay
     from tenbaud.flight.report import show_summaries
     from tenbaud.recording.folder import RunFolder, create_run_folder
 
@@ -123,7 +129,8 @@ def _fly_all(
         if out is not None and index:
             explicit = out.with_name(f"{out.name}-{index + 1}")
         folder = RunFolder(create_run_folder(None, agreement.config.preset, explicit))
-        result = _fly_shown(agreement, folder, view_options, pace)
+        with StatusDisplay() as display:
+            result = fly(agreement, folder, display.show)
         results.append(result)
         folders.append(folder)
         if as_json:
@@ -135,13 +142,3 @@ def _fly_all(
     if not as_json:
         show_summaries([result.summary for result in results], folders, verbose=verbose)
     return int(results[-1].code)
-
-
-def _fly_shown(
-    agreement: Agreement, folder: RunFolder, view_options: ViewOptions | None, pace: float | None
-) -> DemoResult:
-    from tenbaud.flight.demo import fly_demo
-    from tenbaud.flight.display import StatusDisplay
-
-    with StatusDisplay() as display:
-        return fly_demo(agreement, folder, display.show, view=view_options, pace=pace)

@@ -30,6 +30,7 @@ def transmit(
     disturbance: options.Disturbance = None,
     on_desync: options.OnDesync = None,
     pace: options.Pace = None,
+    figure: options.Draw = True,
 ) -> None:
     """Run the sensor node: the rig, and one bit per sample to the receiver.
 
@@ -53,7 +54,7 @@ def transmit(
     )
     if pace is not None and node.clock is not options.ClockOption.VIRTUAL:
         raise typer.BadParameter("--pace slows the virtual clock down; the real one cannot be paced")
-    _run("transmitter", node, addresses, changed, pace=pace)
+    _run("transmitter", node, addresses, changed, pace=pace, figure=figure)
 
 
 @spread
@@ -108,6 +109,7 @@ def _run(
     *,
     take_over: bool = False,
     pace: float | None = None,
+    figure: bool = False,
 ) -> None:
     from dataclasses import replace
 
@@ -138,8 +140,7 @@ def _run(
     run_end = ends.run_transmitter if role == "transmitter" else ends.run_receiver
     mode = node.status if node.status in ("lines", "none") else "auto"
     outcome, summary = run_end(agreement, endpoints, folder, mode)  # type: ignore[arg-type]
-    draw = role == "transmitter" and bool(summary["samples"])
-    problems = write_up(folder, config, summary, draw) if whole else []
+    problems = write_up(folder, config, summary, figure and summary["samples"] > 0) if whole else []
     if node.json:
         options.print_json(summary)
     elif whole and summary["samples"]:

@@ -61,6 +61,9 @@ AsJson = Annotated[
     bool, typer.Option("--json", help="Summary on standard output as JSON, nothing else there.")
 ]
 Verbose = Annotated[bool, typer.Option("--verbose", help="Also print every figure of the summary.")]
+Draw = Annotated[
+    bool, typer.Option("--figure/--no-figure", envvar="TENBAUD_FIGURE", help="Draw flight.png or not.")
+]
 Settings = Annotated[
     list[str] | None,
     typer.Option("--set", help="Any field, such as --set coder.window_signs=3; repeatable."),

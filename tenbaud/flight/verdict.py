@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
-from tenbaud.build.flight import Agreement, watchdog_wanted_s
-from tenbaud.build.liveness import watchdog_ticks
+if TYPE_CHECKING:
+    from tenbaud.build.flight import Agreement
 
 CONFIRMED_SHARE_MIN = 0.5
 """of the samples that the flight had time for"""
@@ -83,6 +84,10 @@ class Settings:
 
 def settings_of(agreement: Agreement) -> Settings:
     """Return what can be changed about a flight."""
+    # Imported here: every command imports this module for its exit codes.
+    from tenbaud.build.flight import watchdog_wanted_s
+    from tenbaud.build.liveness import watchdog_ticks
+
     terms, up = agreement.terms, agreement.faults.up
     tick_s = terms.tick_ns / 1e9
     watchdog = watchdog_ticks(watchdog_wanted_s(agreement.config), terms, agreement.trip)

@@ -133,7 +133,7 @@ class Sandbox:
             "HOME": str(self.folder / "home"),
             "MPLCONFIGDIR": matplotlib.get_configdir(),
             "COLUMNS": "200",
-            "PYTEST_ADDOPTS": "--collect-only tests/transmitter",
+            "PYTEST_ADDOPTS": "--collect-only tests/transmitter/loops",
             "NO_COLOR": "1",
         }
         return subprocess.Popen(

@@ -28,7 +28,8 @@ GIF_BYTES_MAX = 1_000_000
 def walked(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str]]:
     """Type in every block; return the folder and what each block said, by its first command."""
     said: dict[str, str] = {}
-    with Sandbox(tmp_path_factory.mktemp("newcomer")) as sandbox:
+    with pytest.MonkeyPatch.context() as patch, Sandbox(tmp_path_factory.mktemp("newcomer")) as sandbox:
+        patch.delenv("TENBAUD_FIGURE")
         for block in BLOCKS:
             said[first_words(block)] = sandbox.run(block)
         sandbox.end()

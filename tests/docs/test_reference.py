@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 
 import pytest
 
-from docs.tools.commands_page import commands_page
-from docs.tools.configuration_page import configuration_page
+from docs.tools import commands_page as commands
+from docs.tools import configuration_page as configuration
 from docs.tools.reference import PAGES
 from tenbaud.cli.commands import app
 from tenbaud.config.load import load_config, preset_names
 from tenbaud.config.schema import FlightConfig
 from tests.rules.sources import TOP
+
+commands_page = cache(commands.commands_page)
+configuration_page = cache(configuration.configuration_page)
 
 
 @pytest.mark.parametrize("name", PAGES)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 import sys
 import tomllib
+from collections.abc import Mapping
+from functools import cache
 from importlib.metadata import packages_distributions
 
 import pytest
@@ -43,7 +45,18 @@ EXTRAS = {
     if extra not in NOT_FOR_USERS
     for one in named(requirements)
 }
-OWNERS = packages_distributions()
+
+
+@cache
+def owners_of(module: str) -> list[str]:
+    """Return the distributions that have this module."""
+    root = module.split(".")[0]
+    return [normal(one) for one in _distributions().get(root, [root])]
+
+
+@cache
+def _distributions() -> Mapping[str, list[str]]:
+    return packages_distributions()
 
 
 def findings_in(source: str, name: str) -> list[str]:
@@ -53,7 +66,7 @@ def findings_in(source: str, name: str) -> list[str]:
         root = module.split(".")[0]
         if root in (*sys.stdlib_module_names, *PACKAGES, *OUTSIDE, *UNDECLARED):
             continue
-        owners = {normal(one) for one in OWNERS.get(root, [root])}
+        owners = set(owners_of(root))
         if owners & REQUIRED:
             continue
         if not owners & EXTRAS:
@@ -71,10 +84,10 @@ def test_every_import_is_declared() -> None:
 
 def test_everything_declared_is_imported() -> None:
     used = {
-        normal(owner)
+        owner
         for name, source in files_below(*PACKAGES)
         for _, module, _ in imports_of(source, name)
-        for owner in OWNERS.get(module.split(".")[0], [])
+        for owner in owners_of(module)
     }
     assert used >= REQUIRED | EXTRAS
 

@@ -50,7 +50,7 @@ REAL_FLIGHT = Path(__file__).parents[3] / "shared" / "data" / "uiuc_closed_loop.
 
 
 def test_when_the_demo_flies_the_paper_then_every_sample_is_checked(tmp_path: Path) -> None:
-    ended = run("demo", "--json", "--mismatch", "0.1", "--out", "run", cwd=tmp_path)
+    ended = run("demo", "--json", "--figure", "--mismatch", "0.1", "--out", "run", cwd=tmp_path)
     assert ended.code == 0, ended.err
     summary = ended.summary
     assert set(SUMMARY_FIELDS) <= summary.keys()
@@ -81,7 +81,8 @@ def test_when_a_person_runs_it_then_both_plants_are_shown_and_nothing_else_on_st
 
 @pytest.mark.skipif(not REAL_FLIGHT.is_file(), reason="the recorded flights are not beside the tree")
 def test_when_a_real_flight_is_replayed_then_its_pitch_is_known_remotely(tmp_path: Path) -> None:
-    ended = run("demo", "--json", "--rig", f"replay:{REAL_FLIGHT}", "--out", "run", cwd=tmp_path)
+    replayed = ("--rig", f"replay:{REAL_FLIGHT}")
+    ended = run("demo", "--json", "--figure", *replayed, "--out", "run", cwd=tmp_path)
     assert ended.code == 0, ended.err
     summary = ended.summary
     assert summary["preset"] == "uiuc-10baud"

@@ -28,7 +28,7 @@ def failures(folder: Path, end: str) -> list[dict[str, Any]]:
 def test_when_everything_goes_wrong_then_it_is_counted_and_the_flight_ends_well(
     tmp_path: Path,
 ) -> None:
-    ended = demo(tmp_path, "--impair", FAULTS)
+    ended = demo(tmp_path, "--impair", FAULTS, "--figure")
     assert ended.code == 0, ended.err
     summary = ended.summary
     assert summary["desyncs"] == 0

@@ -62,8 +62,8 @@ def make_inputs(folder: Path) -> Inputs:
 Arguments = Callable[[Inputs, str], list[str]]
 
 WRITERS: dict[str, Arguments] = {
-    "demo": lambda _, out: ["demo", "--link", "memory", *SHORT, "--out", out],
-    "demo over zenoh": lambda _, out: ["demo", *SHORT, "--out", out],
+    "demo": lambda _, out: ["demo", "--link", "memory", *SHORT, "--figure", "--out", out],
+    "demo over zenoh": lambda _, out: ["demo", *SHORT, "--figure", "--out", out],
     "transmit": lambda _, out: ["transmit", *ALONE, "--out", out],
     "receive": lambda _, out: ["receive", *ALONE, "--out", out],
     "replay": lambda inputs, out: ["replay", inputs.run, "--save", out],

@@ -90,7 +90,7 @@ def test_a_user_without_name_or_home_flies(tmp_path: Path) -> None:
     for name in ("HOME", "XDG_RUNTIME_DIR", "XDG_CACHE_HOME", "USER", "LOGNAME"):
         environment.pop(name, None)
     command = [*AS_NOBODY, sys.executable, "-m", "tenbaud"]
-    flight = ["demo", "--duration", "1", "--mismatch", "0", "--json", "--out", str(own / "run")]
+    flight = ["demo", "--duration", "1", "--json", "--figure", "--out", str(own / "run")]
     done = subprocess.run(
         [*command, *flight], env=environment, cwd=own, capture_output=True, text=True, check=False
     )

@@ -22,7 +22,7 @@ from tests.tenbaud.processes import Ended, finish, start
 
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 PATIENCE_S = 240.0
-FLIGHT = ("demo", "--clock", "real", "--duration", "60", "--mismatch", "0", "--out", "run")
+FLIGHT = ("demo", "--clock", "real", "--duration", "60", "--mismatch", "0", "--figure", "--out", "run")
 
 
 def _wait_for(met: Callable[[], bool]) -> None:

@@ -36,7 +36,7 @@ from transmitter.session.records import SAMPLE_CHANNEL
 
 PRESETS = (
     *("paper-10baud", "tuned-20baud", "open-loop-zoom-10baud", "static-10baud", "usual-1000baud"),
-    *("history-10baud", "direction", "linear", "pendulum-30baud"),
+    *("history-10baud", "linear", "pendulum-30baud"),
 )
 LINEAR = {
     **SUM_OF_STATES,
@@ -159,9 +159,11 @@ def test_when_the_smallest_range_follows_the_range_then_no_bit_differs() -> None
 
 COMPILED_LONG = (
     *("integrator-10baud", "heading-1baud", "servo-10baud", "aero-20baud"),
-    *("helicopter-10baud", "furuta-50baud"),
+    *("helicopter-10baud", "furuta-50baud", "direction"),
 )
-"""Few samples each, but machine code of its own for every number of states, inputs and outputs."""
+"""Few samples each, but machine code of its own for every number of states, inputs and outputs.
+
+`direction` is the coder of `linear` on the plant of the other presets."""
 
 
 @pytest.mark.soak

@@ -14,10 +14,12 @@ import pytest
 from benchmarks.browser import served
 from tenbaud.view.server import free_port
 from tests.tenbaud.processes import finish, start
-from tests.tenbaud.view.viewers import beside, is_free
+from tests.tenbaud.view.viewers import beside, is_free, needs_page
 
-pytest.importorskip("nicegui")
-pytestmark = pytest.mark.skipif(not Path("/proc").is_dir(), reason="finds processes in /proc")
+pytestmark = [
+    needs_page,
+    pytest.mark.skipif(not Path("/proc").is_dir(), reason="finds processes in /proc"),
+]
 
 MOMENTS_S = (0.05, 0.3, 0.7, 1.5)
 

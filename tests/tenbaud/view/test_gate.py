@@ -17,8 +17,9 @@ from benchmarks.browser import Served, served
 from tenbaud.view.access import Access, Grant, draw_access, is_same_origin
 from tests.tenbaud.view import asking
 from tests.tenbaud.view.asking import POLLING, SOCKET_IO, ask, enter, everything, open_socket
+from tests.tenbaud.view.viewers import needs_page
 
-pytest.importorskip("nicegui")
+pytestmark = needs_page
 
 # Ours are 400 and not 403: a POST of no session. That it got so far is the point.
 OPEN = {"page": 200, "script": 200, "polling": 200, "posting": 400, "stream": 101, "socket.io": 101}

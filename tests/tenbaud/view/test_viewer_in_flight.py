@@ -17,10 +17,10 @@ from tenbaud.view.server import free_port
 from tests.tenbaud.confirmed import PATIENT, check_flown
 from tests.tenbaud.machine import Pacer
 from tests.tenbaud.processes import finish, start
-from tests.tenbaud.view.viewers import beside, is_free
+from tests.tenbaud.view.viewers import beside, is_free, needs_page
 
-pytest.importorskip("nicegui")
 pytestmark = [
+    needs_page,
     pytest.mark.real_time,
     pytest.mark.skipif(not Path("/proc").is_dir(), reason="finds processes in /proc"),
 ]

@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 import socket
+from importlib.util import find_spec
 from pathlib import Path
+
+import pytest
+
+needs_page = pytest.mark.skipif(find_spec("nicegui") is None, reason="the extra page is not installed")
+"""Looks for NiceGUI and does not import it, which takes each worker a second."""
 
 
 def beside(port: int) -> list[int]:

@@ -12,8 +12,10 @@ from channel.codec.coders.direction import DirectionCoder, DirectionParameters
 from channel.codec.coders.history import HistoryCoder, HistoryParameters
 from channel.codec.coders.open_loop_zoom import OpenLoopZoomCoder, OpenLoopZoomParameters
 from channel.codec.coders.pcm import PcmCoder, PcmParameters
+from channel.codec.coders.signs import Gains
 from channel.codec.coders.static import StaticCoder, StaticParameters
 from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
+from channel.codec.signals import signals_of
 from tenbaud.config.kinds import Kind
 from tenbaud.config.section import AngleRange, Factor, KindSection, NotNegative, Positive
 
@@ -122,12 +124,20 @@ class DirectionCoderSection(KindSection):
     maximum_strength: Positive = 1000.0
 
 
-def _common(section: Any) -> dict[str, Any]:
-    """Return what every coder of signs and gains takes."""
-    return {
-        "gains": tuple((gain,) for gain in section.gains),
-        "impulse": section.correction == "impulse",
-    }
+def _common(section: Any, context: CoderContext) -> dict[str, Any]:
+    """Return what every coder of signs and gains takes; of several outputs each has its own sign."""
+    gains: Gains = tuple((gain,) for gain in section.gains)
+    model = context.model
+    signals = signals_of(model)
+    states = [one.name for one in signals.states[: model.correction_size]]
+    names = [one.name for one in signals.outputs]
+    if len(names) > 1 and {*states} == {*names, *[f"{name}_rate" for name in names]}:
+        angle, rate = section.gains
+        gains = tuple(
+            tuple(angle * (state == name) + rate * (state == f"{name}_rate") for name in names)
+            for state in states
+        )
+    return {"gains": gains, "impulse": section.correction == "impulse"}
 
 
 def _zoom(section: ZoomCoderSection, context: CoderContext) -> Coder:
@@ -137,7 +147,7 @@ def _zoom(section: ZoomCoderSection, context: CoderContext) -> Coder:
             minimum_range=section.minimum_range_rad,
             decay=section.decay,
             window=section.window_signs,
-            **_common(section),
+            **_common(section, context),
         )
     )
 
@@ -148,7 +158,7 @@ def _open_loop_zoom(section: OpenLoopZoomCoderSection, context: CoderContext) ->
             initial_range=section.initial_range_rad,
             minimum_range=section.minimum_range_rad,
             decay=section.decay,
-            **_common(section),
+            **_common(section, context),
         )
     )
 
@@ -157,12 +167,16 @@ def _fixed(section: FixedCoderSection, context: CoderContext) -> Coder:
     """Return an open-loop zoom coder whose range is at its end from the beginning."""
     size = section.range_rad
     return OpenLoopZoomCoder(
-        OpenLoopZoomParameters(initial_range=size, minimum_range=size, decay=1.0, **_common(section))
+        OpenLoopZoomParameters(
+            initial_range=size, minimum_range=size, decay=1.0, **_common(section, context)
+        )
     )
 
 
 def _static(section: StaticCoderSection, context: CoderContext) -> Coder:
-    return StaticCoder(StaticParameters(bits=section.bits, range=section.range_rad, **_common(section)))
+    return StaticCoder(
+        StaticParameters(bits=section.bits, range=section.range_rad, **_common(section, context))
+    )
 
 
 def _pcm(section: PcmCoderSection, context: CoderContext) -> Coder:
@@ -172,6 +186,7 @@ def _pcm(section: PcmCoderSection, context: CoderContext) -> Coder:
             range=section.range_rad,
             period_s=context.symbol_period_s,
             rate_filter_s=section.rate_filter_s,
+            angles=len(context.model.measured(context.model.initial())),
         )
     )
 

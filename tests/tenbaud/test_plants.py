@@ -26,6 +26,8 @@ class Flown(NamedTuple):
     """largest rms of the live estimate's error"""
     reach: dict[str, float]
     """largest output"""
+    bits: int = 1
+    """of a word"""
 
 
 HELICOPTER = {"travel": 1.0, "elevation": 0.45, "pitch": 0.65}
@@ -50,6 +52,12 @@ MORE = {
     "helicopter-30baud": Flown(
         10.0, 3.0, {"travel": 0.008, "elevation": 0.008, "pitch": 0.025}, HELICOPTER
     ),
+    "helicopter-3x10baud": Flown(
+        10.0, 3.0, {"travel": 0.02, "elevation": 0.02, "pitch": 0.03}, HELICOPTER, 3
+    ),
+    "helicopter-usual": Flown(
+        4.0, 3.0, {"travel": 0.005, "elevation": 0.01, "pitch": 0.02}, HELICOPTER, 12
+    ),
     "pendulum-16baud": Flown(10.0, 3.0, {"angle": 0.01}, {"angle": 0.3}),
     "pendulum-20baud": Flown(10.0, 3.0, {"angle": 0.006}, {"angle": 0.2}),
 }
@@ -68,7 +76,7 @@ def check(preset: str, summary: dict[str, Any], tolerance: float = 1.0) -> None:
 def test_it_flies_in_memory_and_every_output_is_known(preset: str, tmp_path: Path) -> None:
     seconds = (PRESETS | MORE)[preset].seconds
     run = fly(preset, settings={"duration_s": seconds}, out=tmp_path / "run")
-    check_flown(run.summary, run.summary["samples"])
+    check_flown(run.summary, run.summary["samples"], bits=(PRESETS | MORE)[preset].bits)
     check(preset, run.summary)
 
 
@@ -96,9 +104,11 @@ def test_presets_are_listed_by_plant_with_their_rates() -> None:
     ],
 )
 def test_it_flies_as_two_processes(preset: str, clock: Clock, tmp_path: Path) -> None:
-    settings = {"duration_s": (PRESETS | MORE)[preset].real_s, "transmitter.watchdog_s": 30.0}
+    period_s = load_config(preset).timing.symbol_period_s
+    samples = round((PRESETS | MORE)[preset].real_s / period_s)
+    settings = {"duration_s": samples * period_s, "transmitter.watchdog_s": 30.0}
     run = fly(preset, settings=settings, out=tmp_path / "run", link="zenoh", clock=clock)
-    check_flown(run.summary, round(settings["duration_s"] / run.config.timing.symbol_period_s))
+    check_flown(run.summary, samples, bits=(PRESETS | MORE)[preset].bits)
     result = audit(tmp_path / "run")
     assert result.passed, result.leaks + result.gaps
     if clock == "virtual" or held_up(run.summary) is None:

@@ -43,7 +43,7 @@ from channel.codec.models.pitch import PITCH_SIGNALS
 from receiver.session import records as receiver
 from tenbaud.flight.report import draw_figure
 from tenbaud.recording.folder import RunFolder
-from tenbaud.recording.gather import OverviewRecorder
+from tenbaud.recording.overview import OverviewRecorder
 from tenbaud.recording.writer import McapRecorder
 from transmitter.session import records as transmitter
 

@@ -84,7 +84,6 @@ class WhiteTorque:
         self._block: list[float] = []
 
     def torque(self, step_index: int) -> float:
-        """Angular acceleration (rad/s^2) held over step `step_index` (at least 0)."""
         block_index, offset = divmod(step_index, _BLOCK_STEPS)
         if block_index != self._block_index:
             if step_index < 0:
@@ -94,7 +93,6 @@ class WhiteTorque:
         return self._block[offset]
 
     def torques(self, steps: int) -> Torques:
-        """Torques of steps `0 ... steps - 1`."""
         blocks = range(-(-steps // _BLOCK_STEPS))
         return np.concatenate([np.empty(0), *(self._draw(index) for index in blocks)])[:steps]
 
@@ -127,7 +125,6 @@ class StepTorque:
         self._end_step = None if end_s is None else math.ceil(end_s / step_s - _STEP_TOLERANCE)
 
     def torque(self, step_index: int) -> float:
-        """Angular acceleration (rad/s^2) held over step `step_index`."""
         if step_index < self._start_step:
             return 0.0
         if self._end_step is not None and step_index >= self._end_step:
@@ -135,7 +132,6 @@ class StepTorque:
         return self._torque_rad_s2
 
     def torques(self, steps: int) -> Torques:
-        """Torques of steps `0 ... steps - 1`."""
         torques = np.zeros(steps)
         torques[self._start_step : self._end_step] = self._torque_rad_s2
         return torques
@@ -151,14 +147,12 @@ class Sum:
         self._parts = parts
 
     def torque(self, step_index: int) -> float:
-        """Angular acceleration (rad/s^2) held over step `step_index`."""
         total = 0.0
         for part in self._parts:
             total += part.torque(step_index)
         return total
 
     def torques(self, steps: int) -> Torques:
-        """Torques of steps `0 ... steps - 1`."""
         total = np.zeros(steps)
         for part in self._parts:
             total += part.torques(steps)

@@ -58,7 +58,6 @@ class FunctionPlant:
         return tuple(values.tolist())
 
     def advance(self, command: tuple[float, ...]) -> None:
-        """Hold a command, clamped, for one step; ValueError for one that is no command."""
         held = np.array(held_command(command, self._command_max))
         self._held = held
         push: NDArray[np.float64] | float = 0.0

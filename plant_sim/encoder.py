@@ -56,7 +56,6 @@ class Encoder:
     turn: float = math.tau
 
     def __post_init__(self) -> None:
-        """Refuse an encoder that cannot be built."""
         if self.turn == math.tau and self.counts_per_turn < 1:
             raise ValueError(f"counts_per_turn is {self.counts_per_turn}; it must be at least 1")
         if self.sign not in (-1, 1):
@@ -73,7 +72,6 @@ class Encoder:
             raise ValueError(f"angle_rad is {angle_rad}; it must be finite") from None
 
     def read(self, value: float) -> tuple[int, float]:
-        """Return the count of a value, and the value that is made of it."""
         count = self.counts(value)
         return count, self.angle_rad(count)
 
@@ -89,15 +87,12 @@ class ExactReader:
     counts_per_unit: float = EXACT_PER_UNIT
 
     def counts(self, value: float) -> int:
-        """Return a count that changes with the value."""
         return math.floor(value * self.counts_per_unit)
 
     def read(self, value: float) -> tuple[int, float]:
-        """Return the count and the value itself."""
         return self.counts(value), value
 
     def angle_rad(self, counts: int) -> float:
-        """Return about the value that counts stand for."""
         return counts / self.counts_per_unit
 
 

@@ -156,7 +156,6 @@ def _number(file: str, variables: Mapping[str, Any], name: str) -> int:
 
 
 def _end(fmu: Any) -> None:
-    """Let go of an FMU."""
     with suppress(Exception):  # one that refused a step may refuse this too
         fmu.terminate()
     with suppress(Exception):

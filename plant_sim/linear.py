@@ -110,15 +110,12 @@ class SimulatedLinear:
 
     @property
     def measured(self) -> Vector:
-        """The outputs, C x."""
         return tuple([linear_output(self.state, self.constants, place) for place in self._outputs])
 
     def pushes(self, steps: int) -> Pushes:
-        """Return what disturbs the first steps; see `pushes_of`."""
         return pushes_of(self._disturbances or (None,) * len(self._still), steps)
 
     def advance(self, command: Vector) -> None:
-        """Hold a command, clamped, for one step; ValueError for one that is no command."""
         held = held_command(command, self._command_max)
         step = self._steps
         push = tuple([one.torque(step) for one in self._disturbances]) or self._still

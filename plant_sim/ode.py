@@ -122,11 +122,9 @@ class OdePlant:
 
     @property
     def measured(self) -> Vector:
-        """The outputs."""
         return self.state[: self._outputs]
 
     def advance(self, command: Vector) -> None:
-        """Hold a command, clamped, for one step; ValueError for one that is no command."""
         held = held_command(command, self._command_max)
         step = self._steps
         push = tuple([one.torque(step) for one in self._disturbances]) or self._still
@@ -136,7 +134,6 @@ class OdePlant:
         )
 
     def pushes(self, steps: int) -> Pushes:
-        """Return what disturbs the first steps; see `pushes_of`."""
         return pushes_of(self._disturbances or (None,) * len(self._still), steps)
 
 

@@ -42,7 +42,6 @@ class PitchParameters:
     volts_max: float = 5.0
 
     def __post_init__(self) -> None:
-        """Refuse constants that make no plant."""
         for name in ("rate_damping_per_s", "stiffness_per_s2"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
@@ -149,7 +148,7 @@ class PitchPlant:
     same `step_s`. Without one the torque is 0. The motors start at rest.
     """
 
-    __slots__ = ("_disturbance", "_sine", "_state", "_step_index", "constants")
+    __slots__ = ("_disturbance", "_sine", "_step_index", "constants", "state")
 
     step_function = staticmethod(pitch_step)
 
@@ -166,41 +165,31 @@ class PitchPlant:
 
         `sine` is `math.sin` or one whose bits do not depend on the machine.
         """
-        for name, value in (
-            ("initial_angle_rad", initial_angle_rad),
-            ("initial_rate", initial_rate),
-        ):
+        for name, value in (("initial_angle_rad", initial_angle_rad), ("initial_rate", initial_rate)):
             if not math.isfinite(value):
                 raise ValueError(f"{name} is {value}; it must be finite")
         self.constants = pitch_constants(parameters, step_s)
         self._disturbance = disturbance
         self._sine = sine
-        self._state: PitchState = (float(initial_angle_rad), float(initial_rate), 0.0, 0.0)
+        self.state: PitchState = (float(initial_angle_rad), float(initial_rate), 0.0, 0.0)
         self._step_index = 0
 
     @property
     def angle_rad(self) -> float:
         """True pitch angle, unwrapped."""
-        return self._state[0]
+        return self.state[0]
 
     @property
     def rate_rad_s(self) -> float:
         """True pitch rate."""
-        return self._state[1]
-
-    @property
-    def state(self) -> PitchState:
-        """The whole state, as `pitch_step` takes it."""
-        return self._state
+        return self.state[1]
 
     def pushes(self, steps: int) -> Pushes:
-        """Return the torques of the first steps; see `pushes_of`."""
         return pushes_of((self._disturbance,), steps)
 
     @property
     def measured(self) -> tuple[float, ...]:
-        """The one angle the encoder sees."""
-        return (self._state[0],)
+        return (self.state[0],)
 
     def advance(self, volts: tuple[float, ...]) -> None:
         """Hold the voltages (front, rear) for one step; they are clamped to `volts_max`.
@@ -214,5 +203,5 @@ class PitchPlant:
             raise ValueError(f"motor voltages are {volts}; they must be finite")
         disturbance = self._disturbance
         torque = 0.0 if disturbance is None else disturbance.torque(self._step_index)
-        self._state = pitch_step(self._state, (front, rear), (torque,), self.constants, self._sine)
+        self.state = pitch_step(self.state, (front, rear), (torque,), self.constants, self._sine)
         self._step_index += 1

@@ -116,6 +116,5 @@ class _OfAngles:
 
     @property
     def measured(self) -> tuple[float, ...]:
-        """The outputs."""
         outputs: tuple[float, ...] = self._plant.measured_rad
         return outputs

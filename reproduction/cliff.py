@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -121,7 +121,7 @@ def draw(path: Path, found: list[Stand]) -> None:
             some = [one for one in found if (one.plant, one.delivery) == (plant, delivery)]
             over = [one.rate_bit_s / one.needed_bit_s for one in some]
             label = f"{plant}, delivery at {delivery}"
-            style = {"color": color, "linestyle": line, "marker": "o", "markersize": 4}
+            style: dict[str, Any] = {"color": color, "linestyle": line, "marker": "o", "markersize": 4}
             panels[0].plot(over, [100.0 * one.share for one in some], label=label, **style)
             panels[1].plot(over, [one.ratio for one in some], **style)
     panels[0].set_ylabel("flights that stay up, %")

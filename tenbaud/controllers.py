@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from receiver.controllers.base import Controller, ControllerContext
 from receiver.controllers.pid import PAPER_GAINS, Pid, PidGains
-from receiver.controllers.references import Constant, Csv, Reference, Sine, Square, Step
+from receiver.controllers.references import Constant, Reference, Sine, Square, Step
+from tenbaud.build.references import Csv
 
 __all__ = [
     "PAPER_GAINS",

@@ -5,13 +5,7 @@ A bad argument is a plain ValueError that names the value and the allowed range.
 
 from __future__ import annotations
 
-from channel.errors import (
-    CodecDiverged,
-    ConfigMismatch,
-    LinkError,
-    LinkLost,
-    TenbaudError,
-)
+from channel.errors import CodecDiverged, ConfigMismatch, LinkError, LinkLost, TenbaudError
 from tenbaud.build.parts import PartError
 from tenbaud.config.load import ConfigError
 from tenbaud.flight.fly import FlightFailed

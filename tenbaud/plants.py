@@ -9,11 +9,4 @@ from plant_sim.disturbance import Disturbance, parse_disturbance
 from plant_sim.pitch import PitchParameters, PitchPlant
 from plant_sim.plant import Plant, PlantContext
 
-__all__ = [
-    "Disturbance",
-    "PitchParameters",
-    "PitchPlant",
-    "Plant",
-    "PlantContext",
-    "parse_disturbance",
-]
+__all__ = ["Disturbance", "PitchParameters", "PitchPlant", "Plant", "PlantContext", "parse_disturbance"]

@@ -57,7 +57,6 @@ class TransmitterEndpoint:
 
     @property
     def next_due_ns(self) -> int | None:
-        """Return when the next tick is due; None: all have been flown."""
         return self.tick * self._tick_ns if self.tick < self._end_tick else None
 
     def begin_tick(self, now_ns: int) -> list[Delivery] | None:

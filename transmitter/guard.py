@@ -105,7 +105,6 @@ class Guard:
 
     @property
     def stopped(self) -> bool:
-        """Return whether the guard no longer passes commands."""
         return self.state is GuardState.RAMPING or self.state is GuardState.LATCHED
 
     @property

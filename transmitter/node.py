@@ -62,7 +62,9 @@ class TransmitterNode:
         self._gauge_samples = max(1, round(GAP_EVERY_S * 1e9 / session.terms.sample_ns))
         self._recorder = recorder or NullRecorder()
         self._reading: Reading | None = None
-        self._watch = EncoderWatch(session.codec, session.terms.tick_ns / 1e9)
+        self._watch: EncoderWatch | None = None
+        if not rig.is_recorded:
+            self._watch = EncoderWatch(session.codec, session.terms.tick_ns / 1e9)
         self._applied = guard.command
         self._guard_told = guard.state
 
@@ -188,20 +190,19 @@ class TransmitterNode:
         self.guard.trip(GuardReason(GuardCause.STOPPED, self.tick))
 
     def tell(self, event: Event) -> None:
-        """Report something at the present tick."""
         time_ns = self.tick * self.session.terms.tick_ns
         event = replace(event, time_ns=time_ns, sample=self.session.copies.confirmed.sample)
         self.session.events.append(event)
         write_event(self._recorder, event)
 
     def on_malformed(self, why: str) -> None:
-        """Report a message that came and was no frame."""
         self.tell(Event(EventKind.MALFORMED, detail=why))
 
     def _check(self, tick: int, reading: Reading) -> None:
-        session = self.session
-        estimate = session.copies.confirmed.model if session.is_proven else None
-        fault = reading.fault or self._watch.check(reading.counts, self._applied, estimate)
+        session, fault = self.session, reading.fault
+        if fault is None and self._watch is not None:
+            estimate = session.copies.confirmed.model if session.is_proven else None
+            fault = self._watch.check(reading.counts, self._applied, estimate)
         if fault is not None and not self.guard.stopped:
             self.sensor_fault = GuardReason(GuardCause.SENSOR, tick, detail=fault)
             self.tell(Event(EventKind.SENSOR, tick=tick, detail=fault))

@@ -49,7 +49,6 @@ class Signal:
     """signals of one group share a panel; empty: those of one unit do"""
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be named or shown."""
         if not NAME.fullmatch(self.name):
             raise ValueError(
                 f"{self.name!r} is no name of a signal: use lower-case letters, digits and "
@@ -83,7 +82,6 @@ class InputSignal(Signal):
     """A command travels as a whole number of steps, at most `STEPS_MAX` either way: 1000 are mV."""
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be named, shown or carried."""
         # Not super(): a dataclass with slots is a class made anew.
         Signal.__post_init__(self)
         if not 0.0 < self.steps_per_unit < float("inf"):
@@ -126,7 +124,6 @@ class Signals:
     """of each input"""
 
     def __post_init__(self) -> None:
-        """Refuse names that occur twice, and outputs that are states which are not there."""
         for what in ("states", "inputs", "outputs"):
             names = [one.name for one in getattr(self, what)]
             doubled = sorted({name for name in names if names.count(name) > 1})

@@ -55,7 +55,6 @@ class Alphabet:
         return self._digit[symbol]
 
     def symbol(self, number: int) -> int | None:
-        """Return the symbol with this number, None when there is none."""
         return self.symbols[number] if 0 <= number < len(self.symbols) else None
 
     def word_number(self, word: Word) -> int:
@@ -70,7 +69,6 @@ class Alphabet:
         return number
 
     def has_word(self, number: int) -> bool:
-        """Return whether this is the wire number of a word or of an erasure."""
         return 0 <= number < self._words or number == WIRE_ERASED
 
     def word(self, number: int) -> Word:

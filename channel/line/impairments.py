@@ -55,7 +55,6 @@ class Impairments:
 
     @property
     def any(self) -> bool:
-        """Return whether anything is set."""
         return self != Impairments()
 
     def is_cut(self, now_ns: int) -> bool:
@@ -75,7 +74,6 @@ class LineFaults:
 
     @property
     def any(self) -> bool:
-        """Return whether anything is set."""
         return self != LineFaults()
 
     @property
@@ -197,12 +195,10 @@ class ImpairedLine:
     _in_burst: bool = field(init=False, default=False)
 
     def __post_init__(self) -> None:
-        """Seed the chance."""
         self._chance = random.Random(self.seed)
 
     @property
     def longest_delay_ns(self) -> int:
-        """Return how long a message may be under way."""
         one = self.impairments
         held_ns = one.reorder_ns if one.reorder or one.duplicate else 0
         return self.line.longest_delay_ns + one.delay_ns + one.jitter_ns + held_ns
@@ -212,7 +208,6 @@ class ImpairedLine:
         self.impairments = impairments
 
     def carry(self, data: bytes, now_ns: int) -> list[Delivery]:
-        """Return the arrivals of a message put on the line at flight time `now_ns`."""
         one, chance = self.impairments, self._chance.random
         enters_ns = now_ns + one.delay_ns
         if one.jitter_ns:

@@ -48,7 +48,6 @@ class CleanLine:
         self.counts: Counter[str] = Counter()
 
     def carry(self, data: bytes, now_ns: int) -> list[Delivery]:
-        """Return the one arrival of a message put on the line at flight time `now_ns`."""
         return [Delivery(now_ns + self.longest_delay_ns, data)]
 
 
@@ -63,12 +62,10 @@ class Outbox:
         self._order = 0
 
     def __len__(self) -> int:
-        """Return how many messages wait."""
         return len(self._waiting)
 
     @property
     def next_due_ns(self) -> int | None:
-        """Return when the next message is due, None when none waits."""
         return self._waiting[0][0] if self._waiting else None
 
     def put(self, deliveries: Iterable[Delivery]) -> None:
@@ -79,7 +76,6 @@ class Outbox:
                 heapq.heappush(self._waiting, (arrival_ns, self._order, data))
 
     def take(self, now_ns: int) -> list[bytes]:
-        """Return all that is due by now."""
         due: list[bytes] = []
         while self._waiting and self._waiting[0][0] <= now_ns:
             due.append(heapq.heappop(self._waiting)[2])
@@ -100,7 +96,6 @@ class Inlet:
         self._on_malformed = on_malformed
 
     def take(self, data: bytes) -> Frame | None:
-        """Return the frame in a message; None when there is none."""
         size = self.wire.size(data)
         self.wire_bytes += size
         try:

@@ -15,7 +15,6 @@ class LatenessMeter:
         self._bins = [0] * (self.BINS + 1)
 
     def add(self, lateness_ns: int) -> None:
-        """Take one lateness."""
         self.count += 1
         self.largest_ns = max(self.largest_ns, lateness_ns)
         self._bins[min(max(lateness_ns, 0) // self.BIN_NS, self.BINS)] += 1
@@ -41,7 +40,6 @@ class BaudMeter:
         self._last_ns = 0
 
     def on_symbol(self, now_ns: int) -> None:
-        """Count one symbol that arrived in time."""
         if self.symbols == 0:
             self._first_ns = now_ns
         self._last_ns = now_ns

@@ -54,7 +54,6 @@ class UplinkMeter:
         """of `wire_bytes`, those that carried no symbol"""
 
     def count(self, frame: Frame, size: int) -> None:
-        """Count one frame of `size` bytes."""
         self.wire_bytes += size
         if isinstance(frame, Symbol):
             self.symbols += 1
@@ -63,7 +62,6 @@ class UplinkMeter:
 
     @property
     def coder_bits(self) -> float:
-        """Return the bits that the coder was paid for."""
         return self.symbols * self._bits_per_symbol
 
 

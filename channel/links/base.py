@@ -48,7 +48,6 @@ class Link(ABC):
 
     @property
     def counts(self) -> LinkCounts:
-        """Return what went over it until now."""
         return self._counts
 
     @abstractmethod

@@ -32,39 +32,24 @@ class NodePlace(TypedDict, total=False):
 
 
 class LinkSettings(Protocol):
-    """The configuration's section `link`."""
+    """The configuration's section `link`; `options` are whatever a kind from outside asks for."""
 
     @property
-    def session(self) -> str:
-        """Name of the session."""
-
+    def session(self) -> str: ...
     @property
-    def peer_timeout_s(self) -> float:
-        """Silence after which an end gives the other one up."""
-
+    def peer_timeout_s(self) -> float: ...
     @property
-    def port(self) -> str:
-        """This end's own port."""
-
+    def port(self) -> str: ...
     @property
-    def line_rate_baud(self) -> int:
-        """Bits per second on the line."""
-
+    def line_rate_baud(self) -> int: ...
     @property
-    def downlink(self) -> str:
-        """Another way for the commands; empty: the same."""
-
+    def downlink(self) -> str: ...
     @property
-    def downlink_rate_baud(self) -> int:
-        """Bits per second on that one."""
-
+    def downlink_rate_baud(self) -> int: ...
     @property
-    def best_effort(self) -> bool:
-        """A congested network may drop symbols."""
-
+    def best_effort(self) -> bool: ...
     @property
-    def options(self) -> Mapping[str, Any]:
-        """Whatever a kind from outside asks for."""
+    def options(self) -> Mapping[str, Any]: ...
 
 
 @dataclass(frozen=True, slots=True)

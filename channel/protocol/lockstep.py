@@ -56,7 +56,6 @@ class History:
         self._kept: deque[_Kept] = deque(maxlen=states_kept)
 
     def add(self, epoch: int, word: Word, state: CodecState) -> None:
-        """Keep one sample; `state` is the one after it."""
         self._kept.append(_Kept(epoch, word, state))
 
     def state_after(self, sample: int) -> CodecState | None:

@@ -30,7 +30,6 @@ class ControllerContext:
 
     @property
     def reference(self) -> Any:
-        """Return the set-point of the first output."""
         return self.references[0] or Constant(0.0, self.tick_s)
 
     @property
@@ -69,12 +68,10 @@ class _OfOneReference:
         self._controller = controller
 
     def command(self, tick: int, state: tuple[float, ...]) -> tuple[float, ...]:
-        """Return the controller's command."""
         command: tuple[float, ...] = self._controller.command(tick, state)
         return command
 
     def references(self, tick: int) -> tuple[float | None, ...]:
-        """Return the controller's set-point."""
         return (self._controller.reference_rad(tick),)
 
 

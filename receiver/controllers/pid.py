@@ -31,7 +31,6 @@ class PidGains:
     unit: str
 
     def __post_init__(self) -> None:
-        """Refuse gains that would push away from the reference, and units that are none."""
         for name in ("proportional", "integral", "derivative"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
@@ -46,11 +45,7 @@ class PidGains:
                 + (" or per deg, such as 'V/rad' or 'V/deg'" if output_unit == "rad" else "")
             )
         scale = math.degrees(1.0) if over != output_unit else 1.0
-        return (
-            self.proportional * scale,
-            self.integral * scale * tick_s,
-            self.derivative * scale,
-        )
+        return (self.proportional * scale, self.integral * scale * tick_s, self.derivative * scale)
 
 
 # The paper prints no unit. In V/rad the loop cannot reach the reference at all; in V/deg it behaves
@@ -166,7 +161,6 @@ class PidLoops:
         self._last_tick: int | None = None
 
     def references(self, tick: int) -> tuple[float | None, ...]:
-        """Return the set-point of each output at `tick`."""
         found: list[float | None] = [None] * self._outputs
         for loop in self.loops:
             found[loop.output] = loop.reference.value(tick)

@@ -1,4 +1,4 @@
-"""A controller that repeats the voltages of a recorded flight."""
+"""A controller that repeats the commands of a recorded flight."""
 
 from __future__ import annotations
 
@@ -11,21 +11,20 @@ class RecordedController:
     The estimated state is ignored, because the flight has already happened.
     """
 
-    def __init__(self, log: FlightLog) -> None:
-        """Replay `log`; ValueError when it was read without voltages."""
-        if not log.volts or not log.volts[0]:
-            raise ValueError("the flight log holds no voltages; read it with its volts columns")
-        self._volts = log.volts
-        self._last_row = len(log.volts) - 1
+    def __init__(self, log: FlightLog, inputs: int) -> None:
+        """Replay `log`; `inputs` of the plant are zero where it has none."""
+        self._commands = log.commands
+        self._zero = (0.0,) * inputs
+        self._last_row = len(log) - 1
 
     def command(self, tick: int, state: tuple[float, ...]) -> tuple[float, ...]:
-        """Return the voltages of row `tick`; past the end, those of the last row.
+        """Return the inputs of row `tick`; past the end, those of the last row; zeros without inputs.
 
         `state` is not read. Raises ValueError for a tick below 0.
         """
         if tick < 0:
             raise ValueError(f"tick is {tick}; it must be at least 0")
-        return self._volts[min(tick, self._last_row)]
+        return tuple(self._commands[min(tick, self._last_row)].tolist()) or self._zero
 
     def references(self, tick: int) -> tuple[float | None, ...]:
         """Return none: a recorded flight follows no reference of ours."""

@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
-from os import PathLike
 from typing import Final, Protocol
-
-from channel.flight_log import column_names, parse_number, read_columns
 
 # A time within this share of a tick after the tick counts as the tick itself.
 _TICK_TOLERANCE: Final = 1e-6
@@ -42,12 +40,10 @@ class Constant(AngleReference):
     tick_s: float
 
     def __post_init__(self) -> None:
-        """Refuse values out of range."""
         _require_finite("level", self.level)
         _require_positive("tick_s", self.tick_s)
 
     def value(self, tick: int) -> float:
-        """Return the level."""
         return self.level
 
 
@@ -59,11 +55,9 @@ class Shifted(AngleReference):
     offset: float
 
     def __post_init__(self) -> None:
-        """Refuse values out of range."""
         _require_finite("offset", self.offset)
 
     def value(self, tick: int) -> float:
-        """Return the set-point at `tick`."""
         return self.offset + self.about.value(tick)
 
 
@@ -76,14 +70,12 @@ class Step(AngleReference):
     tick_s: float
 
     def __post_init__(self) -> None:
-        """Refuse values out of range."""
         _require_finite("amplitude", self.amplitude)
         _require_positive("tick_s", self.tick_s)
         if not (math.isfinite(self.start_s) and self.start_s >= 0.0):
             raise ValueError(f"start_s is {self.start_s}; it must be finite and at least 0")
 
     def value(self, tick: int) -> float:
-        """Return the set-point at `tick`."""
         return self.amplitude if tick >= _first_tick(self.start_s, self.tick_s) else 0.0
 
 
@@ -99,11 +91,9 @@ class Square(AngleReference):
     tick_s: float
 
     def __post_init__(self) -> None:
-        """Refuse values out of range."""
         _require_wave(self.amplitude, self.period_s, self.tick_s)
 
     def value(self, tick: int) -> float:
-        """Return the set-point at `tick`."""
         half_periods = tick * self.tick_s / (0.5 * self.period_s)
         tolerance = _TICK_TOLERANCE * self.tick_s / self.period_s
         odd = math.floor(half_periods + tolerance) % 2
@@ -119,44 +109,24 @@ class Sine(AngleReference):
     tick_s: float
 
     def __post_init__(self) -> None:
-        """Refuse values out of range."""
         _require_wave(self.amplitude, self.period_s, self.tick_s)
 
     def value(self, tick: int) -> float:
-        """Return the set-point at `tick`."""
         return self.amplitude * math.sin(math.tau * tick * self.tick_s / self.period_s)
 
 
-class Csv(AngleReference):
-    """Values from a file with the columns `time_s` and `column`; each row holds until the next.
+class Listed(AngleReference):
+    """Values at times of their own, which rise and are at least 0; each holds until the next.
 
-    Times rise from row to row and are at least 0. Before the first row its value holds, after the
-    last one the last. A file without `column` may have `angle_rad` instead.
+    Before the first time its value holds, after the last one the last.
     """
 
-    def __init__(self, path: str | PathLike[str], tick_s: float, column: str = "angle_rad") -> None:
-        """Read the whole file; ValueError with file and line for anything wrong in it."""
+    def __init__(self, times_s: Sequence[float], values: Sequence[float], tick_s: float) -> None:
         _require_positive("tick_s", tick_s)
-        self._first_ticks: list[int] = []
-        self._values: list[float] = []
-        last_time_s = -math.inf
-        if column not in (present := column_names(path)) and "angle_rad" in present:
-            column = "angle_rad"
-        for line, (time_text, text) in read_columns(path, ("time_s", column)):
-            time_s = parse_number(time_text, path, line, "time_s")
-            if time_s < 0.0 or time_s <= last_time_s:
-                floor = "at least 0" if last_time_s < 0.0 else f"above {last_time_s}"
-                raise ValueError(
-                    f"{path}, line {line}, column time_s: {time_s} found; it must be {floor}"
-                )
-            last_time_s = time_s
-            self._first_ticks.append(_first_tick(time_s, tick_s))
-            self._values.append(parse_number(text, path, line, column))
-        if not self._values:
-            raise ValueError(f"{path}, line 2: no rows; a reference needs at least 1")
+        self._first_ticks = [_first_tick(time_s, tick_s) for time_s in times_s]
+        self._values = list(values)
 
     def value(self, tick: int) -> float:
-        """Return the set-point at `tick`."""
         return self._values[max(bisect_right(self._first_ticks, tick) - 1, 0)]
 
 
@@ -176,7 +146,6 @@ class SteeredReference(AngleReference):
         self.by_hand = value
 
     def value(self, tick: int) -> float:
-        """Return the set-point at `tick`."""
         return self._programme.value(tick) if self.by_hand is None else self.by_hand
 
 

@@ -93,7 +93,6 @@ class StateFeedback:
         self.tick_s = tick_s
 
     def references(self, tick: int) -> tuple[float | None, ...]:
-        """Return the set-point of each output at `tick`."""
         return tuple([None if one is None else one.value(tick) for one in self._references])
 
     def command(self, tick: int, state: Vector) -> Vector:

@@ -100,13 +100,7 @@ class Commander:
         """
         known = tuple(self._commands)
         self.state = carried_to(
-            self.codec,
-            self.state,
-            sample,
-            known,
-            self.hold,
-            silent_samples,
-            self.terms.history_samples,
+            self.codec, self.state, sample, known, self.hold, silent_samples, self.terms.history_samples
         )
         self._hold(self.hold)
 

@@ -9,12 +9,7 @@ from channel.codec.lead import FlownSample
 from channel.codec.words import Word
 from channel.protocol.frames import Desync, Symbol
 from channel.protocol.lockstep import LOCKSTEP_CHANNEL, History
-from channel.protocol.recording import (
-    ARRIVED_CHANNEL,
-    Field,
-    RecordChannel,
-    Recorder,
-)
+from channel.protocol.recording import ARRIVED_CHANNEL, Field, RecordChannel, Recorder
 from channel.protocol.terms import Terms
 
 ReferencesOf = Callable[[int], tuple[float | None, ...]]
@@ -73,11 +68,7 @@ def write_commands(
 def write_failure(recorder: Recorder, terms: Terms, history: History, theirs: Desync) -> None:
     """Write a lockstep failure down, as the transmitter reported it and as this end saw it."""
     row = history.failure_row(
-        theirs.epoch,
-        theirs.sample,
-        theirs.receiver_digest,
-        theirs.transmitter_digest,
-        theirs.state,
+        theirs.epoch, theirs.sample, theirs.receiver_digest, theirs.transmitter_digest, theirs.state
     )
     recorder.write(LOCKSTEP_CHANNEL, theirs.sample * terms.sample_ns, row)
 

@@ -90,7 +90,6 @@ class Greeter:
         self._persisted = 0
 
     def answer_with(self, welcome: Welcome) -> None:
-        """Remember what a request was answered with."""
         self.welcome = welcome
 
     def judge(
@@ -142,7 +141,6 @@ class Greeter:
         return self._persisted >= PERSISTENT_REQUESTS
 
     def on_symbol(self) -> None:
-        """Note that the present transmitter is heard."""
         self._symbols_since += 1
 
     def _judge_unknown_peer(

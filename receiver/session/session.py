@@ -163,13 +163,11 @@ class ReceiverSession:
         return frames
 
     def bye(self, end: End) -> list[Frame]:
-        """End the session from this side."""
         was_flying = self.phase is Phase.FLYING
         self._end(end)
         return [Bye(self.session_number, end.ending, end.text)] if was_flying else []
 
     def on_malformed(self, why: str) -> None:
-        """Note that bytes came which are no frame."""
         self.counts["malformed"] += 1
         self._emit(Event(EventKind.MALFORMED, detail=why))
 

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import solve_continuous_are
 
+from reproduction.limits.models import integrators
 from tenbaud.bounds.closed import DOUBLE_INTEGRATOR
 from tenbaud.bounds.floor import floor
-from tenbaud.bounds.linear import LinearModel, integrators
+from tenbaud.bounds.linear import LinearModel
 
 
 def encoder_floor(counts_per_turn: int) -> float:

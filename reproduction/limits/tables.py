@@ -9,13 +9,13 @@ from reproduction.limits.candidates import CANDIDATES, PRESETS, TUNED, Candidate
 from reproduction.limits.encoder import floor_behind_encoder
 from reproduction.limits.flight import FINE_COUNTS, RIG_COUNTS, tick_of
 from reproduction.limits.intervals import exponent, paired, ratio
+from reproduction.limits.models import integrators, pitch
 from reproduction.limits.plan import DENSITIES, NOMINAL, RATES, Outcome
 from reproduction.limits.recorded import Row
 from reproduction.limits.tracking import DISTURBANCES, USUAL
 from reproduction.limits.tracking import PRESETS as LOOPS
 from reproduction.limits.trials import TRIALS, fly_trial
 from tenbaud.bounds.floor import floor, word_floor
-from tenbaud.bounds.linear import integrators, pitch
 
 
 def estimation(

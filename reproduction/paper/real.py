@@ -23,7 +23,7 @@ from reproduction.paper.flights import Job, Overrides
 from tenbaud.config.load import load_config
 from tenbaud.files.whole import write_whole
 from tenbaud.identify.run import model_section
-from tenbaud.identify.sources import LogColumns, from_csv
+from tenbaud.identify.sources import from_log
 
 UIUC_FILE = "uiuc_closed_loop.csv"
 NTNU_FILES = ("ntnu_travel_step.csv", "ntnu_elevation_obstacle.csv")
@@ -54,8 +54,8 @@ def identify_first_half(data: Path) -> FirstHalf:
     People push it, so the regression is disturbed by torques that the log does not hold, and says so.
     The model is therefore that of the simulation-error fit over stretches of 0.6 s.
     """
-    config = load_config("uiuc-10baud")
-    record = from_csv(data / UIUC_FILE, LogColumns(), config).part(0.0, HALF_S)
+    log = {"file": str(data / UIUC_FILE), "end_s": HALF_S}
+    record = from_log(load_config("uiuc-10baud", None, {"flight_log": log}))
     settings = PitchSettings(filter_bandwidth_rad_s=BANDWIDTH_RAD_S, settle_s=5.0 / BANDWIDTH_RAD_S)
     regression = identify(record, None, settings)
     start = PitchEstimates(1.0, 1.0, regression.estimates.torque_gain_rad_per_v_s2, 0.0)

@@ -28,7 +28,6 @@ class Findings:
         self._count: Counter[tuple[bool, str, str, str, str]] = Counter()
 
     def add(self, is_gap: bool, place: Place, field: str, what: str, detail: str) -> None:
-        """Add one; see `Place`."""
         kind = (is_gap, place.end, place.topic, field, what)
         self._count[kind] += 1
         if kind not in self._first:
@@ -57,7 +56,6 @@ class Place(NamedTuple):
     """such as `sample 77`"""
 
     def leak(self, field: str, what: str, detail: str = "") -> None:
-        """Note something wrong."""
         self.findings.add(False, self, field, what, detail)
 
     def gap(self, field: str, what: str, detail: str = "") -> None:
@@ -90,26 +88,21 @@ class Evidence:
 
     @property
     def rows(self) -> dict[str, EndRows]:
-        """The rows of each end that is here."""
         return self.record.rows
 
     @property
     def agreement(self) -> Agreement:
-        """The agreement of both ends."""
         return self.record.agreement
 
     @property
     def terms(self) -> Terms:
-        """The timing that they agreed on."""
         return self.record.agreement.terms
 
     @property
     def alphabet(self) -> Alphabet:
-        """The symbols of the coder."""
         return self.record.agreement.codec.coder.alphabet
 
     def at(self, end: str, topic: str, row: str) -> Place:
-        """Return a place in the recordings."""
         return Place(self.findings, end, topic, row)
 
     def topic(self, end: str, name: str) -> Topic:
@@ -118,12 +111,10 @@ class Evidence:
         return Topic() if rows is None else rows.topics[name]
 
     def each(self, end: str, name: str) -> Iterator[tuple[Place, Any]]:
-        """Yield the rows of a topic, each with its place."""
         for row in self.topic(end, name):
             yield self.at(end, name, _label(name, row)), row
 
     def is_whole(self, end: str) -> bool:
-        """Return whether an end was recorded to its end."""
         return end in self.rows and self.rows[end].complete
 
     def summary(self, end: str) -> dict[str, Any]:
@@ -161,7 +152,6 @@ class Claim:
 
     @property
     def fields(self) -> set[tuple[str, str, str]]:
-        """Each (end, topic, field) that it verifies."""
         return {(end, topic, name) for end, topic, *names in self.owns for name in names}
 
 

@@ -92,11 +92,9 @@ class LinearStrength:
 
     @property
     def whole(self) -> float | None:
-        """Return the density as the mean over all of the flight."""
         return self._strength(self.squares.whole)
 
     def add(self, done: Confirmed, measured: tuple[float, ...]) -> None:
-        """Take a confirmed sample and the outputs measured at its first tick; samples in order."""
         if done.sample != self._next_sample or len(self._errors) == self._samples:
             self._known = np.zeros(len(self._known))
             self._errors.clear()

@@ -63,6 +63,11 @@ def build_model(config: FlightConfig, parts: Parts | None = None) -> Model:
         model = build_plugin(config, MODELS, section.kind, context, section.options, Model)
     else:
         model = kind_of(MODELS, section.kind).build(section, context)
+        if len(model.initial()) != model.state_size:
+            raise ValueError(
+                f"model.start has {len(model.initial())} numbers, one for each of "
+                f"{model.state_size} states is needed"
+            )
     return model
 
 

@@ -12,7 +12,7 @@ from receiver.controllers.pid import Loop, PidConstants, PidGains, PidLoops, Rea
 from receiver.controllers.recorded import RecordedController
 from receiver.controllers.references import Constant
 from tenbaud.build.codec import build_model
-from tenbaud.build.flight import read_flight_log
+from tenbaud.build.flight_log import read_flight_log
 from tenbaud.build.plugins import build_part
 from tenbaud.build.references import References, build_references
 from tenbaud.build.signals import build_limits, initial_command
@@ -53,7 +53,7 @@ def controller_context(
 
 def recorded(config: FlightConfig, context: ControllerContext) -> RecordedController:
     """Return what gives the commands of a recorded flight again."""
-    return RecordedController(read_flight_log(config))
+    return RecordedController(read_flight_log(config, context.signals), len(context.signals.inputs))
 
 
 def pid(config: FlightConfig, context: ControllerContext) -> PidLoops:

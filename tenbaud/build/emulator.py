@@ -6,7 +6,7 @@ import time
 from typing import Literal
 
 from plant_sim.encoder import Encoder
-from tenbaud.build.flight import read_flight_log
+from tenbaud.build.flight_log import read_flight_log
 from tenbaud.build.rig import build_axes, build_plant, quarc_commands, quarc_fields, wired_outputs
 from tenbaud.build.signals import configured_signals
 from tenbaud.config.load import ConfigError
@@ -85,9 +85,9 @@ def _axis(config: FlightConfig, form: EmulatedFormat) -> Axis:
 
 
 def _body(config: FlightConfig, axis: Axis) -> Body:
-    if config.transmitter.rig == "replay":
-        return RecordedBody(read_flight_log(config), round(config.timing.tick_s * 1e9))
     encoder = Encoder(axis.counts_per_turn, axis.sign, axis.zero_counts or 0, axis.turn)
+    if config.transmitter.rig == "replay":
+        return RecordedBody(read_flight_log(config), round(config.timing.tick_s * 1e9), encoder)
     return SimulatedBody(build_plant(config, STEP_S), round(STEP_S * 1e9), encoder)
 
 

@@ -22,12 +22,13 @@ from receiver.session.session import ReceiverSession
 from tenbaud.build.codec import build_codec
 from tenbaud.build.controllers import build_controller
 from tenbaud.build.flight import Agreement, ticks_of, watchdog_wanted_s
+from tenbaud.build.flight_log import output_steps
 from tenbaud.build.gauge import build_gauge
 from tenbaud.build.liveness import overtaking_ticks, watchdog_ticks
 from tenbaud.build.parts import Parts
 from tenbaud.build.references import References, build_references, values_of
 from tenbaud.build.rig import build_rig
-from tenbaud.build.signals import configured_signals, encoder_steps, safe_command, soft_limits
+from tenbaud.build.signals import configured_signals, safe_command, soft_limits
 from tenbaud.config.kinds import CONTROLLERS
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
@@ -60,8 +61,8 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
         gauge.on_errors if gauge is not None else lambda _errors: None,
     )
     # Only a rig that hurts nobody is armed again by itself.
-    rearm_s = config.link.peer_timeout_s if config.transmitter.rig == "simulated" else None
-    rearm_ticks = None if rearm_s is None else ticks_of(rearm_s, config)
+    harmless = config.transmitter.rig in ("simulated", "replay")
+    rearm_ticks = ticks_of(config.link.peer_timeout_s, config) if harmless else None
     return TransmitterNode(
         session,
         build_rig(config, agreement.parts.plant, agreement.signals),
@@ -92,7 +93,7 @@ def build_observer(agreement: Agreement) -> StateObserver | None:
         if isinstance(codec.model, LinearModel) or len(agreement.signals.outputs) > 1:
             from tenbaud.design.observer import configured_observer
 
-            steps = encoder_steps(config, agreement.signals)
+            steps = output_steps(config, agreement.signals)
             return configured_observer(codec.model, config, steps)
         return rate_observer(codec.model, tick_s, config.transmitter.rate_observer_bandwidth_rad_s)
     except ValueError as error:
@@ -184,13 +185,20 @@ def _check_command(config: FlightConfig, controller: Controller, parts: Parts) -
 
 
 def guard_settings(agreement: Agreement) -> GuardSettings:
-    """Return when the guard steps in, and how."""
+    """Return when the guard steps in, and how.
+
+    On a recording there is nothing to protect: only a receiver that is gone ends the flight.
+    """
     section = agreement.config.transmitter
     terms = agreement.terms
+    recorded = section.rig == "replay"
+    timeout_ticks = watchdog_ticks(watchdog_wanted_s(agreement.config), terms, agreement.trip)
+    if recorded:
+        timeout_ticks = ticks_of(agreement.config.link.peer_timeout_s, agreement.config)
     return GuardSettings(
-        timeout_ticks=watchdog_ticks(watchdog_wanted_s(agreement.config), terms, agreement.trip),
+        timeout_ticks=timeout_ticks,
         ramp_ticks=ticks_of(section.ramp_s, agreement.config),
         safe_command=safe_command(agreement.config, agreement.signals),
-        soft_limits=soft_limits(agreement.config, agreement.signals),
+        soft_limits=() if recorded else soft_limits(agreement.config, agreement.signals),
         outputs=agreement.signals.outputs,
     )

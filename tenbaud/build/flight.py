@@ -6,12 +6,9 @@ import math
 from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 
 from channel.codec.codec import Codec
 from channel.codec.signals import Signals, signals_of
-from channel.errors import TenbaudError
-from channel.flight_log import FlightColumns, FlightLog
 from channel.line.impairments import LineFaults, parse_impairments
 from channel.links.kind import LinkKind
 from channel.links.registry import LINKS, link_kind
@@ -62,18 +59,15 @@ class Agreement:
 
     @property
     def flight_ticks(self) -> int:
-        """Return the ticks of the flight: whole samples, at least one."""
         samples = round(self.config.duration_s * 1e9) // self.terms.sample_ns
         return max(1, samples) * self.terms.ticks_per_sample
 
     @property
     def link(self) -> LinkKind:
-        """Return what the configured kind of link says about itself."""
         return kind_of_link(self.config)
 
     @property
     def faults(self) -> LineFaults:
-        """Return what goes wrong on the line, on purpose."""
         return parse_impairments(self.config.link.impairments)
 
     @property
@@ -126,9 +120,9 @@ def agree(config: FlightConfig, clock: Clock, parts: Parts | None = None) -> Agr
 
 
 def watchdog_wanted_s(config: FlightConfig) -> float | None:
-    """Return the watchdog's time-out as configured, None where it is "auto"."""
+    """Return the watchdog's time-out as configured, None where it is "auto" or a recording flies."""
     wanted = config.transmitter.watchdog_s
-    return None if wanted == "auto" else wanted
+    return None if wanted == "auto" or config.transmitter.rig == "replay" else wanted
 
 
 def checked_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:
@@ -176,26 +170,6 @@ def kind_of_link(config: FlightConfig) -> LinkKind:
         return link_kind(config.link.kind)
     except RegistryError as error:
         raise ConfigError(str(error)) from error
-
-
-def read_flight_log(config: FlightConfig) -> FlightLog:
-    """Read the recorded flight that the configuration names."""
-    section = config.flight_log
-    if not section.file:
-        raise ConfigError("flight_log.file names no recording; give --rig replay:FILE")
-    columns = FlightColumns(
-        index_column=section.index_column,
-        counts_columns=(section.counts_column,),
-        volts_columns=section.volts_columns,
-    )
-    try:
-        return FlightLog.read(Path(section.file), columns)
-    except ValueError as error:
-        raise RecordingUnusable(str(error)) from error
-
-
-class RecordingUnusable(TenbaudError):
-    """A recorded flight that cannot be replayed; the text names file, line and column."""
 
 
 def ticks_of(seconds: float, config: FlightConfig) -> int:

@@ -10,7 +10,7 @@ from channel.codec.models.pitch import PitchModel
 from channel.line.uplink import bit_rate
 from tenbaud.bounds.closed import double_integrator_floor, double_integrator_rate
 from tenbaud.build.flight import Agreement
-from tenbaud.build.signals import encoder_steps
+from tenbaud.build.flight_log import output_steps
 from tenbaud.config.kinds import model_kind
 from transmitter.metrics.gap import GapGauge, Limit, StrengthMeter
 
@@ -26,7 +26,7 @@ def build_gauge(agreement: Agreement) -> GapGauge | None:
     """
     codec, terms = agreement.codec, agreement.terms
     tick_s = terms.tick_ns / 1e9
-    steps = encoder_steps(agreement.config, agreement.signals)
+    steps = output_steps(agreement.config, agreement.signals)
     if isinstance(codec.model, PitchModel):
         limit = Limit(
             double_integrator_floor(1.0, bit_rate(codec, tick_s)),

@@ -124,7 +124,6 @@ def _over_time(given: Any, outputs: int, ticks: int, tick_s: float) -> Table:
 
 
 def _is_pair(given: Any) -> bool:
-    """Return whether these are times and values."""
     return isinstance(given, tuple) and len(given) == 2 and np.ndim(given[0]) == 1
 
 

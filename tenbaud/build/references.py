@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from channel.codec.signals import Signal, Signals
-from receiver.controllers.references import Constant, Csv, Reference, Shifted, Sine, Square, Step
+from receiver.controllers.references import Constant, Listed, Reference, Shifted, Sine, Square, Step
 from tenbaud.build.signals import check_outputs
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig, ReferenceSection
@@ -75,8 +77,33 @@ def _about_zero(section: ReferenceSection, tick_s: float, output: Signal) -> Ref
             if not section.file:
                 raise ConfigError("receiver.reference.file names no file for the csv reference")
             try:
-                return Csv(Path(section.file), tick_s, output.column)
+                return Csv(section.file, tick_s, output.column)
             except ValueError as error:
                 raise ConfigError(f"receiver.reference: {error}") from error
         case "none":
             raise ConfigError(f"the output {output.name} follows no reference")
+
+
+class Csv(Listed):
+    """Values from a log with the columns `time_s` and `column`; each row holds until the next.
+
+    Times rise from row to row and are at least 0. A file without `column` may have `angle_rad` instead.
+    """
+
+    def __init__(self, path: str | Path, tick_s: float, column: str = "angle_rad") -> None:
+        """Read the whole file; ValueError with file and line for anything wrong in it."""
+        from tenbaud.log.reader import read_table
+
+        table = read_table(path)
+        if column not in table.names and "angle_rad" in table.names:
+            column = "angle_rad"
+        at, of = table.find("time_s"), table.find(column)
+        times_s, values = table.check(at), table.check(of)
+        if not len(values):
+            raise ValueError(f"{path}: no rows; a reference needs at least 1")
+        wrong = [0] if times_s[0] < 0.0 else (np.flatnonzero(np.diff(times_s) <= 0.0) + 1).tolist()
+        if wrong:
+            row = wrong[0]
+            floor = f"above {times_s[row - 1]}" if row else "at least 0"
+            raise table.fault(row, at, f"{times_s[row]} found; it must be {floor}")
+        super().__init__(times_s.tolist(), values.tolist(), tick_s)

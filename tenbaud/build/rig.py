@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from channel.codec.numerics import sin
 from channel.codec.signals import Signals
 from plant_sim.disturbance import parse_disturbance
 from plant_sim.pitch import PitchParameters, PitchPlant
 from plant_sim.plant import Plant, PlantContext
-from tenbaud.build.flight import REAL_RIGS, read_flight_log
+from tenbaud.build.flight import REAL_RIGS
+from tenbaud.build.flight_log import read_flight_log
 from tenbaud.build.plugins import build_part
 from tenbaud.build.signals import (
     TURNS,
@@ -23,7 +26,7 @@ from tenbaud.config.rig_schema import AxisSection
 from tenbaud.config.schema import FlightConfig
 from transmitter.rigs.axes import Axis, Motors
 from transmitter.rigs.base import Rig
-from transmitter.rigs.device import DeviceRig, DeviceSettings
+from transmitter.rigs.device import DeviceRig, DeviceSettings, Wiring
 from transmitter.rigs.formats.base import SerialFormat
 from transmitter.rigs.simulated import DryRig, ReplayRig, SimulatedRig
 
@@ -145,17 +148,16 @@ def nominal_plant(config: FlightConfig, volts_max: float | None = None) -> Pitch
     plant = config.transmitter.plant
     follows = isinstance(model, PitchModelSection) and plant.relative_to == "model"
     section = model if follows else plant.pitch
-    return PitchParameters(**section.model_dump(exclude={"kind"}), volts_max=volts_max)
+    return PitchParameters(**section.model_dump(exclude={"kind", "start"}), volts_max=volts_max)
 
 
 def _build_other(config: FlightConfig, plant: Plant | None, signals: Signals) -> Rig:
-    encoders = build_encoders(config, signals)
     if config.transmitter.rig == "replay":
-        return ReplayRig(read_flight_log(config), encoders)
+        return ReplayRig(read_flight_log(config, signals))
     if plant is None:
         plant = build_plant(config, config.timing.tick_s, signals)
     names = [one.name for one in signals.outputs]
-    return SimulatedRig(plant, encoders, safe_command(config, signals), names)
+    return SimulatedRig(plant, build_encoders(config, signals), safe_command(config, signals), names)
 
 
 def build_axes(config: FlightConfig, signals: Signals | None = None) -> tuple[Axis, ...]:
@@ -243,8 +245,10 @@ def wired_outputs(signals: Signals) -> dict[str, str]:
     return {"pitch": "rad"} if list(outputs) == ["output_1"] else outputs
 
 
-def _measured(signals: Signals) -> tuple[str, ...]:
-    return tuple(wired_outputs(signals))
+def _wiring(config: FlightConfig, settings: DeviceSettings, signals: Signals, outputs: int) -> Wiring:
+    """Return what hangs on a device of `outputs` outputs."""
+    motors = build_motors(config, signals, outputs)
+    return Wiring(build_axes(config, signals), tuple(wired_outputs(signals)), motors, settings)
 
 
 def _build_serial(config: FlightConfig, settings: DeviceSettings, signals: Signals) -> DeviceRig:
@@ -254,17 +258,15 @@ def _build_serial(config: FlightConfig, settings: DeviceSettings, signals: Signa
     section = config.transmitter.serial
     if not section.port:
         raise ValueError("port names no serial port; write --rig cobs:/dev/ttyACM0")
-    motors = build_motors(config, signals, SERIAL_OUTPUTS)
-    if len(motors.off()) > SERIAL_OUTPUTS:
-        raise ValueError(f"the serial formats carry outputs 0 and 1, not {max(motors.channels)}")
+    wiring = _wiring(config, settings, signals, SERIAL_OUTPUTS)
+    channels = wiring.motors.channels
+    if max(channels) >= SERIAL_OUTPUTS:
+        raise ValueError(f"the serial formats carry outputs 0 and 1, not {max(channels)}")
     second = BytePort(section.motor_port, section.motor_line_baud) if section.motor_port else None
     return SerialBridge(
         BytePort(section.port, section.line_baud),
         serial_format(config),
-        build_axes(config, signals),
-        _measured(signals),
-        motors,
-        settings,
+        wiring,
         motor_port=second,
         motor_format=AsciiFormat() if second else None,
     )
@@ -311,31 +313,17 @@ def _build_quarc(config: FlightConfig, settings: DeviceSettings, signals: Signal
 
     section = config.transmitter.quarc
     fields = quarc_fields(config, signals)
+    wiring = _wiring(config, settings, signals, 0)
     # An axis that the model does not send is not wired, as far as we are concerned.
-    axes = tuple(axis for axis in build_axes(config, signals) if f"c{axis.channel}" in fields)
-    layout = DoublesLayout(
-        fields,
-        section.byte_order,
-        section.unit,
-        {axis.channel: int(axis.counts_per_turn) for axis in axes},
-    )
-    return QuarcBridge(
-        section.host,
-        section.port,
-        section.role,
-        layout,
-        quarc_commands(config, signals),
-        section.byte_order,
-        axes,
-        _measured(signals),
-        build_motors(config, signals, 0),
-        settings,
-    )
+    wiring = replace(wiring, axes=tuple(one for one in wiring.axes if f"c{one.channel}" in fields))
+    per_turn = {axis.channel: int(axis.counts_per_turn) for axis in wiring.axes}
+    layout = DoublesLayout(fields, section.byte_order, section.unit, per_turn)
+    commands = quarc_commands(config, signals)
+    return QuarcBridge(section.host, section.port, section.role, layout, commands, wiring)
 
 
 def _build_hil(config: FlightConfig, settings: DeviceSettings, signals: Signals) -> DeviceRig:
     from transmitter.rigs.hil import HilRig, HilSettings
 
     hil = HilSettings(**config.transmitter.hil.model_dump())
-    motors = build_motors(config, signals, len(hil.analog_channels))
-    return HilRig(hil, build_axes(config, signals), _measured(signals), motors, settings)
+    return HilRig(hil, _wiring(config, settings, signals, len(hil.analog_channels)))

@@ -81,7 +81,6 @@ class Linear:
 def _law(
     section: StateFeedbackSection, plant: Linear, context: ControllerContext
 ) -> tuple[Matrix, Matrix]:
-    """Return K and K_i."""
     signals = context.signals
     inputs, states, outputs = (len(one) for one in (signals.inputs, signals.states, signals.outputs))
     if not section.gains:

@@ -41,10 +41,8 @@ class TransmitterRun:
 
     @property
     def node(self) -> TransmitterNode:
-        """Return the sensor node."""
         return self.endpoint.node
 
     @property
     def uplink(self) -> Uplink:
-        """Return its way out."""
         return self.endpoint.uplink

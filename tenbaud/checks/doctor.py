@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import importlib.metadata
+import importlib.util
 import platform
+import socket
 import sys
 import time
 from dataclasses import dataclass
 from typing import Literal
 
+from channel.errors import LinkError
 from channel.links.base import Link
+from channel.links.endpoints import free_endpoint
+from channel.protocol.frames import Symbol
+from channel.protocol.wire import encode
 from tenbaud.build.flight import agree, software_version
 from tenbaud.config.schema import FlightConfig
+from transmitter.rigs.serial_ports import list_ports
 
 State = Literal["ok", "note", "problem"]
 
@@ -54,8 +62,6 @@ def report(findings: list[Finding]) -> str:
 
 
 def _software() -> list[Finding]:
-    import importlib.metadata
-
     versions = []
     for name in ("eclipse-zenoh", "pyserial", "numpy", "pydantic"):
         try:
@@ -108,8 +114,6 @@ def _clock(config: FlightConfig) -> list[Finding]:
 
 
 def _ports() -> list[Finding]:
-    from transmitter.rigs.serial_ports import list_ports
-
     ports = list_ports()
     if not ports:
         return [
@@ -124,8 +128,6 @@ def _ports() -> list[Finding]:
 
 
 def _vendor() -> list[Finding]:
-    import importlib.util
-
     try:
         found = importlib.util.find_spec("quanser.hardware") is not None
     except ModuleNotFoundError:
@@ -136,11 +138,7 @@ def _vendor() -> list[Finding]:
 
 def _zenoh() -> list[Finding]:
     """Let two sessions on this machine meet and count how long messages take."""
-    from channel.errors import LinkError
-    from channel.links.endpoints import free_endpoint
     from channel.links.zenoh.link import ZenohLink
-    from channel.protocol.frames import Symbol
-    from channel.protocol.wire import encode
 
     endpoint = free_endpoint()
     trips_ms = []
@@ -176,8 +174,6 @@ def _zenoh() -> list[Finding]:
 
 def _reach(endpoint: str) -> Finding:
     """Try to open a TCP connection: the first thing that a firewall would refuse."""
-    import socket
-
     host, _, port = endpoint.partition("/")[2].partition("#")[0].rpartition(":")
     try:
         begun = time.perf_counter()

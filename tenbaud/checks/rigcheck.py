@@ -11,6 +11,9 @@ import time
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from rich.console import Console
+from rich.table import Table
+
 from tenbaud.build.rig import build_device
 from tenbaud.config.schema import FlightConfig
 from tenbaud.flight.summary import real_rig_name
@@ -176,9 +179,6 @@ def _show_live(watcher: _Watcher) -> None:
 
 def show_check(result: RigCheck) -> None:
     """Print a check as tables, and what to do about it."""
-    from rich.console import Console
-    from rich.table import Table
-
     console = Console()
     table = Table(
         title=f"{result.rig}: {result.seconds:g} s, its output never opened", title_justify="left"

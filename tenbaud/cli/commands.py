@@ -6,19 +6,7 @@ from typing import Annotated
 
 import typer
 
-from tenbaud.cli import (
-    demo,
-    design,
-    identify,
-    keys,
-    nodes,
-    rig,
-    router,
-    runs,
-    sweep,
-    tune,
-    view,
-)
+from tenbaud.cli import demo, design, identify, keys, nodes, rig, router, runs, sweep, tune, view
 from tenbaud.cli.checkout import add_commands
 
 app = typer.Typer(
@@ -54,10 +42,7 @@ def _root(
 
 for panel, commands in (
     ("Fly", (demo.demo, nodes.transmit, nodes.receive, view.view, runs.presets)),
-    (
-        "What was flown",
-        (runs.inspect, runs.diff, runs.replay, runs.audit, runs.convert, runs.recover),
-    ),
+    ("What was flown", (runs.inspect, runs.diff, runs.replay, runs.audit, runs.convert, runs.recover)),
     ("Rigs and machines", (rig.doctor, rig.rig, rig.rig_check, router.router)),
     (
         "Models, coders, studies",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from tenbaud.cli import options
+from tenbaud.cli.log_options import LogOptions
 from tenbaud.cli.spread import spread
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ VIEW_DURATION_S = 3600.0
 @spread
 def demo(
     flight: options.FlightOptions,
+    log: LogOptions,
     mismatch: options.Mismatches = None,
     view: options.View = False,
     view_port: options.ViewPort = 8710,
@@ -50,9 +52,7 @@ def demo(
     if not flights:
         single = json or view or flight.config is not None or rig != "simulated"
         flights = [None] if single else list(DEFAULT_MISMATCHES)
-    if flight.preset is None and flight.config is None and rig.startswith("replay"):
-        flight = replace(flight, preset="uiuc-10baud")
-    changes = [options.overrides(**options.fields_of(flight), mismatch=off) for off in flights]
+    changes = [options.overrides(**options.fields_of(flight), mismatch=off, log=log) for off in flights]
     agreements = _agree_all(flight, changes)
     pace = _checked_pace(agreements[0], pace, view)
     view_options = _view_options(agreements, view, view_port, open_browser)
@@ -92,12 +92,16 @@ def _agree_all(flight: options.FlightOptions, changes: list[dict[str, Any]]) -> 
     """Return the flights, each checked as far as it can be before anything starts."""
     from tenbaud.build.ends import check_parts
     from tenbaud.build.flight import agree
-    from tenbaud.config.load import load_config
+    from tenbaud.build.recorded import flight_config, replay_notes
 
-    configs = [load_config(flight.preset, flight.config, change, allow_code=True) for change in changes]
+    configs = [
+        flight_config(flight.preset, flight.config, change, allow_code=True) for change in changes
+    ]
     agreements = [agree(one, flight.clock.value) for one in configs]
     for agreement in agreements:
         check_parts(agreement.config)
+    for note in replay_notes(configs[0]):
+        typer.echo(f"  {note}", err=True)
     return agreements
 
 
@@ -136,7 +140,6 @@ def _fly_all(
 def _fly_shown(
     agreement: Agreement, folder: RunFolder, view_options: ViewOptions | None, pace: float | None
 ) -> DemoResult:
-    """Fly once, and show how it goes."""
     from tenbaud.flight.demo import fly_demo
     from tenbaud.flight.display import StatusDisplay
 

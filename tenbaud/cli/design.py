@@ -22,14 +22,10 @@ def floor(
     preset: options.Preset = None,
     config: options.ConfigFile = None,
     plant: Annotated[
-        str | None,
-        typer.Option(help="A linear plant by name instead of a configuration's.", show_default=False),
+        str | None, typer.Option(help="A linear plant by name instead of a configuration's.")
     ] = None,
     rate: Annotated[
-        float | None,
-        typer.Option(
-            help="In bit/s; the flight's if not given.", min=1e-6, max=1e9, show_default=False
-        ),
+        float | None, typer.Option(help="In bit/s; the flight's if not given.", min=1e-6, max=1e9)
     ] = None,
     json: options.AsJson = False,
 ) -> None:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tenbaud.cli import options
+from tenbaud.cli.log_options import LogOptions
 from tenbaud.cli.spread import spread
 
 if TYPE_CHECKING:
@@ -24,20 +24,6 @@ TICKS_MAX = 10_000_000
 """of an experiment, which is in memory as a whole"""
 
 
-class UnitOption(StrEnum):
-    """Unit of the angle column of a log."""
-
-    COUNTS = "counts"
-    RAD = "rad"
-    DEG = "deg"
-
-
-Start = Annotated[
-    float, typer.Option("--from", help="Use the record from here on, s.", min=0.0, max=1e7)
-]
-End = Annotated[
-    float | None, typer.Option("--to", help="Use the record up to here, s.", min=0.0, max=1e7)
-]
 Bandwidth = Annotated[
     float, typer.Option(help="Pass band w_f of the filters, rad/s.", min=0.001, max=1000.0)
 ]
@@ -48,6 +34,7 @@ Forgetting = Annotated[float, typer.Option(help="alpha of (10), 1/s.", min=0.0, 
 @spread
 def identify(
     plant: options.PlantOptions,
+    log: LogOptions,
     source: Annotated[
         Path | None,
         typer.Argument(help="Folder of a run, or a CSV log; not given: the simulated rig is excited."),
@@ -60,14 +47,6 @@ def identify(
             "chirp:START,END,DURATION,MAGNITUDE in Hz, s, V; repeatable. Not given: two square waves."
         ),
     ] = None,
-    columns: Annotated[
-        str, typer.Option(help="Of a log: angle=NAME,front=NAME,rear=NAME,index=NAME,time=NAME.")
-    ] = "",
-    unit: Annotated[
-        UnitOption, typer.Option(help="Unit of the log's angle column.")
-    ] = UnitOption.COUNTS,
-    start: Start = 0.0,
-    end: End = None,
     equilibrium: Annotated[
         str, typer.Option(help="theta_0: auto, quiet (a stretch at rest), estimate, or rad.")
     ] = "auto",
@@ -87,10 +66,8 @@ def identify(
 
     from tenbaud.identify.run import run, settings_of
 
-    loaded = plant.load()
-    records = _records(loaded, source, excitation, duration, columns, unit.value)
-    if start > 0.0 or end is not None:
-        records = [(name, record.part(start, end or 1e9)) for name, record in records]
+    loaded = plant.load(log=log)
+    records = _records(loaded, source, excitation, duration)
     # A log or a run may begin in motion; the filters must forget what they did not see.
     settle_s = 5.0 / bandwidth if source is not None and bandwidth > 0.0 else 0.0
     filters = replace(
@@ -108,10 +85,8 @@ def _records(
     source: Path | None,
     excitation: list[str] | None,
     duration: float | None,
-    columns: str,
-    unit: str,
 ) -> list[tuple[str, PitchRecord]]:
-    from tenbaud.identify.sources import LogColumns, from_csv, from_rig, from_run, parse_columns
+    from tenbaud.identify.sources import from_log, from_rig, from_run
 
     if source is None:
         rest = config.transmitter.plant.model_copy(
@@ -125,12 +100,14 @@ def _records(
         if ticks > TICKS_MAX:
             raise typer.BadParameter(f"--duration: {ticks:.3g} ticks; at most {TICKS_MAX:.3g}")
         return [(signal, from_rig(at_rest, signal, duration or DURATION_S)) for signal in signals]
+    section = config.flight_log
     if source.is_dir() or source.suffix == ".mcap":
-        return [(source.name, from_run(source))]
-    log = config.flight_log
-    base = LogColumns(log.counts_column, *log.volts_columns, log.index_column)
-    chosen = parse_columns(columns, unit, base)  # type: ignore[arg-type]
-    return [(source.name, from_csv(source, chosen, config))]
+        record = from_run(source)
+        if section.start_s is not None or section.end_s is not None:
+            record = record.part(section.start_s or 0.0, section.end_s or 1e9)
+        return [(source.name, record)]
+    named = section.model_copy(update={"file": str(source)})
+    return [(source.name, from_log(config.model_copy(update={"flight_log": named})))]
 
 
 def _write(

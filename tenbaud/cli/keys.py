@@ -5,22 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 from shlex import quote
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from channel.links.endpoints import DEFAULT_PORT
-from tenbaud.keys.authority import Certified, NodeRole
-from tenbaud.keys.store import (
-    KeysError,
-    NodeKeys,
-    add_node,
-    create_authority,
-    expiry_warning,
-    read_node,
-    read_nodes,
-    renew_node,
-)
+
+if TYPE_CHECKING:
+    from tenbaud.keys.authority import Certified
+    from tenbaud.keys.store import NodeKeys
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -48,6 +41,8 @@ DEFAULT_FOLDER = Path("keys")
 @app.command()
 def init(folder: Folder = DEFAULT_FOLDER) -> None:
     """Make the authority that signs the nodes' certificates; once, on one machine."""
+    from tenbaud.keys.store import create_authority
+
     made = create_authority(folder)
     typer.echo(f"{made}: the authority, valid for ten years. It never leaves this machine.")
     typer.echo(next_steps(()))
@@ -56,14 +51,15 @@ def init(folder: Folder = DEFAULT_FOLDER) -> None:
 @app.command()
 def add(
     name: Name,
-    role: Annotated[
-        str | None, typer.Option(help="transmitter, receiver, router or viewer.", show_default=False)
-    ] = None,
+    role: Annotated[str | None, typer.Option(help="transmitter, receiver, router or viewer.")] = None,
     host: Hosts = None,
     days: Days = 365.0,
     folder: Folder = DEFAULT_FOLDER,
 ) -> None:
     """Make key and certificate of one node, and print the commands for the two machines."""
+    from tenbaud.keys.authority import NodeRole
+    from tenbaud.keys.store import add_node, read_nodes
+
     if role not in list(NodeRole):
         known = ", ".join(NodeRole)
         raise typer.BadParameter(f"--role says what {name} is for: {known}", param_hint="--role")
@@ -75,6 +71,8 @@ def add(
 @app.command()
 def renew(name: Name, host: Hosts = None, days: Days = 365.0, folder: Folder = DEFAULT_FOLDER) -> None:
     """Make a node's key and certificate anew, before or after it expires; copy its folder again."""
+    from tenbaud.keys.store import renew_node
+
     node = renew_node(folder, name, tuple(host or ()), days)
     typer.echo(_line(node))
     typer.echo(f"Copy {node.folder} to its machine again, and start its end again there.")
@@ -87,6 +85,8 @@ def show(
     ] = DEFAULT_FOLDER,
 ) -> None:
     """List the nodes, until when they are valid, and the commands for the two machines."""
+    from tenbaud.keys.store import KeysError, expiry_warning, read_node, read_nodes
+
     nodes = [read_node(folder)] if (folder / "node.pem").exists() else read_nodes(folder)
     if not nodes and not (folder / "authority").exists():
         raise KeysError(f"there are no keys in {folder}; `tenbaud keys init` makes an authority")
@@ -115,9 +115,9 @@ def endpoint_of(host: str) -> str:
 
 def next_steps(nodes: Sequence[NodeKeys]) -> str:
     """Return what is still to be added, or the commands for the machines of a whole set."""
-    transmitter = _first(nodes, NodeRole.TRANSMITTER)
-    receiver = _first(nodes, NodeRole.RECEIVER)
-    router = _first(nodes, NodeRole.ROUTER)
+    transmitter = _first(nodes, "transmitter")
+    receiver = _first(nodes, "receiver")
+    router = _first(nodes, "router")
     if transmitter is None:
         return "Next: tenbaud keys add rig --role transmitter"
     if receiver is None:
@@ -149,5 +149,5 @@ def _place(node: Certified) -> str:
     return quote(endpoint_of(node.hosts[0])) if node.hosts else f"tls/ADDRESS:{DEFAULT_PORT}"
 
 
-def _first(nodes: Sequence[NodeKeys], role: NodeRole) -> NodeKeys | None:
-    return next((node for node in nodes if node.certified.role is role), None)
+def _first(nodes: Sequence[NodeKeys], role: str) -> NodeKeys | None:
+    return next((node for node in nodes if node.certified.role == role), None)

@@ -102,7 +102,7 @@ def agreements(
     """
     from tenbaud.build.ends import check_parts
     from tenbaud.build.flight import agree
-    from tenbaud.config.load import load_config
+    from tenbaud.build.recorded import flight_config
 
     known: dict[Path | None, tuple[float, Agreement]] = {}
 
@@ -112,7 +112,9 @@ def agreements(
             own = None
         changed_s = 0.0 if own is None else own.stat().st_mtime
         if own not in known or known[own][0] != changed_s:
-            config = load_config(preset if own is None else None, own or path, changed, allow_code=True)
+            config = flight_config(
+                preset if own is None else None, own or path, changed, allow_code=True
+            )
             if own is not None:
                 check_parts(config)
             known[own] = (changed_s, agree(config, clock))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tenbaud.cli import options
+from tenbaud.cli.log_options import LogOptions
 from tenbaud.cli.spread import spread
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 def transmit(
     node: options.NodeOptions,
     addresses: options.Addresses,
+    log: LogOptions,
     duration: options.Duration = None,
     seed: options.Seed = None,
     rig: options.Rig = None,
@@ -43,6 +45,7 @@ def transmit(
         duration=duration,
         seed=seed,
         rig=rig,
+        log=log,
         dry_run=dry_run,
         mismatch=mismatch,
         disturbance=disturbance,
@@ -58,6 +61,7 @@ def receive(
     node: options.NodeOptions,
     addresses: options.Addresses,
     rigs: options.ManyOptions,
+    log: LogOptions,
     rig: Annotated[
         str | None,
         typer.Option(help="replay:FILE when the transmitter replays: its voltages are used."),
@@ -76,7 +80,7 @@ def receive(
 
     [dim]tenbaud receive --sessions 'rig/*' --configs rigs/[/dim]
     """
-    changed = node.changes(rig=rig, sabotaged_end="receiver")
+    changed = node.changes(rig=rig, log=log, sabotaged_end="receiver")
     if rigs.sessions is None:
         if rigs.configs is not None or rigs.flights is not None:
             raise typer.BadParameter("--configs and --flights go with --sessions, the names to serve")
@@ -109,8 +113,9 @@ def _run(
 
     from tenbaud.build.ends import check_parts
     from tenbaud.build.flight import agree
+    from tenbaud.build.recorded import flight_config
     from tenbaud.cli.addresses import endpoints_of
-    from tenbaud.config.load import dump_config, load_config
+    from tenbaud.config.load import dump_config
     from tenbaud.files.whole import write_whole
     from tenbaud.flight import ends
     from tenbaud.flight.outcome import ExitCode, first_code
@@ -118,7 +123,7 @@ def _run(
     from tenbaud.recording.folder import RunFolder, create_run_folder
     from tenbaud.telemetry.end import TelemetryOptions
 
-    config = load_config(node.preset, node.config, changed, allow_code=True)
+    config = flight_config(node.preset, node.config, changed, allow_code=True)
     _check_link(config, addresses.insecure)
     telemetry = TelemetryOptions(node.telemetry, node.allow_control, pace)
     agreement = replace(agree(config, node.clock.value), live=telemetry.control)
@@ -166,6 +171,7 @@ def _introduce(
     role: Role, identity: Any, config: FlightConfig, endpoints: Endpoints, folder: RunFolder
 ) -> None:
     from tenbaud.build.flight import kind_of_link
+    from tenbaud.build.recorded import replay_notes
 
     own = kind_of_link(config).where(config.link)
     places = [*own, *endpoints.listen, *endpoints.connect, *endpoints.router]
@@ -177,3 +183,5 @@ def _introduce(
         f"  at {', '.join(places)}, recording into {folder.path}",
         err=True,
     )
+    for note in replay_notes(config):
+        typer.echo(f"  {note}", err=True)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tenbaud.cli import rigs
+from tenbaud.cli.log_options import LogOptions as LogOptions
 
 if TYPE_CHECKING:
     from tenbaud.config.schema import FlightConfig
@@ -22,9 +23,7 @@ class ClockOption(StrEnum):
     VIRTUAL = "virtual"
 
 
-Preset = Annotated[
-    str | None, typer.Option(help="Preset to fly; `tenbaud presets` lists them.", show_default=False)
-]
+Preset = Annotated[str | None, typer.Option(help="Preset to fly; `tenbaud presets` lists them.")]
 ConfigFile = Annotated[
     Path | None,
     typer.Option("--config", help="TOML file over the preset; the same at both ends."),
@@ -38,11 +37,11 @@ AllowCode = Annotated[
 ]
 Duration = Annotated[
     float | None,
-    typer.Option(help="Flight time in seconds.", min=1e-5, max=1e7, show_default=False),
+    typer.Option(help="Flight time in seconds.", min=1e-5, max=1e7),
 ]
 Seed = Annotated[
     int | None,
-    typer.Option(help="Seed of everything random.", min=0, max=2**63 - 1, show_default=False),
+    typer.Option(help="Seed of everything random.", min=0, max=2**63 - 1),
 ]
 Lead = Annotated[
     int | None,
@@ -74,22 +73,16 @@ Mismatches = Annotated[
         "--mismatch",
         help="Model mismatch of the simulated plant, 0.1 for 10 %; repeatable. Not given: 0 "
         "and 0.1, one flight each (one as configured with --json or --config).",
-        show_default=False,
     ),
 ]
 Mismatch = Annotated[
     float | None,
-    typer.Option(help="Model mismatch of the simulated plant, 0.1 for 10 %.", show_default=False),
+    typer.Option(help="Model mismatch of the simulated plant, 0.1 for 10 %."),
 ]
-LineRate = Annotated[
-    int | None, typer.Option(help="Bits per second on the serial line (115200).", show_default=False)
-]
+LineRate = Annotated[int | None, typer.Option(help="Bits per second on the serial line (115200).")]
 Downlink = Annotated[
     str | None,
-    typer.Option(
-        help="Separate link for the commands: zenoh, or a second serial port.",
-        show_default=False,
-    ),
+    typer.Option(help="Separate link for the commands: zenoh, or a second serial port."),
 ]
 Rig = Annotated[str | None, typer.Option(help=rigs.FORMS)]
 Disturbance = Annotated[
@@ -99,15 +92,13 @@ Impair = Annotated[
     str | None,
     typer.Option(
         help='Impairments of the line, such as "up:loss=0.3,delay=30ms". On a real clock they '
-        "apply to outgoing messages; pass the same value to both ends.",
-        show_default=False,
+        "apply to outgoing messages; pass the same value to both ends."
     ),
 ]
 Sabotage = Annotated[
     str | None,
     typer.Option(
-        help="Corrupt one bit of this end's codec on purpose, such as sample=500,field=range.",
-        show_default=False,
+        help="Corrupt one bit of this end's codec on purpose, such as sample=500,field=range."
     ),
 ]
 OnDesync = Annotated[
@@ -115,7 +106,6 @@ OnDesync = Annotated[
     typer.Option(
         "--on-desync",
         help="If the codecs differ: rejoin (continue from a common state) or stop (exit code 5).",
-        show_default=False,
     ),
 ]
 Insecure = Annotated[
@@ -134,12 +124,7 @@ TakeOver = Annotated[
 ]
 Pace = Annotated[
     float | None,
-    typer.Option(
-        min=0.05,
-        max=1e6,
-        help="Virtual clock: maximum speed as a multiple of real time.",
-        show_default=False,
-    ),
+    typer.Option(min=0.05, max=1e6, help="Virtual clock: maximum speed as a multiple of real time."),
 ]
 View = Annotated[
     bool,
@@ -198,15 +183,13 @@ class ManyOptions:
     sessions: Annotated[
         str | None,
         typer.Option(
-            help="Serve every session whose name matches, such as 'rig/*', in this one process.",
-            show_default=False,
+            help="Serve every session whose name matches, such as 'rig/*', in this one process."
         ),
     ] = None
     configs: Annotated[
         Path | None,
         typer.Option(
-            help="With --sessions: folder of files for single sessions, rig/7.toml for rig/7.",
-            show_default=False,
+            help="With --sessions: folder of files for single sessions, rig/7.toml for rig/7."
         ),
     ] = None
     rigs_max: Annotated[
@@ -217,12 +200,7 @@ class ManyOptions:
     ] = 100
     flights: Annotated[
         int | None,
-        typer.Option(
-            help="With --sessions: end after this number of flights.",
-            min=1,
-            max=10**9,
-            show_default=False,
-        ),
+        typer.Option(help="With --sessions: end after this number of flights.", min=1, max=10**9),
     ] = None
 
 
@@ -240,10 +218,10 @@ class PlantOptions:
 
     def load(self, **own: Any) -> FlightConfig:
         """Return the configuration with these options, and the command's own, over it."""
-        from tenbaud.config.load import load_config
+        from tenbaud.build.recorded import flight_config
 
         changes = overrides(**fields_of(self), **own)
-        return load_config(self.preset, self.config, changes, allow_code=self.allow_code)
+        return flight_config(self.preset, self.config, changes, allow_code=self.allow_code)
 
 
 @dataclass(frozen=True, slots=True)
@@ -285,20 +263,15 @@ class FlightOptions(_Configured):
 class NodeOptions(_Configured):
     """Common options of `transmit` and `receive`, except addresses."""
 
-    session: Annotated[
-        str | None, typer.Option(help="Session name; the same at both ends.", show_default=False)
-    ] = None
+    session: Annotated[str | None, typer.Option(help="Session name; the same at both ends.")] = None
     link: Annotated[
         str | None,
-        typer.Option(
-            help="zenoh, serial with --port, or a kind from an installed package.", show_default=False
-        ),
+        typer.Option(help="zenoh, serial with --port, or a kind from an installed package."),
     ] = None
     port: Annotated[
         str | None,
         typer.Option(
-            help="Serial port of this end: /dev/ttyUSB0, COM3, socket://HOST:PORT, rfc2217://HOST:PORT.",
-            show_default=False,
+            help="Serial port of this end: /dev/ttyUSB0, COM3, socket://HOST:PORT, rfc2217://HOST:PORT."
         ),
     ] = None
     clock: Clock = ClockOption.REAL
@@ -306,8 +279,7 @@ class NodeOptions(_Configured):
         str,
         typer.Option(
             help="For viewers: on, off, or a Zenoh endpoint to listen on. Not given: on, on a socket "
-            "that only this user can open; off beside an insecure link that leaves this machine.",
-            show_default=False,
+            "that only this user can open; off beside an insecure link that leaves this machine."
         ),
     ] = ""
     allow_control: Annotated[
@@ -358,6 +330,7 @@ def fields_of(group: NodeOptions | FlightOptions | PlantOptions) -> dict[str, An
 def overrides(
     *,
     rig: str | None = None,
+    log: LogOptions | None = None,
     sabotage: str | None = None,
     sabotaged_end: str = "transmitter",
     settings: list[str] | None = None,
@@ -375,6 +348,7 @@ def overrides(
         values[f"{sabotaged_end}.sabotage"] = sabotage
     if rig is not None:
         values |= rigs.settings_of(rig)
+    values |= {} if log is None else log.settings()
     return nested(values | dict(_parse_setting(setting) for setting in settings or []))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json as json_module
 import sys
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -29,6 +29,7 @@ PortOption = Annotated[
 @spread
 def rig(
     body: options.PlantOptions,
+    log: options.LogOptions,
     form: FormatOption = "cobs",
     port: PortOption = "pty",
     replay: Annotated[
@@ -65,10 +66,8 @@ def rig(
     """
     from tenbaud.build.emulator import build_emulator
 
-    if body.preset is None and body.config is None and replay is not None:
-        body = replace(body, preset="uiuc-10baud")
     emulator = build_emulator(
-        body.load(rig=None if replay is None else f"replay:{replay}"),
+        body.load(rig=None if replay is None else f"replay:{replay}", log=log),
         form,  # type: ignore[arg-type]
         port,
         line_form=lines,

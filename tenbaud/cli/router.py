@@ -37,8 +37,7 @@ def router(
         ),
     ] = 64,
     print_config: Annotated[
-        bool,
-        typer.Option("--print-config", help="Print the settings for zenohd and exit."),
+        bool, typer.Option("--print-config", help="Print the settings for zenohd and exit.")
     ] = False,
 ) -> None:
     """Route between two ends that cannot reach each other but both reach this machine.

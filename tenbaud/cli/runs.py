@@ -15,8 +15,7 @@ RunArgument = Annotated[Path, typer.Argument(help="Folder of a run, or one recor
 
 
 def inspect(
-    run: RunArgument,
-    json: Annotated[bool, typer.Option("--json", help="The same as JSON.")] = False,
+    run: RunArgument, json: Annotated[bool, typer.Option("--json", help="The same as JSON.")] = False
 ) -> None:
     """Show what a run's recordings hold: channels, units, spans, events.
 
@@ -33,8 +32,7 @@ def inspect(
 def diff(
     run_a: RunArgument,
     run_b: Annotated[
-        Path | None,
-        typer.Argument(help="Another; not given: the two ends of the first are compared."),
+        Path | None, typer.Argument(help="Another; not given: the two ends of the first are compared.")
     ] = None,
 ) -> None:
     """Name the first sample at which two recordings differ, and the field.
@@ -132,10 +130,7 @@ def recover(
 
 
 OtherRun = Annotated[
-    Path | None,
-    typer.Argument(
-        help="Run folder of the other machine, if each recorded its own end.", show_default=False
-    ),
+    Path | None, typer.Argument(help="Run folder of the other machine, if each recorded its own end.")
 ]
 
 

@@ -27,7 +27,6 @@ class KeptStream(io.TextIOWrapper):
     error: OSError | None = None
 
     def write(self, text: str) -> int:
-        """Write; what fails is kept."""
         try:
             return super().write(text)
         except OSError as error:
@@ -35,7 +34,6 @@ class KeptStream(io.TextIOWrapper):
             return len(text)
 
     def flush(self) -> None:
-        """Flush; what fails is kept."""
         try:
             super().flush()
         except OSError as error:

@@ -24,14 +24,10 @@ def sweep(
         typer.Option(help="Folder of the results; studies/<name> if not given. Resumes what is there."),
     ] = None,
     workers: Annotated[
-        int | None,
-        typer.Option(
-            min=1, max=1024, help="Processes on this machine; default: all cores.", show_default=False
-        ),
+        int | None, typer.Option(min=1, max=1024, help="Processes on this machine; default: all cores.")
     ] = None,
     scheduler: Annotated[
-        str | None,
-        typer.Option(help="Dask scheduler to fly on, such as tcp://HOST:8786.", show_default=False),
+        str | None, typer.Option(help="Dask scheduler to fly on, such as tcp://HOST:8786.")
     ] = None,
     seeds: Annotated[
         int | None,

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tenbaud.cli import options
+from tenbaud.cli.log_options import LogOptions
+from tenbaud.cli.spread import spread
 from tenbaud.studies.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -70,8 +72,10 @@ Evaluations = Annotated[
 Seed = Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Seed of the search.")]
 
 
+@spread
 def tune(
     out: Out,
+    log: LogOptions,
     preset: options.Preset = None,
     config: options.ConfigFile = None,
     rig: Rig = None,
@@ -115,6 +119,7 @@ def tune(
     overrides = options.overrides(
         duration=duration,
         rig=rig,
+        log=log,
         mismatch=mismatch,
         disturbance=disturbance,
         impair=impair,

@@ -13,8 +13,7 @@ Host = Annotated[
     str | None,
     typer.Option(
         help="Address of the page; one beyond this machine needs --insecure. Not given: 127.0.0.1, or "
-        "::1 where there is no IPv4.",
-        show_default=False,
+        "::1 where there is no IPv4."
     ),
 ]
 
@@ -24,8 +23,7 @@ def view(
         list[str] | None,
         typer.Option(
             help="Telemetry endpoint of an end (its --telemetry); repeatable. Not given: flights of "
-            "this user on this machine are found.",
-            show_default=False,
+            "this user on this machine are found."
         ),
     ] = None,
     keys: Annotated[

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from channel.codec.codec import Coder, CoderContext
+from channel.codec.codec import Coder, CoderContext, Model
 from channel.codec.coders.base import readout_of
 from channel.codec.coders.direction import DirectionCoder, DirectionParameters
 from channel.codec.coders.history import HistoryCoder, HistoryParameters
@@ -20,7 +20,23 @@ from tenbaud.config.kinds import Kind
 from tenbaud.config.section import AngleRange, Factor, KindSection, NotNegative, Positive
 
 
-class ZoomCoderSection(KindSection):
+class _GainsSection(KindSection):
+    correction: Literal["held", "impulse"] = "held"
+    """held over the sample as in (22), or added to the state at once"""
+    gains: tuple[Factor, Factor] = (4.1, 8.6)
+    """l1 and l2 of (23): 1/s and 1/s^2 when held, per unit when impulse"""
+
+
+class OpenLoopZoomCoderSection(_GainsSection):
+    """One sign per sample and a range that shrinks with time: time-based zooming."""
+
+    kind: Literal["open-loop-zoom"] = "open-loop-zoom"
+    initial_range_rad: AngleRange = 0.5
+    minimum_range_rad: AngleRange = 0.05
+    decay: Annotated[float, Field(ge=1e-6, le=1.0)] = 0.95
+
+
+class ZoomCoderSection(_GainsSection):
     """The paper's coder (16)-(22) and the observer gains."""
 
     kind: Literal["zoom"] = "zoom"
@@ -29,41 +45,22 @@ class ZoomCoderSection(KindSection):
     initial_range_rad: AngleRange = 0.5
     minimum_range_rad: AngleRange = 0.05
     decay: Annotated[float, Field(ge=1e-6, le=1.0)] = 0.95
-    correction: Literal["held", "impulse"] = "held"
-    """held over the sample as in (22), or added to the state at once"""
-    gains: tuple[Factor, Factor] = (4.1, 8.6)
-    """l1 and l2 of (23): 1/s and 1/s^2 when held, per unit when impulse"""
 
 
-class FixedCoderSection(KindSection):
+class FixedCoderSection(_GainsSection):
     """One sign per sample and a range that never changes."""
 
     kind: Literal["fixed"] = "fixed"
     range_rad: AngleRange = 0.1
-    correction: Literal["held", "impulse"] = "held"
-    gains: tuple[Factor, Factor] = (4.1, 8.6)
 
 
-class OpenLoopZoomCoderSection(KindSection):
-    """One sign per sample and a range that shrinks with time: time-based zooming."""
-
-    kind: Literal["open-loop-zoom"] = "open-loop-zoom"
-    initial_range_rad: AngleRange = 0.5
-    minimum_range_rad: AngleRange = 0.05
-    decay: Annotated[float, Field(ge=1e-6, le=1.0)] = 0.95
-    correction: Literal["held", "impulse"] = "held"
-    gains: tuple[Factor, Factor] = (4.1, 8.6)
-
-
-class StaticCoderSection(KindSection):
+class StaticCoderSection(_GainsSection):
     """The measurement itself in a few bits, without memory (16)."""
 
     kind: Literal["static"] = "static"
     bits: Annotated[int, Field(ge=1, le=15)] = 1
     range_rad: AngleRange = 3.141592653589793
     """half the width that the cells cover"""
-    correction: Literal["held", "impulse"] = "held"
-    gains: tuple[Factor, Factor] = (4.1, 8.6)
 
 
 class PcmCoderSection(KindSection):
@@ -124,85 +121,46 @@ class DirectionCoderSection(KindSection):
     maximum_strength: Positive = 1000.0
 
 
-def _common(section: Any, context: CoderContext) -> dict[str, Any]:
-    """Return what every coder of signs and gains takes; of several outputs each has its own sign."""
-    gains: Gains = tuple((gain,) for gain in section.gains)
-    model = context.model
-    signals = signals_of(model)
-    states = [one.name for one in signals.states[: model.correction_size]]
-    names = [one.name for one in signals.outputs]
-    if len(names) > 1 and {*states} == {*names, *[f"{name}_rate" for name in names]}:
-        angle, rate = section.gains
-        gains = tuple(
-            tuple(angle * (state == name) + rate * (state == f"{name}_rate") for name in names)
-            for state in states
-        )
-    return {"gains": gains, "impulse": section.correction == "impulse"}
+def _given(section: KindSection, model: Model | None = None) -> dict[str, Any]:
+    """Return the settings of a section under the names of the coder's parameters."""
+    given = section.model_dump(exclude={"kind"})
+    if "correction" in given:
+        given["impulse"] = given.pop("correction") == "impulse"
+        given["gains"] = _gains(given["gains"], model)
+    return {name.removesuffix("_rad").removesuffix("_signs"): given[name] for name in given}
 
 
-def _zoom(section: ZoomCoderSection, context: CoderContext) -> Coder:
-    return ZoomCoder(
-        ZoomParameters(
-            initial_range=section.initial_range_rad,
-            minimum_range=section.minimum_range_rad,
-            decay=section.decay,
-            window=section.window_signs,
-            **_common(section, context),
-        )
-    )
-
-
-def _open_loop_zoom(section: OpenLoopZoomCoderSection, context: CoderContext) -> Coder:
-    return OpenLoopZoomCoder(
-        OpenLoopZoomParameters(
-            initial_range=section.initial_range_rad,
-            minimum_range=section.minimum_range_rad,
-            decay=section.decay,
-            **_common(section, context),
-        )
-    )
+def _gains(both: tuple[float, float], model: Model | None) -> Gains:
+    """Return a row for each corrected state; a column for each output of which the rate is a state."""
+    angle, rate = both
+    if model is not None:
+        signals = signals_of(model)
+        states = [one.name for one in signals.states[: model.correction_size]]
+        names = [one.name for one in signals.outputs]
+        if len(names) > 1 and {*states} == {*names, *[f"{name}_rate" for name in names]}:
+            return tuple(
+                tuple(angle * (state == name) + rate * (state == f"{name}_rate") for name in names)
+                for state in states
+            )
+    return ((angle,), (rate,))
 
 
 def _fixed(section: FixedCoderSection, context: CoderContext) -> Coder:
     """Return an open-loop zoom coder whose range is at its end from the beginning."""
-    size = section.range_rad
+    given = _given(section, context.model)
+    size = given.pop("range")
     return OpenLoopZoomCoder(
-        OpenLoopZoomParameters(
-            initial_range=size, minimum_range=size, decay=1.0, **_common(section, context)
-        )
-    )
-
-
-def _static(section: StaticCoderSection, context: CoderContext) -> Coder:
-    return StaticCoder(
-        StaticParameters(bits=section.bits, range=section.range_rad, **_common(section, context))
+        OpenLoopZoomParameters(initial_range=size, minimum_range=size, decay=1.0, **given)
     )
 
 
 def _pcm(section: PcmCoderSection, context: CoderContext) -> Coder:
-    return PcmCoder(
-        PcmParameters(
-            bits=section.bits,
-            range=section.range_rad,
-            period_s=context.symbol_period_s,
-            rate_filter_s=section.rate_filter_s,
-            angles=len(context.model.measured(context.model.initial())),
-        )
-    )
+    angles = len(context.model.measured(context.model.initial()))
+    return PcmCoder(PcmParameters(period_s=context.symbol_period_s, angles=angles, **_given(section)))
 
 
 def _history(section: HistoryCoderSection, context: CoderContext) -> Coder:
-    return HistoryCoder(
-        HistoryParameters(
-            rows=section.rows,
-            initial_range=section.initial_range_rad,
-            minimum_range=section.minimum_range_rad,
-            maximum_range=section.maximum_range_rad,
-            period_s=context.symbol_period_s,
-            weights=section.weights,
-            lookahead=section.lookahead,
-        )
-    )
+    return HistoryCoder(HistoryParameters(period_s=context.symbol_period_s, **_given(section)))
 
 
 def _direction(section: DirectionCoderSection, context: CoderContext) -> Coder:
@@ -211,7 +169,7 @@ def _direction(section: DirectionCoderSection, context: CoderContext) -> Coder:
             "coder.transition, noise, worth and start are missing: `tenbaud design` finds them, once "
             "and for both ends"
         )
-    parameters = DirectionParameters(**section.model_dump(exclude={"kind"}))
+    parameters = DirectionParameters(**_given(section))
     coder = DirectionCoder(parameters, readout_of(context.model))
     if coder.correction_size != context.model.correction_size:
         raise ValueError(
@@ -221,10 +179,21 @@ def _direction(section: DirectionCoderSection, context: CoderContext) -> Coder:
     return coder
 
 
-ZOOM = Kind(ZoomCoderSection, _zoom)
+ZOOM = Kind(
+    ZoomCoderSection,
+    lambda section, context: ZoomCoder(ZoomParameters(**_given(section, context.model))),
+)
 FIXED = Kind(FixedCoderSection, _fixed)
-OPEN_LOOP_ZOOM = Kind(OpenLoopZoomCoderSection, _open_loop_zoom)
-STATIC = Kind(StaticCoderSection, _static)
+OPEN_LOOP_ZOOM = Kind(
+    OpenLoopZoomCoderSection,
+    lambda section, context: OpenLoopZoomCoder(
+        OpenLoopZoomParameters(**_given(section, context.model))
+    ),
+)
+STATIC = Kind(
+    StaticCoderSection,
+    lambda section, context: StaticCoder(StaticParameters(**_given(section, context.model))),
+)
 PCM = Kind(PcmCoderSection, _pcm)
 HISTORY = Kind(HistoryCoderSection, _history)
 DIRECTION = Kind(DirectionCoderSection, _direction)

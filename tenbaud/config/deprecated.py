@@ -25,6 +25,8 @@ MOVED = {
     "receiver.reference.amplitude_rad": "receiver.reference.amplitude",
 }
 """Old full name of a field to the new one."""
+LOG_COLUMNS = {"index_column": "index", "counts_column": "outputs", "volts_columns": "inputs"}
+"""The same in the section of a recorded flight, where the new ones are tables by signal."""
 DIGEST_KINDS = {new: old for old, new in RENAMED["coder.kind"].items()}
 """Names in the shared configuration, whose digest both ends compare and recordings hold."""
 
@@ -41,6 +43,7 @@ def current_name(place: str, name: str, source: str, *, warn: bool = True) -> st
 def with_current_names(values: dict[str, Any], source: str, *, warn: bool = True) -> dict[str, Any]:
     """Return the values of a configuration under their present names."""
     values = copy.deepcopy(values)
+    _name_log_columns(values.get("flight_log"), source, warn=warn)
     coder = values.get("coder")
     if isinstance(coder, dict) and isinstance(coder.get("kind"), str):
         coder["kind"] = current_name("coder.kind", coder["kind"], source, warn=warn)
@@ -61,3 +64,26 @@ def with_current_names(values: dict[str, Any], source: str, *, warn: bool = True
             here = here.setdefault(section, {})
         here.setdefault(field, value)
     return values
+
+
+def _name_log_columns(section: Any, source: str, *, warn: bool) -> None:
+    """Give the columns of a recorded flight, which had fields of their own, to their signals."""
+    if not isinstance(section, dict):
+        return
+    for old, new in {
+        "index_column": "index",
+        "counts_column": "outputs",
+        "volts_columns": "inputs",
+    }.items():
+        if old not in section:
+            continue
+        if warn:
+            text = f"{source}: 'flight_log.{old}' is deprecated; use 'flight_log.{new}'"
+            warnings.warn(text, FutureWarning, stacklevel=4)
+        value = section.pop(old)
+        if old == "counts_column":
+            section.setdefault("units", {"angles": "counts"})
+            value = {"1": value}
+        elif old == "volts_columns" and isinstance(value, (list, tuple)):
+            value = {str(at): name for at, name in enumerate(value, 1)}
+        section.setdefault(new, value)

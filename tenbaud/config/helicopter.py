@@ -17,14 +17,14 @@ from channel.codec.models.helicopter import (
     hover_volts,
 )
 from tenbaud.config.kinds import Kind
-from tenbaud.config.models import LinearModelSection
-from tenbaud.config.section import KindSection, NotNegative, Positive
+from tenbaud.config.models import LinearModelSection, ModelSection
+from tenbaud.config.section import NotNegative, Positive
 
 LAG_LEAST_S = 1e-3
 """in the description of motors that do not lag"""
 
 
-class HelicopterModelSection(KindSection):
+class HelicopterModelSection(ModelSection):
     """Travel, elevation and pitch of a helicopter on an arm; defaults are the LAAS benchmark's.
 
     A thrust is the acceleration by a force of 1: that of a rotor at 5 V.
@@ -65,7 +65,8 @@ class HelicopterModelSection(KindSection):
 
 
 def _build(section: HelicopterModelSection, context: ModelContext) -> HelicopterModel:
-    return HelicopterModel(section.parameters, section.hover_rad, section.motor_lag_s, context.tick_s)
+    hover_rad, lag_s = section.hover_rad, section.motor_lag_s
+    return HelicopterModel(section.parameters, hover_rad, lag_s, context.tick_s, section.start)
 
 
 def _linear(section: HelicopterModelSection) -> LinearModelSection:

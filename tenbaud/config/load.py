@@ -50,12 +50,29 @@ def load_config(
     `recorded`: the file was written by a flight; old names in it cause no warning. Raises ConfigError.
     """
     values = merged_values(preset, path, overrides, recorded=recorded)
+    return checked(values, path, allow_code=allow_code)
+
+
+def checked(
+    values: dict[str, Any], path: Path | None = None, *, allow_code: bool = False
+) -> FlightConfig:
+    """Return the configuration of nested settings, some of them from the file `path`; ConfigError."""
     try:
         config = FlightConfig.model_validate(values)
     except ValidationError as error:
         source = str(path) if path is not None else f"preset {values['preset']}"
         raise ConfigError(_describe_all(source, error)) from error
     return config.allowing_code() if allow_code else config
+
+
+def given_names(path: Path | None, overrides: Mapping[str, Any] | None) -> set[str]:
+    """Return the full names of the settings that are given over a preset, in a file or beside it."""
+    in_file = read_toml(path) if path is not None else {}
+    return {
+        name
+        for values in (in_file, dict(overrides or {}))
+        for name, _ in flattened(with_current_names(values, "", warn=False))
+    }
 
 
 def merged_values(

@@ -16,7 +16,14 @@ from tenbaud.config.kinds import Kind
 from tenbaud.config.section import Factor, KindSection, NotNegative, Positive
 
 
-class PitchModelSection(KindSection):
+class ModelSection(KindSection):
+    """What every kind of model that is built in may be given."""
+
+    start: tuple[Factor, ...] = ()
+    """state that both ends begin with; empty: at rest, a linear model's operating state"""
+
+
+class PitchModelSection(ModelSection):
     """The pitch model (11),(12) that both codecs predict with."""
 
     kind: Literal["pitch"] = "pitch"
@@ -31,7 +38,7 @@ ANGLE_DENSITY = 2e-3
 """rad^2/s^3; of the torque that designs and floors of an angle assume"""
 
 
-class HoldModelSection(KindSection):
+class HoldModelSection(ModelSection):
     """No model: angle and rate stay as the last word set them. For the coder `pcm`."""
 
     kind: Literal["hold"] = "hold"
@@ -47,7 +54,7 @@ else:
     Picture = Literal[("", *dict(PICTURES))]
 
 
-class LinearModelSection(KindSection):
+class LinearModelSection(ModelSection):
     """A linear plant: dx/dt = A x + B u + G w, y = C x; per tick x <- F x + E u.
 
     About an operating point it is dx/dt = A (x - x0) + B (u - u0) + G w; y is still C x.
@@ -70,8 +77,6 @@ class LinearModelSection(KindSection):
     """of the squared error of each output, or one for all"""
     corrected: Annotated[int, Field(ge=0, le=64)] = 0
     """how many of the states, from the first, take corrections; 0: all"""
-    start: tuple[Factor, ...] = ()
-    """state that both ends begin with; empty: the operating state"""
     operating_state: tuple[Factor, ...] = ()
     """x0, at rest under u0: where a nonlinear plant was linearised; empty: zero"""
     operating_command: tuple[Factor, ...] = ()
@@ -164,7 +169,7 @@ def _check_length(name: str, values: tuple[object, ...], count: int, default: in
         raise ValueError(f"{name} has {len(values)} entries, and {count} are needed")
 
 
-class PendulumModelSection(KindSection):
+class PendulumModelSection(ModelSection):
     """An inverted pendulum, upright at angle 0 and pushed by one motor: unstable."""
 
     kind: Literal["pendulum"] = "pendulum"
@@ -175,12 +180,12 @@ class PendulumModelSection(KindSection):
 
 
 def _pitch(section: PitchModelSection, context: ModelContext) -> PitchModel:
-    parameters = PitchParameters(**section.model_dump(exclude={"kind"}))
-    return PitchModel(parameters, context.tick_s)
+    parameters = PitchParameters(**section.model_dump(exclude={"kind", "start"}))
+    return PitchModel(parameters, context.tick_s, section.start)
 
 
 def _hold(section: HoldModelSection, context: ModelContext) -> HoldModel:
-    return HoldModel(context.tick_s, section.outputs)
+    return HoldModel(context.tick_s, section.start, section.outputs)
 
 
 def _linear(section: LinearModelSection, context: ModelContext) -> LinearModel:

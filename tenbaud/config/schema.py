@@ -279,13 +279,35 @@ class ReceiverSection(Section):
 
 
 class FlightLogSection(Section):
-    """A recorded flight, for the replay rig and the recorded controller."""
+    """A recorded flight: its file, and what the columns are. FILE.toml beside it may hold the same."""
 
     file: str = ""
-    index_column: str = "step"
-    counts_column: str = "pitch_counts"
-    volts_columns: tuple[str, str] = ("right_volts", "left_volts")
-    """front and rear motor; their difference pitches the body"""
+    join: tuple[str, ...] = ()
+    """further files, whose columns are joined by time"""
+    columns: dict[str, str] = Field(default_factory=dict)
+    """column, by name or number, of a signal, `angle`, `output`, `input`, `time` or `index`"""
+    outputs: dict[str, str] = Field(default_factory=dict)
+    """the same for outputs only; what is not given is guessed from the names of the columns"""
+    inputs: dict[str, str] = Field(default_factory=dict)
+    """the same for inputs only; "0": there is no such column, and the input is zero"""
+    time: str = ""
+    """column of the clock"""
+    index: str = ""
+    """column that counts the rows, `period_s` apart"""
+    period_s: Annotated[float, Field(ge=1e-6, le=1e6)] | None = None
+    """time between two rows of a file without a clock; none: timing.tick_s"""
+    units: dict[str, str] = Field(default_factory=dict)
+    """of a signal, of all outputs (`angles`), or of `time`: rad, deg, counts, mV, ms ...; none: as the
+    file says, or as the model's"""
+    signs: dict[str, Literal[-1, 1]] = Field(default_factory=dict)
+    scales: dict[str, Factor] = Field(default_factory=dict)
+    offsets: dict[str, Factor] = Field(default_factory=dict)
+    """value = sign * scale * number + offset, then the unit"""
+    start_s: Annotated[float, Field(ge=-2.4e9, le=2.4e9)] | None = None
+    """on the file's own clock; earlier rows are not looked at"""
+    end_s: Annotated[float, Field(ge=-2.4e9, le=2.4e9)] | None = None
+    remove_spikes: bool = False
+    """set single rows that are far off between their neighbours"""
 
 
 class LinkSection(Section):
@@ -345,7 +367,6 @@ class FlightConfig(CodePermission):
 
     @property
     def plant_kind(self) -> str:
-        """Return the kind of the simulated plant."""
         kind = self.transmitter.plant.kind
         if kind != "auto":
             return kind
@@ -356,5 +377,7 @@ class FlightConfig(CodePermission):
         """Return the shared part as canonical JSON, with the command lead that was chosen."""
         shared = self.model_dump(mode="json", include=set(SHARED_SECTIONS))
         shared["timing"]["lead_ticks"] = lead_ticks
+        if not shared["model"].get("start") and self.model.kind != "linear":
+            shared["model"].pop("start", None)  # recordings from before it have the same digest
         shared["coder"]["kind"] = DIGEST_KINDS.get(self.coder.kind, self.coder.kind)
         return json.dumps(shared, sort_keys=True, separators=(",", ":"))

@@ -37,7 +37,6 @@ class NamedSections(Section):
 
     @property
     def by_name(self) -> dict[str, Any]:
-        """Return the sections by the name of their output."""
         return dict(self.__pydantic_extra__ or {})
 
 

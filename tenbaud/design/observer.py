@@ -49,7 +49,12 @@ def kalman_observer(
             f"the outputs do not show every state, so none is observed: {error}"
         ) from error
     gains: Matrix = ahead @ C.T @ np.linalg.inv(C @ ahead @ C.T + seen)
-    return StateObserver(model, rows_of(gains), rows_of(np.linalg.pinv(C)), (STATE_MAX,) * size)
+    return StateObserver(
+        model,
+        rows_of(gains),
+        rows_of(np.asarray(np.linalg.pinv(C), dtype=np.float64)),
+        (STATE_MAX,) * size,
+    )
 
 
 def observer_of_coder(codec: Codec, counts_per_turn: int) -> StateObserver:

@@ -18,6 +18,7 @@ from channel.protocol.wire import DATAGRAM
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build.ends import build_receiver
 from tenbaud.build.flight import Agreement
+from tenbaud.build.recorded import replay_notes
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.flight import receive, transmit
 from tenbaud.flight.display import StatusReporter
@@ -28,7 +29,7 @@ from tenbaud.flight.summary import Summary, gap_part, link_part, receiver_part, 
 from tenbaud.flight.trouble import Trouble
 from tenbaud.recording.encoding import SIGNALS_KEY, signals_text
 from tenbaud.recording.folder import RunFolder
-from tenbaud.recording.gather import OverviewRecorder
+from tenbaud.recording.overview import OverviewRecorder
 from tenbaud.recording.shared import SharedWriter
 from tenbaud.recording.writer import McapRecorder
 from tenbaud.telemetry.compose import ReceiverComposer, TransmitterComposer
@@ -186,6 +187,8 @@ def open_recorder(
         "seed": str(agreement.config.seed),
         "impairments": agreement.config.link.impairments,
     }
+    if notes := replay_notes(agreement.config):
+        metadata["flight_log_notes"] = "\n".join(notes)
     # Of many rigs no figures are drawn at the end.
     overview = OverviewRecorder(plant) if writer is None else None
     # Virtual time can outrun the disk and is not disturbed by waiting for it.

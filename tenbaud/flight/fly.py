@@ -7,24 +7,36 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from numpy.typing import ArrayLike
+
+from channel.codec.codec import Coder, Model
 from channel.errors import TenbaudError
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from channel.codec.codec import Coder, Model
-    from channel.protocol.terms import Clock
-    from plant_sim.plant import Plant
-    from receiver.controllers.base import Controller
-    from tenbaud.build.flight import Agreement
-    from tenbaud.build.given import Given
-    from tenbaud.build.parts import Parts
-    from tenbaud.config.schema import FlightConfig
-    from tenbaud.design.systems import Point, System
-    from tenbaud.recording.folder import RunFolder
-    from tenbaud.recording.run import Run
+from channel.protocol.terms import Clock
+from plant_sim.plant import Plant
+from receiver.controllers.base import Controller
+from tenbaud.build.controllers import controller_context
+from tenbaud.build.ends import check_parts
+from tenbaud.build.flight import Agreement, agree
+from tenbaud.build.given import Given, feedback_gains, reference_settings, whole_sections
+from tenbaud.build.parts import PartError, Parts
+from tenbaud.build.plugins import build_class
+from tenbaud.build.recorded import flight_config
+from tenbaud.build.rig import plant_context
+from tenbaud.build.signals import configured_signals
+from tenbaud.config.deprecated import with_current_names
+from tenbaud.config.load import OWN, ConfigError, load_config, merged, merged_values, nested
+from tenbaud.config.outside_code import object_kind
+from tenbaud.config.schema import FlightConfig
+from tenbaud.design.complete import completed
+from tenbaud.design.settings import exact_outputs, settings_of
+from tenbaud.design.simulated import system_plant
+from tenbaud.design.systems import Point, System, is_system, matrices
+from tenbaud.files.whole import remove
+from tenbaud.flight.demo import fly_demo
+from tenbaud.recording.folder import RunFolder, create_run_folder
+from tenbaud.recording.run import Run
 
 FIELDS = {
     "model": "model.kind",
@@ -78,12 +90,6 @@ def fly(
     Raises ConfigError for plants, settings and parts that make no flight, and FlightFailed for a flight
     that did not end well.
     """
-    from tenbaud.build.given import feedback_gains
-    from tenbaud.config.load import nested
-    from tenbaud.flight.demo import fly_demo
-    from tenbaud.recording.folder import RunFolder, create_run_folder
-    from tenbaud.recording.run import Run
-
     settings = dict(settings or {})
     if _are_gains(controller):
         settings["receiver.state_feedback.gains"] = feedback_gains(controller)
@@ -112,9 +118,6 @@ def _are_gains(controller: object) -> bool:
 
 def _names(parts: Mapping[str, Any], link: str) -> dict[str, str]:
     """Return the settings that name each part."""
-    from tenbaud.build.parts import PartError
-    from tenbaud.config.outside_code import object_kind
-
     objects = [name for name, part in parts.items() if not isinstance(part, str)]
     if objects and link != "memory":
         raise PartError(
@@ -134,12 +137,6 @@ def _loaded(
 
     `plant` is what only a system has: rate and operating point.
     """
-    from tenbaud.config.deprecated import with_current_names
-    from tenbaud.config.load import OWN, ConfigError, load_config, merged, merged_values, nested
-    from tenbaud.design.complete import completed
-    from tenbaud.design.settings import exact_outputs, settings_of
-    from tenbaud.design.systems import is_system, matrices
-
     if is_system(preset):
         if config is not None:
             raise ConfigError("config describes a plant of its own; lay settings= over this one")
@@ -158,18 +155,13 @@ def _loaded(
         raise ConfigError("rate_baud and operating_point are for a plant; a preset says them itself")
     elif not isinstance(preset, str | None):
         raise ConfigError(f"a {type(preset).__name__} is neither the name of a preset nor a plant")
-    return load_config(preset, config, changes, allow_code=True), parts
+    return flight_config(preset, config, changes, allow_code=True), parts
 
 
 def _following(
     loaded: FlightConfig, reference: Given, parts: Mapping[str, Any], folder: RunFolder
 ) -> FlightConfig:
     """Return the configuration with other set-points; values over time are in a file in the folder."""
-    from tenbaud.build.given import reference_settings, whole_sections
-    from tenbaud.build.parts import PartError
-    from tenbaud.build.signals import configured_signals
-    from tenbaud.config.load import load_config, merged
-
     controller = parts.get("controller")
     if not (controller is None or isinstance(controller, str) or inspect.isclass(controller)):
         raise PartError(
@@ -192,9 +184,6 @@ def _following(
 
 def _objects(parts: Mapping[str, Any]) -> Parts:
     """Return the parts that are objects already, checked."""
-    from tenbaud.build.parts import Parts
-    from tenbaud.design.systems import is_system
-
     made = {
         name: part
         for name, part in parts.items()
@@ -212,16 +201,6 @@ def _is_built(name: str, part: object) -> bool:
 
 def _agreement(loaded: FlightConfig, clock: Clock, parts: Mapping[str, Any]) -> Agreement:
     """Return what both ends share, with every part built and checked."""
-    from plant_sim.plant import Plant
-    from receiver.controllers.base import Controller
-    from tenbaud.build.controllers import controller_context
-    from tenbaud.build.ends import check_parts
-    from tenbaud.build.flight import agree
-    from tenbaud.build.plugins import build_class
-    from tenbaud.build.rig import plant_context
-    from tenbaud.design.simulated import system_plant
-    from tenbaud.design.systems import is_system
-
     agreement = agree(loaded, clock, _objects(parts))
     plant, controller = parts.get("plant"), parts.get("controller")
     made = agreement.parts
@@ -243,8 +222,6 @@ def _agreement(loaded: FlightConfig, clock: Clock, parts: Mapping[str, Any]) -> 
 @contextmanager
 def _removed_if_refused(folder: RunFolder) -> Iterator[None]:
     """Remove a new folder where what is done within the `with` shows that nothing can be flown."""
-    from tenbaud.files.whole import remove
-
     try:
         yield
     except BaseException:

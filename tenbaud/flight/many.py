@@ -61,12 +61,7 @@ class ManyHost:
     """
 
     def __init__(
-        self,
-        hub: ZenohHub,
-        agreement_of: AgreementOf,
-        root: Path,
-        rigs_max: int,
-        log: Log,
+        self, hub: ZenohHub, agreement_of: AgreementOf, root: Path, rigs_max: int, log: Log
     ) -> None:
         self._hub = hub
         self._agreement_of = agreement_of
@@ -124,7 +119,6 @@ class ManyHost:
         return [_closed(answer, number)]
 
     def ready(self) -> Iterable[tuple[str, Served]]:
-        """Return the services that have become ready since the last call."""
         while self._ready:
             name, served = self._ready.popleft()
             self._opening.discard(name)

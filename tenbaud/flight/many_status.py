@@ -49,7 +49,6 @@ class ManyStatus:
             self._live.stop()
 
     def tell(self, text: str) -> None:
-        """Print one line, above the table if there is one."""
         self._console.print(text, markup=False, highlight=False, soft_wrap=True)
 
     def table(self) -> RenderableType:

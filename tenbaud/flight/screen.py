@@ -36,7 +36,6 @@ class Screen:
         self._unicode = unicode
 
     def update(self, status: Status) -> None:
-        """Take a status in."""
         self._newest[status["role"]] = status
         for one in status.get("outputs", ()):
             if one["error"] is not None:
@@ -44,7 +43,6 @@ class Screen:
                 errors.append(abs(one["error"]))
 
     def __rich__(self) -> RenderableType:
-        """Return what is to be shown now."""
         if not self._newest:
             return Text("starting", style="dim")
         return Group(*(self._end(status) for status in self._newest.values()))
@@ -151,11 +149,7 @@ def _lockstep(status: Status) -> Text:
 
 def _counts(status: Status) -> str:
     words = []
-    for name, form in (
-        ("baud", "{:.2f} baud"),
-        ("erasures", "{} erased"),
-        ("guard", "guard {}"),
-    ):
+    for name, form in (("baud", "{:.2f} baud"), ("erasures", "{} erased"), ("guard", "guard {}")):
         if status.get(name) is not None:
             words.append(form.format(status[name]))
     return "  ".join(words)

@@ -39,7 +39,6 @@ class StopFlag(_Handlers):
         self.raised = False
 
     def __call__(self) -> bool:
-        """Return whether the flight was asked to stop."""
         return self.raised
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:

@@ -11,6 +11,7 @@ from channel.protocol.bounds import COUNTER
 from channel.protocol.endings import End
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build.flight import Agreement
+from tenbaud.build.recorded import replay_notes
 from tenbaud.build.transmitter_run import TransmitterRun
 from tenbaud.config.schema import TransmitterSection
 from tenbaud.flight.outcome import Outcome
@@ -170,6 +171,7 @@ def _common(agreement: Agreement, outcome: Outcome, end: End | None) -> Summary:
         "config_digest": agreement.identity.config_digest.hex(),
         "numerics_probe": agreement.identity.numerics_probe.hex(),
         "version": agreement.identity.version,
+        **({"flight_log_notes": list(notes)} if (notes := replay_notes(config)) else {}),
     }
 
 

@@ -32,11 +32,9 @@ class Certificate:
             self._end_s = end_of(security.credentials.certificate.read_bytes()).timestamp()
 
     def expired(self) -> bool:
-        """Return whether it has expired."""
         return time.time() >= self._end_s
 
     def text(self) -> str:
-        """Return what to do about it."""
         when = time.strftime("%Y-%m-%d %H:%M:%S", time.gmtime(self._end_s))
         return (
             f"the certificate of {self._name} expired in flight, at {when} UTC; where the authority "

@@ -10,11 +10,13 @@ import ipaddress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from cryptography import x509
-    from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePrivateKey
+from cryptography import x509
+from cryptography.exceptions import InvalidSignature
+from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.serialization import load_pem_private_key
+from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 ORGANISATION = "tenbaud"
 AUTHORITY_DAYS = 3650
@@ -60,10 +62,7 @@ class Pem:
 
 def new_authority(name: str, days: float = AUTHORITY_DAYS) -> Pem:
     """Return a fresh authority of this name, valid for a number of days."""
-    from cryptography import x509
-    from cryptography.hazmat.primitives import hashes
-
-    key = _new_key()
+    key = ec.generate_private_key(ec.SECP256R1())
     subject = _name(name, None)
     usage = _usage(signs_certificates=True)
     certificate = (
@@ -79,14 +78,9 @@ def issue(
     authority: Pem, name: str, role: NodeRole, hosts: tuple[str, ...], days: float = NODE_DAYS
 ) -> Pem:
     """Return a fresh key and certificate for a node; it never outlives its authority."""
-    from cryptography import x509
-    from cryptography.hazmat.primitives import hashes
-    from cryptography.hazmat.primitives.serialization import load_pem_private_key
-    from cryptography.x509.oid import ExtendedKeyUsageOID
-
     root = x509.load_pem_x509_certificate(authority.certificate)
     root_key = load_pem_private_key(authority.private_key, None)
-    key = _new_key()
+    key = ec.generate_private_key(ec.SECP256R1())
     names = [_general_name(host) for host in dict.fromkeys((*hosts, *LOCAL_HOSTS))]
     both_sides = [ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH]
     certificate = (
@@ -102,9 +96,6 @@ def issue(
 
 def read_certificate(pem: bytes) -> Certified:
     """Return what a node's certificate says; ValueError for anything that is not one of ours."""
-    from cryptography import x509
-    from cryptography.x509.oid import NameOID
-
     certificate = x509.load_pem_x509_certificate(pem)
     names = certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
     roles = certificate.subject.get_attributes_for_oid(NameOID.ORGANIZATIONAL_UNIT_NAME)
@@ -124,25 +115,17 @@ def read_certificate(pem: bytes) -> Certified:
 
 def end_of(certificate_pem: bytes) -> datetime:
     """Return when any certificate expires, an authority's too; ValueError for what is none."""
-    from cryptography import x509
-
     return x509.load_pem_x509_certificate(certificate_pem).not_valid_after_utc
 
 
 def is_key_of(key_pem: bytes, certificate_pem: bytes) -> bool:
     """Return whether a private key belongs to a certificate; ValueError for what is no key."""
-    from cryptography import x509
-    from cryptography.hazmat.primitives.serialization import load_pem_private_key
-
     key = load_pem_private_key(key_pem, None)
     return key.public_key() == x509.load_pem_x509_certificate(certificate_pem).public_key()
 
 
 def is_signed_by(certificate_pem: bytes, authority_pem: bytes) -> bool:
     """Return whether a certificate comes from this authority."""
-    from cryptography import x509
-    from cryptography.exceptions import InvalidSignature
-
     certificate = x509.load_pem_x509_certificate(certificate_pem)
     authority = x509.load_pem_x509_certificate(authority_pem)
     try:
@@ -152,16 +135,7 @@ def is_signed_by(certificate_pem: bytes, authority_pem: bytes) -> bool:
     return True
 
 
-def _new_key() -> EllipticCurvePrivateKey:
-    from cryptography.hazmat.primitives.asymmetric import ec
-
-    return ec.generate_private_key(ec.SECP256R1())
-
-
 def _name(common_name: str, role: NodeRole | None) -> x509.Name:
-    from cryptography import x509
-    from cryptography.x509.oid import NameOID
-
     parts = [x509.NameAttribute(NameOID.ORGANIZATION_NAME, ORGANISATION)]
     if role is not None:
         parts.append(x509.NameAttribute(NameOID.ORGANIZATIONAL_UNIT_NAME, role.value))
@@ -172,12 +146,10 @@ def _name(common_name: str, role: NodeRole | None) -> x509.Name:
 def _builder(
     subject: x509.Name,
     issuer: x509.Name,
-    key: EllipticCurvePrivateKey,
+    key: ec.EllipticCurvePrivateKey,
     days: float,
     latest: datetime | None = None,
 ) -> x509.CertificateBuilder:
-    from cryptography import x509
-
     now = datetime.now(UTC)
     expires = now + timedelta(days=days)
     if latest is not None:
@@ -196,8 +168,6 @@ def _builder(
 
 
 def _usage(signs_certificates: bool) -> x509.KeyUsage:
-    from cryptography import x509
-
     return x509.KeyUsage(
         digital_signature=not signs_certificates,
         key_cert_sign=signs_certificates,
@@ -212,17 +182,13 @@ def _usage(signs_certificates: bool) -> x509.KeyUsage:
 
 
 def _general_name(host: str) -> x509.GeneralName:
-    from cryptography import x509
-
     try:
         return x509.IPAddress(ipaddress.ip_address(host))
     except ValueError:
         return x509.DNSName(host)
 
 
-def _pem(certificate: x509.Certificate, key: EllipticCurvePrivateKey) -> Pem:
-    from cryptography.hazmat.primitives import serialization
-
+def _pem(certificate: x509.Certificate, key: ec.EllipticCurvePrivateKey) -> Pem:
     encoding = serialization.Encoding.PEM
     return Pem(
         certificate.public_bytes(encoding),

@@ -7,10 +7,11 @@ an epoch the transmitter may lack samples, which is no fault; anything else that
 from __future__ import annotations
 
 from collections.abc import Iterator
+from operator import attrgetter, lt
 from pathlib import Path
 from typing import NamedTuple
 
-from tenbaud.recording.comparison import Compared, Difference, unlike_field
+from tenbaud.recording.comparison import Compared, Difference, paired, unlike_field
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import TRANSMITTER_NAME
 from tenbaud.recording.reader import Recording
@@ -34,8 +35,10 @@ def compare_ends(first: Recording, second: Recording, compared: Compared) -> Non
     if not _is_transmitter(first) and _is_transmitter(second):
         ends.reverse()
     upper, lower = ends
-    # An end that recorded no sample at all cannot be checked, and `schema` says so.
-    names = [[field.name for field in end.schema(TOPIC).fields if not field.timing] for end in ends]
+    # An end that recorded no sample at all cannot be checked, and `topic` says so.
+    names = [
+        [field.name for field in end.topic(TOPIC).channel.fields if not field.timing] for end in ends
+    ]
     fields = [name for name in names[0] if name in names[1]]
     shared = set(_epochs(upper)) & set(_epochs(lower))
     walk = _Walk(upper, lower, shared, fields, compared)
@@ -73,19 +76,14 @@ class _Walk:
         """Compare; return the samples with a recorded failure that were compared."""
         left, right = _samples(self._upper, self._compared), _samples(self._lower, self._compared)
         seen: set[int] = set()
-        here, there = next(left, None), next(right, None)
-        while here is not None or there is not None:
-            if here is None or (there is not None and there.sample < here.sample):
+        for here, there in paired(left, right, attrgetter("sample"), lt):
+            if here is None:
                 self._only_lower(there)
-                there = next(right, None)
-            elif there is None or here.sample < there.sample:
-                if here.epoch in self._shared:
-                    self._compared.lacks(self._lower.path, TOPIC, KEY, here.sample)
-                here = next(left, None)
-            else:
+            elif there is not None:
                 self._both(here, there)
                 seen |= {here.sample} & self._failures
-                here, there = next(left, None), next(right, None)
+            elif here.epoch in self._shared:
+                self._compared.lacks(self._lower.path, TOPIC, KEY, here.sample)
         self.unheard += len(self._pending)
         return seen
 

@@ -57,7 +57,6 @@ class ChunkWriter:
         self._messages: dict[int, int] = {}
 
     def start(self, profile: str, library: str) -> None:
-        """Write the head of the file."""
         self._stream.write(MCAP0_MAGIC + _bytes_of(Header(profile, library)))
 
     def add_metadata(self, name: str, metadata: dict[str, str]) -> None:
@@ -84,7 +83,6 @@ class ChunkWriter:
         return number
 
     def add_message(self, channel_id: int, time_ns: int, data: bytes) -> None:
-        """Add a message; its time is at least 0."""
         chunk = self._chunk
         entries = self._entries.get(channel_id)
         if entries is None:

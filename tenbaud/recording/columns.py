@@ -6,69 +6,52 @@ thing that was reported.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from channel.protocol.events import EVENT_CHANNEL
 from channel.protocol.recording import Field
 from tenbaud.recording.run import Run
+from tenbaud.recording.signals import Signal
 from tenbaud.recording.table import Table
 
 TABLES = ("flight", "samples", "events")
 
 
-@dataclass(frozen=True, slots=True)
-class Column:
-    """One column: float64 values (NaN where there is none), whole numbers, or texts."""
-
-    name: str
-    values: NDArray[Any]
-    unit: str = ""
-    description: str = ""
-
-    @property
-    def is_text(self) -> bool:
-        """Whether the values are texts or None."""
-        return self.values.dtype == object
-
-
-def flight_columns(run: Run) -> list[Column]:
+def flight_columns(run: Run) -> list[Signal]:
     """Return tick, time and every signal of the run."""
     columns = [
-        Column("tick", run.base.ticks, "", "index of the tick"),
-        Column("time_s", run.time_s, "s", "flight time"),
+        Signal("tick", run.base.ticks, "", "index of the tick"),
+        Signal("time_s", run.time_s, "s", "flight time"),
     ]
-    signals = run.signals.values()
-    return columns + [Column(one.column, one.values, one.unit, one.description) for one in signals]
+    return columns + [replace(one, name=one.column) for one in run.signals.values()]
 
 
-def sample_columns(run: Run) -> list[Column]:
+def sample_columns(run: Run) -> list[Signal]:
     """Return what was recorded per sample, lists spread over numbered columns; [] without any."""
     for end in run.ends:
         if "sample" in run.topics(end):
             table = run.table(end, "sample")
             time_s = np.array(table.times_ns, dtype=np.float64) / 1e9
             columns = [column for one in table.channel.fields for column in _spread(table, one)]
-            return [columns[0], Column("time_s", time_s, "s", "flight time"), *columns[1:]]
+            return [columns[0], Signal("time_s", time_s, "s", "flight time"), *columns[1:]]
     return []
 
 
-def _spread(table: Table, one: Field) -> list[Column]:
+def _spread(table: Table, one: Field) -> list[Signal]:
     values = table[one.name]
     if values.ndim == 1:
         if one.type == "integer" and not np.isnan(values).any():
             values = values.astype(np.int64)
-        return [Column(one.name, values, one.unit, one.description)]
+        return [Signal(one.name, values, one.unit, one.description)]
     return [
-        Column(f"{one.name}_{axis}", values[:, axis], one.unit, one.description)
+        Signal(f"{one.name}_{axis}", values[:, axis], one.unit, one.description)
         for axis in range(values.shape[1])
     ]
 
 
-def event_columns(run: Run) -> list[Column]:
+def event_columns(run: Run) -> list[Signal]:
     """Return the events of both ends."""
     events = run.events
     described = (Field("end", "string", "", "which end reported it"), *EVENT_CHANNEL.fields, _TEXT)
@@ -77,14 +60,14 @@ def event_columns(run: Run) -> list[Column]:
         values = [event.get(one.name) for event in events]
         number = one.type != "string"
         array = np.array(values, dtype=float if number else object)
-        columns.append(Column(one.name, array, one.unit, one.description))
+        columns.append(Signal(one.name, array, one.unit, one.description))
     return columns
 
 
 _TEXT = Field("text", "string", "", "a sentence made from the fields")
 
 
-def all_columns(run: Run) -> dict[str, list[Column]]:
+def all_columns(run: Run) -> dict[str, list[Signal]]:
     """Return the three tables by name; one without rows is left out."""
     makers = (flight_columns, sample_columns, event_columns)
     tables = {name: make(run) for name, make in zip(TABLES, makers, strict=True)}

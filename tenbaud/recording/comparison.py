@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
+from typing import Any, TypeVar
 
 from tenbaud.recording.rows import Row
 
@@ -86,7 +88,6 @@ class Compared:
 
     @property
     def verdict(self) -> Verdict:
-        """The verdict."""
         if self.differences:
             return Verdict.DIFFERENT
         if self.missing or self.faults or not self.rows:
@@ -116,6 +117,29 @@ class Compared:
 
 def _follows(before: object, key: object) -> bool:
     return isinstance(before, int) and isinstance(key, int) and key == before + 1
+
+
+Keyed = TypeVar("Keyed")
+
+
+def paired(
+    left: Iterator[Keyed],
+    right: Iterator[Keyed],
+    key: Callable[[Keyed], Any],
+    is_before: Callable[[Any, Any], bool],
+) -> Iterator[tuple[Keyed | None, Keyed | None]]:
+    """Walk two streams side by side; what one of them lacks comes alone, beside None."""
+    here, there = next(left, None), next(right, None)
+    while here is not None or there is not None:
+        if here is not None and there is not None and key(here) == key(there):
+            yield here, there
+            here, there = next(left, None), next(right, None)
+        elif here is None or (there is not None and is_before(key(there), key(here))):
+            yield None, there
+            there = next(right, None)
+        else:
+            yield here, None
+            here = next(left, None)
 
 
 def unlike_field(here: Row, there: Row, fields: list[str]) -> tuple[str, object, object] | None:

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from channel.protocol.recording import Field, RecordChannel
 from tenbaud.files.whole import make_folder, whole_path
-from tenbaud.recording.columns import TABLES, Column, all_columns, flight_columns
+from tenbaud.recording.columns import TABLES, all_columns, flight_columns
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.layouts import flight_layouts, layout_paths
 from tenbaud.recording.run import Run
+from tenbaud.recording.signals import Signal
 
 ROWS_AT_ONCE = 10_000
 
@@ -82,14 +83,14 @@ def _write_csv(run: Run, folder: Path) -> None:
                 writer.writerows(zip(*[_cells(column, rows) for column in columns], strict=True))
 
 
-def _stretches(columns: list[Column]) -> Iterator[slice]:
+def _stretches(columns: list[Signal]) -> Iterator[slice]:
     """Yield the rows of a table a stretch at a time: as objects they take ten times the memory."""
     count = len(columns[0].values)
     for start in range(0, count, ROWS_AT_ONCE):
         yield slice(start, min(count, start + ROWS_AT_ONCE))
 
 
-def _cells(column: Column, rows: slice) -> list[object]:
+def _cells(column: Signal, rows: slice) -> list[object]:
     """Return some values as the csv module writes them: None as nothing, others as JSON has them."""
     values: list[object] = column.values[rows].tolist()
     if column.is_text:
@@ -126,7 +127,7 @@ def _shown(path: Path) -> str:
     return os.fsencode(path).decode("utf-8", "backslashreplace")
 
 
-def _matlab_cells(column: Column) -> Any:
+def _matlab_cells(column: Signal) -> Any:
     if not column.is_text:
         return column.values
     return np.array(["" if value is None else value for value in column.values], dtype=object)

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
 
 from channel.protocol.recording import RecordChannel
 from tenbaud.recording.both_ends import compare_ends
-from tenbaud.recording.comparison import Compared, Difference, unlike_field
+from tenbaud.recording.comparison import Compared, Difference, paired, unlike_field
 from tenbaud.recording.encoding import END_METADATA
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RECEIVER_NAME, TRANSMITTER_NAME, RunFolder
@@ -87,7 +88,7 @@ def _check_whole(recording: Recording, compared: Compared) -> None:
     end = recording.metadata_record(END_METADATA)
     if not recording.complete:
         compared.faults.append(f"{recording.path} was cut or damaged: rows after that are missing")
-    held = sum(topic.rows for topic in recording.topics.values())
+    held = sum(len(topic) for topic in recording.topics.values())
     written = end.get("rows_written", "")
     if written.isdecimal() and int(written) != held:
         compared.faults.append(f"{recording.path} holds {held} rows of {written} that were written")
@@ -99,7 +100,7 @@ def _check_whole(recording: Recording, compared: Compared) -> None:
 
 def _compare_files(first: Recording, second: Recording, compared: Compared) -> None:
     for topic in sorted((first.topics.keys() | second.topics.keys()) - {IGNORED_TOPIC}):
-        channels = [side.schema(topic) for side in (first, second) if topic in side.topics]
+        channels = [side.topics[topic].channel for side in (first, second) if topic in side.topics]
         _compare_topic(first, second, channels[0], _fields(channels), compared)
 
 
@@ -111,39 +112,30 @@ def _fields(channels: list[RecordChannel]) -> list[str]:
 
 
 def _compare_topic(
-    first: Recording,
-    second: Recording,
-    channel: RecordChannel,
-    fields: list[str],
-    compared: Compared,
+    first: Recording, second: Recording, channel: RecordChannel, fields: list[str], compared: Compared
 ) -> None:
     topic, key_name = channel.topic, channel.fields[0].name
     left, right = _keyed(first, topic, key_name), _keyed(second, topic, key_name)
-    here, there = next(left, None), next(right, None)
     found = False
-    while here is not None and there is not None:
-        if here[0] != there[0]:
-            if _before(there[0], here[0]):
-                compared.lacks(first.path, topic, key_name, there[0])
-                there = next(right, None)
-            else:
-                compared.lacks(second.path, topic, key_name, here[0])
-                here = next(left, None)
-            continue
-        compared.rows += 1
-        unlike = None if found else unlike_field(here[2], there[2], fields)
-        if unlike is not None:
-            found = True
-            where = (topic, key_name, here[0], here[1])
-            compared.differences.append(Difference(*where, *unlike, first.path, second.path))
-        here, there = next(left, None), next(right, None)
-    for recording, row, rest in ((second, here, left), (first, there, right)):
-        before = len(compared.missing)
-        while row is not None:
-            compared.lacks(recording.path, topic, key_name, row[0])
-            row = next(rest, None)
-        for entry in compared.missing[before:]:
-            entry.ends = True
+    after = [len(compared.missing)] * 2
+    for here, there in paired(left, right, itemgetter(0), _before):
+        if here is None and there is not None:
+            compared.lacks(first.path, topic, key_name, there[0])
+            after[1] = len(compared.missing)
+        elif there is None and here is not None:
+            compared.lacks(second.path, topic, key_name, here[0])
+            after[0] = len(compared.missing)
+        elif here is not None and there is not None:
+            compared.rows += 1
+            after = [len(compared.missing)] * 2
+            unlike = None if found else unlike_field(here[2], there[2], fields)
+            if unlike is not None:
+                found = True
+                where = (topic, key_name, here[0], here[1])
+                compared.differences.append(Difference(*where, *unlike, first.path, second.path))
+    for recording, count in ((first, after[0]), (second, after[1])):
+        for entry in compared.missing[count:]:
+            entry.ends = entry.ends or entry.path == recording.path
 
 
 def _keyed(recording: Recording, topic: str, key_name: str) -> Iterator[_KeyedRow]:

@@ -83,8 +83,7 @@ def channel_from_schema(topic: str, data: bytes) -> RecordChannel:
     """The inverse of `channel_schema`; raises ValueError or KeyError for a foreign schema."""
     schema = orjson.loads(data)
     return RecordChannel(
-        topic,
-        tuple(_field_from_schema(name, entry) for name, entry in schema["properties"].items()),
+        topic, tuple(_field_from_schema(name, entry) for name, entry in schema["properties"].items())
     )
 
 

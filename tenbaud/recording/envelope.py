@@ -47,7 +47,6 @@ class Envelope:
         self._times, self._values, self._held = [times], [values], len(times)
 
     def points(self) -> tuple[Series, Series]:
-        """Return the points that are held, by time."""
         if not self._times:
             return np.zeros(0), np.zeros(0)
         times, values = np.concatenate(self._times), np.concatenate(self._values)
@@ -57,7 +56,6 @@ class Envelope:
         return times, values
 
     def curve(self) -> tuple[Series, Series]:
-        """Return the curve, thinned to what a picture can show."""
         return thin(*self.points(), self._points)
 
     def _interrupted(self, times: Series, values: Series) -> tuple[Series, Series]:

@@ -86,22 +86,18 @@ class RunFolder:
 
     @property
     def transmitter(self) -> Path:
-        """The sensor node's recording."""
         return self.path / TRANSMITTER_NAME
 
     @property
     def receiver(self) -> Path:
-        """The controller node's recording."""
         return self.path / RECEIVER_NAME
 
     @property
     def summary(self) -> Path:
-        """The run's numbers."""
         return self.path / SUMMARY_NAME
 
     @property
     def figure(self) -> Path:
-        """The run's picture."""
         return self.path / FIGURE_NAME
 
     def recordings(self) -> list[Path]:

@@ -112,7 +112,6 @@ class HoleFinder:
         self._open: _Gap | None = None
 
     def on_damage(self, damage: Damage) -> None:
-        """A part of the file could not be read."""
         if self._open is not None and not self._open.behind:
             self._open.end = damage.end
         elif len(self._gaps) < HOLES_MAX:
@@ -120,7 +119,6 @@ class HoleFinder:
             self._gaps.append(self._open)
 
     def on_messages(self, messages: list[RawMessage]) -> None:
-        """A block was read."""
         if self._open is not None:
             first = {message[0]: message for message in reversed(messages)}
             self._open.behind = first | self._open.behind

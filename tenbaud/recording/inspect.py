@@ -14,8 +14,9 @@ from channel.protocol.recording import Field, RecordChannel
 from tenbaud.recording.encoding import END_METADATA, SIGNALS_KEY, recorded_signals
 from tenbaud.recording.folder import RunFolder, find_recordings, read_summary
 from tenbaud.recording.notes import printable, recording_notes
-from tenbaud.recording.reader import Recording, TopicSummary
+from tenbaud.recording.reader import Recording
 from tenbaud.recording.rows import Row
+from tenbaud.recording.table import Table
 from tenbaud.sentences import events
 
 EVENT_TOPIC = "event"
@@ -87,12 +88,12 @@ def _plain(description: Description) -> dict[str, Any]:
         "metadata": recording.metadata,
         "topics": {
             topic: {
-                "rows": summary.rows,
-                "first_time_s": summary.first_time_ns / 1e9,
-                "last_time_s": summary.last_time_ns / 1e9,
-                "fields": [asdict(field) for field in summary.channel.fields],
+                "rows": len(table),
+                "first_time_s": table.first_time_ns / 1e9,
+                "last_time_s": table.last_time_ns / 1e9,
+                "fields": [asdict(field) for field in table.channel.fields],
             }
-            for topic, summary in recording.topics.items()
+            for topic, table in recording.topics.items()
         },
         "events": description.events,
     }
@@ -127,12 +128,12 @@ def _text(description: Description) -> str:
     lines += [f"  {note}" for note in description.notes]
     for name, value in recording.metadata.items():
         lines.extend(_metadata_lines(name, value))
-    for topic, summary in recording.topics.items():
+    for topic, table in recording.topics.items():
         lines.append("")
-        lines.append(f"  {topic}: {_span(summary)}")
-        lines.extend(_field_lines(summary.channel))
+        lines.append(f"  {topic}: {_span(table)}")
+        lines.extend(_field_lines(table.channel))
     if description.events:
-        total = recording.topics[EVENT_TOPIC].rows
+        total = len(recording.topics[EVENT_TOPIC])
         shown = len(description.events)
         lines.append("")
         lines.append("  events" if shown == total else f"  the first {shown} of {total} events")
@@ -162,10 +163,10 @@ def _metadata_lines(name: str, value: str) -> list[str]:
     return lines
 
 
-def _span(summary: TopicSummary) -> str:
-    first_s, last_s = summary.first_time_ns / 1e9, summary.last_time_ns / 1e9
-    noun = "row" if summary.rows == 1 else "rows"
-    return f"{summary.rows} {noun}, {first_s:.3f} s to {last_s:.3f} s"
+def _span(table: Table) -> str:
+    first_s, last_s = table.first_time_ns / 1e9, table.last_time_ns / 1e9
+    noun = "row" if len(table) == 1 else "rows"
+    return f"{len(table)} {noun}, {first_s:.3f} s to {last_s:.3f} s"
 
 
 def _field_lines(channel: RecordChannel) -> list[str]:

@@ -7,6 +7,7 @@ all when a name is wrong.
 from __future__ import annotations
 
 import json
+from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.etree import ElementTree
@@ -17,14 +18,14 @@ from tenbaud.recording.signals import output_name
 if TYPE_CHECKING:
     from tenbaud.recording.run import Run
 
+TOPIC = "flight"
 FOXGLOVE_SUFFIX = ".foxglove.json"
 PLOTJUGGLER_SUFFIX = ".plotjuggler.xml"
 
 
 class Curve(NamedTuple):
-    """One curve: a field of a topic."""
+    """One curve: a field of the topic `flight`."""
 
-    topic: str
     field: str
     label: str
     colour: str
@@ -67,7 +68,7 @@ def flight_plots(run: Run) -> tuple[Plot, ...]:
     for title, curves in shown:
         found = [(run.signals[name], colour) for name, colour in curves if name in run.signals]
         if found:
-            there = [Curve("flight", one.column, one.name, colour) for one, colour in found]
+            there = [Curve(one.column, one.name, colour) for one, colour in found]
             plots.append(Plot(title, tuple(there)))
     return tuple(plots)
 
@@ -89,88 +90,38 @@ def flight_layouts(run: Run, recording: Path) -> list[Path]:
 
 def foxglove_layout(plots: tuple[Plot, ...]) -> str:
     """Return a layout that Foxglove and Lichtblick import: the plots below each other."""
+    whole, panel, path = json.loads(_template("foxglove.json")).values()
     names = [f"Plot!tenbaud{number}" for number in range(len(plots))]
-    panels = {name: _foxglove_plot(plot) for name, plot in zip(names, plots, strict=True)}
+    for name, plot in zip(names, plots, strict=True):
+        paths = [
+            path | {"value": f"{TOPIC}.{curve.field}", "label": curve.label, "color": curve.colour}
+            for curve in plot.curves
+        ]
+        titles = {"title": plot.title, "foxglovePanelTitle": plot.title}
+        whole["configById"][name] = panel | titles | {"paths": paths}
     layout: Any = names[-1]
     for left, name in enumerate(reversed(names[:-1]), start=1):
-        layout = {
-            "first": name,
-            "second": layout,
-            "direction": "column",
-            "splitPercentage": 100.0 / (left + 1),
-        }
-    return json.dumps(
-        {
-            "configById": panels,
-            "globalVariables": {},
-            "userNodes": {},
-            "playbackConfig": {"speed": 1},
-            "layout": layout,
-        },
-        indent=2,
-    )
-
-
-def _foxglove_plot(plot: Plot) -> dict[str, Any]:
-    return {
-        "title": plot.title,
-        "foxglovePanelTitle": plot.title,
-        "paths": [
-            {
-                "value": f"{curve.topic}.{curve.field}",
-                "enabled": True,
-                "timestampMethod": "receiveTime",
-                "label": curve.label,
-                "color": curve.colour,
-            }
-            for curve in plot.curves
-        ],
-        "showXAxisLabels": True,
-        "showYAxisLabels": True,
-        "showLegend": True,
-        "legendDisplay": "floating",
-        "showPlotValuesInLegend": False,
-        "isSynced": True,
-        "xAxisVal": "timestamp",
-        "sidebarDimension": 240,
-    }
+        share = {"direction": "column", "splitPercentage": 100.0 / (left + 1)}
+        layout = {"first": name, "second": layout, **share}
+    return json.dumps(whole | {"layout": layout}, indent=2)
 
 
 def plotjuggler_layout(plots: tuple[Plot, ...], recording: str) -> str:
     """Return a layout for PlotJuggler 3; `recording` is the file it offers to load, beside it."""
-    root = ElementTree.Element("root")
-    tabs = ElementTree.SubElement(
-        root, "tabbed_widget", {"parent": "main_window", "name": "Main Window"}
-    )
-    tab = ElementTree.SubElement(tabs, "Tab", containers="1", tab_name="flight")
-    sizes = ";".join([f"{1.0 / len(plots):.6f}"] * len(plots))
-    splitter = ElementTree.SubElement(
-        ElementTree.SubElement(tab, "Container"),
-        "DockSplitter",
-        orientation="-",
-        sizes=sizes,
-        count=str(len(plots)),
-    )
+    root = ElementTree.fromstring(_template("plotjuggler.xml"))
+    splitter, file = (next(root.iter(name)) for name in ("DockSplitter", "fileInfo"))
+    file.set("filename", recording)
+    splitter.set("sizes", ";".join([f"{1.0 / len(plots):.6f}"] * len(plots)))
+    splitter.set("count", str(len(plots)))
     for plot in plots:
         area = ElementTree.SubElement(splitter, "DockArea", name=plot.title)
         shown = ElementTree.SubElement(area, "plot", mode="TimeSeries", style="Lines")
         for curve in plot.curves:
-            name = f"{curve.topic}/{curve.field}"
-            ElementTree.SubElement(shown, "curve", name=name, color=curve.colour)
-    ElementTree.SubElement(tabs, "currentTabIndex", index="0")
-    ElementTree.SubElement(root, "use_relative_time_offset", enabled="1")
-    files = ElementTree.SubElement(root, "previouslyLoaded_Datafiles")
-    file = ElementTree.SubElement(files, "fileInfo", filename=recording, prefix="")
-    topics = sorted({curve.topic for plot in plots for curve in plot.curves})
-    ElementTree.SubElement(
-        ElementTree.SubElement(file, "plugin", ID="DataLoad MCAP"),
-        "parameters",
-        use_timestamp="0",
-        use_mcap_log_time="1",
-        clamp_large_arrays="1",
-        max_array_size="100",
-        selected_topics=";".join(topics),
-    )
+            ElementTree.SubElement(shown, "curve", name=f"{TOPIC}/{curve.field}", color=curve.colour)
     ElementTree.indent(root, " ")
     text: str = ElementTree.tostring(root, encoding="unicode")
     return f"<?xml version='1.0' encoding='UTF-8'?>\n{text}\n"
+
+
+def _template(name: str) -> str:
+    return (files("tenbaud") / "recording" / "templates" / name).read_text()

@@ -15,6 +15,7 @@ import numpy as np
 import orjson
 
 from channel.codec.signals import Signals
+from channel.protocol.recording import RecordChannel
 from tenbaud.recording.envelope import Envelope, Means, Series
 from tenbaud.recording.signals import summed
 
@@ -22,6 +23,11 @@ SYMBOLS_DRAWN_SINGLY = 1200
 """Beyond these the bits of a flight merge into a solid block; their mean is drawn instead."""
 PENDING_MAX = 50_000
 """Ticks that wait for their estimate, or the other way round."""
+
+ROWS_OF_LONG_FLIGHT = 300_000
+"""A recording of fewer rows is read again in a second or two."""
+BLOCK_ROWS = 512
+"""Rows of one topic that are kept as they are, until they are added in one go."""
 
 CURVES = ("value", "reference", "coded", "live", "error_coded", "error_live", "range")
 """Of every output."""
@@ -243,3 +249,47 @@ def unpacked(metadata: Mapping[str, str], plant: Signals) -> Overview | None:
     except (KeyError, ValueError, TypeError):
         return None
     return overview
+
+
+class OverviewRecorder:
+    """Gathers an overview from rows as they are recorded, some at a time."""
+
+    def __init__(self, plant: Signals) -> None:
+        self._overview = Overview(plant)
+        self._rows: dict[str, tuple[list[int], list[Sequence[object]]]] = {}
+        self._places: dict[str, dict[str, int]] = {}
+        self._count = 0
+
+    def wants(self, channel: RecordChannel) -> bool:
+        """Whether rows of this channel are to be handed to `add`."""
+        self._places[channel.topic] = {one.name: place for place, one in enumerate(channel.fields)}
+        self._rows.setdefault(channel.topic, ([], []))
+        return channel.topic in FIELDS
+
+    def add(self, topic: str, time_ns: int, row: Sequence[object]) -> None:
+        times, rows = self._rows[topic]
+        times.append(time_ns)
+        rows.append(row)
+        if len(rows) >= BLOCK_ROWS:
+            self._take(topic)
+
+    def metadata(self) -> dict[str, str] | None:
+        """Return the overview as metadata of the file; None for a flight that is quickly read again."""
+        for topic in self._rows:
+            self._take(topic)
+        if self._count < ROWS_OF_LONG_FLIGHT:
+            return None
+        return packed(self._overview)
+
+    def _take(self, topic: str) -> None:
+        times, rows = self._rows[topic]
+        self._rows[topic] = ([], [])
+        self._count += len(rows)
+        places = self._places[topic]
+
+        def columns(name: str) -> list[Any] | None:
+            place = places.get(name)
+            return None if place is None else [row[place] for row in rows]
+
+        if rows:
+            self._overview.add(topic, times, columns)

@@ -10,8 +10,8 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
+from functools import cached_property, partial
 from pathlib import Path
 from typing import BinaryIO
 
@@ -19,19 +19,15 @@ from mcap.records import Channel, Footer, Metadata, MetadataIndex, Schema
 from mcap.writer import MCAP0_MAGIC
 
 from channel.protocol.recording import RecordChannel
-from tenbaud.recording.chunks import (
-    Damage,
-    Described,
-    RawMessage,
-    metadata_at,
-    summary_of_file,
-)
+from tenbaud.recording.chunks import Damage, Described, RawMessage, metadata_at, summary_of_file
 from tenbaud.recording.encoding import END_METADATA, RUN_METADATA, channel_from_schema
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.holes import HOLES_METADATA, Hole, HoleFinder, unpacked_holes
+from tenbaud.recording.notes import recording_notes
 from tenbaud.recording.old_rows import of_today
 from tenbaud.recording.resync import blocks_of_file
 from tenbaud.recording.rows import Row, RowDecoder, channel_of_names, check_channel
+from tenbaud.recording.table import Table
 
 METADATA_RECORDS_MAX = 100
 
@@ -172,23 +168,13 @@ class MessageStream:
 
 
 @dataclass(slots=True)
-class TopicSummary:
-    """The rows of one topic of a recording."""
-
-    channel: RecordChannel
-    rows: int = 0
-    first_time_ns: int = 0
-    last_time_ns: int = 0
-
-
-@dataclass(slots=True)
 class _Survey:
     complete: bool
     holes: list[Hole]
     strays: int
     size: int
     metadata: dict[str, dict[str, str]]
-    topics: dict[str, TopicSummary] = field(default_factory=dict)
+    topics: dict[str, Table]
 
 
 class Recording:
@@ -220,57 +206,67 @@ class Recording:
         return self.metadata_record(RUN_METADATA)
 
     def metadata_record(self, name: str) -> dict[str, str]:
-        """A metadata record by name; empty if there is none."""
         return self._survey.metadata.get(name, {})
 
+    @cached_property
+    def end(self) -> dict[str, str]:
+        """What the recorder said when it finished: rows written and dropped; empty if it was cut."""
+        end = self.metadata_record(END_METADATA)
+        for name in ("rows_written", "rows_dropped", "rows_recovered"):
+            count = end.get(name, "0")
+            if not (count.isascii() and count.isdigit() and len(count) < 19):
+                raise RecordingError(
+                    f"{self.path}: its end says {count!r:.40} for {name}, which is no count. "
+                    "tenbaud writes no such end: the file was changed, or another program wrote it."
+                )
+        return end
+
     @property
-    def topics(self) -> dict[str, TopicSummary]:
-        """The topics with their rows and time span, in the order of their first row."""
+    def notes(self) -> list[str]:
+        """Notes to read before trusting results from this recording."""
+        return recording_notes(self.path, self.metadata, self.complete, self.holes, self.strays)
+
+    @property
+    def topics(self) -> dict[str, Table]:
         return self._survey.topics
 
-    def schema(self, topic: str) -> RecordChannel:
-        """The topic's fields with types, units and meanings; RecordingError if there is none."""
-        if topic not in self.topics:
+    def topic(self, name: str) -> Table:
+        """Return a topic; RecordingError if there is none."""
+        if name not in self.topics:
             raise RecordingError(
-                f"The recording {self.path} has no topic {topic!r}. "
+                f"The recording {self.path} has no topic {name!r}. "
                 f"It has: {', '.join(self.topics) or 'none at all'}."
                 + ("" if self.complete else " It was cut or damaged before one.")
             )
-        return self.topics[topic].channel
+        return self.topics[name]
 
     def rows(self, topic: str) -> Iterator[tuple[int, Row]]:
         """Stream (flight time in ns, row) of one topic; nothing if the topic is absent."""
-        for times, rows in self.blocks(topic):
-            yield from zip(times, rows, strict=True)
-
-    def blocks(
-        self, topic: str, names: Sequence[str] | None = None
-    ) -> Iterator[tuple[list[int], list[Row]]]:
-        """Stream times and rows of one topic many at a time; only fields in `names` are checked."""
-        stream = MessageStream(self.path, topic, self._size)
-        for block in rows_in_blocks(stream, {topic: names}):
-            yield block[topic]
-
-    @property
-    def _size(self) -> int | None:
         # All passes end where the first one did, also in a file that still grows.
-        return self.__dict__["_survey"].size if "_survey" in self.__dict__ else None
+        size = self.__dict__["_survey"].size if "_survey" in self.__dict__ else None
+        for times, rows in _blocks(self.path, topic, size):
+            yield from zip(times, rows, strict=True)
 
     @cached_property
     def _survey(self) -> _Survey:
         size = self.path.stat().st_size
         stream = MessageStream(self.path, size=size)
-        topics: dict[str, TopicSummary] = {}
+        topics: dict[str, Table] = {}
         for block in stream.texts():
             for topic, (times, _) in block.items():
-                summary = topics.get(topic)
-                if summary is None:
-                    summary = TopicSummary(stream.channels[topic], first_time_ns=times[0])
-                    topics[topic] = summary
-                summary.rows += len(times)
-                summary.first_time_ns = min(summary.first_time_ns, *times)
-                summary.last_time_ns = max(summary.last_time_ns, *times)
+                if topic not in topics:
+                    blocks = partial(_blocks, self.path, topic, size)
+                    topics[topic] = Table(self.path, stream.channels[topic], blocks)
+                topics[topic].count(times)
         return _Survey(stream.complete, stream.holes, stream.strays, size, stream.metadata, topics)
+
+
+def _blocks(
+    path: Path, topic: str, size: int | None, names: Sequence[str] | None = None
+) -> Iterator[tuple[list[int], list[Row]]]:
+    """Stream times and rows of one topic many at a time; only fields in `names` are checked."""
+    for block in rows_in_blocks(MessageStream(path, topic, size), {topic: names}):
+        yield block[topic]
 
 
 def rows_in_blocks(

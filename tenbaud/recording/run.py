@@ -32,8 +32,9 @@ from tenbaud.recording.folder import (
     read_small,
     read_summary,
 )
+from tenbaud.recording.reader import Recording
 from tenbaud.recording.signals import Definition, Signal, Source, TimeBase, definitions
-from tenbaud.recording.table import Series, Table, Tables, read_tables
+from tenbaud.recording.table import Series, Table
 from tenbaud.sentences import events
 
 if TYPE_CHECKING:
@@ -64,13 +65,11 @@ class Run:
         self.folder = RunFolder(self.path if self.path.is_dir() else self.path.parent)
         names = {TRANSMITTER_NAME: "transmitter", RECEIVER_NAME: "receiver"}
         self._files = {names.get(file.name) or self._role(file): file for file in found}
-        self._read: dict[str, Tables] = {}
+        self._read: dict[str, Recording] = {}
         self._made: dict[str, Signal | None] = {}
 
     @staticmethod
     def _role(file: Path) -> str:
-        from tenbaud.recording.reader import Recording
-
         role = Recording(file).metadata.get("role", "")
         if role not in ENDS:
             raise RecordingError(
@@ -232,18 +231,19 @@ class Run:
 
     # Reading
 
-    def tables(self, end: str) -> Tables:
+    def tables(self, end: str) -> Recording:
         """Return all topics of an end; RecordingError if it was not recorded here."""
         tables = self._end(end)
         if tables is None:
             raise RecordingError(f"{self.path} holds no recording of the {end}.")
         return tables
 
-    def _end(self, end: str) -> Tables | None:
+    def _end(self, end: str) -> Recording | None:
         if end not in self._files:
             return None
         if end not in self._read:
-            self._read[end] = read_tables(self._files[end])
+            self._read[end] = Recording(self._files[end])
+            _ = self._read[end].end  # refuses a file whose end is none
         return self._read[end]
 
     @cached_property

@@ -9,23 +9,28 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from channel.codec.signals import Signals, unit_row, unit_suffix
-from tenbaud.recording.table import Series, Table, Tables
+from tenbaud.recording.reader import Recording
+from tenbaud.recording.table import Series, Table
 
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """One signal: values on the common time base, their unit and what they mean."""
+    """One signal or column: float64 values (NaN where there is none), whole numbers, or texts."""
 
     name: str
-    values: Series
-    unit: str
-    description: str
+    values: NDArray[Any]
+    unit: str = ""
+    description: str = ""
+
+    @property
+    def is_text(self) -> bool:
+        return self.values.dtype == object
 
     @property
     def column(self) -> str:
@@ -96,8 +101,8 @@ class Source:
     """The sources of signals. An end that was not recorded is None."""
 
     base: TimeBase
-    transmitter: Tables | None
-    receiver: Tables | None
+    transmitter: Recording | None
+    receiver: Recording | None
 
     def ticks(self, end: str, topic: str, name: str, axis: int | None) -> Series | None:
         """Return a per-tick field on the time base; None where it was not recorded."""
@@ -133,7 +138,6 @@ class Source:
         return self.ticks("transmitter", "tick", name, None)
 
     def applied(self, place: int) -> Series | None:
-        """Return what an input was given."""
         return self.ticks("transmitter", "tick", "applied", place)
 
     def command(self, place: int) -> Series | None:
@@ -178,8 +182,8 @@ class Source:
         return held
 
     def _table(self, end: str, topic: str) -> Table | None:
-        tables = self.transmitter if end == "transmitter" else self.receiver
-        return tables.topics.get(topic) if tables is not None else None
+        recording = self.transmitter if end == "transmitter" else self.receiver
+        return recording.topics.get(topic) if recording is not None else None
 
     def _column(self, end: str, topic: str, name: str, axis: int | None) -> tuple[Table, Series] | None:
         table = self._table(end, topic)

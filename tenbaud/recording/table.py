@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -13,15 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from channel.protocol.recording import Field
-from tenbaud.recording.encoding import END_METADATA
+from channel.protocol.recording import Field, RecordChannel
 from tenbaud.recording.errors import RecordingError
-from tenbaud.recording.holes import Hole
-from tenbaud.recording.notes import recording_notes
-from tenbaud.recording.reader import Recording
 from tenbaud.recording.rows import KEYS, Row
 
 Series = NDArray[np.float64]
+Blocks = Callable[[Sequence[str] | None], Iterator[tuple[list[int], list[Row]]]]
+"""(names of the fields that will be used, None: all) -> flight times and rows, many at a time"""
 
 CELLS_PER_ROW_MAX = 1024
 """Values in a list, each a column; a codec's state has some ten."""
@@ -41,12 +38,20 @@ class Table:
     take some tenth of the memory of `rows`.
     """
 
-    def __init__(self, recording: Recording, topic: str) -> None:
-        self.channel = recording.topics[topic].channel
-        self._recording = recording
-        self._count = recording.topics[topic].rows
+    def __init__(self, path: Path, channel: RecordChannel, blocks: Blocks) -> None:
+        self.channel = channel
+        self.first_time_ns = self.last_time_ns = 0
+        self._path = path
+        self._blocks = blocks
+        self._count = 0
         self._columns: dict[str, NDArray[Any]] = {}
         self._times_ns: NDArray[np.uint64] | None = None
+
+    def count(self, times_ns: Sequence[int]) -> None:
+        """Take in that the file has rows of these flight times."""
+        self.first_time_ns = min(self.first_time_ns if self._count else times_ns[0], *times_ns)
+        self.last_time_ns = max(self.last_time_ns, *times_ns)
+        self._count += len(times_ns)
 
     @cached_property
     def rows(self) -> list[Row]:
@@ -56,7 +61,7 @@ class Table:
 
     def blocks(self) -> Iterator[list[Row]]:
         """Stream the rows, many at a time."""
-        for _, rows in self._recording.blocks(self.channel.topic):
+        for _, rows in self._blocks(None):
             yield rows
 
     def __len__(self) -> int:
@@ -64,7 +69,6 @@ class Table:
 
     @property
     def names(self) -> list[str]:
-        """The names of the columns."""
         return [one.name for one in self.channel.fields]
 
     @property
@@ -105,10 +109,9 @@ class Table:
         )
 
     def _read(self, fields: Sequence[Field]) -> None:
-        topic = self.channel.topic
         parts: dict[str, list[NDArray[Any]]] = {one.name: [] for one in fields}
         times: list[NDArray[np.uint64]] = []
-        for times_ns, rows in self._recording.blocks(topic, list(parts)):
+        for times_ns, rows in self._blocks(list(parts)):
             times.append(np.array(times_ns, dtype=np.uint64))
             for one in fields:
                 parts[one.name].append(self._part(rows, one))
@@ -125,7 +128,7 @@ class Table:
         width = max((len(value) for value in values if value is not None), default=0)
         if width > CELLS_PER_ROW_MAX:
             raise RecordingError(
-                f"{self._recording.path}: a row of the topic {self.channel.topic!r} has {width} values "
+                f"{self._path}: a row of the topic {self.channel.topic!r} has {width} values "
                 f"in its field {one.name!r}, at most {CELLS_PER_ROW_MAX} are read."
             )
         if width and all(value is not None and len(value) == width for value in values):
@@ -153,68 +156,10 @@ class Table:
         """All lists of a recorded field have one length; single long ones would ask for much memory."""
         if width > 16 and width * rows > 4 * items + (1 << 20):
             raise RecordingError(
-                f"{self._recording.path}: the lists in the field {one.name!r} of the topic "
+                f"{self._path}: the lists in the field {one.name!r} of the topic "
                 f"{self.channel.topic!r} have up to {width} values, and most far fewer. tenbaud writes "
                 "no such field: the file was changed, or another program wrote it."
             )
-
-
-@dataclass(slots=True)
-class Tables:
-    """All topics of one recording."""
-
-    path: Path
-    complete: bool
-    metadata: dict[str, str]
-    end: dict[str, str]
-    """what the recorder said when it finished: rows written and dropped; empty if the file was cut"""
-    topics: dict[str, Table]
-    holes: list[Hole] = field(default_factory=list)
-    strays: int = 0
-    """rows that nothing in the file describes, and that are left out"""
-
-    @property
-    def notes(self) -> list[str]:
-        """Notes to read before trusting results from this recording."""
-        return recording_notes(self.path, self.metadata, self.complete, self.holes, self.strays)
-
-    def topic(self, name: str) -> Table:
-        """Return a topic; RecordingError if there is none."""
-        if name not in self.topics:
-            raise RecordingError(
-                f"The recording {self.path} has no topic {name!r}. "
-                f"It has: {', '.join(self.topics) or 'none at all'}."
-                + ("" if self.complete else " It was cut or damaged before one.")
-            )
-        return self.topics[name]
-
-
-def read_tables(path: Path) -> Tables:
-    """Return the topics of a recording; of one that was cut or damaged, with the rows that are whole.
-
-    Raises RecordingError for a file that is missing, empty or no recording of ours.
-    """
-    recording = Recording(path)
-    return Tables(
-        path,
-        recording.complete,
-        recording.metadata,
-        _checked_end(path, recording.metadata_record(END_METADATA)),
-        {topic: Table(recording, topic) for topic in recording.topics},
-        recording.holes,
-        recording.strays,
-    )
-
-
-def _checked_end(path: Path, end: dict[str, str]) -> dict[str, str]:
-    for name in ("rows_written", "rows_dropped", "rows_recovered"):
-        count = end.get(name, "0")
-        if not (count.isascii() and count.isdigit() and len(count) < 19):
-            raise RecordingError(
-                f"{path}: its end says {count!r:.40} for {name}, which is no count. "
-                "tenbaud writes no such end: the file was changed, or another program wrote it."
-            )
-    return end
 
 
 @contextmanager

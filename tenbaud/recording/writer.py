@@ -30,7 +30,7 @@ from tenbaud.recording.folder import open_new_recording
 from tenbaud.recording.shared import SharedWriter
 
 if TYPE_CHECKING:
-    from tenbaud.recording.gather import OverviewRecorder
+    from tenbaud.recording.overview import OverviewRecorder
 
 PROFILE = "tenbaud"
 
@@ -82,12 +82,15 @@ class McapRecorder:
         self._batch_rows = BATCH_ROWS if wait_when_full else in_real_time
         self._dropped_at_queue = 0
         self._dropped_in_thread = 0
-        self._rows_written = 0
+        self.rows_written = 0
+        """that the operating system has, so that a killed process keeps them"""
         self._rows_unflushed = 0
         self._metadata = metadata
         self._overview = overview
-        self._error: str | None = None
-        self._cause: Exception | None = None
+        self.error: str | None = None
+        """the first trouble met, for a person"""
+        self.cause: Exception | None = None
+        """what ended the recording early"""
         self._failed = False
         self._writers: dict[int, _ChannelWriter] = {}
         self._stream = open_new_recording(path)
@@ -104,27 +107,12 @@ class McapRecorder:
             threading.Thread(target=self._run, name=name, daemon=True).start()
 
     @property
-    def rows_written(self) -> int:
-        """Rows the operating system has, so that a killed process keeps them."""
-        return self._rows_written
-
-    @property
     def rows_dropped(self) -> int:
         """Rows lost: the queue was full, the disk failed, or a row could not be encoded.
 
         After `close` these and `rows_written` are all the rows there were.
         """
         return self._dropped_at_queue + self._dropped_in_thread
-
-    @property
-    def error(self) -> str | None:
-        """The first trouble met, for a person; None while all is well."""
-        return self._error
-
-    @property
-    def cause(self) -> Exception | None:
-        """The error that ended the recording early, None if there was none."""
-        return self._cause
 
     def write(self, channel: RecordChannel, time_ns: int, row: Sequence[object]) -> None:
         """Queue one row; drop and count it if the queue is full or the recorder is closed."""
@@ -165,10 +153,7 @@ class McapRecorder:
         return self
 
     def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
 
@@ -254,7 +239,7 @@ class McapRecorder:
             return
         self._writer.flush()
         self._flushed_s = time.monotonic()
-        self._rows_written += self._rows_unflushed
+        self.rows_written += self._rows_unflushed
         self._rows_unflushed = 0
 
     def _finish(self) -> None:
@@ -273,9 +258,9 @@ class McapRecorder:
             os.fsync(self._stream.fileno())
 
     def _write_end(self) -> None:
-        counts = {"rows_written": str(self._rows_written), "rows_dropped": str(self.rows_dropped)}
-        if self._error is not None:
-            counts["error"] = self._error
+        counts = {"rows_written": str(self.rows_written), "rows_dropped": str(self.rows_dropped)}
+        if self.error is not None:
+            counts["error"] = self.error
         overview = self._overview.metadata() if self._overview is not None else None
         if overview is not None:
             self._writer.add_metadata(OVERVIEW_METADATA, overview)
@@ -288,7 +273,7 @@ class McapRecorder:
         # Anything at all: an exception that left this thread would end it without a word.
         except Exception as error:
             self._failed = True
-            self._cause = self._cause or error
+            self.cause = self.cause or error
             self._dropped_in_thread += self._rows_unflushed
             self._rows_unflushed = 0
             cause, advice = repr(error), "Please report this as a fault of tenbaud."
@@ -300,8 +285,8 @@ class McapRecorder:
             )
 
     def _note(self, text: str) -> None:
-        if self._error is None:
-            self._error = text
+        if self.error is None:
+            self.error = text
 
 
 _Gather = Callable[[str, int, Sequence[object]], None]

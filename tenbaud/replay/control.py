@@ -28,12 +28,10 @@ class RecordedCommands:
         self._references = references
 
     def command(self, tick: int, state: tuple[float, ...]) -> tuple[float, ...]:
-        """Return the command that was recorded for `tick`."""
         self._last = self._commands.get(tick, self._last)
         return self._last
 
     def references(self, tick: int) -> tuple[float | None, ...]:
-        """Return the set-points that were recorded for `tick`."""
         return self._references.get(tick, ())
 
 
@@ -45,7 +43,6 @@ class SteppedReference:
     steps: tuple[tuple[int, float], ...]
 
     def value(self, tick: int) -> float:
-        """Return the set-point at `tick`."""
         found = self.configured.value(tick)
         for start, value in self.steps:
             if tick < start:

@@ -14,8 +14,8 @@ from tenbaud.config.deprecated import with_current_names
 from tenbaud.config.outside_code import require_allowed, require_regular_files
 from tenbaud.config.schema import FlightConfig
 from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.reader import Recording
 from tenbaud.recording.run import ENDS, Run
-from tenbaud.recording.table import Tables
 from tenbaud.replay.rows import EndRows, read_rows
 
 NUMBER_MAX = 1e9
@@ -37,7 +37,7 @@ class FlightRecord:
     """The recordings of a flight with the configuration that was flown."""
 
     agreement: Agreement
-    tables: dict[str, Tables]
+    tables: dict[str, Recording]
     """of each end that is here, the transmitter's first"""
     summaries: dict[str, dict[str, Any]]
     """of each end that left one"""
@@ -72,7 +72,7 @@ def load_record(path: Path, other: Path | None = None, *, allow_code: bool = Fal
     return FlightRecord(agreement, tables, {end: run.summary for end, run in homes.items()}, rows)
 
 
-def _agreement(run: Run, tables: Tables, allow_code: bool) -> Agreement:
+def _agreement(run: Run, tables: Recording, allow_code: bool) -> Agreement:
     config = run.config.allowing_code() if allow_code else run.config
     require_allowed(config)
     config = _with_files_of(run.folder.path, config)
@@ -103,7 +103,7 @@ def _with_files_of(folder: Path, config: FlightConfig) -> FlightConfig:
     return config.model_copy(update={"receiver": receiver})
 
 
-def _check_same(tables: Tables, agreement: Agreement, end: str) -> None:
+def _check_same(tables: Recording, agreement: Agreement, end: str) -> None:
     identity = agreement.identity
     recorded = _with_current_names(tables.metadata.get("shared_config", ""))
     if recorded != identity.config:

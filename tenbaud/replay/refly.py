@@ -57,7 +57,6 @@ class _Starting(Codec):
         self._start = start
 
     def initial(self) -> CodecState:
-        """Return the state that the epoch starts from."""
         return self._start
 
 

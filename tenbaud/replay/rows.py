@@ -21,8 +21,9 @@ from channel.protocol.recording import (
     RecordChannel,
 )
 from receiver.session import records as receiver
+from tenbaud.recording.reader import Recording
 from tenbaud.recording.recover import RECOVERED_NOTE
-from tenbaud.recording.table import Table, Tables
+from tenbaud.recording.table import Table
 from transmitter.metrics.gap import GAP_CHANNEL
 from transmitter.session import records as transmitter
 
@@ -118,7 +119,7 @@ class EndRows:
     """topics that no node writes"""
 
 
-def read_rows(end: str, tables: Tables) -> EndRows:
+def read_rows(end: str, tables: Recording) -> EndRows:
     """Return the rows of one end; those that do not fit are left out and listed as misfits."""
     misfits: list[Misfit] = []
     topics: dict[str, Topic] = {}

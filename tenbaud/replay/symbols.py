@@ -59,10 +59,7 @@ class Unpacked:
 
 
 def pack(
-    agreement: Agreement,
-    epochs: list[Epoch],
-    steps: tuple[tuple[int, float], ...],
-    last_digest: str,
+    agreement: Agreement, epochs: list[Epoch], steps: tuple[tuple[int, float], ...], last_digest: str
 ) -> Packed:
     """Return the flight as bytes."""
     codec = agreement.codec

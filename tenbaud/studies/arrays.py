@@ -12,14 +12,12 @@ from channel.codec.codec import Codec
 from channel.codec.signals import Signal, Signals
 from channel.flight_log import FlightLog
 from plant_sim.encoder import Encoder
-from receiver.controllers.recorded import RecordedController
 from tenbaud.build.ends import guard_settings
 from tenbaud.build.flight import Agreement
 from tenbaud.build.references import reference_of, reference_sections
 from tenbaud.build.signals import build_encoders
 from tenbaud.config.schema import ReferenceSection
 from tenbaud.studies.flight_data import Work
-from tenbaud.studies.schedule import Uncommon
 from transmitter.encoder_watch import motion_of
 from transmitter.session.state_observer import StateObserver
 
@@ -45,8 +43,6 @@ def signal_arrays(agreement: Agreement) -> dict[str, Any]:
     readers = build_encoders(config, signals)
     encoders = [one if isinstance(one, Encoder) else Encoder(1.0) for one in readers]
     exact = [not isinstance(one, Encoder) for one in readers]
-    if any(exact) and config.transmitter.rig == "replay":
-        raise Uncommon("a recorded output that is read exactly")
     outputs = len(signals.outputs)
     replay = config.transmitter.rig == "replay"
     sections = reference_sections(config, signals)
@@ -128,13 +124,12 @@ def _values(section: str, tick_s: float, output: Signal, ticks: int) -> Any:
 
 
 def recorded_arrays(log: FlightLog | None, ahead: int, signals: Signals) -> dict[str, Any]:
-    """Return counts, commands and applied inputs of a recording; empty without one."""
+    """Return outputs, commands and applied inputs of a recording; empty without one."""
     if log is None:
-        counts = np.zeros((0, len(signals.outputs)), dtype=np.int64)
-        return {"counts": counts, "commands": NO_ROWS, "applied": NO_ROWS}
-    controller = RecordedController(log)
-    return {
-        "counts": np.array(log.counts, dtype=np.int64),
-        "commands": np.array([controller.command(tick, ()) for tick in range(ahead)]),
-        "applied": np.array(log.volts, dtype=float),
-    }
+        return {"recorded": NO_ROWS, "commands": NO_ROWS, "applied": NO_ROWS}
+    given = {"recorded": log.measured, "commands": log.commands[:ahead], "applied": log.commands}
+    if not log.commands.shape[1]:
+        return given | {"commands": np.zeros((ahead, len(signals.inputs))), "applied": NO_ROWS}
+    if ahead > len(log):
+        given["commands"] = np.pad(log.commands, ((0, ahead - len(log)), (0, 0)), mode="edge")
+    return given

@@ -40,7 +40,6 @@ class FlightFigures(NamedTuple):
 
     @property
     def first(self) -> OutputFigures:
-        """Return the figures of the first output."""
         return self.outputs[0] if self.outputs else OutputFigures()
 
 

@@ -16,11 +16,11 @@ class Numbers(NamedTuple):
     window_start: int
     impulse: bool
     replay: bool
-    """the rig is a recording: counts, commands and applied inputs are given"""
+    """the rig is a recording: outputs, commands and applied inputs are given"""
     uses_rates: bool
     """words are formed from all corrected states, which the transmitter observes"""
     watch: int
-    """ticks of the window in which the encoders are watched"""
+    """ticks of the window in which the encoders are watched; beyond any flight: they are not"""
 
 
 class Given(NamedTuple):
@@ -61,8 +61,8 @@ class Given(NamedTuple):
     sign: Any
     zero_counts: Any
     turn: Any
-    counts: Any
-    """replay: per tick"""
+    recorded: Any
+    """replay: outputs per tick"""
     commands: Any
     """replay: per tick, `D` ticks beyond the flight included"""
     applied: Any

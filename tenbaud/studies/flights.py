@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,10 +16,11 @@ from channel.codec.signals import Signals, signals_of
 from channel.flight_log import FlightLog
 from tenbaud.build.controllers import build_controller
 from tenbaud.build.ends import build_observer, guard_settings
-from tenbaud.build.flight import Agreement, kind_of_link, read_flight_log
+from tenbaud.build.flight import Agreement, kind_of_link
+from tenbaud.build.flight_log import read_flight_log
 from tenbaud.build.rig import build_plant
 from tenbaud.config.kinds import PLANTS
-from tenbaud.config.schema import FlightConfig, FlightLogSection
+from tenbaud.config.schema import FlightConfig
 from tenbaud.flight.verdict import FlightCounts, faults_of
 from tenbaud.studies.arrays import (
     observer_arrays,
@@ -83,7 +83,7 @@ class CompiledPoint:
         replay = config.transmitter.rig == "replay"
         self._plant = AtRest()
         if replay:
-            self._log = recorded_flight(config)
+            self._log = read_flight_log(config, signals)
             ticks = min(ticks, len(self._log))
         else:
             self._plant = build_plant(config, tick_s, signals)
@@ -99,7 +99,7 @@ class CompiledPoint:
             impulse=codec.coder.impulse,
             replay=replay,
             uses_rates=codec.uses_rates,
-            watch=window_ticks(codec.model, agreement.terms.tick_ns / 1e9),
+            watch=sys.maxsize if replay else window_ticks(codec.model, agreement.terms.tick_ns / 1e9),
         )
         self.constants = (
             arrays_of(codec.model.constants),  # type: ignore[attr-defined]
@@ -261,19 +261,6 @@ def _require_ordinary(config: FlightConfig, codec: Codec) -> None:
     unread = None in signals_of(model).output_states and not hasattr(model, "output_function")
     if unread:
         raise Uncommon("a model whose outputs are neither states nor written as a function")
-
-
-def recorded_flight(config: FlightConfig) -> FlightLog:
-    """Return the recorded flight of a configuration, read once as long as its file stays the same."""
-    path = Path(config.flight_log.file)
-    changed = path.stat().st_mtime_ns if path.exists() else 0
-    return _recorded_flight(config.flight_log.model_dump_json(), changed)
-
-
-@lru_cache(maxsize=4)
-def _recorded_flight(section: str, changed: int) -> FlightLog:
-    log = FlightLogSection.model_validate_json(section)
-    return read_flight_log(FlightConfig(flight_log=log))
 
 
 def _rms(squares: float, count: int) -> float:

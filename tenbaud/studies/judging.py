@@ -15,11 +15,12 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from tenbaud.build.flight import ticks_of
+from tenbaud.build.flight_log import read_flight_log
 from tenbaud.config.schema import FlightConfig
 from tenbaud.design.described import linear_of
 from tenbaud.studies.chunk import fly_point
 from tenbaud.studies.figures import FlightFigures
-from tenbaud.studies.flights import CompiledPoint, recorded_flight
+from tenbaud.studies.flights import CompiledPoint
 from tenbaud.studies.plain import fly_plain
 from tenbaud.studies.schedule import Uncommon
 from tenbaud.studies.settings import StudyError, configured
@@ -135,7 +136,7 @@ def split_ticks(config: FlightConfig, share: float) -> tuple[int, int]:
 
     StudyError when a part of it has nothing to score.
     """
-    ticks = min(len(recorded_flight(config)), ticks_of(config.duration_s, config))
+    ticks = min(len(read_flight_log(config)), ticks_of(config.duration_s, config))
     border = math.floor(share * ticks)
     lead = config.timing.lead_ticks
     if min(border, ticks - border) <= (0 if lead == "auto" else lead):

@@ -24,7 +24,6 @@ class AtRest:
 
     @staticmethod
     def step_function(state: Any, command: Any, push: Any, constants: Any, sine: Any) -> Any:
-        """Return the state."""
         return state
 
 

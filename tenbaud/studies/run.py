@@ -35,11 +35,7 @@ OnChunk = Callable[[int, int], None]
 
 
 def run_study(
-    study: Study,
-    results: Results,
-    on_chunk: OnChunk,
-    workers: int = 1,
-    scheduler: str | None = None,
+    study: Study, results: Results, on_chunk: OnChunk, workers: int = 1, scheduler: str | None = None
 ) -> Any:
     """Fly what is missing of a study; return the whole table.
 

@@ -95,11 +95,9 @@ class _NumberWire:
     """Symbols are their numbers: enough for a line to flip one."""
 
     def is_symbol(self, data: bytes) -> bool:
-        """Return whether there is a number."""
         return len(data) == 1
 
     def renumbered(self, data: bytes, shift: int, kinds: int) -> bytes:
-        """Return another number."""
         return bytes(((data[0] + shift) % kinds,))
 
 

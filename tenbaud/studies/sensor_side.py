@@ -35,8 +35,8 @@ def read(at: int, plant: Any, numbers: Numbers, plant_constants: Any, given: Giv
         per_turn, sign = given.counts_per_turn[place], given.sign[place]
         zero, turn = given.zero_counts[place], given.turn[place]
         if numbers.replay:
-            counts = given.counts[at, place]
-            value = angle_of(counts, per_turn, sign, zero, turn)
+            counts = 0
+            value = given.recorded[at, place]
             shown = value
         else:
             value = plant_output(plant, plant_constants, place)

@@ -19,7 +19,7 @@ from pydantic import BaseModel
 
 from channel.errors import TenbaudError
 from tenbaud.build.codec import unchecked_codec
-from tenbaud.config.load import load_config
+from tenbaud.build.recorded import flight_config
 from tenbaud.config.outside_code import require_allowed
 from tenbaud.config.schema import KINDS, FlightConfig
 
@@ -106,7 +106,7 @@ def configured(
     for name, value in swept.items():
         if name not in entries and name not in texts:
             put(values, FIELDS.get(name, name), value)
-    config = load_config(preset, file, values, allow_code=allow_code)
+    config = flight_config(preset, file, values, allow_code=allow_code)
     require_allowed(config)
     if not (entries or texts or "rate" in swept):
         return config
@@ -117,7 +117,7 @@ def configured(
     for name, value in entries.items():
         field, _, index = name.rpartition(".")
         put(values, field, _with_entry(config, values, field, int(index), value))
-    config = load_config(preset, file, values, allow_code=allow_code)
+    config = flight_config(preset, file, values, allow_code=allow_code)
     require_allowed(config)
     return config
 

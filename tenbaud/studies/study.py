@@ -69,7 +69,6 @@ class Study:
 
     @property
     def flights(self) -> int:
-        """Return how many flights the study has."""
         return len(self.points) * len(self.seeds)
 
     @property
@@ -83,7 +82,6 @@ class Study:
         return range(index * size, min((index + 1) * size, self.flights))
 
     def flight(self, number: int) -> tuple[int, int]:
-        """Return (point, seed) of a flight."""
         return number // len(self.seeds), self.seeds[number % len(self.seeds)]
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections import deque
+from collections.abc import Callable
 from math import isfinite
 from typing import Any
 
@@ -12,8 +13,7 @@ from channel.codec.signals import Signal
 from channel.protocol.events import EVENT_CHANNEL
 from channel.protocol.recording import RecordChannel
 from receiver.endpoint import ReceiverEndpoint
-from receiver.session.records import SAMPLE_CHANNEL as TAKEN
-from receiver.session.records import TICK_CHANNEL as DECIDED
+from receiver.session import records as receiver
 from tenbaud.build.flight import Agreement
 from tenbaud.build.transmitter_run import TransmitterRun
 from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
@@ -30,23 +30,18 @@ LATENESS_TICKS = 1000
 EVENT_TEXT_MAX = 300
 
 Row = Any
-"""a row as its channel describes it; the values are read by position, which `_at` gives"""
+"""a row as its channel describes it; the tick or the sample is its first value"""
 
 
-def _at(channel: RecordChannel, *names: str) -> list[int]:
-    known = [field.name for field in channel.fields]
-    return [known.index(name) for name in names]
+def _reader(channel: RecordChannel) -> Callable[[Row], dict[str, Any]]:
+    names = [field.name for field in channel.fields]
+    return lambda row: dict(zip(names, row, strict=True))
 
 
-T_TICK, T_TIME, T_MEASURED, T_TRUE, T_APPLIED, T_LATE_MS = _at(
-    TICK_CHANNEL, "tick", "time_s", "measured", "true", "applied", "lateness_ms"
+READ, ESTIMATED, SAMPLED, DECIDED, TAKEN = map(
+    _reader,
+    (TICK_CHANNEL, ESTIMATE_CHANNEL, SAMPLE_CHANNEL, receiver.TICK_CHANNEL, receiver.SAMPLE_CHANNEL),
 )
-E_TICK, E_CODED, E_LIVE = _at(ESTIMATE_CHANNEL, "tick", "coded_state", "live_state")
-S_SAMPLE, S_SENT, S_WORD, S_ABOUT, S_RANGE, S_DIGEST, S_PEER = _at(
-    SAMPLE_CHANNEL, "sample", "word_sent", "word", "about", "range", "digest", "peer_digest"
-)
-D_TICK, D_REFERENCE, D_LIVE = _at(DECIDED, "tick", "reference", "live_state")
-R_SAMPLE, R_WORD, R_DIGEST = _at(TAKEN, "sample", "word", "digest")
 
 
 class Composer(ABC):
@@ -112,7 +107,6 @@ class TransmitterComposer(Composer):
         self._applied: Vector | None = None
 
     def compose(self) -> dict[str, Any]:
-        """Return the message of this moment."""
         run, config, terms = self._run, self.agreement.config, self.agreement.terms
         node, session = run.node, run.node.session
         rows = self.tap.take()
@@ -149,35 +143,29 @@ class TransmitterComposer(Composer):
         for topic, row in rows:
             if topic == "tick":
                 if real:
-                    self._lateness_ms.append(row[T_LATE_MS])
-                if row[T_TICK] % stride == 0:
-                    self._read_of[row[T_TICK]] = {
-                        "time_s": row[T_TIME],
-                        "measured": row[T_MEASURED],
-                        "true": row[T_TRUE],
+                    self._lateness_ms.append(READ(row)["lateness_ms"])
+                if row[0] % stride == 0:
+                    tick = READ(row)
+                    self._read_of[row[0]] = {
+                        name: tick[name] for name in ("time_s", "measured", "true")
                     }
-                    self._applied = row[T_APPLIED]
-                    self._join(row[T_TICK], points)
+                    self._applied = tick["applied"]
+                    self._join(row[0], points)
             elif topic == "estimate":
-                if row[E_TICK] % stride == 0:
-                    self._estimated_of[row[E_TICK]] = {
-                        "coded": self._measured(row[E_CODED]),
-                        "live": row[E_LIVE] and self._measured(row[E_LIVE]),
+                if row[0] % stride == 0:
+                    live = ESTIMATED(row)["live_state"]
+                    self._estimated_of[row[0]] = {
+                        "coded": self._measured(ESTIMATED(row)["coded_state"]),
+                        "live": live and self._measured(live),
                         "range": self._range,
                     }
-                    self._join(row[E_TICK], points)
+                    self._join(row[0], points)
             elif topic == "sample":
-                self._range = row[S_RANGE]
-                samples.append(
-                    {
-                        "sample": row[S_SAMPLE],
-                        "word_sent": _word(row[S_SENT]),
-                        "word": _word(row[S_WORD]),
-                        "about": _word(row[S_ABOUT]),
-                        "digest": row[S_DIGEST],
-                        "peer_digest": row[S_PEER],
-                    }
-                )
+                sample = SAMPLED(row)
+                self._range = sample["range"]
+                words = {name: _word(sample[name]) for name in ("word_sent", "word", "about")}
+                known = {name: sample[name] for name in ("sample", "digest", "peer_digest")}
+                samples.append(known | words)
         for waiting in (self._read_of, self._estimated_of):
             while len(waiting) > TICKS_WAITING_MAX:
                 del waiting[next(iter(waiting))]
@@ -211,23 +199,22 @@ class ReceiverComposer(Composer):
         self._live = live
 
     def compose(self) -> dict[str, Any]:
-        """Return the message of this moment."""
         session, terms = self._endpoint.session, self.agreement.terms
         rows: list[tuple[str, Row]] = self.tap.take()
         stride = self._stride
         points = [
             {
-                "time_s": row[D_TICK] * terms.tick_ns / 1e9,
-                "reference": row[D_REFERENCE],
-                "live": self._measured(row[D_LIVE]),
+                "time_s": row[0] * terms.tick_ns / 1e9,
+                "reference": DECIDED(row)["reference"],
+                "live": self._measured(DECIDED(row)["live_state"]),
             }
             for topic, row in rows
-            if topic == "tick" and row[D_TICK] % stride == 0
+            if topic == "tick" and row[0] % stride == 0
         ]
         samples = [
-            {"sample": row[R_SAMPLE], "word": _word(row[R_WORD]), "digest": row[R_DIGEST]}
+            {"sample": row[0], "word": _word(one["word"]), "digest": one["digest"]}
             for topic, row in rows
-            if topic == "sample"
+            if topic == "sample" and (one := TAKEN(row))
         ]
         steering = self._live.steering or (None,) * len(self.outputs)
         return {

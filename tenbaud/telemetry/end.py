@@ -114,7 +114,6 @@ class TelemetryEnd:
             yield
 
     def summary(self) -> dict[str, Any]:
-        """Return what became of the telemetry, for the summary."""
         if self.publisher is None or self.tap is None:
             return {"telemetry": "off"}
         told = {

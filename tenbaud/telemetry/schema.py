@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, field_validator
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, create_model, field_validator
 
 from channel.line.impairments import parse_impairments
-from channel.protocol.events import EventKind
+from channel.protocol.events import EVENT_CHANNEL, EventKind
 
 SCHEMA_VERSION = 3
 SET_POINT_MAX = 1e6
@@ -78,28 +78,13 @@ class TakenSample(_Message):
     digest: str = Field(description="64-bit digest of the receiver's copy after the sample")
 
 
-class Happening(_Message):
-    """An event, as recordings have it; fields without meaning for its kind are left out."""
-
-    time_s: float
-    kind: EventKind
-    sample: int | None = None
-    tick: int | None = None
-    slot: int | None = None
-    session: int | None = None
-    epoch: int | None = None
-    cause: str | None = Field(None, description="why, by name")
-    state: str | None = Field(None, description="of the guard")
-    by_peer: bool | None = None
-    axis: int | None = None
-    number: int | None = None
-    value: float | None = None
-    limit: float | None = None
-    missed_share: float | None = None
-    overdue_share: float | None = None
-    transmitter_digest: str | None = None
-    receiver_digest: str | None = None
-    detail: str | None = Field(None, description="for people")
+_TYPES: dict[str, Any] = {"number": float, "integer": int, "boolean": bool, "string": str}
+_OF_EVENT: dict[str, Any] = {
+    one.name: (_TYPES[one.type] | None, Field(None, description=one.description))
+    for one in EVENT_CHANNEL.fields
+} | {"time_s": (float, Field(description="flight time")), "kind": EventKind}
+Happening: Any = create_model("Happening", __base__=_Message, **_OF_EVENT)
+Happening.__doc__ = "An event, as recordings have it; fields without meaning for its kind are left out."
 
 
 class Lateness(_Message):

@@ -57,7 +57,6 @@ class Access:
         return found[0] if found else None
 
     def below(self, path: str) -> Grant | None:
-        """Return the grant whose path this one begins with."""
         return next((one for one in self.grants if path.startswith(f"{one.path}/")), None)
 
     def answers_to(self, host: str) -> bool:

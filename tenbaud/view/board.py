@@ -49,13 +49,7 @@ class Board:
         self._index = 0
         self._fresh = self._nothing()
 
-    @property
-    def takes_commands(self) -> bool:
-        """Return whether the flight shown may be steered."""
-        return any(head["takes_commands"] for head in self.heads.values())
-
     def take(self, messages: list[bytes], now_s: float) -> bool:
-        """Take messages in; return whether there is news."""
         for data in messages:
             try:
                 self._one(orjson.loads(data), now_s)

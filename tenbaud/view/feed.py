@@ -89,10 +89,7 @@ class Feed:
 
 
 def _try_open(
-    endpoint: str,
-    session_name: str,
-    take: Callable[[bytes], None],
-    credentials: Credentials | None,
+    endpoint: str, session_name: str, take: Callable[[bytes], None], credentials: Credentials | None
 ) -> Any:
     from channel.links.zenoh.telemetry import TelemetryFeed
 

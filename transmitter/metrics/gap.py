@@ -41,11 +41,7 @@ GAP_CHANNEL = RecordChannel(
         Field("density", "number", "", "density q of the first disturbance; of a torque in rad^2/s^3"),
         # Which errors have come by then depends on when echoes came.
         Field(
-            "rms_over_floor",
-            "number",
-            "",
-            "running rms of the live error over its floor",
-            timing=True,
+            "rms_over_floor", "number", "", "running rms of the live error over its floor", timing=True
         ),
         Field("ideal_bits", "number", "bit", "an ideal code's, for the same error", timing=True),
     ),
@@ -192,7 +188,6 @@ class GapGauge:
             self._strength.add(done, measured.popleft()[1])
 
     def on_errors(self, errors: Vector) -> None:
-        """Take the live errors of a tick."""
         total = 0.0
         for weight, error in zip(self._limit.weights, errors, strict=True):
             total += weight * error * error
@@ -205,11 +200,9 @@ class GapGauge:
 
     @property
     def whole(self) -> Gap | None:
-        """Return the gauge over all that was flown."""
         return self._gap(self._strength.whole, self._errors.whole)
 
     def row(self, sample: int) -> tuple[object, ...]:
-        """Return the row of `GAP_CHANNEL`."""
         gap = self.now
         return (sample, None, None, None) if gap is None else (sample, *astuple(gap))
 
@@ -239,7 +232,6 @@ class Running(Generic[Number]):
         self._least = period_s / MEMORY_S
 
     def add(self, value: Number) -> None:
-        """Take one number."""
         self.count += 1
         self._sum = self._sum + value
         # A plain mean until there is enough to forget.

@@ -31,7 +31,6 @@ class ErrorMeter:
         self._sum_of_squares = 0.0
 
     def add(self, error: float) -> None:
-        """Take one error."""
         self.count += 1
         size = error if error >= 0.0 else -error
         if size > self.largest:
@@ -89,7 +88,6 @@ class Scores:
 
     @property
     def first(self) -> OutputScores:
-        """Return the scores of the first output."""
         return self.outputs[0]
 
     def forget_reference(self) -> None:
@@ -97,7 +95,6 @@ class Scores:
         self._references = lambda _tick: ()
 
     def on_word(self, word: Word, about: tuple[int, ...] | None) -> None:
-        """Note a confirmed word and what its symbols were about."""
         self.last_words.append((word, about))
         for place in about or ():
             self.outputs[place].symbols += 1

@@ -59,5 +59,4 @@ class Motors:
         return tuple(outputs)
 
     def off(self) -> tuple[float, ...]:
-        """Return zero for every output."""
         return (0.0,) * max(self.outputs, max(self.channels) + 1)

@@ -54,6 +54,8 @@ class Rig(ABC):
     name = ""
     is_real = False
     """a body that moves in real time: it cannot be flown on the virtual clock"""
+    is_recorded = False
+    """a flight that is over: nothing on it is to be protected"""
     ramps_down = False
     """after a flight the voltages are taken down along the guard's ramp, not dropped"""
 

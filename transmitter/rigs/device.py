@@ -46,33 +46,35 @@ class DeviceSettings:
     """False: never send a command, not even a zero"""
 
 
-class DeviceRig(Rig):
-    """Base of the rigs that talk to a device.
+@dataclass(frozen=True, slots=True)
+class Wiring:
+    """What hangs on a device, and within which limits it is used."""
 
-    `axes` are all encoders; `measured` are the names of those that the codec measures, in its order.
-    """
+    axes: tuple[Axis, ...]
+    """all encoders"""
+    measured: tuple[str, ...]
+    """names of those that the codec measures, in its order"""
+    motors: Motors
+    settings: DeviceSettings
+
+
+class DeviceRig(Rig):
+    """Base of the rigs that talk to a device."""
 
     is_real = True
     ramps_down = True
 
-    def __init__(
-        self,
-        axes: tuple[Axis, ...],
-        measured: tuple[str, ...],
-        motors: Motors,
-        settings: DeviceSettings,
-        wraps: Wraps,
-    ) -> None:
-        self.axes = axes
-        self.motors = motors
-        self.settings = settings
+    def __init__(self, wiring: Wiring, wraps: Wraps) -> None:
+        axes = self.axes = wiring.axes
+        self.motors = wiring.motors
+        self.settings = wiring.settings
         self.timeline = Timeline(wraps)
         self.counts: Counter[str] = Counter()
         """reads, samples_skipped, writes, writes_lost, sign_reversals"""
         self.hard_fault: str | None = None
-        self._measured = [axis for name in measured for axis in axes if axis.name == name]
+        self._measured = [axis for name in wiring.measured for axis in axes if axis.name == name]
         self._first: DeviceSample | None = None
-        self._latest: DeviceSample | None = None
+        self.latest: DeviceSample | None = None
         self._arrived = threading.Condition()
         self._unread = 0
         self._enabled = False
@@ -119,7 +121,7 @@ class DeviceRig(Rig):
     def read(self, tick: int) -> Reading:
         """Return the newest sample, with what is wrong with it."""
         with self._arrived:
-            sample, unread, self._unread = self._latest, self._unread, 0
+            sample, unread, self._unread = self.latest, self._unread, 0
         if sample is None:
             raise RigError(f"{self.name}: read before it was opened")
         self.counts["reads"] += 1
@@ -182,13 +184,7 @@ class DeviceRig(Rig):
 
     # For those that look on
 
-    @property
-    def latest(self) -> DeviceSample | None:
-        """Return the newest sample."""
-        return self._latest
-
     def angles_rad(self, sample: DeviceSample, axes: list[Axis] | None = None) -> tuple[float, ...]:
-        """Return the angles of these axes, or of all."""
         first = self._first or sample
         chosen = self.axes if axes is None else axes
         return tuple(
@@ -201,18 +197,17 @@ class DeviceRig(Rig):
             if not self._arrived.wait_for(lambda: self._unread > 0, timeout_s):
                 return None
             self._unread = 0
-            return self._latest
+            return self.latest
 
     # The reader's side
 
     def _take(self, raw: RawSample, host_ns: int) -> None:
-        """Take one sample from the reader thread."""
         needed = max(axis.channel for axis in self.axes) + 1
         if len(raw.counts) < needed:
             self.counts["short_samples"] += 1
             return
         sample = self.timeline.take(raw, host_ns)
-        before = self._latest
+        before = self.latest
         if before is None or (sample.restarted and not self._enabled):
             self._first = sample
         elif self._enabled:
@@ -220,7 +215,7 @@ class DeviceRig(Rig):
             if problem is not None:
                 self._fail(problem)
         with self._arrived:
-            self._latest = sample
+            self.latest = sample
             self._unread += 1
             self._arrived.notify_all()
 
@@ -262,21 +257,21 @@ class DeviceRig(Rig):
         timeout_s = self.settings.first_sample_timeout_s
         with self._arrived:
             self._arrived.wait_for(
-                lambda: self._latest is not None or self._thread_error is not None, timeout_s
+                lambda: self.latest is not None or self._thread_error is not None, timeout_s
             )
         if self._thread_error is not None:
             raise self._thread_error
-        if self._latest is None and self.counts["short_samples"]:
+        if self.latest is None and self.counts["short_samples"]:
             raise RigError(
                 f"{self.name}: its samples have fewer channels than transmitter.bridge.axes names; "
                 "list there what is wired; the motors were not enabled"
             )
-        if self._latest is None:
+        if self.latest is None:
             raise RigError(
                 f"{self.name}: no valid sample for {timeout_s:g} s{self._no_sample_hint()}; the "
                 "motors were not enabled"
             )
-        problem = _flag_fault(self._latest.flags & ~DeviceFlag.WATCHDOG_TRIPPED)
+        problem = _flag_fault(self.latest.flags & ~DeviceFlag.WATCHDOG_TRIPPED)
         if problem is not None:
             raise RigError(f"{self.name}: {problem}; the motors were not enabled")
 
@@ -289,7 +284,7 @@ class DeviceRig(Rig):
             return
         until = time.monotonic() + REARM_TIMEOUT_S
         self._send(self.motors.off(), False)
-        while self._latest is not None and self._latest.flags & DeviceFlag.WATCHDOG_TRIPPED:
+        while self.latest is not None and self.latest.flags & DeviceFlag.WATCHDOG_TRIPPED:
             if time.monotonic() > until:
                 raise RigError(
                     f"{self.name}: the device's watchdog has tripped and a command to turn the "

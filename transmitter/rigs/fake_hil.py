@@ -19,7 +19,6 @@ class FakeHILError(Exception):
     """The error of the vendor's package."""
 
     def get_error_message(self) -> str:
-        """Return the text."""
         return str(self)
 
 
@@ -55,7 +54,6 @@ class FakeHIL:
         self.expired = False
 
     def set_card_specific_options(self, options: str, length_max: int) -> None:
-        """Take the options."""
         self.calls.append(f"options {options}")
 
     def write_analog(self, channels: Any, count: int, volts: Any) -> None:
@@ -71,12 +69,10 @@ class FakeHIL:
             self._moving_since = time.monotonic()
 
     def write_digital(self, channels: Any, count: int, states: Any) -> None:
-        """Switch digital outputs."""
         self.calls.append(f"digital {[int(state) for state in states]} at {self.analog[:2]}")
         self.digital.update(zip((int(one) for one in channels), map(int, states), strict=True))
 
     def task_create_encoder_reader(self, samples_in_buffer: int, channels: Any, count: int) -> int:
-        """Return a task."""
         self.calls.append("create")
         return 1
 
@@ -84,7 +80,6 @@ class FakeHIL:
         """Take the mode."""
 
     def task_start(self, task: int, clock: Any, frequency: float, samples: int) -> None:
-        """Start the hardware clock."""
         self.calls.append("start")
         self._period_s = 1.0 / frequency
         self._due = time.monotonic()
@@ -103,11 +98,9 @@ class FakeHIL:
         return 1
 
     def task_stop(self, task: int) -> None:
-        """Stop the clock."""
         self.calls.append("stop")
 
     def task_delete(self, task: int) -> None:
-        """Forget the task."""
         self.calls.append("delete")
 
     def watchdog_set_analog_expiration_state(self, channels: Any, count: int, volts: Any) -> None:
@@ -115,7 +108,6 @@ class FakeHIL:
         raise FakeHILError("not supported by this card")
 
     def watchdog_start(self, timeout_s: float) -> None:
-        """Start it."""
         self._watchdog_s, self._fed = timeout_s, time.monotonic()
 
     def watchdog_reload(self) -> bool:
@@ -125,15 +117,12 @@ class FakeHIL:
         return not self.expired
 
     def watchdog_clear(self) -> None:
-        """Allow access again."""
         self.expired, self._watchdog_s = False, None
 
     def watchdog_stop(self) -> None:
-        """Stop it."""
         self._watchdog_s = None
 
     def close(self) -> None:
-        """Give the board back."""
         self._look()
         self.calls.append("close")
         self.closed = True

@@ -16,9 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from transmitter.rigs.axes import Axis, Motors
 from transmitter.rigs.base import RigError
-from transmitter.rigs.device import DeviceRig, DeviceSettings
+from transmitter.rigs.device import DeviceRig, Wiring
 from transmitter.rigs.formats.samples import RawSample, Wraps
 
 FAKE_CARD = "fake"
@@ -58,12 +57,7 @@ def load_library(card_type: str) -> HilLibrary:
 
         return HilLibrary(FakeHIL, FakeHILError, 0, 2)
     try:
-        from quanser.hardware import (  # type: ignore[import-not-found]
-            HIL,
-            BufferOverflowMode,
-            Clock,
-            HILError,
-        )
+        from quanser.hardware import HIL, BufferOverflowMode, Clock, HILError  # type: ignore[import-not-found]
     except ImportError as error:
         raise RigError(
             "the package quanser.hardware is not installed. It is Quanser's own and comes with its "
@@ -77,16 +71,8 @@ def load_library(card_type: str) -> HilLibrary:
 class HilRig(DeviceRig):
     """Encoders and analogue outputs of one board; every call to it comes from one thread."""
 
-    def __init__(
-        self,
-        hil: HilSettings,
-        axes: tuple[Axis, ...],
-        measured: tuple[str, ...],
-        motors: Motors,
-        settings: DeviceSettings,
-        library: HilLibrary | None = None,
-    ) -> None:
-        super().__init__(axes, measured, motors, settings, Wraps(1 << 62, 1 << 62))
+    def __init__(self, hil: HilSettings, wiring: Wiring, library: HilLibrary | None = None) -> None:
+        super().__init__(wiring, Wraps(1 << 62, 1 << 62))
         self.name = f"Quanser {hil.card_type} {hil.card_identifier}"
         self._hil = hil
         self._library = library
@@ -94,7 +80,7 @@ class HilRig(DeviceRig):
         self._task: Any = None
         self._watchdog = False
         self._switched_on = False
-        self._wanted: tuple[float, ...] = motors.off()
+        self._wanted: tuple[float, ...] = wiring.motors.off()
         self._wanted_enable = False
         self._wanted_ns = 0
         self._encoders = np.array(hil.encoder_channels, dtype=np.uint32)

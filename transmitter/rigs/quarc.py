@@ -12,15 +12,13 @@ import contextlib
 import math
 import select
 import socket
-import struct
 import threading
 import time
 from typing import Literal
 
-from transmitter.rigs.axes import Axis, Motors
 from transmitter.rigs.base import RigError
-from transmitter.rigs.device import DeviceRig, DeviceSettings
-from transmitter.rigs.formats.doubles import ByteOrder, DoublesLayout, UnitError
+from transmitter.rigs.device import DeviceRig, Wiring
+from transmitter.rigs.formats.doubles import DoublesLayout, UnitError, doubles
 
 Role = Literal["client", "server"]
 WAIT_S = 0.05
@@ -43,20 +41,15 @@ class QuarcBridge(DeviceRig):
         role: Role,
         layout: DoublesLayout,
         command_fields: tuple[str, ...],
-        byte_order: ByteOrder,
-        axes: tuple[Axis, ...],
-        measured: tuple[str, ...],
-        motors: Motors,
-        settings: DeviceSettings,
+        wiring: Wiring,
     ) -> None:
-        super().__init__(axes, measured, motors, settings, layout.wraps)
+        super().__init__(wiring, layout.wraps)
         self.name = f"QUARC {role} at {host}:{port}"
         self._address = (host, port)
         self._role = role
         self._layout = layout
         self._command_fields = command_fields
-        mark = "<" if byte_order == "little" else ">"
-        self._command = struct.Struct(f"{mark}{len(command_fields)}d")
+        self._command = doubles(len(command_fields), layout.byte_order)
         self._listener: socket.socket | None = None
         self._peer: socket.socket | None = None
         self._sequence = 0

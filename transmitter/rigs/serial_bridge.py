@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING
 
 from channel.errors import LinkError
 from channel.links.serial.port import open_port
-from transmitter.rigs.axes import Axis, Motors
 from transmitter.rigs.base import RigError
-from transmitter.rigs.device import DeviceRig, DeviceSettings
+from transmitter.rigs.device import DeviceRig, Wiring
 from transmitter.rigs.formats.base import SerialFormat
 
 if TYPE_CHECKING:
@@ -64,7 +63,6 @@ class BytePort:
 
     @property
     def is_open(self) -> bool:
-        """Return whether there is a device at present."""
         return self._port is not None
 
     def reopen(self) -> bool:
@@ -119,7 +117,6 @@ class BytePort:
             return False
 
     def close(self) -> None:
-        """Give the port back."""
         port, self._port = self._port, None
         if port is not None:
             # What was written last says that the motors are off: let it out before the port closes.
@@ -149,22 +146,19 @@ class SerialBridge(DeviceRig):
         self,
         port: BytePort,
         serial_format: SerialFormat,
-        axes: tuple[Axis, ...],
-        measured: tuple[str, ...],
-        motors: Motors,
-        settings: DeviceSettings,
+        wiring: Wiring,
         *,
         motor_port: BytePort | None = None,
         motor_format: SerialFormat | None = None,
     ) -> None:
-        super().__init__(axes, measured, motors, settings, serial_format.wraps)
+        super().__init__(wiring, serial_format.wraps)
         self.name = f"{serial_format.name} at {port.url}"
         self._port = port
         self._format = serial_format
         self._motor_port = port if motor_port is None else motor_port
         self._motor_format = motor_format or serial_format
         self._sequence = 0
-        if settings.output and not self._motor_format.has_output:
+        if self.settings.output and not self._motor_format.has_output:
             raise RigError(
                 f"{self.name}: this format carries no commands, so nothing would turn the motors; "
                 "name a motor_port for them, or add --dry-run"
@@ -227,9 +221,4 @@ class SerialBridge(DeviceRig):
         return " and not one byte that could be one: is it the right port, and the device running?"
 
     def figures(self) -> dict[str, object]:
-        """Return every count of device, line and format."""
-        return {
-            **super().figures(),
-            **self._format.counts,
-            "reconnects": self._port.reconnects,
-        }
+        return {**super().figures(), **self._format.counts, "reconnects": self._port.reconnects}

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from channel.codec.codec import Vector
 from channel.flight_log import FlightLog
-from plant_sim.encoder import OutputReader, angles_rad
+from plant_sim.encoder import OutputReader
 from plant_sim.plant import Plant
 from transmitter.rigs.base import Reading, Rig, RigError
 
@@ -62,7 +62,6 @@ class SimulatedRig(Rig):
         self._volts = volts
 
     def safe_stop(self) -> None:
-        """Put the safe voltage on the motors."""
         self._volts = self._safe_command
 
 
@@ -71,12 +70,11 @@ class DryRig(Rig):
 
     def __init__(self, rig: Rig, motors: int = 2) -> None:
         self.name = f"{rig.name} (dry run)"
-        self.is_real = rig.is_real
+        self.is_real, self.is_recorded = rig.is_real, rig.is_recorded
         self._rig = rig
         self._nothing = (0.0,) * motors
 
     def open(self) -> None:
-        """Open the rig."""
         self._rig.open()
 
     def read(self, tick: int) -> Reading | None:
@@ -90,11 +88,9 @@ class DryRig(Rig):
         """Do nothing."""
 
     def close(self) -> None:
-        """Give the rig back."""
         self._rig.close()
 
     def figures(self) -> dict[str, object]:
-        """Return what the rig counted."""
         return {**self._rig.figures(), "dry_run": True}
 
 
@@ -102,18 +98,19 @@ class ReplayRig(Rig):
     """Reads one row per tick; what is written to it changes nothing."""
 
     name = "replay"
+    is_recorded = True
 
-    def __init__(self, log: FlightLog, encoders: tuple[OutputReader, ...]) -> None:
+    def __init__(self, log: FlightLog) -> None:
         self._log = log
-        self._encoders = encoders
 
     def read(self, tick: int) -> Reading | None:
-        """Return the row of a tick, None past the last."""
         if tick >= len(self._log):
             return None
-        counts = self._log.counts[tick]
-        volts = self._log.volts[tick] if self._log.volts else None
-        return Reading(counts, angles_rad(self._encoders, counts), applied_volts=volts)
+        log = self._log
+        applied = tuple(log.commands[tick].tolist()) or None
+        return Reading(
+            tuple(log.counts[tick].tolist()), tuple(log.measured[tick].tolist()), applied_volts=applied
+        )
 
     def write(self, tick: int, volts: Vector) -> None:
         """Do nothing: this flight is over."""

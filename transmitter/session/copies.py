@@ -77,7 +77,6 @@ class Copies:
 
     @property
     def next_sample(self) -> int:
-        """Return the sample whose word is to be sent next."""
         return self.confirmed.sample + len(self._sent)
 
     @property
@@ -96,7 +95,6 @@ class Copies:
         return self._provisional
 
     def sent(self, word: Word) -> None:
-        """Note the word that was sent for `next_sample`."""
         self._sent.append(word)
 
     def skip_to(self, sample: int) -> int:

@@ -35,7 +35,6 @@ class Owing:
         return max(0, tick - self._since_tick + 1)
 
     def on_confirmed(self) -> None:
-        """Note that commands have come."""
         self._pauses = 0
 
     def begin(self, epoch_tick: int, tick: int, why: Why) -> int:

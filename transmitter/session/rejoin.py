@@ -74,7 +74,6 @@ class Asking:
         )
 
     def is_answered_by(self, welcome: Welcome) -> bool:
-        """Return whether this is an answer to the last request."""
         return (welcome.incarnation, welcome.request) == (self._incarnation, self._request)
 
 

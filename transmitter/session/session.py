@@ -230,7 +230,6 @@ class TransmitterSession:
         return []
 
     def bye(self, end: End) -> list[Frame]:
-        """End the session from this side."""
         had_session = self._has_session
         self._end(end)
         return [Bye(self.session_number, end.ending, end.text)] if had_session else []

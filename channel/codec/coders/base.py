@@ -61,17 +61,14 @@ class FunctionCoder:
     """model states that a correction is for"""
 
     def initial(self) -> Vector:
-        """Return the coder state that both ends start from."""
         return ()
 
     def encode(self, coder: Vector, predicted: Vector, measurement: Vector) -> tuple[int, ...]:
-        """Return the word for a measurement, given the predicted one."""
         symbols = [0] * self.alphabet.symbols_per_word
         self.functions.encode(self.constants, coder, predicted, measurement, symbols)
         return tuple(symbols)
 
     def decode(self, coder: Vector, state: Vector, word: Word) -> tuple[Vector, Vector]:
-        """Return the correction and the next coder state for a word or ERASED."""
         correction = [0.0] * self.correction_size
         after = [0.0] * len(coder)
         if word is ERASED:

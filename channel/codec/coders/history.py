@@ -215,7 +215,6 @@ class HistoryCoder(FunctionCoder):
         return self.parameters.minimum_range <= reach <= self.parameters.maximum_range and known
 
     def ranges(self, coder: Vector) -> Vector:
-        """Return the range."""
         return coder[:1]
 
 

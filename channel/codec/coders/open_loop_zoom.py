@@ -16,16 +16,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from channel.codec.codec import STATE_MAX, Vector
-from channel.codec.coders.base import (
-    CoderFunctions,
-    FunctionCoder,
-    Numbers,
-    Results,
-    SymbolResults,
-    Symbols,
-)
-from channel.codec.coders.signs import Gains, axes_of, spread_signs, write_signs
-from channel.codec.words import Alphabet
+from channel.codec.coders.base import CoderFunctions, Numbers, Results, Symbols
+from channel.codec.coders.signs import Gains, SignCoder, encode_signs, spread_signs
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,17 +44,6 @@ class OpenLoopZoomConstants(NamedTuple):
     gains: Gains
 
 
-def open_loop_zoom_encode(
-    constants: OpenLoopZoomConstants,
-    coder: Numbers,
-    predicted: Numbers,
-    measurement: Numbers,
-    symbols: SymbolResults,
-) -> None:
-    """Write the sign of the estimation error of each axis (20)."""
-    write_signs(predicted, measurement, symbols)
-
-
 def open_loop_zoom_decode(
     constants: OpenLoopZoomConstants,
     coder: Numbers,
@@ -78,31 +59,19 @@ def open_loop_zoom_decode(
         after[axis] = constants.floor + constants.decay * coder[axis]
 
 
-class OpenLoopZoomCoder(FunctionCoder):
+class OpenLoopZoomCoder(SignCoder):
     """A sign per axis, and ranges that shrink by the clock. Coder state: the ranges."""
 
-    functions = CoderFunctions(open_loop_zoom_encode, open_loop_zoom_decode)
+    functions = CoderFunctions(encode_signs, open_loop_zoom_decode)
 
     def __init__(self, parameters: OpenLoopZoomParameters) -> None:
-        axes = axes_of(parameters.gains)
-        if not 0.0 < parameters.decay <= 1.0:
-            raise ValueError(f"decay must be in (0, 1], got {parameters.decay}")
+        super().__init__(parameters.gains, parameters.decay, parameters.impulse)
         self.parameters = parameters
-        self.impulse = parameters.impulse
-        self.axes = axes
-        self.alphabet = Alphabet((-1, 1), axes)
-        self.correction_size = len(parameters.gains)
         floor = (1.0 - parameters.decay) * parameters.minimum_range
         self.constants = OpenLoopZoomConstants(parameters.decay, floor, parameters.gains)
 
     def initial(self) -> Vector:
-        """Return `M_0` for every axis."""
         return (self.parameters.initial_range,) * self.axes
 
     def is_state(self, coder: Vector) -> bool:
-        """Return whether these are ranges."""
         return all(0.0 <= value < STATE_MAX for value in coder)
-
-    def ranges(self, coder: Vector) -> Vector:
-        """Return the range `M_k` of each axis."""
-        return coder

@@ -137,7 +137,7 @@ class PcmCoder(FunctionCoder):
 
     def initial(self) -> Vector:
         """Return that no angle has come yet."""
-        angles = self.constants.angles
+        angles = self.parameters.angles
         return (0.0,) * (2 * angles + (angles > 1))
 
     def is_state(self, coder: Vector) -> bool:
@@ -159,4 +159,4 @@ class PcmCoder(FunctionCoder):
 
     def ranges(self, coder: Vector) -> Vector:
         """Return half a step, the largest error of an angle within the range."""
-        return (0.5 * self.constants.step,) * self.constants.angles
+        return (0.5 * self.constants.step,) * self.parameters.angles

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from channel.codec.coders.base import Numbers, Results, SymbolResults, Symbols
+from typing import Any
+
+from channel.codec.codec import Vector
+from channel.codec.coders.base import FunctionCoder, Numbers, Results, SymbolResults, Symbols
+from channel.codec.words import Alphabet
 
 Gains = tuple[tuple[float, ...], ...]
 
@@ -15,7 +19,9 @@ def axes_of(gains: Gains) -> int:
     return axes
 
 
-def write_signs(predicted: Numbers, measurement: Numbers, symbols: SymbolResults) -> None:
+def encode_signs(
+    constants: Any, coder: Numbers, predicted: Numbers, measurement: Numbers, symbols: SymbolResults
+) -> None:
     """Write the sign of the estimation error of each axis (20); the sign of zero is +1."""
     for axis in range(len(symbols)):
         symbols[axis] = 1 if measurement[axis] >= predicted[axis] else -1
@@ -28,3 +34,18 @@ def spread_signs(gains: Gains, ranges: Numbers, signs: Symbols, correction: Resu
         for axis in range(len(signs)):
             total += gains[row][axis] * (ranges[axis] * signs[axis])
         correction[row] = total
+
+
+class SignCoder(FunctionCoder):
+    """A sign per measured axis, and a range for each, which come first in the coder state."""
+
+    def __init__(self, gains: Gains, decay: float, impulse: bool) -> None:
+        self.axes = axes_of(gains)
+        if not 0.0 < decay <= 1.0:
+            raise ValueError(f"decay must be in (0, 1], got {decay}")
+        self.impulse = impulse
+        self.alphabet = Alphabet((-1, 1), self.axes)
+        self.correction_size = len(gains)
+
+    def ranges(self, coder: Vector) -> Vector:
+        return coder[: self.axes]

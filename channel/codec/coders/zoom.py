@@ -15,16 +15,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from channel.codec.codec import STATE_MAX, Vector
-from channel.codec.coders.base import (
-    CoderFunctions,
-    FunctionCoder,
-    Numbers,
-    Results,
-    SymbolResults,
-    Symbols,
-)
-from channel.codec.coders.signs import Gains, axes_of, spread_signs, write_signs
-from channel.codec.words import Alphabet
+from channel.codec.coders.base import CoderFunctions, Numbers, Results, Symbols
+from channel.codec.coders.signs import Gains, SignCoder, encode_signs, spread_signs
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,17 +45,6 @@ class ZoomConstants(NamedTuple):
     floor: float
     """(1 - rho) M_min"""
     gains: Gains
-
-
-def zoom_encode(
-    constants: ZoomConstants,
-    coder: Numbers,
-    predicted: Numbers,
-    measurement: Numbers,
-    symbols: SymbolResults,
-) -> None:
-    """Write the sign of the estimation error of each axis (20)."""
-    write_signs(predicted, measurement, symbols)
 
 
 def zoom_decode(
@@ -95,25 +76,19 @@ def zoom_decode(
         after[axis] = constants.floor + scaled
 
 
-class ZoomCoder(FunctionCoder):
+class ZoomCoder(SignCoder):
     """One sign and one self-adjusting range per measured axis.
 
     Coder state: the ranges of all axes, then the last `window - 1` signs of each axis, newest first.
     """
 
-    functions = CoderFunctions(zoom_encode, zoom_decode)
+    functions = CoderFunctions(encode_signs, zoom_decode)
 
     def __init__(self, parameters: ZoomParameters) -> None:
-        axes = axes_of(parameters.gains)
-        if not 0.0 < parameters.decay <= 1.0:
-            raise ValueError(f"decay must be in (0, 1], got {parameters.decay}")
+        super().__init__(parameters.gains, parameters.decay, parameters.impulse)
         if parameters.window < 1:
             raise ValueError(f"window must be at least 1 sign, got {parameters.window}")
         self.parameters = parameters
-        self.impulse = parameters.impulse
-        self.axes = axes
-        self.alphabet = Alphabet((-1, 1), axes)
-        self.correction_size = len(parameters.gains)
         self.constants = ZoomConstants(
             parameters.window,
             parameters.decay,
@@ -130,7 +105,3 @@ class ZoomCoder(FunctionCoder):
         """Return whether these are ranges, and signs or the zeros of erased words."""
         ranges = all(0.0 <= value < STATE_MAX for value in coder[: self.axes])
         return ranges and all(value in (-1.0, 0.0, 1.0) for value in coder[self.axes :])
-
-    def ranges(self, coder: Vector) -> Vector:
-        """Return the range `M_k` of each axis."""
-        return coder[: self.axes]

@@ -175,7 +175,7 @@ def helicopter_tick(
 
 
 class HelicopterModel:
-    """Three angles and two rotors; both ends begin in hover at an elevation of at least 0."""
+    """Three angles and two rotors."""
 
     state_size = 8
     correction_size = 6
@@ -184,16 +184,23 @@ class HelicopterModel:
     tick_function = staticmethod(helicopter_tick)
 
     def __init__(
-        self, parameters: HelicopterParameters, hover_rad: float, motor_lag_s: float, tick_s: float
+        self,
+        parameters: HelicopterParameters,
+        hover_rad: float,
+        motor_lag_s: float,
+        tick_s: float,
+        start: Vector = (),
     ) -> None:
-        self.hover_rad, self.hover_v = hover_rad, hover_volts(parameters, hover_rad)
+        """`start` is the initial state; empty: the hover."""
+        volts = hover_volts(parameters, hover_rad)
+        self._start = start or (0.0, hover_rad, 0.0, 0.0, 0.0, 0.0, volts, volts)
         left_half = exp(-0.5 * tick_s / motor_lag_s) if motor_lag_s > 0.0 else 0.0
         left_whole = exp(-tick_s / motor_lag_s) if motor_lag_s > 0.0 else 0.0
         self.constants = HelicopterConstants(parameters, tick_s, left_half, left_whole)
 
     def initial(self) -> Vector:
-        """Return the hover."""
-        return (0.0, self.hover_rad, 0.0, 0.0, 0.0, 0.0, self.hover_v, self.hover_v)
+        """Return the state that both ends begin with."""
+        return self._start
 
     def measured(self, state: Vector) -> Vector:
         """Return travel, elevation and pitch."""

@@ -20,16 +20,18 @@ class HoldModel:
     input_size = 2
     row_function = staticmethod(hold_row)
 
-    def __init__(self, tick_s: float, outputs: Sequence[str] = ("pitch",)) -> None:
+    def __init__(self, tick_s: float, start: Vector = (), outputs: Sequence[str] = ("pitch",)) -> None:
+        """`start` is the initial state; empty: at angle zero and at rest."""
         angles = tuple([Signal(name, "rad") for name in outputs])
         rates = [Signal(f"{name}_rate", "rad/s") for name in outputs]
         self.signals = Signals((*angles, *rates), PITCH_SIGNALS.inputs, angles)
         self.state_size = self.correction_size = 2 * len(outputs)
         self.constants: Vector = (tick_s,)
+        self._start = start or (0.0,) * self.state_size
 
     def initial(self) -> Vector:
-        """Return the body at angle zero, at rest."""
-        return (0.0,) * self.state_size
+        """Return the state that both ends begin with."""
+        return self._start
 
     def measured(self, state: Vector) -> Vector:
         """Return the angles."""

@@ -109,16 +109,13 @@ class LinearModel:
         )
 
     def initial(self) -> Vector:
-        """Return the state that both ends start from."""
         return self._start
 
     def measured(self, state: Vector) -> Vector:
-        """Return the outputs."""
         constants = self.constants
         return tuple([linear_output(state, constants, place) for place in range(len(self.outputs))])
 
     def tick(self, state: Vector, command: Vector, held: Vector) -> Vector:
-        """Advance by one tick; see `linear_row`."""
         constants = self.constants
         return tuple(
             [linear_row(state, command, held, constants, row) for row in range(self.state_size)]

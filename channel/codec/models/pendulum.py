@@ -61,13 +61,16 @@ class PendulumModel:
         growth_per_s: float = 7.32,
         damping_per_s: float = 0.1,
         torque_gain_rad_per_v_s2: float = 4.0,
+        start: Vector = (),
     ) -> None:
+        """`start` is the initial state; empty: upright and at rest."""
         growth = growth_per_s * growth_per_s
         self.constants: Vector = (growth, damping_per_s, torque_gain_rad_per_v_s2, context.tick_s)
+        self._start = start or (0.0, 0.0)
 
     def initial(self) -> Vector:
-        """Return the pendulum upright and at rest."""
-        return (0.0, 0.0)
+        """Return the state that both ends begin with."""
+        return self._start
 
     def measured(self, state: Vector) -> Vector:
         """Return the angle, the one output."""

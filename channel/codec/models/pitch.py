@@ -106,13 +106,15 @@ class PitchModel:
     signals = PITCH_SIGNALS
     tick_function = staticmethod(pitch_tick)
 
-    def __init__(self, parameters: PitchParameters, tick_s: float) -> None:
+    def __init__(self, parameters: PitchParameters, tick_s: float, start: Vector = ()) -> None:
+        """`start` is the initial state; empty: the paper's, at angle zero, at rest, motors off."""
         self.parameters = parameters
         self.constants = pitch_constants(parameters, tick_s)
+        self._start = start or (0.0, 0.0, 0.0, 0.0)
 
     def initial(self) -> Vector:
-        """Return the body at angle zero, at rest, with motors off: the paper's initial state."""
-        return (0.0, 0.0, 0.0, 0.0)
+        """Return the state that both ends begin with."""
+        return self._start
 
     def measured(self, state: Vector) -> Vector:
         """Return the pitch angle, the one measured axis."""

@@ -44,7 +44,6 @@ class _Direction:
         return QUEUE_BYTES_MAX - len(self._queue)
 
     def put(self, data: bytes, now: float) -> None:
-        """Put bytes on the line."""
         if not self._queue:
             self._due = now + self._byte_s
         self._queue += data
@@ -89,10 +88,7 @@ class EmulatedLine:
     def __init__(self, folder: Path, rate_baud: float | None = 115_200) -> None:
         self.transmitter_port = folder / "transmitter"
         self.receiver_port = folder / "receiver"
-        self._ways: dict[Way, _Direction] = {
-            "up": _Direction(rate_baud),
-            "down": _Direction(rate_baud),
-        }
+        self._ways: dict[Way, _Direction] = {"up": _Direction(rate_baud), "down": _Direction(rate_baud)}
         self._ends = (PseudoTerminal(self.transmitter_port), PseudoTerminal(self.receiver_port))
         self._lock = threading.Lock()
         self._stop = threading.Event()
@@ -109,7 +105,6 @@ class EmulatedLine:
         self.unplug()
 
     def carried(self, way: Way) -> int:
-        """Return how many bytes have gone in this direction."""
         with self._lock:  # else a byte may be read at its end before it is counted
             return self._ways[way].carried
 

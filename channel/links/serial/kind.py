@@ -12,13 +12,7 @@ from typing import Any
 from channel.codec.codec import Codec
 from channel.links.base import Link
 from channel.links.kind import LinkEnd, LinkKind, LinkSettings, Meeting
-from channel.links.serial.budget import (
-    byte_ns,
-    check_down,
-    check_slot_counter,
-    check_up,
-    command_bytes,
-)
+from channel.links.serial.budget import byte_ns, check_down, check_slot_counter, check_up, command_bytes
 from channel.links.serial.wire import SerialWire
 from channel.links.zenoh.kind import ZenohKind
 from channel.protocol.terms import Terms
@@ -38,7 +32,6 @@ class SerialKind(LinkKind):
         return settings.downlink == ZENOH
 
     def where(self, settings: LinkSettings) -> tuple[str, ...]:
-        """Return the ports."""
         return tuple(filter(None, (settings.port, settings.downlink)))
 
     def check(self, settings: LinkSettings, insecure: bool) -> None:

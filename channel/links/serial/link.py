@@ -108,7 +108,6 @@ class SerialLink(Link):
             self.counts.bytes_out += len(data)
 
     def receive(self, timeout_s: float) -> bytes | None:
-        """Return the next message, or None after `timeout_s` seconds."""
         until = time.monotonic() + timeout_s
         while True:
             left_s = until - time.monotonic()
@@ -164,7 +163,6 @@ class SerialLink(Link):
         return len(raw) * LINE_BITS_PER_BYTE / self._line_rate_baud
 
     def _write(self, raw: bytes, is_answer: bool = False) -> bool:
-        """Put bytes on the line; return whether they are on it, all of them."""
         with self._writing:
             port = self._port
             if is_answer and self._leaving:

@@ -18,7 +18,6 @@ class SplitWire:
         self._up, self._down = up, down
 
     def size(self, data: bytes) -> int:
-        """Return how many bytes a message takes on its line."""
         downward = len(data) > 1 and data[1] in DOWNWARD_KINDS
         return (self._down if downward else self._up).size(data)
 
@@ -48,7 +47,6 @@ class SplitLink(Link):
         )
 
     def send(self, data: bytes) -> None:
-        """Put one message on the outward line."""
         self._out.send(data)
 
     def receive(self, timeout_s: float) -> bytes | None:
@@ -60,10 +58,8 @@ class SplitLink(Link):
         return self._in.peer_present()
 
     def trouble(self) -> str:
-        """Return what is wrong with either line."""
         return self._out.trouble() or self._in.trouble()
 
     def close(self) -> None:
-        """Give both lines back."""
         self._out.close()
         self._in.close()

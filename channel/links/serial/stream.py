@@ -57,7 +57,6 @@ class Deframer:
         self._run_slot = 0
 
     def feed(self, data: bytes) -> list[Received]:
-        """Return the messages that these bytes complete."""
         taken = (self._take(byte) for byte in data)
         return [received for received in taken if received is not None]
 

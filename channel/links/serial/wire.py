@@ -91,7 +91,6 @@ class SerialWire:
         return symbol
 
     def size(self, data: bytes) -> int:
-        """Return how many bytes a message takes on the line, delimiters included."""
         return 1 if self.is_symbol(data) else len(stuff(data))
 
     def symbol(self, byte: int) -> ShortSymbol | None:
@@ -99,7 +98,6 @@ class SerialWire:
         return self._symbols.get(byte)
 
     def is_symbol(self, data: bytes) -> bool:
-        """Return whether a message is one symbol byte."""
         return len(data) == 1 and data[0] in self._symbols
 
     def renumbered(self, data: bytes, shift: int, kinds: int) -> bytes:

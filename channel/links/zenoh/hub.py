@@ -40,11 +40,7 @@ class ZenohHub:
 
     name = "zenoh"
 
-    def __init__(
-        self,
-        pattern: str,
-        **node: Unpack[NodeOptions],
-    ) -> None:
+    def __init__(self, pattern: str, **node: Unpack[NodeOptions]) -> None:
         if not is_session_pattern(pattern):
             raise LinkError(
                 f"sessions {pattern!r}: write names as in rig/7, with * for any one part, as in rig/*"

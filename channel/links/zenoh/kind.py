@@ -20,7 +20,6 @@ class ZenohKind(LinkKind):
         return True
 
     def open(self, end: LinkEnd) -> Link:
-        """Return an open session."""
         from channel.links.zenoh.link import ZenohLink
 
         return ZenohLink(

@@ -40,12 +40,7 @@ class ZenohLink(Link):
     name = "zenoh"
 
     def __init__(
-        self,
-        role: Role,
-        session_name: str,
-        *,
-        best_effort: bool = False,
-        **node: Unpack[NodeOptions],
+        self, role: Role, session_name: str, *, best_effort: bool = False, **node: Unpack[NodeOptions]
     ) -> None:
         super().__init__()
         if not is_session_name(session_name):
@@ -101,7 +96,6 @@ class ZenohLink(Link):
         self.counts.bytes_out += len(data)
 
     def receive(self, timeout_s: float) -> bytes | None:
-        """Return the next message, or None after `timeout_s` seconds."""
         data = self._inbox.get(timeout_s)
         if data is None:
             return None

@@ -13,13 +13,7 @@ from typing import Self
 from channel.errors import LinkError
 from channel.links.endpoints import check_endpoints
 from channel.links.security import Security
-from channel.links.zenoh.config import (
-    SESSIONS_MAX,
-    as_file,
-    open_session,
-    zenoh_config,
-    zenoh_settings,
-)
+from channel.links.zenoh.config import SESSIONS_MAX, as_file, open_session, zenoh_config, zenoh_settings
 from channel.links.zenoh.gate import Gate
 
 
@@ -60,11 +54,9 @@ class ZenohRouter:
 
     @property
     def connected(self) -> int:
-        """Return how many nodes are connected now."""
         return len(list(self._session.info.transports()))
 
     def close(self) -> None:
-        """Stop routing; may be called more than once."""
         self._parts.close()
 
     def __enter__(self) -> Self:

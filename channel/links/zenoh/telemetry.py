@@ -70,7 +70,6 @@ class TelemetryPort:
             raise LinkError(f"telemetry could not be sent: {error}") from error
 
     def close(self) -> None:
-        """Close the session."""
         self._session.close()
 
 
@@ -99,7 +98,6 @@ class TelemetryFeed:
 
     @property
     def is_connected(self) -> bool:
-        """Return whether the end is still there."""
         return bool(self._session.info.peers_zid() or self._session.info.routers_zid())
 
     def send(self, session_name: str, data: bytes) -> None:
@@ -113,7 +111,6 @@ class TelemetryFeed:
             raise LinkError(f"the command could not be sent: {error}") from error
 
     def close(self) -> None:
-        """Close the session."""
         self._session.close()
 
 

@@ -12,13 +12,13 @@ from channel.protocol.wire import DATAGRAM
 from reproduction.limits.candidates import CANDIDATES, PRESETS, innovation_gains, unit_rad
 from reproduction.limits.flight import Case, configuration, fly, fly_agreement
 from reproduction.limits.intervals import exponent, paired, ratio
+from reproduction.limits.models import pitch
 from reproduction.limits.tracking import HISTORY_10, USUAL, TrackingCase, fly_tracking
 from reproduction.limits.trials import TRIALS, fly_trial
 from reproduction.paper.flights import Job
 from reproduction.paper.flights import fly as fly_job
 from reproduction.paper.real import HALF_S, UIUC_FILE, replayed
 from tenbaud.bounds.floor import floor
-from tenbaud.bounds.linear import pitch
 from tenbaud.build.ends import build_receiver
 from tenbaud.config.load import load_config
 from tenbaud.flight import transmit

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from reproduction.limits.models import integrators, pitch
 from tenbaud.bounds.closed import (
     DOUBLE_INTEGRATOR,
     WIENER,
@@ -20,7 +21,7 @@ from tenbaud.bounds.floor import (
     ideal_worth,
     word_floor,
 )
-from tenbaud.bounds.linear import LinearModel, integrators, linear_model, pitch, reached, sampled
+from tenbaud.bounds.linear import LinearModel, linear_model, reached, sampled
 from tenbaud.design.described import plant_of, plant_section
 from tenbaud.design.floors import floors
 

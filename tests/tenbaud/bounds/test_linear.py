@@ -11,11 +11,10 @@ from reproduction.limits.encoder import (
     double_integrator_rate_at_encoder_floor,
     encoder_floor,
 )
+from reproduction.limits.models import integrators, pitch
 from tenbaud.bounds.floor import floor
 from tenbaud.bounds.linear import (
-    integrators,
     linear_model,
-    pitch,
     rate_needed,
     sampled,
 )

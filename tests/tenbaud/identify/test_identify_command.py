@@ -113,7 +113,7 @@ def not_finite(rows: Cells) -> None:
         (still, "voltage difference of the motors never changes"),
         (in_degrees, "in degrees"),
         (in_millivolts, "millivolts"),
-        (with_gap, "line 702, column t: 7.5 after 6.99"),
+        (with_gap, "line 702, column t: 7.5 s after 6.99 s"),
         (not_finite, "line 12, column pitch"),
     ],
 )
@@ -131,7 +131,7 @@ def test_when_a_log_is_no_good_then_the_error_names_the_cause(
     ("arguments", "text"),
     [
         (("--columns", "time=t,angle=yaw,front=uf,rear=ur"), "column yaw is missing"),
-        (("--columns", "when=t"), "is not NAME=COLUMN"),
+        (("--columns", "when=t"), "when is no signal of the model"),
         ((*COLUMNS, "--equilibrium", "later"), "--equilibrium later"),
         ((*COLUMNS, "--from", "29.9"), "too few"),
     ],

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from channel.codec.models.pitch import PITCH_SIGNALS
-from tenbaud.recording.gather import OverviewRecorder
+from tenbaud.recording.overview import OverviewRecorder
 from tenbaud.recording.reader import stored_metadata
 from tenbaud.recording.writer import McapRecorder
 from tests.tenbaud.processes import REPOSITORY
@@ -63,9 +63,9 @@ def test_the_stored_overview_of_a_long_flight_is_that_of_its_rows(
 ) -> None:
     import numpy as np
 
-    from tenbaud.recording import figure, gather
+    from tenbaud.recording import figure, overview
 
-    monkeypatch.setattr(gather, "ROWS_OF_LONG_FLIGHT", 50_000)
+    monkeypatch.setattr(overview, "ROWS_OF_LONG_FLIGHT", 50_000)
     path = tmp_path / "transmitter.mcap"
     with McapRecorder(
         path, {}, wait_when_full=True, overview=OverviewRecorder(PITCH_SIGNALS)

@@ -87,10 +87,10 @@ def test_channel_comes_back_with_types_units_and_meanings(tmp_path: Path) -> Non
         recorder.write(percent, 5, (12.5,))
     recording = Recording(path)
     assert recording.metadata == {"seed": "7"}
-    assert [recording.schema(topic) for topic in recording.topics] == [TICK, SAMPLE, percent]
+    assert [topic.channel for topic in recording.topics.values()] == [TICK, SAMPLE, percent]
     assert [row for _, row in recording.rows("odd %s")] == [{"share_%": 12.5}]
     with pytest.raises(RecordingError, match=r"no topic 'tock'.*tick, sample"):
-        recording.schema("tock")
+        recording.topic("tock")
 
 
 def test_full_queue_drops_the_newest_and_counts(tmp_path: Path, still: threading.Event) -> None:

@@ -52,7 +52,7 @@ def test_both_ends_are_joined_by_sample() -> None:
     assert event["text"] == f"slot {event['slot']} is erased"
     assert set(whole["heads"]) == {"transmitter", "receiver"}
     assert "points" not in whole["heads"]["transmitter"]
-    assert board.takes_commands
+    assert board.heads["receiver"]["takes_commands"]
 
 
 def test_a_rig_that_knows_no_true_angle_shows_the_measured_one() -> None:

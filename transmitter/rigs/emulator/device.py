@@ -52,15 +52,17 @@ class SimulatedBody:
 
 
 class RecordedBody:
-    """A recorded flight: its counts come again, one row per tick; past the last, the last stays."""
+    """A recorded flight: its output comes again, one row per tick; past the last, the last stays."""
 
-    def __init__(self, log: FlightLog, tick_ns: int) -> None:
+    def __init__(self, log: FlightLog, tick_ns: int, encoder: Encoder) -> None:
         self._log = log
         self._tick_ns = tick_ns
+        self._encoder = encoder
 
     def counts_at(self, time_ns: int, volts: tuple[float, float]) -> int:
         """Return the row of this time."""
-        return self._log.counts[min(max(0, time_ns) // self._tick_ns, len(self._log) - 1)][0]
+        row = min(max(0, time_ns) // self._tick_ns, len(self._log) - 1)
+        return self._encoder.counts(float(self._log.measured[row, 0]))
 
 
 class EmulatedDevice:

@@ -44,7 +44,6 @@ class Faults:
             self._add(text)
 
     def active(self, kind: str, time_s: float | None) -> Fault | None:
-        """Return the fault of a kind that lasts at this time."""
         for fault in self.faults:
             if fault.kind == kind and fault.active(time_s):
                 return fault

@@ -43,18 +43,15 @@ class _Handled:
     handle = -1
 
     def wait(self, timeout_s: float) -> None:
-        """Wait for bytes."""
         _wait(self.handle, timeout_s)
 
     def read(self) -> bytes:
-        """Return what the other side wrote."""
         try:
             return os.read(self.handle, READ_BYTES) if self.handle >= 0 else b""
         except OSError:
             return b""
 
     def write(self, data: bytes) -> bool:
-        """Write as much as the buffer holds."""
         try:
             return self.handle >= 0 and os.write(self.handle, data) == len(data)
         except OSError:
@@ -76,7 +73,6 @@ class SerialLine(_Handled):
         self._line_baud = line_baud
 
     def plug(self) -> None:
-        """Open the port."""
         import serial
 
         try:
@@ -87,7 +83,6 @@ class SerialLine(_Handled):
         os.set_blocking(self.handle, False)
 
     def unplug(self) -> None:
-        """Close it."""
         self.handle = -1
         self._port.close()
 
@@ -105,7 +100,6 @@ class TcpLine:
         self.address = self._named()
 
     def plug(self) -> None:
-        """Listen, or begin to connect."""
         self._plugged = True
         if self._connects:
             return
@@ -131,12 +125,10 @@ class TcpLine:
             self._listener = None
 
     def wait(self, timeout_s: float) -> None:
-        """Wait for bytes or for somebody to connect."""
         handle = self._peer or self._listener
         _wait(-1 if handle is None else handle.fileno(), timeout_s)
 
     def read(self) -> bytes:
-        """Return what has come."""
         if self._peer is None and not self._meet():
             return b""
         assert self._peer is not None

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 import struct
+from abc import ABC, abstractmethod
 from collections import Counter
-from typing import NamedTuple, Protocol
+from collections.abc import Callable
+from typing import NamedTuple
 
 from transmitter.rigs.formats.ascii import checked, unchecked
 from transmitter.rigs.formats.base import Cutter
@@ -19,6 +21,7 @@ from transmitter.rigs.formats.cobs import (
     seal,
     unseal,
 )
+from transmitter.rigs.formats.doubles import doubles
 from transmitter.rigs.formats.qsb import STAMP_US
 from transmitter.rigs.formats.samples import RawSample
 
@@ -33,64 +36,81 @@ class DeviceCommand(NamedTuple):
     zero_encoders: bool = False
 
 
-class Speech(Protocol):
+class Speech(ABC):
     """The device's side of a format."""
 
-    streams: bool
-    """False: samples are sent only when asked for"""
-    counts: Counter[str]
-    """bad_commands"""
-
-    def encode(self, sample: RawSample) -> bytes:
-        """Return a sample as it goes onto the line."""
-
-    def feed(self, data: bytes) -> tuple[list[DeviceCommand], int]:
-        """Return the commands in these bytes, and how many samples they ask for."""
-
-
-class CobsSpeech:
-    """Binary frames."""
-
     streams = True
+    """False: samples are sent only when asked for"""
 
     def __init__(self) -> None:
         self.counts: Counter[str] = Counter()
+        """bad_commands"""
+        self._rest = b""
+
+    @abstractmethod
+    def encode(self, sample: RawSample) -> bytes:
+        """Return a sample as it goes onto the line."""
+
+    @abstractmethod
+    def feed(self, data: bytes) -> tuple[list[DeviceCommand], int]:
+        """Return the commands in these bytes, and how many samples they ask for."""
+
+    def _lines(self, data: bytes) -> list[bytes]:
+        """Return the lines that these bytes complete, empty ones left out."""
+        *lines, self._rest = (self._rest + data).replace(b"\r", b"\n").split(b"\n")
+        self._rest = self._rest[-COMMAND_BYTES_MAX:]
+        return [line.strip() for line in lines if line.strip()]
+
+    def _each(self, pieces: list[bytes], read: Callable[[bytes], DeviceCommand]) -> list[DeviceCommand]:
+        """Return the commands in some pieces; what is none is counted."""
+        commands = []
+        for piece in pieces:
+            try:
+                commands.append(read(piece))
+            except (ValueError, struct.error):
+                self.counts["bad_commands"] += 1
+        return commands
+
+
+class CobsSpeech(Speech):
+    """Binary frames."""
+
+    def __init__(self) -> None:
+        super().__init__()
         self._cutter = Cutter(b"\0", COMMAND_BYTES_MAX)
 
     def encode(self, sample: RawSample) -> bytes:
-        """Return a SAMPLE frame."""
         sequence, time_us = (sample.sequence or 0) & 0xFFFF, (sample.device_us or 0) & 0xFFFFFFFF
         return seal(SAMPLE.pack(SAMPLE_TYPE, sample.flags, sequence, time_us, *sample.counts))
 
     def feed(self, data: bytes) -> tuple[list[DeviceCommand], int]:
-        """Return the COMMAND frames."""
-        commands = []
-        for piece in self._cutter.feed(data):
-            try:
-                kind, flags, _, front, rear = COMMAND.unpack(unseal(piece))
-                if kind != COMMAND_TYPE or not (math.isfinite(front) and math.isfinite(rear)):
-                    raise ValueError
-            except (ValueError, struct.error):
-                self.counts["bad_commands"] += 1
-                continue
-            zero = bool(flags & ZERO_ENCODERS)
-            commands.append(DeviceCommand((front, rear), bool(flags & ENABLE), zero))
-        return commands, 0
+        return self._each(self._cutter.feed(data), _frame_command), 0
 
 
-class AsciiSpeech:
+def _frame_command(piece: bytes) -> DeviceCommand:
+    kind, flags, _, front, rear = COMMAND.unpack(unseal(piece))
+    if kind != COMMAND_TYPE:
+        raise ValueError(kind)
+    return DeviceCommand(_finite(front, rear), bool(flags & ENABLE), bool(flags & ZERO_ENCODERS))
+
+
+def _finite(front: float, rear: float) -> tuple[float, float]:
+    if not (math.isfinite(front) and math.isfinite(rear)):
+        raise ValueError("not finite")
+    return front, rear
+
+
+class AsciiSpeech(Speech):
     """Lines; `form` is what a sample line looks like."""
 
     def __init__(self, form: str = "checked", polled: bool = False) -> None:
         if form not in ("checked", "plain", "counts"):
             raise ValueError(f"line form {form!r}: checked, plain or counts")
-        self.counts: Counter[str] = Counter()
+        super().__init__()
         self.streams = not polled
         self._form = form
-        self._rest = b""
 
     def encode(self, sample: RawSample) -> bytes:
-        """Return a sample line."""
         cells = list(sample.counts)
         if self._form == "counts":
             return " ".join(map(str, cells)).encode() + b"\r\n"
@@ -102,19 +122,8 @@ class AsciiSpeech:
 
     def feed(self, data: bytes) -> tuple[list[DeviceCommand], int]:
         """Return the `U`, `S` and `Z` lines; `e` asks for a sample."""
-        *lines, self._rest = (self._rest + data).replace(b"\r", b"\n").split(b"\n")
-        self._rest = self._rest[-COMMAND_BYTES_MAX:]
-        commands = []
-        asked = 0
-        for line in filter(None, lines):
-            if line == b"e":
-                asked += 1
-                continue
-            try:
-                commands.append(_line_command(line))
-            except ValueError:
-                self.counts["bad_commands"] += 1
-        return commands, asked
+        lines = self._lines(data)
+        return self._each([one for one in lines if one != b"e"], _line_command), lines.count(b"e")
 
 
 def _line_command(line: bytes) -> DeviceCommand:
@@ -125,23 +134,18 @@ def _line_command(line: bytes) -> DeviceCommand:
         return DeviceCommand((0.0, 0.0), False, True)
     if kind != "U" or len(cells) != 3:
         raise ValueError(kind)
-    front, rear = float(cells[1]), float(cells[2])
-    if not (math.isfinite(front) and math.isfinite(rear)):
-        raise ValueError("not finite")
-    return DeviceCommand((front, rear), True)
+    return DeviceCommand(_finite(float(cells[1]), float(cells[2])), True)
 
 
-class QsbSpeech:
+class QsbSpeech(Speech):
     """One encoder, registers in hexadecimal; streams after `S0E`."""
 
     def __init__(self) -> None:
-        self.counts: Counter[str] = Counter()
+        super().__init__()
         self.streams = False
         self._stamped = False
-        self._rest = b""
 
     def encode(self, sample: RawSample) -> bytes:
-        """Return the counter as the adapter streams it."""
         text = f"s0E{sample.counts[1] & 0xFFFFFFFF:08X}"
         if self._stamped:
             text += f"{(sample.device_us or 0) // STAMP_US & 0xFFFFFFFF:08X}"
@@ -149,9 +153,8 @@ class QsbSpeech:
 
     def feed(self, data: bytes) -> tuple[list[DeviceCommand], int]:
         """Take register writes; `S0E` starts the stream, `R0E` stops it and asks once."""
-        *lines, self._rest = (self._rest + data).split(b"\n")
         asked = 0
-        for line in filter(None, (line.strip().upper() for line in lines)):
+        for line in map(bytes.upper, self._lines(data)):
             if line == b"S0E":
                 self.streams = True
             elif line == b"R0E":
@@ -164,26 +167,21 @@ class QsbSpeech:
         return [], asked
 
 
-class DoublesSpeech:
+class DoublesSpeech(Speech):
     """Units of doubles, as a QUARC model sends and takes them."""
-
-    streams = True
 
     def __init__(
         self, fields: tuple[str, ...], commands: tuple[str, ...], byte_order: str, scale: float
     ) -> None:
-        mark = "<" if byte_order == "little" else ">"
-        self.counts: Counter[str] = Counter()
+        super().__init__()
         self._fields = fields
         self._commands = commands
         self._scale = scale
         """turns a pitch count into the unit that is sent"""
-        self._out = struct.Struct(f"{mark}{len(fields)}d")
-        self._in = struct.Struct(f"{mark}{len(commands)}d")
-        self._rest = b""
+        self._out = doubles(len(fields), byte_order)
+        self._in = doubles(len(commands), byte_order)
 
     def encode(self, sample: RawSample) -> bytes:
-        """Return one unit."""
         known: dict[str, float] = {
             "seq": sample.sequence or 0,
             "time_s": (sample.device_us or 0) / 1e6,

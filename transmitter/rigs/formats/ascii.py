@@ -52,7 +52,6 @@ class AsciiFormat(SerialFormat):
         self._pulse_full_volts = pulse_full_volts
 
     def command(self, sequence: int, volts: tuple[float, ...], enable: bool) -> bytes:
-        """Return a command line."""
         if self._command_style == "pulse":
             pulses = [round(value / self._pulse_full_volts * PULSE_FULL) for value in volts]
             wanted = pulses if enable else [0] * len(volts)

@@ -43,7 +43,6 @@ class Cutter:
         self._synchronised = False
 
     def feed(self, data: bytes) -> list[bytes]:
-        """Return the pieces that these bytes complete."""
         self._rest += data
         *pieces, rest = self._rest.split(self._delimiter)
         self._rest = bytearray(rest)

@@ -48,7 +48,6 @@ class CobsFormat(SerialFormat):
         super().__init__(b"\0", FRAME_BYTES_MAX)
 
     def command(self, sequence: int, volts: tuple[float, ...], enable: bool) -> bytes:
-        """Return a COMMAND frame."""
         flags = ENABLE if enable else 0
         return seal(COMMAND.pack(COMMAND_TYPE, flags, sequence & 0xFFFF, *volts))
 

@@ -21,6 +21,11 @@ PLAUSIBLE_MIN = 1e-100
 WRAPS = Wraps(sequence=1 << 53, device_us=1 << 62)
 
 
+def doubles(count: int, byte_order: str) -> struct.Struct:
+    """Return the layout of `count` doubles in a row."""
+    return struct.Struct(f"{'<' if byte_order == 'little' else '>'}{count}d")
+
+
 class UnitError(ValueError):
     """A unit that cannot be what was agreed: alignment or byte order is lost."""
 
@@ -43,8 +48,8 @@ class DoublesLayout:
         counts_per_turn: dict[int, int] | None = None,
     ) -> None:
         self.fields = fields
-        self.struct = struct.Struct(f"{'<' if byte_order == 'little' else '>'}{len(fields)}d")
-        self._byte_order = byte_order
+        self.struct = doubles(len(fields), byte_order)
+        self.byte_order = byte_order
         turn = {"counts": None, "rad": math.tau, "deg": 360.0}[unit]
         self._scales = {
             channel: 1.0 if turn is None else counts / turn
@@ -78,5 +83,5 @@ class DoublesLayout:
             return
         raise UnitError(
             f"element {name} is {value!r}: the other end sends another number of doubles than "
-            f"{len(self.fields)}, or not in byte order '{self._byte_order}'"
+            f"{len(self.fields)}, or not in byte order '{self.byte_order}'"
         )

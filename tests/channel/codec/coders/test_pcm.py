@@ -57,7 +57,7 @@ def test_when_the_differentiator_is_filtered_then_a_steady_rate_is_reached_in_it
 
 
 def test_when_there_are_three_angles_then_they_have_their_words_in_turn() -> None:
-    model = HoldModel(0.01, ("travel", "elevation", "pitch"))
+    model = HoldModel(0.01, outputs=("travel", "elevation", "pitch"))
     parts = Codec(model, PcmCoder(PcmParameters(angles=3)), 1)
     state = parts.initial()
     for sample in range(9):

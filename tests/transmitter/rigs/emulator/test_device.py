@@ -1,9 +1,12 @@
 from __future__ import annotations
 
+import math
+
+import numpy as np
 import pytest
 
 from channel.flight_log import FlightLog
-from plant_sim.encoder import QUANSER_PITCH
+from plant_sim.encoder import QUANSER_PITCH, Encoder
 from plant_sim.pitch import PitchParameters, PitchPlant
 from transmitter.rigs.emulator.device import EmulatedDevice, RecordedBody, SimulatedBody
 from transmitter.rigs.emulator.faults import Faults
@@ -86,8 +89,9 @@ def test_a_jump_shifts_the_counts_for_good() -> None:
 
 
 def test_a_recorded_flight_comes_again_and_stays_at_its_end() -> None:
-    log = FlightLog(((5,), (6,), (7,)), ())
-    one = EmulatedDevice(RecordedBody(log, 10 * MS), 0, 0.1)
+    angles = np.array([[5.0], [6.0], [7.0]]) * math.tau / 4096.0
+    log = FlightLog(0.01, angles, np.empty((3, 0)), np.zeros((3, 1), np.int64))
+    one = EmulatedDevice(RecordedBody(log, 10 * MS, Encoder(4096)), 0, 0.1)
     one.command(S, (1.0, 1.0), True)
     read = [one.sample(S + ms * MS).counts[1] for ms in (0, 9, 10, 20, 500)]
     assert read == [5, 5, 6, 7, 7]

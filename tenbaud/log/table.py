@@ -1,0 +1,101 @@
+"""What every format of a log is read into."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+
+import numpy as np
+import numpy.typing as npt
+
+from channel.errors import TenbaudError
+from tenbaud.log.units import bare_name
+
+Array = npt.NDArray[np.float64]
+Wanted = Callable[[Sequence[str], Sequence[str], Mapping[str, str]], Sequence[int]]
+"""Names, units and roles of all columns to the places of those that are read."""
+
+
+class LogError(TenbaudError, ValueError):
+    """A log that cannot be used; the text names file, line, column and the next step."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """The columns of a file that were asked for, as numbers."""
+
+    path: str
+    source: str
+    """such as "CSV text, semicolons, decimal commas, latin-1" """
+    names: tuple[str, ...]
+    """unique; the number of the column, from 1, where it has no name"""
+    units: tuple[str, ...]
+    """as the file gives them; "" unknown"""
+    columns: tuple[Array, ...]
+    """NaN where a cell is empty or no number"""
+    place: Callable[[int], str] = lambda row: f"row {row + 1}"
+    """row to where it is in the file, for people: "line 12" """
+    faults: Mapping[str, tuple[tuple[int, str], ...]] = field(default_factory=dict)
+    """column to its first cells that are no number: row and text"""
+    period_s: float | None = None
+    """where the format itself knows it"""
+    roles: Mapping[str, str] = field(default_factory=dict)
+    """where the format itself knows: "time", "index", or the name of a signal, to a column"""
+
+    def __len__(self) -> int:
+        """Return the number of rows."""
+        return len(self.columns[0]) if self.columns else 0
+
+    def find(self, wanted: str) -> int:
+        """Return the place of a column by name or number."""
+        return find_column(self.path, self.names, wanted)
+
+    def fault(self, row: int, column: int, what: str) -> LogError:
+        """Return the error of one cell."""
+        return LogError(f"{self.path}, {self.place(row)}, column {self.names[column]}: {what}")
+
+    def check(self, column: int, rows: slice = slice(None)) -> Array:
+        """Return the values of a column; LogError for the first that is no finite number."""
+        values = self.columns[column][rows]
+        bad = np.flatnonzero(~np.isfinite(values))
+        if not len(bad):
+            return values
+        row = int(bad[0]) + (rows.start or 0)
+        text = dict(self.faults.get(self.names[column], ())).get(row, "")
+        found = self.columns[column][row]
+        if np.isinf(found):
+            text = text or str(found)
+        told = f"'{text}' is not a finite number" if text else "empty cell"
+        if not np.isinf(found) and text:
+            told = f"'{text}' is not a number"
+        raise self.fault(row, column, f"{told}; correct it, or leave it out with --from and --to")
+
+
+def find_column(path: str, names: Sequence[str], wanted: str) -> int:
+    """Return the place of a column by its name, its name without unit, or its number from 1.
+
+    LogError lists the columns.
+    """
+    if names.count(wanted) == 1:
+        return names.index(wanted)
+    for simpler in (str.strip, str.casefold, lambda name: bare_name(name).casefold()):
+        found = [place for place, name in enumerate(names) if simpler(name) == simpler(wanted)]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            numbers = " or ".join(str(place + 1) for place in found)
+            raise LogError(
+                f"{path}: column {wanted} is there {len(found)} times; give its number, {numbers}"
+            )
+    if wanted.isdigit() and 1 <= int(wanted) <= len(names):
+        return int(wanted) - 1
+    close = get_close_matches(wanted, names, n=1)
+    meant = f" (did you mean {close[0]}?)" if close else ""
+    raise LogError(f"{path}: column {wanted} is missing{meant}; present: {listed(names)}")
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return the columns with their numbers, for people."""
+    shown = [f"{at} {name}" if name != str(at) else name for at, name in enumerate(names[:40], 1)]
+    return ", ".join(shown) + (f" and {len(names) - 40} more" if len(names) > 40 else "") or "none"

@@ -1,0 +1,78 @@
+"""One flight in every dialect of text: what is read is always the same."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from channel.codec.models.pitch import PITCH_SIGNALS
+from tenbaud.config.schema import FlightLogSection
+from tenbaud.log.read import Log, read_log
+from tests.tenbaud import lab_files
+
+DIALECTS = lab_files.dialects()
+
+
+def read(path: Path, **fields: object) -> Log:
+    section = FlightLogSection.model_validate({"file": str(path), **fields})
+    return read_log(section, PITCH_SIGNALS)
+
+
+@pytest.mark.parametrize("name", DIALECTS)
+def test_a_flight_is_read_alike_however_it_is_written(name: str, tmp_path: Path) -> None:
+    text, encoding, end, fields = DIALECTS[name]
+    log = read(lab_files.write(tmp_path / "flight.txt", text, encoding, end), **fields)
+    _, angle_rad, front_volts, rear_volts = lab_files.flight()
+    assert log.tick_s == lab_files.TICK_S
+    assert np.abs(log.measured[:, 0] - angle_rad).max() < 3e-5
+    assert np.abs(log.commands - np.column_stack([front_volts, rear_volts])).max() < 1e-5
+    start_s = {"milli": 5.0, "epoch": 1.7e9}.get(name, 0.0)
+    assert log.start_s == pytest.approx(start_s)
+
+
+def test_one_input_is_enough_and_the_other_is_zero(tmp_path: Path) -> None:
+    rows = lab_files.table()
+    rows[:, 2] -= rows[:, 3]
+    path = lab_files.write(tmp_path / "one.csv", ["time,angle,u", *lab_files.lines(rows[:, :3])])
+    for columns in ({"front": "u"}, {"front": "u", "rear": "0"}, {"input": "u"}, {}):
+        log = read(path, columns=columns)
+        assert np.abs(log.commands[:, 0] - rows[:, 2]).max() < 1e-5
+        assert not log.commands[:, 1].any()
+        assert "rear: no column, zero" in log.notes
+
+
+def test_a_file_of_its_own_signals_says_which_they_are(tmp_path: Path) -> None:
+    rows = np.column_stack([lab_files.table(), lab_files.table()[:, 1]])
+    path = lab_files.write(
+        tmp_path / "own.csv", ["t,Speed [rpm],i_ma,spare,level", *lab_files.lines(rows)]
+    )
+    section = FlightLogSection(
+        file=str(path), columns={"out:speed": "2", "in:current": "i_ma"}, units={"output": "rpm"}
+    )
+    log = read_log(section, None)
+    assert [(one.name, one.unit) for one in log.signals.outputs] == [("speed", "rpm")]
+    assert [(one.name, one.unit) for one in log.signals.inputs] == [("current", "A")]
+    assert np.abs(log.commands[:, 0] - rows[:, 2] / 1000.0).max() < 1e-5
+    guessed = read_log(FlightLogSection(file=str(path)), None)
+    assert [one.name for one in guessed.signals.outputs] == ["speed", "level"]
+    assert "output level: column level, by its name" in guessed.notes
+
+
+def test_files_of_one_flight_are_joined_by_time(tmp_path: Path) -> None:
+    rows = lab_files.table()
+    angles = lab_files.write(tmp_path / "angles.csv", ["t,angle", *lab_files.lines(rows[:, :2])])
+    same = lab_files.write(
+        tmp_path / "volts.csv", ["t;u1;u2", *lab_files.lines(rows[:, [0, 2, 3]], ";")]
+    )
+    late = rows[10:, [0, 2, 3]] + (0.005, 0.0, 0.0)
+    other = lab_files.write(tmp_path / "late.csv", ["t u1 u2", *lab_files.lines(late, " ")])
+    log = read(angles, join=[str(same)])
+    assert np.abs(log.commands - rows[:, 2:]).max() < 1e-5
+    assert "volts.csv joined row by row" in log.notes
+    with pytest.raises(ValueError, match=r"column u1: empty cell"):
+        read(angles, join=[str(other)])
+    cut = read(angles, join=[str(other)], start_s=1.0)
+    assert len(cut) == lab_files.ROWS - 50
+    assert "late.csv joined by linear interpolation at the times of the first file" in cut.notes

@@ -9,7 +9,7 @@ import typer
 
 from tenbaud.studies.progress import progress_bar
 
-DRAWINGS = ("theory", "animation", "cliff")
+DRAWINGS = ("theory", "animation")
 DATA_VARIABLE = "TENBAUD_FLIGHT_DATA"
 
 Out = Annotated[
@@ -21,8 +21,7 @@ def figures(
     which: Annotated[
         list[str] | None,
         typer.Argument(
-            help="3, 4, 5, 6, 7, 8 or all; several may be given. "
-            "For the pages: theory, animation, cliff."
+            help="3, 4, 5, 6, 7, 8 or all; several may be given. For the pages: theory, animation."
         ),
     ] = None,
     docs: Annotated[
@@ -134,12 +133,6 @@ def _draw_documentation(drawings: list[str], pictures: Path) -> None:
     if "animation" in drawings:
         path = pictures / "tenbaud.gif"
         typer.echo(f"{path}, {draw_animation(path) / 1e6:.2f} MB")
-    if "cliff" in drawings:
-        from reproduction.cliff import PICTURE, stands, write_cliff
-
-        found = list(stands(told=lambda text: typer.echo(text, err=True)))
-        write_cliff(pictures.parent / "THREE-AXES.md", pictures / PICTURE, found)
-        typer.echo(str(pictures / PICTURE))
 
 
 def _wanted(names: list[str], known: tuple[str, ...]) -> set[str]:

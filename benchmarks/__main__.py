@@ -22,6 +22,7 @@ from benchmarks.flights import (
 )
 from benchmarks.latency import latency_figures
 from benchmarks.load import load_figures
+from benchmarks.logs import log_figures
 from benchmarks.page import page_figures
 from benchmarks.recordings import recording_figures
 from benchmarks.studies import studies_figures
@@ -36,6 +37,7 @@ BENCHMARKS: dict[str, Callable[[], Iterable[Figure]]] = {
     "latency": latency_figures,
     "fastest": fastest_figures,
     "load": load_figures,
+    "logs": log_figures,
     "page": page_figures,
     "recordings": recording_figures,
     "studies": studies_figures,

@@ -68,7 +68,7 @@ for tick in range(ticks):
     if tick % 10 == 0:
         word = (1 if tick % 3 else -1,)
         end = ((0.1,), states[0], (0.1, 1.0), digest)
-        upper.write(transmitter.SAMPLE_CHANNEL, at, (tick // 10, word, word, *end, digest, 1))
+        upper.write(transmitter.SAMPLE_CHANNEL, at, (tick // 10, word, word, *end, digest, 1, (0,)))
         lower.write(receiver.SAMPLE_CHANNEL, at, (tick // 10, word, *end, tick / 100))
 flown = time.perf_counter()
 upper.close()

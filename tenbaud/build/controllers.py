@@ -80,11 +80,12 @@ def _loop(field: str, section: PidLoopSection, context: ControllerContext, condi
         place = signals.index("outputs", section.output) if section.output else 0
         output = signals.outputs[place]
         mixing = _mixing(section, signals)
-        gains = PidGains(section.proportional, section.integral, section.derivative, section.unit)
+        factors = (section.proportional, section.integral, section.derivative)
+        gains = PidGains(*factors, section.unit)
         output_unit = output.unit or "rad"
         over = signals.inputs[next(place for place, share in enumerate(mixing) if share)].unit
         if not section.unit:
-            gains = PidGains(*_three(section), f"{over}/{output_unit}")
+            gains = PidGains(*factors, f"{over}/{output_unit}")
         elif over and section.unit.rpartition("/")[0] != over:
             raise ValueError(
                 f"unit = {section.unit!r}, and the input is in {over}, the output {output.name} in "
@@ -97,10 +98,6 @@ def _loop(field: str, section: PidLoopSection, context: ControllerContext, condi
         raise ConfigError(f"{field}: {error}") from error
     reference = context.references[place] or Constant(0.0, context.tick_s)
     return Loop(constants, reference, place, value, rate)
-
-
-def _three(section: PidLoopSection) -> tuple[float, float, float]:
-    return section.proportional, section.integral, section.derivative
 
 
 def _mixing(section: PidLoopSection, signals: Signals) -> Vector:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 
 from channel.codec.codec import Codec
 from channel.codec.signals import Signals, signals_of
@@ -23,17 +21,9 @@ from tenbaud.build.signals import build_limits, initial_command
 from tenbaud.config.load import ConfigError
 from tenbaud.config.outside_code import require_allowed
 from tenbaud.config.schema import FlightConfig
+from tenbaud.config.version import software_version
 
 REAL_RIGS = ("serial", "quarc", "hil")
-
-
-@cache
-def software_version() -> str:
-    """Return the installed version of tenbaud."""
-    try:
-        return version("tenbaud")
-    except PackageNotFoundError:
-        return "0+source"
 
 
 @dataclass(frozen=True, slots=True)

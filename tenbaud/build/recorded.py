@@ -188,7 +188,10 @@ class _Adoption:
 
     def _start(self, log: FlightLog) -> dict[str, Any]:
         """Return the state at which both codecs begin: at the first values that were measured."""
-        known = self._is_given("model.start") or not isinstance(self._config.model, BuiltInModel)
+        section = self._config.model
+        known = not isinstance(section, BuiltInModel) or (
+            section.start and self._is_given("model.start")
+        )
         model = build_model(self._config)
         first, state = log.measured[0], np.array(model.initial())
         if known or tuple(first.tolist()) == model.measured(model.initial()):

@@ -16,8 +16,9 @@ from channel.links.base import Link
 from channel.links.endpoints import free_endpoint
 from channel.protocol.frames import Symbol
 from channel.protocol.wire import encode
-from tenbaud.build.flight import agree, software_version
+from tenbaud.build.flight import agree
 from tenbaud.config.schema import FlightConfig
+from tenbaud.config.version import software_version
 from transmitter.rigs.serial_ports import list_ports
 
 State = Literal["ok", "note", "problem"]

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from tenbaud.cli import demo, design, identify, keys, nodes, rig, router, runs, sweep, tune, view
+from tenbaud.cli import demo, design, identify, keys, log, nodes, rig, router, runs, sweep, tune, view
 from tenbaud.cli.checkout import add_commands
 
 app = typer.Typer(
@@ -25,7 +25,7 @@ app = typer.Typer(
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        from tenbaud.build.flight import software_version
+        from tenbaud.config.version import software_version
 
         typer.echo(f"tenbaud {software_version()}")
         raise typer.Exit
@@ -46,7 +46,7 @@ for panel, commands in (
     ("Rigs and machines", (rig.doctor, rig.rig, rig.rig_check, router.router)),
     (
         "Models, coders, studies",
-        (design.floor, design.design, identify.identify, sweep.sweep, tune.tune),
+        (design.floor, design.design, log.log, identify.identify, sweep.sweep, tune.tune),
     ),
 ):
     for command in commands:

@@ -37,7 +37,7 @@ def identify(
     log: LogOptions,
     source: Annotated[
         Path | None,
-        typer.Argument(help="Folder of a run, or a CSV log; not given: the simulated rig is excited."),
+        typer.Argument(help="A log or the folder of a run; not given: the simulated rig is excited."),
     ] = None,
     duration: options.Duration = None,
     excitation: Annotated[
@@ -86,7 +86,7 @@ def _records(
     excitation: list[str] | None,
     duration: float | None,
 ) -> list[tuple[str, PitchRecord]]:
-    from tenbaud.identify.sources import from_log, from_rig, from_run
+    from tenbaud.identify.sources import from_log, from_rig
 
     if source is None:
         rest = config.transmitter.plant.model_copy(
@@ -100,13 +100,7 @@ def _records(
         if ticks > TICKS_MAX:
             raise typer.BadParameter(f"--duration: {ticks:.3g} ticks; at most {TICKS_MAX:.3g}")
         return [(signal, from_rig(at_rest, signal, duration or DURATION_S)) for signal in signals]
-    section = config.flight_log
-    if source.is_dir() or source.suffix == ".mcap":
-        record = from_run(source)
-        if section.start_s is not None or section.end_s is not None:
-            record = record.part(section.start_s or 0.0, section.end_s or 1e9)
-        return [(source.name, record)]
-    named = section.model_copy(update={"file": str(source)})
+    named = config.flight_log.model_copy(update={"file": str(source)})
     return [(source.name, from_log(config.model_copy(update={"flight_log": named})))]
 
 

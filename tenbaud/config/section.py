@@ -13,7 +13,6 @@ Gain = Annotated[float, Field(ge=0.0, le=1e6)]
 Factor = Annotated[float, Field(ge=-1e9, le=1e9)]
 Mismatch = Annotated[float, Field(ge=-0.999, le=10.0)]
 """A fraction: -1 would leave nothing of the constant."""
-Volts = Annotated[float, Field(ge=-32.0, le=32.0)]
 Command = Factor | tuple[Factor, ...]
 """A number for all inputs, or a list with one for each."""
 Counts = Annotated[int, Field(ge=-(2**31), lt=2**31)]

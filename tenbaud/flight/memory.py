@@ -21,9 +21,9 @@ from plant_sim.plant import Plant, with_measured
 from receiver.controllers.base import Controller, with_references
 from receiver.endpoint import ReceiverEndpoint
 from receiver.session.session import ReceiverSession
-from tenbaud.build.flight import software_version
 from tenbaud.build.liveness import round_trip, watchdog_ticks
 from tenbaud.build.parts import PartError, Parts, check_codec
+from tenbaud.config.version import software_version
 from tenbaud.flight.memory_result import FlightResult, result_of
 from tenbaud.recording.memory import MemoryRecorder
 from tenbaud.sentences.endings import end_text, refusal_text

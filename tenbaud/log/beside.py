@@ -9,6 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from tenbaud.config.schema import FlightLogSection
+from tenbaud.files.whole import write_whole
 from tenbaud.log.table import LogError
 
 
@@ -32,3 +33,11 @@ def with_file_beside(section: FlightLogSection) -> FlightLogSection:
     for name, value in own.items():
         given[name] = {**given.get(name, {}), **value} if isinstance(value, dict) else value
     return FlightLogSection.model_validate(given)
+
+
+def write_beside(section: FlightLogSection) -> None:
+    """Write what a section says into the file beside its log."""
+    import tomli_w
+
+    values = section.model_dump(mode="json", exclude_defaults=True, exclude={"file"})
+    write_whole(Path(f"{section.file}.toml"), tomli_w.dumps(values))

@@ -46,6 +46,11 @@ class Dialect:
     units: tuple[str, ...]
 
     @property
+    def one_comment(self) -> str:
+        """The sign of comment lines below the first row; pandas knows single letters only."""
+        return self.comment if len(self.comment) == 1 else ""
+
+    @property
     def told(self) -> str:
         """The dialect for people."""
         decimals = ", decimal commas" if self.decimal == "," else ""

@@ -137,11 +137,26 @@ class _Reading:
                     f"{table.path}: no column is a clock; say which is (--columns time=NAME), or how "
                     "far apart the rows are (--period SECONDS)"
                 )
+            self._refuse_unused_clock()
             self.notes.append(f"rows {period_s:g} s apart: timing.tick_s, as the file has no clock")
         if chosen.index is not None:
             column = self.at[chosen.index]
             return by_index(table, column, period_s, section.start_s, section.end_s)
         return by_period(len(table), period_s, section.start_s, section.end_s)
+
+    def _refuse_unused_clock(self) -> None:
+        """Raise LogError where the first column looks like a clock that nobody named."""
+        if self.section.join or self.chosen.index is not None or 0 in self.chosen.places:
+            return
+        first = read_table(self.section.file, lambda names, units, known: [0])
+        values = first.columns[0]
+        if len(values) < ROWS_MIN or not np.all(np.diff(values) > 0.0):
+            return
+        name, step = first.names[0], float(np.median(np.diff(values)))
+        raise LogError(
+            f"{first.path}: column {name} rises by {step:g} a row; if it is the clock, give --columns "
+            f"time={name}, if it counts the rows, --columns index={name}, if neither, --period SECONDS"
+        )
 
     def _given_unit(self, role: str, kind: str) -> str:
         given = self.roles.setting(self.section.units, role, kind)
@@ -221,6 +236,8 @@ class _Reading:
                 values = cleaned.values
             done = ": removed" if self.section.remove_spikes else "; --remove-spikes removes them"
             self.notes.append(told + done)
+        if np.ptp(values) == 0.0:
+            self.notes.append(f"{name}: constant")
         if turn is None:
             return values
         whole = unwrapped(values, turn)

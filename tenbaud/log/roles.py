@@ -61,6 +61,7 @@ class Roles:
 
     def choose(self, names: Sequence[str], units: Sequence[str], known: Mapping[str, str]) -> Chosen:
         """Return the columns; LogError where one is missing, or none can be found."""
+        self.notes.clear()  # a file of several sets of signals asks for each
         given = self._given(known)
         clock = {name: self._clock(name, given, names) for name in CLOCKS}
         if clock["time"] is not None and "index" not in given:
@@ -241,7 +242,7 @@ def _input_words(signal: InputSignal, at: int, count: int, names: Sequence[str])
 
 def stem_of(name: str) -> str:
     """Return a column's name without unit, case and signs, for comparisons."""
-    return re.sub(r"[^\w]+", "_", bare_name(name).strip().casefold()).strip("_")
+    return re.sub(r"[^\w]+", "_", bare_name(name).strip().casefold().rpartition(".")[2]).strip("_")
 
 
 def _is_input(name: str) -> bool:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tenbaud.log.dialect import COMMENTS, DATE, Dialect, find_dialect
+from tenbaud.log.dialect import DATE, Dialect, find_dialect
+from tenbaud.log.export import export_roles
 from tenbaud.log.table import Array, LogError, Table, Wanted
 from tenbaud.log.units import DATE_TIME
 
@@ -24,7 +25,7 @@ def read_text(path: Path, wanted: Wanted | None = None) -> Table:
     """Return the table in a file of text; LogError where there is none."""
     dialect = find_dialect(path)
     names, units = dialect.names, list(dialect.units)
-    places = list(wanted(names, units, {}) if wanted else range(len(names)))
+    places = list(wanted(names, units, export_roles(names, units)) if wanted else range(len(names)))
     columns = [_Column(names[place], place) for place in places]
     for chunk in _chunks(path, dialect):
         for column in columns:
@@ -32,14 +33,17 @@ def read_text(path: Path, wanted: Wanted | None = None) -> Table:
     for column in columns:
         if column.began is not None:
             units[column.place] = DATE_TIME
+    # Spreadsheet programs write rows of separators below a table.
+    rows = max([column.used for column in columns], default=0)
     return Table(
         str(path),
         dialect.told,
         tuple([names[place] for place in places]),
         tuple([units[place] for place in places]),
-        tuple([column.values() for column in columns]),
+        tuple([column.values()[:rows] for column in columns]),
         _places(path, dialect),
         {column.name: tuple(column.faults) for column in columns if column.faults},
+        roles=export_roles(names, units),
     )
 
 
@@ -51,6 +55,8 @@ class _Column:
         self.faults: list[tuple[int, str]] = []
         self.began: pd.Timestamp | None = None
         """first time of a column of dates"""
+        self.used = 0
+        """rows up to the last cell that is not empty"""
         self._parts: list[Array] = []
         self._rows = 0
 
@@ -60,6 +66,7 @@ class _Column:
 
         if cells.dtype.kind in "biuf":
             values = cells.to_numpy(np.float64)
+            filled = np.flatnonzero(~np.isnan(values))
         else:
             texts = cells.astype(str).str.strip()
             if self.began is None and not self._rows and len(texts) and DATE.fullmatch(texts.iloc[0]):
@@ -70,9 +77,12 @@ class _Column:
                 values = (times - self.began).dt.total_seconds().to_numpy(np.float64)
             else:
                 values = pd.to_numeric(texts, errors="coerce").to_numpy(np.float64)
+            filled = np.flatnonzero(cells.notna().to_numpy())
             bad = np.flatnonzero(np.isnan(values) & cells.notna().to_numpy())
             for row in bad[: FAULTS_MAX - len(self.faults)].tolist():
                 self.faults.append((self._rows + row, str(texts.iloc[row])))
+        if len(filled):
+            self.used = self._rows + int(filled[-1]) + 1
         self._parts.append(values)
         self._rows += len(values)
 
@@ -96,7 +106,7 @@ def _chunks(path: Path, dialect: Dialect) -> Any:
             skiprows=dialect.skipped,
             skip_blank_lines=True,
             skipinitialspace=True,
-            comment=dialect.comment if len(dialect.comment) == 1 else None,
+            comment=dialect.one_comment or None,
             decimal=dialect.decimal,
             encoding=dialect.encoding,
             encoding_errors="replace",
@@ -124,7 +134,8 @@ def _places(path: Path, dialect: Dialect) -> Callable[[int], str]:
         rows = -1
         with path.open(encoding=dialect.encoding, errors="replace") as file:
             for number, line in enumerate(file, 1):
-                if number > dialect.skipped and line.strip() and not line.lstrip().startswith(COMMENTS):
+                commented = dialect.one_comment and line.lstrip().startswith(dialect.one_comment)
+                if number > dialect.skipped and line.strip() and not commented:
                     rows += 1
                 if rows == row:
                     return f"line {number}"

@@ -97,7 +97,8 @@ class Compared:
     def lacks(self, path: Path, topic: str, key_name: str, key: object) -> None:
         """Note a row that a file lacks; rows that follow each other make one entry."""
         last = self.missing[-1] if self.missing else None
-        if last is not None and (last.path, last.topic) == (path, topic) and _follows(last.last, key):
+        follows = last is not None and isinstance(last.last, int) and key == last.last + 1
+        if last is not None and (last.path, last.topic) == (path, topic) and follows:
             last.last, last.rows = key, last.rows + 1
         else:
             self.missing.append(Missing(path, topic, key_name, key, key))
@@ -113,10 +114,6 @@ class Compared:
         if self.verdict is Verdict.NOT_COMPARABLE and not (self.missing or self.faults):
             lines.append("  there is no row that both hold")
         return "\n".join([*lines, *self.notes])
-
-
-def _follows(before: object, key: object) -> bool:
-    return isinstance(before, int) and isinstance(key, int) and key == before + 1
 
 
 Keyed = TypeVar("Keyed")

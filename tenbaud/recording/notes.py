@@ -22,7 +22,7 @@ def recording_notes(
 
 def version_notes(path: Path, metadata: Mapping[str, str]) -> list[str]:
     """Return a sentence if another version recorded this."""
-    from tenbaud.build.flight import software_version
+    from tenbaud.config.version import software_version
 
     version, here = metadata.get("version"), software_version()
     if version in (None, here):

@@ -100,6 +100,11 @@ class Table:
             self._read([one for one in self.channel.fields if (one.type == "string") == texts])
         return self._columns[name]
 
+    def read(self, *names: str) -> list[NDArray[Any]]:
+        """Return some columns in one pass over the file, without reading any other."""
+        self._read([self._field(name) for name in names if name not in self._columns])
+        return [self._columns[name] for name in names]
+
     def _field(self, name: str) -> Field:
         for one in self.channel.fields:
             if one.name == name:

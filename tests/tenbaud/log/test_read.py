@@ -130,6 +130,37 @@ def test_the_file_beside_a_log_says_what_the_configuration_leaves_open(tmp_path:
         read(tmp_path, text)
 
 
+def test_rows_of_separators_below_the_table_are_left_out(tmp_path: Path) -> None:
+    log = read(tmp_path, HEADER + "0,1,2,3,4,5\n1,1,2,3,4,5\n,,,,,\n,,,,,\n")
+    assert len(log) == 2
+    assert "pitch: constant" in log.notes
+
+
+def test_a_clock_that_nobody_named_is_asked_for(tmp_path: Path) -> None:
+    text = "".join(f"{0.02 * row:.2f},{row % 7 / 8},0,0\n" for row in range(99))
+    chosen = {"angle": "2", "front": "3", "rear": "4"}
+    with pytest.raises(LogError, match=r"column 1 rises by 0.02 a row; if it is the clock, give --col"):
+        read(tmp_path, text, columns=chosen)
+    assert read(tmp_path, text, columns=chosen | {"time": "1"}).tick_s == 0.02
+    assert read(tmp_path, text, columns=chosen, period_s=0.5).tick_s == 0.5
+
+
+def test_a_comment_far_down_does_not_shift_the_line_that_is_named(tmp_path: Path) -> None:
+    rows = [f"{row},{row % 50},0,0" for row in range(20_000)]
+    rows[9_000] = "# pause"
+    with pytest.raises(LogError, match=r"line 9002, column step: '# pause' is not a number"):
+        read(tmp_path, "\n".join(["step,pitch_counts,u1,u2", *rows]))
+    rows[9_000], rows[12_000] = "9000,1,0,0", "12000,x,0,0"
+    with pytest.raises(LogError, match=r"line 12003, column pitch_counts: 'x' is not a number"):
+        read(tmp_path, "\n".join(["# by the rig", "step,pitch_counts,u1,u2", *rows]))
+
+
+def test_a_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:
+    section = FlightLogSection(file=str(tmp_path))
+    with pytest.raises(LogError, match=r"holds neither transmitter\.mcap"):
+        read_log(section, SIGNALS)
+
+
 @pytest.mark.skipif(
     not REAL_FLIGHT.is_file(), reason="the recorded flight is kept outside the repository"
 )

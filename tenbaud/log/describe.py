@@ -1,0 +1,233 @@
+"""What is in a log, for the person who has to say which column is what."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from channel.flight_log import FlightLog
+from tenbaud.config.schema import FlightLogSection
+from tenbaud.log.angles import without_spikes
+from tenbaud.log.beside import with_file_beside
+from tenbaud.log.join import read_joined
+from tenbaud.log.look import Look, looks_of
+from tenbaud.log.read import read_log
+from tenbaud.log.reader import read_table
+from tenbaud.log.suggest import Suggestion, suggest
+from tenbaud.log.table import Array, LogError, Table
+from tenbaud.log.units import DATE_TIME, factor
+
+GAP = 2.5
+"""Usual steps from which two rows have a gap between them."""
+PLACES_MAX = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Sampling:
+    """How the rows lie in time, before anything is cut or resampled."""
+
+    step_s: float
+    first_s: float
+    last_s: float
+    jitter_s: float
+    """largest deviation of a step from the usual one, gaps apart"""
+    gaps: int
+    repeats: int
+    """rows whose time is that of the row before, or earlier"""
+    places: tuple[str, ...]
+    """the first of these rows"""
+
+    @property
+    def words(self) -> str:
+        """The sampling in a sentence."""
+        jitter = f"jitter up to {100.0 * self.jitter_s / self.step_s:.2g} % of it"
+        even = "even" if self.jitter_s < 0.001 * self.step_s else jitter
+        text = (
+            f"{1.0 / self.step_s:.6g} Hz, a row every {self.step_s:.6g} s ({even}), "
+            f"from {self.first_s:.6g} to {self.last_s:.6g} s"
+        )
+        faults = [("gaps", self.gaps), ("times that do not rise", self.repeats)]
+        told = [f"{what}: {count}" for what, count in faults if count]
+        return "; ".join([text, *told]) + (f" ({', '.join(self.places)})" if told else "")
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """All that is said about a log."""
+
+    source: str
+    rows: int
+    looks: tuple[Look, ...]
+    sampling: Sampling | None
+    spikes: tuple[str, ...]
+    suggestion: Suggestion
+    log: FlightLog | None
+    """as it is read with that section"""
+    problem: str
+    """why it cannot be read; empty: it can"""
+
+    @property
+    def taken_as(self) -> dict[str, str]:
+        """The signal that each column is taken as."""
+        return {column: signal for signal, column in self.suggestion.taken.items()}
+
+    def as_json(self) -> dict[str, Any]:
+        """Return it for programs."""
+        columns = [
+            {
+                "number": number,
+                "name": one.name,
+                "unit": one.unit,
+                "unit_guessed": one.guess,
+                "lowest": None if math.isnan(one.lowest) else one.lowest,
+                "highest": None if math.isnan(one.highest) else one.highest,
+                "missing": one.missing,
+                "looks_like": one.kind,
+                "taken_as": self.taken_as.get(one.name, ""),
+            }
+            for number, one in enumerate(self.looks, start=1)
+        ]
+        timing = self.sampling
+        return {
+            "source": self.source,
+            "rows": self.rows,
+            "columns": columns,
+            "sampling": None
+            if timing is None
+            else {name: getattr(timing, name) for name in Sampling.__slots__},
+            "spikes": list(self.spikes),
+            "tick_s": None if self.log is None else self.log.tick_s,
+            "notes": [] if self.log is None else list(self.log.notes),
+            "problem": self.problem,
+            "options": self.suggestion.section.model_dump(exclude_defaults=True, exclude={"file"}),
+            "commands": self.suggestion.commands(beside=False),
+        }
+
+    def as_text(self, beside: bool = False) -> str:
+        """Return it for people; `beside`: the options are kept in a file beside the log."""
+        lines = [f"{self.source}; {self.rows} rows", "", *self._columns(), ""]
+        if self.sampling is not None:
+            lines.append(f"Sampling: {self.sampling.words}.")
+        if self.spikes:
+            lines.append(f"Spikes: {'; '.join(self.spikes)}. --remove-spikes removes them.")
+        if self.log is not None:
+            told = [note for note in self.log.notes if note != self.source]
+            lines += [f"Read as: {len(self.log)} rows {self.log.tick_s:g} s apart."]
+            lines += [f"  {note}" for note in told]
+        if self.suggestion.others:
+            others = ", ".join(self.suggestion.others)
+            lines.append(f"Other outputs: {others}; --columns angle=NAME takes one.")
+        if self.problem:
+            lines.append(f"Cannot be used yet: {self.problem}")
+        lines += ["", "Next:" if not self.problem else "Next, once that is set right:"]
+        return "\n".join(lines + [f"  {one}" for one in self.suggestion.commands(beside)])
+
+    def _columns(self) -> list[str]:
+        rows = [("", "column", "unit", "lowest", "highest", "looks like", "taken as")]
+        for number, one in enumerate(self.looks, start=1):
+            unit = f"{one.unit}?" if one.guess else one.unit
+            empty = f", {one.missing} empty cells" if one.missing and one.kind != "empty" else ""
+            because = f" ({one.guess})" if one.guess and one.kind in ("signal", "counts") else ""
+            low, high = ("" if math.isnan(end) else f"{end:.6g}" for end in (one.lowest, one.highest))
+            words, taken = f"{one.words}{empty}{because}", self.taken_as.get(one.name, "")
+            rows.append((str(number), one.name, unit, low, high, words, taken))
+        widths = [max(len(row[place]) for row in rows) for place in range(len(rows[0]))]
+        padded = [[cell.ljust(width) for cell, width in zip(row, widths, strict=True)] for row in rows]
+        return ["  ".join(row).rstrip() for row in padded]
+
+
+def describe(section: FlightLogSection) -> tuple[Description, Table]:
+    """Return what is said about the log of a section, and its columns. LogError: it holds no table."""
+    section = with_file_beside(section)
+    if section.join:
+        time = section.columns.get("time", section.time)
+        table, _ = read_joined((section.file, *section.join), read_table, time, None)
+    else:
+        table = read_table(section.file)
+    looks = looks_of(table)
+    suggestion = suggest(section, table, looks)
+    section = suggestion.section
+    looks = [one if _is_read(one, suggestion) else _unguessed(one) for one in looks]
+    log, problem = None, ""
+    try:
+        log = read_log(section, None)
+    except LogError as error:
+        problem = str(error).removeprefix(section.file).lstrip(",: ")
+    found = Description(
+        table.source,
+        len(table),
+        tuple(looks),
+        _sampling(clock_of(suggestion, table), table),
+        tuple(_spikes(suggestion.taken, table)),
+        suggestion,
+        log,
+        problem,
+    )
+    return found, table
+
+
+def _is_read(one: Look, suggestion: Suggestion) -> bool:
+    return one.name in [suggestion.taken.get(role) for role in ("time", "angle", "output")]
+
+
+def _unguessed(one: Look) -> Look:
+    return replace(one, unit="", guess="") if one.guess else one
+
+
+def clock_of(suggestion: Suggestion, table: Table) -> Array | None:
+    """Return the times of the rows in seconds as the file has them; None without a clock."""
+    name = suggestion.taken.get("time", "")
+    if name not in table.names:
+        return None
+    place = table.names.index(name)
+    unit = suggestion.section.units.get("time") or table.units[place]
+    by = 1.0 if unit == DATE_TIME else factor(unit, "s") or 1.0
+    return by * table.columns[place]
+
+
+def _sampling(times: Array | None, table: Table) -> Sampling | None:
+    if times is None:
+        return None
+    rows = np.flatnonzero(np.isfinite(times))
+    times = times[rows]
+    if len(times) < 2 or np.median(np.diff(times)) <= 0.0:
+        return None
+    steps = np.diff(times)
+    usual = float(np.median(steps))
+    gaps = np.flatnonzero(steps > GAP * usual)
+    back = np.flatnonzero(steps <= 0.0)
+    sound = (steps > 0.0) & (steps <= GAP * usual)
+    sound[1:] &= steps[:-1] > 0.0  # the step behind a repeat makes up for it
+    within = steps[sound]
+
+    return Sampling(
+        usual,
+        float(times[0]),
+        float(times[-1]),
+        float(np.max(np.abs(within - usual), initial=0.0)),
+        len(gaps),
+        len(back),
+        tuple([table.place(int(rows[at + 1])) for at in sorted({*gaps, *back})[:PLACES_MAX]]),
+    )
+
+
+def _spikes(taken: dict[str, str], table: Table) -> list[str]:
+    inputs = ("in:", "front", "rear", "input", "time", "index")
+    told = []
+    for signal, name in taken.items():
+        if signal.startswith(inputs):
+            continue
+        values = table.columns[table.names.index(name)]
+        rows = without_spikes(values, None).rows if np.isfinite(values).all() else ()
+        if rows:
+            told.append(f"{len(rows)} in column {name}, {_few(table, rows)}")
+    return told
+
+
+def _few(table: Table, rows: Sequence[int]) -> str:
+    places = [table.place(row) for row in rows[:PLACES_MAX]]
+    return ", ".join(places) + (", ..." if len(rows) > PLACES_MAX else "")

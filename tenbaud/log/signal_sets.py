@@ -1,0 +1,205 @@
+"""Variables as tables: those of one clock are a set, and a table holds one set."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from tenbaud.log.export import export_roles
+from tenbaud.log.table import Array, LogError, Table, Wanted
+from tenbaud.log.variables import ROWS_MIN, Clock, Variable, rows_first
+
+PARAMETER_SHARE = 0.05
+"""Arrays without a clock that are shorter than this share of the longest are parameters."""
+LISTED_MAX = 6
+
+
+@dataclass(slots=True)
+class _Group:
+    """The variables of one clock, or of one length where there is no clock."""
+
+    rows: int
+    clock: Clock | None
+    members: list[tuple[Variable, Array]] = field(default_factory=list)
+
+    def takes(self, rows: int, clock: Clock | None) -> bool:
+        if self.rows != rows or clock is None or self.clock is None:
+            return self.rows == rows and clock is self.clock
+        return np.array_equal(self.clock.values, clock.values)
+
+
+def table_of(
+    path: Path, kind: str, variables: Iterable[Variable], wanted: Wanted | None = None
+) -> Table:
+    """Return the variables of one clock as a table.
+
+    A file with several clocks, or vectors of several lengths, is ambiguous unless all `wanted` columns
+    are in one of these sets. LogError names the variables and the option that chooses.
+    """
+    groups, left_out = _groups(list(variables))
+    group, places = _chosen(path, groups, left_out, wanted)
+    one = _columns(group)
+    left_out = [_listed(other) for other in groups if other is not group] + left_out
+    left = f"; left out: {', '.join(left_out[:LISTED_MAX])}" if left_out else ""
+    return Table(
+        str(path),
+        f"{kind}: {one.form}{left}",
+        tuple([one.names[place] for place in places]),
+        tuple([one.units[place] for place in places]),
+        tuple([np.ascontiguousarray(one.columns[place]) for place in places]),
+        roles=one.roles,
+    )
+
+
+def flat_table(
+    path: Path,
+    source: str,
+    units: Mapping[str, str],
+    read: Callable[[str], Array],
+    wanted: Wanted | None = None,
+) -> Table:
+    """Return a table whose columns `read` gives by name, the wanted ones alone; `units` names all."""
+    names = list(units)
+    roles = export_roles(names, list(units.values()))
+    places = range(len(names)) if wanted is None else wanted(names, list(units.values()), roles)
+    chosen = [names[place] for place in places]
+    return Table(
+        str(path),
+        source,
+        tuple(chosen),
+        tuple([units[name] for name in chosen]),
+        tuple([read(name) for name in chosen]),
+        roles=roles,
+    )
+
+
+def _groups(variables: list[Variable]) -> tuple[list[_Group], list[str]]:
+    """Return the variables by clock, those without one with the vectors of their length."""
+    groups: list[_Group] = []
+    left_out = []
+    table: list[tuple[Variable, Array]] = []
+    for one in variables:
+        rows = len(one.clock.values) if one.clock is not None else None
+        turned = rows_first(one.values, rows)
+        if turned is None and rows is not None:
+            one = Variable(one.name, one.values, one.unit)  # of another length than the clock beside it
+            turned = rows_first(one.values, None)
+        if turned is None:
+            left_out.append(f"{one.name} ({'x'.join(map(str, one.values.shape))})")
+        elif len(turned) < ROWS_MIN:
+            left_out.append(f"{one.name} = {turned[0, 0]:g}")
+        else:
+            table.append((one, turned))
+    order = {id(one): place for place, (one, _) in enumerate(table)}
+    for one, turned in sorted(table, key=lambda pair: pair[0].clock is None):
+        fitting = [group for group in groups if group.takes(len(turned), one.clock)]
+        if one.clock is None:
+            fitting = [group for group in groups if group.rows == len(turned)]
+        if len(fitting) != 1:
+            fitting = [_Group(len(turned), one.clock)]
+            groups += fitting
+        fitting[0].members.append((one, turned))
+    for group in groups:
+        group.members.sort(key=lambda pair: order[id(pair[0])])
+    return groups, left_out
+
+
+def _chosen(
+    path: Path, groups: list[_Group], left_out: list[str], wanted: Wanted | None
+) -> tuple[_Group, Sequence[int]]:
+    """Return the set of signals that is meant, and the places of the columns that are wanted."""
+    if not groups:
+        there = f"; it holds {', '.join(left_out[:LISTED_MAX])}" if left_out else ""
+        raise LogError(
+            f"{path} holds no signals{there}. Give a file with at least one array of numbers that has "
+            f"{ROWS_MIN} rows or more."
+        )
+    longest = max(one.rows for one in groups)
+    groups = [one for one in groups if one.clock or one.rows >= PARAMETER_SHARE * longest]
+    if len(groups) == 1:
+        return groups[0], _places(groups[0], wanted)
+    fitting = []
+    for group in groups:
+        with suppress(LogError):
+            _places(group, wanted)
+            fitting.append(group)
+    if len(fitting) == 1:
+        return fitting[0], _places(fitting[0], wanted)
+    raise LogError(
+        f"{path} holds {len(groups)} sets of signals, on different clocks or of different lengths: "
+        f"{'; '.join(map(_listed, groups))}. Choose one by the names of its columns, such as "
+        f"--columns output={groups[0].members[0][0].name}; to use several, save each as a separate "
+        "file and join them (`join` in the section [flight_log])."
+    )
+
+
+def _places(group: _Group, wanted: Wanted | None) -> Sequence[int]:
+    one = _columns(group)
+    return range(len(one.names)) if wanted is None else wanted(one.names, one.units, one.roles)
+
+
+def _listed(group: _Group) -> str:
+    names = _columns(group).names
+    more = ", ..." if len(names) > LISTED_MAX else ""
+    return f"{', '.join(names[:LISTED_MAX])}{more} ({group.rows} rows)"
+
+
+@dataclass(frozen=True, slots=True)
+class _Columns:
+    """A set of signals column by column, and what they were made from."""
+
+    names: Sequence[str]
+    units: Sequence[str]
+    columns: Sequence[Array]
+    roles: Mapping[str, str]
+    form: str
+
+
+def _columns(group: _Group) -> _Columns:
+    one, turned = group.members[0]
+    if len(group.members) == 1 and group.clock is None and turned.shape[1] > 1:
+        return _of_matrix(one, turned)
+    names, units, columns = [], [], []
+    if group.clock is not None:
+        names.append(group.clock.name)
+        units.append(group.clock.unit)
+        columns.append(group.clock.values)
+    for one, turned in group.members:
+        width = turned.shape[1]
+        names += [one.name] if width == 1 else [f"{one.name}.{at}" for at in range(1, width + 1)]
+        units += [one.unit] * width
+        columns += list(turned.T)
+    form = f"{len(group.members)} variable{'s' * (len(group.members) > 1)}"
+    roles = dict(export_roles(names, units))
+    if group.clock is not None:
+        form += f" over the clock {group.clock.name}"
+        roles["time"] = group.clock.name
+    return _Columns(_unique(names), units, columns, roles, form)
+
+
+def _of_matrix(one: Variable, turned: Array) -> _Columns:
+    """Return the columns of a matrix by number, the first as the clock if it rises throughout."""
+    names = [str(number) for number in range(1, turned.shape[1] + 1)]
+    lying = "columns" if one.values.shape[0] == len(turned) else "rows"
+    form = f"matrix {one.name}, {len(names)} signals in {lying}"
+    roles = {}
+    if np.all(np.diff(turned[:, 0]) > 0.0):
+        roles["time"] = "1"
+        form += ", the first is the clock"
+    return _Columns(names, [one.unit] * len(names), list(turned.T), roles, form)
+
+
+def _unique(names: Sequence[str]) -> list[str]:
+    """Return the names, a later one that is there already with a number."""
+    found: dict[str, None] = {}
+    for name in names:
+        number, free = 1, name
+        while free in found:
+            number += 1
+            free = f"{name}.{number}"
+        found[free] = None
+    return list(found)

@@ -30,7 +30,7 @@ from tenbaud.bounds.floor import floor, period_cost
 from tenbaud.bounds.linear import sampled, van_loan
 from tenbaud.design.described import plant_of, plant_section
 from tenbaud.design.direction import design_direction
-from tenbaud.design.observer import kalman_observer
+from tenbaud.design.observer import linear_observer
 from tenbaud.design.plant import LinearPlant
 from tenbaud.studies.compiled import arrays_of, compiled
 
@@ -164,7 +164,7 @@ def behind_encoders(plant: LinearPlant, rate: float, coder: DirectionCoder) -> R
     F, E = (np.ascontiguousarray(one) for one in discretised(plant.A, plant.B, tick_s))
     _, noise = van_loan(plant.A, plant.noise, tick_s)
     predicts = LinearModel(F.tolist(), E.tolist(), plant.C.tolist(), tick_s)
-    observer = kalman_observer(predicts, noise, np.array([STEP]))
+    observer = linear_observer(predicts, noise, np.array([STEP]))
     states = model.cost + 1e-6 * np.trace(model.cost) * np.eye(len(F))
     inputs = 1e-2 * np.eye(E.shape[1])
     X = solve_discrete_are(F, E, states, inputs)

@@ -45,7 +45,8 @@ def unchecked_codec(config: FlightConfig, parts: Parts | None = None) -> Codec:
 
 def configured_rate(config: FlightConfig) -> float:
     """Return the bit/s of a configuration's words, be they enough for its plant or not."""
-    if isinstance(config.coder, OutsideSection):
+    designed = config.coder.kind != "direction" and getattr(config.model, "F", True)
+    if isinstance(config.coder, OutsideSection) or designed:
         return bit_rate(unchecked_codec(config), config.timing.tick_s)
     # Without a codec: a linear model and its coder may not have been designed yet.
     return float(getattr(config.coder, "bits", 1)) / config.timing.symbol_period_s

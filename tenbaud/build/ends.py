@@ -90,7 +90,7 @@ def build_observer(agreement: Agreement) -> StateObserver | None:
         return None
     config, tick_s = agreement.config, agreement.terms.tick_ns / 1e9
     try:
-        if isinstance(codec.model, LinearModel):
+        if isinstance(codec.model, LinearModel) or len(agreement.signals.outputs) > 1:
             from tenbaud.design.observer import configured_observer
 
             steps = output_steps(config, agreement.signals)

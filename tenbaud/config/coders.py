@@ -6,14 +6,16 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from channel.codec.codec import Coder, CoderContext
+from channel.codec.codec import Coder, CoderContext, Model
 from channel.codec.coders.base import readout_of
 from channel.codec.coders.direction import DirectionCoder, DirectionParameters
 from channel.codec.coders.history import HistoryCoder, HistoryParameters
 from channel.codec.coders.open_loop_zoom import OpenLoopZoomCoder, OpenLoopZoomParameters
 from channel.codec.coders.pcm import PcmCoder, PcmParameters
+from channel.codec.coders.signs import Gains
 from channel.codec.coders.static import StaticCoder, StaticParameters
 from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
+from channel.codec.signals import signals_of
 from tenbaud.config.kinds import Kind
 from tenbaud.config.section import AngleRange, Factor, KindSection, NotNegative, Positive
 
@@ -123,18 +125,33 @@ class DirectionCoderSection(KindSection):
     maximum_strength: Positive = 1000.0
 
 
-def _given(section: KindSection) -> dict[str, Any]:
+def _given(section: KindSection, model: Model | None = None) -> dict[str, Any]:
     """Return the settings of a section under the names of the coder's parameters."""
     given = section.model_dump(exclude={"kind"})
     if "correction" in given:
         given["impulse"] = given.pop("correction") == "impulse"
-        given["gains"] = tuple((gain,) for gain in given["gains"])
+        given["gains"] = _gains(given["gains"], model)
     return {name.removesuffix("_rad").removesuffix("_signs"): given[name] for name in given}
 
 
-def _fixed(section: FixedCoderSection, _: CoderContext) -> Coder:
+def _gains(both: tuple[float, float], model: Model | None) -> Gains:
+    """Return a row for each corrected state; a column for each output of which the rate is a state."""
+    angle, rate = both
+    if model is not None:
+        signals = signals_of(model)
+        states = [one.name for one in signals.states[: model.correction_size]]
+        names = [one.name for one in signals.outputs]
+        if len(names) > 1 and {*states} == {*names, *[f"{name}_rate" for name in names]}:
+            return tuple(
+                tuple(angle * (state == name) + rate * (state == f"{name}_rate") for name in names)
+                for state in states
+            )
+    return ((angle,), (rate,))
+
+
+def _fixed(section: FixedCoderSection, context: CoderContext) -> Coder:
     """Return an open-loop zoom coder whose range is at its end from the beginning."""
-    given = _given(section)
+    given = _given(section, context.model)
     size = given.pop("range")
     return OpenLoopZoomCoder(
         OpenLoopZoomParameters(initial_range=size, minimum_range=size, decay=1.0, **given)
@@ -142,7 +159,8 @@ def _fixed(section: FixedCoderSection, _: CoderContext) -> Coder:
 
 
 def _pcm(section: PcmCoderSection, context: CoderContext) -> Coder:
-    return PcmCoder(PcmParameters(period_s=context.symbol_period_s, **_given(section)))
+    angles = len(context.model.measured(context.model.initial()))
+    return PcmCoder(PcmParameters(period_s=context.symbol_period_s, angles=angles, **_given(section)))
 
 
 def _history(section: HistoryCoderSection, context: CoderContext) -> Coder:
@@ -165,13 +183,21 @@ def _direction(section: DirectionCoderSection, context: CoderContext) -> Coder:
     return coder
 
 
-ZOOM = Kind(ZoomCoderSection, lambda section, _: ZoomCoder(ZoomParameters(**_given(section))))
+ZOOM = Kind(
+    ZoomCoderSection,
+    lambda section, context: ZoomCoder(ZoomParameters(**_given(section, context.model))),
+)
 FIXED = Kind(FixedCoderSection, _fixed)
 OPEN_LOOP_ZOOM = Kind(
     OpenLoopZoomCoderSection,
-    lambda section, _: OpenLoopZoomCoder(OpenLoopZoomParameters(**_given(section))),
+    lambda section, context: OpenLoopZoomCoder(
+        OpenLoopZoomParameters(**_given(section, context.model))
+    ),
 )
-STATIC = Kind(StaticCoderSection, lambda section, _: StaticCoder(StaticParameters(**_given(section))))
+STATIC = Kind(
+    StaticCoderSection,
+    lambda section, context: StaticCoder(StaticParameters(**_given(section, context.model))),
+)
 PCM = Kind(PcmCoderSection, _pcm)
 HISTORY = Kind(HistoryCoderSection, _history)
 DIRECTION = Kind(DirectionCoderSection, _direction)

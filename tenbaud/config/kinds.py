@@ -31,6 +31,7 @@ MODELS = Registry(
         "hold": "tenbaud.config.models:HOLD",
         "pendulum": "tenbaud.config.models:PENDULUM",
         "linear": "tenbaud.config.models:LINEAR",
+        "helicopter": "tenbaud.config.helicopter:HELICOPTER",
     },
 )
 CODERS = Registry(

@@ -39,9 +39,11 @@ ANGLE_DENSITY = 2e-3
 
 
 class HoldModelSection(ModelSection):
-    """No model: angle and rate stay as the last word set them. For the coder `words`."""
+    """No model: angle and rate stay as the last word set them. For the coder `pcm`."""
 
     kind: Literal["hold"] = "hold"
+    outputs: Annotated[tuple[str, ...], Field(min_length=1, max_length=16)] = ("pitch",)
+    """angles; the words are theirs in turn"""
 
 
 Matrix = tuple[tuple[Factor, ...], ...]
@@ -183,7 +185,7 @@ def _pitch(section: PitchModelSection, context: ModelContext) -> PitchModel:
 
 
 def _hold(section: HoldModelSection, context: ModelContext) -> HoldModel:
-    return HoldModel(context.tick_s, section.start)
+    return HoldModel(context.tick_s, section.start, section.outputs)
 
 
 def _linear(section: LinearModelSection, context: ModelContext) -> LinearModel:

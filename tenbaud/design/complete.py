@@ -18,7 +18,7 @@ from tenbaud.config.load import ConfigError
 from tenbaud.config.models import LinearModelSection
 from tenbaud.config.schema import Timing
 from tenbaud.config.section import KindSection, Section
-from tenbaud.design.described import corrected_part, plant_of, require_rate, require_seen
+from tenbaud.design.described import corrected_part, linear_of, plant_of, require_rate, require_seen
 from tenbaud.design.direction import design_direction
 
 SectionKind = TypeVar("SectionKind", bound=Section)
@@ -58,10 +58,10 @@ def _checked(place: str, sort: type[SectionKind], values: Mapping[str, Any]) -> 
 
 
 def _direction(section: KindSection, coder: Mapping[str, Any], timing: Timing) -> dict[str, Any]:
-    plant = plant_of(section, timing.tick_s)
-    if plant is None:
+    linear, plant = linear_of(section), plant_of(section, timing.tick_s)
+    if linear is None or plant is None:
         raise ValueError(f"model.kind = {section.kind!r} describes no plant to design for")
-    plant = corrected_part(plant, getattr(section, "corrected", 0))
+    plant = corrected_part(plant, linear.corrected)
     rate = coder.get("bits", 1) / timing.symbol_period_s
     require_seen(plant, section)
     require_rate(plant, rate, section)

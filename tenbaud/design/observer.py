@@ -1,4 +1,7 @@
-"""The transmitter's observer of a linear model: the steady Kalman filter behind its encoders."""
+"""The transmitter's observer of a plant: the steady Kalman filter behind its encoders.
+
+Of a model that is not linear the gains are those at its rest; its own prediction stays what it is.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
-from channel.codec.codec import STATE_MAX, Codec
+from channel.codec.codec import STATE_MAX, Codec, Model
 from channel.codec.coders.direction import DirectionCoder
 from channel.codec.models.linear import LinearModel
 from tenbaud.bounds.linear import Matrix, van_loan
@@ -23,11 +26,20 @@ LEAST_NOISE = 1e-9
 """of every state, as a share of the largest: a state that no noise reaches is still looked at"""
 
 
-def kalman_observer(model: LinearModel, tick_noise: Matrix, steps: Matrix) -> StateObserver:
-    """Return the observer for a noise covariance per tick and the step of each output's encoder."""
-    size, outputs = model.state_size, len(model.outputs)
-    transition = np.array(model.constants.transition).reshape(size, size)
-    C = np.array(model.outputs)
+def linear_observer(model: LinearModel, tick_noise: Matrix, steps: Matrix) -> StateObserver:
+    """Return the observer of a linear model; see `kalman_observer`."""
+    transition = np.array(model.constants.transition).reshape(model.state_size, model.state_size)
+    return kalman_observer(model, transition, np.array(model.outputs), tick_noise, steps)
+
+
+def kalman_observer(
+    model: Model, transition: Matrix, C: Matrix, tick_noise: Matrix, steps: Matrix
+) -> StateObserver:
+    """Return the observer for a noise covariance per tick and the step of each output's encoder.
+
+    `transition` is that of a tick, `C` makes outputs of states.
+    """
+    size, outputs = len(transition), len(C)
     seen = np.diag(np.maximum(np.broadcast_to(steps, (outputs,)), LEAST_STEP) ** 2 / 12.0)
     noise = tick_noise + LEAST_NOISE * float(np.trace(tick_noise)) * np.eye(size)
     try:
@@ -36,8 +48,13 @@ def kalman_observer(model: LinearModel, tick_noise: Matrix, steps: Matrix) -> St
         raise ValueError(
             f"the outputs do not show every state, so none is observed: {error}"
         ) from error
-    gains = ahead @ C.T @ np.linalg.inv(C @ ahead @ C.T + seen)
-    return StateObserver(model, rows_of(gains), rows_of(np.linalg.pinv(C)), (STATE_MAX,) * size)
+    gains: Matrix = ahead @ C.T @ np.linalg.inv(C @ ahead @ C.T + seen)
+    return StateObserver(
+        model,
+        rows_of(gains),
+        rows_of(np.asarray(np.linalg.pinv(C), dtype=np.float64)),
+        (STATE_MAX,) * size,
+    )
 
 
 def observer_of_coder(codec: Codec, counts_per_turn: int) -> StateObserver:
@@ -50,16 +67,16 @@ def observer_of_coder(codec: Codec, counts_per_turn: int) -> StateObserver:
     noise = np.zeros((model.state_size, model.state_size))
     corrected = model.correction_size
     noise[:corrected, :corrected] = np.array(coder.parameters.noise) / codec.ticks_per_sample
-    return kalman_observer(model, noise, np.array([math.tau / counts_per_turn]))
+    return linear_observer(model, noise, np.array([math.tau / counts_per_turn]))
 
 
-def configured_observer(
-    model: LinearModel, config: FlightConfig, steps: Sequence[float]
-) -> StateObserver:
+def configured_observer(model: Model, config: FlightConfig, steps: Sequence[float]) -> StateObserver:
     """Return the observer for a configuration's disturbance and the steps of its encoders."""
     tick_s = config.timing.tick_s
     plant = plant_of(config.model, tick_s)
     if plant is None:
-        raise ValueError(f"model.kind = {config.model.kind!r} describes no linear plant to observe")
-    _, noise = van_loan(plant.A, plant.noise, tick_s)
-    return kalman_observer(model, noise, np.array(steps))
+        raise ValueError(f"model.kind = {config.model.kind!r} describes no plant to observe")
+    transition, noise = van_loan(plant.A, plant.noise, tick_s)
+    if isinstance(model, LinearModel):
+        return linear_observer(model, noise, np.array(steps))
+    return kalman_observer(model, transition, plant.C, noise, np.array(steps))

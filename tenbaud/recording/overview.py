@@ -180,7 +180,11 @@ class Overview:
         times, values = _symbols(times_s, words)
         self.symbols.add(times, values)
         if len(self.about) > 1:
-            places = [None if word is None else of for word, of in zip(words, about, strict=True)]
+            # A receiver does not record what symbols were about.
+            places = [
+                None if word is None else of or (None,) * len(word)
+                for word, of in zip(words, about, strict=True)
+            ]
             _, outputs = _symbols(times_s, places)
             for place, means in enumerate(self.about):
                 means.add(times, np.where(np.isnan(outputs), np.nan, outputs == place))

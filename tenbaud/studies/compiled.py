@@ -109,7 +109,7 @@ def arrays_of(constants: Any) -> Any:
     """Return constants with arrays for their sequences of numbers, which are read at any index."""
     if not hasattr(constants, "_replace"):
         return constants
-    rows = {name: value for name, value in constants._asdict().items() if isinstance(value, tuple)}
+    rows = {name: value for name, value in constants._asdict().items() if type(value) is tuple}
     numbers = {name: np.array(value) for name, value in rows.items() if isinstance(value[0], float)}
     return constants._replace(**numbers)
 

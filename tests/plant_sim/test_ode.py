@@ -15,6 +15,7 @@ from plant_sim.ode import OdePlant
 from plant_sim.plant import PlantContext
 from plant_sim.servo import ServoPlant
 from tenbaud.config.load import load_config
+from tenbaud.design.described import linear_of
 
 STEP_S = 0.004
 
@@ -66,7 +67,9 @@ def test_when_a_plant_is_driven_then_it_follows_its_equations(
 def test_when_it_is_linearised_then_it_is_the_model_of_its_preset(
     kind: type[OdePlant], preset: str
 ) -> None:
-    model = load_config(preset).model.model_dump()
+    linear = linear_of(load_config(preset).model)
+    assert linear is not None
+    model = linear.model_dump()
     a, b, c, g = (np.array(model[one]) for one in "ABCG")
     inputs, size = b.shape[1], model["corrected"] or len(a)
     options = {} if kind is HelicopterPlant else {"friction": 0.0, "rod_damping": 0.0}

@@ -18,10 +18,10 @@ PATIENT = ("--set", "transmitter.watchdog_s=30")
 """For a flight that is not about the guard: no pause of a process ends an epoch."""
 
 
-def check_flown(summary: Summary, samples: int, receiver: Summary | None = None) -> None:
+def check_flown(summary: Summary, samples: int, receiver: Summary | None = None, bits: int = 1) -> None:
     """Check that all samples of a flight without faults of its line were confirmed.
 
-    `receiver`: the receiver's summary, where it is not joined to the transmitter's.
+    `receiver`: the receiver's summary, where it is not joined to the transmitter's; `bits` of a word.
     """
     assert summary["desyncs"] == 0
     if summary["rejoins"]:
@@ -31,7 +31,7 @@ def check_flown(summary: Summary, samples: int, receiver: Summary | None = None)
         return
     assert summary["digest_checks"] == summary["samples"] == samples
     unsent = summary["words_missed"] + summary["symbols_refused"]
-    symbols = samples - unsent
+    symbols = samples * bits - unsent
     assert summary["coder_bits_up"] == symbols, "one bit for each symbol that was sent"
     if summary["link"] != "serial":  # a byte that is late by several slots may be taken for another's
         assert summary["erasures"] == unsent + (receiver or summary)["symbols_late"]

@@ -13,6 +13,7 @@ from channel.protocol.terms import Clock
 from tenbaud import fly
 from tenbaud.audit.audit import audit
 from tenbaud.cli.commands import app
+from tenbaud.config.load import load_config
 from tests.tenbaud.confirmed import check_flown, held_up
 
 
@@ -25,8 +26,11 @@ class Flown(NamedTuple):
     """largest rms of the live estimate's error"""
     reach: dict[str, float]
     """largest output"""
+    bits: int = 1
+    """of a word"""
 
 
+HELICOPTER = {"travel": 1.0, "elevation": 0.45, "pitch": 0.65}
 PRESETS = {
     "integrator-10baud": Flown(20.0, 3.0, {"angle": 0.005}, {"angle": 1.0}),
     "servo-10baud": Flown(20.0, 3.0, {"angle": 0.01}, {"angle": 1.5}),
@@ -36,25 +40,43 @@ PRESETS = {
     "helicopter-10baud": Flown(
         20.0,
         3.0,
-        {"travel": 0.015, "elevation": 0.015, "pitch": 0.02},
-        {"travel": 1.0, "elevation": 0.4, "pitch": 0.5},
+        {"travel": 0.015, "elevation": 0.015, "pitch": 0.025},
+        HELICOPTER,
     ),
+    "pendulum-13baud": Flown(10.0, 3.0, {"angle": 0.02}, {"angle": 0.4}),
 }
-CLOCKS = ["virtual", pytest.param("real", marks=pytest.mark.real_time)]
+MORE = {
+    "helicopter-20baud": Flown(
+        10.0, 3.0, {"travel": 0.01, "elevation": 0.01, "pitch": 0.025}, HELICOPTER
+    ),
+    "helicopter-30baud": Flown(
+        10.0, 3.0, {"travel": 0.008, "elevation": 0.008, "pitch": 0.025}, HELICOPTER
+    ),
+    "helicopter-3x10baud": Flown(
+        10.0, 3.0, {"travel": 0.02, "elevation": 0.02, "pitch": 0.03}, HELICOPTER, 3
+    ),
+    "helicopter-usual": Flown(
+        4.0, 3.0, {"travel": 0.005, "elevation": 0.01, "pitch": 0.02}, HELICOPTER, 12
+    ),
+    "pendulum-16baud": Flown(10.0, 3.0, {"angle": 0.01}, {"angle": 0.3}),
+    "pendulum-20baud": Flown(10.0, 3.0, {"angle": 0.006}, {"angle": 0.2}),
+}
+"""Presets of the same plants at other rates."""
 
 
 def check(preset: str, summary: dict[str, Any], tolerance: float = 1.0) -> None:
-    outputs, flown = summary["outputs"], PRESETS[preset]
+    outputs, flown = summary["outputs"], (PRESETS | MORE)[preset]
     assert list(outputs) == list(flown.errors)
     for name, output in outputs.items():
         assert 0.0 < output["error_live_rms"] < tolerance * flown.errors[name], name
         assert output["largest"] < flown.reach[name], name
 
 
-@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("preset", PRESETS | MORE)
 def test_it_flies_in_memory_and_every_output_is_known(preset: str, tmp_path: Path) -> None:
-    run = fly(preset, settings={"duration_s": PRESETS[preset].seconds}, out=tmp_path / "run")
-    check_flown(run.summary, run.summary["samples"])
+    seconds = (PRESETS | MORE)[preset].seconds
+    run = fly(preset, settings={"duration_s": seconds}, out=tmp_path / "run")
+    check_flown(run.summary, run.summary["samples"], bits=(PRESETS | MORE)[preset].bits)
     check(preset, run.summary)
 
 
@@ -64,20 +86,29 @@ def test_presets_are_listed_by_plant_with_their_rates() -> None:
     for line in shown.splitlines():
         plant, _, rest = line.partition("  ")
         plants[plant or list(plants)[-1]] = plants.get(plant or list(plants)[-1], "") + rest
-    named = {"pitch": "paper-10baud", "pendulum": "pendulum-30baud"}
-    named |= {preset.rpartition("-")[0]: preset for preset in PRESETS}
+    named = {"pitch": ["paper-10baud"], "pendulum": ["pendulum-30baud"]}
+    for preset in PRESETS | MORE:
+        named.setdefault(preset.rpartition("-")[0], []).append(preset)
     assert plants.keys() == named.keys()
-    for plant, preset in named.items():
-        rate = preset.rpartition("-")[2].removesuffix("baud")
-        assert re.search(rf"{preset} +{rate} baud  \w", plants[plant]), plant
+    for plant, presets in named.items():
+        for preset in presets:
+            rate = load_config(preset).channel.rate_baud
+            assert re.search(rf"{preset} +{rate:g} baud  \w", plants[plant]), plant
 
 
-@pytest.mark.parametrize("clock", CLOCKS)
-@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize(
+    ("preset", "clock"),
+    [
+        *[(preset, "virtual") for preset in PRESETS | MORE],
+        *[pytest.param(preset, "real", marks=pytest.mark.real_time) for preset in PRESETS],
+    ],
+)
 def test_it_flies_as_two_processes(preset: str, clock: Clock, tmp_path: Path) -> None:
-    settings = {"duration_s": PRESETS[preset].real_s, "transmitter.watchdog_s": 30.0}
+    period_s = load_config(preset).timing.symbol_period_s
+    samples = round((PRESETS | MORE)[preset].real_s / period_s)
+    settings = {"duration_s": samples * period_s, "transmitter.watchdog_s": 30.0}
     run = fly(preset, settings=settings, out=tmp_path / "run", link="zenoh", clock=clock)
-    check_flown(run.summary, round(settings["duration_s"] / run.config.timing.symbol_period_s))
+    check_flown(run.summary, samples, bits=(PRESETS | MORE)[preset].bits)
     result = audit(tmp_path / "run")
     assert result.passed, result.leaks + result.gaps
     if clock == "virtual" or held_up(run.summary) is None:

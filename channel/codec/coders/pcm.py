@@ -6,12 +6,14 @@ through a first-order low-pass:
 
     rate <- rate + T / (T + tau) ((y_k - y_{k-1}) / T - rate),   tau = 0: the plain difference
 
-It belongs to the `hold` model, whose two states are set by it at every word.
+Several angles have their words in turn, one a sample: a fixed frame. It belongs to the `hold` model,
+whose angles and rates are set by the words.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -40,6 +42,7 @@ class PcmParameters:
     """T, time between two words"""
     rate_filter_s: float = 0.0
     """tau"""
+    angles: int = 1
 
 
 class PcmConstants(NamedTuple):
@@ -51,6 +54,12 @@ class PcmConstants(NamedTuple):
     """between two neighbouring words"""
     period_s: float
     rate_filter_s: float
+    angles: int
+
+
+def turn_of(constants: PcmConstants, coder: Numbers) -> int:
+    """Return the angle that a sample's word is about."""
+    return math.floor(coder[2 * constants.angles]) if constants.angles > 1 else 0
 
 
 def pcm_encode(
@@ -61,7 +70,7 @@ def pcm_encode(
     symbols: SymbolResults,
 ) -> None:
     """Write the nearest step of the angle; beyond the range, the outermost one."""
-    step = math.floor(measurement[0] / constants.step + 0.5)
+    step = math.floor(measurement[turn_of(constants, coder)] / constants.step + 0.5)
     write_bits(step + constants.half, symbols)
 
 
@@ -75,33 +84,37 @@ def pcm_decode(
     after: Results,
 ) -> None:
     """Write what brings (angle, rate) to the word and its difference; nothing if erased."""
-    last, age = coder[0], coder[1]
+    angles, turn = constants.angles, turn_of(constants, coder)
+    for place in range(angles):
+        age = coder[angles + place]
+        correction[place] = correction[angles + place] = 0.0
+        after[place] = coder[place]
+        after[angles + place] = age + 1.0 if age > 0.0 else 0.0
+    if angles > 1:
+        after[2 * angles] = turn + 1.0 if turn + 1 < angles else 0.0
     if erased:
-        correction[0] = correction[1] = 0.0
-        after[0] = last
-        after[1] = age + 1.0 if age > 0.0 else 0.0
         return
+    last, age = coder[turn], coder[angles + turn]
     angle = (number_of(symbols) - constants.half) * constants.step
-    turn = 0.0
+    change = 0.0
     if age > 0.0:
         elapsed = age * constants.period_s
         share = elapsed / (elapsed + constants.rate_filter_s)
-        turn = share * ((angle - last) / elapsed - model[1])
-    correction[0] = angle - model[0]
-    correction[1] = turn
-    after[0] = angle
-    after[1] = 1.0
+        change = share * ((angle - last) / elapsed - model[angles + turn])
+    correction[turn] = angle - model[turn]
+    correction[angles + turn] = change
+    after[turn] = angle
+    after[angles + turn] = 1.0
 
 
 class PcmCoder(FunctionCoder):
-    """`b` binary symbols per word. Coder state: the last angle and how many samples ago it was.
+    """`b` binary symbols per word. Coder state: each last angle, and how many samples ago it was.
 
-    An age of 0 says that there is none yet.
+    An age of 0 says that there is none yet. Of several angles the one whose turn it is comes last.
     """
 
     functions = CoderFunctions(pcm_encode, pcm_decode)
     impulse = True
-    correction_size = 2
 
     def __init__(self, parameters: PcmParameters) -> None:
         if not 1 <= parameters.bits <= 15:
@@ -114,19 +127,36 @@ class PcmCoder(FunctionCoder):
         self.alphabet = Alphabet((0, 1), parameters.bits)
         half = 1 << (parameters.bits - 1)
         self.constants = PcmConstants(
-            half, parameters.range / half, parameters.period_s, parameters.rate_filter_s
+            half,
+            parameters.range / half,
+            parameters.period_s,
+            parameters.rate_filter_s,
+            parameters.angles,
         )
+        self.correction_size = 2 * parameters.angles
 
     def initial(self) -> Vector:
         """Return that no angle has come yet."""
-        return (0.0, 0.0)
+        angles = self.parameters.angles
+        return (0.0,) * (2 * angles + (angles > 1))
 
     def is_state(self, coder: Vector) -> bool:
-        """Return whether this is an angle within the words' range and a count of samples."""
-        last, age = coder
-        within = -self.parameters.range <= last <= self.parameters.range
-        return within and 0.0 <= age < STATE_MAX and age == math.floor(age)
+        """Return whether these are angles within the words' range, counts of samples, and a turn."""
+        angles = self.constants.angles
+        most = self.parameters.range
+        return all(-most <= last <= most for last in coder[:angles]) and all(
+            0.0 <= count < limit and count == math.floor(count)
+            for counts, limit in (
+                (coder[angles : 2 * angles], STATE_MAX),
+                (coder[2 * angles :], angles),
+            )
+            for count in counts
+        )
+
+    def about(self, coder: Vector, word: Sequence[int], correction: Numbers) -> tuple[int, ...]:
+        """Return the angle whose turn it is, for every symbol."""
+        return (turn_of(self.constants, coder),) * len(word)
 
     def ranges(self, coder: Vector) -> Vector:
         """Return half a step, the largest error of an angle within the range."""
-        return (0.5 * self.constants.step,)
+        return (0.5 * self.constants.step,) * self.parameters.angles

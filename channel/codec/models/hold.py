@@ -1,39 +1,44 @@
-"""No prediction at all: angle and rate stay as the last word said. The usual loop has no model."""
+"""No prediction at all: angles and rates stay as the last words said. The usual loop has no model."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from channel.codec.codec import Vector
 from channel.codec.models.pitch import PITCH_SIGNALS
-from channel.codec.signals import Signals
+from channel.codec.signals import Signal, Signals
 
 
-def hold_tick(state: Vector, command: Vector, held: Vector, constants: Vector) -> Vector:
-    """Keep the state, but for a correction that is held over the sample; constants: (tick in s,)."""
-    return (state[0] + constants[0] * held[0], state[1] + constants[0] * held[1])
+def hold_row(state: Vector, command: Vector, held: Vector, constants: Vector, row: int) -> float:
+    """Keep a state, but for a correction held over the sample; constants: (tick in s,)."""
+    return state[row] + constants[0] * held[row]
 
 
 class HoldModel:
-    """States (angle rad, rate rad/s), held between words; two motor voltages that it does not read."""
+    """Angles in rad, then their rates, held between words; two motor voltages that it does not read."""
 
-    state_size = 2
-    correction_size = 2
     input_size = 2
-    signals = Signals(PITCH_SIGNALS.states[:2], PITCH_SIGNALS.inputs, PITCH_SIGNALS.outputs)
-    tick_function = staticmethod(hold_tick)
+    row_function = staticmethod(hold_row)
 
-    def __init__(self, tick_s: float, start: Vector = ()) -> None:
+    def __init__(self, tick_s: float, start: Vector = (), outputs: Sequence[str] = ("pitch",)) -> None:
         """`start` is the initial state; empty: at angle zero and at rest."""
+        angles = tuple([Signal(name, "rad") for name in outputs])
+        rates = [Signal(f"{name}_rate", "rad/s") for name in outputs]
+        self.signals = Signals((*angles, *rates), PITCH_SIGNALS.inputs, angles)
+        self.state_size = self.correction_size = 2 * len(outputs)
         self.constants: Vector = (tick_s,)
-        self._start = start or (0.0, 0.0)
+        self._start = start or (0.0,) * self.state_size
 
     def initial(self) -> Vector:
         """Return the state that both ends begin with."""
         return self._start
 
     def measured(self, state: Vector) -> Vector:
-        """Return the angle, the one measured axis."""
-        return state[:1]
+        """Return the angles."""
+        return state[: len(self.signals.outputs)]
 
     def tick(self, state: Vector, command: Vector, held: Vector) -> Vector:
-        """Advance by one tick; see `hold_tick`."""
-        return hold_tick(state, command, held, self.constants)
+        """Advance by one tick; see `hold_row`."""
+        return tuple(
+            [hold_row(state, command, held, self.constants, row) for row in range(self.state_size)]
+        )

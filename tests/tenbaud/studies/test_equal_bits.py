@@ -200,7 +200,7 @@ def compare(point: CompiledPoint) -> None:
 
 
 def test_when_a_kind_of_model_or_coder_exists_then_a_preset_above_flies_it() -> None:
-    configs = [config_of(preset, {}) for preset in (*PRESETS, "fixed-10baud")]
+    configs = [config_of(preset, {}) for preset in (*PRESETS, *COMPILED_LONG, "fixed-10baud")]
     assert {config.coder.kind for config in configs} == set(CODERS.built_in)
     assert {config.model.kind for config in configs} == set(MODELS.built_in)
 

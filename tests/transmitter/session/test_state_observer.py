@@ -16,7 +16,7 @@ from plant_sim.pitch import PitchPlant
 from plant_sim.zero_order_hold import discretised
 from tenbaud.bounds.linear import van_loan
 from tenbaud.design.described import plant_of, plant_section
-from tenbaud.design.observer import kalman_observer
+from tenbaud.design.observer import linear_observer
 from tests.channel.codec.two_axes import TwoAxes
 from transmitter.session.state_observer import StateObserver, rate_observer
 
@@ -85,15 +85,15 @@ def test_when_two_axes_are_seen_then_the_kalman_filter_finds_all_states() -> Non
     transition, drive = discretised(plant.A, plant.B, TICK_S)
     model = LinearModel(transition.tolist(), drive.tolist(), plant.C.tolist(), TICK_S)
     _, noise = van_loan(plant.A, plant.noise, TICK_S)
-    found = fly_aero(kalman_observer(model, noise, np.array([STEP])), model, noise, range(0))
+    found = fly_aero(linear_observer(model, noise, np.array([STEP])), model, noise, range(0))
     assert (found[[0, 2]] < STEP).all()
     assert (found[[1, 3]] < 0.25 * STEP / TICK_S).all()
-    again = fly_aero(kalman_observer(model, noise, np.array([STEP])), model, noise, range(900, 1000))
+    again = fly_aero(linear_observer(model, noise, np.array([STEP])), model, noise, range(900, 1000))
     assert np.allclose(again, found, rtol=0.05)
     # Gains for ten times the disturbance, or a tenth, are worse.
     for share in (0.01, 100.0):
         other = fly_aero(
-            kalman_observer(model, share * noise, np.array([STEP])), model, noise, range(0)
+            linear_observer(model, share * noise, np.array([STEP])), model, noise, range(0)
         )
         assert (other[[1, 3]] > found[[1, 3]]).all()
 
@@ -101,7 +101,7 @@ def test_when_two_axes_are_seen_then_the_kalman_filter_finds_all_states() -> Non
 def test_when_outputs_hide_a_state_then_no_observer_is_designed() -> None:
     model = LinearModel(((1.0, 0.0), (0.0, 2.0)), ((1.0,), (1.0,)), ((1.0, 0.0),), TICK_S)
     with pytest.raises(ValueError, match="do not show every state"):
-        kalman_observer(model, np.eye(2), np.array([STEP]))
+        linear_observer(model, np.eye(2), np.array([STEP]))
 
 
 def test_when_it_makes_no_sense_then_it_is_refused() -> None:

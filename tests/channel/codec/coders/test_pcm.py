@@ -56,6 +56,26 @@ def test_when_the_differentiator_is_filtered_then_a_steady_rate_is_reached_in_it
         assert state.model[1] == pytest.approx(100.0 * STEP * (1.0 - left), rel=1e-6, abs=1e-9)
 
 
+def test_when_there_are_three_angles_then_they_have_their_words_in_turn() -> None:
+    model = HoldModel(0.01, outputs=("travel", "elevation", "pitch"))
+    parts = Codec(model, PcmCoder(PcmParameters(angles=3)), 1)
+    state = parts.initial()
+    for sample in range(9):
+        measured = (sample * STEP, -2 * sample * STEP, 5 * STEP)
+        word = parts.encode(state, measured)
+        if sample == 4:
+            word = ERASED  # type: ignore[assignment]
+        assert parts.about(state, word, parts.open(state, word).model) in (None, (sample % 3,) * 10)
+        assert parts.coder.is_state(state.coder)  # type: ignore[attr-defined]
+        state = parts.step(state, word, NOTHING)
+    seen = (6 * STEP, -14 * STEP, 5 * STEP)
+    # The elevation's second word was erased: its difference spans six samples.
+    rates = (3 * STEP / 0.03, -12 * STEP / 0.06, 0.0)
+    assert state.model == pytest.approx((*seen, *rates), abs=1e-9)
+    broken = (*state.coder[:-1], 3.0)
+    assert not parts.coder.is_state(broken)  # type: ignore[attr-defined]
+
+
 @pytest.mark.parametrize(
     "parameters",
     [PcmParameters(bits=16), PcmParameters(range=0.0), PcmParameters(rate_filter_s=-1.0)],

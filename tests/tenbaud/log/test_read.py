@@ -157,7 +157,7 @@ def test_a_comment_far_down_does_not_shift_the_line_that_is_named(tmp_path: Path
 
 def test_a_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:
     section = FlightLogSection(file=str(tmp_path))
-    with pytest.raises(LogError, match="holds neither transmitter.mcap"):
+    with pytest.raises(LogError, match=r"holds neither transmitter\.mcap"):
         read_log(section, SIGNALS)
 
 

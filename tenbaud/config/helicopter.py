@@ -45,10 +45,10 @@ class HelicopterModelSection(ModelSection):
     """force of a rotor at 1 V; it grows with the square up to there, in proportion beyond"""
     force_down: NotNegative = 0.012054
     """the same at -0.5 V, without its sign"""
-    elevation_low_rad: Annotated[float, Field(ge=-1.5, lt=0.0)] = -0.4886921905584123
+    elevation_low_rad: Annotated[float, Field(ge=-1.5, le=-0.001)] = -0.4886921905584123
     """stops of elevation and, to either side, pitch"""
-    elevation_high_rad: Annotated[float, Field(gt=0.0, le=1.5)] = 0.5235987755982988
-    pitch_stop_rad: Annotated[float, Field(gt=0.0, le=1.5)] = 0.5585053606381855
+    elevation_high_rad: Annotated[float, Field(ge=0.001, le=1.5)] = 0.5235987755982988
+    pitch_stop_rad: Annotated[float, Field(ge=0.001, le=1.5)] = 0.5585053606381855
     motor_lag_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.08
     hover_rad: Annotated[float, Field(ge=0.0, le=1.5)] = 0.17453292519943295
     """elevation at which both ends begin, and at which design and floor take the plant for linear"""

@@ -70,11 +70,7 @@ def _name_log_columns(section: Any, source: str, *, warn: bool) -> None:
     """Give the columns of a recorded flight, which had fields of their own, to their signals."""
     if not isinstance(section, dict):
         return
-    for old, new in {
-        "index_column": "index",
-        "counts_column": "outputs",
-        "volts_columns": "inputs",
-    }.items():
+    for old, new in LOG_COLUMNS.items():
         if old not in section:
             continue
         if warn:
@@ -82,7 +78,6 @@ def _name_log_columns(section: Any, source: str, *, warn: bool) -> None:
             warnings.warn(text, FutureWarning, stacklevel=4)
         value = section.pop(old)
         if old == "counts_column":
-            section.setdefault("units", {"angles": "counts"})
             value = {"1": value}
         elif old == "volts_columns" and isinstance(value, (list, tuple)):
             value = {str(at): name for at, name in enumerate(value, 1)}

@@ -162,17 +162,20 @@ class Result:
 
 
 def _finish(one: Each, folder: Path, number: str, fly: bool) -> None:
-    """Choose the coder, fly the record, and write what flew."""
+    """Fly the record with the configured coder and with one fitted to it; write the better one."""
     if "file" not in one.settings.get("flight_log", {}):
         log = written.write_record(folder / f"record{number}.csv", one.identified.record)
         one.settings["flight_log"] = log
     if fly:
+        one.flown = fly_record(one.settings)
         # An experiment that this command made shows the plant, and not what flights are like.
         if one.source.file is not None:
-            one.settings, note = with_coder(one.settings)
+            fitted, note = with_coder(one.settings)
+            flown = one.flown if note else fly_record(fitted)
+            if flown.error < one.flown.error:
+                one.settings, one.flown = fitted, flown
             notes = (*one.identified.notes, *filter(None, [note]))
             one.identified = replace(one.identified, notes=notes)
-        one.flown = fly_record(one.settings)
     one.config_file = folder / f"identified{number}.toml"
     said = one.flown.sentence() if one.flown is not None else ""
     written.write(one.config_file, one.settings, one.identified, said)

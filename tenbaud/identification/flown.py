@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -21,6 +22,12 @@ class Flown(NamedTuple):
     rate_bit_s: float
     outputs: tuple[tuple[str, float, float, float], ...]
     """name, rms and largest error, and largest value of each output, in its unit"""
+
+    @property
+    def error(self) -> float:
+        """Return the rms error in units of the largest values; infinite without a whole flight."""
+        shares = [rms / largest for _, rms, _, largest in self.outputs if largest]
+        return math.hypot(*shares) if self.outcome == "ok" and shares else math.inf
 
     def sentence(self) -> str:
         """Return the figures for people."""

@@ -58,18 +58,17 @@ def by_period(rows: int, period_s: float, start_s: float | None, end_s: float | 
     return Clock(slice(first, last), None, period_s, first * period_s, max(0, last - first))
 
 
+def has_fractions(values: Array) -> bool:
+    """Return whether some of the numbers that are there are not whole."""
+    return bool(np.any((values != np.floor(values)) & np.isfinite(values)))
+
+
 def by_index(
     table: Table, column: int, period_s: float, start_s: float | None, end_s: float | None
 ) -> Clock:
-    """Return the clock of rows that an index counts; LogError where it does not count evenly."""
+    """Return the clock of rows that whole numbers count; LogError where they do not count evenly."""
     clock = by_period(len(table), period_s, start_s, end_s)
     index = table.check(column, clock.rows)
-    if np.any(index != np.floor(index)):
-        name = table.names[column]
-        raise LogError(
-            f"{table.path}, column {name}: it counts no rows, as its values are not whole; if it is "
-            f"the clock, give --columns time={name}"
-        )
     step = float(np.median(np.diff(index))) if len(index) > 1 else 1.0
     wrong = np.flatnonzero(np.diff(index) != step)
     if len(wrong) or step <= 0.0:

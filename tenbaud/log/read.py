@@ -13,7 +13,7 @@ from plant_sim.encoder import Encoder, OutputReader
 from tenbaud.config.schema import FlightLogSection
 from tenbaud.log.angles import counts_of, step_of, turn_of, unwrapped, values_of, without_spikes
 from tenbaud.log.beside import with_file_beside
-from tenbaud.log.clock import Clock, by_index, by_period, by_time
+from tenbaud.log.clock import Clock, by_index, by_period, by_time, has_fractions
 from tenbaud.log.join import read_joined
 from tenbaud.log.reader import read_table
 from tenbaud.log.roles import Chosen, Roles
@@ -124,8 +124,13 @@ class _Reading:
 
     def _clock(self) -> Clock:
         section, chosen, table = self.section, self.chosen, self.table
-        if chosen.time is not None:
-            column = self.at[chosen.time]
+        index = None if chosen.index is None else self.at[chosen.index]
+        time = chosen.time
+        if time is None and index is not None and has_fractions(table.columns[index]):
+            time = chosen.index
+            self.notes.append(f"column {table.names[index]}: the clock, as its values are not whole")
+        if time is not None:
+            column = self.at[time]
             unit = self._given_unit("time", "time") or table.units[column]
             scale, offset = self._linear("time", "time")
             return by_time(table, column, scale, offset, unit, section.start_s, section.end_s)
@@ -139,9 +144,8 @@ class _Reading:
                 )
             self._refuse_unused_clock()
             self.notes.append(f"rows {period_s:g} s apart: timing.tick_s, as the file has no clock")
-        if chosen.index is not None:
-            column = self.at[chosen.index]
-            return by_index(table, column, period_s, section.start_s, section.end_s)
+        if index is not None:
+            return by_index(table, index, period_s, section.start_s, section.end_s)
         return by_period(len(table), period_s, section.start_s, section.end_s)
 
     def _refuse_unused_clock(self) -> None:

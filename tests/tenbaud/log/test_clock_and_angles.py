@@ -110,9 +110,10 @@ def test_from_and_to_are_on_the_clock_of_the_file(tmp_path: Path) -> None:
         read(tmp_path, rows, start_s=5.0, end_s=25.0)
 
 
-def test_a_clock_that_is_given_as_a_counter_of_rows_is_pointed_out(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match="if it is the clock, give --columns time=time"):
-        read(tmp_path, lab_files.table(), index="time")
+def test_a_clock_that_is_given_as_a_counter_of_rows_is_the_clock_and_said(tmp_path: Path) -> None:
+    log = read(tmp_path, lab_files.table(), index="time")
+    assert log.tick_s == 0.02
+    assert "column time: the clock, as its values are not whole" in log.notes
 
 
 def test_a_file_without_a_clock_takes_the_period_that_is_given(tmp_path: Path) -> None:

@@ -25,6 +25,7 @@ os.environ.setdefault("TENBAUD_FIGURE", "0")
 # A run that a shell started in the background ignores Ctrl-C; so would each process that it starts.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 LONGEST_FIRST = (
     "tests/docs/",

@@ -48,7 +48,7 @@ def test_when_tuned_on_the_first_half_then_the_second_half_is_estimated_this_wel
 @needs_data
 def test_when_the_first_half_is_identified_then_the_regression_warns_and_the_fit_has_the_sign() -> None:
     first = real.identify_first_half(FOLDER)
-    assert first.regression.warnings
+    assert first.warnings
     assert 0.5 < first.model["torque_gain_rad_per_v_s2"] < 3.0
 
 

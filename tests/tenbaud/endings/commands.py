@@ -72,7 +72,9 @@ WRITERS: dict[str, Arguments] = {
     "convert parquet": lambda inputs, out: ["convert", inputs.run, "--to", "parquet", "--out", out],
     "convert json": lambda inputs, out: ["convert", inputs.run, "--to", "json", "--out", out],
     "convert mcap": lambda inputs, out: ["convert", inputs.run, "--to", "mcap", "--out", out],
-    "identify": lambda inputs, out: ["identify", inputs.run, "--out", out],
+    "identify": lambda _, out: [
+        *("identify", "--excitation", "square:0.2,0,2.5", "--duration", "30", "--out", out),
+    ],
     "sweep": lambda inputs, out: ["sweep", inputs.study, "--workers", "1", "--no-plots", "--out", out],
     "keys init": lambda _, out: ["keys", "init", "--folder", out],
     "design": lambda inputs, out: ["design", "--config", inputs.plant, "--out", out],
@@ -90,6 +92,7 @@ SLOW_WRITERS: dict[str, Arguments] = {
 READERS: dict[str, Arguments] = {
     "presets": lambda *_: ["presets"],
     "inspect": lambda inputs, _: ["inspect", inputs.run],
+    "log": lambda inputs, _: ["log", inputs.run],
     "diff": lambda inputs, _: ["diff", inputs.run],
     "audit": lambda inputs, _: ["audit", inputs.run],
     "recover": lambda inputs, _: ["recover", inputs.run],

@@ -277,9 +277,9 @@ def test_when_set_points_are_given_in_any_form_then_each_output_follows_its_own(
 @pytest.mark.parametrize(
     ("given", "travel", "elevation"),
     [
-        ({"elevation": 0.1}, 0.0, 0.1),
-        ({"elevation": {"amplitude": 0.0}}, 0.0, math.radians(10.0)),
-        ({"kind": "constant", "amplitude": 0.3}, 0.3, math.radians(10.0)),
+        ({"elevation": 0.1}, 0.4, 0.1),
+        ({"elevation": {"amplitude": 0.0}}, 0.4, math.radians(10.0)),
+        ({"kind": "constant", "amplitude": 0.3}, 0.3, 0.1 + math.radians(10.0)),
     ],
 )
 def test_when_a_set_point_replaces_that_of_a_preset_then_nothing_of_it_stays(

@@ -44,6 +44,21 @@ def test_a_cell_of_text_leaves_the_other_decimal_commas_and_exponents_alone(tmp_
 
 
 @pytest.mark.parametrize(
+    ("count", "said"),
+    [("{}", "has no name"), ('"r{}"', "has no name"), ("{}.5", "names 3 of 4 columns")],
+)
+def test_a_short_header_moves_behind_the_names_of_the_rows(
+    tmp_path: Path, count: str, said: str
+) -> None:
+    rows = [f"{count.format(row)},{row / 50},0.25,3" for row in range(1, 20)]
+    table = read_text(lab_files.write(tmp_path / "log.csv", ["time,angle_deg,u", *rows]))
+    assert said in table.source
+    shifted = table.names == ("1", "time", "angle_deg", "u")
+    assert shifted == (said == "has no name")
+    assert table.columns[table.find("u")][5] == (3.0 if shifted else 0.25)
+
+
+@pytest.mark.parametrize(
     "days", ["12.02.2026 13.02.2026", "12/02/2026 13/02/2026", "2/11/2026 2/12/2026"]
 )
 def test_dates_are_read_with_the_day_where_it_makes_them_rise(days: str, tmp_path: Path) -> None:

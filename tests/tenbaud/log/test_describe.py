@@ -185,6 +185,15 @@ def test_written_options_are_found_again(plain: Path) -> None:
     assert again.log.start_s == 1.0
 
 
+def test_options_that_cannot_be_used_are_named_and_not_written(plain: Path) -> None:
+    result = command(plain, "--scale", "angle=nan", "--sign", "angle=2")
+    assert result.exit_code != 0
+    assert "flight_log.scales.angle = nan: Input should be a finite number" in str(result.exception)
+    assert "flight_log.signs.angle = 2: Input should be -1 or 1" in str(result.exception)
+    assert command(plain, "--from", "99", "--write").exit_code == 1
+    assert not Path(f"{plain}.toml").exists()
+
+
 def test_json_holds_what_the_text_says(plain: Path) -> None:
     told = json.loads(command(plain, "--json").output)
     assert told["rows"] == ROWS

@@ -126,7 +126,7 @@ def test_the_file_beside_a_log_says_what_the_configuration_leaves_open(tmp_path:
     chosen = read(tmp_path, text, columns={"angle": "a"}, signs={"pitch": 1})
     assert chosen.measured[:, 0] == pytest.approx([math.radians(k) for k in range(9)])
     beside.write_text("sings = 1\n")
-    with pytest.raises(LogError, match="sings: Extra inputs"):
+    with pytest.raises(LogError, match="sings: unknown field; did you mean signs"):
         read(tmp_path, text)
 
 

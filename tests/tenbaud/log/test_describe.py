@@ -169,7 +169,7 @@ def test_spikes_are_named_and_the_option_that_removes_them(tmp_path: Path) -> No
     angle = ANGLE.copy()
     angle[200] += 3.0
     result = command(csv(tmp_path / "log.csv", time=TIME, angle=angle, u=VOLTS))
-    assert "Spikes: 1 in column angle, line 202. --remove-spikes removes them." in result.output
+    assert "angle: 1 spike(s), line 202; --remove-spikes removes them" in result.output
 
 
 def test_written_options_are_found_again(plain: Path) -> None:

@@ -150,7 +150,7 @@ def describe(section: FlightLogSection) -> tuple[Description, Table]:
     ]
     log, problem = None, ""
     try:
-        log = read_log(section, None)
+        log = read_log(section, None, table=table)
     except LogError as error:
         problem = str(error).removeprefix(section.file).lstrip(",: ")
     found = Description(

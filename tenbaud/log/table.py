@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
 
@@ -64,6 +64,16 @@ class Table:
     def find(self, wanted: str) -> int:
         """Return the place of a column by name or number."""
         return find_column(self.path, self.names, wanted)
+
+    def only(self, wanted: Wanted) -> Table:
+        """Return the table with the wanted columns alone."""
+        places = wanted(self.names, self.units, self.roles)
+        return replace(
+            self,
+            names=tuple([self.names[place] for place in places]),
+            units=tuple([self.units[place] for place in places]),
+            columns=tuple([self.columns[place] for place in places]),
+        )
 
     def fault(self, row: int, column: int, what: str) -> LogError:
         """Return the error of one cell."""

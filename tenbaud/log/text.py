@@ -107,7 +107,7 @@ def _seconds(texts: pd.Series[str], day_first: bool, began: pd.Timestamp) -> Arr
     import pandas as pd
 
     times = pd.to_datetime(texts, errors="coerce", format="mixed", dayfirst=day_first, utc=True)
-    return (times - began).dt.total_seconds().to_numpy(np.float64)
+    return np.asarray((times - began).dt.total_seconds(), dtype=np.float64)
 
 
 def _unrest(times: Array) -> tuple[int, float]:

@@ -130,6 +130,12 @@ def test_the_file_beside_a_log_says_what_the_configuration_leaves_open(tmp_path:
         read(tmp_path, text)
 
 
+def test_dates_have_no_unit(tmp_path: Path) -> None:
+    text = "time,pitch,u1,u2\n" + "".join(f"2024-05-06 10:00:0{k},{k},0,0\n" for k in range(9))
+    with pytest.raises(LogError, match=r"column time: the times are dates.*leave out --units time=ms"):
+        read(tmp_path, text, units={"time": "ms"})
+
+
 def test_rows_of_separators_below_the_table_are_left_out(tmp_path: Path) -> None:
     log = read(tmp_path, HEADER + "0,1,2,3,4,5\n1,1,2,3,4,5\n,,,,,\n,,,,,\n")
     assert len(log) == 2

@@ -37,16 +37,17 @@ def log(
 
     [dim]tenbaud log run.mat --columns time=1,angle=2,input=3 --units angle=deg --write[/dim]
     """
-    from tenbaud.config.schema import FlightLogSection
+    from tenbaud.config.load import checked, nested
     from tenbaud.flight.outcome import ExitCode
     from tenbaud.log.describe import describe
 
-    fields = {name.removeprefix("flight_log."): value for name, value in given.settings().items()}
-    described, table = describe(FlightLogSection.model_validate({"file": str(file), **fields}))
+    config = checked(nested({"flight_log.file": str(file), **given.settings()}), file)
+    described, table = describe(config.flight_log)
     if plot is not None:
         from tenbaud.log.figure import draw_log
 
         draw_log(described, table, plot)
+    write = write and not described.problem
     if write:
         from tenbaud.log.beside import write_beside
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,8 +10,8 @@ import numpy as np
 
 from channel.flight_log import FlightLog
 from tenbaud.config.schema import FlightLogSection
-from tenbaud.log.angles import without_spikes
 from tenbaud.log.beside import with_file_beside
+from tenbaud.log.clock import GAP
 from tenbaud.log.join import read_joined
 from tenbaud.log.look import Look, looks_of
 from tenbaud.log.read import read_log
@@ -21,8 +20,6 @@ from tenbaud.log.suggest import Suggestion, suggest
 from tenbaud.log.table import Array, LogError, Table
 from tenbaud.log.units import DATE_TIME, factor
 
-GAP = 2.5
-"""Usual steps from which two rows have a gap between them."""
 PLACES_MAX = 3
 
 
@@ -63,7 +60,6 @@ class Description:
     rows: int
     looks: tuple[Look, ...]
     sampling: Sampling | None
-    spikes: tuple[str, ...]
     suggestion: Suggestion
     log: FlightLog | None
     """as it is read with that section"""
@@ -99,7 +95,6 @@ class Description:
             "sampling": None
             if timing is None
             else {name: getattr(timing, name) for name in Sampling.__slots__},
-            "spikes": list(self.spikes),
             "tick_s": None if self.log is None else self.log.tick_s,
             "notes": [] if self.log is None else list(self.log.notes),
             "problem": self.problem,
@@ -112,8 +107,6 @@ class Description:
         lines = [f"{self.source}; {self.rows} rows", "", *self._columns(), ""]
         if self.sampling is not None:
             lines.append(f"Sampling: {self.sampling.words}.")
-        if self.spikes:
-            lines.append(f"Spikes: {'; '.join(self.spikes)}. --remove-spikes removes them.")
         if self.log is not None:
             told = [note for note in self.log.notes if note != self.source]
             lines += [f"Read as: {len(self.log)} rows {self.log.tick_s:g} s apart."]
@@ -151,10 +144,13 @@ def describe(section: FlightLogSection) -> tuple[Description, Table]:
     looks = looks_of(table)
     suggestion = suggest(section, table, looks)
     section = suggestion.section
-    looks = [one if _is_read(one, suggestion) else _unguessed(one) for one in looks]
+    read = [suggestion.taken.get(role) for role in ("time", "angle", "output")]
+    looks = [
+        replace(one, unit="", guess="") if one.guess and one.name not in read else one for one in looks
+    ]
     log, problem = None, ""
     try:
-        log = read_log(section, None)
+        log = read_log(section, None, table=table)
     except LogError as error:
         problem = str(error).removeprefix(section.file).lstrip(",: ")
     found = Description(
@@ -162,20 +158,11 @@ def describe(section: FlightLogSection) -> tuple[Description, Table]:
         len(table),
         tuple(looks),
         _sampling(clock_of(suggestion, table), table),
-        tuple(_spikes(suggestion.taken, table)),
         suggestion,
         log,
         problem,
     )
     return found, table
-
-
-def _is_read(one: Look, suggestion: Suggestion) -> bool:
-    return one.name in [suggestion.taken.get(role) for role in ("time", "angle", "output")]
-
-
-def _unguessed(one: Look) -> Look:
-    return replace(one, unit="", guess="") if one.guess else one
 
 
 def clock_of(suggestion: Suggestion, table: Table) -> Array | None:
@@ -203,7 +190,6 @@ def _sampling(times: Array | None, table: Table) -> Sampling | None:
     sound = (steps > 0.0) & (steps <= GAP * usual)
     sound[1:] &= steps[:-1] > 0.0  # the step behind a repeat makes up for it
     within = steps[sound]
-
     return Sampling(
         usual,
         float(times[0]),
@@ -213,21 +199,3 @@ def _sampling(times: Array | None, table: Table) -> Sampling | None:
         len(back),
         tuple([table.place(int(rows[at + 1])) for at in sorted({*gaps, *back})[:PLACES_MAX]]),
     )
-
-
-def _spikes(taken: dict[str, str], table: Table) -> list[str]:
-    inputs = ("in:", "front", "rear", "input", "time", "index")
-    told = []
-    for signal, name in taken.items():
-        if signal.startswith(inputs):
-            continue
-        values = table.columns[table.names.index(name)]
-        rows = without_spikes(values, None).rows if np.isfinite(values).all() else ()
-        if rows:
-            told.append(f"{len(rows)} in column {name}, {_few(table, rows)}")
-    return told
-
-
-def _few(table: Table, rows: Sequence[int]) -> str:
-    places = [table.place(row) for row in rows[:PLACES_MAX]]
-    return ", ".join(places) + (", ..." if len(rows) > PLACES_MAX else "")

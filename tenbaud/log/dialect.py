@@ -45,6 +45,8 @@ class Dialect:
     """lines above the first row"""
     names: tuple[str, ...]
     units: tuple[str, ...]
+    note: str = ""
+    """on a header that is shorter than the rows"""
 
     @property
     def one_comment(self) -> str:
@@ -55,7 +57,7 @@ class Dialect:
     def told(self) -> str:
         """The dialect for people."""
         decimals = ", decimal commas" if self.decimal == "," else ""
-        return f"text, {_SEPARATORS[self.separator]}{decimals}, {self.encoding}"
+        return f"text, {_SEPARATORS[self.separator]}{decimals}, {self.encoding}{self.note}"
 
 
 def find_dialect(path: Path) -> Dialect:
@@ -88,12 +90,24 @@ def find_dialect(path: Path) -> Dialect:
         if len(above[0]) != len(rows[0][1]):
             above = []
     width = median_low([len(row) for _, row in rows[first:]] or [0])
+    note = ""
+    if above and 0 < (named := len(above[-1])) < width:
+        note = f"; the header names {named} of {width} columns, taken as the first ones"
+        if named == width - 1 and _counts_rows([line for _, line in numbered[first:]], rows[first:]):
+            above = [["", *row] for row in above]
+            note = "; the header has no name for the first column, which names or counts the rows"
     names, units = _header(above, width)
     if first < len(rows) and (found := len(rows[first][1])) > len(names):
         raise LogError(
             f"{path}, line {skipped + 1}: {found} cells found, {len(names)} expected; {MIXED}"
         )
-    return Dialect(encoding, separator, decimal, comment, skipped, names, units)
+    return Dialect(encoding, separator, decimal, comment, skipped, names, units, note)
+
+
+def _counts_rows(lines: list[str], rows: list[tuple[int, list[str]]]) -> bool:
+    """Return whether rows begin with their names in quotes, or with 1, 2, 3 ..., as R writes them."""
+    counted = all(row[:1] == [str(number)] for number, (_, row) in enumerate(rows, 1))
+    return counted or all(line.lstrip().startswith('"') for line in lines)
 
 
 def split_line(line: str, separator: str) -> list[str]:

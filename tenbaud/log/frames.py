@@ -12,7 +12,7 @@ import numpy as np
 import orjson
 
 from tenbaud.log.signal_sets import flat_table, table_of
-from tenbaud.log.table import Array, LogError, Table, Wanted
+from tenbaud.log.table import Array, LogError, Table, Wanted, unreadable
 from tenbaud.log.variables import Clock, Variable, seconds, variables_of
 
 LIST_MAX = 64
@@ -23,19 +23,14 @@ NEEDS = "{path} needs {package}, which is not installed: pip install 'tenbaud[lo
 def read_parquet(path: Path, wanted: Wanted | None = None) -> Table:
     """Return the columns of numbers and times of a Parquet file; LogError where there are none."""
     try:
-        from pyarrow import ArrowException, parquet
+        from pyarrow import parquet
     except ImportError as error:
         raise LogError(NEEDS.format(path=path, package="pyarrow")) from error
-    try:
-        with parquet.ParquetFile(path) as file:
-            units = dict(_parquet_columns(file))
-            if not units:
-                raise LogError(
-                    f"{path} has no column of numbers; it has {', '.join(file.schema.names)}"
-                )
-            return flat_table(path, "Parquet file", units, partial(_parquet_column, file), wanted)
-    except (ArrowException, OSError) as error:
-        raise LogError(f"{path} cannot be read as a Parquet file: {error}") from error
+    with unreadable(path, "a Parquet file"), parquet.ParquetFile(path) as file:
+        units = dict(_parquet_columns(file))
+        if not units:
+            raise LogError(f"{path} has no column of numbers; it has {', '.join(file.schema.names)}")
+        return flat_table(path, "Parquet file", units, partial(_parquet_column, file), wanted)
 
 
 def _parquet_columns(file: Any) -> Iterator[tuple[str, str]]:
@@ -64,20 +59,17 @@ def _parquet_column(file: Any, name: str) -> Array:
 
 def read_numpy(path: Path, wanted: Wanted | None = None) -> Table:
     """Return the signals in an `.npy` or `.npz` file; LogError where there are none."""
-    try:
+    advice = "Save arrays of numbers: numpy.savez(file, time=..., angle=...)."
+    with unreadable(path, "a NumPy file", advice):
         loaded = np.load(path)
         if isinstance(loaded, np.ndarray):
-            return table_of(path, "NumPy array", variables_of(_fields(path.stem, loaded)), wanted)
-        with loaded as file:
-            tree: dict[str, Any] = {}
-            for name in file.files:
-                tree |= _fields(name, file[name])
-    except (OSError, ValueError, EOFError) as error:
-        raise LogError(
-            f"{path} cannot be read as a NumPy file: it is damaged, or holds Python objects. Save "
-            "arrays of numbers: numpy.savez(file, time=..., angle=...)."
-        ) from error
-    return table_of(path, "NumPy archive", variables_of(tree), wanted)
+            kind, tree = "NumPy array", _fields(path.stem, loaded)
+        else:
+            kind, tree = "NumPy archive", {}
+            with loaded as file:
+                for name in file.files:
+                    tree |= _fields(name, file[name])
+    return table_of(path, kind, variables_of(tree), wanted)
 
 
 def _fields(name: str, values: np.ndarray[Any, Any]) -> dict[str, Any]:
@@ -92,17 +84,14 @@ def read_tdms(path: Path, wanted: Wanted | None = None) -> Table:
         from nptdms import TdmsFile
     except ImportError as error:
         raise LogError(NEEDS.format(path=path, package="npTDMS")) from error
-    try:
-        with TdmsFile.open(path) as file:
-            groups = file.groups()
-            found = [
-                _channel(channel, group.name if len(groups) > 1 else "")
-                for group in groups
-                for channel in group.channels()
-                if len(channel) and channel.dtype is not None and channel.dtype.kind in "biufmM"
-            ]
-    except (OSError, ValueError, KeyError) as error:
-        raise LogError(f"{path} cannot be read as a TDMS file: {error}") from error
+    with unreadable(path, "a TDMS file"), TdmsFile.open(path) as file:
+        groups = file.groups()
+        found = [
+            _channel(channel, group.name if len(groups) > 1 else "")
+            for group in groups
+            for channel in group.channels()
+            if len(channel) and channel.dtype is not None and channel.dtype.kind in "biufmM"
+        ]
     return table_of(path, "TDMS file", found, wanted)
 
 
@@ -125,23 +114,19 @@ def read_messages(path: Path, wanted: Wanted | None = None) -> Table:
 
     LogError where no topic has JSON messages, and for several topics unless `wanted` chooses one.
     """
-    from mcap.exceptions import McapError
     from mcap.reader import make_reader
 
     topics: dict[str, _Topic] = {}
     others: dict[str, str] = {}
     first_ns: int | None = None
-    try:
-        with path.open("rb") as stream:
-            for _, channel, message in make_reader(stream).iter_messages():
-                if channel.message_encoding != "json":
-                    others[channel.topic] = channel.message_encoding or "no encoding"
-                    continue
-                first_ns = message.log_time if first_ns is None else first_ns
-                topic = topics.setdefault(channel.topic, _Topic())
-                topic.add((message.log_time - first_ns) * 1e-9, orjson.loads(message.data))
-    except (McapError, OSError, ValueError) as error:
-        raise LogError(f"{path} cannot be read as an MCAP file: {error}") from error
+    with unreadable(path, "an MCAP file"), path.open("rb") as stream:
+        for _, channel, message in make_reader(stream).iter_messages():
+            if channel.message_encoding != "json":
+                others[channel.topic] = channel.message_encoding or "no encoding"
+                continue
+            first_ns = message.log_time if first_ns is None else first_ns
+            topic = topics.setdefault(channel.topic, _Topic())
+            topic.add((message.log_time - first_ns) * 1e-9, orjson.loads(message.data))
     if not topics:
         there = ", ".join(f"{name} ({how})" for name, how in sorted(others.items())) or "no messages"
         raise LogError(

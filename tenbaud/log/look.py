@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tenbaud.log.angles import unwrapped
+from tenbaud.log.angles import step_of, unwrapped
 from tenbaud.log.table import Array, Table
 from tenbaud.log.units import COUNTS, unit_named
 
@@ -57,8 +57,7 @@ class Look:
 
 def looks_of(table: Table) -> list[Look]:
     """Return what every column of a table looks like."""
-    first = [_look(table, place) for place in range(len(table.names))]
-    return [_with_rate(table, first, place) for place in range(len(first))]
+    return list(_with_rates(table, [_look(table, place) for place in range(len(table.names))]))
 
 
 def _look(table: Table, place: int) -> Look:
@@ -96,7 +95,7 @@ def _kind(values: Array, unit: str) -> tuple[str, str, str]:
             return "angle", f"angle, wraps {seams} times", f"{name}: it jumps by {turn:.4g}"
     if unit in ("", COUNTS) and np.all(values == np.floor(values)):
         return "counts", "whole numbers", f"{COUNTS}: all values are whole"
-    if unit in ("", *TURNS) and (counted := _encoder(steps, unit)):
+    if unit in ("", *TURNS) and (counted := _encoder(values, unit)):
         name, per_turn = counted
         return "angle", f"angle, {per_turn} steps a turn", f"{name}: {per_turn} steps are a turn"
     if not kind and np.mean(steps == 0.0) > HELD_SHARE:
@@ -117,37 +116,37 @@ def _clock_unit(step: float) -> str:
     return ""
 
 
-def _encoder(steps: Array, unit: str) -> tuple[str, int] | None:
+def _encoder(values: Array, unit: str) -> tuple[str, int] | None:
     """Return unit and steps a turn of a column that an encoder made; None for another."""
-    moved = np.abs(steps[:ROWS_MAX])
-    moved = moved[moved > 0.0]
-    if len(moved) < 20:
-        return None
-    step = float(np.percentile(moved, 2))
-    times = np.round(moved / step)
-    step = float(np.sum(moved) / np.sum(times))
-    if np.mean(np.abs(moved / step - times) < 0.1) < 0.98 or len(np.unique(times)) < 2:
-        return None
+    step = step_of(values)
     for name, turn in TURNS.items():
-        per_turn = round(turn / step)
+        per_turn = round(turn / step) if step else 0
         usual = per_turn and (per_turn & (per_turn - 1) == 0 or per_turn % 100 == 0)
         if unit in ("", name) and usual and abs(per_turn * step / turn - 1.0) < 0.005:
             return name, per_turn
     return None
 
 
-def _with_rate(table: Table, looks: Sequence[Look], place: int) -> Look:
-    """Return the look of a column, as a rate where it is the slope of another one."""
-    one = looks[place]
-    if one.kind not in ("signal", "angle", "rate") or one.missing:
-        return one
-    values = table.columns[place][:ROWS_MAX]
-    for at, other in enumerate(looks):
-        if other is one or not other.moves or other.missing:
-            continue
-        slope = np.gradient(table.columns[at][:ROWS_MAX])
-        moving = np.ptp(slope) > 0.0 and np.ptp(values) > 0.0
-        if moving and float(np.corrcoef(slope, values)[0, 1]) > RATE_MATCH:
-            unit = "" if one.guess else one.unit
-            return replace(one, kind="rate", words=f"rate of {other.name}", unit=unit, guess="")
-    return one
+def _with_rates(table: Table, looks: Sequence[Look]) -> Iterator[Look]:
+    """Yield the looks of all columns, as a rate where one is the slope of another."""
+    columns = [values[:ROWS_MAX] for values in table.columns]
+    slopes = {
+        one.name: _normal(np.gradient(values))
+        for one, values in zip(looks, columns, strict=True)
+        if one.moves and not one.missing and len(values) > 1
+    }
+    for one, values in zip(looks, columns, strict=True):
+        if one.kind in ("signal", "angle", "rate") and not one.missing:
+            normal = _normal(values)
+            for name, slope in slopes.items():
+                if name != one.name and float(slope @ normal) > RATE_MATCH:
+                    unit = "" if one.guess else one.unit
+                    one = replace(one, kind="rate", words=f"rate of {name}", unit=unit, guess="")
+                    break
+        yield one
+
+
+def _normal(values: Array) -> Array:
+    """Return values about zero, of length one: the product of two is their correlation."""
+    about = values - np.mean(values)
+    return about / (float(np.linalg.norm(about)) or 1.0)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tenbaud.log.signal_sets import table_of
-from tenbaud.log.table import LogError, Table, Wanted
+from tenbaud.log.table import LogError, Table, Wanted, unreadable
 from tenbaud.log.variables import variables_of
 
 DEPTH_MAX = 16
@@ -43,22 +43,17 @@ def read_matlab(path: Path, wanted: Wanted | None = None) -> Table:
 def load_matlab(path: Path) -> tuple[str, dict[str, Any]]:
     """Return the file's version in words, and its variables as a tree."""
     from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError, matfile_version
+    from scipy.io.matlab import matfile_version
 
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of variables that are no numbers
-            major, _ = matfile_version(str(path))
-            contents = None if major == 2 else loadmat(path)
-            if contents is None or "__function_workspace__" in contents:
-                contents = _with_objects(path)
-    except (MatReadError, ValueError, TypeError, KeyError, OSError, RuntimeError) as error:
-        raise LogError(
-            f"{path} cannot be read as a MATLAB file: {error}. If MATLAB itself opens it, save the "
-            "signals anew: save(file, 'name', ..., '-v7')."
-        ) from error
-    version = {0: "v4", 1: "v5", 2: "v7.3"}[major]
-    tree = {name: _plain(value) for name, value in contents.items() if not name.startswith("__")}
+    advice = "If MATLAB itself opens it, save the signals anew: save(file, 'name', ..., '-v7')."
+    with unreadable(path, "a MATLAB file", advice), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of variables that are no numbers
+        major, _ = matfile_version(str(path))
+        contents = None if major == 2 else loadmat(path)
+        if contents is None or "__function_workspace__" in contents:
+            contents = _with_objects(path)
+        version = {0: "v4", 1: "v5", 2: "v7.3"}[major]
+        tree = {name: _plain(value) for name, value in contents.items() if not name.startswith("__")}
     return f"MATLAB file {version}", tree
 
 

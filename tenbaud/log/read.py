@@ -18,7 +18,7 @@ from tenbaud.log.join import read_joined
 from tenbaud.log.reader import read_table
 from tenbaud.log.roles import Chosen, Roles
 from tenbaud.log.table import Array, LogError, Table
-from tenbaud.log.units import COUNTS, factor, split_unit, unit_named
+from tenbaud.log.units import COUNTS, DATE_TIME, factor, split_unit, unit_named
 
 ROWS_MIN = 2
 COUNTS_MAX = 2.0**53
@@ -37,12 +37,14 @@ def read_log(
     signals: Signals | None,
     encoders: tuple[OutputReader, ...] = (),
     tick_s: float | None = None,
+    table: Table | None = None,
 ) -> Log:
     """Return the log that a section names, in the units of `signals`.
 
     Without signals they are the file's own: those that the section names, or guessed from the
     columns. `encoders` read the outputs; `tick_s` is the time between rows where neither file nor
-    section say it. LogError names file, line, column and the next step.
+    section say it. `table` is the whole of a file that is not joined, if it was read before. LogError
+    names file, line, column and the next step.
     """
     if not section.file:
         raise LogError("flight_log.file names no recording; give --rig replay:FILE")
@@ -59,7 +61,7 @@ def read_log(
         time = section.columns.get("time", section.time)
         table, notes = read_joined((section.file, *section.join), read_table, time, wanted)
     else:
-        table = read_table(section.file, wanted)
+        table = read_table(section.file, wanted) if table is None else table.only(wanted)
     return _Reading(table, chosen[-1], roles, encoders, tick_s, notes).log()
 
 
@@ -131,7 +133,13 @@ class _Reading:
             self.notes.append(f"column {table.names[index]}: the clock, as its values are not whole")
         if time is not None:
             column = self.at[time]
-            unit = self._given_unit("time", "time") or table.units[column]
+            given = self._given_unit("time", "time")
+            if given and table.units[column] == DATE_TIME:
+                raise LogError(
+                    f"{table.path}, column {table.names[column]}: the times are dates, which have no "
+                    f"unit; leave out --units time={given}"
+                )
+            unit = given or table.units[column]
             scale, offset = self._linear("time", "time")
             return by_time(table, column, scale, offset, unit, section.start_s, section.end_s)
         period_s = section.period_s or table.period_s

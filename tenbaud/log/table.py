@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +21,18 @@ Wanted = Callable[[Sequence[str], Sequence[str], Mapping[str, str]], Sequence[in
 
 class LogError(TenbaudError, ValueError):
     """A log that cannot be used; the text names file, line, column and the next step."""
+
+
+@contextmanager
+def unreadable(path: Path, kind: str, advice: str = "") -> Iterator[None]:
+    """Raise LogError where a library fails at a file: on a corrupt one it raises anything."""
+    try:
+        yield
+    except LogError:
+        raise
+    except Exception as error:
+        why = " ".join(str(error).split()) or type(error).__name__
+        raise LogError(f"{path} cannot be read as {kind}: {why}. {advice}".rstrip()) from error
 
 
 @dataclass(frozen=True)
@@ -50,6 +64,16 @@ class Table:
     def find(self, wanted: str) -> int:
         """Return the place of a column by name or number."""
         return find_column(self.path, self.names, wanted)
+
+    def only(self, wanted: Wanted) -> Table:
+        """Return the table with the wanted columns alone."""
+        places = wanted(self.names, self.units, self.roles)
+        return replace(
+            self,
+            names=tuple([self.names[place] for place in places]),
+            units=tuple([self.units[place] for place in places]),
+            columns=tuple([self.columns[place] for place in places]),
+        )
 
     def fault(self, row: int, column: int, what: str) -> LogError:
         """Return the error of one cell."""

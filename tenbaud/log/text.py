@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 
 CHUNK_ROWS = 100_000
 FAULTS_MAX = 5
+DAY_FIRST = {"": (False,), ".": (True,), "/": (False, True)}
+"""Readings of a date by what separates day and month; of two, the one whose times rise is taken."""
+_DAY_OR_MONTH = re.compile(r"\d\d?([./])")
+_EXPONENTS = {"d": "e", "D": "E"}
 
 
 def read_text(path: Path, wanted: Wanted | None = None) -> Table:
@@ -26,12 +30,12 @@ def read_text(path: Path, wanted: Wanted | None = None) -> Table:
     dialect = find_dialect(path)
     names, units = dialect.names, list(dialect.units)
     places = list(wanted(names, units, export_roles(names, units)) if wanted else range(len(names)))
-    columns = [_Column(names[place], place) for place in places]
+    columns = [_Column(names[place], place, dialect.decimal) for place in places]
     for chunk in _chunks(path, dialect):
         for column in columns:
             column.take(chunk[column.place])
     for column in columns:
-        if column.began is not None:
+        if column.began:
             units[column.place] = DATE_TIME
     # Spreadsheet programs write rows of separators below a table.
     rows = max([column.used for column in columns], default=0)
@@ -50,11 +54,13 @@ def read_text(path: Path, wanted: Wanted | None = None) -> Table:
 class _Column:
     """One column as it is read."""
 
-    def __init__(self, name: str, place: int) -> None:
+    def __init__(self, name: str, place: int, decimal: str) -> None:
         self.name, self.place = name, place
+        # A point among decimal commas is no decimal sign: 1.234,5.
+        self._signs = str.maketrans(_EXPONENTS | ({",": ".", ".": ","} if decimal == "," else {}))
         self.faults: list[tuple[int, str]] = []
-        self.began: pd.Timestamp | None = None
-        """first time of a column of dates"""
+        self.began: dict[bool, pd.Timestamp] = {}
+        """first time of a column of dates, by whether the day comes first"""
         self.used = 0
         """rows up to the last cell that is not empty"""
         self._parts: list[Array] = []
@@ -64,34 +70,50 @@ class _Column:
         """Add the cells of a chunk."""
         import pandas as pd
 
-        if cells.dtype.kind in "biuf":
+        if cells.dtype.kind in "biuf" and not self.began:
             values = cells.to_numpy(np.float64)
             filled = np.flatnonzero(~np.isnan(values))
         else:
             texts = cells.astype(str).str.strip()
             head = str(texts.iloc[0]) if len(texts) and not self._rows else ""
             if DATE.fullmatch(head):
-                first: Any = pd.to_datetime(head, errors="coerce", utc=True)
-                self.began = None if first is pd.NaT else first
-            if self.began is not None:
-                times = pd.to_datetime(texts, errors="coerce", format="mixed", utc=True)
-                values = (times - self.began).dt.total_seconds().to_numpy(np.float64)
+                found = _DAY_OR_MONTH.match(head)
+                for day_first in DAY_FIRST[found[1] if found else ""]:
+                    first: Any = pd.to_datetime(head, errors="coerce", dayfirst=day_first, utc=True)
+                    if first is not pd.NaT:
+                        self.began[day_first] = first
+            if self.began:
+                values = np.stack([_seconds(texts, *one) for one in self.began.items()])
             else:
-                values = pd.to_numeric(texts, errors="coerce").to_numpy(np.float64)
+                numbers = pd.to_numeric(texts.str.translate(self._signs), errors="coerce")
+                values = numbers.to_numpy(np.float64)
             filled = np.flatnonzero(cells.notna().to_numpy())
-            bad = np.flatnonzero(np.isnan(values) & cells.notna().to_numpy())
+            bad = np.flatnonzero(np.isnan(np.atleast_2d(values)).any(axis=0) & cells.notna().to_numpy())
             for row in bad[: FAULTS_MAX - len(self.faults)].tolist():
                 self.faults.append((self._rows + row, str(texts.iloc[row])))
         if len(filled):
             self.used = self._rows + int(filled[-1]) + 1
         self._parts.append(values)
-        self._rows += len(values)
+        self._rows += len(cells)
 
     def values(self) -> Array:
         """Return all cells; the parts are given up."""
-        whole = np.concatenate(self._parts) if self._parts else np.empty(0)
+        whole = np.concatenate(self._parts, axis=-1) if self._parts else np.empty(0)
         self._parts = []
-        return whole
+        return min(whole, key=_unrest) if self.began else whole
+
+
+def _seconds(texts: pd.Series[str], day_first: bool, began: pd.Timestamp) -> Array:
+    import pandas as pd
+
+    times = pd.to_datetime(texts, errors="coerce", format="mixed", dayfirst=day_first, utc=True)
+    return np.asarray((times - began).dt.total_seconds(), dtype=np.float64)
+
+
+def _unrest(times: Array) -> tuple[int, float]:
+    """Return how often times run back, and their largest step."""
+    steps = np.diff(times[np.isfinite(times)])
+    return int(np.sum(steps < 0.0)), float(np.max(steps, initial=0.0))
 
 
 def _chunks(path: Path, dialect: Dialect) -> Any:
@@ -114,6 +136,7 @@ def _chunks(path: Path, dialect: Dialect) -> Any:
             keep_default_na=False,
             na_values=[""],
             chunksize=CHUNK_ROWS,
+            low_memory=False,  # numbers and texts in one column would be told apart piece by piece
         ) as chunks:
             yield from chunks
     except pd.errors.EmptyDataError:

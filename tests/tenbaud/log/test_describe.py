@@ -169,7 +169,7 @@ def test_spikes_are_named_and_the_option_that_removes_them(tmp_path: Path) -> No
     angle = ANGLE.copy()
     angle[200] += 3.0
     result = command(csv(tmp_path / "log.csv", time=TIME, angle=angle, u=VOLTS))
-    assert "Spikes: 1 in column angle, line 202. --remove-spikes removes them." in result.output
+    assert "angle: 1 spike(s), line 202; --remove-spikes removes them" in result.output
 
 
 def test_written_options_are_found_again(plain: Path) -> None:
@@ -183,6 +183,15 @@ def test_written_options_are_found_again(plain: Path) -> None:
     assert again.suggestion.section == described(plain, signs={"angle": -1}).suggestion.section
     assert again.log is not None
     assert again.log.start_s == 1.0
+
+
+def test_options_that_cannot_be_used_are_named_and_not_written(plain: Path) -> None:
+    result = command(plain, "--scale", "angle=nan", "--sign", "angle=2")
+    assert result.exit_code != 0
+    assert "flight_log.scales.angle = nan: Input should be a finite number" in str(result.exception)
+    assert "flight_log.signs.angle = 2: Input should be -1 or 1" in str(result.exception)
+    assert command(plain, "--from", "99", "--write").exit_code == 1
+    assert not Path(f"{plain}.toml").exists()
 
 
 def test_json_holds_what_the_text_says(plain: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 from channel.codec.models.pitch import PITCH_SIGNALS
 from tenbaud.config.schema import FlightLogSection
 from tenbaud.log.read import Log, read_log
+from tenbaud.log.text import read_text
 from tests.tenbaud import lab_files
 
 DIALECTS = lab_files.dialects()
@@ -30,6 +31,42 @@ def test_a_flight_is_read_alike_however_it_is_written(name: str, tmp_path: Path)
     assert np.abs(log.commands - np.column_stack([front_volts, rear_volts])).max() < 1e-5
     start_s = {"milli": 5.0, "epoch": 1.7e9}.get(name, 0.0)
     assert log.start_s == pytest.approx(start_s)
+
+
+def test_a_cell_of_text_leaves_the_other_decimal_commas_and_exponents_alone(tmp_path: Path) -> None:
+    rows = [f"{row / 8:.3f};{row}D-01".replace(".", ",") for row in range(200)]
+    rows[150:152] = ["18,75;off", "1.875,0;nan"]
+    table = read_text(lab_files.write(tmp_path / "log.csv", ["t;angle_deg", *rows]))
+    whole = np.delete(np.arange(200), (150, 151))
+    np.testing.assert_allclose(table.columns[0][whole], whole / 8)
+    np.testing.assert_allclose(table.columns[1][whole], whole / 10)
+    assert table.faults == {"t": ((151, "1.875,0"),), "angle_deg": ((150, "off"), (151, "nan"))}
+
+
+@pytest.mark.parametrize(
+    ("count", "said"),
+    [("{}", "has no name"), ('"r{}"', "has no name"), ("{}.5", "names 3 of 4 columns")],
+)
+def test_a_short_header_moves_behind_the_names_of_the_rows(
+    tmp_path: Path, count: str, said: str
+) -> None:
+    rows = [f"{count.format(row)},{row / 50},0.25,3" for row in range(1, 20)]
+    table = read_text(lab_files.write(tmp_path / "log.csv", ["time,angle_deg,u", *rows]))
+    assert said in table.source
+    shifted = table.names == ("1", "time", "angle_deg", "u")
+    assert shifted == (said == "has no name")
+    assert table.columns[table.find("u")][5] == (3.0 if shifted else 0.25)
+
+
+@pytest.mark.parametrize(
+    "days", ["12.02.2026 13.02.2026", "12/02/2026 13/02/2026", "2/11/2026 2/12/2026"]
+)
+def test_dates_are_read_with_the_day_where_it_makes_them_rise(days: str, tmp_path: Path) -> None:
+    first, second = days.split()
+    lines = [f"{first} 23:59:{s},{s}" for s in range(50, 60)]
+    lines += [f"{second} 00:00:0{s},{s}" for s in range(5)]
+    table = read_text(lab_files.write(tmp_path / "log.csv", ["time,angle", *lines]))
+    np.testing.assert_allclose(table.columns[0], np.arange(15.0))
 
 
 def test_one_input_is_enough_and_the_other_is_zero(tmp_path: Path) -> None:

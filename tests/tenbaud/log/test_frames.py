@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,10 @@ import pytest
 from mcap.writer import Writer
 from nptdms import ChannelObject, TdmsWriter
 from pyarrow import parquet
+from scipy.io import savemat
 
 from tenbaud.log.frames import read_messages, read_numpy, read_parquet, read_tdms
+from tenbaud.log.reader import read_table
 from tenbaud.log.table import LogError, find_column
 
 ROWS = 40
@@ -149,6 +152,35 @@ def test_a_damaged_file_is_named(tmp_path: Path, read: Any) -> None:
     path.write_bytes(b"nothing of the kind")
     with pytest.raises(LogError, match=r"log\.bin cannot be read as"):
         read(path)
+
+
+@pytest.mark.parametrize("name", ["npz", "npy", "mat", "parquet", "tdms", "mcap"])
+def test_a_corrupt_file_is_read_or_refused(tmp_path: Path, name: str) -> None:
+    path = tmp_path / f"log.{name}"
+    with TdmsWriter(tmp_path / "log.tdms") as writer:
+        writer.write_segment([ChannelObject("Log", "theta", THETA, {"wf_increment": 0.02})])
+    np.savez_compressed(tmp_path / "log.npz", t=TIME, theta=THETA)
+    np.save(tmp_path / "log.npy", np.vstack([TIME, THETA]))
+    savemat(tmp_path / "log.mat", {"t": TIME, "theta": THETA}, do_compression=True)
+    pd.DataFrame({"t": TIME, "theta": THETA}).to_parquet(tmp_path / "log.parquet")
+    messages(tmp_path / "log.mcap", ["/imu"])
+    data, draw, refused = path.read_bytes(), random.Random(3), 0
+    for at in range(8, len(data), len(data) // 8):
+        flipped = bytearray(data)
+        flipped[draw.randrange(8, len(data))] ^= 1 << draw.randrange(8)
+        for corrupt in (data[:at], flipped, data[:at] + bytes(len(data) - at)):
+            path.write_bytes(corrupt)
+            try:
+                read_table(path)
+            except LogError as error:
+                refused += str(path) in str(error)
+    assert refused
+
+
+def test_a_column_that_is_missing_is_named_and_not_the_file_called_corrupt(tmp_path: Path) -> None:
+    np.save(tmp_path / "log.npy", np.vstack([TIME, THETA]))
+    with pytest.raises(LogError, match=r"column theta is missing; present: 1, 2$"):
+        read_numpy(tmp_path / "log.npy", lambda names, *_: [find_column("log", names, "theta")])
 
 
 @pytest.mark.parametrize(("read", "module"), [(read_parquet, "pyarrow"), (read_tdms, "nptdms")])

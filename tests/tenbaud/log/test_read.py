@@ -126,8 +126,14 @@ def test_the_file_beside_a_log_says_what_the_configuration_leaves_open(tmp_path:
     chosen = read(tmp_path, text, columns={"angle": "a"}, signs={"pitch": 1})
     assert chosen.measured[:, 0] == pytest.approx([math.radians(k) for k in range(9)])
     beside.write_text("sings = 1\n")
-    with pytest.raises(LogError, match="sings: Extra inputs"):
+    with pytest.raises(LogError, match="sings: unknown field; did you mean signs"):
         read(tmp_path, text)
+
+
+def test_dates_have_no_unit(tmp_path: Path) -> None:
+    text = "time,pitch,u1,u2\n" + "".join(f"2024-05-06 10:00:0{k},{k},0,0\n" for k in range(9))
+    with pytest.raises(LogError, match=r"column time: the times are dates.*leave out --units time=ms"):
+        read(tmp_path, text, units={"time": "ms"})
 
 
 def test_rows_of_separators_below_the_table_are_left_out(tmp_path: Path) -> None:

@@ -199,5 +199,5 @@ def write_record(path: Path, record: Record) -> dict[str, Any]:
         "time": "time",
         "outputs": {name: name for name in record.output_names},
         "inputs": {name: name for name in record.input_names},
-        "units": {"time": "s", **{role: unit for role, unit in units.items() if unit}},
+        "units": {"time": "s", **{role: unit for role, unit in units if unit}},
     }

@@ -9,7 +9,6 @@ import numpy as np
 from scipy.signal import detrend, welch
 
 from plant_sim.identification.errors import IdentificationError
-from plant_sim.identification.filters import Array
 from plant_sim.identification.pitch import PitchStructure
 from plant_sim.identification.record import Record
 from plant_sim.identification.structures import Structure
@@ -17,8 +16,6 @@ from plant_sim.identification.structures import Structure
 VOLTS_MAX = 60.0
 COUNTS = (360, 400, 500, 512, 720, 1000, 1440, 2000, 2500, 3600, 4000, 5000, 8000, 10_000, 20_000)
 """Counts per turn of usual encoders, beside the powers of two."""
-LOOKED_AT = 20_000
-"""samples that are looked at for the step of an encoder"""
 SPECTRUM_SAMPLES = 65_536
 
 
@@ -39,16 +36,13 @@ def require_motion(record: Record) -> None:
 
 def require_units(record: Record) -> None:
     """Raise IdentificationError where angles are not in rad, or voltages not in volts."""
-    for name, unit, values in zip(
-        record.output_names, record.output_units, record.outputs.T, strict=True
-    ):
-        step = encoder_step(values)
-        if unit in ("rad", "") and step is not None and _counts(360.0 / step):
+    for name, unit, step in zip(record.output_names, record.output_units, record.steps, strict=True):
+        if unit in ("rad", "") and step and _counts(360.0 / step):
             raise IdentificationError(
                 f"the {name} moves in steps of {step:.6g} = 360/{round(360.0 / step)}: the column is "
                 "in degrees and is read as rad, a factor of 57.3. Say --units deg"
             )
-        if unit == "deg" and step is not None and _counts(math.tau / step):
+        if unit == "deg" and step and _counts(math.tau / step):
             raise IdentificationError(
                 f"the {name} moves in steps of {step:.6g} = 2 pi/{round(math.tau / step)}: the column "
                 "is in rad and is read as degrees, a factor of 57.3. Say --units rad"
@@ -60,23 +54,6 @@ def require_units(record: Record) -> None:
                 f"{name} reaches {largest:.4g} V; is the column in millivolts (a factor of 1000) or in "
                 f"counts? Say --units {name}=mV, or --scale {name}=FACTOR"
             )
-
-
-def encoder_step(values: Array) -> float | None:
-    """Return the step of which all differences are multiples; None for values that have none."""
-    levels = np.unique(values[:LOOKED_AT])
-    if len(levels) < 3:
-        return None
-    gaps = np.diff(levels)
-    gaps = gaps[gaps > 1e-6 * (levels[-1] - levels[0])]
-    if not len(gaps):
-        return None
-    step = float(gaps.min())
-    multiples = gaps / step
-    # A file prints its numbers with few digits: a step of 0.0015 differs from the true one.
-    if np.mean(np.abs(multiples - np.round(multiples)) < 0.1) < 0.95:
-        return None
-    return float(gaps.sum() / np.round(multiples).sum())
 
 
 def _counts(value: float) -> bool:

@@ -24,6 +24,8 @@ class Record:
     input_names: tuple[str, ...] = ()
     output_units: tuple[str, ...] = ()
     input_units: tuple[str, ...] = ()
+    steps: tuple[float, ...] = ()
+    """of each output, how far its values lie apart; 0: as fine as numbers are"""
 
     def __post_init__(self) -> None:
         """Refuse what cannot be a record; name the signals that have no names."""
@@ -35,6 +37,7 @@ class Record:
             )
         if len(self) < STEPS_MIN:
             raise IdentificationError(f"{len(self)} samples are too few; give at least {STEPS_MIN}")
+        object.__setattr__(self, "steps", self.steps or (0.0,) * self.outputs.shape[1])
         for what in ("output", "input"):
             values = getattr(self, f"{what}s")
             count = values.shape[1]

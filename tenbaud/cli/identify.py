@@ -46,9 +46,7 @@ Structure = Annotated[
 ]
 Lag = Annotated[
     str,
-    typer.Option(
-        help="Motor lag: auto (model.motor_lag_s where it differs from the preset, else found), or s."
-    ),
+    typer.Option(help="Motor lag: auto (model.motor_lag_s where it is set, else found), or s."),
 ]
 
 
@@ -84,16 +82,21 @@ def identify(
 ) -> None:
     """Identify a plant, write a configuration that flies it, and Figs. 3 and 4.
 
-    Exit code 1, and no configuration, where the data support no model.
+    Exit code 1, and no configuration, where the data support no model, or none that flies.
 
     [dim]tenbaud identify[/dim]
 
     [dim]tenbaud identify flight.csv --columns angle=pitch,front=u1,rear=u2,time=t --unit deg[/dim]
     """
+    from tenbaud.config.load import given_names
     from tenbaud.identification.api import Request, identify_sources, sources_of
 
     loaded = plant.load(log=log)
-    request = Request(structure, lag, equilibrium, bandwidth, damping, forgetting, fly=fly)
+    given = given_names(plant.config, options.overrides(**options.fields_of(plant), log=log))
+    given |= {"preset"} if plant.preset else set()
+    request = Request(
+        structure, lag, equilibrium, bandwidth, damping, forgetting, fly=fly, given=frozenset(given)
+    )
     if duration is not None and duration / loaded.timing.tick_s > 10_000_000:
         raise typer.BadParameter(f"--duration: {duration / loaded.timing.tick_s:.3g} ticks")
     sources = sources_of(loaded, source, request, excitation, duration)

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from channel.codec.signals import Signals
 from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.pipeline import Options
+from plant_sim.identification.pitch import PitchStructure
 from plant_sim.identification.record import Record
 from plant_sim.identification.regression import Filters
 from tenbaud.build.signals import build_limits, configured_signals
-from tenbaud.config.load import OWN, load_config, nested
+from tenbaud.config.load import given_names, load_config, nested
 from tenbaud.config.schema import FlightConfig
 from tenbaud.identification import written
-from tenbaud.identification.closed_loop import require_commands
+from tenbaud.identification.closed_loop import with_commands
 from tenbaud.identification.coder import with_coder
 from tenbaud.identification.flown import Flown, fly_record
 from tenbaud.identification.run import Identified, Wanted, run
@@ -41,6 +45,8 @@ class Request:
     damping: float = 0.7
     forgetting_per_s: float | None = None
     fly: bool = True
+    given: frozenset[str] = frozenset()
+    """full names of the settings that a person gives; "preset" where one is named"""
 
 
 @dataclass(slots=True, eq=False)
@@ -50,7 +56,7 @@ class Each:
     identified: Identified
     source: Source
     settings: dict[str, Any]
-    """a whole configuration; empty where the data support no model"""
+    """a whole configuration; empty where the data support no model, or no flight"""
     flown: Flown | None = None
     config_file: Path | None = None
 
@@ -58,8 +64,8 @@ class Each:
     def config(self) -> FlightConfig:
         """Return the configuration that flies what was identified; IdentificationError without one."""
         if not self.settings:
-            raise IdentificationError("; ".join(self.identified.found.refused))
-        return load_config(None, None, self.settings)
+            raise IdentificationError("; ".join(self.refused or self.warnings))
+        return load_config(self.settings["preset"], None, self.settings)
 
     @property
     def model(self) -> dict[str, Any]:
@@ -144,8 +150,8 @@ class Result:
 
     @property
     def supported(self) -> bool:
-        """Return whether every record supports a model."""
-        return all(one.identified.supported for one in self.each)
+        """Return whether every record supports a model that flies."""
+        return all(one.settings for one in self.each)
 
     def save(self, folder: Path, *, fly: bool = True) -> None:
         """Write figures and configurations, and fly each record with its own."""
@@ -169,7 +175,7 @@ def _finish(one: Each, folder: Path, number: str, fly: bool) -> None:
     if fly:
         one.flown = fly_record(one.settings)
         # An experiment that this command made shows the plant, and not what flights are like.
-        if one.source.file is not None:
+        if not one.source.excited:
             fitted, note = with_coder(one.settings)
             flown = one.flown if note else fly_record(fitted)
             if flown.error < one.flown.error:
@@ -204,41 +210,58 @@ def sources_of(
             update={"transmitter": config.transmitter.model_copy(update={"plant": rest})}
         )
         signals = list(excitation or EXCITATIONS)
-        return [Source(one, from_rig(at_rest, one, duration_s or DURATION_S)) for one in signals]
+        return [
+            Source(one, from_rig(at_rest, one, duration_s or DURATION_S), excited=True)
+            for one in signals
+        ]
     named = config.flight_log.model_copy(update={"file": str(source)})
     config = config.model_copy(update={"flight_log": named})
-    record, notes = from_log(config, request.structure)
+    # The tick of a preset that nobody named says nothing about the file.
+    tick_s = config.timing.tick_s if request.given & {"timing.tick_s", "preset"} else None
+    record, notes = from_log(config, request.structure, tick_s)
     return [Source(source.name, record, notes, source)]
 
 
 def identify_sources(config: FlightConfig, sources: Sequence[Source], request: Request) -> Result:
     """Identify every record, and work out the settings that fly it."""
-    excited = all(source.file is None and not source.notes for source in sources)
     each = []
     for source in sources:
-        require_commands(source.record)
-        wanted = _wanted(config, source, request)
-        one = run(source.name, source.record, wanted)
-        settings = written.settings(config, one, source.file) if one.supported else {}
+        record, dropped = with_commands(source.record)
+        told = [f"{name}: a set-point, which moves no plant: left out" for name in dropped]
+        source = replace(source, record=record, dropped=dropped, notes=(*source.notes, *told))
+        one = run(source.name, record, _wanted(config, source, request))
+        if isinstance(one.found.structure, PitchStructure):
+            one = replace(one, record=_as_pitch(one.record, configured_signals(config)))
+        settings = written.settings(config, one, source, request.given) if one.supported else {}
+        if one.supported and not settings:
+            slow = f"no flight: rows are {record.step_s:g} s apart, and ticks are at most 1 s"
+            one = replace(one, warnings=(*one.warnings, slow))
         each.append(Each(one, source, settings))
-    simulated = excited and sources[0].name.partition(":")[0] in ("square", "prbs", "chirp")
-    return Result(each, config, simulated)
+    return Result(each, config, sources[0].excited)
+
+
+def _as_pitch(record: Record, signals: Signals) -> Record:
+    """Return a record whose signals have the names that the pitch model gives them."""
+    outputs, inputs = signals.outputs[:1], signals.inputs[: record.inputs.shape[1]]
+    return replace(
+        record,
+        output_names=tuple([one.name for one in outputs]),
+        input_names=tuple([one.name for one in inputs]),
+        output_units=tuple([unit or "rad" for unit in record.output_units]),
+    )
 
 
 def _wanted(config: FlightConfig, source: Source, request: Request) -> Wanted:
-    excited = source.name.partition(":")[0] in ("square", "prbs", "chirp") and source.file is None
-    # What a preset says is of the preset's plant.
-    preset = {} if config.preset == OWN else load_config(config.preset).model.model_dump()
-    known = getattr(config.model, "motor_lag_s", None)
-    set_lag = known is not None and known != preset.get("motor_lag_s", known)
+    excited = source.excited
     lag_s: float | None = None
     if request.lag != "auto":
-        try:
+        with suppress(ValueError):
             lag_s = float(request.lag)
-        except ValueError:
-            raise IdentificationError(f"--lag {request.lag}: give auto or seconds") from None
-    elif set_lag or (excited and config.transmitter.rig == "simulated"):
-        lag_s = known
+        if lag_s is None or not 0.0 <= lag_s < math.inf:
+            raise IdentificationError(f"--lag {request.lag}: give auto or seconds")
+    elif "model.motor_lag_s" in request.given or (excited and config.transmitter.rig == "simulated"):
+        # What a preset says is of the preset's plant.
+        lag_s = getattr(config.model, "motor_lag_s", None)
     forgetting = request.forgetting_per_s
     paper = Filters()
     if forgetting is None:
@@ -251,18 +274,13 @@ def _wanted(config: FlightConfig, source: Source, request: Request) -> Wanted:
         paper.gain if excited else None,
         rests=excited,
     )
-    limited = excited or config.limits.command_max is not None
+    limited = excited or "limits.command_max" in request.given
     volts_max = float("inf")
-    pitches = config.model.kind == "pitch" and _is_pitch(source.record)
+    own = tuple([one.name for one in configured_signals(config).outputs])
+    pitches = config.model.kind == "pitch" and source.record.output_names == own
     if limited and pitches:
         volts_max = build_limits(config, configured_signals(config)).command_max[0]
     return Wanted(request.structure, request.equilibrium, volts_max, pitches, options)
-
-
-def _is_pitch(record: Record) -> bool:
-    return record.output_names == ("pitch",) or (
-        record.outputs.shape[1] == 1 and record.output_units[0] in ("rad", "")
-    )
 
 
 def identify(
@@ -295,8 +313,10 @@ def identify(
     """
     from tenbaud.recording.folder import create_run_folder
 
-    loaded = load_config(preset, None if config is None else Path(config), nested(settings or {}))
-    request = Request(structure, str(lag), str(equilibrium), bandwidth_rad_s, fly=fly)
+    path, over = None if config is None else Path(config), nested(settings or {})
+    loaded = load_config(preset, path, over)
+    given = frozenset(given_names(path, over) | ({"preset"} if preset else set()))
+    request = Request(structure, str(lag), str(equilibrium), bandwidth_rad_s, fly=fly, given=given)
     if isinstance(source, Mapping):
         sources = [_of_arrays(source, tuple(outputs), tuple(inputs), tick_s, units or {})]
     else:
@@ -327,6 +347,8 @@ def _of_arrays(
         raise IdentificationError(
             f"the arrays differ in shape: {sorted(lengths)}; give vectors of one length"
         )
+    from tenbaud.log.angles import step_of
+
     rows = len(columns[outputs[0]])
     record = Record(
         tick_s,
@@ -336,5 +358,6 @@ def _of_arrays(
         inputs,
         tuple(units.get(name, "") for name in outputs),
         tuple(units.get(name, "") for name in inputs),
+        tuple(step_of(columns[name]) for name in outputs),
     )
     return Source("arrays", record)

@@ -3,34 +3,48 @@
 from __future__ import annotations
 
 import math
+import re
+from dataclasses import replace
 
 import numpy as np
 from scipy.signal import savgol_filter
 
 from plant_sim.identification.errors import IdentificationError
-from plant_sim.identification.faults import dominant_rad_s, encoder_step
+from plant_sim.identification.faults import dominant_rad_s
 from plant_sim.identification.pipeline import identify
 from plant_sim.identification.record import Record
 from plant_sim.identification.structures import LinearStructure
 
-SET_POINTS = ("setpoint", "set_point", "set-point", "reference", "ref", "desired", "target", "soll")
+SET_POINTS = {"setpoint", "reference", "ref", "desired", "target", "soll"}
+COMMANDS = {"u", "v", "i", "voltage", "current", "torque", "pwm"}
+"""Words of a name that say that it is what a controller commands: `i_ref` moves the plant."""
 
 
-def set_points(record: Record) -> list[int]:
-    """Return the inputs whose names say that they are set-points."""
-    names = [name.lower() for name in record.input_names]
-    return [
-        index
-        for index, name in enumerate(names)
-        if any(word in name.replace(" ", "_") for word in SET_POINTS)
-    ]
+def _set_points(record: Record) -> list[int]:
+    """Return the inputs whose names say that they are set-points, in the unit of an output."""
+    found = []
+    for index, (name, unit) in enumerate(zip(record.input_names, record.input_units, strict=True)):
+        words = set(re.findall("[a-z]+", re.sub("set[ _-]point", "setpoint", name.lower())))
+        if words & SET_POINTS and not words & COMMANDS and unit in ("", *record.output_units):
+            found.append(index)
+    return found
 
 
-def require_commands(record: Record) -> None:
-    """Raise IdentificationError, with what the record does say, where no command is in it."""
-    wanted = set_points(record)
+def with_commands(record: Record) -> tuple[Record, tuple[str, ...]]:
+    """Return a record without the set-points beside its commands, and their names.
+
+    Raises IdentificationError, with what the record does say, where no command is in it.
+    """
+    wanted = _set_points(record)
     if record.inputs.shape[1] > len(wanted):
-        return
+        kept = [index for index in range(record.inputs.shape[1]) if index not in wanted]
+        commands = replace(
+            record,
+            inputs=record.inputs[:, kept],
+            input_names=tuple([record.input_names[index] for index in kept]),
+            input_units=tuple([record.input_units[index] for index in kept]),
+        )
+        return commands, tuple([record.input_names[index] for index in wanted])
     lines = [_motion(record, index) for index in range(record.outputs.shape[1])]
     lines += [_loop(record, index) for index in wanted]
     missing = (
@@ -56,13 +70,13 @@ def _motion(record: Record, index: int) -> str:
     values, unit = one.outputs[:, 0], record.output_units[index]
     window = min(len(values) // 2 * 2 - 1, max(5, round(0.1 / record.step_s) | 1))
     rate = savgol_filter(values, window, min(3, window - 1), deriv=1, delta=record.step_s)
-    step = encoder_step(values)
+    step = record.steps[index]
     slow = LinearStructure("integrator", ("y",), (), 1)
     found = (
         f"{record.output_names[index]}: {values.min():.4g} to {values.max():.4g} {unit}, fastest "
         f"{np.abs(rate).max():.3g} {unit}/s, moves most at {dominant_rad_s(one, slow):.3g} rad/s"
     )
-    return found + ("" if step is None else f", in steps of {step:.3g} {unit}")
+    return found + ("" if not step else f", in steps of {step:.3g} {unit}")
 
 
 def _loop(record: Record, index: int) -> str:

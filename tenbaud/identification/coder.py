@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from channel.errors import TenbaudError
-from tenbaud.config.load import load_config, merged
+from tenbaud.config.load import merged
+from tenbaud.identification.flown import replayed
 
 
 def with_coder(values: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
@@ -18,7 +19,7 @@ def with_coder(values: Mapping[str, Any]) -> tuple[dict[str, Any], str]:
     try:
         from tenbaud.studies.quick import quick_coder
 
-        found = quick_coder(load_config(None, None, settings))
+        found = quick_coder(replayed(settings))
     except ImportError as error:
         missing = f"{error.name} is missing: install tenbaud[studies]"
         return settings, f"the coder was not fitted to the record, as {missing}"

@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from tenbaud.config.load import load_config, merged
+from tenbaud.build.recorded import flight_config
+from tenbaud.config.load import merged
 from tenbaud.config.schema import FlightConfig
 from tenbaud.studies.figures import FlightFigures
 
@@ -42,17 +43,22 @@ class Flown(NamedTuple):
         return f"flown over the record at {self.rate_bit_s:g} bit/s: {'; '.join(parts)}"
 
 
-def fly_record(values: Mapping[str, Any]) -> Flown:
-    """Fly the log that settings name with the model and the coder in them."""
-    from tenbaud.build.codec import configured_rate
-    from tenbaud.build.signals import configured_signals
-
+def replayed(values: Mapping[str, Any]) -> FlightConfig:
+    """Return the configuration with which `tenbaud demo --rig replay` flies settings, once written."""
     over = {
         "transmitter": {"rig": "replay"},
         "receiver": {"controller": "recorded"},
         "link": {"kind": "memory"},
     }
-    config = load_config(None, None, merged(dict(values), over))
+    return flight_config(values["preset"], None, merged(dict(values), over))
+
+
+def fly_record(values: Mapping[str, Any]) -> Flown:
+    """Fly the log that settings name with the model and the coder in them."""
+    from tenbaud.build.codec import configured_rate
+    from tenbaud.build.signals import configured_signals
+
+    config = replayed(values)
     figures = _fly(config)
     names = [one.name for one in configured_signals(config).outputs]
     return Flown(

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-
-import numpy as np
 
 from channel.codec.signals import Signals
 from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.excitation import excite, parse_excitation
 from plant_sim.identification.record import Record
 from tenbaud.build.rig import build_rig
-from tenbaud.build.signals import build_encoders, configured_signals
-from tenbaud.config.schema import FlightConfig
+from tenbaud.build.signals import build_encoders, configured_signals, encoder_steps
+from tenbaud.config.schema import FlightConfig, FlightLogSection
+from tenbaud.identification.structure import SPEEDS
 
 ALIASES = ("angle", "output", "input", "time", "index", "front", "rear")
 
@@ -26,6 +26,10 @@ class Source:
     record: Record
     notes: tuple[str, ...] = ()
     file: Path | None = None
+    dropped: tuple[str, ...] = ()
+    """set-points in the file, which are no inputs"""
+    excited: bool = False
+    """the configured rig moved as this command made it"""
 
 
 def from_rig(config: FlightConfig, excitation: str, duration_s: float) -> Record:
@@ -46,44 +50,72 @@ def from_rig(config: FlightConfig, excitation: str, duration_s: float) -> Record
 
         signal = parse_excitation(excitation, tick_s)
         force = config.receiver.pid.normal_force_volts
-        return excite(step, signal, tick_s, duration_s, normal_force_volts=force)
+        record = excite(step, signal, tick_s, duration_s, normal_force_volts=force)
+    return replace(record, steps=tuple(encoder_steps(config, signals)))
 
 
-def from_log(config: FlightConfig, structure: str = "") -> tuple[Record, tuple[str, ...]]:
+def from_log(
+    config: FlightConfig, structure: str = "", tick_s: float | None = None
+) -> tuple[Record, tuple[str, ...]]:
     """Return the record in the log that a configuration names, and what was done to the file.
 
     The signals are those of the model, or the file's own where the structure is none of the model.
-    LogError where the file cannot be used.
+    `tick_s` is the time between rows of a file without a clock. LogError where it cannot be used.
     """
     from tenbaud.log.read import read_log
 
     # On the file's own clock: a flight may resample it, an identification need not.
     signals = None if _own_signals(config, structure) else configured_signals(config)
     encoders = () if signals is None else build_encoders(config, signals)
-    log = read_log(config.flight_log, signals, encoders, config.timing.tick_s)
-    return record_of(log.tick_s, log.measured, log.commands, log.signals), log.notes
-
-
-def record_of(step_s: float, outputs: np.ndarray, inputs: np.ndarray, signals: Signals) -> Record:
-    """Return a record with the names and units of signals."""
-    taken = signals.inputs[: inputs.shape[1]]
-    return Record(
-        step_s,
-        outputs,
-        inputs,
-        tuple([one.name for one in signals.outputs]),
-        tuple([one.name for one in taken]),
-        tuple([one.unit for one in signals.outputs]),
-        tuple([one.unit for one in taken]),
+    log = read_log(config.flight_log, signals, encoders, tick_s)
+    outputs, inputs = log.signals.outputs, log.signals.inputs[: log.commands.shape[1]]
+    record = Record(
+        log.tick_s,
+        log.measured,
+        log.commands,
+        tuple([one.name for one in outputs]),
+        tuple([one.name for one in inputs]),
+        tuple([one.unit for one in outputs]),
+        tuple([one.unit for one in inputs]),
+        log.steps,
     )
+    return record, log.notes
 
 
 def _own_signals(config: FlightConfig, structure: str) -> bool:
     """Return whether a log's signals are its own, and not those of the configured model."""
-    if structure and structure != "pitch":
-        return config.model.kind in ("pitch", "hold", "pendulum")
-    log = config.flight_log
+    if structure:
+        # The structure pitch has the model's signals, under their names.
+        return structure != "pitch" and config.model.kind in ("pitch", "hold", "pendulum")
+    from tenbaud.log.beside import with_file_beside
+
+    log = with_file_beside(config.flight_log)
     signals = configured_signals(config)
     known = {one.name for one in (*signals.outputs, *signals.inputs)}
     named = {*log.columns, *log.outputs, *log.inputs}
-    return any(name not in known and name not in ALIASES and not name.isdigit() for name in named)
+    named -= {*known, *ALIASES, *(f"out:{name}" for name in known), *(f"in:{name}" for name in known)}
+    if not all(name.isdigit() for name in named):
+        return True
+    given = log.columns or log.outputs
+    return config.model.kind == "pitch" and not given and not log.join and _is_no_angle(log, signals)
+
+
+def _is_no_angle(log: FlightLogSection, signals: Signals) -> bool:
+    """Return whether the column that would be read as the angle is a speed, a level or the like."""
+    from tenbaud.log.reader import read_table
+    from tenbaud.log.roles import Roles, stem_of
+    from tenbaud.log.units import COUNTS, factor, split_unit, unit_named
+
+    found: list[bool] = []
+    roles = Roles(log.file, log, signals)
+
+    def wanted(names: Sequence[str], units: Sequence[str], known: Mapping[str, str]) -> list[int]:
+        signal, place = roles.choose(names, units, known).outputs[0]
+        given = roles.setting(log.units, f"out:{signal.name}", "angle")
+        unit = str(given or unit_named(units[place]) or split_unit(names[place])[1])
+        converts = unit_named(unit) == COUNTS or factor(unit, signal.unit) is not None
+        found.append(not converts or (not given and stem_of(names[place]) in (*SPEEDS, "level")))
+        return [place]
+
+    read_table(log.file, wanted)
+    return found[-1]

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from typing import NamedTuple
 
 from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.pitch import PitchStructure, quiescent_angle
 from plant_sim.identification.record import Record
 from plant_sim.identification.structures import Structure, parse_linear
+
+SPEEDS = ("speed", "omega", "velocity", "rpm", "rate", "drehzahl")
+"""words of an output's name that say that it has no rate"""
 
 
 class Chosen(NamedTuple):
@@ -54,8 +58,7 @@ def _suiting(record: Record, pitches: bool) -> tuple[str, str]:
     if record.outputs.shape[1] > 1:
         return "linear", f"there are {record.outputs.shape[1]} outputs, which may be coupled"
     name, unit = record.output_names[0], record.output_units[0]
-    speeds = ("speed", "omega", "velocity", "rpm", "rate", "drehzahl")
-    if unit.endswith(("/s", "rpm", "/min")) or any(word in name.lower() for word in speeds):
+    if unit.endswith(("/s", "rpm", "/min")) or any(word in name.lower() for word in SPEEDS):
         return "first-order", f"{name} is a speed"
     return "siso:2,0", f"{name} is no speed, so it has a rate"
 
@@ -74,9 +77,7 @@ def _equilibrium(record: Record, wanted: str) -> tuple[float | None, str]:
                 "give --equilibrium in rad, or estimate"
             )
         return None, "estimated with the other parameters: the record has no quiet stretch"
-    try:
-        return float(wanted), "given"
-    except ValueError:
-        raise IdentificationError(
-            f"--equilibrium {wanted}: give auto, quiet, estimate or an angle in rad"
-        ) from None
+    with suppress(ValueError):
+        if math.isfinite(angle := float(wanted)):
+            return angle, "given"
+    raise IdentificationError(f"--equilibrium {wanted}: give auto, quiet, estimate or an angle in rad")

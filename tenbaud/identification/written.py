@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from plant_sim.identification.faults import encoder_step
 from plant_sim.identification.filters import low_pass
 from plant_sim.identification.record import Record
 from plant_sim.identification.structures import LinearStructure, StateSpace
@@ -19,48 +18,69 @@ from tenbaud.config.schema import FlightConfig
 from tenbaud.design.complete import completed
 from tenbaud.design.settings import settings_of
 from tenbaud.design.systems import Matrices, Names
-from tenbaud.files.whole import write_whole
+from tenbaud.files.whole import whole_file, write_whole
 from tenbaud.identification.run import Identified, model_section
+from tenbaud.identification.sources import Source
 
 WHOLE = 1e-6
 DENSITY_LEAST = 1e-3
 """disturbance that is assumed at least, as a share of what the inputs do"""
 SLEW_USUAL = 1000.0
+TICK_S_MAX = 1.0
+PIECE = 100_000
+"""rows that are written at once"""
 
 
-def settings(config: FlightConfig, one: Identified, file: Path | None) -> dict[str, Any]:
-    """Return nested settings; `file` is the log that they are also for, if there is one."""
+def settings(
+    config: FlightConfig, one: Identified, source: Source, given: Collection[str]
+) -> dict[str, Any]:
+    """Return nested settings; those whose full names are in `given` stay, and all of an excited rig.
+
+    Empty where the rows lie further apart than ticks can.
+    """
     record = one.record
+    if record.step_s > TICK_S_MAX:
+        return {}
     tick_s = float(f"{record.step_s:.9g}")
     ticks = max(1, math.ceil(config.timing.symbol_period_s / tick_s - WHOLE))
-    limits = _limits(config, record)
+    limits = config.limits.model_dump(mode="json", exclude_unset=True, exclude_none=True)
+    if not source.excited:
+        kept = {name: limits[name] for name in limits if f"limits.{name}" in given}
+        limits = _limits(record) | kept
+    section = config.transmitter.encoders
+    if source.excited or any(name.startswith("transmitter.encoders.") for name in given):
+        encoders = section.model_dump(mode="json", exclude_unset=True, exclude_none=True)
+    else:
+        encoders = _encoders(record)
     values: dict[str, Any] = {
         "duration_s": float(f"{len(record) * tick_s:.9g}"),
         "timing": {"tick_s": tick_s, "symbol_period_s": float(f"{ticks * tick_s:.9g}")},
         "channel": {"rate_baud": config.channel.rate_baud},
         "limits": limits,
-        "transmitter": {"encoders": _encoders(config, record)},
+        "transmitter": {"encoders": encoders},
     }
-    if file is not None:
+    if source.file is not None:
         log = config.flight_log.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
-        values["flight_log"] = {**log, "file": str(file.resolve())}
+        for table in (one for one in log.values() if isinstance(one, dict)):
+            for name in source.dropped:
+                table.pop(name, None)
+                table.pop(f"in:{name}", None)
+        values["flight_log"] = {**log, "file": str(source.file.resolve())}
     if isinstance(one.found.structure, LinearStructure):
         return _linear(one, values)
     # What the plant of a simulated flight is like is not known better than its model.
     return {"preset": config.preset, **values, "model": model_section(one.found)}
 
 
-def _limits(config: FlightConfig, record: Record) -> dict[str, Any]:
-    """Return the limits of the configuration where it has any, or those of the file's own commands."""
-    given = config.limits.model_dump(mode="json", exclude_unset=True, exclude_none=True)
+def _limits(record: Record) -> dict[str, Any]:
+    """Return the limits that the file's own commands show."""
     largest = np.abs(record.inputs).max(axis=0)
     largest = np.where(largest > 0.0, largest, max(float(largest.max()), 1e-3))
     slew = np.abs(np.diff(record.inputs, axis=0)).max(axis=0) / record.step_s
-    found = {
+    return {
         "command_max": [_rounded_up(value) for value in largest.tolist()],
         "command_slew_per_s": [max(SLEW_USUAL, _rounded_up(1.01 * value)) for value in slew.tolist()],
     }
-    return {**found, **given}
 
 
 def _rounded_up(value: float) -> float:
@@ -68,21 +88,17 @@ def _rounded_up(value: float) -> float:
     return float(f"{math.ceil(value / place - WHOLE) * place:.6g}")
 
 
-def _encoders(config: FlightConfig, record: Record) -> dict[str, Any]:
-    """Return the encoders of the configuration, or the ones whose steps the file shows."""
-    section = config.transmitter.encoders
-    given = section.model_dump(mode="json", exclude_unset=True, exclude_none=True)
-    if given:
-        return given
+def _encoders(record: Record) -> dict[str, Any]:
+    """Return the encoders whose steps the file shows."""
     found: dict[str, Any] = {}
-    for name, unit, values in zip(
-        record.output_names, record.output_units, record.outputs.T, strict=True
-    ):
-        step, turn = encoder_step(values), TURNS.get(unit) if unit else None
-        if turn is None:
-            found[name] = {"quantised": False} if step is None else {"counts_per_unit": 1.0 / step}
-        elif step is not None and 2 <= round(turn / step) <= 10_000_000:
+    for name, unit, step in zip(record.output_names, record.output_units, record.steps, strict=True):
+        turn = TURNS.get(unit)
+        if step and turn is None:
+            found[name] = {"counts_per_unit": 1.0 / step}
+        elif step and turn is not None and 2 <= round(turn / step) <= 10_000_000:
             found[name] = {"counts_per_turn": round(turn / step)}
+        else:
+            found[name] = {"quantised": False}
     return found
 
 
@@ -146,7 +162,7 @@ def _densities(one: Identified, space: StateSpace, period_s: float) -> list[floa
 
 def write(path: Path, values: Mapping[str, Any], one: Identified, said: str = "") -> None:
     """Write settings that `demo`, `transmit`, `receive` and `tune` take."""
-    load_config(None, None, dict(values))
+    load_config(values["preset"], None, dict(values))
     found = one.found
     head = [f"# Identified from {one.name}: structure {found.structure.kind}, {one.chosen.why}."]
     head += [
@@ -165,14 +181,23 @@ def write(path: Path, values: Mapping[str, Any], one: Identified, said: str = ""
 def write_record(path: Path, record: Record) -> dict[str, Any]:
     """Write a record as a log, and return the section that reads it."""
     names = ["time", *record.output_names, *record.input_names]
-    times = (np.arange(len(record)) * record.step_s)[:, None]
-    rows = np.hstack((times, record.outputs, record.inputs))
-    lines = [",".join(f"{value:.9g}" for value in row) for row in rows.tolist()]
-    write_whole(path, "\n".join([",".join(names), *lines]) + "\n")
+    with whole_file(path) as stream:
+        stream.write(f"{','.join(names)}\n".encode())
+        for first in range(0, len(record), PIECE):
+            piece = slice(first, first + PIECE)
+            outputs, inputs = record.outputs[piece], record.inputs[piece]
+            times = (first + np.arange(len(outputs))) * record.step_s
+            np.savetxt(stream, np.column_stack((times, outputs, inputs)), "%.9g", ",")
+    units = {
+        f"out:{name}": unit for name, unit in zip(record.output_names, record.output_units, strict=True)
+    }
+    units |= {
+        f"in:{name}": unit for name, unit in zip(record.input_names, record.input_units, strict=True)
+    }
     return {
         "file": str(path.resolve()),
         "time": "time",
         "outputs": {name: name for name in record.output_names},
         "inputs": {name: name for name in record.input_names},
-        "units": {"time": "s", **dict(zip(record.output_names, record.output_units, strict=True))},
+        "units": {"time": "s", **{role: unit for role, unit in units if unit}},
     }

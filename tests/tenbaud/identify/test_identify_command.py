@@ -15,6 +15,7 @@ import tenbaud
 from plant_sim.identification.errors import IdentificationError
 from tenbaud.cli.commands import app
 from tenbaud.config.load import load_config
+from tenbaud.log.table import LogError
 from tests.plant_sim.identification.experiments import EXCITATION_A, experiment
 from tests.plant_sim.identification.test_linear import CASES, COUPLED, record_of
 from tests.plant_sim.identification.test_pitch import random_volts, swing
@@ -123,6 +124,8 @@ def test_when_a_log_is_no_good_then_the_error_names_the_cause(
     [
         (("--equilibrium", "later"), "--equilibrium later"),
         (("--lag", "much"), "--lag much"),
+        (("--lag", "nan"), "--lag nan"),
+        (("--equilibrium", "inf"), "--equilibrium inf"),
         (("--structure", "cubic"), "--structure cubic: give pitch"),
         (("--from", "29.9"), "too few"),
     ],
@@ -173,6 +176,107 @@ def test_when_a_log_drifts_over_turns_then_it_is_identified_with_a_warning(tmp_p
     assert estimates["torque_gain_rad_per_v_s2"] == pytest.approx(0.2, rel=0.05)
     warnings = " ".join(json.loads(result.stdout)[0]["warnings"])
     assert "drifts by 0." in warnings
+
+
+TEN_VOLTS = swing(0.02, random_volts(1500, 10.0, 60), 0.4, 4.0, 0.08)
+
+
+def write_ten_volts(path: Path) -> Path:
+    times = np.arange(len(TEN_VOLTS))[:, None] * TEN_VOLTS.step_s
+    columns = times, TEN_VOLTS.outputs, TEN_VOLTS.inputs[:, :1]
+    return write_columns(path, "time,theta,u", *columns)
+
+
+def test_when_a_file_goes_beyond_the_limits_of_a_preset_then_its_own_are_written_and_demo_agrees(
+    tmp_path: Path,
+) -> None:
+    log = write_ten_volts(tmp_path / "log.csv")
+    out = tmp_path / "out"
+    options = ("--columns", "angle=theta,front=u", "--unit", "rad", "--json", "--out", str(out))
+    result = run(str(log), *options)
+    assert found(result)["torque_gain_rad_per_v_s2"] == pytest.approx(0.08, rel=0.05)
+    (flown,) = json.loads(result.stdout)[0]["flown"]["outputs"].values()
+    written = str(out / "identified.toml")
+    demo = ("demo", "--config", written, "--rig", f"replay:{log}", "--link", "memory", "--json")
+    again = CliRunner().invoke(app, [*demo, "--out", str(tmp_path / "flight")])
+    assert again.exit_code == 0, again.output
+    said = json.loads(again.stdout)["outputs"]["pitch"]
+    # The summary has fewer digits than the flight.
+    assert said["error_live_rms"] == pytest.approx(flown["rms_error"], rel=1e-4)
+    assert said["error_live_max"] == pytest.approx(flown["largest_error"], rel=1e-4)
+
+
+def test_when_a_person_sets_what_the_preset_says_then_it_counts_as_set(tmp_path: Path) -> None:
+    log = write_ten_volts(tmp_path / "log.csv")
+    settings = {
+        "flight_log.columns": {"angle": "theta", "front": "u"},
+        "flight_log.units": {"angles": "rad"},
+        "model.motor_lag_s": 0.08,
+        "limits.command_max": 5.0,
+    }
+    result = tenbaud.identify(log, settings=settings)
+    assert result.identified.found.lag_s == 0.08
+    assert result.config.limits.command_max == 5.0
+
+
+@pytest.mark.parametrize("header", ["", "time,speed (rad/s),u"])
+def test_when_an_output_is_not_the_angle_of_the_model_then_the_structure_is_of_the_file(
+    header: str, tmp_path: Path
+) -> None:
+    log = write_ten_volts(tmp_path / "log.csv")
+    settings = {
+        "flight_log.columns": {"out:theta": "theta", "in:u": "u"},
+        "flight_log.units.angles": "rad",
+    }
+    if header:
+        log.write_text(log.read_text().replace("time,theta,u", header))
+        settings = {}
+    result = tenbaud.identify(log, settings=settings)
+    model = result.identified.found.structure
+    assert model.kind == ("first-order" if header else "siso:2,0")
+    assert result.model.get("outputs", ["speed"]) == ["speed" if header else "theta"]
+
+
+def test_when_a_file_counts_its_rows_then_the_tick_of_no_preset_is_taken_for_its_period(
+    tmp_path: Path,
+) -> None:
+    rows = np.arange(len(TEN_VOLTS))[:, None]
+    log = write_columns(
+        tmp_path / "log.csv", "step,pitch,front,rear", rows, TEN_VOLTS.outputs, TEN_VOLTS.inputs
+    )
+    with pytest.raises(LogError, match="--period SECONDS"):
+        tenbaud.identify(log)
+    assert tenbaud.identify(log, settings={"flight_log.period_s": 0.02}).config.timing.tick_s == 0.02
+
+
+def test_when_rows_are_further_apart_than_ticks_then_the_estimates_are_told_without_a_flight() -> None:
+    volts, level = random_volts(3000, 5.0, 40), [0.0]
+    for push in volts[:-1]:
+        level.append(level[-1] * math.exp(-0.02) + (1.0 - math.exp(-0.02)) * push)
+    result = tenbaud.identify(
+        {"level": level, "u": volts},
+        outputs=["level"],
+        inputs=["u"],
+        tick_s=2.0,
+        structure="first-order",
+    )
+    assert result.estimates["a"] == pytest.approx(0.01, rel=0.05)
+    assert result.settings == {}
+    assert "ticks are at most 1 s" in result.warnings[-1]
+
+
+def test_when_a_set_point_is_logged_beside_a_command_then_it_is_left_out(tmp_path: Path) -> None:
+    random = np.random.default_rng(2).normal(size=(len(TEN_VOLTS), 1))
+    names = "time,theta,pitch_ref,i_ref,prefilter_out"
+    times = np.arange(len(TEN_VOLTS))[:, None] * TEN_VOLTS.step_s
+    columns = times, TEN_VOLTS.outputs, random, TEN_VOLTS.inputs[:, :1], random[::-1]
+    log = write_columns(tmp_path / "log.csv", names, *columns)
+    roles = {"out:theta": "theta"} | {f"in:{name}": name for name in names.split(",")[2:]}
+    settings = {"flight_log.columns": roles, "flight_log.units.angles": "rad"}
+    result = tenbaud.identify(log, settings=settings)
+    assert result.identified.record.input_names == ("i_ref", "prefilter_out")
+    assert any("pitch_ref: a set-point" in text for text in result.source.notes)
+    assert "in:pitch_ref" not in result.settings["flight_log"]["columns"]
 
 
 @pytest.mark.soak
@@ -247,7 +351,7 @@ def test_when_the_excitation_is_not_understood_then_the_grammar_is_shown() -> No
     assert "square:FREQUENCY" in str(result.exception)
 
 
-def test_when_arrays_are_identified_then_the_model_is_that_of_the_command(tmp_path: Path) -> None:
+def test_when_arrays_are_identified_then_the_model_is_that_of_the_command() -> None:
     record = swing(0.02, random_volts(1500, 5.0, 60), 0.4, 4.0, 0.2)
     arrays = {"angle": record.outputs[:, 0], "u": record.inputs[:, 0]}
     result = tenbaud.identify(
@@ -256,5 +360,6 @@ def test_when_arrays_are_identified_then_the_model_is_that_of_the_command(tmp_pa
     assert result.refused == ()
     assert result.estimates["rate_damping_per_s"] == pytest.approx(0.4, rel=0.05)
     assert result.config.timing.tick_s == 0.02
+    assert list(result.settings["transmitter"]["encoders"]) == ["pitch"]
     with pytest.raises(IdentificationError, match="no array is called v"):
         tenbaud.identify(arrays, outputs=["angle"], inputs=["v"], tick_s=0.02)

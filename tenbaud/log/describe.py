@@ -13,6 +13,7 @@ from channel.flight_log import FlightLog
 from tenbaud.config.schema import FlightLogSection
 from tenbaud.log.angles import without_spikes
 from tenbaud.log.beside import with_file_beside
+from tenbaud.log.clock import shown
 from tenbaud.log.join import read_joined
 from tenbaud.log.look import Look, looks_of
 from tenbaud.log.read import read_log
@@ -48,7 +49,7 @@ class Sampling:
         even = "even" if self.jitter_s < 0.001 * self.step_s else jitter
         text = (
             f"{1.0 / self.step_s:.6g} Hz, a row every {self.step_s:.6g} s ({even}), "
-            f"from {self.first_s:.6g} to {self.last_s:.6g} s"
+            f"from {shown(self.first_s, self.step_s)} to {shown(self.last_s, self.step_s)} s"
         )
         faults = [("gaps", self.gaps), ("times that do not rise", self.repeats)]
         told = [f"{what}: {count}" for what, count in faults if count]

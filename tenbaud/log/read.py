@@ -13,7 +13,7 @@ from plant_sim.encoder import Encoder, OutputReader
 from tenbaud.config.schema import FlightLogSection
 from tenbaud.log.angles import counts_of, step_of, turn_of, unwrapped, values_of, without_spikes
 from tenbaud.log.beside import with_file_beside
-from tenbaud.log.clock import Clock, by_index, by_period, by_time, has_fractions
+from tenbaud.log.clock import Clock, by_index, by_period, by_time, counts_rows, has_fractions
 from tenbaud.log.join import read_joined
 from tenbaud.log.reader import read_table
 from tenbaud.log.roles import Chosen, Roles
@@ -126,7 +126,11 @@ class _Reading:
         section, chosen, table = self.section, self.chosen, self.table
         index = None if chosen.index is None else self.at[chosen.index]
         time = chosen.time
-        if time is None and index is not None and has_fractions(table.columns[index]):
+        if index is not None and section.period_s is not None:
+            if not counts_rows(table.columns[index]):
+                self.notes.append(f"column {table.names[index]} not used: the period is given")
+                index = None
+        elif time is None and index is not None and has_fractions(table.columns[index]):
             time = chosen.index
             self.notes.append(f"column {table.names[index]}: the clock, as its values are not whole")
         if time is not None:

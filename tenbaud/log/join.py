@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tenbaud.log.roles import CLOCK_WORDS, stem_of
 from tenbaud.log.table import Array, LogError, Table, Wanted, find_column, listed
+from tenbaud.log.units import CLOCK_WORDS, stem_of
 
 SAME = 1e-3
 """Difference of two clocks, in steps, up to which their rows are the same."""

@@ -18,7 +18,7 @@ from tenbaud.log.join import read_joined
 from tenbaud.log.reader import read_table
 from tenbaud.log.roles import Chosen, Roles
 from tenbaud.log.table import Array, LogError, Table
-from tenbaud.log.units import COUNTS, factor, split_unit, unit_named
+from tenbaud.log.units import COUNTS, factor, is_speed, says_counts, split_unit, unit_named, units_like
 
 ROWS_MIN = 2
 COUNTS_MAX = 2.0**53
@@ -135,7 +135,7 @@ class _Reading:
             self.notes.append(f"column {table.names[index]}: the clock, as its values are not whole")
         if time is not None:
             column = self.at[time]
-            unit = self._given_unit("time", "time") or table.units[column]
+            unit = str(self.roles.setting(section.units, "time", "time") or table.units[column])
             scale, offset = self._linear("time", "time")
             return by_time(table, column, scale, offset, unit, section.start_s, section.end_s)
         period_s = section.period_s or table.period_s
@@ -166,9 +166,16 @@ class _Reading:
             f"time={name}, if it counts the rows, --columns index={name}, if neither, --period SECONDS"
         )
 
-    def _given_unit(self, role: str, kind: str) -> str:
-        given = self.roles.setting(self.section.units, role, kind)
-        return "" if given is None else unit_named(str(given)) or str(given)
+    def _given_unit(self, role: str, kind: str, signal: Signal) -> str:
+        given = str(self.roles.setting(self.section.units, role, kind) or "")
+        unit = unit_named(given)
+        fits = (kind == "angle" and unit == COUNTS) or (unit and factor(unit, signal.unit) is not None)
+        if given not in ("", signal.unit) and not fits:
+            raise LogError(
+                f"--units: {given!r} is no unit of {signal.name}; known are "
+                f"{', '.join(units_like(signal.unit))}"
+            )
+        return unit or given
 
     def _linear(self, role: str, kind: str) -> tuple[float, float]:
         """Return what a column's numbers are multiplied by, and what is added then."""
@@ -190,7 +197,7 @@ class _Reading:
         """Fill in one output; return how far its values lie apart."""
         role = f"out:{signal.name}"
         values = self._values(column, role, "angle", clock)
-        unit = self._given_unit(role, "angle") or self._unit_of(column, values, signal)
+        unit = self._given_unit(role, "angle", signal) or self._unit_of(column, values, signal)
         encoder = self.encoders[at] if self.encoders else None
         values = self._straight(values, turn_of(unit, encoder), column, clock, signal)
         if unit == COUNTS:
@@ -211,11 +218,17 @@ class _Reading:
         unit = unit_named(self.table.units[column]) or split_unit(self.table.names[column])[1]
         if unit:
             return unit
+        name = self.table.names[column]
         if (
             np.all(values == np.floor(values))
             and np.ptp(values) > 0.0
             and signal.unit in ("", "rad", "deg")
         ):
+            if is_speed(name) or not (signal.unit or says_counts(name)):
+                raise LogError(
+                    f"{self.table.path}, column {name}: whole numbers of an unknown unit; say which: "
+                    f"--units {signal.name}=counts, deg, rpm ..."
+                )
             self.notes.append(f"{signal.name}: in counts, as all its values are whole numbers")
             return COUNTS
         largest = float(np.max(np.abs(values)))
@@ -274,5 +287,5 @@ class _Reading:
     def _input(self, signal: Signal, column: int, clock: Clock) -> Array:
         role = f"in:{signal.name}"
         values = self._values(column, role, "input", clock)
-        unit = self._given_unit(role, "input") or unit_named(self.table.units[column])
+        unit = self._given_unit(role, "input", signal) or unit_named(self.table.units[column])
         return values * self._factor(unit, signal)

@@ -12,6 +12,7 @@ import pytest
 from channel.codec.models.pitch import PITCH_SIGNALS
 from plant_sim.encoder import Encoder
 from tenbaud.config.schema import FlightLogSection
+from tenbaud.log.angles import step_of
 from tenbaud.log.read import Log, read_log
 from tenbaud.log.table import Array, LogError
 from tests.tenbaud import lab_files
@@ -115,7 +116,7 @@ def test_from_and_to_of_a_counter_are_its_number_times_the_period(tmp_path: Path
     rows = np.delete(lab_files.table(), slice(500, 550), axis=0)
     rows[:, 0] = 2.0 * np.round(50.0 * rows[:, 0]) + 1000.0
     fields = {"period_s": 0.02, "index": "time"}
-    with pytest.raises(LogError, match="21 s after 19.98 s") as caught:
+    with pytest.raises(LogError, match=r"21 s after 19\.98 s") as caught:
         read(tmp_path, rows, **fields)
     _, end = re.findall(r"--from (\S+) --to (\S+?)(?=,|$)", str(caught.value))
     log = read(tmp_path, rows, start_s=float(end[0]), end_s=float(end[1]), **fields)
@@ -174,6 +175,22 @@ def test_a_wrapped_angle_is_unwrapped_and_said(
     assert np.abs(log.measured[:, 0] - spin).max() < 2e-3
     assert any(note.startswith("pitch: unwrapped at 3 jump(s) of a turn, line") for note in log.notes)
     assert "pitch: turns 3.2 times" in log.notes
+
+
+def test_a_spike_does_not_stop_the_unwrapping(tmp_path: Path) -> None:
+    rows = lab_files.table()
+    spin = np.linspace(0.0, 20.0, len(rows))
+    rows[:, 1] = np.degrees(spin) % 360.0
+    rows[300, 1] += 700.0
+    log = read(tmp_path, rows, units={"angle": "deg"}, remove_spikes=True)
+    assert np.abs(log.measured[:, 0] - spin).max() < 1e-3
+
+
+def test_a_continuous_walk_has_no_step() -> None:
+    random = np.random.default_rng(11)
+    walks = (np.cumsum(random.normal(size=1500)) for _ in range(300))
+    assert sum(step_of(one) > 0.0 for one in walks) < 3
+    assert step_of(np.array([0.0, 0.5, 0.0, 1.5, 1.0])) == 0.5
 
 
 def test_many_turns_are_no_seam(tmp_path: Path) -> None:

@@ -146,7 +146,8 @@ def describe(section: FlightLogSection) -> tuple[Description, Table]:
     section = with_file_beside(section)
     if section.join:
         time = section.columns.get("time", section.time)
-        table, _ = read_joined((section.file, *section.join), read_table, time, None)
+        unit = section.units.get("time", "")
+        table, _ = read_joined((section.file, *section.join), read_table, time, unit, None)
     else:
         table = read_table(section.file)
     looks = looks_of(table)

@@ -57,7 +57,14 @@ def read_log(
     notes: tuple[str, ...] = ()
     if section.join:
         time = section.columns.get("time", section.time)
-        table, notes = read_joined((section.file, *section.join), read_table, time, wanted)
+        table, notes = read_joined(
+            (section.file, *section.join),
+            read_table,
+            time,
+            section.units.get("time", ""),
+            wanted,
+            lambda: [place for _, place in chosen[-1].inputs],
+        )
     else:
         table = read_table(section.file, wanted)
     return _Reading(table, chosen[-1], roles, encoders, tick_s, notes).log()

@@ -123,7 +123,7 @@ def test_from_and_to_of_a_counter_are_its_number_times_the_period(tmp_path: Path
     assert (log.tick_s, log.start_s, len(log)) == (0.02, 21.0, 950)
 
 
-def test_stretches_of_an_epoch_clock_are_told_with_their_digits(tmp_path: Path) -> None:
+def test_stretches_of_an_epoch_clock_have_their_digits(tmp_path: Path) -> None:
     rows = np.delete(np.add(lab_files.table(), (1.7e9, 0, 0, 0)), slice(500, 550), axis=0)
     with pytest.raises(LogError, match=r"--from 1700000011 --to 1700000029.99"):
         read(tmp_path, rows)

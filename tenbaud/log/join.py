@@ -113,7 +113,8 @@ def _covered(clock: Array, own: Array) -> npt.NDArray[np.bool_]:
     steps = np.diff(own)
     inside = (clock >= own[0] - near) & (clock <= own[-1] + near)
     on_row = np.minimum(np.abs(clock - own[before]), np.abs(clock - own[before + 1])) <= near
-    return inside & (on_row | (steps[before] <= GAP * _step(own)))
+    covered: npt.NDArray[np.bool_] = inside & (on_row | (steps[before] <= GAP * _step(own)))
+    return covered
 
 
 def _at(times: Array, own: Array, values: Array, held: bool) -> Array:

@@ -115,15 +115,14 @@ def test_from_and_to_are_on_the_clock_of_the_file(tmp_path: Path) -> None:
 def test_from_and_to_of_a_counter_are_its_number_times_the_period(tmp_path: Path) -> None:
     rows = np.delete(lab_files.table(), slice(500, 550), axis=0)
     rows[:, 0] = 2.0 * np.round(50.0 * rows[:, 0]) + 1000.0
-    fields = {"period_s": 0.02, "index": "time"}
     with pytest.raises(LogError, match=r"21 s after 19\.98 s") as caught:
-        read(tmp_path, rows, **fields)
+        read(tmp_path, rows, period_s=0.02, index="time")
     _, end = re.findall(r"--from (\S+) --to (\S+?)(?=,|$)", str(caught.value))
-    log = read(tmp_path, rows, start_s=float(end[0]), end_s=float(end[1]), **fields)
+    log = read(tmp_path, rows, start_s=float(end[0]), end_s=float(end[1]), period_s=0.02, index="time")
     assert (log.tick_s, log.start_s, len(log)) == (0.02, 21.0, 950)
 
 
-def test_stretches_of_an_epoch_clock_are_told_with_their_digits(tmp_path: Path) -> None:
+def test_stretches_of_an_epoch_clock_have_their_digits(tmp_path: Path) -> None:
     rows = np.delete(np.add(lab_files.table(), (1.7e9, 0, 0, 0)), slice(500, 550), axis=0)
     with pytest.raises(LogError, match=r"--from 1700000011 --to 1700000029.99"):
         read(tmp_path, rows)

@@ -48,7 +48,7 @@ def test_columns_may_be_chosen_and_inputs_left_out(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("unit", ["dgr", "V"])
 @pytest.mark.parametrize("signals", [SIGNALS, None])
-def test_a_given_unit_that_is_none_is_refused(tmp_path: Path, unit: str, signals: Any) -> None:
+def test_an_unknown_given_unit_is_refused(tmp_path: Path, unit: str, signals: Any) -> None:
     (tmp_path / "log.csv").write_text("time,angle,u\n0,1.5,0\n0.5,2,1\n")
     section = FlightLogSection(file=str(tmp_path / "log.csv"), units={"angle": unit})
     if (unit, signals) == ("V", None):

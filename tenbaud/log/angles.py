@@ -20,6 +20,10 @@ STEP_ROWS = 100_000
 """Rows at the beginning in which the step of a quantised signal is looked for."""
 STEP_NEAR = 10.0
 """Smallest steps between two values that tell the step."""
+STEP_GAPS_MIN = 10
+"""Such gaps that are needed, or all of them where there are fewer."""
+STEP_SHARE = 1e-6
+"""Of the range, from which a step is one."""
 STEP_ERROR = 0.05
 """Share of a step by which numbers with few digits may be off it."""
 
@@ -34,9 +38,10 @@ class Straightened:
 
 def unwrapped(values: Array, turn: float) -> Straightened:
     """Return an angle that goes on where its encoder began again at 0 or half a turn."""
-    steps = np.diff(values)
+    cleaned = without_spikes(values, turn).values
+    steps = np.diff(cleaned)
     seams = np.flatnonzero(np.abs(steps) > JUMP * turn)
-    if not len(seams) or np.ptp(values) > turn * (1.0 + 1e-6):
+    if not len(seams) or np.ptp(cleaned) > turn * (1.0 + 1e-6):
         return Straightened(values, ())
     whole = np.round(steps[seams] / turn)
     shift = np.zeros(len(values))
@@ -58,8 +63,10 @@ def without_spikes(values: Array, turn: float | None) -> Straightened:
     )
     around = np.abs(values[2:] - values[:-2])
     off = (np.abs(bend) > SPIKE * usual) & (around < 0.25 * np.abs(bend)) & (np.abs(bend) > 0.0)
-    if turn is not None and np.ptp(values) <= turn * (1.0 + 1e-6):
-        off &= np.abs(bend) < JUMP * turn
+    rest = np.delete(values, np.flatnonzero(off) + 1)
+    if turn is not None and np.ptp(rest) <= (whole := turn * (1.0 + 1e-6)):
+        beyond = (values[1:-1] < rest.max() - whole) | (values[1:-1] > rest.min() + whole)
+        off &= (np.abs(bend) < JUMP * turn) | beyond
     rows = np.flatnonzero(off)
     if not len(rows) or len(rows) > max(1.0, SPIKES_MAX_SHARE * len(values)):
         return Straightened(values, ())
@@ -89,6 +96,8 @@ def step_of(values: Array) -> float:
     if not len(gaps):
         return 0.0
     near = gaps[gaps < STEP_NEAR * gaps.min()]
+    if len(near) < min(STEP_GAPS_MIN, len(gaps)) or gaps.min() < STEP_SHARE * (seen[-1] - seen[0]):
+        return 0.0
     steps = np.round(near / gaps.min())
     step = float(near.sum() / steps.sum())
     return step if np.all(np.abs(near / step - steps) < STEP_ERROR * steps) else 0.0

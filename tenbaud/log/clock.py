@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -63,23 +64,23 @@ def has_fractions(values: Array) -> bool:
     return bool(np.any((values != np.floor(values)) & np.isfinite(values)))
 
 
+def counts_rows(values: Array) -> bool:
+    """Return whether numbers are whole and lie a whole number of their usual steps apart."""
+    steps = np.diff(values[np.isfinite(values)])
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    return not has_fractions(values) and usual > 0.0 and not np.any(steps % usual)
+
+
 def by_index(
     table: Table, column: int, period_s: float, start_s: float | None, end_s: float | None
 ) -> Clock:
-    """Return the clock of rows that whole numbers count; LogError where they do not count evenly."""
-    clock = by_period(len(table), period_s, start_s, end_s)
-    index = table.check(column, clock.rows)
-    step = float(np.median(np.diff(index))) if len(index) > 1 else 1.0
-    wrong = np.flatnonzero(np.diff(index) != step)
-    if len(wrong) or step <= 0.0:
-        row = int(wrong[0]) if len(wrong) else 0
-        raise table.fault(
-            clock.rows.start + row + 1,
-            column,
-            f"{index[row + 1]:g} found, {index[row] + max(step, 1.0):g} expected; steps must "
-            "follow each other without a gap or a repeat: choose a stretch with --from and --to",
-        )
-    return clock
+    """Return the clock of rows that whole numbers count.
+
+    A table that has its own period counts in it; in another one the usual step is a period.
+    """
+    step = float(np.nanmedian(np.diff(table.columns[column]))) if len(table) > 1 else 1.0
+    by = period_s if table.period_s is not None or step <= 0.0 else period_s / step
+    return by_time(table, column, by, 0.0, "s", start_s, end_s, step * by)
 
 
 def by_time(
@@ -90,12 +91,10 @@ def by_time(
     unit: str,
     start_s: float | None,
     end_s: float | None,
+    tick_s: float | None = None,
 ) -> Clock:
     """Return the clock of rows with a time each; `unit` is as given, "" unknown."""
-    by = 1.0 if unit == DATE_TIME else factor(unit, "s")
-    if by is None:
-        raise LogError(f"{table.path}: the unit of the time is {unit!r}; give s, ms, us or ns")
-    times = (scale * table.columns[column] + offset) * by
+    times = (scale * table.columns[column] + offset) * seconds_in(table, unit)
     rows = _cut(table, times, start_s, end_s)
     table.check(column, rows)
     times = times[rows]
@@ -104,27 +103,54 @@ def by_time(
     steps = np.diff(times)
     usual = float(np.median(steps))
     _check_rising(table, column, rows, steps, usual)
-    if not unit and usual > 1.0:
-        raise LogError(
-            f"{table.path}, column {table.names[column]}: the clock rises by {usual:g} a row; "
-            "say in which unit: --units time=ms, us, ns or s"
-        )
+    if not unit and usual >= 1.0:
+        raise without_unit(table, column, usual)
     _check_gaps(table, column, rows, times, steps, usual)
-    return _even(rows, times, unit)
+    return _even(rows, times, unit, tick_s)
+
+
+def seconds_in(table: Table, unit: str) -> float:
+    """Return the seconds of a unit of time; LogError where it is none."""
+    by = 1.0 if unit == DATE_TIME else factor(unit, "s")
+    if by is None:
+        raise LogError(f"{table.path}: the unit of the time is {unit!r}; give s, ms, us or ns")
+    return by
+
+
+def without_unit(table: Table, column: int, step: float) -> LogError:
+    """Return the error of a clock that may count seconds, parts of them, or the rows."""
+    name = table.names[column]
+    return LogError(
+        f"{table.path}, column {name}: the clock rises by {step:g} a row; say in which unit: "
+        f"--units time=ms, us, ns or s; if it counts the rows: --columns index={name} and "
+        "--period SECONDS"
+    )
+
+
+def shown(time_s: float, step_s: float) -> str:
+    """Return a time with the digits that tell it from those one step before and after."""
+    if not step_s > 0.0:
+        return f"{time_s:.12g}"
+    text = f"{time_s:.{max(1, 2 - math.floor(math.log10(step_s)))}f}"
+    return text.rstrip("0").rstrip(".")
 
 
 def _cut(table: Table, times: Array, start_s: float | None, end_s: float | None) -> slice:
     first, last = 0, len(times)
+    if start_s is None and end_s is None:
+        return slice(first, last)
+    step = float(np.nanmedian(np.diff(times))) if len(times) > 1 else 0.0
+    near = max(1e-9, 0.01 * step)  # times are shown rounded
     if start_s is not None:
-        first = int(np.argmax(times >= start_s - 1e-9)) if np.any(times >= start_s - 1e-9) else last
+        first = int(np.argmax(times >= start_s - near)) if np.any(times >= start_s - near) else last
     if end_s is not None:
-        after = np.flatnonzero(times[first:] >= end_s - 1e-9)
+        after = np.flatnonzero(times[first:] >= end_s - near)
         last = first + int(after[0]) if len(after) else last
     if first >= last and len(times):
         raise LogError(
             f"{table.path}: no row from {start_s if start_s is not None else 'the start'} to "
             f"{end_s if end_s is not None else 'the end'} s; the file's clock runs from "
-            f"{np.nanmin(times):g} to {np.nanmax(times):g} s"
+            f"{shown(np.nanmin(times), step)} to {shown(np.nanmax(times), step)} s"
         )
     return slice(first, last)
 
@@ -157,24 +183,24 @@ def _check_gaps(
     edges = [0, *(gaps + 1).tolist(), len(times)]
     stretches = sorted(pairwise(edges), key=lambda one: one[0] - one[1])
     told = ", ".join(
-        f"--from {times[first]:g} --to {times[last - 1] + usual / 2:g}"
+        f"--from {shown(times[first], usual)} --to {shown(times[last - 1] + usual / 2, usual)}"
         for first, last in sorted(stretches[:STRETCHES_MAX])
         if last - first > 1
     )
     raise table.fault(
         rows.start + row + 1,
         column,
-        f"{times[row + 1]:g} s after {times[row]:g} s, where the usual step is {usual:g} s; choose "
-        f"one of the {len(edges) - 1} stretches between the gaps: {told}",
+        f"{shown(times[row + 1], usual)} s after {shown(times[row], usual)} s, where the usual step is "
+        f"{usual:g} s; choose one of the {len(edges) - 1} stretches between the gaps: {told}",
     )
 
 
-def _even(rows: slice, times: Array, unit: str) -> Clock:
-    """Return the clock with an even tick; resampled where the rows are too far from it."""
+def _even(rows: slice, times: Array, unit: str, known_s: float | None) -> Clock:
+    """Return the clock with an even tick, the known one if any; resampled where rows are off it."""
     count, start = len(times), float(times[0])
     mean = float(times[-1] - start) / (count - 1)
-    tick_s = float(f"{mean:.3g}")
-    if abs(tick_s - mean) * (count - 1) > 0.5 * mean:
+    tick_s = known_s or float(f"{mean:.3g}")
+    if known_s is None and abs(tick_s - mean) * (count - 1) > 0.5 * mean:
         tick_s = round(mean, 9) or mean
     notes = []
     if unit == DATE_TIME:
@@ -184,7 +210,7 @@ def _even(rows: slice, times: Array, unit: str) -> Clock:
         return Clock(rows, None, tick_s, start, count, tuple(notes))
     # Rows are put on a grid of their own times, so that the tick may be a round one.
     near = [float(f"{mean:.{digits}g}") for digits in (1, 2, 3)]
-    tick_s = next((one for one in near if abs(one - mean) <= ROUND * mean), mean)
+    tick_s = known_s or next((one for one in near if abs(one - mean) <= ROUND * mean), mean)
     ticks = int((times[-1] - start) / tick_s + 1e-6) + 1
     places = (times - start) / tick_s
     jitter = float(np.max(np.abs(places - np.round(places)))) * tick_s

@@ -11,7 +11,7 @@ import numpy as np
 from channel.flight_log import FlightLog
 from tenbaud.config.schema import FlightLogSection
 from tenbaud.log.beside import with_file_beside
-from tenbaud.log.clock import GAP
+from tenbaud.log.clock import GAP, shown
 from tenbaud.log.join import read_joined
 from tenbaud.log.look import Look, looks_of
 from tenbaud.log.read import read_log
@@ -45,7 +45,7 @@ class Sampling:
         even = "even" if self.jitter_s < 0.001 * self.step_s else jitter
         text = (
             f"{1.0 / self.step_s:.6g} Hz, a row every {self.step_s:.6g} s ({even}), "
-            f"from {self.first_s:.6g} to {self.last_s:.6g} s"
+            f"from {shown(self.first_s, self.step_s)} to {shown(self.last_s, self.step_s)} s"
         )
         faults = [("gaps", self.gaps), ("times that do not rise", self.repeats)]
         told = [f"{what}: {count}" for what, count in faults if count]
@@ -138,7 +138,8 @@ def describe(section: FlightLogSection) -> tuple[Description, Table]:
     section = with_file_beside(section)
     if section.join:
         time = section.columns.get("time", section.time)
-        table, _ = read_joined((section.file, *section.join), read_table, time, None)
+        unit = section.units.get("time", "")
+        table, _ = read_joined((section.file, *section.join), read_table, time, unit, None)
     else:
         table = read_table(section.file)
     looks = looks_of(table)

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from channel.codec.signals import unit_suffix
-
-CLOCKS = ("tick", "time_s", "time")
-"""The first column of an export."""
+from tenbaud.log.units import stem_of
 
 
 def export_roles(names: Sequence[str], units: Sequence[str]) -> Mapping[str, str]:
@@ -19,7 +17,10 @@ def export_roles(names: Sequence[str], units: Sequence[str]) -> Mapping[str, str
         name.removesuffix(f"_{unit_suffix(unit)}") if unit else name
         for name, unit in zip(names, units, strict=True)
     ]
-    if not any(one.startswith("error_coded") for one in plain) or names[0] not in CLOCKS:
+    if not any(one.startswith("error_coded") for one in plain) or stem_of(names[0]) not in (
+        "tick",
+        "time",
+    ):
         return {}
     roles = {"time": names[1] if names[0] == "tick" else names[0]}
     for at, name in enumerate(plain):

@@ -10,7 +10,7 @@ import numpy as np
 
 from tenbaud.log.angles import step_of, unwrapped
 from tenbaud.log.table import Array, Table
-from tenbaud.log.units import COUNTS, unit_named
+from tenbaud.log.units import COUNTS, is_speed, unit_named
 
 LEVELS_MAX = 8
 """Different values of a command that switches between levels."""
@@ -72,6 +72,8 @@ def _look(table: Table, place: int) -> Look:
     guess = ""
     if not unit and told:
         unit, _, guess = told.partition(": ")
+        if unit == COUNTS and is_speed(name):
+            unit = guess = ""
     return Look(name, kind, words, unit, guess, float(there.min()), float(there.max()), missing)
 
 

@@ -13,12 +13,21 @@ from plant_sim.encoder import Encoder, OutputReader
 from tenbaud.config.schema import FlightLogSection
 from tenbaud.log.angles import counts_of, step_of, turn_of, unwrapped, values_of, without_spikes
 from tenbaud.log.beside import with_file_beside
-from tenbaud.log.clock import Clock, by_index, by_period, by_time, has_fractions
+from tenbaud.log.clock import Clock, by_index, by_period, by_time, counts_rows, has_fractions
 from tenbaud.log.join import read_joined
 from tenbaud.log.reader import read_table
 from tenbaud.log.roles import Chosen, Roles
 from tenbaud.log.table import Array, LogError, Table
-from tenbaud.log.units import COUNTS, DATE_TIME, factor, split_unit, unit_named
+from tenbaud.log.units import (
+    COUNTS,
+    DATE_TIME,
+    factor,
+    is_speed,
+    says_counts,
+    split_unit,
+    unit_named,
+    units_like,
+)
 
 ROWS_MIN = 2
 COUNTS_MAX = 2.0**53
@@ -59,7 +68,14 @@ def read_log(
     notes: tuple[str, ...] = ()
     if section.join:
         time = section.columns.get("time", section.time)
-        table, notes = read_joined((section.file, *section.join), read_table, time, wanted)
+        table, notes = read_joined(
+            (section.file, *section.join),
+            read_table,
+            time,
+            section.units.get("time", ""),
+            wanted,
+            lambda: [place for _, place in chosen[-1].inputs],
+        )
     else:
         table = read_table(section.file, wanted) if table is None else table.only(wanted)
     return _Reading(table, chosen[-1], roles, encoders, tick_s, notes).log()
@@ -128,12 +144,16 @@ class _Reading:
         section, chosen, table = self.section, self.chosen, self.table
         index = None if chosen.index is None else self.at[chosen.index]
         time = chosen.time
-        if time is None and index is not None and has_fractions(table.columns[index]):
+        if index is not None and section.period_s is not None:
+            if not counts_rows(table.columns[index]):
+                self.notes.append(f"column {table.names[index]} not used: the period is given")
+                index = None
+        elif time is None and index is not None and has_fractions(table.columns[index]):
             time = chosen.index
             self.notes.append(f"column {table.names[index]}: the clock, as its values are not whole")
         if time is not None:
             column = self.at[time]
-            given = self._given_unit("time", "time")
+            given = str(self.roles.setting(section.units, "time", "time") or "")
             if given and table.units[column] == DATE_TIME:
                 raise LogError(
                     f"{table.path}, column {table.names[column]}: the times are dates, which have no "
@@ -170,9 +190,16 @@ class _Reading:
             f"time={name}, if it counts the rows, --columns index={name}, if neither, --period SECONDS"
         )
 
-    def _given_unit(self, role: str, kind: str) -> str:
-        given = self.roles.setting(self.section.units, role, kind)
-        return "" if given is None else unit_named(str(given)) or str(given)
+    def _given_unit(self, role: str, kind: str, signal: Signal) -> str:
+        given = str(self.roles.setting(self.section.units, role, kind) or "")
+        unit = unit_named(given)
+        fits = (kind == "angle" and unit == COUNTS) or (unit and factor(unit, signal.unit) is not None)
+        if given not in ("", signal.unit) and not fits:
+            raise LogError(
+                f"--units: {given!r} is no unit of {signal.name}; known are "
+                f"{', '.join(units_like(signal.unit))}"
+            )
+        return unit or given
 
     def _linear(self, role: str, kind: str) -> tuple[float, float]:
         """Return what a column's numbers are multiplied by, and what is added then."""
@@ -194,7 +221,7 @@ class _Reading:
         """Fill in one output; return how far its values lie apart."""
         role = f"out:{signal.name}"
         values = self._values(column, role, "angle", clock)
-        unit = self._given_unit(role, "angle") or self._unit_of(column, values, signal)
+        unit = self._given_unit(role, "angle", signal) or self._unit_of(column, values, signal)
         encoder = self.encoders[at] if self.encoders else None
         values = self._straight(values, turn_of(unit, encoder), column, clock, signal)
         if unit == COUNTS:
@@ -215,11 +242,17 @@ class _Reading:
         unit = unit_named(self.table.units[column]) or split_unit(self.table.names[column])[1]
         if unit:
             return unit
+        name = self.table.names[column]
         if (
             np.all(values == np.floor(values))
             and np.ptp(values) > 0.0
             and signal.unit in ("", "rad", "deg")
         ):
+            if is_speed(name) or not (signal.unit or says_counts(name)):
+                raise LogError(
+                    f"{self.table.path}, column {name}: whole numbers of an unknown unit; say which: "
+                    f"--units {signal.name}=counts, deg, rpm ..."
+                )
             self.notes.append(f"{signal.name}: in counts, as all its values are whole numbers")
             return COUNTS
         largest = float(np.max(np.abs(values)))
@@ -278,5 +311,5 @@ class _Reading:
     def _input(self, signal: Signal, column: int, clock: Clock) -> Array:
         role = f"in:{signal.name}"
         values = self._values(column, role, "input", clock)
-        unit = self._given_unit(role, "input") or unit_named(self.table.units[column])
+        unit = self._given_unit(role, "input", signal) or unit_named(self.table.units[column])
         return values * self._factor(unit, signal)

@@ -9,14 +9,13 @@ from dataclasses import dataclass, field
 from channel.codec.signals import InputSignal, Signal, Signals
 from tenbaud.config.schema import FlightLogSection
 from tenbaud.log.table import LogError, find_column, listed
-from tenbaud.log.units import COUNTS, bare_name, split_unit, unit_named
+from tenbaud.log.units import CLOCK_WORDS, COUNTS, split_unit, stem_of, unit_named, units_like
 
 NO_COLUMN = "0"
 EVERY = {"angle": ("angles", "outputs"), "input": ("inputs",)}
 """Names of all signals of a kind, in tables such as `units`."""
 ALL = ("angles", "outputs", "inputs")
 CLOCKS = ("time", "index")
-CLOCK_WORDS = ("time", "t", "zeit", "timestamp", "clock", "seconds", "sec", "stamp", "temps", "tid")
 _INDEX = ("step", "index", "sample", "n", "k", "tick", "row")
 _ANGLES = (
     *("pitch", "angle", "theta", "winkel", "pos", "position", "y", "output", "measured", "encoder"),
@@ -76,8 +75,20 @@ class Roles:
     def _given(self, known: Mapping[str, str]) -> dict[str, str]:
         """Return the columns that are given, by "time", "index", `out:NAME` and `in:NAME`."""
         section = self.section
-        found = {role: column for role, column in known.items() if role in CLOCKS}
-        found |= {self.role(role, ""): column for role, column in known.items() if role not in CLOCKS}
+        found: dict[str, str] = {}
+        for role, column in known.items():
+            try:
+                found[self.role(role, "")] = column
+            except LogError:
+                self.notes.append(f"column {column}: left out, {role} is no signal of the model")
+        if section.period_s is not None:
+            if section.time or "time" in section.columns:
+                raise LogError(
+                    f"{self.path}: both a clock and a period are given; leave out --period, or say "
+                    "that the column counts the rows (--columns index=NAME)"
+                )
+            if "time" in found:  # as the format suggests; at most it counts the rows
+                found["index"] = found.pop("time")
         found |= {name: getattr(section, name) for name in CLOCKS if getattr(section, name)}
         found |= {self.role(name, "out"): column for name, column in section.outputs.items()}
         found |= {self.role(name, "in"): column for name, column in section.inputs.items()}
@@ -194,6 +205,7 @@ class Roles:
                 stem = stem_of(names[place])
                 what = "output" if kind == "out" else "input"
                 if stem in words or (kind == "in" and _is_input(names[place])):
+                    stem += f"_{place + 1}" * (stem in found[kind])
                     found[kind][stem] = place
                     self.notes.append(f"{what} {stem}: column {names[place]}, by its name")
         if not found["out"]:
@@ -222,8 +234,13 @@ class Roles:
         return outputs, inputs
 
     def _unit(self, role: str, kind: str, in_file: str) -> str:
-        unit = str(self.setting(self.section.units, role, kind) or in_file)
-        unit = unit_named(unit) or unit
+        given = str(self.setting(self.section.units, role, kind) or "")
+        if given and not unit_named(given):
+            known = ", ".join(units_like(""))
+            raise LogError(
+                f"--units: {given!r} is no unit of {role[role.find(':') + 1 :]}; known are {known}"
+            )
+        unit = unit_named(given or in_file) or in_file
         return {"deg": "rad", COUNTS: "rad" if kind == "angle" else "", "mV": "V", "mA": "A"}.get(
             unit, unit
         )
@@ -240,14 +257,9 @@ def _input_words(signal: InputSignal, at: int, count: int, names: Sequence[str])
     return words + ([] if at else list(_INPUTS))
 
 
-def stem_of(name: str) -> str:
-    """Return a column's name without unit, case and signs, for comparisons."""
-    return re.sub(r"[^\w]+", "_", bare_name(name).strip().casefold().rpartition(".")[2]).strip("_")
-
-
 def _is_input(name: str) -> bool:
     stem = stem_of(name)
-    numbered = re.sub(r"_?\d+$", "", stem)
+    numbered = re.sub(r"_?\d+$|_[a-d]$", "", stem)
     return stem in (*_INPUTS, *_FRONT, *_REAR) or (numbered in _INPUTS and numbered != "v")
 
 

@@ -182,12 +182,16 @@ def _columns(group: _Group) -> _Columns:
 
 
 def _of_matrix(one: Variable, turned: Array) -> _Columns:
-    """Return the columns of a matrix by number, the first as the clock if it rises throughout."""
+    """Return the columns of a matrix by number, the first as clock or index if it rises throughout."""
     names = [str(number) for number in range(1, turned.shape[1] + 1)]
     lying = "columns" if one.values.shape[0] == len(turned) else "rows"
     form = f"matrix {one.name}, {len(names)} signals in {lying}"
     roles = {}
-    if np.all(np.diff(turned[:, 0]) > 0.0):
+    steps = np.diff(turned[:, 0])
+    if np.all(steps == 1.0):
+        roles["index"] = "1"
+        form += ", the first counts the rows"
+    elif np.all(steps > 0.0):
         roles["time"] = "1"
         form += ", the first is the clock"
     return _Columns(names, [one.unit] * len(names), list(turned.T), roles, form)

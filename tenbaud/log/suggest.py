@@ -65,6 +65,8 @@ def suggest(section: FlightLogSection, table: Table, looks: Sequence[Look]) -> S
         taken, others = _by_names(section, table)
     except LogError:
         taken, others = _by_looks(table, looks)
+        if section.period_s is not None:
+            taken.pop("time", None)
     given = {
         role: table.names[table.find(name)] for role, name in section.columns.items() if name != "0"
     }

@@ -30,6 +30,11 @@ _SPELLINGS = {
     "percent": "%", "count": "counts", "ticks": "counts", "cnt": "counts", "cts": "counts",
     "inkremente": "counts", "pwm": "counts",
 }  # fmt: skip
+CLOCK_WORDS = (
+    *("time", "t", "zeit", "timestamp", "clock", "seconds", "sec", "stamp", "temps", "tid"),
+    *("times", "tout"),
+)
+"""Stems of the names of clocks, the likeliest first."""
 COUNTS, DATE_TIME = "counts", "date-time"
 _BRACKETS = re.compile(r"^(.*?)\s*[\[(<]\s*([^\[\]()<>]*?)\s*[\])>]\s*$")
 _SEPARATORS = re.compile(r"( in |, |[_ ])")
@@ -54,9 +59,31 @@ def split_unit(name: str) -> tuple[str, str]:
         # The longest end first: rad_per_s before s. One letter is as often a number's name: u_a.
         text = "".join(parts[end + 1 :])
         unit = unit_named(text)
-        if unit and (len(text) > 1 or text in "sVA°%"):
+        if unit and (len(text) > 1 or text in "sV°%"):
             return "".join(parts[:end]), unit
     return name, ""
+
+
+def units_like(unit: str) -> list[str]:
+    """Return the known units into which one converts; all where it is none of them."""
+    what = _FACTORS.get(unit, ("", 1.0))[0]
+    found = [one for one, (of, _) in _FACTORS.items() if what in ("", of)]
+    return found + [COUNTS] * (what in ("", "angle"))
+
+
+def is_speed(name: str) -> bool:
+    """Return whether the name of a column says that it is a rate of something."""
+    return bool(re.search(r"speed|omega|veloc|rate|rpm|drehzahl", name.casefold()))
+
+
+def says_counts(name: str) -> bool:
+    """Return whether the name of a column says that an encoder counts it."""
+    return bool(re.search(r"count|encoder|tick|pulse|incr", name.casefold()))
+
+
+def stem_of(name: str) -> str:
+    """Return a column's name without unit, case and signs, for comparisons."""
+    return re.sub(r"[^\w]+", "_", bare_name(name).strip().casefold().rpartition(".")[2]).strip("_")
 
 
 def bare_name(name: str) -> str:

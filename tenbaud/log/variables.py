@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tenbaud.log.table import Array
+from tenbaud.log.units import CLOCK_WORDS, stem_of
 
 Tree = Mapping[str, Any]
 """Names to arrays, texts, trees, and lists of these."""
 
-CLOCK_NAMES = frozenset({"t", "time", "times", "time_s", "tout", "timestamp", "zeit"})
 DATA_NAMES = frozenset({"data", "value", "values"})
 """What the array of a signal is called that is a structure by itself."""
 UNNAMED = frozenset({"", "unnamed"})
@@ -58,7 +58,7 @@ def variables_of(tree: Tree, path: str = "", above: Clock | None = None) -> Iter
     own = next((texts[key] for key in ("name", "label") if texts.get(key, "") not in UNNAMED), path)
     clock, clock_key = above, ""
     for key in arrays:
-        if key.lower() in CLOCK_NAMES and _is_vector(arrays[key]):
+        if stem_of(key) in CLOCK_WORDS and _is_vector(arrays[key]):
             name = key if len(data) == 1 else _dotted(path, key)
             unit = "s" if arrays[key].dtype.kind in "mM" else texts.get("time_unit", "")
             clock, clock_key = Clock(name, seconds(arrays[key]), unit), key

@@ -12,6 +12,7 @@ import pytest
 from channel.codec.models.pitch import PITCH_SIGNALS
 from plant_sim.encoder import Encoder
 from tenbaud.config.schema import FlightLogSection
+from tenbaud.log.angles import step_of
 from tenbaud.log.read import Log, read_log
 from tenbaud.log.table import Array, LogError
 from tests.tenbaud import lab_files
@@ -86,6 +87,7 @@ def at_700(values: Array, others: Array) -> Array:
         (lambda t: at_700(t, t * np.nan), "line 702, column time: 'nan' is not a number"),
         (lambda t: 0.0 * t, "column time: the times do not rise"),
         (lambda t: 1000.0 * t, "the clock rises by 20 a row; say in which unit"),
+        (lambda t: np.round(50.0 * t), r"rises by 1 a row; .*--units time=ms.*--columns index=time"),
     ],
 )
 def test_a_bad_clock_is_named_by_line_and_may_be_cut_off(
@@ -108,6 +110,38 @@ def test_from_and_to_are_on_the_clock_of_the_file(tmp_path: Path) -> None:
         LogError, match=r"no row from 5.0 to 25.0 s; the file's clock runs from 100 to 129.98"
     ):
         read(tmp_path, rows, start_s=5.0, end_s=25.0)
+
+
+def test_from_and_to_of_a_counter_are_its_number_times_the_period(tmp_path: Path) -> None:
+    rows = np.delete(lab_files.table(), slice(500, 550), axis=0)
+    rows[:, 0] = 2.0 * np.round(50.0 * rows[:, 0]) + 1000.0
+    with pytest.raises(LogError, match=r"21 s after 19\.98 s") as caught:
+        read(tmp_path, rows, period_s=0.02, index="time")
+    _, end = re.findall(r"--from (\S+) --to (\S+?)(?=,|$)", str(caught.value))
+    log = read(tmp_path, rows, start_s=float(end[0]), end_s=float(end[1]), period_s=0.02, index="time")
+    assert (log.tick_s, log.start_s, len(log)) == (0.02, 21.0, 950)
+
+
+def test_stretches_of_an_epoch_clock_have_their_digits(tmp_path: Path) -> None:
+    rows = np.delete(np.add(lab_files.table(), (1.7e9, 0, 0, 0)), slice(500, 550), axis=0)
+    with pytest.raises(LogError, match=r"--from 1700000011 --to 1700000029.99"):
+        read(tmp_path, rows)
+
+
+def test_a_clock_and_a_period_are_not_both_given(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="both a clock and a period are given"):
+        read(tmp_path, lab_files.table(), columns={"time": "time"}, period_s=0.05)
+
+
+@pytest.mark.parametrize("step", [0.0333, 1.0, 20.0])
+def test_a_period_drops_the_clock_that_only_the_format_suggests(step: float, tmp_path: Path) -> None:
+    rows = lab_files.table()
+    rows[:, 0] *= step / lab_files.TICK_S
+    np.save(tmp_path / "log.npy", rows)
+    columns = {"angle": "2", "front": "3", "rear": "4"}
+    section = FlightLogSection(file=str(tmp_path / "log.npy"), columns=columns, period_s=0.05)
+    log = read_log(section, PITCH_SIGNALS)
+    assert (log.tick_s, len(log)) == (0.05, lab_files.ROWS)
 
 
 def test_a_clock_that_is_given_as_a_counter_of_rows_is_the_clock_and_said(tmp_path: Path) -> None:
@@ -140,6 +174,22 @@ def test_a_wrapped_angle_is_unwrapped_and_said(
     assert np.abs(log.measured[:, 0] - spin).max() < 2e-3
     assert any(note.startswith("pitch: unwrapped at 3 jump(s) of a turn, line") for note in log.notes)
     assert "pitch: turns 3.2 times" in log.notes
+
+
+def test_a_spike_does_not_stop_the_unwrapping(tmp_path: Path) -> None:
+    rows = lab_files.table()
+    spin = np.linspace(0.0, 20.0, len(rows))
+    rows[:, 1] = np.degrees(spin) % 360.0
+    rows[300, 1] += 700.0
+    log = read(tmp_path, rows, units={"angle": "deg"}, remove_spikes=True)
+    assert np.abs(log.measured[:, 0] - spin).max() < 1e-3
+
+
+def test_a_continuous_walk_has_no_step() -> None:
+    random = np.random.default_rng(11)
+    walks = (np.cumsum(random.normal(size=1500)) for _ in range(300))
+    assert sum(step_of(one) > 0.0 for one in walks) < 3
+    assert step_of(np.array([0.0, 0.5, 0.0, 1.5, 1.0])) == 0.5
 
 
 def test_many_turns_are_no_seam(tmp_path: Path) -> None:

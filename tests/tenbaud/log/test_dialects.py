@@ -10,6 +10,7 @@ import pytest
 from channel.codec.models.pitch import PITCH_SIGNALS
 from tenbaud.config.schema import FlightLogSection
 from tenbaud.log.read import Log, read_log
+from tenbaud.log.table import LogError
 from tenbaud.log.text import read_text
 from tests.tenbaud import lab_files
 
@@ -108,8 +109,45 @@ def test_files_of_one_flight_are_joined_by_time(tmp_path: Path) -> None:
     log = read(angles, join=[str(same)])
     assert np.abs(log.commands - rows[:, 2:]).max() < 1e-5
     assert "volts.csv joined row by row" in log.notes
-    with pytest.raises(ValueError, match=r"column u1: empty cell"):
-        read(angles, join=[str(other)])
-    cut = read(angles, join=[str(other)], start_s=1.0)
-    assert len(cut) == lab_files.ROWS - 50
-    assert "late.csv joined by linear interpolation at the times of the first file" in cut.notes
+    log = read(angles, join=[str(other)])
+    assert (len(log), log.start_s) == (lab_files.ROWS - 11, 0.22)
+    # A command is held, and not a value between two.
+    assert np.abs(log.commands - rows[10:-1, 2:]).max() < 1e-5
+    assert "late.csv joined at the times of the first file" in log.notes
+    assert "11 row(s) left out: files before, or late.csv, have none there" in log.notes
+
+
+def joined(folder: Path, rows: np.ndarray, header: str) -> Log:
+    """Return the volts of the flight joined with angles that are written beside them."""
+    for place in ("a", "b"):
+        (folder / place).mkdir()
+    volts = lab_files.lines(lab_files.table()[:, [0, 2, 3]])
+    first = lab_files.write(folder / "a/log.csv", ["time_s,u1,u2", *volts])
+    second = lab_files.write(folder / "b/log.csv", [header, *lab_files.lines(rows[:, :2])])
+    return read(first, join=[str(second)])
+
+
+def test_each_clock_is_joined_in_its_unit_and_files_may_have_one_name(tmp_path: Path) -> None:
+    log = joined(tmp_path, lab_files.table() * (1000.0, 1.0, 1.0, 1.0), "time_ms,angle")
+    assert np.abs(log.measured[:, 0] - lab_files.flight()[1]).max() < 1e-5
+    assert len(log) == lab_files.ROWS
+
+
+def test_a_wrapped_angle_is_joined_without_values_between_its_ends(tmp_path: Path) -> None:
+    rows = lab_files.table()
+    rows[:, 0] += 0.01
+    spin = np.linspace(0.0, 20.0, len(rows))
+    rows[:, 1] = np.degrees(spin) % 360.0
+    log = joined(tmp_path, rows, "time_s,angle_deg")
+    assert np.abs(np.diff(log.measured[:, 0]) - spin[1]).max() < 0.6 * spin[1]
+
+
+def test_a_gap_of_any_joined_file_splits(tmp_path: Path) -> None:
+    rows = np.delete(lab_files.table(), slice(500, 550), axis=0)
+    with pytest.raises(LogError, match=r"11 s after 9\.98 s.*--from 0 --to 9\.99, --from 11"):
+        joined(tmp_path, rows, "time_s,angle")
+
+
+def test_files_that_do_not_overlap_are_not_joined(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=r"do not overlap in time: log\.csv from 0 to 29\.98 s"):
+        joined(tmp_path, np.add(lab_files.table(), (100, 0, 0, 0)), "time_s,angle")

@@ -8,8 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from channel.codec.models.pitch import PITCH_SIGNALS
 from tenbaud import Run
+from tenbaud.config.schema import FlightLogSection
 from tenbaud.log.export import export_roles
+from tenbaud.log.read import read_log
 from tenbaud.log.reader import read_table
 from tenbaud.log.table import LogError
 from tenbaud.recording.convert import FORMS, convert
@@ -56,6 +59,14 @@ def test_a_run_as_measured_and_applied(run: Run, two: Run) -> None:
 def test_every_export(run: Run, form: str, tmp_path: Path) -> None:
     convert(run, form, tmp_path / f"flight.{form}")
     check(tmp_path / f"flight.{form}", run)
+
+
+def test_a_run_is_a_log_for_another_model_by_its_columns(two: Run) -> None:
+    table = read_table(two.path)
+    columns = {"angle": table.names[1], "front": "4", "rear": "5"}
+    log = read_log(FlightLogSection(file=str(two.path), columns=columns), PITCH_SIGNALS)
+    np.testing.assert_array_equal(log.measured[:, 0], table.columns[1])
+    assert any("is no signal of the model" in note for note in log.notes)
 
 
 @pytest.mark.parametrize("form", FORMS)

@@ -46,6 +46,34 @@ def test_columns_may_be_chosen_and_inputs_left_out(tmp_path: Path) -> None:
     assert "pitch: in counts, as all its values are whole numbers" in log.notes
 
 
+@pytest.mark.parametrize("unit", ["dgr", "V"])
+@pytest.mark.parametrize("signals", [SIGNALS, None])
+def test_an_unknown_given_unit_is_refused(tmp_path: Path, unit: str, signals: Any) -> None:
+    (tmp_path / "log.csv").write_text("time,angle,u\n0,1.5,0\n0.5,2,1\n")
+    section = FlightLogSection(file=str(tmp_path / "log.csv"), units={"angle": unit})
+    if (unit, signals) == ("V", None):
+        assert read_log(section, signals).signals.outputs[0].unit == "V"
+        return
+    with pytest.raises(LogError, match=rf"{unit}' is no unit of \w+; known are .*rad, mrad, deg"):
+        read_log(section, signals)
+
+
+def test_whole_numbers_of_a_speed_are_no_counts(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("time,speed,u\n0,1500,0\n0.5,1520,1\n")
+    section = FlightLogSection(file=str(tmp_path / "log.csv"))
+    with pytest.raises(LogError, match="column speed: whole numbers of an unknown unit"):
+        read_log(section, None)
+    log = read_log(section.model_copy(update={"units": {"speed": "rpm"}}), None)
+    assert log.measured[:, 0].tolist() == [1500.0, 1520.0]
+
+
+def test_two_motors_by_letter_are_two_inputs_without_a_unit(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("time,angle,motor_A,motor_B\n0,1.5,0,2\n0.5,2.5,1,3\n")
+    log = read_log(FlightLogSection(file=str(tmp_path / "log.csv")), None)
+    assert [(one.name, one.unit) for one in log.signals.inputs] == [("motor_a", ""), ("motor_b", "")]
+    assert log.commands.tolist() == [[0.0, 2.0], [1.0, 3.0]]
+
+
 def test_byte_order_mark_spaces_and_empty_lines_are_harmless(tmp_path: Path) -> None:
     log = read(tmp_path, "\ufeff step, pitch_counts\r\n0, 1\r\n\r\n1, 2\r\n\r\n")
     assert log.counts.tolist() == [[1], [2]]
@@ -63,10 +91,10 @@ def test_byte_order_mark_spaces_and_empty_lines_are_harmless(tmp_path: Path) -> 
         ("0,1,1e17,3,4,5\n1,1,2,3,4,5\n", ", line 2, column pitch_counts: '1e+17' is not a whole"),
         ("0,1,1_000,3,4,5\n1,1,2,3,4,5\n", ", line 2, column pitch_counts: '1_000' is not a number"),
         (
-            "0,1,2,3,4,5\n2,1,2,3,4,5\n3,1,2,3,4,5\n4,1,2,3,4,5\n",
-            ", line 3, column step: 2 found, 1 expected",
+            "0,1,2,3,4,5\n3,1,2,3,4,5\n4,1,2,3,4,5\n5,1,2,3,4,5\n",
+            ", line 3, column step: 0.06 s after 0 s, where the usual step is 0.02 s",
         ),
-        ("4,1,2,3,4,5\n4,1,2,3,4,5\n", ", line 3, column step: 4 found, 5 expected"),
+        ("4,1,2,3,4,5\n4,1,2,3,4,5\n", ", column step: the times do not rise"),
         ("0,1,2,3,4,5\n1,1,2,3,4\n", ", line 3, column left_volts: empty cell"),
         ("0,1,2,3,4,5\n1,1,2,3,4,5,6\n", ", line 3: 7 cells found, 6 expected"),
         ("0,1,2,3,4,5\n", ": 1 row(s) of numbers; a log needs at least 2"),

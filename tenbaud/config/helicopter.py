@@ -50,7 +50,7 @@ class HelicopterModelSection(ModelSection):
     elevation_high_rad: Annotated[float, Field(ge=0.001, le=1.5)] = 0.5235987755982988
     pitch_stop_rad: Annotated[float, Field(ge=0.001, le=1.5)] = 0.5585053606381855
     motor_lag_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.08
-    hover_rad: Annotated[float, Field(gt=0.0, lt=1.5)] = 0.17453292519943295
+    hover_rad: Annotated[float, Field(ge=0.001, le=1.5)] = 0.17453292519943295
     """elevation at which both ends begin, and at which design and floor take the plant for linear"""
     densities: tuple[NotNegative, NotNegative, NotNegative] = (2e-4, 2e-4, 2e-3)
     """q of the disturbance of travel, elevation and pitch, in rad^2/s^3"""

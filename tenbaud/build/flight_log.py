@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -42,14 +43,22 @@ def output_steps(config: FlightConfig, signals: Signals) -> list[float]:
 def _recording_of(config: FlightConfig, signals: Signals | None) -> _Recording:
     signals = signals or configured_signals(config)
     section, encoders = config.flight_log, build_encoders(config, signals)
-    files = [Path(one) for one in (section.file, f"{section.file}.toml", *section.join)]
-    changed = tuple([one.stat().st_mtime_ns if one.is_file() else 0 for one in files])
-    return _recording(section.model_dump_json(exclude_unset=True), signals, encoders, changed)
+    changed = tuple(map(_changed, (section.file, f"{section.file}.toml", *section.join)))
+    text = section.model_dump_json(exclude_unset=True, exclude={"digest"})
+    return _recording(text, signals, encoders, changed)
+
+
+def _changed(name: str) -> tuple[tuple[str, int, int], ...]:
+    """Return what changes with a file, or with one in a folder."""
+    path = Path(name)
+    files = sorted(path.iterdir()) if path.is_dir() else [path]
+    stats = [(one.name, one.stat()) for one in files if one.is_file()]
+    return tuple([(own, stat.st_size, stat.st_mtime_ns) for own, stat in stats])
 
 
 @lru_cache(maxsize=2)
 def _recording(
-    section: str, signals: Signals, encoders: tuple[OutputReader, ...], changed: tuple[int, ...]
+    section: str, signals: Signals, encoders: tuple[OutputReader, ...], changed: tuple[Any, ...]
 ) -> _Recording:
     return _Recording(FlightLogSection.model_validate_json(section), signals, encoders)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from hashlib import blake2b
 from pathlib import Path
 from typing import Any
 
@@ -62,15 +63,18 @@ def flight_config(
 
 
 def _replays(overrides: dict[str, Any]) -> bool:
-    return bool(overrides.get("transmitter", {}).get("rig") == "replay")
+    section = overrides.get("transmitter")
+    return isinstance(section, dict) and section.get("rig") == "replay"
 
 
-def _fit_tick(timing: dict[str, Any]) -> None:
+def _fit_tick(timing: Any) -> None:
     """Change a preset's tick so that a symbol period that is given has a whole number of them."""
+    if not isinstance(timing, dict):
+        return  # `checked` says so
     usual = Timing()
     tick_s = timing.get("tick_s", usual.tick_s)
     symbol_s = timing.get("symbol_period_s", usual.symbol_period_s)
-    if all(isinstance(one, int | float) and one >= 1e-5 for one in (tick_s, symbol_s)):
+    if all(isinstance(one, int | float) and 1e-5 <= one <= 60.0 for one in (tick_s, symbol_s)):
         timing["tick_s"] = nearest_tick_s(tick_s, symbol_s)
 
 
@@ -88,9 +92,13 @@ class _Adoption:
         self._take_tick(recorded_tick_s(self._config))
         # From here on in its own ticks.
         log = read_flight_log(self._config)
-        self._take(self._duration(log))
+        asked_s, length_s = self._config.duration_s, len(log) * self._config.timing.tick_s
+        self._take(self._duration(length_s))
         self._take(self._commands(log))
         self._take(self._start(log))
+        self._take({"flight_log.digest": digest_of(log, configured_signals(self._config))})
+        if self._is_given("duration_s") and asked_s > length_s:
+            return self._config.noting(f"{asked_s:g} s were asked for; the recording ends before")
         return self._config
 
     def _take(self, settings: dict[str, Any]) -> None:
@@ -123,9 +131,8 @@ class _Adoption:
             }
         self._take(settings)
 
-    def _duration(self, log: FlightLog) -> dict[str, Any]:
+    def _duration(self, length_s: float) -> dict[str, Any]:
         """Return the duration: that of the recording, or of less of it."""
-        length_s = len(log) * self._config.timing.tick_s
         if self._is_given("duration_s") and self._config.duration_s <= length_s:
             return {}
         return {"duration_s": float(f"{length_s:.{DIGITS}g}")}
@@ -189,26 +196,38 @@ class _Adoption:
     def _start(self, log: FlightLog) -> dict[str, Any]:
         """Return the state at which both codecs begin: at the first values that were measured."""
         section = self._config.model
-        known = not isinstance(section, BuiltInModel) or (
-            section.start and self._is_given("model.start")
-        )
-        model = build_model(self._config)
-        first, state = log.measured[0], np.array(model.initial())
-        if known or tuple(first.tolist()) == model.measured(model.initial()):
-            return {}
-        signals = signals_of(model)
-        rows = np.array([signals.row(place) or np.zeros(len(state)) for place in range(len(first))])
-        places = [at for at in signals.output_states if at is not None]
-        if len(places) == len(first):
-            state[places] = first
-            return {"model.start": state.tolist()}
-        # The smallest change of the state that shows what was measured.
-        state += np.linalg.pinv(rows) @ (first - np.array(model.measured(model.initial())))
-        return {"model.start": [_shortened(one) for one in state.tolist()]}
+        known = isinstance(section, BuiltInModel) and section.start and self._is_given("model.start")
+        return {} if known else start_at(self._config, log)
 
     @property
     def _name(self) -> str:
         return Path(self._config.flight_log.file).name
+
+
+def start_at(config: FlightConfig, log: FlightLog) -> dict[str, Any]:
+    """Return `model.start` with which a codec begins at the first row; {} where it does by itself."""
+    model = build_model(config)
+    first, state = log.measured[0], np.array(model.initial())
+    outside = not isinstance(config.model, BuiltInModel)
+    if outside or tuple(first.tolist()) == model.measured(model.initial()):
+        return {}
+    signals = signals_of(model)
+    rows = np.array([signals.row(place) or np.zeros(len(state)) for place in range(len(first))])
+    places = [at for at in signals.output_states if at is not None]
+    if len(places) == len(first):
+        state[places] = first
+        return {"model.start": state.tolist()}
+    # The smallest change of the state that shows what was measured.
+    state += np.linalg.pinv(rows) @ (first - np.array(model.measured(model.initial())))
+    return {"model.start": [_shortened(one) for one in state.tolist()]}
+
+
+def digest_of(log: FlightLog, signals: Signals) -> str:
+    """Return what both ends of a replay must have alike: time, rows, and commands as they travel."""
+    digest = blake2b(repr((log.tick_s, log.start_s, log.commands.shape)).encode(), digest_size=8)
+    for column, steps in zip(log.commands.T, signals.steps_per_unit, strict=False):
+        digest.update(np.rint(column * steps).astype("<i8").tobytes())
+    return digest.hexdigest()
 
 
 def nearest_tick_s(period_s: float, symbol_period_s: float) -> float:
@@ -246,6 +265,7 @@ def _notes(config: FlightConfig) -> Iterator[str]:
     model = build_model(config)
     signals = signals_of(model)
     yield f"{len(log)} rows, {len(log) * tick_s:g} s; tick {tick_s:g} s"
+    yield from config.notes
     yield from log.notes
     if log.commands.size:
         limits = build_limits(config, signals).command_max

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from enum import StrEnum
 from pathlib import Path
@@ -137,7 +136,7 @@ def tune(
     from tenbaud.studies.constants import free_ranges
     from tenbaud.studies.judging import Tuning, split_of
     from tenbaud.studies.records import Augment
-    from tenbaud.studies.tuning import preset_text
+    from tenbaud.studies.tuning import preset_text, shown, units_of
     from tenbaud.studies.tuning import tune as fit
 
     _make_room(out)
@@ -156,8 +155,11 @@ def tune(
         preset, config, overrides, {}, split, method.value, evaluations, seed, allow_code, augment
     )
     tuning.free.update(free_ranges(tuning.config({}), _named(free or []), model=model))
+    units = units_of(tuning.config({}))
     with StopFlag() as stop, progress_bar("tune", counted=True) as update:
-        tuned = fit(tuning, lambda n, error: update(n, evaluations, _best(error)), stop)
+        tuned = fit(
+            tuning, lambda n, error: update(n, evaluations, f"best {shown(error, units)}"), stop
+        )
     _leave(tuned, preset_text(tuning, tuned), out, as_json)
     if stop.raised:
         typer.echo(f"stopped after {tuned.evaluations} of {evaluations} evaluations", err=True)
@@ -197,10 +199,6 @@ def _tell(tuned: Tuned) -> None:
         typer.echo(f"{name:36} {value:.6g}")
     for line in report(tuned):
         typer.echo(line)
-
-
-def _best(error_rad: float) -> str:
-    return f"best {math.degrees(error_rad):.4g}°"
 
 
 def _sizes(text: str) -> tuple[float, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from channel.codec.codec import ModelContext
 from channel.codec.models.helicopter import (
@@ -50,12 +50,21 @@ class HelicopterModelSection(ModelSection):
     elevation_high_rad: Annotated[float, Field(ge=0.001, le=1.5)] = 0.5235987755982988
     pitch_stop_rad: Annotated[float, Field(ge=0.001, le=1.5)] = 0.5585053606381855
     motor_lag_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.08
-    hover_rad: Annotated[float, Field(ge=0.0, le=1.5)] = 0.17453292519943295
+    hover_rad: Annotated[float, Field(ge=0.001, le=1.5)] = 0.17453292519943295
     """elevation at which both ends begin, and at which design and floor take the plant for linear"""
     densities: tuple[NotNegative, NotNegative, NotNegative] = (2e-4, 2e-4, 2e-3)
     """q of the disturbance of travel, elevation and pitch, in rad^2/s^3"""
     weights: tuple[NotNegative, NotNegative, NotNegative] = (1.0, 1.0, 1.0)
     """of the squared error of each angle"""
+
+    @model_validator(mode="after")
+    def _hovering(self) -> HelicopterModelSection:
+        if not 0.0 < self.hover_rad < self.elevation_high_rad:
+            raise ValueError(
+                f"hover_rad = {self.hover_rad:g} must lie above 0 and below the stop, "
+                f"elevation_high_rad = {self.elevation_high_rad:g}"
+            )
+        return self
 
     @property
     def parameters(self) -> HelicopterParameters:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
-from pydantic import AfterValidator, Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, PrivateAttr, field_validator, model_validator
 
 from channel.line.impairments import parse_impairments
 from channel.links.registry import LINKS
@@ -54,6 +54,8 @@ def _checked_sabotage(text: str) -> str:
 SabotageText = Annotated[str, AfterValidator(_checked_sabotage)]
 
 SHARED_SECTIONS = ("timing", "channel", "model", "coder", "limits")
+ADDED_FIELDS = {"start", "outputs", "floor_gain", "floor_exponent"}
+"""Of models and coders that were flown before they had them."""
 
 
 class Timing(Section):
@@ -308,6 +310,8 @@ class FlightLogSection(Section):
     end_s: Annotated[float, Field(ge=-2.4e9, le=2.4e9)] | None = None
     remove_spikes: bool = False
     """set single rows that are far off between their neighbours"""
+    digest: str = ""
+    """of ticks, rows and commands, for the handshake; a replay computes it"""
 
 
 class LinkSection(Section):
@@ -364,6 +368,18 @@ class FlightConfig(CodePermission):
     flight_log: FlightLogSection = FlightLogSection()
     link: LinkSection = LinkSection()
     telemetry: TelemetrySection = TelemetrySection()
+    _notes: tuple[str, ...] = PrivateAttr(default=())
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Return what of the settings was changed, for people; what goes through text forgets it."""
+        return self._notes
+
+    def noting(self, *notes: str) -> FlightConfig:
+        """Return the same configuration with notes."""
+        noted = self.model_copy()
+        noted._notes = notes
+        return noted
 
     @property
     def plant_kind(self) -> str:
@@ -377,9 +393,12 @@ class FlightConfig(CodePermission):
         """Return the shared part as canonical JSON, with the command lead that was chosen."""
         shared = self.model_dump(mode="json", include=set(SHARED_SECTIONS))
         shared["timing"]["lead_ticks"] = lead_ticks
-        if not shared["coder"].get("floor_gain", True):  # recordings from before have the same digest
-            del shared["coder"]["floor_gain"], shared["coder"]["floor_exponent"]
-        if not shared["model"].get("start") and self.model.kind != "linear":
-            shared["model"].pop("start", None)  # recordings from before it have the same digest
+        for name, section in (("model", self.model), ("coder", self.coder)):
+            fields = {} if section.kind == "linear" else type(section).model_fields
+            for field in ADDED_FIELDS & fields.keys():
+                if getattr(section, field) == fields[field].default:
+                    del shared[name][field]  # recordings from before it have the same digest
+        if self.flight_log.digest:
+            shared["flight_log"] = {"digest": self.flight_log.digest}
         shared["coder"]["kind"] = DIGEST_KINDS.get(self.coder.kind, self.coder.kind)
         return json.dumps(shared, sort_keys=True, separators=(",", ":"))

@@ -130,6 +130,6 @@ def recorded_arrays(log: FlightLog | None, ahead: int, signals: Signals) -> dict
     given = {"recorded": log.measured, "commands": log.commands[:ahead], "applied": log.commands}
     if not log.commands.shape[1]:
         return given | {"commands": np.zeros((ahead, len(signals.inputs))), "applied": NO_ROWS}
-    if ahead > len(log):
-        given["commands"] = np.pad(log.commands, ((0, ahead - len(log)), (0, 0)), mode="edge")
+    if (more := ahead - len(log.commands)) > 0:
+        given["commands"] = np.pad(log.commands, ((0, more), (0, 0)), mode="edge")
     return given

@@ -5,7 +5,10 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from tenbaud.build.ends import build_observer
 from tenbaud.build.flight import Agreement
@@ -40,9 +43,13 @@ class Bench:
         """of each flight's motion, in units of the recorded one"""
         self._points: list[CompiledPoint] = []
         self._cores = cores
+        # Commands of a last sample that is cut short, once: the phases share the arrays.
+        more = ((0, point.numbers.per_sample + point.numbers.lead), (0, 0))
         for log, size, scale in variants:
+            if log.commands.size:
+                log = replace(log, commands=np.pad(log.commands, more, mode="edge"))
             for phase in phases:
-                one = point.on(rows(log, phase, len(log)), max(scored_from - phase, 0))
+                one = point.on(rows(log, phase), max(scored_from - phase, 0))
                 for name in ("command_max", "slew"):
                     one.steady[name] = one.steady[name] * max(1.0, scale)
                 self._points.append(one)
@@ -71,4 +78,5 @@ def _fly(
             flown.append(point.fly(agreement.config.seed)[0])
         except Uncommon as error:
             flown.append(FlightFigures(str(error), "compiled", "", (), 0, 0, 0))
+        point.rest()
     return flown

@@ -81,7 +81,8 @@ class DirectionFamily:
 
     def __init__(self, config: FlightConfig) -> None:
         """Design for the disturbance as configured: another strength scales Q and P alone."""
-        bits = round(config.channel.rate_baud * config.timing.symbol_period_s)
+        # As many as the line carries: rounded up they would come late.
+        bits = max(1, math.floor(config.channel.rate_baud * config.timing.symbol_period_s + 1e-6))
         given = config.model_dump(mode="json", include={"timing", "model"})
         done = completed({**given, "coder": {"kind": "direction", "bits": bits}})
         model = type(config.model).model_validate(done["model"])

@@ -154,15 +154,14 @@ class CompiledPoint:
         return self._figures(schedule), Trace(work.models, work.coders)
 
     def on(self, log: FlightLog, scored_from: int) -> CompiledPoint:
-        """Return this point on another record, which is no longer than its own."""
-        agreement, ticks = replace(self.agreement, scored_from=scored_from), len(log)
-        codec, signals = agreement.codec, agreement.signals
+        """Return this point on another record, which is no longer than its own; `use` comes first."""
+        agreement = replace(self.agreement, scored_from=scored_from)
         other = copy(self)
         other.agreement, other.scored_from = agreement, scored_from
         other._log, other._clean = log, None
-        other.numbers = self.numbers._replace(ticks=ticks, window_start=scored_from)
-        other.steady = self.steady | recorded_arrays(log, other._ahead, signals)
-        other._work = work_arrays(codec, signals, other._samples, ticks, other._ahead)
+        other.numbers = self.numbers._replace(ticks=len(log), window_start=scored_from)
+        other.steady = self.steady | recorded_arrays(log, other._ahead, agreement.signals)
+        del other._work
         return other
 
     def use(self, agreement: Agreement, observer: dict[str, Any]) -> None:
@@ -173,11 +172,12 @@ class CompiledPoint:
         coder: Any = codec.coder
         self.constants = (arrays_of(model.constants), arrays_of(coder.constants), *self.constants[2:])
         self.steady = self.steady | observer
-        state = codec.initial()
-        if self._work.coders.shape[1] != len(state.coder):
-            ticks, signals = self.numbers.ticks, agreement.signals
-            self._work = work_arrays(codec, signals, self._samples, ticks, self._ahead)
-        self._work.models[0], self._work.coders[0] = state.model, state.coder
+        ticks, signals = self.numbers.ticks, agreement.signals
+        self._work = work_arrays(codec, signals, self._samples, ticks, self._ahead)
+
+    def rest(self) -> None:
+        """Give back what a flight wrote: points of a long record need the room in turn."""
+        del self._work
 
     def _counts(self, schedule: Schedule) -> FlightCounts:
         """Return what the verdict on a flight rests on; a compiled one has no rejoin and no stop."""

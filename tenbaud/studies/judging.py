@@ -1,10 +1,11 @@
 """Flights on which constants are fitted, and others on which they are judged.
 
 On simulated flights, one set of seeds is for the fit and another for the judgement. On a recorded
-flight, the first part is for the fit, at several sizes, with shoves added and from several sample
-phases (`records`); the rest is for the judgement, as it was recorded and from every phase: there the
-codec flies through the whole recording and only the rest counts. The measure is the rms error of the
-receiver's predicted estimate, of several outputs together by the weights of the model.
+flight, the first part is for the fit (of a long one, where it moves most), at several sizes, with
+shoves added and from several sample phases (`records`); the rest is for the judgement, as it was
+recorded and from every phase: there the codec flies through the whole recording and only the rest
+counts. The measure is the rms error of the receiver's predicted estimate, of several outputs together
+by the weights of the model.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from channel.errors import TenbaudError
 from tenbaud.build.codec import build_codec
 from tenbaud.build.flight import ticks_of
 from tenbaud.build.flight_log import read_flight_log
+from tenbaud.build.recorded import start_at
 from tenbaud.config.schema import FlightConfig
 from tenbaud.design.described import linear_of
 from tenbaud.studies.bench import Bench
@@ -29,7 +31,7 @@ from tenbaud.studies.chunk import fly_point
 from tenbaud.studies.constants import changed
 from tenbaud.studies.figures import FlightFigures
 from tenbaud.studies.plain import fly_plain
-from tenbaud.studies.records import Augment, Variant, phases_of, rows, variants_of
+from tenbaud.studies.records import Augment, Variant, liveliest, phases_of, rows, variants_of
 from tenbaud.studies.schedule import Uncommon
 from tenbaud.studies.settings import StudyError, configured
 from tenbaud.studies.study_file import Range
@@ -38,6 +40,8 @@ Method = Literal["cma-es", "nelder-mead"]
 
 PENALTY_RAD = 100.0
 """The error that counts for a flight without figures: larger than any error of an angle of weight 1."""
+FIT_TICKS = 100_000
+"""of a recorded flight that are fitted, at most"""
 PHASES_MAX = 50
 """sample phases of the judgement"""
 NO_CONSTANTS = (TenbaudError, ValueError, ArithmeticError, np.linalg.LinAlgError)
@@ -134,9 +138,13 @@ class Judge:
         config = tuning.config({})
         self._weights = weights_of(config)
         self.recorded = config.transmitter.rig == "replay"
-        self._border = self._ticks = 0
+        self.border = self.ticks = self._first = 0
+        self._start: dict[str, Any] = {}
         if self.recorded:
-            self._border, self._ticks = split_ticks(config, tuning.split.train_share)
+            self.border, self.ticks = split_ticks(config, tuning.split.train_share)
+            log = rows(read_flight_log(config), 0, self.border)
+            if first := liveliest(log, FIT_TICKS):
+                self._first, self._start = first, start_at(config, rows(log, first))
 
     def __call__(self, values: dict[str, float], *, train: bool) -> Judged:
         """Fly constants; ConfigError, StudyError and the like where they make no flight at all."""
@@ -147,23 +155,32 @@ class Judge:
             return score(fly_point(config, seeds, "auto"), None, self._weights)
         bench = self._train if train else self._test
         if bench is not None:
+            config = changed(config, self._start) if train else config
             return score(
                 bench.fly(config), bench.sizes if train else None, self._weights, mean=not train
             )
-        until = self._border if train else self._ticks
+        until = self.border if train else self.ticks
         config = config.model_copy(update={"duration_s": until * config.timing.tick_s})
-        return score([fly_plain(config, 0 if train else self._border)], None, self._weights)
+        return score([fly_plain(config, 0 if train else self.border)], None, self._weights)
+
+    @property
+    def fit(self) -> tuple[int, int]:
+        """Return the ticks between which a recorded flight is fitted."""
+        if self._train is None:
+            return 0, self.border  # the nodes begin where the recording does
+        return self._first, min(self._first + FIT_TICKS, self.border)
 
     @cached_property
     def _train(self) -> Bench | None:
-        config, augment = self._tuning.config({}), self._tuning.augment
-        log = rows(read_flight_log(config), 0, self._border)
+        augment = self._tuning.augment
+        config = changed(self._tuning.config({}), self._start)
+        log = rows(read_flight_log(config), self._first, min(self._first + FIT_TICKS, self.border))
         return self._bench(variants_of(config, build_codec(config), log, augment), augment.phases, 0)
 
     @cached_property
     def _test(self) -> Bench | None:
-        log = rows(read_flight_log(self._tuning.config({})), 0, self._ticks)
-        return self._bench([Variant(log, 1.0, 1.0)], PHASES_MAX, self._border)
+        log = rows(read_flight_log(self._tuning.config({})), 0, self.ticks)
+        return self._bench([Variant(log, 1.0, 1.0)], PHASES_MAX, self.border)
 
     def _bench(self, variants: list[Variant], phases: int, scored_from: int) -> Bench | None:
         """Return the flights of a part; None where only the nodes can fly them."""

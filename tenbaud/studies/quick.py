@@ -15,13 +15,14 @@ import numpy as np
 
 from channel.flight_log import FlightLog
 from tenbaud.build.flight_log import read_flight_log
+from tenbaud.build.recorded import start_at
 from tenbaud.config.schema import FlightConfig
 from tenbaud.studies.bench import Bench
 from tenbaud.studies.constants import BANDWIDTH, changed
 from tenbaud.studies.families import Family, family_of
 from tenbaud.studies.figures import shared_parts
 from tenbaud.studies.judging import NO_CONSTANTS, PHASES_MAX, score, weights_of
-from tenbaud.studies.records import Augment, Variant, phases_of, rows, variants_of
+from tenbaud.studies.records import Augment, Variant, liveliest, phases_of, rows, variants_of
 from tenbaud.studies.schedule import Uncommon
 from tenbaud.studies.search import minimise
 from tenbaud.studies.settings import StudyError
@@ -68,7 +69,12 @@ def quick_coder(
     log, timing = read_flight_log(config), config.timing
     if until_s is not None:
         log = rows(log, 0, max(0, round(until_s / timing.tick_s)))
-    log = _liveliest(log)
+    first = liveliest(log, WINDOW_TICKS)
+    log = rows(log, first, first + WINDOW_TICKS)
+    own = config.model
+    if first:
+        config = changed(config, start_at(config, log))
+        family = family_of(config)
     samples = len(log) * timing.tick_s / timing.symbol_period_s
     if samples < SAMPLES_MIN:
         raise StudyError(
@@ -85,6 +91,8 @@ def quick_coder(
         raise StudyError(f"the constants that suit the record's variants do not fly it: {bad[0]}")
     outputs = list(zip(*[one.outputs for one in flown], strict=True))
     sections = found.model_dump(mode="json", include={"model", "coder"})
+    if first:
+        sections["model"]["start"] = list(own.start)
     if found.model.kind != "linear":
         name = BANDWIDTH.rpartition(".")[2]
         sections["transmitter"] = {name: getattr(found.transmitter, name)}
@@ -149,13 +157,3 @@ class _Fit:
             self._least, self._found = judged.rms_rad, config
         self._on_evaluation(self._count, self._least)
         return judged.rms_rad
-
-
-def _liveliest(log: FlightLog) -> FlightLog:
-    """Return the part of a record that moves most, where it is long."""
-    if len(log) <= WINDOW_TICKS:
-        return log
-    starts = range(0, len(log) - WINDOW_TICKS + 1, WINDOW_TICKS // 2)
-    moved = [float(log.measured[at : at + WINDOW_TICKS].std(axis=0).sum()) for at in starts]
-    first = starts[int(np.argmax(moved))]
-    return rows(log, first, first + WINDOW_TICKS)

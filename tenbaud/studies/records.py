@@ -86,7 +86,16 @@ def phases_of(config: FlightConfig, most: int) -> list[int]:
     return [phase * ticks // min(most, ticks) for phase in range(min(most, ticks))]
 
 
-def rows(log: FlightLog, first: int, last: int) -> FlightLog:
+def liveliest(log: FlightLog, ticks: int) -> int:
+    """Return the row at which that many begin that move most; 0 where there are no more."""
+    if len(log) <= ticks:
+        return 0
+    starts = range(0, len(log) - ticks + 1, ticks // 2)
+    moved = [float(log.measured[at : at + ticks].std(axis=0).sum()) for at in starts]
+    return starts[int(np.argmax(moved))]
+
+
+def rows(log: FlightLog, first: int, last: int | None = None) -> FlightLog:
     """Return the rows of a record from `first` to before `last`."""
     parts = {name: getattr(log, name)[first:last] for name in ("measured", "counts", "commands")}
     return replace(log, **parts)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any, NamedTuple
 
+from tenbaud.build.signals import configured_signals
 from tenbaud.config.load import flattened
 from tenbaud.config.schema import FlightConfig
 from tenbaud.studies.constants import BANDWIDTH, present
@@ -20,18 +21,17 @@ from tenbaud.studies.judging import (
     Judged,
     Tuning,
     is_worse,
-    split_ticks,
 )
 from tenbaud.studies.search import minimise
 from tenbaud.studies.settings import StudyError
 from tenbaud.studies.study_file import Range
 
 OnEvaluation = Callable[[int, float], None]
-"""(sets of constants flown, smallest error so far in rad)"""
+"""(sets of constants flown, smallest error so far)"""
 
 
 class Tuned(NamedTuple):
-    """The result. Errors are rms of the live estimate, in rad."""
+    """The result. Errors are rms of the live estimate, in the units of the outputs."""
 
     values: dict[str, float]
     train_before: float
@@ -55,6 +55,8 @@ class Tuned(NamedTuple):
     """whether the error of the validation rose by more than its spread over the flights explains"""
     failure: str
     """why the search found nothing; empty: it did"""
+    units: tuple[str, ...] = ("rad",)
+    """of the outputs, each once"""
 
 
 def tune(
@@ -89,7 +91,7 @@ def tune(
         "train_after": trials.best,
         "test_after": after_test,
     }
-    train_what, test_what = _described(config, tuning)
+    train_what, test_what = _described(config, tuning, judge)
     return Tuned(
         values=trials.values,
         **{name: one.rms_rad for name, one in judged.items()},
@@ -103,6 +105,7 @@ def tune(
         test_amplitude=after_test.amplitude,
         over_fitted=is_worse(before_test, after_test),
         failure=trials.failure if trials.values == start else "",
+        units=units_of(config),
     )
 
 
@@ -187,15 +190,17 @@ def _share(one: Range, value: float) -> float:
     return min(max(share, 0.0), 1.0)
 
 
-def _described(config: FlightConfig, tuning: Tuning) -> tuple[str, str]:
+def _described(config: FlightConfig, tuning: Tuning, judge: Judge) -> tuple[str, str]:
     split = tuning.split
-    if config.transmitter.rig != "replay":
+    if not judge.recorded:
         return f"seeds {_listed(split.train_seeds)}", f"seeds {_listed(split.test_seeds)}"
-    border, last = (tick * config.timing.tick_s for tick in split_ticks(config, split.train_share))
+    first, end, border, last = (
+        tick * config.timing.tick_s for tick in (*judge.fit, judge.border, judge.ticks)
+    )
     sizes = ", ".join(f"{scale:g}" for scale in tuning.augment.scales)
     shoves = " with and without shoves" if tuning.augment.shoves else ""
     return (
-        f"0 ... {border:g} s of the recording at the sizes {sizes}{shoves}",
+        f"{first:g} ... {end:g} s of the recording at the sizes {sizes}{shoves}",
         f"{border:g} ... {last:g} s of it, mean of all sample phases",
     )
 
@@ -204,21 +209,35 @@ def _listed(seeds: tuple[int, ...]) -> str:
     return f"{seeds[0]} ... {seeds[-1]}" if len(seeds) > 1 else str(seeds[0])
 
 
+def units_of(config: FlightConfig) -> tuple[str, ...]:
+    """Return the units of a model's outputs, each once."""
+    return tuple(dict.fromkeys([one.unit for one in configured_signals(config).outputs]))
+
+
+def shown(error: float, units: tuple[str, ...]) -> str:
+    """Return an error with its unit, degrees for rad; with all of them where they differ."""
+    if units == ("rad",):
+        return f"{math.degrees(error):.4g} degrees"
+    return f"{error:.4g} {' and '.join(units)}".rstrip()
+
+
 def report(tuned: Tuned) -> Iterator[str]:
     """Yield lines with the errors of both parts, and what they leave out."""
     for what, part in (
         (f"fit on {tuned.train_what}", "train"),
         (f"validated on {tuned.test_what}", "test"),
     ):
-        before, after = (math.degrees(getattr(tuned, f"{part}_{when}")) for when in ("before", "after"))
-        yield f"{what}: rms error {before:.4g} -> {after:.4g} degrees"
-    least, worst, largest = (
-        math.degrees(one) for one in (min(tuned.test_each), max(tuned.test_each), tuned.test_largest)
-    )
+        before, after = (
+            shown(getattr(tuned, f"{part}_{when}"), tuned.units) for when in ("before", "after")
+        )
+        yield f"{what}: rms error {before} -> {after}"
+    least, worst = (shown(one, tuned.units) for one in (min(tuned.test_each), max(tuned.test_each)))
+    largest = shown(tuned.test_largest, tuned.units[:1])
+    penalty = f"{PENALTY_RAD:g} {' and '.join(tuned.units)}".rstrip()
     share = 100.0 * tuned.test_largest / tuned.test_amplitude
     yield (
-        f"the {len(tuned.test_each)} flights of the validation: rms error {least:.4g} ... {worst:.4g} "
-        f"degrees, largest error {largest:.4g} degrees ({share:.3g} % of the largest value)"
+        f"the {len(tuned.test_each)} flights of the validation: rms error {least} ... {worst}, "
+        f"largest error {largest} ({share:.3g} % of the largest value)"
     )
     if tuned.failure:
         yield f"the fit failed: {tuned.failure}"
@@ -227,11 +246,11 @@ def report(tuned: Tuned) -> Iterator[str]:
     for name, lost in tuned.without_figures.items():
         part, when = name.split("_")
         flights = "flights for the fit" if part == "train" else "flights for validation"
-        yield f"{lost} of the {flights} failed {when} the fit and were scored {PENALTY_RAD:g} rad each"
+        yield f"{lost} of the {flights} failed {when} the fit and were scored {penalty} each"
     if tuned.penalised:
         yield (
             f"{tuned.penalised} of the {tuned.evaluations} parameter sets had failed flights, which "
-            f"were scored {PENALTY_RAD:g} rad each"
+            f"were scored {penalty} each"
         )
 
 

@@ -11,6 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from channel.protocol.frames import Hello
+from channel.protocol.identity import differing_fields
+from receiver.session.rejoin import difference
 from tenbaud.build.emulator import build_emulator
 from tenbaud.build.ends import guard_settings
 from tenbaud.build.flight import Agreement, agree
@@ -235,3 +238,38 @@ def flat(values: dict[str, Any]) -> dict[str, Any]:
     from tenbaud.config.load import flattened
 
     return {name: value for name, value in flattened(values) if name != "link.kind"}
+
+
+@pytest.mark.parametrize("text", ["transmitter = 5", "timing = 3", "flight_log = []"])
+def test_a_section_that_is_none_is_an_error_in_words(tmp_path: Path, text: str) -> None:
+    (tmp_path / "wrong.toml").write_text(text)
+    name = text.split()[0]
+    over = {"transmitter": {"rig": "replay"}} if name == "timing" else {}
+    with pytest.raises(ConfigError, match=f"wrong.toml.*\n  {name}"):
+        flight_config(None, tmp_path / "wrong.toml", over)
+
+
+def test_ends_that_read_other_commands_refuse_each_other(tmp_path: Path) -> None:
+    file = pitch_log(tmp_path)
+    rig, desk = (
+        agreed(flight_config("tuned-10baud", None, replay(file, **changes))).identity
+        for changes in ({}, {"flight_log__signs": {"front": -1}})
+    )
+    assert differing_fields(desk.config, rig.config)[0].startswith("flight_log.digest: here ")
+    hello = Hello(1, rig.version, rig.config_digest, rig.numerics_probe)
+    assert "the shared configuration differs" in str(difference(hello, desk))
+
+
+def test_a_run_folder_whose_file_changed_is_read_again(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    folder.mkdir()
+    for start_rad in (0.5, 0.25):
+        pitch_log(tmp_path, start_rad=start_rad).replace(folder / "flight.csv")
+        config = flight_config("tuned-10baud", None, replay(folder))
+        assert read_flight_log(config).measured[0, 0] == start_rad
+
+
+def test_a_duration_beyond_the_recording_is_told(tmp_path: Path) -> None:
+    config = flight_config("tuned-10baud", None, replay(pitch_log(tmp_path), duration_s=60.0))
+    assert config.duration_s == 6.0
+    assert "60 s were asked for" in replay_notes(config)[1]

@@ -145,3 +145,9 @@ def test_each_end_flies_or_is_refused_in_words(
     arguments += ["--set", number.kind] if number.kind else []
     code = run(arguments)
     assert code == 0 or capsys.readouterr().err
+
+
+@pytest.mark.parametrize("hover_rad", [0.0, 0.6])
+def test_a_helicopter_hovers_between_level_and_its_stop(hover_rad: float) -> None:
+    with pytest.raises(TenbaudError, match="hover_rad"):
+        load_config("helicopter-10baud", None, {"model": {"hover_rad": hover_rad}})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from hashlib import blake2b
 from pathlib import Path
 from typing import Any
 
@@ -102,3 +103,8 @@ def test_when_a_run_was_recorded_under_old_names_then_it_replays_and_passes_its_
 def test_the_digest_of_a_configuration_is_that_of_its_old_names() -> None:
     assert '"kind":"timed"' in agree(load_config("open-loop-zoom-10baud"), "virtual").identity.config
     assert '"kind":"words"' in agree(load_config("usual-1000baud"), "virtual").identity.config
+
+
+def test_a_pcm_recording_from_before_there_were_several_outputs_has_the_same_digest() -> None:
+    shared = load_config("usual-1000baud").shared_json(3)
+    assert blake2b(shared.encode(), digest_size=16).hexdigest() == "2d2b67e5eaac75e129a0140e7a4952f2"

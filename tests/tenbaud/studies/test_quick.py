@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from tenbaud.config.coders import DirectionCoderSection
 from tenbaud.config.load import load_config, merged
 from tenbaud.studies import quick
+from tenbaud.studies.families import DirectionFamily
 from tenbaud.studies.plain import fly_plain
 from tenbaud.studies.quick import quick_coder
 from tenbaud.studies.settings import StudyError
@@ -76,3 +78,25 @@ def test_when_only_the_beginning_may_be_looked_at_then_the_rest_changes_nothing(
 def test_when_the_record_is_too_short_then_it_says_so(log: Path) -> None:
     with pytest.raises(StudyError, match=r"10 samples of 0\.1 s; 20 are needed"):
         quick_coder(config_of(log), until_s=1.0)
+
+
+def test_when_the_fit_begins_within_the_record_then_the_codec_begins_there_too(
+    log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(quick, "WINDOW_TICKS", 300)
+    monkeypatch.setattr(quick, "liveliest", lambda _log, _ticks: 650)
+    lines = [line.split(",") for line in log.read_text().splitlines()]
+    far = [[one[0], str(int(one[1]) + 1000 * (at >= 600)), *one[2:]] for at, one in enumerate(lines[1:])]
+    log.write_text("\n".join(",".join(one) for one in [lines[0], *far]))
+    found = quick_coder(config_of(log))
+    assert found.sections["model"]["start"] == []
+    assert found.largest[0] < 0.6  # the step before it is 1.5 rad
+
+
+@pytest.mark.parametrize(("tick_s", "bits"), [(0.16, 1), (0.04, 1), (0.2, 2)])
+def test_when_a_coder_is_designed_then_its_bits_fit_the_line(tick_s: float, bits: int) -> None:
+    timing = {"tick_s": tick_s, "symbol_period_s": tick_s}
+    family = DirectionFamily(load_config("own", None, {"timing": timing, **LINEAR}))
+    coder = family.at(family.scan[0]).coder
+    assert isinstance(coder, DirectionCoderSection)
+    assert coder.bits == bits

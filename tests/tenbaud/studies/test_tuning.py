@@ -22,6 +22,7 @@ from tenbaud.build.rig import nominal_plant
 from tenbaud.cli.commands import app
 from tenbaud.config.load import load_config
 from tenbaud.flight.outcome import ExitCode
+from tenbaud.studies import judging
 from tenbaud.studies.constants import free_ranges
 from tenbaud.studies.flights import CompiledPoint
 from tenbaud.studies.judging import PENALTY_RAD, Judge, Judged, Split, Tuning, is_worse, split_ticks
@@ -29,7 +30,7 @@ from tenbaud.studies.plain import fly_plain
 from tenbaud.studies.records import Augment, phases_of, variants_of
 from tenbaud.studies.settings import StudyError
 from tenbaud.studies.study_file import Range
-from tenbaud.studies.tuning import preset_text, report, tune
+from tenbaud.studies.tuning import preset_text, report, shown, tune
 
 REPLAY: dict[str, Any] = {
     "transmitter": {"rig": "replay"},
@@ -343,3 +344,27 @@ def test_when_a_recording_is_split_then_fit_and_judgement_see_different_halves(
     again = CliRunner().invoke(app, command)
     assert again.exit_code != 0
     assert "exists already" in str(again.exception)
+
+
+def test_when_a_recording_is_long_then_it_is_fitted_where_it_moves_most_on_shared_arrays(
+    log: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(judging, "FIT_TICKS", 200)
+    overrides = replayed(log)
+    tuning = tuning_of({}, preset="uiuc-10baud", overrides=overrides, augment=AS_RECORDED)
+    fitted = Judge(tuning)
+    first, last = fitted.fit
+    assert (last - first, fitted.border, fitted.ticks) == (200, 500, 1000)
+    assert first > 0
+    assert fitted({}, train=True).lost == 0
+    bench = fitted._test
+    assert bench is not None
+    one, other = (point.steady for point in bench._points[:2])
+    for name in ("recorded", "commands", "applied"):
+        assert np.shares_memory(one[name], other[name])
+
+
+def test_when_errors_are_reported_then_their_unit_is_that_of_the_outputs() -> None:
+    assert shown(0.5, ("rad",)) == "28.65 degrees"
+    assert shown(0.5, ("rad/s",)) == "0.5 rad/s"
+    assert shown(0.5, ("rad", "m")) == "0.5 rad and m"

@@ -188,12 +188,9 @@ def write_record(path: Path, record: Record) -> dict[str, Any]:
             outputs, inputs = record.outputs[piece], record.inputs[piece]
             times = (first + np.arange(len(outputs))) * record.step_s
             np.savetxt(stream, np.column_stack((times, outputs, inputs)), "%.9g", ",")
-    units = {
-        f"out:{name}": unit for name, unit in zip(record.output_names, record.output_units, strict=True)
-    }
-    units |= {
-        f"in:{name}": unit for name, unit in zip(record.input_names, record.input_units, strict=True)
-    }
+    roles = [f"out:{name}" for name in record.output_names]
+    roles += [f"in:{name}" for name in record.input_names]
+    units = zip(roles, (*record.output_units, *record.input_units), strict=True)
     return {
         "file": str(path.resolve()),
         "time": "time",

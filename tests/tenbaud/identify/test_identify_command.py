@@ -13,8 +13,11 @@ from typer.testing import CliRunner, Result
 
 import tenbaud
 from plant_sim.identification.errors import IdentificationError
+from tenbaud.build.flight_log import read_flight_log
 from tenbaud.cli.commands import app
 from tenbaud.config.load import load_config
+from tenbaud.identification.api import Each
+from tenbaud.identification.api import Result as Found
 from tenbaud.log.table import LogError
 from tests.plant_sim.identification.experiments import EXCITATION_A, experiment
 from tests.plant_sim.identification.test_linear import CASES, COUPLED, record_of
@@ -351,7 +354,7 @@ def test_when_the_excitation_is_not_understood_then_the_grammar_is_shown() -> No
     assert "square:FREQUENCY" in str(result.exception)
 
 
-def test_when_arrays_are_identified_then_the_model_is_that_of_the_command() -> None:
+def test_when_arrays_are_identified_then_the_model_is_that_of_the_command(tmp_path: Path) -> None:
     record = swing(0.02, random_volts(1500, 5.0, 60), 0.4, 4.0, 0.2)
     arrays = {"angle": record.outputs[:, 0], "u": record.inputs[:, 0]}
     result = tenbaud.identify(
@@ -360,6 +363,10 @@ def test_when_arrays_are_identified_then_the_model_is_that_of_the_command() -> N
     assert result.refused == ()
     assert result.estimates["rate_damping_per_s"] == pytest.approx(0.4, rel=0.05)
     assert result.config.timing.tick_s == 0.02
-    assert list(result.settings["transmitter"]["encoders"]) == ["pitch"]
+    written = Each(result.identified, result.source, result.settings)
+    Found([written], load_config(), False).save(tmp_path, fly=False)
+    log = read_flight_log(load_config(None, tmp_path / "identified.toml"))
+    assert log.measured == pytest.approx(record.outputs, abs=1e-8)
+    assert log.commands[:, 0] == pytest.approx(record.inputs[:, 0])
     with pytest.raises(IdentificationError, match="no array is called v"):
         tenbaud.identify(arrays, outputs=["angle"], inputs=["v"], tick_s=0.02)

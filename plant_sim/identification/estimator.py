@@ -107,13 +107,15 @@ def estimate(
     gain_bound: float | None = None,
     memory_s: float = 6.0,
     shown: int | None = None,
+    constant: int | None = None,
 ) -> Estimate:
     """Run (9), (10) over all blocks.
 
     `forgetting_per_s` is alpha, `gain` the diagonal of Gamma(0) (None: large, by the size of each
     regressor), `gain_bound` what the norm of Gamma may not exceed (ten times Gamma(0) if not given),
     `memory_s` longer than the noise's memory. The first `shown` parameters count for the condition;
-    the others describe how the record begins.
+    the others describe how the record begins. `constant` is the regressor that is always 1: what it
+    explains of the others does not tell them apart, and does not make them alike.
     """
     if not 0.0 <= forgetting_per_s < math.inf:
         raise IdentificationError(f"forgetting_per_s is {forgetting_per_s}; it must be at least 0")
@@ -157,7 +159,7 @@ def estimate(
         values,
         covariance,
         levels,
-        _condition(summed[:shown, :shown] / remembered, levels[:shown]),
+        _condition(summed[:shown, :shown] / remembered, constant),
         math.sqrt(max(0.0, float(weights @ errors)) / remembered),
         math.sqrt(float(weights @ moments.targets) / remembered),
     )
@@ -179,8 +181,14 @@ def _covariance(
     return np.asarray(inverse @ (blocks.T @ blocks) @ inverse * (whole / free))
 
 
-def _condition(mean: Array, levels: Array) -> float:
+def _condition(mean: Array, constant: int | None) -> float:
     """Return the smallest eigenvalue of a correlation matrix; 0 when a regressor is missing."""
-    if not np.all(levels > 0.0):
+    power = np.diag(mean)
+    if constant is not None:
+        mean = mean - np.outer(mean[constant], mean[constant]) / mean[constant, constant]
+        mean, power = (np.delete(one, constant, axis=0) for one in (mean, power))
+        mean = np.delete(mean, constant, axis=1)
+    levels = np.sqrt(np.maximum(np.diag(mean), 0.0))
+    if not np.all(levels**2 > 1e-12 * power):
         return 0.0
     return float(max(0.0, np.linalg.eigvalsh(mean / np.outer(levels, levels))[0]))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 from scipy.signal import detrend, welch
@@ -34,10 +33,10 @@ def require_motion(record: Record) -> None:
         )
 
 
-def require_units(record: Record) -> None:
-    """Raise IdentificationError where angles are not in rad, or voltages not in volts."""
+def require_units(record: Record) -> list[str]:
+    """Raise IdentificationError where angles are in another unit; return doubts about voltages."""
     for name, unit, step in zip(record.output_names, record.output_units, record.steps, strict=True):
-        if unit in ("rad", "") and step and _counts(360.0 / step):
+        if unit == "rad" and step and _counts(360.0 / step):
             raise IdentificationError(
                 f"the {name} moves in steps of {step:.6g} = 360/{round(360.0 / step)}: the column is "
                 "in degrees and is read as rad, a factor of 57.3. Say --units deg"
@@ -47,13 +46,13 @@ def require_units(record: Record) -> None:
                 f"the {name} moves in steps of {step:.6g} = 2 pi/{round(math.tau / step)}: the column "
                 "is in rad and is read as degrees, a factor of 57.3. Say --units rad"
             )
-    for name, unit, values in zip(record.input_names, record.input_units, record.inputs.T, strict=True):
-        largest = float(np.abs(values).max())
-        if unit == "V" and largest > VOLTS_MAX:
-            raise IdentificationError(
-                f"{name} reaches {largest:.4g} V; is the column in millivolts (a factor of 1000) or in "
-                f"counts? Say --units {name}=mV, or --scale {name}=FACTOR"
-            )
+    largest = np.abs(record.inputs).max(axis=0, initial=0.0).tolist()
+    return [
+        f"{name} reaches {most:.4g} V; if the column is in millivolts (a factor of 1000) or in counts, "
+        f"say --units {name}=mV, or --scale {name}=FACTOR"
+        for name, unit, most in zip(record.input_names, record.input_units, largest, strict=True)
+        if unit == "V" and most > VOLTS_MAX
+    ]
 
 
 def _counts(value: float) -> bool:
@@ -61,24 +60,6 @@ def _counts(value: float) -> bool:
     whole = round(value)
     usual = whole in COUNTS or (whole >= 64 and whole & (whole - 1) == 0)
     return usual and abs(value - whole) < 2e-3 * whole
-
-
-def unwrapped(record: Record) -> tuple[Record, list[str]]:
-    """Return a record whose angles do not jump by a turn, and what was done."""
-    outputs, notes = record.outputs, []
-    for index, (name, unit) in enumerate(zip(record.output_names, record.output_units, strict=True)):
-        turn = 360.0 if unit == "deg" else math.tau
-        steps = np.abs(np.diff(outputs[:, index]))
-        jumps = np.flatnonzero(np.abs(steps - turn) < 0.2 * turn)
-        usual = float(np.median(steps))
-        if unit in ("rad", "deg", "") and len(jumps) and usual < 0.1 * turn:
-            outputs = outputs.copy()
-            outputs[:, index] = np.unwrap(outputs[:, index], period=turn)
-            notes.append(
-                f"the {name} jumps by a turn at sample {jumps[0] + 1} and {len(jumps) - 1} more: it "
-                "was unwrapped"
-            )
-    return replace(record, outputs=outputs), notes
 
 
 def dominant_rad_s(record: Record, structure: Structure) -> float:

@@ -2,7 +2,7 @@
 
 The motor lag is found by the smallest simulation error; the regression (9), (10) then runs with it
 over the whole record, and the simulation-error fit is the second opinion. Of the two, the one counts
-that predicts better over stretches of half the length of those of the fit.
+that predicts better over every other segment, which the fit does without for that decision.
 """
 
 from __future__ import annotations
@@ -41,6 +41,8 @@ FOLLOWED = 0.995
 """share of the motion that a fit should explain; below it shorter segments are tried"""
 EXPLAINED = 0.9
 """share below which something else moves the plant"""
+EXPLAINED_MIN = 0.5
+"""share below which it moves the plant more than the inputs do"""
 SHORTER = (1.0, 4.0, 16.0)
 COARSE = 100
 """blocks of a regression of which only the last estimate counts"""
@@ -127,7 +129,7 @@ def identify(record: Record, structure: Structure, options: Options | None = Non
         regression = regress(record, structure, filters)
         values, covariance, by_simulation = _decided(structure, regression, check, segments)
     if check is not None:
-        warnings += disagreements(regression, check)
+        warnings += disagreements(regression, check).values()
     deviation = 0.0 if check is None else check.lag_deviation_s
     result = Identification(
         structure,
@@ -194,7 +196,7 @@ def _simulated(
         length_s = simulation.SEGMENT_S / filters.bandwidth_rad_s / shorter
         if best is not None and length_s < 16.0 * record.step_s:
             break
-        segments = simulation.cut(record, structure, length_s)
+        segments = simulation.cut(record, structure, length_s, rests=filters.rests)
         lag_s = _rough_lag(record, structure, filters, segments, options)
         start = regress(record, structure, replace(filters, lag_s=lag_s), blocks=COARSE)
         free = options.lag_s is None
@@ -235,20 +237,19 @@ def _decided(
 def _predicts_better(
     structure: Structure, check: SimulationFit, regression: Regression, segments: Segments
 ) -> bool:
-    """Return whether the fit beats the regression over stretches of half the length as well."""
+    """Return whether a fit of half the segments beats the regression over the other half."""
     if not np.all(np.isfinite(np.diag(regression.covariance))):
         return True
-    half = max(4, len(segments.outputs) // 2)
-    shorter = replace(segments, outputs=segments.outputs[:half], inputs=segments.inputs[:half])
-    errors = [
-        _error(structure, values, regression.filters.lag_s, shorter)
-        for values in (check.values, regression.values)
-    ]
+    used, held = (simulation.every_other(segments, first) for first in (0, 1))
+    lag_s = regression.filters.lag_s
+    fitted = simulation.fit(used, structure, check.values, lag_s)
+    errors = [_error(structure, one.values, lag_s, held) for one in (fitted, regression)]
     return errors[0] < errors[1]
 
 
-def disagreements(regression: Regression, check: SimulationFit) -> Iterable[str]:
-    """Yield where the two opinions differ by more than both uncertainties and 10 % explain."""
+def disagreements(regression: Regression, check: SimulationFit) -> dict[str, str]:
+    """Return, by parameter, where the opinions differ more than both uncertainties and 10 % explain."""
+    found = {}
     theirs = regression.structure.parameters(regression.values, regression.covariance)
     ours = regression.structure.parameters(check.values, check.covariance)
     for one, other in zip(theirs, ours, strict=True):
@@ -256,11 +257,12 @@ def disagreements(regression: Regression, check: SimulationFit) -> Iterable[str]
         floor = 0.02 if one.letter == "theta_0" else 0.0
         small = one.letter == "a_w" and 0.02 * math.sqrt(abs(ours[1].value))
         if abs(one.value - other.value) > 3.0 * spread + AGREEMENT * abs(other.value) + floor + small:
-            yield (
+            found[one.letter] = (
                 f"{one.letter}: the regression says {one.value:.4g}, the simulation-error fit "
                 f"{other.value:.4g}; the model does not describe these data well, or something else "
                 "pushes the plant"
             )
+    return found
 
 
 def _doubts(found: Identification) -> Iterable[str]:
@@ -296,11 +298,26 @@ def _unsupported(found: Identification, record: Record) -> Iterable[str]:
     deviations = np.sqrt(np.maximum(np.diag(found.covariance), 0.0)).tolist()
     spread = dict(zip(found.values, deviations, strict=True))
     gains = gains_of(structure, structure.acting(record.inputs[:1]).shape[1])
-    alone = len(gains) == 1
+    check = found.check
+    if check is None:
+        yield "no second method confirms the estimates: the simulation-error fit failed"
+    elif check.explained < EXPLAINED_MIN:
+        yield (
+            f"the model explains {max(0.0, check.explained):.0%} of the motion, at least "
+            f"{EXPLAINED_MIN:.0%} is needed: something that the file does not hold moves the plant "
+            "more than its inputs do"
+        )
+    differing = {} if check is None else disagreements(regression, check)
     for equation, one in zip(structure.equations, regression.estimates, strict=True):
+        own = gains.intersection(term.name for term in equation.terms)
+        sure = any(spread[name] <= UNCERTAINTY_MAX * abs(found.values[name]) for name in own)
         for term, level in zip(equation.terms, one.levels, strict=False):
             value, deviation = found.values[term.name], spread[term.name]
-            small = deviation * level <= IMMATERIAL * one.target and not (alone and term.name in gains)
+            small = deviation * level <= IMMATERIAL * one.target and (sure or term.name not in own)
+            if check is not None and term.name in own.intersection(differing):
+                apart = abs(regression.values[term.name] - check.values[term.name])
+                if apart * level > IMMATERIAL * one.target:
+                    yield differing[term.name]
             if not math.isfinite(deviation):
                 yield f"{term.name}: the record is too short to say how sure the estimate is"
             elif deviation > UNCERTAINTY_MAX * abs(value) and not small:

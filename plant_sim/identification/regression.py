@@ -119,6 +119,7 @@ def regress(
             gain=filters.gain,
             memory_s=MEMORY / filters.bandwidth_rad_s,
             shown=len(equation.terms),
+            constant=_constant(record, structure, equation),
         )
         for equation, pieces in zip(structure.equations, sums, strict=True)
     )
@@ -130,6 +131,15 @@ def regress(
 
 
 Columns = Mapping[tuple[int, int], Array]
+
+
+def _constant(record: Record, structure: Structure, equation: Equation) -> int | None:
+    """Return which of an equation's regressors is the constant 1."""
+    signal = (
+        structure.signals(record.outputs[:1]).shape[1] + structure.acting(record.inputs[:1]).shape[1]
+    )
+    places = [place for place, term in enumerate(equation.terms) if term.signal == signal]
+    return places[0] if places else None
 
 
 def _rows(equation: Equation, columns: Columns, modes: list[Array]) -> tuple[Array, Array]:

@@ -26,10 +26,10 @@ SEGMENT_S = 5.0
 SEGMENTS_MIN = 4
 SAMPLES_MAX = 400_000
 """samples that are simulated; of a longer record, segments all over it"""
-STEPS_MAX = 600
-"""samples of a segment that are compared"""
 DRAWS_MIN = 12
-LAG_MAX_S = 10.0
+MEMORY_S = 10.0
+MEMORY_MAX = 5000
+"""seconds and samples before a segment that its lag remembers, at most"""
 NUDGE = 1e-4
 """by which initial states are moved for their derivatives"""
 WILD = 1e3
@@ -60,7 +60,6 @@ class Segments:
     inputs: Array
     before: Array
     """(inputs before each segment, segments, inputs): what the lag remembers"""
-    rests: bool
 
     @property
     def scale(self) -> Array:
@@ -69,8 +68,8 @@ class Segments:
         return np.asarray(np.maximum(np.sqrt(np.mean(moved**2, axis=(0, 1))), 1e-12))
 
 
-def cut(record: Record, structure: Structure, segment_s: float) -> Segments:
-    """Return the segments of a record; IdentificationError if they are too few."""
+def cut(record: Record, structure: Structure, segment_s: float, *, rests: bool = False) -> Segments:
+    """Return the segments of a record; before one that does not begin at rest its first input held."""
     steps = max(8, round(segment_s / record.step_s))
     count = len(record) // steps
     if count < SEGMENTS_MIN:
@@ -80,11 +79,20 @@ def cut(record: Record, structure: Structure, segment_s: float) -> Segments:
         chosen = np.linspace(0, count - 1, max(SEGMENTS_MIN, SAMPLES_MAX // steps)).astype(int)
     rows = chosen[None, :] * steps + np.arange(steps)[:, None]
     inputs = structure.acting(record.inputs)
-    # What the motors still remember at a segment's start: ten seconds of lag at most.
-    memory = min(len(record), round(LAG_MAX_S / record.step_s), 5000)
+    memory = min(len(record), round(MEMORY_S / record.step_s), MEMORY_MAX)
     behind = chosen[None, :] * steps - np.arange(memory, 0, -1)[:, None]
-    before = np.where((behind < 0)[:, :, None], 0.0, inputs[np.maximum(behind, 0)])
-    return Segments(record.step_s, record.outputs[rows], inputs[rows], before, rests=True)
+    before = inputs[np.maximum(behind, 0)]
+    if rests:
+        before[behind < 0] = 0.0
+    return Segments(record.step_s, record.outputs[rows], inputs[rows], before)
+
+
+def every_other(segments: Segments, first: int) -> Segments:
+    """Return every other segment."""
+    outputs, inputs, before = (
+        one[:, first::2] for one in (segments.outputs, segments.inputs, segments.before)
+    )
+    return Segments(segments.step_s, outputs, inputs, before)
 
 
 def simulation_residuals(
@@ -136,7 +144,7 @@ def _acting(segments: Segments, lag_s: float) -> Array:
         return segments.inputs
     memory = min(len(segments.before), max(1, round(20.0 * lag_s / segments.step_s)))
     both = np.concatenate((segments.before[-memory:], segments.inputs))
-    return lagged(both, segments.step_s, lag_s, 0.0)[memory:]
+    return lagged(both, segments.step_s, lag_s, both[0])[memory:]
 
 
 def _start(segments: Segments) -> Array:

@@ -6,15 +6,19 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from plant_sim.identification import pipeline, simulation
 from plant_sim.identification.errors import IdentificationError
-from plant_sim.identification.faults import require_units, unwrapped
+from plant_sim.identification.faults import require_units
+from plant_sim.identification.filters import Array
 from plant_sim.identification.pipeline import Identification, Options
 from plant_sim.identification.pitch import PitchStructure
 from plant_sim.identification.record import Record
 from plant_sim.identification.regression import regress
+from plant_sim.identification.structures import names_of
 from tenbaud.identification.structure import Chosen, choose
+from tenbaud.log.angles import turn_of, unwrapped
 
 DRIFT_EXPLAINED = 0.98
 UNIT_SCALES = {
@@ -57,8 +61,8 @@ class Identified:
 
 def run(name: str, record: Record, wanted: Wanted) -> Identified:
     """Identify one record; IdentificationError where it cannot be used at all."""
-    require_units(record)
-    record, notes = unwrapped(record)
+    warnings = require_units(record)
+    record, notes = _unwrapped(record)
     chosen = choose(
         record,
         wanted.structure,
@@ -67,7 +71,6 @@ def run(name: str, record: Record, wanted: Wanted) -> Identified:
         volts_max=wanted.volts_max,
     )
     found = pipeline.identify(record, chosen.structure, wanted.options)
-    warnings: list[str] = []
     if isinstance(chosen.structure, PitchStructure):
         _require_angle(record, chosen.structure, found)
         record, found = _without_drift(record, chosen.structure, found, wanted, warnings)
@@ -88,6 +91,18 @@ def run(name: str, record: Record, wanted: Wanted) -> Identified:
         (*warnings, *found.warnings),
         advice,
     )
+
+
+def _unwrapped(record: Record) -> tuple[Record, list[str]]:
+    """Return a record whose angles do not jump by a turn, and what was done."""
+    outputs, notes = record.outputs.copy(), []
+    for index, (name, unit) in enumerate(zip(record.output_names, record.output_units, strict=True)):
+        turn = turn_of(unit, None)
+        whole = unwrapped(outputs[:, index], turn) if turn else None
+        if whole is not None and whole.rows:
+            outputs[:, index] = whole.values
+            notes.append(f"{name}: unwrapped at {len(whole.rows)} jump(s) of a turn")
+    return replace(record, outputs=outputs), notes
 
 
 def _saturated(record: Record, structure: PitchStructure) -> list[str]:
@@ -140,25 +155,32 @@ def _without_drift(
         return record, found
     times = np.arange(len(record)) * record.step_s
 
+    # A drift and a lag stand in for each other: both are fitted with the parameters.
+    free = PitchStructure(None, structure.volts_max)
+    length_s = simulation.SEGMENT_S / found.regression.filters.bandwidth_rad_s
+    segments = simulation.cut(record, free, length_s)
+    clock = simulation.cut(replace(record, outputs=times[:, None]), free, length_s).outputs
+    guess = float(np.polyfit(times, record.outputs[:, 0], 1)[0])
+    lag_s, names = wanted.options.lag_s, names_of(free)
+    filters = replace(found.regression.filters, lag_s=0.05 if lag_s is None else lag_s)
+
     def without(rate: float) -> Record:
         return replace(record, outputs=record.outputs - rate * times[:, None])
 
-    from scipy.optimize import minimize_scalar
+    def residuals(values: Array) -> Array:
+        *found, lag, rate = values.tolist()
+        straight = replace(segments, outputs=segments.outputs - rate * clock)
+        named, lag = dict(zip(names, found, strict=True)), abs(lag) if lag_s is None else lag_s
+        return simulation.simulation_residuals(free, named, lag, straight).ravel()
 
-    guess = float(np.polyfit(times, record.outputs[:, 0], 1)[0])
-    width = max(0.1 * abs(guess), 0.05)
-    best = minimize_scalar(
-        lambda rate: -_explained(without(rate), found),
-        bounds=(guess - width, guess + width),
-        method="bounded",
-        options={"maxiter": 12, "xatol": 1e-3},
-    )
-    straight = without(float(best.x))
+    start = regress(without(guess), free, filters, blocks=pipeline.COARSE).values
+    rate = float(least_squares(residuals, [*start.values(), filters.lag_s, guess], max_nfev=20).x[-1])
+    straight = without(rate)
     again = pipeline.identify(straight, structure, wanted.options)
     if again.check is None or again.check.explained < DRIFT_EXPLAINED:
         return record, found
     warnings.append(
-        f"the angle drifts by {best.x:.3g} rad/s all the time, as an encoder that slips or an "
+        f"the angle drifts by {rate:.3g} rad/s all the time, as an encoder that slips or an "
         "integrated gyro does: the drift was taken off before the identification; look at the sensor"
     )
     return straight, again

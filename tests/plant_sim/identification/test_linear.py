@@ -10,9 +10,11 @@ import pytest
 from scipy.linalg import expm
 from scipy.signal import cont2discrete, dlsim
 
+from plant_sim.identification import simulation
 from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.estimator import estimate, moments_of
 from plant_sim.identification.excitation import PseudoRandom
+from plant_sim.identification.faults import require_units
 from plant_sim.identification.filters import Array, SignalFilter, low_pass
 from plant_sim.identification.pipeline import Identification, Options, identify
 from plant_sim.identification.record import Record
@@ -143,6 +145,50 @@ def test_when_an_output_does_not_follow_the_input_then_nothing_is_supported() ->
     noise = np.random.default_rng(7).normal(size=record.outputs.shape).cumsum(axis=0)
     found = found_in(CASES[0], Record(H, noise, record.inputs))
     assert any(text.startswith("b = ") and "uncertain" in text for text in found.refused)
+
+
+def test_when_two_gains_are_both_uncertain_then_neither_passes_as_immaterial() -> None:
+    record = record_of(COUPLED, 1)
+    noise = 0.1 * np.random.default_rng(7).normal(size=(STEPS, 1)).cumsum(axis=0)
+    structure = parse_linear("first-order", ("y",), ("u", "v"))
+    found = identify(Record(H, noise, record.inputs), structure)
+    assert any(text.startswith("b/u = ") and "uncertain" in text for text in found.refused)
+    assert any("of the motion, at least 50% is needed" in text for text in found.refused)
+
+
+def test_when_the_input_moves_little_about_a_large_mean_then_the_plant_is_found() -> None:
+    u = 10.0 + record_of(CASES[0], 1).inputs / 3.0
+    y = np.asarray(dlsim(cont2discrete(([20.0], [1.0, 4.0]), H), u)[1])
+    found = identify(Record(H, y, u), parse_linear("first-order", ("y",), ("u",)))
+    assert found.refused == ()
+    assert [found.values["a"], found.values["b"]] == pytest.approx([4.0, 20.0], rel=0.01)
+
+
+def test_when_no_second_method_confirms_the_estimates_then_no_model_is_supported(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fails(*_: object, **__: object) -> None:
+        raise IdentificationError("no fit")
+
+    monkeypatch.setattr(simulation, "fit", fails)
+    found = found_in(CASES[0], record_of(CASES[0], 1))
+    assert any("no second method" in text for text in found.refused)
+
+
+def test_when_a_record_begins_under_a_steady_input_then_its_lag_remembers_that() -> None:
+    record = Record(H, np.zeros((STEPS, 1)), np.full((STEPS, 1), 5.0))
+    structure = parse_linear("first-order", ("y",), ("u",))
+    assert np.all(simulation.cut(record, structure, 5.0).before == 5.0)
+    assert np.all(simulation.cut(record, structure, 5.0, rests=True).before[:, 0] == 0.0)
+
+
+def test_when_a_level_without_a_unit_moves_in_steps_of_1_then_it_is_not_taken_for_degrees() -> None:
+    levels, drive = np.arange(200.0)[:, None] % 50, np.full((200, 1), 230.0)
+    assert require_units(Record(H, levels, drive)) == []
+    with pytest.raises(IdentificationError, match="in degrees and is read as rad"):
+        require_units(Record(H, levels, drive, output_units=("rad",)))
+    doubts = require_units(Record(H, levels, drive, input_units=("V",)))
+    assert "reaches 230 V" in doubts[0]
 
 
 @pytest.mark.parametrize(

@@ -153,7 +153,7 @@ def _without_drift(
     turned = float(np.ptp(record.outputs[:, 0])) > 2.0 * np.pi
     if not turned or found.check is None or found.check.explained > DRIFT_EXPLAINED:
         return record, found
-    times = np.arange(len(record)) * record.step_s
+    times = (np.arange(len(record)) * record.step_s).astype(np.float64)
 
     # A drift and a lag stand in for each other: both are fitted with the parameters.
     free = PitchStructure(None, structure.volts_max)

@@ -103,8 +103,8 @@ def _own_signals(config: FlightConfig, structure: str) -> bool:
 def _is_no_angle(log: FlightLogSection, signals: Signals) -> bool:
     """Return whether the column that would be read as the angle is a speed, a level or the like."""
     from tenbaud.log.reader import read_table
-    from tenbaud.log.roles import Roles, stem_of
-    from tenbaud.log.units import COUNTS, factor, split_unit, unit_named
+    from tenbaud.log.roles import Roles
+    from tenbaud.log.units import COUNTS, factor, split_unit, stem_of, unit_named
 
     found: list[bool] = []
     roles = Roles(log.file, log, signals)

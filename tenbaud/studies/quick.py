@@ -92,7 +92,7 @@ def quick_coder(
     outputs = list(zip(*[one.outputs for one in flown], strict=True))
     sections = found.model_dump(mode="json", include={"model", "coder"})
     if first:
-        sections["model"]["start"] = list(own.start)
+        sections["model"]["start"] = list(getattr(own, "start", ()))
     if found.model.kind != "linear":
         name = BANDWIDTH.rpartition(".")[2]
         sections["transmitter"] = {name: getattr(found.transmitter, name)}

@@ -86,7 +86,9 @@ def test_when_the_fit_begins_within_the_record_then_the_codec_begins_there_too(
     monkeypatch.setattr(quick, "WINDOW_TICKS", 300)
     monkeypatch.setattr(quick, "liveliest", lambda _log, _ticks: 650)
     lines = [line.split(",") for line in log.read_text().splitlines()]
-    far = [[one[0], str(int(one[1]) + 1000 * (at >= 600)), *one[2:]] for at, one in enumerate(lines[1:])]
+    far = [
+        [one[0], str(int(one[1]) + 1000 * (at >= 600)), *one[2:]] for at, one in enumerate(lines[1:])
+    ]
     log.write_text("\n".join(",".join(one) for one in [lines[0], *far]))
     found = quick_coder(config_of(log))
     assert found.sections["model"]["start"] == []

@@ -48,8 +48,8 @@ def require_units(record: Record) -> list[str]:
             )
     largest = np.abs(record.inputs).max(axis=0, initial=0.0).tolist()
     return [
-        f"{name} reaches {most:.4g} V; if the column is in millivolts (a factor of 1000) or in counts, "
-        f"say --units {name}=mV, or --scale {name}=FACTOR"
+        f"{name} reaches {most:.4g} V: is the column in millivolts (a factor of 1000) or in counts? "
+        f"Say --units {name}=mV, --scale {name}=FACTOR, or --units {name}=V where it is right"
         for name, unit, most in zip(record.input_names, record.input_units, largest, strict=True)
         if unit == "V" and most > VOLTS_MAX
     ]

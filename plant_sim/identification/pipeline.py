@@ -284,6 +284,12 @@ def _doubts(found: Identification) -> Iterable[str]:
 def _unsupported(found: Identification, record: Record) -> Iterable[str]:
     """Yield why the data support no model, with the experiment that would."""
     regression, structure = found.regression, found.structure
+    fastest, seen = dominant_rad_s(record, structure), 0.5 * math.pi / record.step_s
+    if fastest > seen:
+        yield (
+            f"the outputs move most at {fastest:.3g} rad/s, and rows {record.step_s:g} s apart show "
+            f"motion up to {seen:.3g} rad/s: the noise of a plant at rest, or sampled too slowly"
+        )
     if regression.condition < CONDITION_MIN:
         levels = ", ".join(
             f"{term.name} {level:.2g}"

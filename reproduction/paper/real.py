@@ -61,7 +61,7 @@ def identify_first_half(data: Path) -> FirstHalf:
     damping is negative. The model is therefore that of the simulation-error fit over stretches of
     0.6 s, with a damping of 0.
     """
-    log = {"file": str(data / UIUC_FILE), "end_s": HALF_S}
+    log = {"file": str(data / UIUC_FILE), "end_s": HALF_S, "period_s": TICK_S}
     record, _ = from_log(load_config("uiuc-10baud", None, {"flight_log": log}))
     options = Options(MOTOR_LAG_S, BANDWIDTH_RAD_S)
     whole = identify(record, PitchStructure(), options)

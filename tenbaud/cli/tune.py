@@ -140,15 +140,8 @@ def tune(
     from tenbaud.studies.tuning import tune as fit
 
     _make_room(out)
-    overrides = options.overrides(
-        duration=duration,
-        rig=rig,
-        log=log,
-        mismatch=mismatch,
-        disturbance=disturbance,
-        impair=impair,
-        settings=settings,
-    )
+    plant: dict[str, Any] = {"rig": rig, "log": log, "mismatch": mismatch, "disturbance": disturbance}
+    overrides = options.overrides(duration=duration, impair=impair, settings=settings, **plant)
     split = split_of(seeds, test_seeds, train_share)
     augment = Augment(_sizes(scales), shoves, phases, seed)
     tuning = Tuning(

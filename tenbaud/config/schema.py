@@ -13,7 +13,6 @@ from pydantic import AfterValidator, Field, PrivateAttr, field_validator, model_
 
 from channel.line.impairments import parse_impairments
 from channel.links.registry import LINKS
-from channel.protocol.sabotage import parse_sabotage
 from tenbaud.config.coders import ZoomCoderSection
 from tenbaud.config.deprecated import DIGEST_KINDS
 from tenbaud.config.kinds import (
@@ -41,17 +40,9 @@ from tenbaud.config.section import (
     Options,
     OutsideSection,
     Positive,
+    SabotageText,
     Section,
 )
-
-
-def _checked_sabotage(text: str) -> str:
-    if text:
-        parse_sabotage(text)
-    return text
-
-
-SabotageText = Annotated[str, AfterValidator(_checked_sabotage)]
 
 SHARED_SECTIONS = ("timing", "channel", "model", "coder", "limits")
 ADDED_FIELDS = {"start", "outputs", "floor_gain", "floor_exponent"}

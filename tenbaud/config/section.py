@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue, PrivateAttr
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, JsonValue, PrivateAttr
+
+from channel.protocol.sabotage import parse_sabotage
 
 Positive = Annotated[float, Field(ge=1e-9, le=1e9)]
 AngleRange = Annotated[float, Field(ge=1e-9, le=1000.0)]
@@ -76,3 +78,12 @@ class CodePermission(Section):
     def __eq__(self, other: object) -> bool:
         """Return whether two configurations say the same; what is allowed is no part of that."""
         return isinstance(other, CodePermission) and self.model_dump() == other.model_dump()
+
+
+def _checked_sabotage(text: str) -> str:
+    if text:
+        parse_sabotage(text)
+    return text
+
+
+SabotageText = Annotated[str, AfterValidator(_checked_sabotage)]

@@ -169,7 +169,11 @@ class Result:
 
 def _finish(one: Each, folder: Path, number: str, fly: bool) -> None:
     """Fly the record with the configured coder and with one fitted to it; write the better one."""
-    if "file" not in one.settings.get("flight_log", {}):
+    readable = "file" in one.settings.get("flight_log", {})
+    if not readable and not str(folder).isprintable():
+        # No configuration can name a file there.
+        fly = False
+    elif not readable:
         log = written.write_record(folder / f"record{number}.csv", one.identified.record)
         one.settings["flight_log"] = log
     if fly:
@@ -280,7 +284,15 @@ def _wanted(config: FlightConfig, source: Source, request: Request) -> Wanted:
     pitches = config.model.kind == "pitch" and source.record.output_names == own
     if limited and pitches:
         volts_max = build_limits(config, configured_signals(config)).command_max[0]
-    return Wanted(request.structure, request.equilibrium, volts_max, pitches, options)
+    units = {f"flight_log.units.{one}" for one in ("input", "inputs", *source.record.input_names)}
+    return Wanted(
+        request.structure,
+        request.equilibrium,
+        volts_max,
+        pitches,
+        not units.isdisjoint(request.given),
+        options,
+    )
 
 
 def identify(

@@ -37,6 +37,7 @@ class Wanted:
     volts_max: float = float("inf")
     pitches: bool = True
     """the signals are those of a pitch model"""
+    units_given: bool = False
     options: Options = field(default_factory=Options)
 
 
@@ -62,6 +63,8 @@ class Identified:
 def run(name: str, record: Record, wanted: Wanted) -> Identified:
     """Identify one record; IdentificationError where it cannot be used at all."""
     warnings = require_units(record)
+    if warnings and not wanted.units_given:
+        raise IdentificationError(warnings[0])
     record, notes = _unwrapped(record)
     chosen = choose(
         record,

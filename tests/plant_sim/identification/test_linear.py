@@ -184,9 +184,9 @@ def test_when_a_record_begins_under_a_steady_input_then_its_lag_remembers_that()
 
 def test_when_a_level_without_a_unit_moves_in_steps_of_1_then_it_is_not_taken_for_degrees() -> None:
     levels, drive = np.arange(200.0)[:, None] % 50, np.full((200, 1), 230.0)
-    assert require_units(Record(H, levels, drive)) == []
+    assert require_units(Record(H, levels, drive, steps=(1.0,))) == []
     with pytest.raises(IdentificationError, match="in degrees and is read as rad"):
-        require_units(Record(H, levels, drive, output_units=("rad",)))
+        require_units(Record(H, levels, drive, output_units=("rad",), steps=(1.0,)))
     doubts = require_units(Record(H, levels, drive, input_units=("V",)))
     assert "reaches 230 V" in doubts[0]
 

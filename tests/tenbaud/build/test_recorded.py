@@ -241,7 +241,7 @@ def flat(values: dict[str, Any]) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("text", ["transmitter = 5", "timing = 3", "flight_log = []"])
-def test_a_section_that_is_none_is_an_error_in_words(tmp_path: Path, text: str) -> None:
+def test_a_value_in_place_of_a_section_is_an_error_in_words(tmp_path: Path, text: str) -> None:
     (tmp_path / "wrong.toml").write_text(text)
     name = text.split()[0]
     over = {"transmitter": {"rig": "replay"}} if name == "timing" else {}
@@ -269,7 +269,7 @@ def test_a_run_folder_whose_file_changed_is_read_again(tmp_path: Path) -> None:
         assert read_flight_log(config).measured[0, 0] == start_rad
 
 
-def test_a_duration_beyond_the_recording_is_told(tmp_path: Path) -> None:
+def test_a_duration_beyond_the_recording_has_a_note(tmp_path: Path) -> None:
     config = flight_config("tuned-10baud", None, replay(pitch_log(tmp_path), duration_s=60.0))
     assert config.duration_s == 6.0
     assert "60 s were asked for" in replay_notes(config)[1]

@@ -252,7 +252,7 @@ def test_when_a_file_counts_its_rows_then_the_tick_of_no_preset_is_taken_for_its
     assert tenbaud.identify(log, settings={"flight_log.period_s": 0.02}).config.timing.tick_s == 0.02
 
 
-def test_when_rows_are_further_apart_than_ticks_then_the_estimates_are_told_without_a_flight() -> None:
+def test_when_rows_are_further_apart_than_ticks_then_the_estimates_come_without_a_flight() -> None:
     volts, level = random_volts(3000, 5.0, 40), [0.0]
     for push in volts[:-1]:
         level.append(level[-1] * math.exp(-0.02) + (1.0 - math.exp(-0.02)) * push)

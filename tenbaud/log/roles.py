@@ -167,7 +167,7 @@ class Roles:
                 key = "angle" if not at else signal.name
                 raise LogError(
                     f"{self.path}: which column is the {signal.name}? Give --columns {key}=NAME; "
-                    f"present: {listed(names)}"
+                    f"present: {listed(names)}; `tenbaud log` shows what each looks like"
                 )
             taken.add(place)
             outputs.append((signal, place))

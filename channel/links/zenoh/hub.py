@@ -17,7 +17,7 @@ import zenoh
 from channel.errors import LinkError
 from channel.links.base import LinkCounts
 from channel.links.security import KEY_ROOT
-from channel.links.zenoh.config import NodeOptions, is_session_name, open_node
+from channel.links.zenoh.config import NodeOptions, close_session, is_session_name, open_node
 from channel.links.zenoh.gate import Gate
 from channel.links.zenoh.inbox import ChannelInbox
 
@@ -51,7 +51,7 @@ class ZenohHub:
         """session names by the keys of those joined, which nearly all messages have"""
         self._parts = ExitStack()
         self._session = open_node(**node)
-        self._parts.callback(self._session.close)
+        self._parts.callback(close_session, self._session)
         try:
             gate = Gate(self._session, node.get("security"), self.counts.refused)
             self._parts.callback(gate.close)

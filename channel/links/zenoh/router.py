@@ -13,7 +13,14 @@ from typing import Self
 from channel.errors import LinkError
 from channel.links.endpoints import check_endpoints
 from channel.links.security import Security
-from channel.links.zenoh.config import SESSIONS_MAX, as_file, open_session, zenoh_config, zenoh_settings
+from channel.links.zenoh.config import (
+    SESSIONS_MAX,
+    as_file,
+    close_session,
+    open_session,
+    zenoh_config,
+    zenoh_settings,
+)
 from channel.links.zenoh.gate import Gate
 
 
@@ -49,7 +56,7 @@ class ZenohRouter:
         settings = _settings(listen, security, connections_max)
         self._session = open_session(zenoh_config(settings), ", ".join(listen))
         self._parts = ExitStack()
-        self._parts.callback(self._session.close)
+        self._parts.callback(close_session, self._session)
         self._parts.callback(Gate(self._session, security, self.refused).close)
 
     @property

@@ -20,7 +20,7 @@ import zenoh
 from channel.errors import LinkError
 from channel.links.base import Role
 from channel.links.security import KEY_ROOT, Credentials, Security, tls_settings
-from channel.links.zenoh.config import open_session, zenoh_config, zenoh_settings
+from channel.links.zenoh.config import close_session, open_session, zenoh_config, zenoh_settings
 
 OnMessage = Callable[[bytes], None]
 
@@ -70,7 +70,7 @@ class TelemetryPort:
             raise LinkError(f"telemetry could not be sent: {error}") from error
 
     def close(self) -> None:
-        self._session.close()
+        close_session(self._session)
 
 
 class TelemetryFeed:
@@ -111,7 +111,7 @@ class TelemetryFeed:
             raise LinkError(f"the command could not be sent: {error}") from error
 
     def close(self) -> None:
-        self._session.close()
+        close_session(self._session)
 
 
 @contextmanager

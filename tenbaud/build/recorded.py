@@ -1,4 +1,4 @@
-"""The configuration of a flight; one that replays a recording takes from it what nobody has set.
+"""The configuration of a flight; one that replays a recording takes from it what is not set.
 
 Both ends call this with the same file and the same settings, and come to the same shared configuration.
 Only `tenbaud.log` knows what files look like; here it is known what a flight needs of them.
@@ -27,7 +27,7 @@ from tenbaud.config.models import ModelSection as BuiltInModel
 from tenbaud.config.schema import FlightConfig, Timing
 
 PRESET = "uiuc-10baud"
-"""Of a recording for which nobody names one."""
+"""Of a recording for which none is given."""
 ROUND = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 """What a limit is rounded up to, times a power of ten."""
 STEPS_LEAST = 1000.0

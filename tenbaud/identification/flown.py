@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 from tenbaud.build.recorded import flight_config
@@ -72,16 +73,10 @@ def fly_record(values: Mapping[str, Any]) -> Flown:
 
 
 def _fly(config: FlightConfig) -> FlightFigures:
-    from tenbaud.studies.plain import fly_plain
+    from tenbaud.studies.chunk import fly_point
 
-    if config.duration_s <= PLAIN_TICKS * config.timing.tick_s:
-        return fly_plain(config)
-    try:
-        from tenbaud.studies.flights import CompiledPoint
-        from tenbaud.studies.schedule import Uncommon
-    except ImportError:  # numba is an extra
-        return fly_plain(config)
-    try:
-        return CompiledPoint(config).fly(config.seed)[0]
-    except Uncommon:
-        return fly_plain(config)
+    seeds = (config.seed,)
+    if config.duration_s > PLAIN_TICKS * config.timing.tick_s:
+        with suppress(ImportError):  # numba is an extra
+            return fly_point(config, seeds, "auto")[0]
+    return fly_point(config, seeds, "plain")[0]

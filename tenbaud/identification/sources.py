@@ -100,13 +100,20 @@ def _own_signals(config: FlightConfig, structure: str) -> bool:
     return config.model.kind == "pitch" and not given and not log.join and _is_no_angle(log, signals)
 
 
+class _Seen(Exception):
+    """The names of the columns were seen, so that no rows need to be read."""
+
+    def __init__(self, no_angle: bool) -> None:
+        super().__init__()
+        self.no_angle = no_angle
+
+
 def _is_no_angle(log: FlightLogSection, signals: Signals) -> bool:
     """Return whether the column that would be read as the angle is a speed, a level or the like."""
     from tenbaud.log.reader import read_table
     from tenbaud.log.roles import Roles
     from tenbaud.log.units import COUNTS, factor, split_unit, stem_of, unit_named
 
-    found: list[bool] = []
     roles = Roles(log.file, log, signals)
 
     def wanted(names: Sequence[str], units: Sequence[str], known: Mapping[str, str]) -> list[int]:
@@ -114,8 +121,10 @@ def _is_no_angle(log: FlightLogSection, signals: Signals) -> bool:
         given = roles.setting(log.units, f"out:{signal.name}", "angle")
         unit = str(given or unit_named(units[place]) or split_unit(names[place])[1])
         converts = unit_named(unit) == COUNTS or factor(unit, signal.unit) is not None
-        found.append(not converts or (not given and stem_of(names[place]) in (*SPEEDS, "level")))
-        return [place]
+        raise _Seen(not converts or (not given and stem_of(names[place]) in (*SPEEDS, "level")))
 
-    read_table(log.file, wanted)
-    return found[-1]
+    try:
+        read_table(log.file, wanted)
+    except _Seen as seen:
+        return seen.no_angle
+    return False

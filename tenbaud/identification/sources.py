@@ -14,6 +14,7 @@ from tenbaud.build.rig import build_rig
 from tenbaud.build.signals import build_encoders, configured_signals, encoder_steps
 from tenbaud.config.schema import FlightConfig, FlightLogSection
 from tenbaud.identification.structure import SPEEDS
+from tenbaud.log.table import LogError
 
 ALIASES = ("angle", "output", "input", "time", "index", "front", "rear")
 
@@ -100,8 +101,8 @@ def _own_signals(config: FlightConfig, structure: str) -> bool:
     return config.model.kind == "pitch" and not given and not log.join and _is_no_angle(log, signals)
 
 
-class _Seen(Exception):
-    """The names of the columns were seen, so that no rows need to be read."""
+class _Seen(LogError):
+    """The names of the columns were seen; readers let it pass, and so read no rows."""
 
     def __init__(self, no_angle: bool) -> None:
         super().__init__()

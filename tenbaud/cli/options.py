@@ -74,8 +74,8 @@ Mismatches = Annotated[
     list[float] | None,
     typer.Option(
         "--mismatch",
-        help="Model mismatch of the simulated plant, 0.1 for 10 %; repeatable. Not given: 0 "
-        "and 0.1, one flight each (one as configured with --json or --config).",
+        help="Model mismatch of the simulated plant, 10% or 0.1; repeatable, one flight each. Not "
+        "given: as configured, and 10% without --preset, --config and --rig.",
     ),
 ]
 Mismatch = Annotated[

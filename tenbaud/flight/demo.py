@@ -52,12 +52,14 @@ def fly_demo(
     view: ViewOptions | None = None,
     pace: float | None = None,
     status: StatusMode = "auto",
+    compare: bool = False,
 ) -> DemoResult:
     """Fly once into an existing, empty run folder; write summary and, if wished, figure there.
 
     `view`: serve the live page beside the flight, which may then be steered from it. `pace`: on the
     virtual clock, at most this factor of real time; not for a link within one process. `status`: what a
-    flight within this process writes on the standard error.
+    flight within this process writes on the standard error. `compare`: fly the usual loop beside it,
+    where there is one.
     """
     write_whole(folder.config, dump_config(agreement.config))
     if agreement.link.in_process:
@@ -69,7 +71,13 @@ def fly_demo(
             if pace is not None:
                 viewing = replace(viewing, transmitter=[*viewing.transmitter, "--pace", str(pace)])
             result = _fly_processes(agreement, folder, on_status, viewing, stop)
-    problems = write_up(folder, agreement.config, result.summary, draw)
+    usual = None
+    if compare and result.code is ExitCode.OK and view is None:
+        from tenbaud.flight.usual import usual_flight
+
+        usual = usual_flight(agreement)
+        result.summary |= {"usual_loop": usual.figures} if usual else {}
+    problems = write_up(folder, agreement.config, result.summary, draw, usual and usual.curve)
     # What ended the flight is said last.
     result.messages[:0] = [problem.text for problem in problems]
     result.code = first_code(result.code, *(problem.code for problem in problems))
@@ -111,6 +119,8 @@ def _result(agreement: Agreement, transmitter: _Child, receiver: _Child) -> Demo
     was_killed = ends[0].process.returncode < 0 and not ends[0].died_of_interrupt
     if was_killed or not summary.get("exit_code"):
         summary["outcome"], summary["exit_code"] = outcomes[0].text, int(code)
+        for own in [end.summary for end in ends if end.summary.get("not_flown")]:
+            summary |= {name: own[name] for name in ("outcome", "not_flown")}
     return DemoResult(summary, code, [outcome.text for outcome in reversed(outcomes)])
 
 

@@ -17,11 +17,18 @@ from tenbaud.recording.folder import RunFolder
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from tenbaud.recording.figure import Curve
 
-def write_up(folder: RunFolder, config: FlightConfig, summary: Summary, draw: bool) -> list[Outcome]:
+
+def write_up(
+    folder: RunFolder, config: FlightConfig, summary: Summary, draw: bool, usual: Curve | None = None
+) -> list[Outcome]:
     """Write `summary.json` and, if wished, the figure; return what went wrong.
 
-    The flight is over by then: what cannot be written is no reason to leave out the rest.
+    `usual`: how the usual loop steers the first output, for the figure.
+
+    The flight is over by then: what cannot be written is no reason to leave out the rest. It is the
+    outcome in `summary` of a flight that has no other.
     """
     problems = []
     recording_error = summary.get("recording_error")
@@ -33,10 +40,13 @@ def write_up(folder: RunFolder, config: FlightConfig, summary: Summary, draw: bo
         problems.append(outcome_of(error))
     if draw:
         try:
-            draw_figure(folder, figure_title(config, summary))
+            draw_figure(folder, figure_title(config, summary), usual)
         except (RecordingError, WriteError) as error:
             code = ExitCode.NOT_WRITTEN if isinstance(error, WriteError) else ExitCode.OK
             problems.append(Outcome(code, f"no figure was drawn: {error}"))
+    failed = [one for one in problems if one.code is not ExitCode.OK]
+    if failed and not summary["exit_code"]:
+        summary |= {"exit_code": int(failed[0].code), "outcome": failed[0].text}
     return problems
 
 
@@ -45,12 +55,12 @@ def write_summary(folder: RunFolder, summary: Summary) -> None:
     write_whole(folder.summary, json.dumps(summary, indent=2) + "\n")
 
 
-def draw_figure(folder: RunFolder, title: str) -> None:
+def draw_figure(folder: RunFolder, title: str, usual: Curve | None = None) -> None:
     """Draw the figure of a run from its recordings. Raises RecordingError and WriteError."""
     from tenbaud.recording.figure import draw_flight
 
     receiver = folder.receiver if folder.receiver.is_file() else None
-    draw_flight(folder.transmitter, receiver, folder.figure, title)
+    draw_flight(folder.transmitter, receiver, folder.figure, title, usual)
 
 
 def figure_title(config: FlightConfig, summary: Summary) -> str:

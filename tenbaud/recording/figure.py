@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 ERASURE_COLOUR = "#d01c1f"
 FLIP_COLOUR = "#8e3fb0"
+USUAL_COLOUR = "#f0a000"
 REJOIN_COLOUR = "#2a8c4a"
 COLOURS = (LINE_B, LINE_C, "#2a8c4a", "#8e3fb0", LINE_A, "#b08a00")
 """Of several outputs or inputs in one panel."""
@@ -63,6 +64,8 @@ class _Flight:
     """of each output: which symbols were about it, or their share; nothing where that is not known"""
     cuts_s: list[tuple[float, float]]
     """times in which nothing was to pass, on purpose"""
+    usual: Curve | None = None
+    """the first output over 1000 bit/s"""
 
     @property
     def live_is_coded(self) -> bool:
@@ -75,19 +78,28 @@ class _Flight:
         return any(not np.isnan(self.curves[name][place][1]).all() for place in places)
 
 
-def draw_flight(transmitter: Path, receiver: Path | None, output: Path, title: str) -> None:
+def draw_flight(
+    transmitter: Path, receiver: Path | None, output: Path, title: str, usual: Curve | None = None
+) -> None:
     """Draw a flight that was just flown into the PNG file `output`.
 
+    `usual` is its first output over 1000 bit/s.
     An output is the true one where the rig knows it, else the measured one; the errors are taken
     from it. The receiver's recording adds the reference. Raises RecordingError if the
     transmitter's recording holds no flight.
     """
-    figure = draw_run(transmitter, receiver, title, own=True)
+    figure = draw_run(transmitter, receiver, title, True, usual)
     with whole_file(output) as stream:
         figure.savefig(stream, dpi=150, format="png")
 
 
-def draw_run(transmitter: Path | None, receiver: Path | None, title: str, own: bool = False) -> Figure:
+def draw_run(
+    transmitter: Path | None,
+    receiver: Path | None,
+    title: str,
+    own: bool = False,
+    usual: Curve | None = None,
+) -> Figure:
     """Return the same as a matplotlib figure. Raises RecordingError without a transmitter's file.
 
     `own`: the recordings were made just now, and what they store for the figure is trusted.
@@ -97,7 +109,7 @@ def draw_run(transmitter: Path | None, receiver: Path | None, title: str, own: b
             "There is no transmitter's recording here, and what was measured is recorded there. Give "
             "the folder of the transmitter's run."
         )
-    flight = _read_flight(transmitter, receiver, own)
+    flight = _read_flight(transmitter, receiver, own, usual)
     drawn = _panels(flight)
     ratios = [ratio for ratio, _, _ in drawn]
     height = (0.9 + sum(ratios)) / len(drawn)
@@ -161,7 +173,7 @@ def _plain(label: str) -> str:
     return label.replace("$", r"\$")
 
 
-def _read_flight(transmitter: Path, receiver: Path | None, own: bool) -> _Flight:
+def _read_flight(transmitter: Path, receiver: Path | None, own: bool, usual: Curve | None) -> _Flight:
     overview, metadata = _read_overview(transmitter, own)
     plant = overview.plant
     times_s = overview.curves["value"][0].curve()[0] if plant.outputs else np.zeros(0)
@@ -182,6 +194,7 @@ def _read_flight(transmitter: Path, receiver: Path | None, own: bool) -> _Flight
         overview.symbols.thinned,
         _about(overview),
         _cuts(metadata.get("impairments", ""), times_s[-1]),
+        usual,
     )
 
 
@@ -243,6 +256,8 @@ def _draw_values(panel: Axes, flight: _Flight, places: list[int]) -> None:
         kinds.append(_Kind("live", "live estimate", LINE_C))
         kinds.append(_Kind("coded", "coded estimate", LINE_B))
     _draw_curves(panel, flight, flight.plant.outputs, places, kinds)
+    if flight.usual is not None and 0 in places:
+        panel.plot(*flight.usual, "--", color=USUAL_COLOUR, linewidth=1.2, label="over 1000 bit/s")
     for index, (start_s, end_s) in enumerate(flight.cuts_s):
         label = "line cut" if index == 0 else ""
         panel.axvspan(start_s, end_s, color=ERASURE_COLOUR, alpha=0.12, linewidth=0, label=label)

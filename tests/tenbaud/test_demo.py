@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tenbaud import fly
+from tenbaud.build.flight import agree
 from tenbaud.config.load import load_config
+from tenbaud.flight.usual import usual_flight
 from tenbaud.recording.comparison import Verdict
 from tenbaud.recording.diff import compare_runs
 from tenbaud.recording.folder import RunFolder
+from tenbaud.studies.plain import fly_plain
 from tests.tenbaud.confirmed import PATIENT, check_flown, need_idle
 from tests.tenbaud.processes import run
 
@@ -50,7 +54,8 @@ REAL_FLIGHT = Path(__file__).parents[3] / "shared" / "data" / "uiuc_closed_loop.
 
 
 def test_when_the_demo_flies_the_paper_then_every_sample_is_checked(tmp_path: Path) -> None:
-    ended = run("demo", "--json", "--figure", "--mismatch", "0.1", "--out", "run", cwd=tmp_path)
+    paper = ("--preset", "paper-10baud", "--mismatch", "0.1")
+    ended = run("demo", "--json", "--figure", *paper, "--out", "run", cwd=tmp_path)
     assert ended.code == 0, ended.err
     summary = ended.summary
     assert set(SUMMARY_FIELDS) <= summary.keys()
@@ -67,16 +72,30 @@ def test_when_the_demo_flies_the_paper_then_every_sample_is_checked(tmp_path: Pa
     assert compare_runs(folder.path).verdict is Verdict.EQUAL, "the two ends' recordings"
 
 
-def test_when_a_person_runs_it_then_both_plants_are_shown_and_nothing_else_on_stdout(
-    tmp_path: Path,
-) -> None:
+def test_when_a_person_runs_it_then_one_flight_is_shown_beside_the_usual_loop(tmp_path: Path) -> None:
     ended = run("demo", "--duration", "30", cwd=tmp_path)
     assert ended.code == 0, ended.err
     assert ended.out.startswith("✓ Flight finished: 30 s, both codecs equal in 300 of 300 checks")
-    assert ended.out.count("Flight finished") == 2
     assert "digest_checks" not in ended.out, "that is for --verbose"
-    assert "+10%" in ended.out
-    assert len(list((tmp_path / "runs").iterdir())) == 2
+    assert "pitch off the model by +10%; tuned-10baud over zenoh" in ended.out
+    assert "° over 1000 bit/s), " in ended.out
+    assert len(list((tmp_path / "runs").iterdir())) == 1
+
+
+def test_the_usual_loop_beside_a_flight_is_the_one_that_both_sessions_fly() -> None:
+    changes: dict[str, Any] = {"duration_s": 3.0, "seed": 4}
+    changes["transmitter"] = {"plant": {"mismatch": 0.1, "disturbance": "q=2e-2"}}
+    usual = usual_flight(agree(load_config("tuned-10baud", None, changes), "virtual"))
+    assert usual is not None
+    (flown,) = fly_plain(load_config("usual-1000baud", None, changes)).outputs
+    assert usual.figures["tracking_rms_rad"] == flown.tracking_rms
+    assert usual.figures["error_live_rms_rad"] == flown.error_live_rms
+    assert max(abs(usual.curve[1])) == flown.amplitude
+
+
+@pytest.mark.parametrize("preset", ["servo-10baud", "usual-1000baud"])
+def test_there_is_no_usual_loop_for_other_plants_and_for_itself(preset: str) -> None:
+    assert usual_flight(agree(load_config(preset), "virtual")) is None
 
 
 @pytest.mark.skipif(not REAL_FLIGHT.is_file(), reason="the recorded flights are not beside the tree")

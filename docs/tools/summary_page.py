@@ -6,10 +6,11 @@ INTRODUCTION = """# Summary
 
 <!-- Written by `make reference` from docs/tools/summary_page.py. Change that, not this page. -->
 
-`summary.json` in a run's folder has these figures; `--json` prints them, and `--verbose` shows them. A run
-of both ends has the transmitter's figures and those that only the receiver knows; one of a single end has its
-own. null: not known. Errors and amplitudes count from `window_start_s` on. The fields with `pitch` or `rad` in
-their name are of the first output, in its unit if that is no angle; `outputs` has those of every output.
+`summary.json` in a run's folder has these figures; `--json` prints them, and `--verbose` shows them. A
+run of both ends has the transmitter's figures and those that only the receiver knows; one of a single
+end has its own. null: not known. Errors and amplitudes count from `window_start_s` on. The fields with
+`pitch` or `rad` in their name are of the first output, in its unit if that is no angle; `outputs` has
+those of every output.
 
 | field | unit | meaning |
 |---|---|---|

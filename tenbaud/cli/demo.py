@@ -57,7 +57,8 @@ def demo(
     flights: list[float | None] = list(mismatch or (None,))
     if flight.preset is None and flight.config is None and flight.rig in (None, "simulated"):
         flight = replace(flight, preset=DEFAULT_PRESET)
-        flights = list(mismatch or (DEFAULT_MISMATCH,))
+        own = any(one.startswith(("model.", "transmitter.plant.")) for one in flight.settings or ())
+        flights = list(mismatch or (None if own else DEFAULT_MISMATCH,))
     changes = [options.overrides(**options.fields_of(flight), mismatch=off, log=log) for off in flights]
     agreements = _agree_all(flight, changes)
     pace = _checked_pace(agreements[0], pace, view)

@@ -113,7 +113,7 @@ def _errors(summary: Summary, unicode: bool) -> Iterator[tuple[str, str]]:
             tracking = shown(one["tracking_rms"], one["unit"], 1)
             usual = summary.get("usual_loop")
             beside = f" ({shown(usual['tracking_rms_rad'], 'rad', 1)} over 1000 bit/s)" if usual else ""
-            yield "Tracking error", f"{of}{tracking} rms{beside}, most of it the steps of the reference"
+            yield "Tracking error", f"{of}{tracking} rms{beside}, steps of the reference included"
 
 
 def _uplink(summary: Summary) -> str:

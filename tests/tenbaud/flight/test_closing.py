@@ -60,7 +60,7 @@ def test_a_good_flight_is_its_verdict_and_six_lines(tmp_path: Path) -> None:
 
 def test_the_usual_loop_stands_beside_the_tracking_error(tmp_path: Path) -> None:
     lines = lines_of(tmp_path, usual_loop={"tracking_rms_rad": 0.84976})
-    assert lines[4].startswith("  Tracking error  48.9° rms (48.7° over 1000 bit/s), most of it")
+    assert lines[4].startswith("  Tracking error  48.9° rms (48.7° over 1000 bit/s), steps of")
 
 
 def test_a_flight_that_did_not_fly_says_in_what_and_then_its_numbers(tmp_path: Path) -> None:
@@ -90,7 +90,7 @@ def test_each_of_several_outputs_has_its_name_and_unit(tmp_path: Path) -> None:
     text = "\n".join(lines_of(tmp_path, outputs=outputs))
     assert "arm angle: 0.39° rms, 1.13° max (0.30% and 0.88% of the largest), after" in text
     assert "place: 0.00677 m rms, 0.0198 m max, after the first 25 s" in text
-    assert "place: 0.854 m rms, most of it the steps" in text
+    assert "place: 0.854 m rms, steps of the reference" in text
 
 
 def test_a_receiver_alone_has_no_checks_to_count(tmp_path: Path) -> None:

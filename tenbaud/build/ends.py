@@ -160,6 +160,10 @@ def check_parts(config: FlightConfig, parts: Parts | None = None) -> None:
     `parts` are objects in place of what is configured; they are checked already.
     """
     parts = parts or Parts()
+    if config.transmitter.rig == "serial":
+        from channel.links.serial.port import check_port
+
+        check_port(config.transmitter.serial.port, insecure=True)
     build_rig(config, parts.plant, configured_signals(config, parts))
     if parts.controller is None:
         controller = build_controller(config, model=parts.model)

@@ -123,7 +123,7 @@ def _fly_all(
     fly: Callable[..., DemoResult],
 ) -> int:
     from tenbaud.flight.display import StatusDisplay
-    from tenbaud.flight.report import show_summaries
+    from tenbaud.flight.report import removed_as_not_begun, removed_unless_begun, show_summaries
     from tenbaud.recording.folder import RunFolder, create_run_folder
 
     results: list[DemoResult] = []
@@ -133,19 +133,21 @@ def _fly_all(
         if out is not None and index:
             explicit = out.with_name(f"{out.name}-{index + 1}")
         folder = RunFolder(create_run_folder(None, agreement.config.preset, explicit))
-        with StatusDisplay() as display:
+        with removed_unless_begun(folder), StatusDisplay() as display:
             result = fly(agreement, folder, display.show)
-        results.append(result)
-        folders.append(folder)
+        begun = not removed_as_not_begun(folder, result.summary, result.code)
         if as_json:
             options.print_json(result.summary)
+        elif begun:
+            results.append(result)
+            folders.append(folder)
         outcome = str(result.summary["outcome"]).partition("\n")[0]
         for message in result.messages:
             # The closing lines begin with the outcome.
-            if as_json or outcome not in message:
-                typer.echo(message, err=True)
+            if as_json or not begun or outcome not in message:
+                typer.echo(message if begun else f"tenbaud: {message}", err=True)
         if result.code:
             break
-    if not as_json:
+    if results:
         show_summaries([result.summary for result in results], folders, verbose=verbose)
-    return int(results[-1].code)
+    return int(result.code)

@@ -77,6 +77,7 @@ def fly_demo(
 
         usual = usual_flight(agreement)
         result.summary |= {"usual_loop": usual.figures} if usual else {}
+    draw = draw and result.summary.get("samples", 0) > 0
     problems = write_up(folder, agreement.config, result.summary, draw, usual and usual.curve)
     # What ended the flight is said last.
     result.messages[:0] = [problem.text for problem in problems]
@@ -108,6 +109,7 @@ def _result(agreement: Agreement, transmitter: _Child, receiver: _Child) -> Demo
     ends = [transmitter, receiver]
     # Whoever was killed comes first: the other one only noticed.
     ends.sort(key=lambda end: end.process.returncode >= 0)
+    ends = [end for end in ends if not end.dismissed]
     outcomes = [outcome for end in ends if (outcome := end.outcome()).code is not ExitCode.OK]
     config = agreement.config
     known: Summary = {"preset": config.preset, "link": config.link.kind, "clock": agreement.clock}
@@ -153,6 +155,9 @@ def _wait(ends: tuple[_Child, _Child], stop: StopFlag) -> None:
         if passed_on and ends[0].died_of_interrupt:
             # It had not begun, and says no farewell.
             ends[1].interrupt()
+        for end, other in (ends, ends[::-1]):
+            if end.process.poll() not in (None, 0):
+                other.dismiss()
         if passed_on or any(end.process.poll() is not None for end in ends):
             patience_s -= 0.1
             if patience_s < 0.0:
@@ -173,6 +178,9 @@ class _Child:
     said: list[str] = field(init=False, default_factory=list)
     _threads: list[threading.Thread] = field(init=False, default_factory=list)
     _interrupted: bool = field(init=False, default=False)
+    _begun: bool = field(init=False, default=False)
+    dismissed: bool = field(init=False, default=False)
+    """it waited for the other end, which could not fly"""
 
     def __post_init__(self) -> None:
         verb = "transmit" if self.role == "transmitter" else "receive"
@@ -196,7 +204,9 @@ class _Child:
     def _read_status(self, stream: IO[str]) -> None:
         for line in stream:
             if line.startswith("{"):
-                self.on_status(json.loads(line))
+                status = json.loads(line)
+                self._begun = self._begun or status["phase"] not in ("greeting", "waiting")
+                self.on_status(status)
             elif line.strip():
                 self.said.append(line.rstrip())
 
@@ -205,6 +215,12 @@ class _Child:
         if not self._interrupted and self.process.poll() is None:
             self._interrupted = True
             self.process.send_signal(signal.SIGINT)
+
+    def dismiss(self) -> None:
+        """Have the process end if it has no session yet: there is nobody to fly with."""
+        if not self._begun and self.process.poll() is None:
+            self.dismissed = True
+            self.interrupt()
 
     @property
     def died_of_interrupt(self) -> bool:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tenbaud.config.load import flattened
 from tenbaud.config.schema import FlightConfig
-from tenbaud.files.whole import WriteError, write_whole
+from tenbaud.files.whole import WriteError, remove, write_whole
 from tenbaud.flight.outcome import ExitCode, Outcome, outcome_of
 from tenbaud.flight.summary import Summary
 from tenbaud.recording.errors import RecordingError
@@ -48,6 +51,37 @@ def write_up(
     if failed and not summary["exit_code"]:
         summary |= {"exit_code": int(failed[0].code), "outcome": failed[0].text}
     return problems
+
+
+@contextmanager
+def removed_unless_begun(folder: RunFolder) -> Iterator[None]:
+    """Remove a new folder where an exception ends the `with` before a tick or a sample is recorded."""
+    try:
+        yield
+    except BaseException as error:
+        if not any(map(_holds_rows, folder.recordings())):
+            remove(folder.path)
+            if isinstance(error, KeyboardInterrupt):
+                sys.stderr.write("tenbaud: stopped before the flight\n")
+        raise
+
+
+def removed_as_not_begun(folder: RunFolder, summary: Summary, code: ExitCode) -> bool:
+    """Remove the folder of a run that was refused or interrupted before its first sample, if it was."""
+    unfit = code in (ExitCode.USAGE, ExitCode.INTERRUPTED) and not summary.get("samples")
+    if unfit:
+        remove(folder.path)
+    return unfit
+
+
+def _holds_rows(path: Path) -> bool:
+    from tenbaud.recording.reader import MessageStream, rows_in_blocks
+
+    try:
+        wanted = {"tick": None, "sample": None}
+        return any(rows for block in rows_in_blocks(MessageStream(path), wanted) for rows in block)
+    except RecordingError:
+        return True  # not known
 
 
 def write_summary(folder: RunFolder, summary: Summary) -> None:

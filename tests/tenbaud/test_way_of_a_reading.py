@@ -1,4 +1,4 @@
-"""The tables of ARCHITECTURE.md name the files that one reading runs through, as a flight shows them."""
+"""The tables of ARCHITECTURE.md name the files that a reading runs through, as a flight shows them."""
 
 from __future__ import annotations
 

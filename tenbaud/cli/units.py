@@ -52,7 +52,7 @@ def plain_setting(field: str, text: str) -> str:
 
 
 def _plain(text: str, units: Mapping[str, str]) -> str:
-    """Return a number in its own unit; a text that is none of it stays as it is."""
+    """Return a number without its unit; any other text stays as it is."""
     match = _NUMBER.fullmatch(text)
     if match is None or match[2] not in units:
         return text

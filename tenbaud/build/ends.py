@@ -170,6 +170,18 @@ def check_parts(config: FlightConfig, parts: Parts | None = None) -> None:
             _check_command(config, controller, parts)
 
 
+def check_sabotage(agreement: Agreement) -> None:
+    """Raise ConfigError for a sabotage at a sample that the flight does not have."""
+    config = agreement.config
+    samples = agreement.flight_ticks // agreement.terms.ticks_per_sample
+    for role, text in (
+        ("transmitter", config.transmitter.sabotage),
+        ("receiver", config.receiver.sabotage),
+    ):
+        if text and parse_sabotage(text).sample >= samples:
+            raise ConfigError(f"{role}.sabotage = {text!r}: the flight has only {samples} samples")
+
+
 def _check_command(config: FlightConfig, controller: Controller, parts: Parts) -> None:
     """Ask a controller from outside for its first command; ConfigError if no motor could follow it."""
     model, name = build_codec(config, parts).model, config.receiver.controller

@@ -71,6 +71,7 @@ def fly_demo(
             if pace is not None:
                 viewing = replace(viewing, transmitter=[*viewing.transmitter, "--pace", str(pace)])
             result = _fly_processes(agreement, folder, on_status, viewing, stop)
+    on_status({"role": "run", "phase": "writing its results"})
     usual = None
     if compare and result.code is ExitCode.OK and view is None:
         from tenbaud.flight.usual import usual_flight

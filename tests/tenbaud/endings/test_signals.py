@@ -89,7 +89,7 @@ LASTING: dict[str, tuple[str, ...]] = {
     "router": ("router", "--listen", "tcp/127.0.0.1:0"),
     "identify": ("identify", "--duration", "20000", "--out", "run"),
     "figures": ("figures", "all", "--out", "run"),
-    "tune": ("tune", "--out", "found.toml", "--evaluations", "100000"),
+    "tune": ("tune", "--disturbance", "q=2e-3", "--out", "found.toml", "--evaluations", "100000"),
     "sweep": ("sweep", "study.toml", "--workers", "2", "--out", "run"),
 }
 STUDY = 'name = "long"\nseeds = 2000\nset = { duration_s = 1000.0 }\ngrid = { loss = [0.0, 0.1] }\n'

@@ -13,6 +13,7 @@ from plant_sim.identification.record import Record
 from tenbaud.build.rig import build_rig
 from tenbaud.build.signals import build_encoders, configured_signals, encoder_steps
 from tenbaud.config.schema import FlightConfig, FlightLogSection
+from tenbaud.identification.bits import Bits, read_bits
 from tenbaud.identification.structure import SPEEDS
 from tenbaud.log.table import LogError
 
@@ -31,6 +32,8 @@ class Source:
     """set-points in the file, which are no inputs"""
     excited: bool = False
     """the configured rig moved as this command made it"""
+    bits: Bits | None = None
+    """what crossed the wire of the run, where nothing else may be used"""
 
 
 def from_rig(config: FlightConfig, excitation: str, duration_s: float) -> Record:
@@ -81,6 +84,14 @@ def from_log(
         log.steps,
     )
     return record, log.notes
+
+
+def from_bits(path: Path) -> Source:
+    """Return what crossed the wire of a run; its file is named where it holds measurements too."""
+    bits = read_bits(path)
+    measured = "transmitter" in bits.ends
+    note = () if measured else ("the run holds no measurements, so nothing can be flown over them",)
+    return Source(path.name, bits.record(), note, path if measured else None, bits=bits)
 
 
 def _own_signals(config: FlightConfig, structure: str) -> bool:

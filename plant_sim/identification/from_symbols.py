@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plant_sim.identification.estimator import CONDITION_MIN, Estimate
+from plant_sim.identification.estimator import Estimate
 from plant_sim.identification.filters import Array
 from plant_sim.identification.likelihood import follow
 from plant_sim.identification.maximum import Maximum, climb
@@ -32,7 +32,10 @@ WIDER = (3.0, 0.0, 6.0, 1.5)
 """starts above the likeliest of them: much disturbance makes a smooth likelihood"""
 SAME = 0.5
 """of the log-likelihood; two starts that reach it have found the maximum"""
-DENSITY_STEP = 2.0
+LOG_STEP = 2.0
+"""of a logarithm in a round of the search"""
+WRONG = math.log(1e-3)
+"""logarithm of the share of symbols that say nothing, at first"""
 WEAK = 1e-6
 """share of all information that the model that flew has in the history"""
 HISTORY = 500
@@ -78,7 +81,7 @@ def identify_symbols(
         f"log-likelihood of a symbol {found.log / count:.3f}; with the model that flew "
         f"{flown / count:.3f}, of guesses {GUESSED:.3f}"
     )
-    densities = np.exp(found.point[len(values) :]).tolist()
+    densities = np.exp(found.point[len(values) : -1]).tolist()
     result = Identification(
         structure, regression, None, lag_s, 0.0, values, covariance, False, tuple(notes), (), (),
         tuple(densities),
@@ -117,20 +120,20 @@ def _scale(chance: Likelihood, levels: Levels, start: Mapping[str, float]) -> Ar
         for term in equation.terms:
             most = target / max(levels.terms[term.name], 1e-12)
             found.append(REGIONS * max(abs(start[term.name]), 0.3 * most, 1e-9))
-    return np.array(found + [DENSITY_STEP] * len(chance.structure.equations))
+    return np.array(found + [LOG_STEP] * (len(chance.structure.equations) + 1))
 
 
 def _highest(chance: Likelihood, start: Array, scale: Array) -> tuple[float, Maximum]:
     """Return the log-likelihood of the model that flew and the maximum, from several starts."""
     symbols, order = chance.symbols, chance.structure.order
     unit = symbols.start_deviations[::order] ** 2 / symbols.period_s ** (2 * order - 1)
-    points = {log: np.concatenate((start, np.log(unit) + log)) for log in DENSITIES}
+    points = {log: np.concatenate((start, np.log(unit) + log, [WRONG])) for log in DENSITIES}
     logs = {log: float(chance(point)[0].sum()) for log, point in points.items()}
     likeliest = max(logs, key=logs.__getitem__)
     ends: list[Maximum] = []
     for wider in WIDER:
         point = points[likeliest].copy()
-        point[len(start) :] += wider
+        point[len(start) : -1] += wider
         ends.append(climb(chance, point, scale))
         best = max(one.log for one in ends)
         if sum(best - one.log < SAME for one in ends) > 1:
@@ -218,12 +221,6 @@ def _unsupported(found: Identification, maximum: Maximum, inputs: int) -> Iterab
     """Yield why the symbols support no model."""
     if not maximum.converged:
         yield "the search for the most likely parameters found no end: fly longer"
-    condition = found.regression.condition
-    if condition < CONDITION_MIN:
-        yield (
-            f"the flight is not exciting enough to tell the parameters apart (measure {condition:.1e}, "
-            f"at least {CONDITION_MIN:g} is needed)"
-        )
     yield from uncertain(found, inputs)
     if isinstance(found.structure, PitchStructure) and found.values.get("a_w", 0.0) < 0.0:
         yield (

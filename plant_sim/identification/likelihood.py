@@ -18,8 +18,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-WRONG = 1e-3
-"""share of symbols that say nothing: flipped ones, and those formed before both ends agreed"""
 ROOT_HALF = math.sqrt(0.5)
 ROOT_TAU = math.sqrt(2.0 * math.pi)
 FAR = 38.0
@@ -104,8 +102,13 @@ def density(z: float) -> float:
     return math.exp(-0.5 * z * z) / ROOT_TAU if -FAR < z < FAR else 0.0
 
 
-def told(c: Any, low: float, high: float, spread: float, x: Any, P: Any, v: Any) -> float:
-    """Take c' x to be between `low` and `high`; return the log-likelihood of that."""
+def told(
+    c: Any, low: float, high: float, spread: float, wrong: float, x: Any, P: Any, v: Any
+) -> float:
+    """Take c' x to be between `low` and `high`; return the log-likelihood of that.
+
+    `wrong` is the share of symbols that say nothing.
+    """
     n = len(x)
     mean, variance = 0.0, spread
     for i in range(n):
@@ -119,10 +122,10 @@ def told(c: Any, low: float, high: float, spread: float, x: Any, P: Any, v: Any)
     deviation = math.sqrt(variance)
     a, b = (low - mean) / deviation, (high - mean) / deviation
     left, right = density(a), density(b)
-    p = WRONG * 0.5 + (1.0 - WRONG) * between(a, b)
-    first = (1.0 - WRONG) * (left - right) / p
+    p = 0.5 * wrong + (1.0 - wrong) * between(a, b)
+    first = (1.0 - wrong) * (left - right) / p
     bent = (a * left if left > 0.0 else 0.0) - (b * right if right > 0.0 else 0.0)
-    second = (1.0 - WRONG) * bent / p - first * first
+    second = (1.0 - wrong) * bent / p - first * first
     for i in range(n):
         x[i] += v[i] * first / deviation
         for j in range(n):
@@ -141,6 +144,7 @@ def follow(
     lows: Any,
     highs: Any,
     spreads: Any,
+    wrong: float,
     x: Any,
     P: Any,
     work: Any,
@@ -157,7 +161,8 @@ def follow(
     for k in range(samples):
         total = 0.0
         for e in range(firsts[k], firsts[k + 1]):
-            total += told(combinations[e], lows[e], highs[e], spreads[e], x, P, work[0, 0])
+            c, v = combinations[e], work[0, 0]
+            total += told(c, lows[e], highs[e], spreads[e], wrong, x, P, v)
         logs[k] = total
         for i in range(len(x)):
             means[k, i] = x[i]

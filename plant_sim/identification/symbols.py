@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from plant_sim.identification.structures import LinearStructure, Structure, name
 STEP_MAX = 0.3
 """of a Runge-Kutta step, over the time constant of the fastest motion"""
 LOG_DENSITY_MIN, LOG_DENSITY_MAX = -60.0, 40.0
+LOG_WRONG_MIN, LOG_WRONG_MAX = -15.0, -0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,8 +67,8 @@ def averaged(inputs: Array, tick_s: float, lag_s: float) -> Array:
 class Likelihood:
     """The log-likelihood of each sample's symbols.
 
-    A point is the structure's parameters, then the logarithm of the density q of the white disturbance
-    of each equation. `function` is `follow`, or what a compiler made of it.
+    A point is the structure's parameters, then logarithms: of the density q of the white disturbance of
+    each equation, and of the share of symbols that say nothing, as flipped ones. `function` is `follow`, or what a compiler made of it.
     """
 
     symbols: Symbols
@@ -94,14 +95,15 @@ class Likelihood:
         size, step_s = len(A), symbols.period_s / self.steps
         noise = np.zeros((size, size))
         last = np.arange(structure.order - 1, size, structure.order)
-        noise[last, last] = np.exp(np.clip(point[len(names) :], LOG_DENSITY_MIN, LOG_DENSITY_MAX))
+        noise[last, last] = np.exp(np.clip(point[len(names) : -1], LOG_DENSITY_MIN, LOG_DENSITY_MAX))
+        wrong = math.exp(min(max(float(point[-1]), LOG_WRONG_MIN), LOG_WRONG_MAX))
         logs, means = np.empty(len(symbols)), np.empty((len(symbols), size))
         told = (symbols.firsts, symbols.combinations, symbols.lows, symbols.highs, symbols.spreads)
         start = (symbols.start.copy(), np.diag(symbols.start_deviations**2))
         drive = np.ascontiguousarray(self.drives @ B.T + force)
         added = _spread(A, noise, step_s)
         work = np.zeros((6, size, size))
-        self.function(A, sine, drive, added, step_s, *told, *start, work, logs, means)
+        self.function(A, sine, drive, added, step_s, *told, wrong, *start, work, logs, means)
         return logs, means
 
 
@@ -130,11 +132,6 @@ def likelihood(
     least = max(2.0, symbols.period_s * fastest / STEP_MAX)
     whole = [count for count in range(1, ticks + 1) if ticks % count == 0 and count >= least]
     return Likelihood(symbols, structure, lag_s, whole[0] if whole else ticks, function)
-
-
-def held_at_zero(found: Likelihood, structure: Structure) -> Likelihood:
-    """Return the likelihood of a structure with fewer parameters."""
-    return replace(found, structure=structure)
 
 
 def _spread(A: Array, noise: Array, step_s: float) -> Array:

@@ -16,7 +16,6 @@ import numpy as np
 
 from plant_sim.identification.estimator import Estimate
 from plant_sim.identification.filters import Array
-from plant_sim.identification.likelihood import follow
 from plant_sim.identification.maximum import Maximum, climb
 from plant_sim.identification.pipeline import Identification, doubts, uncertain
 from plant_sim.identification.pitch import PitchStructure
@@ -58,9 +57,12 @@ def identify_symbols(
     structure: Structure,
     lag_s: float,
     start: Mapping[str, float],
-    function: Callable[..., None] = follow,
+    function: Callable[..., None],
 ) -> Identification:
-    """Identify a structure; `start` has the parameters of the model that flew."""
+    """Identify a structure; `start` has the parameters of the model that flew.
+
+    `function` is `follow`, compiled: plain Python takes minutes.
+    """
     chance = likelihood(symbols, structure, lag_s, start, function)
     scale = _scale(chance, levels_of(chance, dict(start), symbols.estimates), start)
     flown, found = _highest(chance, np.array(list(start.values())), scale)

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from plant_sim.identification.filters import Array, lagged
-from plant_sim.identification.likelihood import follow
 from plant_sim.identification.pitch import PitchStructure
 from plant_sim.identification.structures import LinearStructure, Structure, names_of
 
@@ -76,7 +75,7 @@ class Likelihood:
     lag_s: float
     steps: int
     """in a sample"""
-    function: Callable[..., None] = follow
+    function: Callable[..., None]
     drives: Array = field(init=False)
 
     def __post_init__(self) -> None:
@@ -123,7 +122,7 @@ def likelihood(
     structure: Structure,
     lag_s: float,
     values: Mapping[str, float],
-    function: Callable[..., None] = follow,
+    function: Callable[..., None],
 ) -> Likelihood:
     """Return the likelihood, its steps short for the motion that `values` mean."""
     A, _, _, sine = matrices(structure, values)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -146,18 +144,11 @@ def symbols_of(bits: Bits, order: int) -> tuple[Symbols, Any]:
     return symbols, known
 
 
-def _fastest() -> Callable[..., None]:
-    """Return the filter, compiled where that can be done."""
-    with suppress(ImportError):
-        from tenbaud.studies.compiled import compiled
-
-        found: Callable[..., None] = compiled(follow)
-        return found
-    return follow
-
-
 def run_bits(name: str, bits: Bits, wanted: str, equilibrium: str, lag_s: float | None) -> Identified:
     """Identify the plant of a flight from what crossed the wire."""
+    from tenbaud.studies.compiled import compiled, require
+
+    require("numba")
     record = bits.record()
     pitches = bits.config.model.kind == "pitch"
     where = "estimate" if equilibrium == "auto" and pitches else equilibrium
@@ -168,7 +159,7 @@ def run_bits(name: str, bits: Bits, wanted: str, equilibrium: str, lag_s: float 
         lag_s = float(getattr(bits.config.model, "motor_lag_s", 0.0))
     symbols, known = symbols_of(bits, chosen.structure.order)
     start = start_values(chosen.structure, known)
-    found = identify_symbols(symbols, chosen.structure, lag_s, start, _fastest())
+    found = identify_symbols(symbols, chosen.structure, lag_s, start, compiled(follow))
     count = len(symbols.combinations)
     said = f"from {count} symbols of {symbols.period_s * len(symbols):.6g} s"
     return Identified(name, record, found, chosen, (said, *found.notes), found.warnings, "")

@@ -71,7 +71,9 @@ def identify_symbols(
     spread = math.sqrt(max(0.0, covariance[0, 0]))
     damped = isinstance(structure, PitchStructure) and "a_w" in values
     if damped and -3.0 * spread < values["a_w"] < 0.0:
-        notes.append(f"a_w = {values['a_w']:.2g} +- {spread:.2g} is 0 within its uncertainty: held at 0")
+        notes.append(
+            f"a_w = {values['a_w']:.2g} +- {spread:.2g} is 0 within its uncertainty: held at 0"
+        )
         structure = holding(structure, {"a_w"})
         chance = replace(chance, structure=structure)
         found = climb(chance, found.point[1:], scale[1:])
@@ -165,7 +167,7 @@ def _parameters_covariance(information: Array, count: int) -> Array:
 
 
 def _condition(information: Array, constants: list[int]) -> float:
-    """Return the smallest eigenvalue of the parameters' correlation; what constants explain counts not."""
+    """Return the smallest eigenvalue of the correlation of all but the constants."""
     shown = [place for place in range(len(information)) if place not in constants]
     own = information[np.ix_(shown, shown)]
     if constants:
@@ -229,4 +231,3 @@ def _unsupported(found: Identification, maximum: Maximum, inputs: int) -> Iterab
             f"a_w = {found.values['a_w']:.4g} is negative: a body that gains energy by itself; do the "
             "commands act later than they are due?"
         )
-

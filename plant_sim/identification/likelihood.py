@@ -53,7 +53,9 @@ def transition(A: Any, step_s: float, out: Any, work: Any) -> None:
                 out[i, j] = work[i, j] + (1.0 if i == j else 0.0)
 
 
-def predict(A: Any, sine: Any, drive: Any, noise: Any, step_s: float, x: Any, P: Any, work: Any) -> None:
+def predict(
+    A: Any, sine: Any, drive: Any, noise: Any, step_s: float, x: Any, P: Any, work: Any
+) -> None:
     """Carry mean and covariance over one step; `work` holds vectors first, then matrices."""
     n = len(x)
     J, F, M = work[3], work[4], work[5]
@@ -102,7 +104,7 @@ def density(z: float) -> float:
     return math.exp(-0.5 * z * z) / ROOT_TAU if -FAR < z < FAR else 0.0
 
 
-def told(
+def update(
     c: Any, low: float, high: float, spread: float, wrong: float, x: Any, P: Any, v: Any
 ) -> float:
     """Take c' x to be between `low` and `high`; return the log-likelihood of that.
@@ -162,7 +164,7 @@ def follow(
         total = 0.0
         for e in range(firsts[k], firsts[k + 1]):
             c, v = combinations[e], work[0, 0]
-            total += told(c, lows[e], highs[e], spreads[e], wrong, x, P, v)
+            total += update(c, lows[e], highs[e], spreads[e], wrong, x, P, v)
         logs[k] = total
         for i in range(len(x)):
             means[k, i] = x[i]

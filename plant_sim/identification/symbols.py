@@ -67,7 +67,8 @@ class Likelihood:
     """The log-likelihood of each sample's symbols.
 
     A point is the structure's parameters, then logarithms: of the density q of the white disturbance of
-    each equation, and of the share of symbols that say nothing, as flipped ones. `function` is `follow`, or what a compiler made of it.
+    each equation, and of the share of symbols that say nothing, as flipped ones do. `function` is
+    `follow`, compiled.
     """
 
     symbols: Symbols
@@ -97,12 +98,12 @@ class Likelihood:
         noise[last, last] = np.exp(np.clip(point[len(names) : -1], LOG_DENSITY_MIN, LOG_DENSITY_MAX))
         wrong = math.exp(min(max(float(point[-1]), LOG_WRONG_MIN), LOG_WRONG_MAX))
         logs, means = np.empty(len(symbols)), np.empty((len(symbols), size))
-        told = (symbols.firsts, symbols.combinations, symbols.lows, symbols.highs, symbols.spreads)
+        given = (symbols.firsts, symbols.combinations, symbols.lows, symbols.highs, symbols.spreads)
         start = (symbols.start.copy(), np.diag(symbols.start_deviations**2))
         drive = np.ascontiguousarray(self.drives @ B.T + force)
         added = _spread(A, noise, step_s)
         work = np.zeros((6, size, size))
-        self.function(A, sine, drive, added, step_s, *told, wrong, *start, work, logs, means)
+        self.function(A, sine, drive, added, step_s, *given, wrong, *start, work, logs, means)
         return logs, means
 
 

@@ -78,7 +78,7 @@ def identify(
         bool,
         typer.Option(
             "--from-bits",
-            help="Use only what crossed the wire of a run: symbols, commands, the shared configuration.",
+            help="Use only what crossed the wire of a run: symbols and commands.",
         ),
     ] = False,
     fly: Annotated[
@@ -188,7 +188,9 @@ def _show(result: Result) -> None:
         for where, values in each.beside.items():
             table.add_row(where, *(f"{value:.4f}" for value in values))
             pairs = zip(found.parameters, values, strict=True)
-            off = [f"{100.0 * (item.value / value - 1.0):+.2f} %" if value else "" for item, value in pairs]
+            off = [
+                f"{100.0 * (item.value / value - 1.0):+.2f} %" if value else "" for item, value in pairs
+            ]
             table.add_row("off them" if where == MEASURED else "off it", *off)
         console.print(table)
         for line in each.lines():

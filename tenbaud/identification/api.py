@@ -9,8 +9,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from channel.codec.signals import Signals
 from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.pipeline import Options
@@ -27,7 +25,7 @@ from tenbaud.identification.closed_loop import with_commands
 from tenbaud.identification.coder import with_coder
 from tenbaud.identification.flown import Flown, fly_record
 from tenbaud.identification.run import Identified, Wanted, run
-from tenbaud.identification.sources import Source, from_bits, from_log, from_rig
+from tenbaud.identification.sources import Source, from_arrays, from_bits, from_log, from_rig
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -347,8 +345,9 @@ def identify(
 
     `source` is the path of a log or of a run folder, or a table of arrays by name, of which `outputs`
     and `inputs` name the signals and `tick_s` is the time between two rows. The other arguments are
-    those of `tenbaud identify`: `structure`, `lag`, `equilibrium`, `bandwidth_rad_s`, `from_bits`; `settings` are
-    fields by their full names, `{"flight_log.columns": {"angle": "pitch_deg"}, ...}`.
+    those of `tenbaud identify`: `structure`, `lag`, `equilibrium`, `bandwidth_rad_s`; with `from_bits`,
+    only what crossed the wire of a run is used. `settings` are fields by their full names,
+    `{"flight_log.columns": {"angle": "pitch_deg"}, ...}`.
 
     The result has `estimates`, `deviations`, `warnings`, `refused`, the section `model` and, where the
     data support a model, `config`. With `out`, a new folder, figures and `identified.toml` are written,
@@ -362,46 +361,10 @@ def identify(
     request = Request(structure, str(lag), str(equilibrium), bandwidth_rad_s, fly=fly, given=given)
     request = replace(request, from_bits=from_bits)
     if isinstance(source, Mapping):
-        sources = [_of_arrays(source, tuple(outputs), tuple(inputs), tick_s, units or {})]
+        sources = [from_arrays(source, tuple(outputs), tuple(inputs), tick_s, units or {})]
     else:
         sources = sources_of(loaded, Path(source), request)
     result = identify_sources(loaded, sources, request)
     if out is not None:
         result.save(create_run_folder(None, "identify", Path(out)), fly=fly)
     return result.each[0]
-
-
-def _of_arrays(
-    arrays: Mapping[str, ArrayLike],
-    outputs: tuple[str, ...],
-    inputs: tuple[str, ...],
-    tick_s: float | None,
-    units: Mapping[str, str],
-) -> Source:
-    if tick_s is None or not outputs:
-        raise IdentificationError(
-            "arrays need tick_s, the time between two rows, and outputs=(name, ...)"
-        )
-    missing = [name for name in (*outputs, *inputs) if name not in arrays]
-    if missing:
-        raise IdentificationError(f"no array is called {missing[0]}; there are {', '.join(arrays)}")
-    columns = {name: np.asarray(arrays[name], dtype=np.float64) for name in (*outputs, *inputs)}
-    lengths = {values.shape for values in columns.values()}
-    if len(lengths) != 1 or len(next(iter(lengths))) != 1:
-        raise IdentificationError(
-            f"the arrays differ in shape: {sorted(lengths)}; give vectors of one length"
-        )
-    from tenbaud.log.angles import step_of
-
-    rows = len(columns[outputs[0]])
-    record = Record(
-        tick_s,
-        np.stack([columns[name] for name in outputs], axis=1),
-        np.stack([columns[name] for name in inputs], axis=1) if inputs else np.empty((rows, 0)),
-        outputs,
-        inputs,
-        tuple(units.get(name, "") for name in outputs),
-        tuple(units.get(name, "") for name in inputs),
-        tuple(step_of(columns[name]) for name in outputs),
-    )
-    return Source("arrays", record)

@@ -1,4 +1,4 @@
-"""What a model out of a run's bits is compared with: the simulated plant, and the run's measurements."""
+"""What a model out of a run's bits is compared with: the simulated plant, the run's measurements."""
 
 from __future__ import annotations
 

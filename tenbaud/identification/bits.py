@@ -23,7 +23,7 @@ from tenbaud.build.signals import encoder_steps
 from tenbaud.config.schema import FlightConfig
 from tenbaud.identification.linearised import linearised, start_values
 from tenbaud.identification.run import Identified
-from tenbaud.identification.said import Said, said
+from tenbaud.identification.statements import Statement, statements_of
 from tenbaud.identification.structure import choose
 from tenbaud.replay.record import FlightRecord, epochs_of, load_record
 
@@ -38,7 +38,7 @@ class Bits:
     """The words of a flight as statements, and the commands of its ticks."""
 
     agreement: Agreement
-    statements: list[list[Said]]
+    statements: list[list[Statement]]
     """of each sample; none of an erased one"""
     states: list[Vector]
     """the codec's model state before each sample"""
@@ -79,7 +79,7 @@ def read_bits(path: Path) -> Bits:
         state = epoch.start
         for word in epoch.words:
             states.append(state.model)
-            statements.append([] if word is ERASED else list(said(codec, state, word)))
+            statements.append([] if word is ERASED else list(statements_of(codec, state, word)))
             row = recorded[state.sample]
             state = CodecState(state.sample + 1, row.state, row.coder)
     commands = _commands(record, len(states))
@@ -111,17 +111,17 @@ def symbols_of(bits: Bits, order: int) -> tuple[Symbols, Any]:
         [UNSURE * one / period_s ** np.arange(order) for one in ranges.tolist()]
     )
     flat = [one for sample in bits.statements for one in sample]
-    told = np.array([one[0] for one in flat], dtype=np.float64).reshape(len(flat), -1)
+    combinations = np.array([one[0] for one in flat], dtype=np.float64).reshape(len(flat), -1)
     edges = np.array([one[1:] for one in flat], dtype=np.float64).reshape(len(flat), 2)
     if codec.uses_rates:
         # c' x of the corrected states x = x0 + W (z - z0)
         turned = np.linalg.inv(known.by_corrected)
-        edges += (told @ (turned @ known.state - known.corrected))[:, None]
-        told = told @ turned
+        edges += (combinations @ (turned @ known.state - known.corrected))[:, None]
+        combinations = combinations @ turned
     else:
         whole = np.zeros((len(flat), size))
-        whole[:, ::order] = told
-        told = whole
+        whole[:, ::order] = combinations
+        combinations = whole
     rates = bits.config.transmitter.rate_observer_bandwidth_rad_s
     reading = np.array(encoder_steps(bits.config, bits.agreement.signals)) / math.sqrt(12.0)
     errors = np.concatenate(
@@ -132,10 +132,10 @@ def symbols_of(bits: Bits, order: int) -> tuple[Symbols, Any]:
     symbols = Symbols(
         period_s,
         np.concatenate(([0], np.cumsum([len(one) for one in bits.statements]))),
-        np.ascontiguousarray(told),
+        np.ascontiguousarray(combinations),
         np.ascontiguousarray(edges[:, 0]),
         np.ascontiguousarray(edges[:, 1]),
-        told**2 @ errors**2,
+        combinations**2 @ errors**2,
         bits.commands,
         known.state + known.by_corrected @ (states[0] - known.corrected),
         start_deviations,
@@ -161,5 +161,5 @@ def run_bits(name: str, bits: Bits, wanted: str, equilibrium: str, lag_s: float 
     start = start_values(chosen.structure, known)
     found = identify_symbols(symbols, chosen.structure, lag_s, start, compiled(follow))
     count = len(symbols.combinations)
-    said = f"from {count} symbols of {symbols.period_s * len(symbols):.6g} s"
-    return Identified(name, record, found, chosen, (said, *found.notes), found.warnings, "")
+    origin = f"from {count} symbols of {symbols.period_s * len(symbols):.6g} s"
+    return Identified(name, record, found, chosen, (origin, *found.notes), found.warnings, "")

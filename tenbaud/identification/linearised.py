@@ -76,7 +76,7 @@ def _differences(function: Callable[[Array], tuple[Array, Array]], at: Array) ->
 
 
 def _derivatives(model: Model, corrected: Array, inputs: Array, tick_s: float) -> list[Array]:
-    """Return outputs, rates and accelerations while the inputs are held and all that lags is at rest."""
+    """Return outputs, rates and accelerations; inputs are held, and what lags is at rest."""
     nothing, command = (0.0,) * model.correction_size, tuple(inputs.tolist())
     first = tuple(corrected.tolist())
     state = (*first, *model.initial()[len(first) :])

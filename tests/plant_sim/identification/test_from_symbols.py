@@ -9,7 +9,7 @@ import pytest
 
 from plant_sim.identification.filters import Array
 from plant_sim.identification.from_symbols import identify_symbols
-from plant_sim.identification.likelihood import follow, told
+from plant_sim.identification.likelihood import follow, update
 from plant_sim.identification.structures import parse_linear
 from plant_sim.identification.symbols import Symbols
 from tenbaud.studies.compiled import compiled
@@ -36,7 +36,7 @@ def test_when_a_symbol_is_taken_then_mean_and_covariance_are_those_of_the_cut_no
     chance = 0.5 * wrong + (1.0 - wrong) * 0.5 * (upper - lower)
     after = weights * chance / (weights @ chance)
     found, spread_found = mean.copy(), P.copy()
-    log = told(c, low, high, spread, wrong, found, spread_found, np.empty(2))
+    log = update(c, low, high, spread, wrong, found, spread_found, np.empty(2))
     assert log == pytest.approx(math.log(weights @ chance), abs=1e-6)
     assert found == pytest.approx(after @ x, abs=1e-6)
     off = x - after @ x

@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
+from plant_sim.identification.pitch import PitchStructure
+from plant_sim.identification.structures import parse_linear
 from tenbaud import load_preset
 from tenbaud.cli.commands import app
 from tenbaud.config.load import load_config
 from tenbaud.identification.linearised import linearised, start_values
-from tenbaud.identification.said import said
-from plant_sim.identification.pitch import PitchStructure
-from plant_sim.identification.structures import parse_linear
+from tenbaud.identification.statements import statements_of
 from tenbaud.recording.folder import TRANSMITTER_NAME
 from tests.tenbaud.flown import flown
 
@@ -86,7 +86,7 @@ def test_when_a_word_is_formed_then_what_it_says_is_so(preset: str, wrong: int) 
         reach = max(codec.coder.ranges(state.coder))
         seen = tuple([one + draw.gauss(0.0, 0.7 * reach) for one in codec.predicted(state)])
         word = codec.encode(state, seen)
-        for c, low, high in said(codec, state, word):
+        for c, low, high in statements_of(codec, state, word):
             along = sum(one * value for one, value in zip(c, seen, strict=True))
             missed += not low - 1e-9 <= along <= high + 1e-9
         state = codec.step(state, word, [still] * codec.ticks_per_sample)
@@ -104,9 +104,7 @@ def test_when_a_search_begins_then_it_is_at_the_model_that_flew() -> None:
 
     codec = load_preset("aero-20baud").codec
     names = ("pitch", "yaw"), ("front", "side")
-    start = start_values(
-        parse_linear("linear", *names), linearised(codec.model, 2, 0.01, (0.0, 0.0))
-    )
+    start = start_values(parse_linear("linear", *names), linearised(codec.model, 2, 0.01, (0.0, 0.0)))
     assert start["pitch''/pitch"] == pytest.approx(-1.74, rel=0.02)
     assert start["yaw''/yaw'"] == pytest.approx(-0.928, rel=0.02)
     assert start["yaw''/side"] == pytest.approx(0.0928, rel=0.02)

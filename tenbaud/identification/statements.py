@@ -1,8 +1,8 @@
 """What the symbols of a word say about the plant, by coder: an interval of a combination of its states.
 
 The thresholds are the coder's own, at the recorded state of the codec. They hold as the transmitter
-formed the word from that state: always on a line without faults, and up to the few samples after a
-fault, until the echo has told it of it.
+formed the word from that state: on a line without faults always, and after a fault as soon as its echo
+has come.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from channel.codec.coders.signs import SignCoder
 from channel.codec.coders.static import StaticCoder, number_of
 from plant_sim.identification.errors import IdentificationError
 
-Said = tuple[Sequence[float], float, float]
+Statement = tuple[Sequence[float], float, float]
 """(c, low, high): c' z lies in between, z being the outputs, or all corrected states"""
 HALVINGS = 30
 REACHES = 8.0
 """ranges from the prediction within which the boundary of a coder that looks ahead is sought"""
 
 
-def said(codec: Codec, state: CodecState, word: Sequence[int]) -> Iterator[Said]:
-    """Yield what each symbol of a word says, `state` being the codec's before it."""
+def statements_of(codec: Codec, state: CodecState, word: Sequence[int]) -> Iterator[Statement]:
+    """Yield the statement of each symbol of a word, `state` being the codec's before it."""
     coder, predicted = codec.coder, codec.predicted(state)
     if isinstance(coder, SignCoder):
         for axis, sign in enumerate(word):
@@ -53,11 +53,11 @@ def _unit(place: int, size: int) -> list[float]:
     return [1.0 if place == one else 0.0 for one in range(size)]
 
 
-def _side(c: Sequence[float], edge: float, sign: int) -> Said:
+def _side(c: Sequence[float], edge: float, sign: int) -> Statement:
     return (c, edge, math.inf) if sign > 0 else (c, -math.inf, edge)
 
 
-def _cell(c: Sequence[float], lowest: float, width: float, word: Sequence[int]) -> Said:
+def _cell(c: Sequence[float], lowest: float, width: float, word: Sequence[int]) -> Statement:
     """Return the cell with the number that a word is; the outermost ones have no end."""
     number = number_of(word)
     low = lowest + number * width
@@ -67,7 +67,7 @@ def _cell(c: Sequence[float], lowest: float, width: float, word: Sequence[int]) 
 
 def _directions(
     coder: DirectionCoder, before: Vector, predicted: Vector, word: Sequence[int]
-) -> Iterator[Said]:
+) -> Iterator[Statement]:
     known, size = list(before), coder.correction_size
     c, v, correction = ([0.0] * size for _ in range(3))
     for sign in word:
@@ -77,7 +77,7 @@ def _directions(
             learn(coder.constants, known, c, v, sign, correction)
 
 
-def _boundary(coder: HistoryCoder, before: Vector, predicted: Vector, sign: int) -> Said:
+def _boundary(coder: HistoryCoder, before: Vector, predicted: Vector, sign: int) -> Statement:
     """Return a side of the line between both signs, straight through half a range of either rate.
 
     A coder that looks ahead has no formula for it.

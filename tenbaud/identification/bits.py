@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from channel.codec.codec import CodecState, Vector
-from channel.codec.words import ERASED
+from channel.codec.codec import ERASED, CodecState, Vector
 from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.filters import Array
 from plant_sim.identification.from_symbols import identify_symbols
@@ -21,7 +19,7 @@ from plant_sim.identification.symbols import Symbols
 from tenbaud.build.flight import Agreement
 from tenbaud.build.signals import encoder_steps
 from tenbaud.config.schema import FlightConfig
-from tenbaud.identification.linearised import linearised, start_values
+from tenbaud.identification.linearised import Linearised, linearised, start_values
 from tenbaud.identification.run import Identified
 from tenbaud.identification.statements import Statement, statements_of
 from tenbaud.identification.structure import choose
@@ -100,7 +98,7 @@ def _commands(record: FlightRecord, samples: int) -> Array:
     return np.array(commands, dtype=np.float64)
 
 
-def symbols_of(bits: Bits, order: int) -> tuple[Symbols, Any]:
+def symbols_of(bits: Bits, order: int) -> tuple[Symbols, Linearised]:
     """Return the statements in outputs and rates, and the codec's model in them."""
     codec, terms = bits.agreement.codec, bits.agreement.terms
     tick_s, period_s = terms.tick_ns / 1e9, terms.sample_ns / 1e9
@@ -111,8 +109,15 @@ def symbols_of(bits: Bits, order: int) -> tuple[Symbols, Any]:
         [UNSURE * one / period_s ** np.arange(order) for one in ranges.tolist()]
     )
     flat = [one for sample in bits.statements for one in sample]
+    if not flat:
+        raise IdentificationError("no symbol of this flight arrived: there is nothing to identify from")
     combinations = np.array([one[0] for one in flat], dtype=np.float64).reshape(len(flat), -1)
     edges = np.array([one[1:] for one in flat], dtype=np.float64).reshape(len(flat), 2)
+    if codec.uses_rates and combinations.shape[1] != size:
+        raise IdentificationError(
+            f"the coder asks about {combinations.shape[1]} states, and the structure has {size}: ask "
+            "for another one, or identify from the measurements"
+        )
     if codec.uses_rates:
         # c' x of the corrected states x = x0 + W (z - z0)
         turned = np.linalg.inv(known.by_corrected)

@@ -15,6 +15,7 @@ from plant_sim.identification.structures import Structure, names_of
 
 ORDER_MAX = 2
 NUDGE = 1e-4
+CONDITION_MAX = 1e8
 SETTLING = 400
 """ticks in which what lags, as motors do, comes to rest"""
 
@@ -24,11 +25,11 @@ class Linearised:
     """z = (output, rate, output, rate ...) and the derivatives above it, near the model's start."""
 
     corrected: Array
-    """corrected states there"""
+    """as many states of the model there"""
     state: Array
     """z there"""
     by_corrected: Array
-    """dz by the corrected states"""
+    """dz by these states"""
     by_state: Array
     """of the highest derivative of each output, by z"""
     by_input: Array
@@ -43,7 +44,12 @@ def linearised(model: Model, order: int, tick_s: float, command: Vector) -> Line
             f"the structure is of order {order}: from the bits, structures up to order {ORDER_MAX} are "
             "identified"
         )
-    size = model.correction_size
+    size = order * len(model.measured(model.initial()))
+    if size > model.correction_size:
+        raise IdentificationError(
+            f"outputs and rates of this structure are {size} numbers, and the codec's model has "
+            f"{model.correction_size} states: ask for another structure"
+        )
     start, held = np.array(model.initial()[:size]), np.array(command)
 
     def found(corrected: Array, inputs: Array) -> tuple[Array, Array]:
@@ -53,10 +59,10 @@ def linearised(model: Model, order: int, tick_s: float, command: Vector) -> Line
     state, highest = found(start, held)
     by_corrected, turned = _differences(lambda x: found(x, held), start)
     _, by_input = _differences(lambda u: found(start, u), held)
-    if len(state) != size or np.linalg.cond(by_corrected) > 1e8:
+    if np.linalg.cond(by_corrected) > CONDITION_MAX:
         raise IdentificationError(
-            f"the coder corrects {size} states, and outputs and rates of this structure are "
-            f"{len(state)}: ask for another structure, or identify from the measurements"
+            f"the first {size} states of the codec's model are no outputs and rates of this structure: "
+            "ask for another one"
         )
     by_state = turned @ np.linalg.inv(by_corrected)
     force = highest - by_state @ state - by_input @ held

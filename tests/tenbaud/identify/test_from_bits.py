@@ -11,7 +11,7 @@ from typer.testing import CliRunner, Result
 
 from plant_sim.identification.pitch import PitchStructure
 from plant_sim.identification.structures import parse_linear
-from tenbaud import load_preset
+from tenbaud import identify, load_preset
 from tenbaud.cli.commands import app
 from tenbaud.config.load import load_config
 from tenbaud.identification.linearised import linearised, start_values
@@ -31,17 +31,17 @@ def test_when_a_flight_is_over_then_its_bits_give_the_plant_without_any_measurem
 ) -> None:
     run = tmp_path / "run"
     flown(run, duration_s=40.0)
-    (both,) = json.loads(identified(str(run), "--out", str(tmp_path / "both")).stdout)
+    both = identify(run, from_bits=True, fly=False)
     for name, true in TRUE.items():
-        assert both["estimates"][name] == pytest.approx(true, rel=0.01)
-    assert both["beside"]["true"][:3] == pytest.approx(list(TRUE.values()))
-    assert both["beside"]["measurements"][:3] == pytest.approx(list(TRUE.values()), rel=0.01)
+        assert both.estimates[name] == pytest.approx(true, rel=0.01)
+    assert both.beside["true"][:3] == pytest.approx(list(TRUE.values()))
+    assert both.beside["measurements"][:3] == pytest.approx(list(TRUE.values()), rel=0.01)
 
     (run / TRANSMITTER_NAME).unlink()
     result = identified(str(run), "--out", str(tmp_path / "bits"))
     (alone,) = json.loads(result.stdout)
     assert result.exit_code == 0
-    assert alone["estimates"] == both["estimates"]
+    assert alone["estimates"] == both.estimates
     assert "no measurements" in " ".join(alone["notes"])
     config = load_config(None, tmp_path / "bits" / "identified.toml")
     assert config.model.model_dump()["stiffness_per_s2"] == pytest.approx(0.55, rel=0.01)

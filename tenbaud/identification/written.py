@@ -68,6 +68,8 @@ def settings(
         values["flight_log"] = {**log, "file": str(source.file.resolve())}
     if isinstance(one.found.structure, LinearStructure):
         return _linear(one, values)
+    if source.bits is not None:
+        values["coder"] = config.coder.model_dump(mode="json", exclude_unset=True, exclude_none=True)
     # What the plant of a simulated flight is like is not known better than its model.
     return {"preset": config.preset, **values, "model": model_section(one.found)}
 
@@ -143,7 +145,7 @@ def _linear(one: Identified, values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _densities(one: Identified, space: StateSpace, period_s: float) -> list[float]:
-    """Return q of each equation's disturbance: what the regression leaves unexplained."""
+    """Return q of each equation's disturbance: as found, or what the regression leaves unexplained."""
     filters = one.found.regression.filters
     polynomial = low_pass(one.found.structure.order, filters.bandwidth_rad_s, filters.damping)
     # The filter's noise bandwidth: integral of |H|^2 over all frequencies in Hz.
@@ -153,10 +155,13 @@ def _densities(one: Identified, space: StateSpace, period_s: float) -> list[floa
     width = float(np.trapezoid(np.abs(response) ** 2, omega) / math.tau)
     largest = np.abs(one.record.inputs).max(axis=0)
     found = []
-    for index, estimate in enumerate(one.found.regression.estimates):
+    densities = one.found.densities or [
+        estimate.residual**2 / width for estimate in one.found.regression.estimates
+    ]
+    for index, density in enumerate(densities):
         pushed = float(np.abs(space.B[(index + 1) * one.found.structure.order - 1]) @ largest)
         least = (DENSITY_LEAST * max(pushed, 1e-9)) ** 2 * period_s
-        found.append(float(f"{max(estimate.residual**2 / width, least):.3g}"))
+        found.append(float(f"{max(density, least):.3g}"))
     return found
 
 

@@ -24,16 +24,8 @@ class Reference(Protocol):
         ...
 
 
-class AngleReference:
-    """What every set-point here offers beside its value: the name that the value had."""
-
-    def angle_rad(self: Reference, tick: int) -> float:
-        """Return the set-point at `tick`; deprecated: `value` is the same."""
-        return self.value(tick)
-
-
 @dataclass(frozen=True, slots=True)
-class Constant(AngleReference):
+class Constant:
     """One value for ever."""
 
     level: float
@@ -48,7 +40,7 @@ class Constant(AngleReference):
 
 
 @dataclass(frozen=True, slots=True)
-class Shifted(AngleReference):
+class Shifted:
     """A set-point about another level than 0."""
 
     about: Reference
@@ -62,7 +54,7 @@ class Shifted(AngleReference):
 
 
 @dataclass(frozen=True, slots=True)
-class Step(AngleReference):
+class Step:
     """0 until `start_s` (at least 0), `amplitude` from there on."""
 
     amplitude: float
@@ -80,7 +72,7 @@ class Step(AngleReference):
 
 
 @dataclass(frozen=True, slots=True)
-class Square(AngleReference):
+class Square:
     """A square wave between +`amplitude`, where it starts, and -`amplitude`.
 
     `period_s` is at least two ticks. The defaults of the paper are pi/2 and 25 s.
@@ -101,7 +93,7 @@ class Square(AngleReference):
 
 
 @dataclass(frozen=True, slots=True)
-class Sine(AngleReference):
+class Sine:
     """A sine of `amplitude` that starts at 0 and rises; `period_s` is at least two ticks."""
 
     amplitude: float
@@ -115,7 +107,7 @@ class Sine(AngleReference):
         return self.amplitude * math.sin(math.tau * tick * self.tick_s / self.period_s)
 
 
-class Listed(AngleReference):
+class Listed:
     """Values at times of their own, which rise and are at least 0; each holds until the next.
 
     Before the first time its value holds, after the last one the last.
@@ -130,7 +122,7 @@ class Listed(AngleReference):
         return self._values[max(bisect_right(self._first_ticks, tick) - 1, 0)]
 
 
-class SteeredReference(AngleReference):
+class SteeredReference:
     """A set-point that is the configured one until a person takes it over in flight.
 
     To be steered between two samples only: every tick of a sample then sees the same hand.

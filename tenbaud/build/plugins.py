@@ -12,19 +12,14 @@ import difflib
 import inspect
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
 
 from channel.registry import Registry, RegistryError
-from plant_sim.plant import Plant, with_measured
-from receiver.controllers.base import Controller, with_references
 from tenbaud.build.parts import PartError, check_part
 from tenbaud.config.outside_code import is_object, require_allowed
 from tenbaud.config.schema import FlightConfig
-
-UNDER_OLD_NAMES: dict[type, Callable[[Any], Any]] = {Controller: with_references, Plant: with_measured}
-"""Parts whose members were called otherwise once, and what wraps those."""
 
 
 def build_plugin(
@@ -75,8 +70,6 @@ def build_class(
             f"{type(error).__name__}: {error}. It is called with one context object "
             f"({type(context).__name__}: {', '.join(_names(context))}) and its options."
         ) from error
-    if protocol in UNDER_OLD_NAMES:
-        part = UNDER_OLD_NAMES[protocol](part)
     check_part(where, part, protocol)
     return part
 

@@ -154,10 +154,11 @@ def _read_preset(name: str) -> dict[str, Any]:
 def read_toml(path: Path) -> dict[str, Any]:
     """Return a TOML file's settings; ConfigError where it cannot be read."""
     try:
-        return tomllib.loads(path.read_text())
+        # Names of files that are no UTF-8 have their bytes here, as `write_whole` writes them.
+        return tomllib.loads(path.read_text(encoding="utf-8", errors="surrogateescape"))
     except OSError as error:
         raise ConfigError(f"cannot read the configuration {path}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{path} is not TOML: {error}") from error
 
 

@@ -72,18 +72,26 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True)
-class Square:
-    """A square wave between +`amplitude`, where it starts, and -`amplitude`.
-
-    `period_s` is at least two ticks. The defaults of the paper are pi/2 and 25 s.
-    """
+class _Wave:
+    """What repeats every `period_s`, which is at least two ticks."""
 
     amplitude: float
     period_s: float
     tick_s: float
 
     def __post_init__(self) -> None:
-        _require_wave(self.amplitude, self.period_s, self.tick_s)
+        _require_finite("amplitude", self.amplitude)
+        _require_positive("tick_s", self.tick_s)
+        least_s = 2.0 * self.tick_s
+        if not (math.isfinite(self.period_s) and self.period_s >= least_s):
+            raise ValueError(f"period_s is {self.period_s}; it must be finite and at least {least_s}")
+
+
+class Square(_Wave):
+    """A square wave between +`amplitude`, where it starts, and -`amplitude`.
+
+    The defaults of the paper are pi/2 and 25 s.
+    """
 
     def value(self, tick: int) -> float:
         half_periods = tick * self.tick_s / (0.5 * self.period_s)
@@ -92,16 +100,8 @@ class Square:
         return -self.amplitude if odd else self.amplitude
 
 
-@dataclass(frozen=True, slots=True)
-class Sine:
-    """A sine of `amplitude` that starts at 0 and rises; `period_s` is at least two ticks."""
-
-    amplitude: float
-    period_s: float
-    tick_s: float
-
-    def __post_init__(self) -> None:
-        _require_wave(self.amplitude, self.period_s, self.tick_s)
+class Sine(_Wave):
+    """A sine of `amplitude` that starts at 0 and rises."""
 
     def value(self, tick: int) -> float:
         return self.amplitude * math.sin(math.tau * tick * self.tick_s / self.period_s)
@@ -153,10 +153,3 @@ def _require_finite(name: str, value: float) -> None:
 def _require_positive(name: str, value: float) -> None:
     if not (math.isfinite(value) and value > 0.0):
         raise ValueError(f"{name} is {value}; it must be finite and above 0")
-
-
-def _require_wave(amplitude: float, period_s: float, tick_s: float) -> None:
-    _require_finite("amplitude", amplitude)
-    _require_positive("tick_s", tick_s)
-    if not (math.isfinite(period_s) and period_s >= 2.0 * tick_s):
-        raise ValueError(f"period_s is {period_s}; it must be finite and at least {2.0 * tick_s}")

@@ -22,7 +22,7 @@ from tenbaud.config.outside_code import is_object, require_allowed
 from tenbaud.config.schema import FlightConfig
 
 
-def build_plugin(
+def build_part(
     config: FlightConfig,
     registry: Registry,
     name: str,
@@ -30,11 +30,14 @@ def build_plugin(
     options: Mapping[str, Any],
     protocol: type,
 ) -> Any:
-    """Return the object that a class from outside builds; PartError if it is not what is needed.
+    """Return what the function or class of this name builds; PartError if it is not what is needed.
 
-    `name` is `module:Class` or what an installed package offers. CodeNotAllowed if nobody allowed the
-    configuration's code to run.
+    `name` is built in, `module:Class` or what an installed package offers. CodeNotAllowed if nobody
+    allowed the configuration's code to run.
     """
+    ours = name in registry.built_in
+    if ours and not inspect.isclass(part := registry.load(name)):
+        return part(config, context)
     require_allowed(config)
     field = registry.field
     if is_object(name):
@@ -43,7 +46,6 @@ def build_plugin(
             "run that program again, or name its class as module:Class"
         )
     found = _load_class(field, name) if ":" in name else _offered(registry, name)
-    ours = name in registry.built_in
     return build_class(f"{field} = {name!r}", found, context, options, protocol, ours=ours)
 
 
@@ -104,20 +106,6 @@ def _load_class(field: str, name: str) -> Any:
         hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(classes) or 'no class'}."
         raise PartError(f"{field} = {name!r}: {module_name} has no class {class_name!r}; {hint}")
     return found
-
-
-def build_part(
-    config: FlightConfig,
-    registry: Registry,
-    name: str,
-    context: object,
-    options: Mapping[str, Any],
-    protocol: type,
-) -> Any:
-    """Return a plant or controller: built in as a function of the configuration, or as a class."""
-    if name in registry.built_in and not inspect.isclass(part := registry.load(name)):
-        return part(config, context)
-    return build_plugin(config, registry, name, context, options, protocol)
 
 
 def _offered(registry: Registry, name: str) -> Any:

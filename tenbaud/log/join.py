@@ -35,7 +35,7 @@ def table_of(
     if not section.join:
         return read(section.file, wanted), ()
     tables = [read(path, None) for path in (section.file, *section.join)]
-    time, unit = section.columns.get("time", section.time), section.units.get("time", "")
+    time, unit = (names.get("time", "") for names in (section.columns, section.units))
     first = tables[0]
     clocks = [_clock(table, time, unit) for table in tables]
     names, units, sources = _all_columns(tables, [place for place, _ in clocks])

@@ -125,9 +125,7 @@ class _Reading:
         )
 
     def _has_inputs(self) -> bool:
-        named = bool(self.section.inputs) or any(
-            self.roles.role(name, "").startswith("in:") for name in self.section.columns
-        )
+        named = any(self.roles.role(name, "").startswith("in:") for name in self.section.columns)
         return named or any(place is not None for _, place in self.chosen.inputs)
 
     def _clock(self) -> Clock:

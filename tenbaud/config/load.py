@@ -148,7 +148,9 @@ def _read_preset(name: str) -> dict[str, Any]:
         near = difflib.get_close_matches(name, preset_names(), 1)
         hint = f" Did you mean {near[0]}?" if near else ""
         raise ConfigError(f"there is no preset {name!r}.{hint} Known: {', '.join(preset_names())}")
-    return tomllib.loads(resource.read_text())
+    values = tomllib.loads(resource.read_text())
+    base = values.pop("preset", None)
+    return values if base is None else merged(_read_preset(base), values)
 
 
 def read_toml(path: Path) -> dict[str, Any]:

@@ -135,7 +135,7 @@ def pitch_plant(config: FlightConfig, context: PlantContext) -> PitchPlant:
         nominal_plant(config, context.command_max[0]).mismatched(config.transmitter.plant.mismatch),
         context.step_s,
         disturbance,
-        initial_angle_rad=context.initial_angle_rad,
+        initial_angle_rad=context.initial[0] if context.initial else 0.0,
         sine=context.sine,
     )
 

@@ -148,16 +148,19 @@ def _read_preset(name: str) -> dict[str, Any]:
         near = difflib.get_close_matches(name, preset_names(), 1)
         hint = f" Did you mean {near[0]}?" if near else ""
         raise ConfigError(f"there is no preset {name!r}.{hint} Known: {', '.join(preset_names())}")
-    return tomllib.loads(resource.read_text())
+    values = tomllib.loads(resource.read_text())
+    base = values.pop("preset", None)
+    return values if base is None else merged(_read_preset(base), values)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Return a TOML file's settings; ConfigError where it cannot be read."""
     try:
-        return tomllib.loads(path.read_text())
+        # Names of files that are no UTF-8 have their bytes here, as `write_whole` writes them.
+        return tomllib.loads(path.read_text(encoding="utf-8", errors="surrogateescape"))
     except OSError as error:
         raise ConfigError(f"cannot read the configuration {path}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{path} is not TOML: {error}") from error
 
 

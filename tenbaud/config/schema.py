@@ -278,15 +278,8 @@ class FlightLogSection(Section):
     join: tuple[str, ...] = ()
     """further files, whose columns are joined by time"""
     columns: dict[str, str] = Field(default_factory=dict)
-    """column, by name or number, of a signal, `angle`, `output`, `input`, `time` or `index`"""
-    outputs: dict[str, str] = Field(default_factory=dict)
-    """the same for outputs only; what is not given is guessed from the names of the columns"""
-    inputs: dict[str, str] = Field(default_factory=dict)
-    """the same for inputs only; "0": there is no such column, and the input is zero"""
-    time: str = ""
-    """column of the clock"""
-    index: str = ""
-    """column that counts the rows, `period_s` apart"""
+    """column, by name or number, of a signal, `angle`, `output`, `input`, `time` or `index` (it counts
+    rows, `period_s` apart); "0": no such input. What is not given is guessed from the names"""
     period_s: Annotated[float, Field(ge=1e-6, le=1e6)] | None = None
     """time between two rows of a file without a clock; none: timing.tick_s"""
     units: dict[str, str] = Field(default_factory=dict)

@@ -146,12 +146,12 @@ def _own_signals(config: FlightConfig, structure: str) -> bool:
     log = with_file_beside(config.flight_log)
     signals = configured_signals(config)
     known = {one.name for one in (*signals.outputs, *signals.inputs)}
-    named = {*log.columns, *log.outputs, *log.inputs}
-    named -= {*known, *ALIASES, *(f"out:{name}" for name in known), *(f"in:{name}" for name in known)}
+    named = {name.removeprefix("out:").removeprefix("in:") for name in log.columns}
+    named -= {*known, *ALIASES}
     if not all(name.isdigit() for name in named):
         return True
-    given = log.columns or log.outputs
-    return config.model.kind == "pitch" and not given and not log.join and _is_no_angle(log, signals)
+    given = log.columns or log.join
+    return config.model.kind == "pitch" and not given and _is_no_angle(log, signals)
 
 
 class _Seen(LogError):

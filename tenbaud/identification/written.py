@@ -198,8 +198,6 @@ def write_record(path: Path, record: Record) -> dict[str, Any]:
     units = zip(roles, (*record.output_units, *record.input_units), strict=True)
     return {
         "file": str(path.resolve()),
-        "time": "time",
-        "outputs": {name: name for name in record.output_names},
-        "inputs": {name: name for name in record.input_names},
+        "columns": {"time": "time", **dict(zip(roles, names[1:], strict=True))},
         "units": {"time": "s", **{role: unit for role, unit in units if unit}},
     }

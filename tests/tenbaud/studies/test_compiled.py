@@ -22,5 +22,5 @@ def test_whatever_turns_a_configuration_into_a_flight_is_among_the_sources() -> 
 
 def test_what_is_left_out_is_there_and_only_draws_or_keeps_results() -> None:
     for name in BESIDE:
-        assert (TOP / "tenbaud/studies" / name).is_file()
-        assert TOP / "tenbaud/studies" / name not in figure_sources()
+        assert (TOP / name).is_file()
+        assert TOP / name not in figure_sources()

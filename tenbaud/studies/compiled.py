@@ -74,12 +74,12 @@ def compiled(
     function: Callable[..., Any],
     parts: Parts = (),
     allocates: bool = False,
-    entry: bool = False,
+    inner: bool = False,
 ) -> Any:
     """Return a function of this project, compiled, with all of ours that it calls.
 
     `parts` replace names in functions of the studies; these are kept on disk within the flight alone.
-    `allocates`: they make lists; `entry`: Python itself calls the function.
+    `allocates`: they make lists; `inner`: only compiled functions call this one.
     """
     if not isinstance(function, FunctionType):
         raise TypeError(f"{function!r} is no plain function and cannot be compiled")
@@ -95,17 +95,17 @@ def compiled(
             names[name] = whole_of(value.row_function)
         elif package in PACKAGES:
             of_flight = rest.startswith("studies") or value is fly_ticks
-            names[name] = compiled(value, parts if of_flight else (), allocates)
+            names[name] = compiled(value, parts if of_flight else (), allocates, True)
     scope = {**function.__globals__, **names}
     copy = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
     copy.__module__ = function.__module__
-    # The cache knows a function by its name: with other parts it is another function.
+    # The cache knows a function by its name: with other parts, or for inner use, it is another one.
     named = [getattr(part, "__name__", str(part)) for _, part in parts]
-    own = "_".join([function.__qualname__, *named])
+    own = "_".join([function.__qualname__, *named, *(["inner"] if inner else [])])
     copy.__qualname__ = copy.__name__ = own
     again = function.__name__ in function.__code__.co_names
-    how = {"no_cpython_wrapper": not entry, "forceinline": not again}
-    made = _jit(copy, allocates, entry or not parts, **how)
+    how = {"no_cpython_wrapper": inner, "forceinline": not again}
+    made = _jit(copy, allocates, not (inner and parts), **how)
     if again:  # a function that calls itself
         scope[function.__name__] = made
     return made
@@ -167,7 +167,7 @@ def _refuse(what: str, x: float) -> None:
 def named(function: Callable[..., Any], name: str) -> Any:
     """Return a function compiled, under a name by which the cache tells it from others."""
     function.__qualname__ = function.__name__ = name
-    return _jit(function, no_cpython_wrapper=True, forceinline=True)
+    return _jit(function, forceinline=True)
 
 
 def _jit(function: Callable[..., Any], allocates: bool = False, keep: bool = True, **more: Any) -> Any:

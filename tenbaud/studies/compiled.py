@@ -73,14 +73,13 @@ def require(*modules: str) -> None:
 def compiled(
     function: Callable[..., Any],
     parts: Parts = (),
-    inline: bool = False,
     allocates: bool = False,
-    entry: bool = False,
+    inner: bool = False,
 ) -> Any:
     """Return a function of this project, compiled, with all of ours that it calls.
 
-    `parts` replace names in functions of the studies, which are put into their caller (`inline`).
-    `allocates`: they make lists; `entry`: Python itself calls the function.
+    `parts` replace names in functions of the studies; these are kept on disk within the flight alone.
+    `allocates`: they make lists; `inner`: only compiled functions call this one.
     """
     if not isinstance(function, FunctionType):
         raise TypeError(f"{function!r} is no plain function and cannot be compiled")
@@ -95,20 +94,18 @@ def compiled(
         elif hasattr(value, "row_function"):
             names[name] = whole_of(value.row_function)
         elif package in PACKAGES:
-            ours = rest.startswith("studies")
-            # Put into its caller: only so are the functions that it is given known by then.
-            inlined = ours or value is fly_ticks
-            names[name] = compiled(value, parts if ours else (), inlined, allocates)
+            of_flight = rest.startswith("studies") or value is fly_ticks
+            names[name] = compiled(value, parts if of_flight else (), allocates, True)
     scope = {**function.__globals__, **names}
     copy = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
     copy.__module__ = function.__module__
-    # The cache knows a function by its name: with other parts it is another function.
+    # The cache knows a function by its name: with other parts, or for inner use, it is another one.
     named = [getattr(part, "__name__", str(part)) for _, part in parts]
-    own = "_".join([function.__qualname__, *named])
+    own = "_".join([function.__qualname__, *named, *(["inner"] if inner else [])])
     copy.__qualname__ = copy.__name__ = own
     again = function.__name__ in function.__code__.co_names
-    how = {"inline": "always" if inline else "never", "forceinline": not again}
-    made = _jit(copy, allocates, no_cpython_wrapper=not entry, **how)
+    how = {"no_cpython_wrapper": inner, "forceinline": not again}
+    made = _jit(copy, allocates, not (inner and parts), **how)
     if again:  # a function that calls itself
         scope[function.__name__] = made
     return made
@@ -170,16 +167,16 @@ def _refuse(what: str, x: float) -> None:
 def named(function: Callable[..., Any], name: str) -> Any:
     """Return a function compiled, under a name by which the cache tells it from others."""
     function.__qualname__ = function.__name__ = name
-    return _jit(function, no_cpython_wrapper=True, forceinline=True)
+    return _jit(function, forceinline=True)
 
 
-def _jit(function: Callable[..., Any], allocates: bool = False, **more: Any) -> Any:
+def _jit(function: Callable[..., Any], allocates: bool = False, keep: bool = True, **more: Any) -> Any:
     numba: Any = import_module("numba")
     others = numba.config.CACHE_LOCATOR_CLASSES
     numba.config.CACHE_LOCATOR_CLASSES = f"{__name__}.{MachineCode.__qualname__}"
     try:
-        kept = _cache_folder() is not None
-        return numba.njit(**OPTIONS, **more, _nrt=allocates, cache=kept)(function)
+        keep = keep and _cache_folder() is not None
+        return numba.njit(**OPTIONS, **more, _nrt=allocates, cache=keep)(function)
     finally:
         numba.config.CACHE_LOCATOR_CLASSES = others
 

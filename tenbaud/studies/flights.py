@@ -267,7 +267,7 @@ def compiled_flight(codec: Codec, signals: Signals, law: Any, plant: PlantParts,
         ("plant_output", plant.output),
         ("sine", compiled(sin)),
     )
-    return compiled(fly, parts, entry=True)
+    return compiled(fly, parts)
 
 
 def _require_ordinary(config: FlightConfig, codec: Codec) -> None:

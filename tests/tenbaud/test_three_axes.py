@@ -1,7 +1,8 @@
-"""The helicopter's missions, its moving mass, its cascade of loops, and what it refuses."""
+"""The helicopter's missions, mass and cascade, what it refuses, and what it flies through."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +10,19 @@ import numpy as np
 import pytest
 
 from tenbaud import Run, fly
+from tenbaud.audit.audit import audit
 from tenbaud.build.references import build_references
 from tenbaud.build.rig import build_axes
 from tenbaud.build.signals import configured_signals
 from tenbaud.config.load import ConfigError, flattened, load_config
-from tests.tenbaud.confirmed import check_flown
+from tenbaud.replay.record import load_record
+from tenbaud.replay.replay import replay
+from tests.tenbaud.confirmed import PATIENT, check_flown, need_idle
+from tests.tenbaud.emulated_flight import PATIENT as STALE
+from tests.tenbaud.emulated_flight import RigProcess
+from tests.tenbaud.processes import run as run_command
+from tests.tenbaud.room import Rig, Room, agreement
+from tests.tenbaud.test_emulated_flights import TCP, VECTORS
 
 CASCADE: dict[str, Any] = {
     "controller": "pid",
@@ -144,3 +153,74 @@ def test_a_rig_of_two_encoders_is_refused_with_the_axis_that_lacks_one() -> None
     config = load_config("helicopter-10baud", None, {"transmitter": wired})
     with pytest.raises(ConfigError, match=r"2 encoder\(s\), .* 3 output\(s\): elevation must be"):
         build_axes(config)
+
+
+def test_lost_and_flipped_bits_and_a_corrupt_codec_are_survived(tmp_path: Path) -> None:
+    done = run_command(
+        *("demo", "--json", "--preset", "helicopter-10baud", "--link", "memory", "--duration", "12"),
+        *("--impair", "up:loss=0.1,up:flip=0.02", "--sabotage", "sample=40,field=model.4"),
+        *("--out", "run"),
+        cwd=tmp_path,
+    )
+    assert done.code == 0, done.err
+    summary = done.summary
+    assert summary["desyncs"] == 1
+    assert summary["rejoins"] >= 1
+    assert summary["erasures"] > 3
+    assert sum(one["symbols_share"] for one in summary["outputs"].values()) == pytest.approx(1.0)
+    for name, output in summary["outputs"].items():
+        assert output["error_live_rms"] < 0.1, name
+    (corrupted,) = replay(load_record(tmp_path / "run")).differences
+    assert re.match("transmitter: 1 state differs .* first at sample 40", corrupted)
+    result = audit(tmp_path / "run")
+    assert result.leaks
+    assert all("sample 40" in one for one in result.leaks), "nothing else is wrong with the flight"
+
+
+def test_it_flies_over_a_serial_line(tmp_path: Path) -> None:
+    done = run_command(
+        *("demo", "--json", "--preset", "helicopter-10baud", "--link", "serial", "--duration", "4"),
+        *("--out", "run", *PATIENT),
+        cwd=tmp_path,
+    )
+    assert done.code == 0, done.err
+    check_flown(done.summary, 40)
+    assert list(done.summary["outputs"]) == ["travel", "elevation", "pitch"]
+
+
+def test_one_receiver_serves_it_beside_another_plant(tmp_path: Path) -> None:
+    preset = {"three": "helicopter-10baud"}
+    with Room(tmp_path, lambda name: agreement(preset.get(name))) as room:
+        three = Rig(room, "three", preset="helicopter-10baud").greet()
+        pitch = Rig(room, "pitch").greet()
+        for _ in range(3):
+            three.fly(2)
+            pitch.fly(2)
+        three.bye()
+        pitch.bye()
+        room.until_ended(2)
+    for rig in (three, pitch):
+        assert rig.session.counts["desyncs"] == 0
+        assert room.summary(rig.name)["samples"] == 6
+    assert 'kind = "helicopter"' in (tmp_path / "three" / "config.toml").read_text()
+
+
+@pytest.mark.real_time
+@pytest.mark.parametrize("form", ["cobs", "quarc"])
+def test_an_emulated_rig_turns_three_encoders(form: str, tmp_path: Path) -> None:
+    mission = ("--preset", "helicopter-10baud", "--set", "mission=two-boxes")
+    vectors = VECTORS if form == "quarc" else ()
+    rig = RigProcess(form, "--watchdog", "1", *mission, *(TCP if vectors else ()), *vectors)
+    try:
+        address = ("--rig", f"{form}:{rig.address}", "--clock", "real", *STALE)
+        command = ("demo", "--json", *mission, *vectors, *address, "--duration", "8", "--out", "run")
+        done = run_command(*command, cwd=tmp_path)
+    finally:
+        device = rig.end()
+    assert done.code == 0, done.err
+    check_flown(done.summary, 80)
+    assert (device["volts"], device["enabled"]) == ([0.0, 0.0], False)
+    assert at(Run(tmp_path / "run"), "measured_elevation", 7.0) > 0.08, "it has taken off"
+    need_idle(done.summary)
+    for name, output in done.summary["outputs"].items():
+        assert output["error_live_rms"] < 0.02, name

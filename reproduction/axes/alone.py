@@ -70,8 +70,8 @@ def error_products(
 
 def root_of(covariance: Matrix) -> Matrix:
     """Return L with L L' = covariance, which may lack rank by rounding."""
-    root: Matrix = np.linalg.cholesky(covariance + 1e-13 * np.diag(np.diag(covariance)))
-    return root
+    regular = covariance + 1e-13 * np.diag(np.diag(covariance))
+    return np.asarray(np.linalg.cholesky(regular), dtype=np.float64)
 
 
 def products_of(

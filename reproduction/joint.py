@@ -1,4 +1,4 @@
-"""The recorded flights with all their angles on one wire: `python -m reproduction.joint DATA [FILE [RATE]]`.
+"""The recorded flights with all angles on one wire: `python -m reproduction.joint DATA [FILE [RATE]]`.
 
 A linear model of all angles is fitted to the first half of a file by least squares, with the densities
 of what it leaves unexplained; the `direction` coder is designed for it. Both are then frozen, and the
@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import lsq_linear
 from scipy.signal import savgol_filter
 
 from channel.flight_log import FlightLog
@@ -28,17 +29,17 @@ SMOOTHED_S = 0.25
 """window of the cubic that the derivatives are taken from"""
 WHITE_S = 0.1
 """time over which what is unexplained is taken for white"""
-RIDGE = 1e-3
+DAMPING_LEAST_PER_S = 0.1
+"""of a model: what a rig under its own controller shows as growth is the controller's"""
 COUNTS = {"travel": 8192, "elevation": 4096, "pitch": 4096}
 
 
 class Recording(NamedTuple):
-    """A file, what its columns are, and its tick where that divides the symbol period."""
+    """A file, and what its columns are."""
 
     file: str
     outputs: dict[str, str]
     inputs: dict[str, str]
-    tick_s: float
     log: dict[str, Any]
 
 
@@ -47,21 +48,18 @@ RECORDINGS = (
         "uiuc_closed_loop.csv",
         {name: f"{name}_counts" for name in COUNTS},
         {"right": "right_volts", "left": "left_volts"},
-        0.02,
         {"units": {"angles": "counts"}, "period_s": 0.02},
     ),
     Recording(
         "ntnu_travel_step.csv",
         {"travel": "travel_deg", "pitch": "pitch_deg"},
         {"none": "0"},
-        0.01,
         {},
     ),
     Recording(
         "ntnu_elevation_obstacle.csv",
         {name: f"{name}_rad" for name in COUNTS},
         {"none": "0"},
-        0.01,
         {},
     ),
 )
@@ -84,7 +82,7 @@ class Row(NamedTuple):
 def settings_of(data: Path, recording: Recording, rate: int, model: dict[str, Any]) -> dict[str, Any]:
     """Return the settings of a replay by a linear model."""
     # 30 bit/s make no whole number of the usual ticks.
-    tick_s = recording.tick_s if rate != 30 else 1.0 / 60.0
+    tick_s = 0.01 if rate != 30 else 1.0 / 60.0
     encoders = {name: {"counts_per_turn": COUNTS[name]} for name in recording.outputs}
     log = {"outputs": recording.outputs, "inputs": recording.inputs, **recording.log}
     return {
@@ -116,25 +114,32 @@ def fitted(log: FlightLog, outputs: list[str], inputs: list[str]) -> dict[str, A
     angle, rate, acceleration = (
         savgol_filter(log.measured, window, 3, deriv=order, delta=tick_s, axis=0) for order in range(3)
     )
-    known = np.column_stack((angle, rate, log.commands, np.ones(len(angle))))
-    sizes = known.std(axis=0) + 1e-9
-    sizes[-1] = 1.0
-    scaled = known / sizes
-    normal = scaled.T @ scaled + RIDGE * len(scaled) * np.eye(len(sizes))
-    found = (np.linalg.solve(normal, scaled.T @ acceleration) / sizes[:, None]).T
-    left = acceleration - known @ found.T
+    found = np.zeros((count, 2 * count + len(inputs) + 1))
+    left = np.zeros_like(acceleration)
+    driven = np.column_stack((log.commands, np.ones(len(angle))))
+    for place, name in enumerate(outputs):
+        # The pitch turns the arm; a body that people push does not show more of what is coupled.
+        used = [place, count + place, *range(2 * count, found.shape[1])]
+        used += [outputs.index("pitch")] if name == "travel" else []
+        known = np.column_stack((angle, rate, driven))[:, used]
+        low = np.full(len(used), -np.inf)
+        high = np.array([0.0, -DAMPING_LEAST_PER_S, *[np.inf] * (len(used) - 2)])
+        if name == "travel":
+            low[0], high[0] = -1e-9, 1e-9  # nothing holds it anywhere
+        solved = lsq_linear(known, acceleration[:, place], (low, high)).x
+        found[place, used] = solved
+        left[:, place] = acceleration[:, place] - known @ solved
     size = max(1, round(WHITE_S / tick_s))
     means = left[: len(left) // size * size].reshape(-1, size, count).mean(axis=1)
     densities = (means**2).mean(axis=0) * size * tick_s
-    rows_of_rates = np.zeros((2 * count, known.shape[1]))
-    rows_of_rates[count:] = found
+    rows_of_rates = np.vstack([np.zeros_like(found), found])
     return model_of(rows_of_rates, outputs, inputs, densities.tolist())
 
 
 def model_of(
     rates: Matrix, outputs: list[str], inputs: list[str], densities: list[float]
 ) -> dict[str, Any]:
-    """Return the settings of a model; `rates` has columns for angles, rates, inputs and the constant."""
+    """Return the settings of a model; `rates` has columns for angles, rates, inputs and 1."""
     count = len(outputs)
     A, B, constant = rates[:, : 2 * count].copy(), rates[:, 2 * count : -1], rates[:, -1]
     A[:count, count:] = np.eye(count)

@@ -1,4 +1,4 @@
-"""Moments of a flight as pictures of the plant: the helicopter on its arm, seen in space, or the pendulum.
+"""Moments of a flight as pictures of the plant: the helicopter in space, or the pendulum.
 
 The page draws the helicopter by the same lines (`tenbaud/view/static/pose.js`).
 """

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from functools import partial
 
 from channel.codec.models.pitch import PitchModel
-from channel.line.uplink import bit_rate
+from channel.line.line import bit_rate
 from tenbaud.bounds.closed import double_integrator_floor, double_integrator_rate
 from tenbaud.build.flight import Agreement
 from tenbaud.build.flight_log import output_steps

@@ -21,7 +21,8 @@ def figures(
     which: Annotated[
         list[str] | None,
         typer.Argument(
-            help="3, 4, 5, 6, 7, 8 or all; several may be given. For the pages: theory, animation, axes."
+            help="3, 4, 5, 6, 7, 8 or all; several may be given. "
+            "For the pages: theory, animation, axes."
         ),
     ] = None,
     docs: Annotated[

@@ -35,10 +35,10 @@ FIXED_CODER = {
     "kind": "zoom",
     "window_signs": 3,
     "initial_range_rad": 0.02,
-    "minimum_range_rad": 0.004,
-    "decay": 0.8,
+    "minimum_range_rad": 0.00534,
+    "decay": 0.8925,
     "correction": "impulse",
-    "gains": [0.8, 1.6],
+    "gains": [0.7847, 2.4458],
 }
 """Constants: a search for the least error on two flights of two minutes, of other seeds."""
 

@@ -31,7 +31,7 @@ def _draw(run: Run, path: Path) -> None:
     figure, panels = new_figure(5, 1.25, [1.5, 1.0, 1.0, 1.0, 0.8], width=9.0)
     true, estimated = (
         np.array([run.signals[f"{kind}{name}"].values for name in OUTPUTS])
-        for kind in ("", "estimate_coded_")
+        for kind in ("", "estimate_")
     )
     draw_poses(panels[0], "helicopter", run.time_s.tolist(), true, estimated)
     legend_above(panels[0])
@@ -39,7 +39,7 @@ def _draw(run: Run, path: Path) -> None:
         for signal, color, width in (
             (f"reference_{name}", FAINT, 1.0),
             (name, LINE_A, 2.0),
-            (f"estimate_coded_{name}", LINE_B, 0.8),
+            (f"estimate_{name}", LINE_B, 0.8),
         ):
             if signal in run.signals and np.isfinite(run.signals[signal].values).any():
                 curve = decimated(run.time_s, np.degrees(run.signals[signal].values))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -23,7 +22,7 @@ from reproduction.limits.intervals import mean_of, paired
 from tenbaud.files.whole import make_folder, write_whole
 
 PAGE = Path(__file__).parents[2] / "docs" / "THREE-AXES.md"
-MARK = r"(<!-- table: {name} -->\n).*?(<!-- end -->)"
+END = "<!-- end -->"
 
 OnPart = Callable[[float, str], None]
 
@@ -58,10 +57,11 @@ def make_page(docs: Path, scale: Scale, on_part: OnPart) -> Path:
     tables = {"ratios": _ratios(rows), "boxes": _boxes(flown), "fixed": fixed}
     text = PAGE.read_text(encoding="utf-8")
     for name, table in tables.items():
-        text, count = re.subn(
-            MARK.format(name=name), lambda found, new=table: found[1] + new + found[2], text, flags=re.S
-        )
-        assert count == 1, f"the page has no place for the table {name}"
+        before, mark, rest = text.partition(f"<!-- table: {name} -->\n")
+        _, end, after = rest.partition(END)
+        if not (mark and end):
+            raise ValueError(f"{PAGE.name} has no place for the table {name}")
+        text = before + mark + table + end + after
     write_whole(docs / PAGE.name, text)
     return docs / PAGE.name
 

@@ -5,7 +5,7 @@ The page draws the helicopter by the same lines (`tenbaud/view/static/pose.js`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -97,7 +97,7 @@ def _about(one: int, other: int, angle: float) -> npt.NDArray[np.float64]:
     return turn
 
 
-_LINES = {
+_LINES: dict[tuple[str, int], tuple[Callable[..., Lines], tuple[float, float, float, float]]] = {
     ("helicopter", 3): (helicopter_lines, (-0.75, 1.3, -0.75, 0.75)),
     ("pendulum", 1): (pendulum_lines, (-1.1, 1.1, -0.1, 1.2)),
 }

@@ -10,7 +10,6 @@ import pytest
 
 from channel.codec.coders.direction import DirectionCoder
 from reproduction.axes import alone, page
-from reproduction.axes.picture import draw_mission
 from tests.rules.sources import TOP
 
 PAGE = (TOP / "docs" / "THREE-AXES.md").read_text(encoding="utf-8")
@@ -56,11 +55,6 @@ def test_the_figures_come_of_the_coder_s_own_functions(monkeypatch: pytest.Monke
     assert row.least_degrees == pytest.approx(0.1185, abs=1e-3)
 
 
-def test_the_picture_is_drawn_from_a_flight(tmp_path: Path) -> None:
-    draw_mission(tmp_path / "three-axes.png", 4.0)
-    assert (tmp_path / "three-axes.png").stat().st_size > 10_000
-
-
 @pytest.mark.soak
 def test_the_command_fills_every_table(tmp_path: Path) -> None:
     made = page.make_page(tmp_path, page.Scale(2, 1500, 12.0, 12.0), lambda share, part: None)
@@ -68,4 +62,5 @@ def test_the_command_fills_every_table(tmp_path: Path) -> None:
     assert re.sub(r"<!-- table.*?end -->", "", text, flags=re.DOTALL) == re.sub(
         r"<!-- table.*?end -->", "", PAGE, flags=re.DOTALL
     )
+    assert (tmp_path / "figures" / "three-axes.png").stat().st_size > 10_000
     assert text.count("| `helicopter-") == len(page.PRESETS)

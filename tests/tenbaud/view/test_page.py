@@ -236,8 +236,7 @@ def test_a_plant_of_any_outputs_is_shown_with_its_names_and_units_and_the_gap_to
             page.wait_for_timeout(100.0)
             if page.locator("#f-gap").is_visible():
                 break
-        assert number(page, "#f-gap") == 1.42
-        assert number(page, "#f-late") == 0.25
+        assert (number(page, "#f-gap"), number(page, "#f-late")) == (1.42, 0.25)
         for canvas in ("#value-0", "#error-0", "#value-1", "#error-1"):
             assert page.locator(canvas).is_visible()
         assert "Cart place m, last 30 s of flight" in page.locator("#curves").inner_text()

@@ -67,9 +67,10 @@ def build_emulator(
         raise ConfigError(f"{rate:g} samples/s: from 1 to 5000")
     axes = _axes(config, form)
     try:
-        device = EmulatedDevice(
-            _body(config, axes), time.monotonic_ns(), watchdog_s, Faults(faults, config.seed)
-        )
+        faulty = PITCH_CHANNEL if PITCH_CHANNEL in axes else next(iter(axes))
+        broken = Faults(faults, config.seed)
+        now_ns = time.monotonic_ns()
+        device = EmulatedDevice(_body(config, axes), now_ns, watchdog_s, broken, faulty)
         line = parse_line(port, config.transmitter.serial.line_baud)
         speech = _speech(config, form, line_form, polled, axes)
     except ValueError as error:

@@ -89,8 +89,11 @@ class EmulatedDevice:
         now_ns: int,
         watchdog_s: float = DEFAULT_WATCHDOG_S,
         faults: Faults | None = None,
+        faulty: int = PITCH_CHANNEL,
     ) -> None:
+        """`faulty` is the channel of the encoder that jumps or is stuck where a fault is due."""
         self.faults = faults or Faults()
+        self._faulty_channel = faulty
         self.volts: tuple[float, float] = OFF
         self.enabled = False
         self.tripped = False
@@ -158,15 +161,15 @@ class EmulatedDevice:
         flags |= DeviceFlag.OUTPUT_ENABLED if self.enabled else DeviceFlag(0)
         time_us = (now_ns - self._boot_ns) // 1000
         counts = [turned - zero for turned, zero in zip(self._turned, self._zero, strict=True)]
-        counts[PITCH_CHANNEL] = self._faulty(now_ns, counts[PITCH_CHANNEL])
+        counts[self._faulty_channel] = self._faulty(now_ns, counts[self._faulty_channel])
         return RawSample(tuple(counts), self._sequence, time_us, flags)
 
     def _faulty(self, now_ns: int, counts: int) -> int:
-        """Return the counts of the pitch, which jumps or is stuck where a fault is due."""
+        """Return what the faulty encoder says in place of its counts."""
         flight_s = self.flight_s(now_ns)
         jump = self.faults.take_due("jump", flight_s)
         if jump is not None:
-            self._zero[PITCH_CHANNEL] -= round(jump.amount)
+            self._zero[self._faulty_channel] -= round(jump.amount)
         if self.faults.active("stuck", flight_s) is None:
             self._stuck_at = None
             return counts

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import time
 from typing import Any
 
 import pytest
@@ -131,11 +132,12 @@ def test_an_emulated_rig_has_the_encoder_of_its_output_whatever_it_is_called() -
         build_emulator(load_config(None, None, values), "quarc", "pty")
     for channel in (0, 2):
         values["transmitter"] = {"bridge": {"tilt": {"channel": channel}}}
-        emulator = build_emulator(
-            load_config(None, None, values), "quarc", "pty", faults=("jump=50@0",)
-        )
-        emulator.device.command(0, (0.0, 0.0), True)
-        counts = emulator.device.sample(1_000_000).counts
+        config = load_config(None, None, values)
+        device = build_emulator(config, "quarc", "pty", faults=("jump=50@0",)).device
+        now_ns = time.monotonic_ns()
+        device.command(now_ns, (0.0, 0.0), True)
+        device.sample(now_ns)
+        counts = device.sample(now_ns).counts
         assert [place for place, one in enumerate(counts) if one == 50] == [channel]
 
 

@@ -116,9 +116,7 @@ def fitted(log: FlightLog, outputs: list[str], inputs: list[str]) -> dict[str, A
     )
     found = np.zeros((count, 2 * count + len(inputs) + 1))
     left = np.zeros_like(acceleration)
-    # Smoothed like the accelerations, which they are compared with.
-    commands = savgol_filter(log.commands, window, 3, axis=0)
-    driven = np.column_stack((commands, np.ones(len(angle))))
+    driven = np.column_stack((log.commands, np.ones(len(angle))))
     for place, name in enumerate(outputs):
         # The pitch turns the arm; a body that people push does not show more of what is coupled.
         used = [place, count + place, *range(2 * count, found.shape[1])]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
-    from plant_sim.disturbance import Disturbance
+    from plant_sim.disturbance import Disturbance, PlannedDisturbance
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class PlantContext:
     disturbance_text: str = ""
     """configured disturbance, for a plant that is disturbed in several places"""
 
-    def disturbances(self, places: int) -> tuple[Disturbance, ...]:
+    def disturbances(self, places: int) -> tuple[PlannedDisturbance, ...]:
         """Return the disturbance of each place, none of them where none is configured.
 
         ValueError for a configured disturbance that has more places.

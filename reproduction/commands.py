@@ -9,7 +9,7 @@ import typer
 
 from tenbaud.studies.progress import progress_bar
 
-DRAWINGS = ("theory", "animation")
+DRAWINGS = ("theory", "animation", "axes")
 DATA_VARIABLE = "TENBAUD_FLIGHT_DATA"
 
 Out = Annotated[
@@ -21,7 +21,8 @@ def figures(
     which: Annotated[
         list[str] | None,
         typer.Argument(
-            help="3, 4, 5, 6, 7, 8 or all; several may be given. For the pages: theory, animation."
+            help="3, 4, 5, 6, 7, 8 or all; several may be given. "
+            "For the pages: theory, animation, axes."
         ),
     ] = None,
     docs: Annotated[
@@ -130,6 +131,12 @@ def _draw_documentation(drawings: list[str], pictures: Path) -> None:
     if "theory" in drawings:
         for path in draw_theory(pictures, lambda name: typer.echo(f"drawing {name}", err=True)):
             typer.echo(str(path))
+    if "axes" in drawings:
+        from reproduction.axes.page import FULL, make_page
+
+        with progress_bar("flights") as update:
+            page = make_page(pictures.parent, FULL, lambda share, part: update(share, 1.0, part))
+        typer.echo(f"the tables are in {page}")
     if "animation" in drawings:
         path = pictures / "tenbaud.gif"
         typer.echo(f"{path}, {draw_animation(path) / 1e6:.2f} MB")

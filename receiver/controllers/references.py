@@ -110,16 +110,19 @@ class Sine(_Wave):
 class Listed:
     """Values at times of their own, which rise and are at least 0; each holds until the next.
 
-    Before the first time its value holds, after the last one the last.
+    Before the first time its value holds, after the last one the last. ValueError for other times.
     """
 
     def __init__(self, times_s: Sequence[float], values: Sequence[float], tick_s: float) -> None:
         _require_positive("tick_s", tick_s)
+        for before, time_s in zip((-1.0, *times_s), times_s, strict=False):
+            if not before < time_s or time_s < 0.0:
+                raise ValueError(f"a time is {time_s} s; times are at least 0 and rise")
         self._first_ticks = [_first_tick(time_s, tick_s) for time_s in times_s]
-        self._values = list(values)
+        self.values = list(values)
 
     def value(self, tick: int) -> float:
-        return self._values[max(bisect_right(self._first_ticks, tick) - 1, 0)]
+        return self.values[max(bisect_right(self._first_ticks, tick) - 1, 0)]
 
 
 class SteeredReference:

@@ -182,8 +182,9 @@ def build_axes(config: FlightConfig, signals: Signals | None = None) -> tuple[Ax
     missing = ", ".join(sorted(outputs.keys() - set(names)))
     if missing or len(set(names)) != len(names):
         raise ConfigError(
-            f"transmitter.bridge.axes = {list(names)}: {missing or 'the outputs of the model'} must be "
-            "among them, and none twice"
+            f"transmitter.bridge.axes = {list(names)}: {len(names)} encoder(s), and the model has "
+            f"{len(outputs)} output(s): {missing or ', '.join(outputs)} must be among them, and none "
+            "twice"
         )
     return tuple(_axis(name, sections[name], outputs.get(name, "rad")) for name in names)
 

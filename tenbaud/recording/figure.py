@@ -24,6 +24,7 @@ from tenbaud.recording.overview import (
     marks_of,
     unpacked,
 )
+from tenbaud.recording.pose import draw_poses, poses_of
 from tenbaud.recording.reader import MessageStream, rows_in_blocks, stored_metadata
 from tenbaud.recording.rows import Row
 from tenbaud.recording.style import FAINT, LINE_A, LINE_B, LINE_C, legend_above, new_figure
@@ -142,9 +143,10 @@ def _panels(flight: _Flight) -> list[tuple[float, str, _Draw]]:
         )
     ][:DRAWN_MAX]
     height = 3.0 if len(values) == 1 else 2.2
-    found: list[tuple[float, str, _Draw]] = [
-        (height, _plain(label), partial(_draw_values, places=places)) for label, places in values
-    ]
+    found: list[tuple[float, str, _Draw]] = []
+    if poses_of(plant.picture, len(plant.outputs)):
+        found.append((1.6, "", _draw_poses))
+    found += [(height, _plain(label), partial(_draw_values, places=places)) for label, places in values]
     for name, height, curve, draw in (
         ("error", 2.0, "error_coded", _draw_errors),
         (r"range $M_k$", 1.6, "range", partial(_draw_steps, curve="range")),
@@ -275,6 +277,14 @@ def _draw_values(panel: Axes, flight: _Flight, places: list[int]) -> None:
                 "markersize": 5,
             }
             panel.plot(times_s, low, transform=across, clip_on=False, label=name, **style)
+    legend_above(panel, 7)
+
+
+def _draw_poses(panel: Axes, flight: _Flight) -> None:
+    true, estimated = (
+        np.array([values for _, values in flight.curves[one]]) for one in ("value", "coded")
+    )
+    draw_poses(panel, flight.plant.picture, flight.curves["value"][0][0].tolist(), true, estimated)
     legend_above(panel, 7)
 
 

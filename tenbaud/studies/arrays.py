@@ -16,7 +16,7 @@ from tenbaud.build.ends import guard_settings
 from tenbaud.build.flight import Agreement
 from tenbaud.build.references import reference_of, reference_sections
 from tenbaud.build.signals import build_encoders
-from tenbaud.config.schema import ReferenceSection
+from tenbaud.config.controllers import ReferenceSection
 from tenbaud.studies.flight_data import Work
 from transmitter.encoder_watch import motion_of
 from transmitter.session.state_observer import StateObserver

@@ -13,7 +13,6 @@ from tenbaud.build.flight import REAL_RIGS
 from tenbaud.build.flight_log import read_flight_log
 from tenbaud.build.plugins import build_part
 from tenbaud.build.signals import (
-    TURNS,
     build_encoders,
     build_limits,
     configured_signals,
@@ -24,6 +23,7 @@ from tenbaud.config.load import ConfigError
 from tenbaud.config.models import PitchModelSection
 from tenbaud.config.rig_schema import AxisSection
 from tenbaud.config.schema import FlightConfig
+from tenbaud.log.units import turn_in
 from transmitter.rigs.axes import Axis, Motors
 from transmitter.rigs.base import Rig
 from transmitter.rigs.device import DeviceRig, DeviceSettings, Wiring
@@ -192,7 +192,7 @@ def build_axes(config: FlightConfig, signals: Signals | None = None) -> tuple[Ax
 def _axis(name: str, section: AxisSection, unit: str) -> Axis:
     zero = None if section.zero_counts == "first" else section.zero_counts
     counts, turn = (
-        (section.counts_per_turn, TURNS.get(unit))
+        (section.counts_per_turn, turn_in(unit))
         if section.counts_per_unit is None
         else (section.counts_per_unit, 1.0)
     )

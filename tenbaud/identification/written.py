@@ -12,7 +12,6 @@ import numpy as np
 from plant_sim.identification.filters import low_pass
 from plant_sim.identification.record import Record
 from plant_sim.identification.structures import LinearStructure, StateSpace
-from tenbaud.build.signals import TURNS
 from tenbaud.config.load import OWN, load_config, merged, merged_values, toml_text
 from tenbaud.config.schema import FlightConfig
 from tenbaud.design.complete import completed
@@ -21,6 +20,7 @@ from tenbaud.design.systems import Matrices, Names
 from tenbaud.files.whole import whole_file, write_whole
 from tenbaud.identification.run import Identified, model_section
 from tenbaud.identification.sources import Source
+from tenbaud.log.units import turn_in
 
 WHOLE = 1e-6
 DENSITY_LEAST = 1e-3
@@ -94,7 +94,7 @@ def _encoders(record: Record) -> dict[str, Any]:
     """Return the encoders whose steps the file shows."""
     found: dict[str, Any] = {}
     for name, unit, step in zip(record.output_names, record.output_units, record.steps, strict=True):
-        turn = TURNS.get(unit)
+        turn = turn_in(unit)
         if step and turn is None:
             found[name] = {"counts_per_unit": 1.0 / step}
         elif step and turn is not None and 2 <= round(turn / step) <= 10_000_000:

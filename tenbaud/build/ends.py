@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 
 from channel.codec.codec import Codec
+from channel.codec.coders.direction import DirectionCoder
 from channel.codec.models.linear import LinearModel
 from channel.line.clocks import SkewedClock
 from channel.line.impairments import Direction, ImpairedLine
@@ -28,7 +29,7 @@ from tenbaud.build.parts import Parts
 from tenbaud.build.references import References, build_references, values_of
 from tenbaud.build.rig import build_rig
 from tenbaud.build.signals import configured_signals, safe_command, soft_limits
-from tenbaud.config.kinds import CONTROLLERS
+from tenbaud.config.kinds import CONTROLLERS, model_kind
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
 from transmitter.endpoint import TransmitterNode
@@ -89,7 +90,10 @@ def build_observer(agreement: Agreement) -> StateObserver | None:
         return None
     config, tick_s = agreement.config, agreement.terms.tick_ns / 1e9
     try:
-        if isinstance(codec.model, LinearModel) or len(agreement.signals.outputs) > 1:
+        kind = model_kind(config.model)
+        # A coder that was designed for a plant stands near its limit: it needs the best view of it.
+        is_designed = isinstance(codec.coder, DirectionCoder) and kind is not None and kind.linear
+        if is_designed or isinstance(codec.model, LinearModel) or len(agreement.signals.outputs) > 1:
             from tenbaud.design.observer import configured_observer
 
             steps = output_steps(config, agreement.signals)

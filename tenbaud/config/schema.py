@@ -163,7 +163,7 @@ class TransmitterSection(Section):
     dry_run: bool = False
     """read the rig and never move it"""
     rate_observer_bandwidth_rad_s: Annotated[float, Field(ge=0.001, le=10_000.0)] = 30.0
-    """bandwidth of the rate observer, for coders that use rates"""
+    """bandwidth of the rate observer, for the coder `history`; `direction` has a Kalman filter"""
     encoders: EncodersSection = EncodersSection()
     plant: PlantSection = PlantSection()
     watchdog_s: Positive | Literal["auto"] = "auto"

@@ -37,9 +37,11 @@ def kalman_observer(
 ) -> StateObserver:
     """Return the observer for a noise covariance per tick and the step of each output's encoder.
 
-    `transition` is that of a tick, `C` makes outputs of states.
+    `transition` is that of a tick, `C` makes outputs of states. States of the model beyond these, such
+    as lagging motors, follow from the commands alone.
     """
     size, outputs = len(transition), len(C)
+    known = np.zeros((model.state_size - size, outputs))
     seen = np.diag(np.maximum(np.broadcast_to(steps, (outputs,)), LEAST_STEP) ** 2 / 12.0)
     noise = tick_noise + LEAST_NOISE * float(np.trace(tick_noise)) * np.eye(size)
     try:
@@ -51,9 +53,9 @@ def kalman_observer(
     gains: Matrix = ahead @ C.T @ np.linalg.inv(C @ ahead @ C.T + seen)
     return StateObserver(
         model,
-        rows_of(gains),
-        rows_of(np.asarray(np.linalg.pinv(C), dtype=np.float64)),
-        (STATE_MAX,) * size,
+        rows_of(np.vstack([gains, known])),
+        rows_of(np.vstack([np.linalg.pinv(C), known])),
+        (STATE_MAX,) * model.state_size,
     )
 
 

@@ -104,7 +104,7 @@ def main() -> None:
     lines = given.results.read_text().splitlines() if given.results.exists() else []
     rows = [json.loads(line) for line in lines]
     known = {(row["case"], row["seed"]) for row in rows}
-    missing = [(case, seed) for case in CASES for seed in SEEDS if (case.name, seed) not in known]
+    missing = [(case, seed) for seed in SEEDS for case in CASES if (case.name, seed) not in known]
     with given.results.open("a") as stream:
         for case, seed in missing[: given.most]:
             rows.append(flown(case, seed))

@@ -8,7 +8,8 @@ has come.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 from channel.codec.codec import Codec, CodecState, Vector
 from channel.codec.coders.direction import DirectionCoder, aim, learn
@@ -32,7 +33,7 @@ def statements_of(codec: Codec, state: CodecState, word: Sequence[int]) -> Itera
         for axis, sign in enumerate(word):
             yield _side(_unit(axis, len(predicted)), predicted[axis], sign)
     elif isinstance(coder, DirectionCoder):
-        yield from _directions(coder, state.coder, predicted, word)
+        yield from _directions(coder.constants, aim, learn, state.coder, predicted, word)
     elif isinstance(coder, HistoryCoder):
         yield _boundary(coder, state.coder, predicted, word[0])
     elif isinstance(coder, StaticCoder):
@@ -66,15 +67,21 @@ def _cell(c: Sequence[float], lowest: float, width: float, word: Sequence[int]) 
 
 
 def _directions(
-    coder: DirectionCoder, before: Vector, predicted: Vector, word: Sequence[int]
+    constants: Any,
+    ask: Callable[..., bool],
+    take: Callable[..., None],
+    before: Vector,
+    predicted: Vector,
+    word: Sequence[int],
 ) -> Iterator[Statement]:
-    known, size = list(before), coder.correction_size
-    c, v, correction = ([0.0] * size for _ in range(3))
+    """Yield the statements about the first states, as many as the coder asks about."""
+    known, size = list(before), len(constants.largest)
+    c, v, correction = [0.0] * size, [0.0] * size, [0.0] * len(predicted)
     for sign in word:
-        if aim(coder.constants, known, c, v):
+        if ask(constants, known, c, v):
             edge = sum(c[i] * (predicted[i] + correction[i]) for i in range(size))
             yield _side(list(c), edge, sign)
-            learn(coder.constants, known, c, v, sign, correction)
+            take(constants, known, c, v, sign, correction)
 
 
 def _boundary(coder: HistoryCoder, before: Vector, predicted: Vector, sign: int) -> Statement:

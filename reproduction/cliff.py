@@ -22,7 +22,7 @@ from typing import Any
 from tenbaud.bounds.floor import floor
 from tenbaud.bounds.linear import rate_needed
 from tenbaud.build.signals import configured_signals, encoder_steps
-from tenbaud.config.load import load_config, merged_values
+from tenbaud.config.load import ConfigError, load_config, merged_values
 from tenbaud.config.schema import FlightConfig
 from tenbaud.design.complete import completed
 from tenbaud.design.described import plant_of
@@ -135,11 +135,11 @@ def claims() -> list[Point]:
 
 
 QUICK = sweep({"pendulum": 4, "furuta": 2}, {"pendulum": 20.0, "furuta": 10.0}, (1.0, 1.2, 2.0))
-FULL = sweep({"pendulum": 40, "furuta": 20}, {"pendulum": 300.0, "furuta": 120.0}, RATIOS)
+FULL = sweep({"pendulum": 20, "furuta": 10}, {"pendulum": 120.0, "furuta": 60.0}, RATIOS)
 
 
 def configuration(point: Point) -> FlightConfig:
-    """Return the configuration of a point; ValueError where there is no coder for its rate."""
+    """Return the configuration of a point; ConfigError where there is no coder for its rate."""
     plant = PLANTS[point.plant]
     ticks = math.ceil(1.0 / point.rate_bit_s / TICK_S - 1e-6)
     # Whole nanoseconds, rounded up: the line carries no more than its rate.
@@ -162,7 +162,7 @@ def fly(point: Point) -> Found:
     """Fly a point, compiled."""
     try:
         config = configuration(point)
-    except ValueError as error:  # RateTooLow and what a design says are both
+    except ConfigError as error:
         return Found(0, refused=str(error))
     described = plant_of(config.model, config.timing.tick_s)
     assert described is not None

@@ -85,7 +85,8 @@ def design(
     from tenbaud.design.complete import completed
     from tenbaud.files.whole import make_folder, write_whole
 
-    own, steps = read_toml(config), []
+    own = read_toml(config)
+    steps: list[float] = []
     for _ in range(2):  # the encoders are known of a whole configuration only
         whole = completed(merged_values(preset, config), steps)
         own |= {name: whole[name] for name in ("model", "coder")}

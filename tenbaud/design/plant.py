@@ -77,7 +77,8 @@ def behind_encoders(
         raise ValueError(f"tick_s is {tick_s}; it must be above 0")
     outputs = len(plant.C)
     seen = np.broadcast_to(np.asarray(steps, dtype=float), (outputs,)) ** 2 / 12.0 * tick_s
-    own = solve_continuous_are(plant.A.T, plant.C.T, plant.noise, np.diag(seen))
+    found = solve_continuous_are(plant.A.T, plant.C.T, plant.noise, np.diag(seen))
+    own = np.asarray(found, dtype=np.float64)
     return replace(plant, G=own @ plant.C.T / seen, densities=seen), own
 
 

@@ -167,7 +167,7 @@ def fly(point: Point) -> Found:
     described = plant_of(config.model, config.timing.tick_s)
     assert described is not None
     least = floor(described.model(), point.rate_bit_s)
-    compiled = CompiledPoint(config)
+    compiled = CompiledPoint(config, scored_from=0)
     ratios = []
     for seed in range(FIRST_SEED, FIRST_SEED + point.seeds):
         try:
@@ -204,13 +204,14 @@ def fly_all(points: list[Point], path: Path, on_progress: OnProgress) -> dict[Po
 
 
 def _kept(path: Path) -> dict[Point, Found]:
-    """Return what a file holds; nothing where other sources made it."""
-    if not path.is_file():
+    """Return what a file holds; nothing where other sources made it, or where it is damaged."""
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+        if values["sources"] != _sources():
+            return {}
+        return {Point(**one["point"]): Found(**one["found"]) for one in values["points"]}
+    except (FileNotFoundError, ValueError, TypeError, KeyError):
         return {}
-    values = json.loads(path.read_text(encoding="utf-8"))
-    if values["sources"] != _sources():
-        return {}
-    return {Point(**one["point"]): Found(**one["found"]) for one in values["points"]}
 
 
 def _keep(path: Path, found: dict[Point, Found]) -> None:
@@ -221,5 +222,5 @@ def _keep(path: Path, found: dict[Point, Found]) -> None:
 def _sources() -> str:
     """Return what stands for the sources and the presets that the figures rest on."""
     presets = [merged_values(plant.preset, None) for plant in PLANTS.values()]
-    digest = blake2b(json.dumps(presets, sort_keys=True).encode(), digest_size=8).hexdigest()
-    return f"{sources_digest()} {digest}"
+    own = json.dumps(presets, sort_keys=True).encode() + Path(__file__).read_bytes()
+    return f"{sources_digest()} {blake2b(own, digest_size=8).hexdigest()}"

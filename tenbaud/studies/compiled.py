@@ -105,7 +105,11 @@ def compiled(
     copy.__qualname__ = copy.__name__ = own
     again = function.__name__ in function.__code__.co_names
     how = {"no_cpython_wrapper": inner, "forceinline": not again}
-    made = _jit(copy, allocates, not (inner and parts), **how)
+    # Machine code is kept for sources that its folder stands for.
+    outside = function.__module__.partition(".")[0] not in PACKAGES
+    outside = outside or any(getattr(one, "from_outside", False) for one in names.values())
+    made = _jit(copy, allocates, not outside and not (inner and parts), **how)
+    made.from_outside = outside
     if again:  # a function that calls itself
         scope[function.__name__] = made
     return made
@@ -135,7 +139,9 @@ def whole_of(row_function: Callable[..., float]) -> Any:
             after = tuple_setitem(after, index, row(first, *others, index))
         return after
 
-    return named(whole, f"whole_{row_function.__name__}")
+    made = named(whole, f"whole_{row_function.__name__}", not row.from_outside)
+    made.from_outside = row.from_outside
+    return made
 
 
 @cache
@@ -164,10 +170,10 @@ def _refuse(what: str, x: float) -> None:
     raise ValueError("an argument of sin, cos or exp is out of range")
 
 
-def named(function: Callable[..., Any], name: str) -> Any:
+def named(function: Callable[..., Any], name: str, keep: bool = True) -> Any:
     """Return a function compiled, under a name by which the cache tells it from others."""
     function.__qualname__ = function.__name__ = name
-    return _jit(function, forceinline=True)
+    return _jit(function, keep=keep, forceinline=True)
 
 
 def _jit(function: Callable[..., Any], allocates: bool = False, keep: bool = True, **more: Any) -> Any:

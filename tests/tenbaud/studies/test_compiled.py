@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 import pytest
 
 from tenbaud.studies import compiled as compiling
-from tenbaud.studies.compiled import BESIDE, figure_sources, named
+from tenbaud.studies.compiled import BESIDE, compiled, figure_sources, named
 from tests.rules.sources import TOP
 
 
@@ -47,3 +48,19 @@ def test_machine_code_is_found_again_wherever_the_sources_lie(
         assert doubled(1.5) == 3.0
         hits.append(sum(doubled.stats.cache_hits.values()))
     assert hits == [0, 1, 0]
+
+
+@pytest.mark.parametrize("module", ["channel.codec.lead", "a_plug_in"])
+def test_machine_code_is_kept_for_the_sources_that_its_folder_stands_for_alone(
+    module: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compiling, "_cache_folder", lambda: tmp_path)
+    scope: dict[str, Any] = {"__name__": module}
+    exec(compile("def tripled(x):\n    return 3.0 * x\n", "part.py", "exec"), scope)
+    exec(compile("def outer(x):\n    return inner(x)\n", "part.py", "exec"), scope)
+    inner = compiled(scope["tripled"])
+    assert inner(1.5) == 4.5
+    scope["__name__"] = "tenbaud.studies.kernel"
+    outer = FunctionType(scope["outer"].__code__, scope | {"inner": None}, "outer")
+    assert compiled(outer, (("inner", inner),))(1.5) == 4.5
+    assert any(tmp_path.iterdir()) == (module != "a_plug_in")

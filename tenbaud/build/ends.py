@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 
 from channel.codec.codec import Codec
+from channel.codec.models.learned import plant_model
 from channel.codec.models.linear import LinearModel
 from channel.line.clocks import SkewedClock
 from channel.line.impairments import Direction, ImpairedLine
@@ -90,7 +91,7 @@ def build_observer(agreement: Agreement) -> StateObserver | None:
         return None
     config, tick_s = agreement.config, agreement.terms.tick_ns / 1e9
     try:
-        if isinstance(codec.model, LinearModel) or len(agreement.signals.outputs) > 1:
+        if isinstance(plant_model(codec.model), LinearModel) or len(agreement.signals.outputs) > 1:
             from tenbaud.design.observer import configured_observer
 
             steps = output_steps(config, agreement.signals)

@@ -19,15 +19,18 @@ from tenbaud.config.models import LinearModelSection
 from tenbaud.config.schema import Timing
 from tenbaud.config.section import KindSection, Section
 from tenbaud.design.described import corrected_part, linear_of, plant_of, require_rate, require_seen
-from tenbaud.design.direction import design_direction
+from tenbaud.design.direction import design_direction, design_learning
 
+DESIGNED = (*("transition", "noise", "noises", "worth", "start", "starts", "reach", "removed", "step"),)
+"""settings of a coder that are worked out; what else it has is the user's"""
 SectionKind = TypeVar("SectionKind", bound=Section)
 
 
 def completed(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return nested settings with the sections `model` and `coder` completed.
 
-    A linear model gets F and E from its A and B, and a coder `direction` its constants for the plant;
+    A linear model gets F and E from its A and B, and a coder `direction` or
+    `learning` its constants for the plant;
     both anew where they are there already. Raises ConfigError where nothing can be designed.
     """
     given, coder = dict(values.get("model", {})), dict(values.get("coder", {}))
@@ -38,8 +41,8 @@ def completed(values: Mapping[str, Any]) -> dict[str, Any]:
             F, E = discretised(section.A, section.B, timing.tick_s)
             given |= {"F": F.tolist(), "E": E.tolist()}
             section = _checked("model", LinearModelSection, given)
-        if coder.get("kind") == "direction":
-            coder |= _direction(section, coder, timing)
+        if coder.get("kind") in ("direction", "learning"):
+            coder |= _designed(section, coder, timing)
     except ValueError as error:
         raise ConfigError(f"this cannot be designed: {error}") from error
     return {**values, "model": given, "coder": coder}
@@ -57,7 +60,7 @@ def _checked(place: str, sort: type[SectionKind], values: Mapping[str, Any]) -> 
         raise ValueError("; ".join(faults)) from error
 
 
-def _direction(section: KindSection, coder: Mapping[str, Any], timing: Timing) -> dict[str, Any]:
+def _designed(section: KindSection, coder: Mapping[str, Any], timing: Timing) -> dict[str, Any]:
     linear, plant = linear_of(section), plant_of(section, timing.tick_s)
     if linear is None or plant is None:
         raise ValueError(f"model.kind = {section.kind!r} describes no plant to design for")
@@ -65,9 +68,10 @@ def _direction(section: KindSection, coder: Mapping[str, Any], timing: Timing) -
     rate = coder.get("bits", 1) / timing.symbol_period_s
     require_seen(plant, section)
     require_rate(plant, rate, section)
-    found = asdict(design_direction(plant, rate, timing.symbol_period_s))
-    designed = ("transition", "noise", "worth", "start", "removed", "step")
-    return {
-        name: [list(row) for row in found[name]] if isinstance(found[name], tuple) else found[name]
-        for name in designed
-    }
+    design = design_learning if coder["kind"] == "learning" else design_direction
+    found = asdict(design(plant, rate, timing.symbol_period_s))
+    return {name: _lists(value) for name, value in found.items() if name in DESIGNED}
+
+
+def _lists(value: Any) -> Any:
+    return [_lists(one) for one in value] if isinstance(value, tuple) else value

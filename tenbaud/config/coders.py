@@ -145,7 +145,7 @@ class LearningCoderSection(_DesignedSection):
     """what a constant rate of each state, a column, adds in a sample"""
     spreads: Annotated[tuple[Positive, ...], Field(max_length=64)] = ()
     """standard deviation of each term's error before the first word; empty: 0.1, of a force 0.03"""
-    drift: Annotated[float, Field(ge=0.0, le=1.0)] = 0.003
+    drift: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0003
     """by which an error may change in a sample, as a share of its spread"""
     learned_max: Annotated[float, Field(ge=0.01, le=0.9)] = 0.3
     """of the size of each error"""

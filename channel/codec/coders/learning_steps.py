@@ -101,14 +101,22 @@ def take(
     v = [0.0] * size
     weights = [0.0] * (columns + 1)
     for part in range(columns + 1):
-        for i in range(size):
-            total = 0.0
+        at, row = part * pairs, part * size
+        for i in range(n):
+            for j in range(i):
+                each[row + i] += coder[at] * c[j]
+                each[row + j] += coder[at] * c[i]
+                at += 1
+            each[row + i] += coder[at] * c[i]
+            at += 1
+        for i in range(n, size):
             for j in range(n):
-                total += coder[part * pairs + place(i, j)] * c[j]
-            each[part * size + i] = total
-            v[i] += total
-            if i < n:
-                weights[part] += c[i] * total
+                each[row + i] += coder[at + j] * c[j]
+            at += i + 1
+        for i in range(size):
+            v[i] += each[row + i]
+        for i in range(n):
+            weights[part] += c[i] * each[row + i]
     agreed = 0.0
     agrees = [0.0] * columns
     changes = [0.0] * columns
@@ -220,21 +228,26 @@ def move(constants: LearningConstants, coder: Results, part: int, values: Number
     sums = len(constants.reach) // n  # integers
     begin = part * pairs_of(size)
     transition, reach, rows = constants.transition, constants.reach, constants.rows
-    full = [0.0] * (size * size)
-    at = begin
-    for i in range(size):
-        for j in range(i + 1):
-            full[i * size + j] = coder[at]
-            full[j * size + i] = coder[at]
-            at += 1
-    # What the terms of each row add up to: a row of Y theta is `reach` times these.
+    # P of x and everything, and what the terms of each row add up to: Y theta is `reach` times these.
+    full = [0.0] * (n * size)
     added = [0.0] * (sums * size)
+    at = begin
+    for i in range(n):
+        for j in range(i + 1):
+            full[i * size + j] = full[j * size + i] = coder[at]
+            at += 1
     for i in range(learned):
-        value = values[i]
-        if value != 0.0:
-            row, at = rows[i] * size, (n + i) * size
-            for j in range(size):
-                added[row + j] += value * full[at + j]
+        value, row = values[i], rows[i] * size
+        for j in range(n):
+            full[j * size + n + i] = coder[at + j]
+            added[row + j] += value * coder[at + j]
+        at += n
+        for j in range(i):
+            added[row + n + j] += value * coder[at]
+            added[rows[j] * size + n + i] += values[j] * coder[at]
+            at += 1
+        added[row + n + i] += value * coder[at]
+        at += 1
     moved = [0.0] * (n * size)
     for i in range(n):
         row = i * size

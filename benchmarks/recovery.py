@@ -12,7 +12,7 @@ from channel.protocol.wire import decode
 from tests.channel.codec.parts import THREE_SIGNS, terms
 from tests.simulation.faults import Plan
 from tests.simulation.world import World
-from transmitter.node import TransmitterNode
+from transmitter.endpoint import TransmitterNode
 from transmitter.session.session import Phase
 
 SAMPLE_NS = 100_000_000

@@ -7,13 +7,12 @@ an `Alphabet`, and is given `ERASED` for a word that did not arrive.
 
 from __future__ import annotations
 
-from channel.codec.codec import Coder, CoderContext, Vector
+from channel.codec.codec import ERASED, Alphabet, Coder, CoderContext, Vector, Word
 from channel.codec.coders.history import HistoryCoder, HistoryParameters
 from channel.codec.coders.open_loop_zoom import OpenLoopZoomCoder, OpenLoopZoomParameters
 from channel.codec.coders.pcm import PcmCoder, PcmParameters
 from channel.codec.coders.static import StaticCoder, StaticParameters
 from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
-from channel.codec.words import ERASED, Alphabet, Word
 
 __all__ = [
     "ERASED",

@@ -1,21 +1,225 @@
 """The sensor node without time and transport: messages and times in, messages and arrivals out.
 
-A loop (`transmitter.loops`) asks when the next tick is due, gives it what came, and carries what it
-returns. All times are flight times.
+`TransmitterNode` joins rig, session, guard and scores for one tick at a time; `TransmitterEndpoint`
+adds the way in and the way out. A loop (`transmitter.loops`) asks when the next tick is due, gives it
+what came, and carries what it returns. All times are flight times.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, astuple, replace
 
-from channel.line.line import Delivery, Inlet
+from channel.codec.codec import Vector
+from channel.line.line import Delivery, Inlet, Uplink
 from channel.line.meters import LatenessMeter
-from channel.line.uplink import Uplink
 from channel.protocol.endings import End
-from channel.protocol.frames import Frame
-from transmitter.node import TransmitterNode
+from channel.protocol.events import Event, EventKind, write_event
+from channel.protocol.frames import Frame, Why
+from channel.protocol.recording import NullRecorder, Recorder
+from transmitter.encoder_watch import EncoderWatch
+from transmitter.guard import Guard, GuardCause, GuardReason, GuardState
+from transmitter.metrics.gap import GAP_CHANNEL, GAP_EVERY_S, GapGauge
+from transmitter.metrics.scores import Scores
+from transmitter.rigs.base import Reading, Rig
+from transmitter.session.copies import Confirmed
 from transmitter.session.rate_watch import RateWatch
-from transmitter.session.session import Phase
+from transmitter.session.records import DEVICE_CHANNEL, TICK_CHANNEL
+from transmitter.session.session import Phase, TransmitterSession
+
+RESTLESS_SAMPLES_MAX = 32
+"""Samples that may be confirmed before they are scored even if no driver finds the time."""
+
+
+class TransmitterNode:
+    """Everything of the sensor node but time and transport.
+
+    `rearm_ticks`: re-arm the guard by itself, with a rejoin, after commands have stayed away, for as
+    long as the receiver has been silent for no more than this many ticks. None: never; for every rig
+    that could hurt somebody the way back is to start the node again.
+    """
+
+    def __init__(
+        self,
+        session: TransmitterSession,
+        rig: Rig,
+        guard: Guard,
+        scores: Scores,
+        recorder: Recorder | None = None,
+        rearm_ticks: int | None = None,
+        gauge: GapGauge | None = None,
+    ) -> None:
+        self.session = session
+        self.rig = rig
+        self.guard = guard
+        self.scores = scores
+        self.gauge = gauge
+        self.commands_late = 0
+        self.ticks_commanded = 0
+        """whose own command passed the guard"""
+        self.ticks_down = 0
+        """with the guard at the safe voltage, or on its way there"""
+        self.sensor_fault: GuardReason | None = None
+        self.tick = 0
+        self.rearmed = 0
+        self._before_tick: Callable[[int], None] = lambda _: None
+        self._rearm_ticks = rearm_ticks
+        self._gauge_samples = max(1, round(GAP_EVERY_S * 1e9 / session.terms.sample_ns))
+        self._recorder = recorder or NullRecorder()
+        self._reading: Reading | None = None
+        self._watch: EncoderWatch | None = None
+        if not rig.is_recorded:
+            self._watch = EncoderWatch(session.codec, session.terms.tick_ns / 1e9)
+        self._applied = guard.command
+        self._guard_told = guard.state
+
+    def before_every_tick(self, act: Callable[[int], None]) -> None:
+        """Have this called before every tick: where a person's commands take hold."""
+        self._before_tick = act
+
+    def measure(self, tick: int) -> list[Frame] | None:
+        """Read the rig; return the frames to send, or None when the rig has no more to read."""
+        self.tick = tick
+        self._before_tick(tick)
+        reading = self.rig.read(tick)
+        if reading is None:
+            return None
+        self._reading = reading
+        if reading.device is not None:
+            time_ns = tick * self.session.terms.tick_ns
+            self._recorder.write(DEVICE_CHANNEL, time_ns, (tick, *astuple(reading.device)))
+        self._check(tick, reading)
+        self.scores.on_outputs(tick, reading.true or reading.measured)
+        if self.gauge is not None:
+            self.gauge.on_outputs(tick, reading.measured)
+        asking: list[Frame] = []
+        if self.guard.stopped:
+            if not self._may_rearm:
+                return []
+            asking = self.session.rejoin(Why.GUARD)
+        return asking + self.session.on_measurement(tick, reading.measured)
+
+    def deliver(self, frame: Frame) -> list[Frame]:
+        """Hand an arrived frame to the session; return the answers. `rest` has what it confirmed."""
+        answers = self.session.on_frame(frame)
+        if len(self.session.confirmed) >= RESTLESS_SAMPLES_MAX:
+            self.flush_records()
+        if self.guard.stopped and self._may_rearm and self.session.phase is Phase.FLYING:
+            self.guard.rearm()
+            self.rearmed += 1
+        return answers
+
+    def flush_records(self) -> None:
+        """Score and record what was confirmed: work for when the next symbol is on its way."""
+        if not self.session.confirmed:
+            return
+        per_sample = self.session.terms.ticks_per_sample
+        for done in self.session.take_confirmed():
+            pairs = zip(done.flown.coded, done.live, strict=True)
+            self.scores.on_word(done.word, done.about)
+            for tick, (coded, live) in enumerate(pairs, done.sample * per_sample):
+                self.scores.on_estimate(tick, coded, live)
+            if self.gauge is not None:
+                self._gauge(self.gauge, done)
+
+    def _gauge(self, gauge: GapGauge, done: Confirmed) -> None:
+        gauge.on_confirmed(done)
+        if (done.sample + 1) % self._gauge_samples == 0:
+            time_ns = done.sample * self.session.terms.sample_ns
+            self._recorder.write(GAP_CHANNEL, time_ns, gauge.row(done.sample))
+
+    def actuate(self, tick: int, lateness_ns: int = 0) -> Vector:
+        """Put the tick's voltages on the motors; return them."""
+        reading = self._reading
+        if reading is None:
+            raise RuntimeError(f"tick {tick} is actuated before it was measured")
+        session = self.session
+        if session.phase is Phase.ENDED:
+            self.guard.trip(GuardReason(GuardCause.SESSION_ENDED, tick))
+        asleep = session.phase in (Phase.GREETING, Phase.ENDED)
+        command = None if asleep else session.command(tick)
+        owed = session.phase is Phase.FLYING and tick >= session.epoch_tick
+        late = command is None and owed and not self.guard.stopped
+        self.commands_late += late
+        volts = self.guard.apply(tick, command, session.owing.owed_ticks(tick))
+        self.ticks_down += self.guard.stopped
+        self.ticks_commanded += command is not None and not self.guard.stopped
+        self.rig.write(tick, volts)
+        self._applied = volts if reading.applied_volts is None else reading.applied_volts
+        time_ns = tick * self.session.terms.tick_ns
+        self._recorder.write(
+            TICK_CHANNEL,
+            time_ns,
+            (
+                tick,
+                time_ns / 1e9,
+                reading.measured,
+                reading.true,
+                command,
+                self._applied,
+                late,
+                lateness_ns / 1e6,
+                self.guard.state.value,
+            ),
+        )
+        if self.guard.state is not self._guard_told:
+            self._tell_guard()
+        return volts
+
+    @property
+    def latched(self) -> bool:
+        """Return whether the guard has reached the safe voltage and stays there."""
+        return self.guard.state is GuardState.LATCHED
+
+    @property
+    def over(self) -> bool:
+        """Return whether the flight is over: latched, and nothing left to wait for."""
+        return self.latched and not self._may_rearm
+
+    @property
+    def _may_rearm(self) -> bool:
+        session = self.session
+        return (
+            self._rearm_ticks is not None
+            and self.guard.timed_out
+            and session.phase in (Phase.FLYING, Phase.REJOINING)
+            and self.tick - session.heard_tick <= self._rearm_ticks
+        )
+
+    def conclude(self, tick: int) -> None:
+        """Note that the flight ends before `tick`."""
+        self.session.conclude(tick, withheld=self.guard.stopped)
+
+    def stop(self) -> None:
+        """Take the motors down because a person or a signal asked for it."""
+        self.guard.trip(GuardReason(GuardCause.STOPPED, self.tick))
+
+    def tell(self, event: Event) -> None:
+        time_ns = self.tick * self.session.terms.tick_ns
+        event = replace(event, time_ns=time_ns, sample=self.session.copies.confirmed.sample)
+        self.session.events.append(event)
+        write_event(self._recorder, event)
+
+    def on_malformed(self, why: str) -> None:
+        self.tell(Event(EventKind.MALFORMED, detail=why))
+
+    def _check(self, tick: int, reading: Reading) -> None:
+        session, fault = self.session, reading.fault
+        if fault is None and self._watch is not None:
+            estimate = session.copies.confirmed.model if session.is_proven else None
+            fault = self._watch.check(reading.counts, self._applied, estimate)
+        if fault is not None and not self.guard.stopped:
+            self.sensor_fault = GuardReason(GuardCause.SENSOR, tick, detail=fault)
+            self.tell(Event(EventKind.SENSOR, tick=tick, detail=fault))
+            self.guard.trip(self.sensor_fault)
+        self.guard.check_outputs(tick, reading.measured)
+
+    def _tell_guard(self) -> None:
+        self._guard_told = self.guard.state
+        if self.guard.state is not GuardState.RUNNING:
+            reason = self.guard.reason
+            event = Event(EventKind.GUARD, state=self.guard.state)
+            self.tell(event if reason is None else replace(event, **asdict(reason)))
 
 
 class TransmitterEndpoint:

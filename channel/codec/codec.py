@@ -24,6 +24,10 @@ One sample `k`, its ticks `kN ... (k+1)N - 1`:
     tick     both, N times: the model advances by one tick under a command and the held correction
     close    both: the state after the sample, which is what the digest is of
 
+A coder declares an alphabet (for the paper: -1 and +1) and how many symbols make the word of one
+sample. An erasure (the receiver saw no whole word in time) is distinct from every symbol, a paid
+silence included.
+
 Two parts plug in: a prediction `Model` (any states, inputs, measured axes) and a `Coder` (any
 alphabet, any symbols per word, any correction). The paper's are `models.pitch` and `coders.zoom`.
 """
@@ -36,15 +40,87 @@ from collections.abc import MutableSequence, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import blake2b
-from typing import NamedTuple, Protocol
+from typing import Final, NamedTuple, Protocol, TypeAlias
 
-from channel.codec.words import ERASED, Alphabet, Word
 from channel.errors import CodecDiverged
 
 Vector = tuple[float, ...]
 
 STATE_MAX = 5e4
 """A state beyond this is no estimate any more; angles stay within what `numerics.sin` takes."""
+
+Word: TypeAlias = tuple[int, ...] | None
+"""One sample's symbols in the order in which they were sent, or `ERASED`."""
+
+ERASED: Final = None
+"""No whole word arrived in time."""
+
+WIRE_ERASED: Final = 0xFFFF
+"""An erasure as a frame carries it; word numbers stay below."""
+
+SYMBOLS_MAX: Final = 256
+"""A frame has one byte for a symbol."""
+
+
+class Alphabet:
+    """The symbols of a coder, and the numbering of its words on the wire.
+
+    A word of `b` symbols from an alphabet of `A` has a number in `0 ... A**b - 1`, its first symbol
+    the least significant digit.
+    """
+
+    def __init__(self, symbols: tuple[int, ...], symbols_per_word: int) -> None:
+        if not 2 <= len(symbols) <= SYMBOLS_MAX or len(set(symbols)) != len(symbols):
+            raise ValueError(
+                f"an alphabet needs 2 to {SYMBOLS_MAX} distinct symbols, got {len(symbols)}"
+            )
+        words = 1
+        for _ in range(symbols_per_word):
+            words *= len(symbols)
+        if symbols_per_word < 1 or words > WIRE_ERASED:
+            raise ValueError(
+                f"{symbols_per_word} symbols of {len(symbols)} kinds make {words} words; "
+                f"a word must have at least one symbol and at most {WIRE_ERASED} kinds of words"
+            )
+        self.symbols = symbols
+        self.symbols_per_word = symbols_per_word
+        self._digit = {symbol: digit for digit, symbol in enumerate(symbols)}
+        self._words = words
+
+    def symbol_number(self, symbol: int) -> int:
+        """Return the digit that stands for one symbol; ValueError for a foreign one."""
+        if symbol not in self._digit:
+            raise ValueError(f"symbol {symbol} is not in the alphabet {self.symbols}")
+        return self._digit[symbol]
+
+    def symbol(self, number: int) -> int | None:
+        return self.symbols[number] if 0 <= number < len(self.symbols) else None
+
+    def word_number(self, word: Word) -> int:
+        """Return the wire number of a word, `WIRE_ERASED` for an erasure."""
+        if word is ERASED:
+            return WIRE_ERASED
+        if len(word) != self.symbols_per_word:
+            raise ValueError(f"a word has {self.symbols_per_word} symbols, got {word}")
+        number = 0
+        for symbol in reversed(word):
+            number = number * len(self.symbols) + self.symbol_number(symbol)
+        return number
+
+    def has_word(self, number: int) -> bool:
+        return 0 <= number < self._words or number == WIRE_ERASED
+
+    def word(self, number: int) -> Word:
+        """Return the word with this wire number; ValueError when there is none."""
+        if number == WIRE_ERASED:
+            return ERASED
+        if not 0 <= number < self._words:
+            raise ValueError(f"word number {number} is outside 0 ... {self._words - 1}")
+        digits = []
+        for _ in range(self.symbols_per_word):
+            number, digit = divmod(number, len(self.symbols))  # integers
+            digits.append(self.symbols[digit])
+        return tuple(digits)
 
 
 class Model(Protocol):

@@ -12,8 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from channel.codec.codec import Codec, CodecState, OpenSample, Vector
-from channel.codec.words import Word
+from channel.codec.codec import Codec, CodecState, OpenSample, Vector, Word
 
 Decide = Callable[[int, Vector], Vector]
 """(tick, live model state) -> command of that tick."""

@@ -24,7 +24,7 @@ from collections import Counter
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
-from channel.codec.words import Alphabet
+from channel.codec.codec import Alphabet
 from channel.line.line import CleanLine, Delivery, Line
 from channel.protocol.wire import DATAGRAM, SymbolWire
 

@@ -21,8 +21,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
-from channel.codec.codec import Codec, is_coder_state, is_estimate
-from channel.codec.words import WIRE_ERASED
+from channel.codec.codec import WIRE_ERASED, Codec, is_coder_state, is_estimate
 from channel.protocol.events import Dropped, Event, EventKind, Tell
 from channel.protocol.frames import Bye, Commands, Desync, Echo, Frame, Hello, Refuse, Symbol, Welcome
 from channel.protocol.limits import to_steps

@@ -15,8 +15,7 @@ from struct import pack
 from typing import Any
 
 from channel.codec import numerics
-from channel.codec.codec import Codec
-from channel.codec.words import ERASED, Word
+from channel.codec.codec import ERASED, Codec, Word
 from channel.errors import CodecDiverged
 
 PROBE_SAMPLES = 40

@@ -10,8 +10,7 @@ from collections import deque
 from dataclasses import replace
 from typing import NamedTuple
 
-from channel.codec.codec import Codec, CodecState
-from channel.codec.words import Word
+from channel.codec.codec import Codec, CodecState, Word
 from channel.protocol.events import Event, EventKind
 from channel.protocol.frames import Desync
 from channel.protocol.recording import Field, RecordChannel

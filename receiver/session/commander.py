@@ -10,9 +10,8 @@ from __future__ import annotations
 from collections import Counter, deque
 from typing import NamedTuple
 
-from channel.codec.codec import Codec, CodecState, Vector
+from channel.codec.codec import Codec, CodecState, Vector, Word
 from channel.codec.lead import FlownSample, fly_sample
-from channel.codec.words import Word
 from channel.errors import CodecDiverged
 from channel.protocol.events import Event, EventKind, Failing, Tell
 from channel.protocol.frames import Echo

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from channel.codec.codec import CodecState, Vector
+from channel.codec.codec import CodecState, Vector, Word
 from channel.codec.lead import FlownSample
-from channel.codec.words import Word
 from channel.protocol.frames import Desync, Symbol
 from channel.protocol.lockstep import LOCKSTEP_CHANNEL, History
 from channel.protocol.recording import ARRIVED_CHANNEL, Field, RecordChannel, Recorder

@@ -24,8 +24,7 @@ from dataclasses import replace
 from enum import Enum, auto
 from itertools import chain, repeat
 
-from channel.codec.codec import Codec, CodecState, Vector, is_coder_state
-from channel.codec.words import ERASED
+from channel.codec.codec import ERASED, Codec, CodecState, Vector, is_coder_state
 from channel.errors import CodecDiverged
 from channel.protocol.bounds import shown
 from channel.protocol.frames import Claim, Desync, Frame, Hello, Symbol, Unknown, Welcome

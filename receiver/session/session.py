@@ -15,8 +15,7 @@ from collections import Counter, deque
 from dataclasses import replace
 from enum import Enum
 
-from channel.codec.codec import Codec, CodecState
-from channel.codec.words import ERASED
+from channel.codec.codec import ERASED, Codec, CodecState
 from channel.line.meters import BaudMeter
 from channel.protocol.bounds import Bounds, within_text_bounds
 from channel.protocol.endings import End, Ending

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from channel.errors import CodecDiverged, TenbaudError
-from channel.line.uplink import bits_per_symbol
+from channel.line.line import bits_per_symbol
 from receiver.controllers.base import Controller
 from tenbaud.audit.base import Evidence, Place
 from tenbaud.audit.table import CLAIMS

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
-from channel.codec.words import Alphabet
+from channel.codec.codec import Alphabet
 from channel.protocol.terms import Terms
 from tenbaud.build.flight import Agreement
 from tenbaud.replay.expected import Expected

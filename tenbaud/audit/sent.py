@@ -5,8 +5,8 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Any
 
-from channel.codec.words import Alphabet, Word
-from channel.line.uplink import bits_per_symbol
+from channel.codec.codec import Alphabet, Word
+from channel.line.line import bits_per_symbol
 from tenbaud.audit.base import Evidence, claim
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from channel.codec.codec import Codec, Coder, CoderContext, Model, ModelContext
 from channel.codec.coders.pcm import PcmCoder
 from channel.codec.models.hold import HoldModel
-from channel.line.uplink import bit_rate
+from channel.line.line import bit_rate
 from tenbaud.build.parts import Parts, check_codec
 from tenbaud.build.plugins import build_plugin
 from tenbaud.config.kinds import CODERS, MODELS, kind_of, model_kind

@@ -12,8 +12,7 @@ from channel.codec.models.learned import plant_model
 from channel.codec.models.linear import LinearModel
 from channel.line.clocks import SkewedClock
 from channel.line.impairments import Direction, ImpairedLine
-from channel.line.line import CleanLine, Downlink, Line
-from channel.line.uplink import Uplink
+from channel.line.line import CleanLine, Downlink, Line, Uplink
 from channel.protocol.recording import Recorder
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
 from channel.protocol.wire import SymbolWire, Wire
@@ -33,9 +32,9 @@ from tenbaud.build.signals import configured_signals, safe_command, soft_limits
 from tenbaud.config.kinds import CONTROLLERS
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
+from transmitter.endpoint import TransmitterNode
 from transmitter.guard import Guard, GuardSettings
 from transmitter.metrics.scores import Scores
-from transmitter.node import TransmitterNode
 from transmitter.session.session import TransmitterSession
 from transmitter.session.state_observer import StateObserver, rate_observer
 

@@ -8,7 +8,7 @@ from functools import partial
 
 from channel.codec.models.learned import plant_model
 from channel.codec.models.pitch import PitchModel
-from channel.line.uplink import bit_rate
+from channel.line.line import bit_rate
 from tenbaud.bounds.closed import double_integrator_floor, double_integrator_rate
 from tenbaud.build.flight import Agreement
 from tenbaud.build.flight_log import output_steps

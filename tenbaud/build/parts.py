@@ -11,9 +11,8 @@ import inspect
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from channel.codec.codec import Codec, Coder, Model
+from channel.codec.codec import ERASED, Codec, Coder, Model
 from channel.codec.signals import signals_of
-from channel.codec.words import ERASED
 from plant_sim.plant import Plant, with_measured
 from receiver.controllers.base import Controller, with_references
 from tenbaud.config.load import ConfigError

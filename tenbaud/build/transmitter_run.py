@@ -6,11 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from channel.line.line import Line
-from channel.line.uplink import Uplink
+from channel.line.line import Line, Uplink
 from tenbaud.build.flight import Agreement
-from transmitter.endpoint import TransmitterEndpoint
-from transmitter.node import TransmitterNode
+from transmitter.endpoint import TransmitterEndpoint, TransmitterNode
 
 Stop = Callable[[], bool]
 

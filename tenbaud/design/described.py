@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from channel.codec.codec import Codec
-from channel.line.uplink import bit_rate
+from channel.line.line import bit_rate
 from plant_sim.zero_order_hold import continuous, discretised
 from tenbaud.bounds import floor
 from tenbaud.bounds.linear import unreached

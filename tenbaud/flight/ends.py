@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from channel.codec.words import Word
+from channel.codec.codec import Word
 from channel.links.base import Link, Role
 from channel.links.kind import LinkEnd, NodePlace
 from channel.links.security import Security

@@ -10,8 +10,7 @@ from channel.codec.models.learned import plant_model
 from channel.codec.models.linear import LinearModel
 from channel.errors import ConfigMismatch, LinkLost
 from channel.line.impairments import LineFaults
-from channel.line.line import CleanLine, Downlink, Line
-from channel.line.uplink import Uplink
+from channel.line.line import CleanLine, Downlink, Line, Uplink
 from channel.protocol.endings import End, Ending
 from channel.protocol.identity import Identity, numerics_probe
 from channel.protocol.recording import Recorder
@@ -29,11 +28,10 @@ from tenbaud.flight.memory_result import FlightResult, result_of
 from tenbaud.recording.memory import MemoryRecorder
 from tenbaud.sentences.endings import end_text, refusal_text
 from tenbaud.sentences.events import guard_text
-from transmitter.endpoint import TransmitterEndpoint
+from transmitter.endpoint import TransmitterEndpoint, TransmitterNode
 from transmitter.guard import Guard, GuardSettings
 from transmitter.loops.virtual import VirtualFlight
 from transmitter.metrics.scores import Scores
-from transmitter.node import TransmitterNode
 from transmitter.rigs.simulated import SimulatedRig
 from transmitter.session.session import Phase, TransmitterSession
 from transmitter.session.state_observer import StateObserver

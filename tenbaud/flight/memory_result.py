@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from channel.codec.codec import Model
-from channel.codec.words import Word
+from channel.codec.codec import Model, Word
 from channel.protocol.events import Event
 from channel.protocol.frames import Desync
 from channel.protocol.terms import Terms

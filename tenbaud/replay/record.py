@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path, PureWindowsPath
 from typing import Any
 
-from channel.codec.codec import CodecState, Vector
-from channel.codec.words import Word
+from channel.codec.codec import CodecState, Vector, Word
 from tenbaud.build.flight import Agreement, agree
 from tenbaud.config.deprecated import with_current_names
 from tenbaud.config.outside_code import require_allowed, require_regular_files

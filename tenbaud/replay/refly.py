@@ -11,8 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from channel.codec.codec import Codec, CodecState, Vector
-from channel.codec.words import Word
+from channel.codec.codec import Codec, CodecState, Vector, Word
 from channel.protocol.frames import Hello, Symbol, Welcome
 from receiver.controllers.base import Controller
 from receiver.session.session import ReceiverSession

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from channel.line.uplink import bits_per_symbol
+from channel.line.line import bits_per_symbol
 from tenbaud.files.whole import make_folder, write_whole
 from tenbaud.recording.errors import RecordingError
 from tenbaud.replay.control import controller_of, steps_by_hand

@@ -19,8 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from channel.codec.codec import Codec, CodecState
-from channel.codec.words import ERASED, Alphabet, Word
+from channel.codec.codec import ERASED, Alphabet, Codec, CodecState, Word
 from tenbaud.build.flight import Agreement, agree
 from tenbaud.config.deprecated import with_current_names
 from tenbaud.config.outside_code import require_allowed, require_regular_files

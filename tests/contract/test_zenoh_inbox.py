@@ -9,7 +9,7 @@ import zenoh
 
 from channel.links.endpoints import free_endpoint
 from channel.links.zenoh.config import zenoh_config, zenoh_settings
-from channel.links.zenoh.inbox import ChannelInbox
+from channel.links.zenoh.link import ChannelInbox
 from tests.contract.test_links import PATIENCE_S, SILENCE_S
 
 KEY = "tenbaud/full/up/symbol"

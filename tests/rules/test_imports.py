@@ -150,7 +150,7 @@ def test_a_bad_import_is_caught(name: str, source: str) -> None:
 @pytest.mark.parametrize(
     ("name", "source"),
     [
-        ("channel/codec/codec.py", "import math\nfrom channel import numerics\nfrom . import words"),
+        ("channel/codec/codec.py", "import math\nfrom channel import numerics\nfrom . import lead"),
         ("channel/links/zenoh/link.py", "import zenoh\nfrom .base import Link"),
         ("channel/links/serial/link.py", "import serial"),
         ("transmitter/session/session.py", "import channel.codec.codec\nimport plant_sim"),

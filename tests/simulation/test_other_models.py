@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from channel.codec.codec import Codec
+from channel.codec.codec import WIRE_ERASED, Alphabet, Codec
 from channel.codec.coders.zoom import ZoomCoder
 from channel.codec.signals import signals_of
-from channel.codec.words import WIRE_ERASED, Alphabet
 from channel.protocol.limits import CommandLimits
 from tenbaud import MemoryFlight
 from tests.channel.codec.chua import (

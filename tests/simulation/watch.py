@@ -20,7 +20,7 @@ from transmitter.session.session import Phase
 if TYPE_CHECKING:
     from receiver.session.session import ReceiverSession
     from tests.simulation.world import World
-    from transmitter.node import TransmitterNode
+    from transmitter.endpoint import TransmitterNode
 
 ERROR_BOUND_RAD = 0.5
 """After the quiet phase; the plant may be 20 % off the model."""

@@ -16,7 +16,7 @@ from channel.codec.codec import Codec, Vector
 from channel.errors import FrameError
 from channel.line.clocks import SkewedClock
 from channel.line.impairments import ImpairedLine, Impairments
-from channel.line.uplink import Uplink
+from channel.line.line import Uplink
 from channel.protocol.frames import Frame, Symbol
 from channel.protocol.sabotage import Sabotage, SabotagedCodec
 from channel.protocol.wire import decode
@@ -30,9 +30,9 @@ from tests.channel.codec.parts import TICK_NS, TICK_S, identity_of, pitch_codec
 from tests.simulation.faults import FAULTY_S, QUIET_S, Plan
 from tests.simulation.flight import COUNTS_PER_TURN, REFERENCE
 from tests.simulation.watch import Watch
+from transmitter.endpoint import TransmitterNode
 from transmitter.guard import Guard, GuardSettings
 from transmitter.metrics.scores import Scores
-from transmitter.node import TransmitterNode
 from transmitter.rigs.base import Reading, Rig
 from transmitter.session.copies import Confirmed
 from transmitter.session.session import Phase, TransmitterSession

@@ -75,7 +75,7 @@ class CartModel:
 '''
 
 CODER = '''
-from channel.codec.words import ERASED, Alphabet
+from channel.codec.codec import ERASED, Alphabet
 
 
 class Steps:

@@ -14,9 +14,9 @@ from tenbaud import MemoryRecorder
 from tenbaud.sentences.events import event_text, guard_text
 from tests.channel.codec.parts import identity_of, pitch_codec, terms
 from tests.events import event_fields
+from transmitter.endpoint import TransmitterNode
 from transmitter.guard import Guard, GuardCause, GuardReason, GuardSettings, GuardState
 from transmitter.metrics.scores import Scores
-from transmitter.node import TransmitterNode
 from transmitter.rigs.base import Reading, Rig
 from transmitter.session.session import Phase, TransmitterSession
 

@@ -9,7 +9,7 @@ import pytest
 
 from channel.codec.codec import Vector
 from channel.codec.models.pitch import PITCH_SIGNALS
-from channel.line.uplink import Uplink
+from channel.line.line import Uplink
 from channel.protocol.endings import End, Ending
 from channel.protocol.events import EventKind
 from channel.protocol.limits import CommandLimits
@@ -23,11 +23,10 @@ from tests.channel.codec.parts import THREE_SIGNS, ConstantController, identity_
 from tests.channel.links.memory_pair import MemoryLink, memory_pair
 from tests.events import event_fields
 from tests.tenbaud.machine import Pacer
-from transmitter.endpoint import TransmitterEndpoint
+from transmitter.endpoint import TransmitterEndpoint, TransmitterNode
 from transmitter.guard import Guard, GuardSettings
 from transmitter.loops.real import RealFlight
 from transmitter.metrics.scores import Scores
-from transmitter.node import TransmitterNode
 from transmitter.rigs.simulated import SimulatedRig
 from transmitter.session.session import TransmitterSession
 

@@ -17,10 +17,9 @@ from channel.line.line import Delivery, Outbox
 from channel.line.virtual import is_envelope
 from channel.links.base import Link
 from channel.protocol.events import Event, EventKind, Presence
-from transmitter.endpoint import TransmitterEndpoint
+from transmitter.endpoint import TransmitterEndpoint, TransmitterNode
 from transmitter.guard import GuardCause, GuardReason
 from transmitter.loops.flight import Flight
-from transmitter.node import TransmitterNode
 from transmitter.session.rejoin import ASK_AGAIN_NS
 from transmitter.session.session import Phase
 

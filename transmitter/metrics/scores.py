@@ -12,8 +12,7 @@ import math
 from collections import deque
 from collections.abc import Callable
 
-from channel.codec.codec import Model, Vector
-from channel.codec.words import Word
+from channel.codec.codec import Model, Vector, Word
 
 References = Callable[[int], tuple[float | None, ...]]
 """Set-points of the outputs at a tick; None, or missing at the end, where there is none."""

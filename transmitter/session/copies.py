@@ -17,11 +17,11 @@ from collections import deque
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from channel.codec.codec import Codec, CodecState, Vector
+from channel.codec.codec import ERASED, Codec, CodecState, Vector, Word
 from channel.codec.lead import FlownSample, fly_sample
-from channel.codec.words import ERASED, Word
 from channel.errors import CodecDiverged
 from channel.protocol.frames import Echo
+from channel.protocol.limits import from_steps
 from channel.protocol.terms import Terms
 
 CANNOT_FLY = (CodecDiverged, ArithmeticError, LookupError, ValueError)
@@ -47,6 +47,15 @@ class Confirmed(NamedTuple):
     """samples that had been sent beyond this one when its echo came"""
     about: tuple[int, ...] | None = None
     """the output that each symbol was about, once `Copies.explained` has said so"""
+
+
+def commands_of(echo: Echo, terms: Terms) -> list[Vector]:
+    """Return the commands of an echo within bounds, one for each tick."""
+    inputs = len(terms.signals.inputs)
+    return [
+        from_steps(echo.steps[index * inputs : (index + 1) * inputs], terms.signals)
+        for index in range(terms.ticks_per_sample)
+    ]
 
 
 class Copies:

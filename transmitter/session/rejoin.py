@@ -8,7 +8,7 @@ the codec's state travels up the link; the answer brings the state to start from
 from __future__ import annotations
 
 from channel.codec.codec import Codec, CodecState, Vector
-from channel.protocol.frames import Echo, Hello, Welcome, Why
+from channel.protocol.frames import Hello, Welcome, Why
 from channel.protocol.identity import Identity
 from channel.protocol.limits import from_steps
 from channel.protocol.terms import Terms
@@ -85,12 +85,3 @@ def start_of(welcome: Welcome, codec: Codec, terms: Terms) -> tuple[CodecState, 
     if not welcome.state:
         return codec.initial()._replace(sample=welcome.first_sample), hold
     return codec.unpack(welcome.state), hold
-
-
-def commands_of(echo: Echo, terms: Terms) -> list[Vector]:
-    """Return the commands of an echo within bounds, one for each tick."""
-    inputs = len(terms.signals.inputs)
-    return [
-        from_steps(echo.steps[index * inputs : (index + 1) * inputs], terms.signals)
-        for index in range(terms.ticks_per_sample)
-    ]

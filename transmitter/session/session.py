@@ -13,8 +13,7 @@ from collections import Counter, deque
 from dataclasses import replace
 from enum import Enum
 
-from channel.codec.codec import Codec, Vector
-from channel.codec.words import ERASED
+from channel.codec.codec import ERASED, Codec, Vector
 from channel.protocol.bounds import Bounds, shown, within_text_bounds
 from channel.protocol.endings import End, Ending
 from channel.protocol.events import ASKED, Event, EventKind, ended_event, write_event
@@ -38,10 +37,10 @@ from channel.protocol.lockstep import History, difference_event, is_answer
 from channel.protocol.recording import NullRecorder, Recorder, write_epoch
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
-from transmitter.session.copies import CANNOT_FLY, Confirmed, Copies, EchoOrder
+from transmitter.session.copies import CANNOT_FLY, Confirmed, Copies, EchoOrder, commands_of
 from transmitter.session.owing import Owing
 from transmitter.session.records import write_failure, write_sample
-from transmitter.session.rejoin import Asking, commands_of, start_of
+from transmitter.session.rejoin import Asking, start_of
 from transmitter.session.state_observer import StateObserver, default_observer
 from transmitter.session.takeover import Takeover
 

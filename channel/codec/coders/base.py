@@ -13,8 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, MutableSequence, Sequence
 from typing import Any, NamedTuple, TypeAlias
 
-from channel.codec.codec import Model, Vector
-from channel.codec.words import ERASED, Alphabet, Word
+from channel.codec.codec import ERASED, Alphabet, Model, Vector, Word
 
 Numbers: TypeAlias = Sequence[float]
 Results: TypeAlias = MutableSequence[float]

@@ -28,7 +28,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from channel.codec.codec import Vector
+from channel.codec.codec import Alphabet, Vector
 from channel.codec.coders.base import (
     CoderFunctions,
     FunctionCoder,
@@ -45,7 +45,6 @@ from channel.codec.coders.symmetric import (
     write_full,
 )
 from channel.codec.models.linear import Rows, check, flat
-from channel.codec.words import Alphabet
 
 SQUARINGS = 4
 GROWTH_MAX = 1e12

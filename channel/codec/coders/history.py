@@ -35,7 +35,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from channel.codec.codec import Vector
+from channel.codec.codec import Alphabet, Vector
 from channel.codec.coders.base import (
     CoderFunctions,
     FunctionCoder,
@@ -45,7 +45,6 @@ from channel.codec.coders.base import (
     Symbols,
 )
 from channel.codec.numerics import exp
-from channel.codec.words import Alphabet
 
 Row = tuple[float, float, float]
 

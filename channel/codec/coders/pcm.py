@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from channel.codec.codec import STATE_MAX, Vector
+from channel.codec.codec import STATE_MAX, Alphabet, Vector
 from channel.codec.coders.base import (
     CoderFunctions,
     FunctionCoder,
@@ -27,7 +27,6 @@ from channel.codec.coders.base import (
     Symbols,
 )
 from channel.codec.coders.static import number_of, write_bits
-from channel.codec.words import Alphabet
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from channel.codec.codec import Vector
+from channel.codec.codec import Alphabet, Vector
 from channel.codec.coders.base import FunctionCoder, Numbers, Results, SymbolResults, Symbols
-from channel.codec.words import Alphabet
 
 Gains = tuple[tuple[float, ...], ...]
 

@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from channel.codec.codec import Vector
+from channel.codec.codec import Alphabet, Vector
 from channel.codec.coders.base import (
     CoderFunctions,
     FunctionCoder,
@@ -22,7 +22,6 @@ from channel.codec.coders.base import (
     Symbols,
 )
 from channel.codec.coders.signs import Gains, axes_of
-from channel.codec.words import Alphabet
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ from channel.links.base import LinkCounts
 from channel.links.security import KEY_ROOT
 from channel.links.zenoh.config import NodeOptions, close_session, is_session_name, open_node
 from channel.links.zenoh.gate import Gate
-from channel.links.zenoh.inbox import ChannelInbox
+from channel.links.zenoh.link import ChannelInbox
 
 CHANNEL_MESSAGES_MAX = 1024
 

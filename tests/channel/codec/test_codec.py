@@ -9,9 +9,8 @@ from typing import Any
 
 import pytest
 
-from channel.codec.codec import STATE_MAX, Codec, CodecState, Vector
+from channel.codec.codec import ERASED, STATE_MAX, Codec, CodecState, Vector, Word
 from channel.codec.coders.zoom import ZoomCoder
-from channel.codec.words import ERASED, Word
 from channel.errors import CodecDiverged
 from tests.channel.codec.chua import CHUA_TICK_S, CHUA_ZOOM, ChuaModel
 from tests.channel.codec.parts import IMPULSE, PAPER, THREE_SIGNS, pitch_codec

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from channel.codec.codec import Codec, Vector
+from channel.codec.codec import ERASED, Codec, Vector, Word
 from channel.codec.coders.zoom import ZoomCoder
 from channel.codec.lead import fly_sample
-from channel.codec.words import ERASED, Word
 from tests.channel.codec.parts import IMPULSE, PAPER, ConstantController, pitch_codec
 from tests.channel.codec.two_axes import TWO_AXES_ZOOM, TwoAxes
 

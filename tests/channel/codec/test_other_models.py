@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from channel.codec.codec import Codec, Vector
+from channel.codec.codec import ERASED, Codec, Vector
 from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
 from channel.codec.models.pitch import PitchModel, PitchParameters
-from channel.codec.words import ERASED
 from tests.channel.codec.chua import (
     CHUA_TICK_S,
     CHUA_TICKS_PER_SAMPLE,

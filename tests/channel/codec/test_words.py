@@ -6,7 +6,7 @@ from itertools import product
 
 import pytest
 
-from channel.codec.words import ERASED, WIRE_ERASED, Alphabet, Word
+from channel.codec.codec import ERASED, WIRE_ERASED, Alphabet, Word
 
 
 @pytest.mark.parametrize(

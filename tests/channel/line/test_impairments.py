@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from channel.codec.words import Alphabet
+from channel.codec.codec import Alphabet
 from channel.errors import FrameError
 from channel.line.impairments import FOR_EVER_NS, ImpairedLine, Impairments, parse_impairments
 from channel.line.line import CleanLine, Delivery

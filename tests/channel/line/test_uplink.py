@@ -6,10 +6,9 @@ import math
 
 import pytest
 
-from channel.codec.words import Alphabet
-from channel.line.line import CleanLine
+from channel.codec.codec import Alphabet
+from channel.line.line import CleanLine, SlotShaper, Uplink, UplinkMeter
 from channel.line.meters import BaudMeter
-from channel.line.uplink import SlotShaper, Uplink, UplinkMeter
 from channel.protocol import wire
 from channel.protocol.endings import Ending
 from channel.protocol.frames import Bye, Hello, Symbol

@@ -9,8 +9,7 @@ from typing import Any
 
 import pytest
 
-from channel.codec.codec import STATE_MAX, is_coder_state
-from channel.codec.words import WIRE_ERASED
+from channel.codec.codec import STATE_MAX, WIRE_ERASED, is_coder_state
 from channel.protocol import wire
 from channel.protocol.bounds import (
     COUNTER,

@@ -6,8 +6,8 @@ import math
 
 import pytest
 
+from channel.codec.codec import WIRE_ERASED
 from channel.codec.models.pitch import PITCH_SIGNALS
-from channel.codec.words import WIRE_ERASED
 from channel.protocol.endings import End, Ending
 from channel.protocol.events import EventKind
 from channel.protocol.frames import (

@@ -20,7 +20,7 @@ from tenbaud.flight.fly import fly
 from tests.tenbaud.processes import run as run_command
 
 OUTSIDE = '''
-from channel.codec.words import ERASED, Alphabet
+from channel.codec.codec import ERASED, Alphabet
 
 class Law:
     """A controller: proportional, with a bias that its options set."""

@@ -155,7 +155,7 @@ class Signs:
     impulse, uses_rates = True, False
 
     def __init__(self) -> None:
-        from channel.codec.words import Alphabet
+        from channel.codec.codec import Alphabet
 
         self.alphabet = Alphabet((-1, 1), 1)
 

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from channel.codec.models.linear import LinearModel
 from channel.codec.signals import signals_of
-from channel.line.uplink import bit_rate
+from channel.line.line import bit_rate
 from tenbaud.build.codec import build_codec, configured_rate
 from tenbaud.build.flight import agree
 from tenbaud.cli.commands import app

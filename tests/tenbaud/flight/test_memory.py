@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from channel.codec.words import ERASED
+from channel.codec.codec import ERASED
 from channel.line.line import CleanLine, Delivery
 from channel.protocol.wire import DATAGRAM
 from tenbaud import Codec, MemoryFlight, MemoryRecorder, Run, Terms, coders, fly, load_preset

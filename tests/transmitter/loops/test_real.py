@@ -14,7 +14,7 @@ import pytest
 from channel.codec.codec import Vector
 from channel.codec.models.pitch import PITCH_SIGNALS
 from channel.errors import ConfigMismatch, LinkLost
-from channel.line.uplink import Uplink
+from channel.line.line import Uplink
 from channel.line.virtual import Step, encode_step
 from channel.protocol.endings import End, Ending
 from channel.protocol.identity import Identity
@@ -29,11 +29,10 @@ from receiver.session.session import Phase as ReceiverPhase
 from receiver.session.session import ReceiverSession
 from tests.channel.codec.parts import THREE_SIGNS, identity_of, pitch_codec, terms
 from tests.channel.links.memory_pair import MemoryLink, memory_pair
-from transmitter.endpoint import TransmitterEndpoint
+from transmitter.endpoint import TransmitterEndpoint, TransmitterNode
 from transmitter.guard import Guard, GuardSettings
 from transmitter.loops.real import RealFlight
 from transmitter.metrics.scores import Scores
-from transmitter.node import TransmitterNode
 from transmitter.rigs.simulated import SimulatedRig
 from transmitter.session.session import Phase, TransmitterSession
 

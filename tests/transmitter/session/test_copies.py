@@ -6,8 +6,7 @@ import random
 
 import pytest
 
-from channel.codec.codec import CodecState, Vector
-from channel.codec.words import ERASED, Word
+from channel.codec.codec import ERASED, CodecState, Vector, Word
 from tests.channel.codec.parts import PAPER, pitch_codec, terms
 from transmitter.session.copies import Copies
 

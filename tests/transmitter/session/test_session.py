@@ -7,9 +7,8 @@ from typing import Any
 
 import pytest
 
-from channel.codec.codec import Codec, CodecState, Vector
+from channel.codec.codec import ERASED, WIRE_ERASED, Codec, CodecState, Vector, Word
 from channel.codec.coders.zoom import ZoomCoder
-from channel.codec.words import ERASED, WIRE_ERASED, Word
 from channel.protocol.endings import End, Ending
 from channel.protocol.events import EventKind
 from channel.protocol.frames import (

@@ -19,8 +19,8 @@ from channel.protocol.frames import (
     Why,
 )
 from tests.transmitter.test_node import ScriptedRig, fly_sample, node_with
+from transmitter.endpoint import TransmitterNode
 from transmitter.guard import Guard, GuardSettings, GuardState
-from transmitter.node import TransmitterNode
 from transmitter.session.session import Phase
 from transmitter.session.takeover import ALIVE_COMMANDS, SUCCESSOR_SAMPLES
 

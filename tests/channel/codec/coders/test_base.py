@@ -6,13 +6,12 @@ import random
 
 import pytest
 
-from channel.codec.codec import Coder
+from channel.codec.codec import ERASED, Coder
 from channel.codec.coders.base import FunctionCoder
 from channel.codec.coders.open_loop_zoom import OpenLoopZoomCoder, OpenLoopZoomParameters
 from channel.codec.coders.pcm import PcmCoder, PcmParameters
 from channel.codec.coders.static import StaticCoder, StaticParameters
 from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
-from channel.codec.words import ERASED
 
 CODERS = (
     ZoomCoder(ZoomParameters(window=4)),

@@ -8,10 +8,9 @@ from dataclasses import replace
 
 import pytest
 
-from channel.codec.codec import Vector
+from channel.codec.codec import ERASED, Vector
 from channel.codec.coders.direction import GROWTH_MAX, DirectionCoder, DirectionParameters, aim
 from channel.codec.coders.symmetric import place
-from channel.codec.words import ERASED
 from tests.golden.regenerate import AERO_DIRECTION, PITCH_DIRECTION
 
 ZERO = (0.0, 0.0)

@@ -8,13 +8,13 @@ from itertools import product
 
 import pytest
 
+from channel.codec.codec import ERASED
 from channel.codec.coders.history import (
     HistoryCoder,
     HistoryParameters,
     history_decode,
     history_encode,
 )
-from channel.codec.words import ERASED
 from tenbaud.studies.compiled import compiled
 
 ROWS = ((0.5, 0.3, 0.6), (0.7, 0.9, 1.1), (0.4, 1.1, 0.7), (1.2, 1.0, 1.5))

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from channel.codec.codec import ERASED, Word
 from channel.codec.coders.open_loop_zoom import OpenLoopZoomCoder, OpenLoopZoomParameters
 from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
-from channel.codec.words import ERASED, Word
 
 
 @pytest.mark.parametrize("words", [[(1,)] * 30, [(-1,), (1,)] * 15, [ERASED] * 30])

@@ -6,10 +6,9 @@ import math
 
 import pytest
 
-from channel.codec.codec import Codec
+from channel.codec.codec import ERASED, Codec
 from channel.codec.coders.pcm import PcmCoder, PcmParameters
 from channel.codec.models.hold import HoldModel
-from channel.codec.words import ERASED
 
 STEP = math.tau / 1024
 NOTHING = [(0.0, 0.0)]

@@ -6,8 +6,8 @@ import math
 
 import pytest
 
+from channel.codec.codec import ERASED
 from channel.codec.coders.static import StaticCoder, StaticParameters, number_of, write_bits
-from channel.codec.words import ERASED
 
 
 @pytest.mark.parametrize("bits", [1, 2, 3, 8, 15])

@@ -8,8 +8,8 @@ from collections.abc import Iterable
 
 import pytest
 
+from channel.codec.codec import ERASED, Word
 from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
-from channel.codec.words import ERASED, Word
 
 SEED = 20240612
 NUMBERS = {"initial_range": 0.5, "minimum_range": 0.05, "decay": 0.95}

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from channel.codec.codec import CodecState, Vector
+from channel.codec.codec import CodecState, Vector, Word
 from channel.codec.models.pitch import PitchModel, PitchParameters
-from channel.codec.words import Word
 from tests.channel.codec.parts import IMPULSE, PAPER, pitch_codec
 
 SAMPLE_S = 0.1

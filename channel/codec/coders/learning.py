@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from channel.codec.codec import Vector
+from channel.codec.codec import Alphabet, Vector
 from channel.codec.coders.base import CoderFunctions, FunctionCoder, Numbers
 from channel.codec.coders.direction import GROWTH_MAX, check_steps
 from channel.codec.coders.learning_steps import (
@@ -23,7 +23,6 @@ from channel.codec.coders.learning_steps import (
 )
 from channel.codec.coders.symmetric import check_symmetric, deviations, most_correlated, place
 from channel.codec.models.linear import Rows, check, flat
-from channel.codec.words import Alphabet
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from channel.codec.codec import CodecState
@@ -148,6 +149,25 @@ def test_when_a_flight_is_compiled_then_no_bit_differs(preset: str, changes: dic
         assert (figures.outcome, figures.erasures) == ("ok", figures.samples)
         return
     compare(point)
+
+
+def test_when_the_codec_learns_its_plant_then_no_bit_differs() -> None:
+    values = {
+        **BURSTS,
+        "duration_s": 8.0,
+        "transmitter": {"plant": {"mismatch": 0.1, "disturbance": "q=2e-3"}},
+    }
+    point = CompiledPoint(load_config("integrator-10baud", None, {**values, **learning()}))
+    compare(point)
+    assert np.abs(point._work.models[-1, 2:4]).max() > 0.01  # the errors of its terms
+
+
+@cache
+def learning() -> dict[str, Any]:
+    """Return a model that learns, and its coder."""
+    given = load_config("integrator-10baud").model_dump(mode="json", exclude_unset=True)
+    model = {**given["model"], "learns": True}
+    return completed({"model": model, "coder": {"kind": "learning"}})
 
 
 def test_when_the_smallest_range_follows_the_range_then_no_bit_differs() -> None:

@@ -138,7 +138,7 @@ class LearnedLinearModel(LearnedModel):
         found = []
         for row in range(plant.correction_size):
             entries = [*dynamics[row], *drive[row]]
-            if is_kinematic(entries):
+            if not any(drive[row]) and is_kinematic(dynamics[row]):
                 continue
             name = names.states[row].name
             found += [
@@ -171,5 +171,5 @@ class LearnedLinearModel(LearnedModel):
 
 
 def is_kinematic(entries: Sequence[float]) -> bool:
-    """Return whether a row of A and B says only that a state is the rate of another."""
+    """Return whether a row of A says only that a state is the rate of another."""
     return [value for value in entries if value] == [1.0]

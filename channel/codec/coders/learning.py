@@ -8,8 +8,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from channel.codec.codec import Alphabet, Vector
+from channel.codec.codec import Alphabet, Codec, CodecState, Vector
 from channel.codec.coders.base import CoderFunctions, FunctionCoder, Numbers
 from channel.codec.coders.direction import GROWTH_MAX, check_steps
 from channel.codec.coders.learning_steps import (
@@ -22,6 +23,7 @@ from channel.codec.coders.learning_steps import (
     take,
 )
 from channel.codec.coders.symmetric import check_symmetric, deviations, most_correlated, place
+from channel.codec.models.learned import LearnedModel
 from channel.codec.models.linear import Rows, check, flat
 
 
@@ -207,3 +209,22 @@ def check_parameters(parameters: LearningParameters, term_rows: Sequence[int]) -
     for state in range(size):
         if not any(rows[state][state] > 0.0 for rows in p.starts):
             raise ValueError(f"starts must be above 0 on a diagonal for every state, not {state + 1}")
+
+
+class Learned(NamedTuple):
+    """What both ends know of a term."""
+
+    error: float
+    """relative to the configured one; of a force, the force"""
+    deviation: float
+    """standard deviation that they assume of it"""
+
+
+def learned_of(codec: Codec, state: CodecState) -> dict[str, Learned]:
+    """Return what a codec has learned of its plant, by the terms' names; nothing if it does not."""
+    model, coder = codec.model, codec.coder
+    if not (isinstance(model, LearnedModel) and isinstance(coder, LearningCoder)):
+        return {}
+    errors = state.model[coder.learned_at : coder.correction_size]
+    pairs = zip(errors, coder.learned_deviations(state.coder), strict=True)
+    return {name: Learned(*pair) for name, pair in zip(model.terms, pairs, strict=True)}

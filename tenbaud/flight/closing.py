@@ -80,7 +80,8 @@ def _figures(summary: Summary, unicode: bool) -> Iterator[tuple[str, str]]:
         yield "Uplink", _uplink(summary)
     yield from _errors(summary, unicode)
     if learned := summary.get("learned"):
-        yield "Learned", ", ".join(learned_text(name, **one) for name, one in learned.items())
+        seen = [learned_text(name, **one) for name, one in learned.items() if is_seen(**one)]
+        yield "Model is off by", ", ".join(seen) or "nothing that was learned"
     yield "Link", _link(summary)
     if get("impairments"):
         yield "Impaired", f"{get('impairments')}"
@@ -89,6 +90,11 @@ def _figures(summary: Summary, unicode: bool) -> Iterator[tuple[str, str]]:
             "Loop lateness",
             f"{get('loop_late_ms_p50'):.2f} ms median, {get('loop_late_ms_p99'):.2f} ms p99",
         )
+
+
+def is_seen(error: float, deviation: float) -> bool:
+    """Return whether an error that was learned is more than twice its standard deviation."""
+    return abs(error) > 2.0 * deviation
 
 
 def learned_text(name: str, error: float, deviation: float) -> str:

@@ -23,10 +23,10 @@ help: ## list the targets
 demo: $(FLY) ## fly: both processes on this machine, the plant simulated
 	$(BIN)/tenbaud demo
 
-# Most tests wait for their processes half of the time: four at once keep two cores busy. What is said
+# Most tests wait for their processes half of the time: five at once keep two cores busy. What is said
 # about the times of a flight comes after them, two at once; what needs both cores sees to it itself.
 test: chromium $(DEVELOP) ## run the tests: most of them first, then those of times on the real clock
-	$(BIN)/python -m pytest -n 4 -m "not soak and not real_time"
+	$(BIN)/python -m pytest -n 5 -m "not soak and not real_time"
 	$(BIN)/python -m pytest -n 2 -m "not soak and real_time" $$(grep -rl --include='test_*.py' real_time tests)
 
 check: $(DEVELOP) ## lint, format, types, and the project's own rules

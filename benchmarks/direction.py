@@ -211,7 +211,7 @@ def main(names: list[str]) -> int:
             exact(plant, rate, unknown, UNKNOWN),
             behind_encoders(plant, rate, unknown),
         )
-        behind = floor_behind_encoders(plant.model(), plant.C, STEP, 1.0 / rate / TICKS, rate)
+        behind = floor_behind_encoders(plant, [STEP], 1.0 / rate / TICKS, rate)
         yardstick = math.sqrt(behind / floor(plant.model(), rate))
         texts = "  ".join(f"{one.mean:6.3f} +- {one.half_width:5.3f}" for one in columns)
         print(

@@ -5,16 +5,21 @@ e'' = -a_1 sin(e) - a_2 sin(e) cos(p) - c_e e' + b_e cos(p) f_s
 p'' = -a_p cos(e) sin(p) - c_p p' + b_p f_d
 
 f_s and f_d are sum and difference of the rotors' forces, each a function of its voltage that is weaker
-and smaller downward (`force_of`). Parameters and force are those of the benchmark of Brentari, Bosetti,
-Queinnec and Zaccarian (2018, hal-01711135), measured on a rig. The motors' lag is that of the paper's
-pitch axis. Beyond its mechanical range an axis meets a stiff, damped stop.
+and smaller downward (`force_of`). Parameters and force of the rig `laas` are those of the benchmark of
+Brentari, Bosetti, Queinnec and Zaccarian (2018, hal-01711135), those of `ctu` of a Quanser 3-DOF
+helicopter (obrusvit/quanser-3dof-heli); both were measured. The motors' lag is that of the paper's
+pitch axis. Beyond its mechanical range an axis meets a stiff, damped stop. Without thrust the arm is
+level at rest.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
+from plant_sim.disturbance import Sum
+from plant_sim.moving_mass import MovingMass
 from plant_sim.ode import HALF_PI, OdePlant, Sine, Vector, fractions, started
 from plant_sim.plant import PlantContext
 
@@ -22,9 +27,6 @@ HOVER_RAD = math.radians(10.0)
 PITCH_STOP_RAD = math.radians(32.0)
 ELEVATION_STOPS_RAD = (math.radians(-28.0), math.radians(30.0))
 STOP_STIFFNESS_PER_S2, STOP_DAMPING_PER_S = 400.0, 20.0
-UP, UP_FROM = 0.1111, 1.0
-"""force at the voltage from which it grows in proportion; below it grows with the square"""
-DOWN, DOWN_FROM = 0.012054, 0.5
 
 
 class HelicopterConstants(NamedTuple):
@@ -39,20 +41,40 @@ class HelicopterConstants(NamedTuple):
     pitch_weight: float = 0.858663
     pitch_damping: float = 0.048169
     pitch_thrust: float = 7.339993
+    up_per_v2: float = 0.1111
+    """force of a rotor at 1 V; it grows with the square up to a voltage, in proportion beyond"""
+    up_from_v: float = 1.0
+    down_per_v2: float = 4.0 * 0.012054
+    down_from_v: float = 0.5
+    travel_stop_rad: float = math.pi
+    """to either side of where travel began to be counted"""
 
 
-def force_of(volts: float) -> float:
-    """Return the scaled force of a rotor: 1 at 5 V, -0.23 at -5 V."""
+LAAS = HelicopterConstants()
+RIGS = {
+    "laas": LAAS,
+    "ctu": HelicopterConstants(
+        2.7e-7, 0.181, 0.898, 0.262, 0.042, 0.247, 0.030, 0.037, 2.326, 4.0 * 0.002541, 1e3,
+        4.0 * 0.000975, 1e3,
+    ),
+}  # fmt: skip
+
+
+def force_of(volts: float, constants: HelicopterConstants = LAAS) -> float:
+    """Return the scaled force of a rotor; on the rig `laas` 1 at 5 V, -0.23 at -5 V."""
     if volts >= 0.0:
-        return UP * volts * volts if volts < UP_FROM else UP * (2.0 * volts - 1.0)
-    size = -volts
-    force = 4.0 * DOWN * size * size if size < DOWN_FROM else DOWN * (4.0 * size - 1.0)
-    return -force
+        return _grown(volts, constants.up_per_v2, constants.up_from_v)
+    return -_grown(-volts, constants.down_per_v2, constants.down_from_v)
 
 
-def volts_of(force: float) -> float:
+def _grown(size: float, per_v2: float, from_v: float) -> float:
+    return per_v2 * size * size if size < from_v else per_v2 * from_v * (2.0 * size - from_v)
+
+
+def volts_of(force: float, constants: HelicopterConstants = LAAS) -> float:
     """Return the voltage at which a rotor has this force upward."""
-    return math.sqrt(force / UP) if force < UP else 0.5 * (force / UP + 1.0)
+    square, start = force / constants.up_per_v2, constants.up_from_v
+    return math.sqrt(square) if square < start * start else 0.5 * (square / start + start)
 
 
 def helicopter_slopes(
@@ -61,7 +83,7 @@ def helicopter_slopes(
     """Return the rates and accelerations of travel, elevation and pitch."""
     elevation, pitch = state[1], state[2]
     travel_rate, elevation_rate, pitch_rate = state[3], state[4], state[5]
-    front, rear = force_of(motors[0]), force_of(motors[1])
+    front, rear = force_of(motors[0], constants), force_of(motors[1], constants)
     lift = front + rear
     sin_e, cos_e = sine(elevation), sine(elevation + HALF_PI)
     sin_p, cos_p = sine(pitch), sine(pitch + HALF_PI)
@@ -71,7 +93,8 @@ def helicopter_slopes(
         pitch_rate,
         torques[0]
         - constants.travel_damping * travel_rate
-        - constants.travel_thrust * cos_e * sin_p * lift,
+        - constants.travel_thrust * cos_e * sin_p * lift
+        + _stop(state[0], travel_rate, -constants.travel_stop_rad, constants.travel_stop_rad),
         torques[1]
         - sin_e * (constants.elevation_weight + constants.elevation_tilt * cos_p)
         - constants.elevation_damping * elevation_rate
@@ -95,23 +118,41 @@ def _stop(angle: float, rate: float, low: float, high: float) -> float:
 class HelicopterPlant(OdePlant):
     """A `Plant` of two voltages, front and rear, and three angles.
 
-    It hovers at the start, at 10 degrees of elevation if not configured otherwise. The mismatch is of
-    damping, weight and thrust. Every axis is disturbed.
+    It hovers at the start, at 10 degrees of elevation if not configured otherwise; at 0 its rotors are
+    off. The mismatch is of damping, weight and thrust. Every axis is disturbed.
     """
 
-    def __init__(self, context: PlantContext, motor_lag_s: float = 0.08) -> None:
+    def __init__(
+        self,
+        context: PlantContext,
+        motor_lag_s: float = 0.08,
+        rig: str = "laas",
+        travel_stop_rad: float = math.pi,
+        mass_rad_per_s2_per_m: float = 4.0,
+        mass_moves: Sequence[Sequence[float]] = (),
+    ) -> None:
+        """`rig`: whose parameters it has, `laas` or `ctu`.
+
+        `mass_moves` are (time in s, position in m) of the mass that moves along the arm, from its home
+        outward; a metre of it pulls the elevation down by `mass_rad_per_s2_per_m`.
+        """
+        if rig not in RIGS:
+            raise ValueError(f"rig is {rig!r}; known are {', '.join(RIGS)}")
+        if not 0.0 < travel_stop_rad < math.inf:
+            raise ValueError(f"travel_stop_rad is {travel_stop_rad}; it must be finite and above 0")
         damping, weight, thrust = fractions(context)
         off = {"damping": damping, "weight": weight, "tilt": weight, "thrust": thrust}
-        nominal = HelicopterConstants()
+        nominal = RIGS[rig]._replace(travel_stop_rad=travel_stop_rad)
         constants = HelicopterConstants(
             **{
-                name: value * (1.0 + off[name.rpartition("_")[2]])
+                name: value * (1.0 + off.get(name.rpartition("_")[2], 0.0))
                 for name, value in nominal._asdict().items()
             }
         )
         outputs = started(context, (0.0, HOVER_RAD, 0.0))
         elevation = nominal.elevation_weight + nominal.elevation_tilt
-        hover = volts_of(0.5 * elevation * max(math.sin(outputs[1]), 0.0) / nominal.elevation_thrust)
+        force = 0.5 * elevation * max(math.sin(outputs[1]), 0.0) / nominal.elevation_thrust
+        hover = volts_of(force, nominal)
         super().__init__(
             context,
             helicopter_slopes,
@@ -122,3 +163,7 @@ class HelicopterPlant(OdePlant):
             motor_lag_s=motor_lag_s,
             resting=(hover, hover),
         )
+        if mass_moves:
+            mass = MovingMass(mass_moves, -mass_rad_per_s2_per_m, context.step_s)
+            travel, elevated, pitch = self._disturbances or (Sum(), Sum(), Sum())
+            self._disturbances = (travel, Sum(elevated, mass), pitch)

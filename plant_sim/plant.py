@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
 if TYPE_CHECKING:
-    from plant_sim.disturbance import Disturbance
+    from plant_sim.disturbance import Disturbance, PlannedDisturbance
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +38,7 @@ class PlantContext:
     disturbance_text: str = ""
     """configured disturbance, for a plant that is disturbed in several places"""
 
-    def disturbances(self, places: int) -> tuple[Disturbance, ...]:
+    def disturbances(self, places: int) -> tuple[PlannedDisturbance, ...]:
         """Return the disturbance of each place, none of them where none is configured.
 
         ValueError for a configured disturbance that has more places.
@@ -55,16 +54,6 @@ class PlantContext:
                 for place in range(places)
             ]
         )
-
-    @property
-    def initial_angle_rad(self) -> float:
-        """Return the first output's value at the start, as it was called before outputs had names."""
-        return self.initial[0] if self.initial else 0.0
-
-    @property
-    def volts_max(self) -> float:
-        """Return where the first input is clamped, as it was called before inputs had names."""
-        return self.command_max[0]
 
 
 class Plant(Protocol):
@@ -96,25 +85,3 @@ def held_command(command: Sequence[float], largest: Sequence[float]) -> tuple[fl
     if not all(map(math.isfinite, command)):
         raise ValueError(f"the command is {tuple(command)}; it must be finite")
     return tuple([min(max(one, -most), most) for one, most in zip(command, largest, strict=True)])
-
-
-def with_measured(plant: Any) -> Any:
-    """Return a plant that has `measured`; one that has `measured_rad` instead is wrapped."""
-    if hasattr(plant, "measured") or not hasattr(plant, "measured_rad"):
-        return plant
-    text = f"{type(plant).__name__}.measured_rad is deprecated; call it measured"
-    warnings.warn(text, FutureWarning, stacklevel=3)
-    return _OfAngles(plant)
-
-
-class _OfAngles:
-    """A plant under the name that its outputs had when all were angles."""
-
-    def __init__(self, plant: Any) -> None:
-        self._plant = plant
-        self.advance = plant.advance
-
-    @property
-    def measured(self) -> tuple[float, ...]:
-        outputs: tuple[float, ...] = self._plant.measured_rad
-        return outputs

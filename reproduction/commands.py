@@ -9,7 +9,7 @@ import typer
 
 from tenbaud.studies.progress import progress_bar
 
-DRAWINGS = ("theory", "animation")
+DRAWINGS = ("theory", "animation", "axes", "cliff")
 DATA_VARIABLE = "TENBAUD_FLIGHT_DATA"
 
 Out = Annotated[
@@ -21,7 +21,8 @@ def figures(
     which: Annotated[
         list[str] | None,
         typer.Argument(
-            help="3, 4, 5, 6, 7, 8 or all; several may be given. For the pages: theory, animation."
+            help="3, 4, 5, 6, 7, 8 or all; several may be given. For the pages: theory, animation, "
+            "axes, cliff."
         ),
     ] = None,
     docs: Annotated[
@@ -40,15 +41,21 @@ def figures(
             show_default=False,
         ),
     ] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="cliff: few and short flights, to see that it works.")
+    ] = False,
     out: Out = None,
 ) -> None:
     """Fly and draw the paper's Figs. 3 to 8; with all of them, write the page that compares.
+
+    cliff: flights near the smallest rate of a pendulum and a rotary pendulum. What it has flown into a
+    folder is not flown there again.
 
     [dim]tenbaud figures 7[/dim]
 
     [dim]tenbaud figures all --docs docs --data FOLDER[/dim]
 
-    [dim]tenbaud figures theory animation --docs docs[/dim]
+    [dim]tenbaud figures theory animation cliff --docs docs[/dim]
     """
     from reproduction.paper.make import NUMBERS
     from tenbaud.files.whole import make_folder
@@ -63,6 +70,8 @@ def figures(
     make_folder(pictures)
     if drawings:
         _draw_documentation(drawings, pictures)
+    if "cliff" in drawings:
+        _draw_cliff(docs or folder, pictures, quick)
     if wanted:
         _draw_paper(wanted, folder, pictures, found)
 
@@ -130,9 +139,31 @@ def _draw_documentation(drawings: list[str], pictures: Path) -> None:
     if "theory" in drawings:
         for path in draw_theory(pictures, lambda name: typer.echo(f"drawing {name}", err=True)):
             typer.echo(str(path))
+    if "axes" in drawings:
+        from reproduction.axes.page import FULL, make_page
+
+        with progress_bar("flights") as update:
+            page = make_page(pictures.parent, FULL, lambda share, part: update(share, 1.0, part))
+        typer.echo(f"the tables are in {page}")
     if "animation" in drawings:
         path = pictures / "tenbaud.gif"
         typer.echo(f"{path}, {draw_animation(path) / 1e6:.2f} MB")
+
+
+def _draw_cliff(docs: Path, pictures: Path, quick: bool) -> None:
+    """Fly near the smallest rates; draw it, and write the tables."""
+    from reproduction.cliff import FULL, QUICK, claims, fly_all
+    from reproduction.cliff_page import draw, write_page
+    from tenbaud.files.whole import make_folder
+
+    swept, claimed = (QUICK, []) if quick else (FULL, claims())
+    with progress_bar("flights") as update:
+        found = fly_all([*claimed, *swept], pictures / "cliff.json", update)
+    draw([pictures / "cliff.png", pictures / "cliff.svg"], {one: found[one] for one in swept})
+    make_folder(docs / "theory")
+    page = docs / "theory" / "cliff.md"
+    write_page(page, {one: found[one] for one in swept}, {one: found[one] for one in claimed})
+    typer.echo(f"the tables are in {page}, the points in {pictures / 'cliff.json'}")
 
 
 def _wanted(names: list[str], known: tuple[str, ...]) -> set[str]:

@@ -54,25 +54,25 @@ class Angle:
     timing: dict[str, float] = field(default_factory=dict)
 
 
-def _uiuc(name: str, counts_per_turn: int, **section: Any) -> Angle:
+def _uiuc(name: str, counts_per_turn: int, inputs: dict[str, str], **section: Any) -> Angle:
     # The file counts its rows; they are 0.02 s apart.
-    log = {"outputs": {"pitch": f"{name}_counts"}, "units": {"angles": "counts"}, "period_s": 0.02}
-    log |= section
+    columns = {"pitch": f"{name}_counts", **inputs}
+    log = {"columns": columns, "units": {"angles": "counts"}, "period_s": 0.02, **section}
     return Angle("uiuc_closed_loop.csv", name, log, counts_per_turn)
 
 
 def _ntnu(file: str, name: str, unit: str) -> Angle:
-    log = {"outputs": {"pitch": f"{name}_{unit}"}, "inputs": NO_INPUT}
+    log = {"columns": {"pitch": f"{name}_{unit}", **NO_INPUT}}
     # Recorded at 500 Hz; a fifth of it shows these motions as well.
     return Angle(file, name, log, timing={"tick_s": 0.01})
 
 
 MOTORS = {"front": "right_volts", "rear": "left_volts"}
 ANGLES = (
-    _uiuc("pitch", 4096, inputs=MOTORS),
+    _uiuc("pitch", 4096, MOTORS),
     # Both motors lift: their sum is the difference from a reversed one.
-    _uiuc("elevation", 4096, inputs=MOTORS, signs={"rear": -1}),
-    _uiuc("travel", 8192, inputs=NO_INPUT),
+    _uiuc("elevation", 4096, MOTORS, signs={"rear": -1}),
+    _uiuc("travel", 8192, NO_INPUT),
     _ntnu("ntnu_travel_step.csv", "travel", "deg"),
     _ntnu("ntnu_travel_step.csv", "pitch", "deg"),
     _ntnu("ntnu_elevation_obstacle.csv", "travel", "rad"),

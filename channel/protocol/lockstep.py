@@ -13,7 +13,7 @@ from typing import NamedTuple
 from channel.codec.codec import Codec, CodecState, Word
 from channel.protocol.events import Event, EventKind
 from channel.protocol.frames import Desync
-from channel.protocol.recording import Field, RecordChannel
+from channel.protocol.recording import Field, RecordChannel, Recorder
 
 HISTORY_SAMPLES = 64
 HISTORY_NS = 250_000_000
@@ -89,6 +89,26 @@ class History:
             [kept.state.sample - 1 for kept in inputs],
             [word_number(kept.word) for kept in inputs],
         )
+
+
+def write_failure(
+    recorder: Recorder,
+    sample_ns: int,
+    history: History,
+    report: Desync,
+    peer: bytes,
+    *,
+    received: bool = False,
+) -> None:
+    """Write a lockstep failure down as this end sees it; `received`: the other end reports it.
+
+    `peer` is the other end's packed state, or empty: the transmitter writes a failure when it is found,
+    and once more with the receiver's state.
+    """
+    own, other = report.transmitter_digest, report.receiver_digest
+    digests = (other, own) if received else (own, other)
+    row = history.failure_row(report.epoch, report.sample, *digests, peer)
+    recorder.write(LOCKSTEP_CHANNEL, report.sample * sample_ns, row)
 
 
 def difference_event(report: Desync) -> Event:

@@ -12,14 +12,18 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
 
+from docs.tools.meanings import meaning_of
 from tenbaud.config.kinds import PartName
 from tenbaud.config.schema import KINDS, SHARED_SECTIONS, FlightConfig
 from tenbaud.config.section import NamedSections, Section
 
 UNITS = (
-    ("command_slew_per_s", ""),
+    ("command_slew_per_s", "of the input, per s"),
     ("_rad_per_v_s2", "rad/(V s²)"),
+    ("_rad_per_s2", "rad/s²"),
+    ("_rad_s", "rad/s"),
     ("_volts_per_s", "V/s"),
     ("_rad_per_s", "rad/s"),
     ("_per_s2", "1/s²"),
@@ -81,7 +85,7 @@ def _section(name: str, model: type[BaseModel], kind: str = "") -> Iterator[str]
             continue
         if field == "kind" and kind:
             continue
-        rows.append(_row(field, info, meanings.get(field, "")))
+        rows.append(_row(field, info, meanings.get(field) or meaning_of(name, kind, field)))
     if issubclass(model, NamedSections):
         named = get_type_hints(model)["__pydantic_extra__"]
         inner.append((f"{name}.NAME", get_args(named)[1]))
@@ -113,6 +117,8 @@ def _row(field: str, info: FieldInfo, meaning: str) -> str:
 def _default(value: object) -> str:
     if value is None:
         return "none"
+    if value is PydanticUndefined:
+        return "required"
     if isinstance(value, dict):
         return "`{}`" if not value else f"`{value}`"
     if isinstance(value, tuple):

@@ -14,11 +14,13 @@ sys.path.insert(0, str(TOP))
 
 from docs.tools.commands_page import commands_page  # noqa: E402
 from docs.tools.configuration_page import configuration_page  # noqa: E402
+from docs.tools.summary_page import summary_page  # noqa: E402
 from docs.tools.wire_page import wire_page  # noqa: E402
 
 PAGES: dict[str, Callable[[], str]] = {
     "docs/reference/commands.md": commands_page,
     "docs/reference/configuration.md": configuration_page,
+    "docs/reference/summary.md": summary_page,
     "docs/reference/wire-format.md": wire_page,
 }
 

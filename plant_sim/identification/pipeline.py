@@ -78,6 +78,8 @@ class Identification:
     warnings: tuple[str, ...]
     refused: tuple[str, ...]
     """why the data support no model; empty when they do"""
+    densities: tuple[float, ...] = ()
+    """of each equation's white disturbance; empty: what the regression leaves unexplained"""
     parameters: tuple[Parameter, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -145,7 +147,7 @@ def identify(record: Record, structure: Structure, options: Options | None = Non
         (),
     )
     refused = tuple(_unsupported(result, record))
-    return replace(result, warnings=(*warnings, *_doubts(result)), refused=refused)
+    return replace(result, warnings=(*warnings, *doubts(result)), refused=refused)
 
 
 def _bandwidth(record: Record, structure: Structure, options: Options, notes: list[str]) -> float:
@@ -265,7 +267,7 @@ def disagreements(regression: Regression, check: SimulationFit) -> dict[str, str
     return found
 
 
-def _doubts(found: Identification) -> Iterable[str]:
+def doubts(found: Identification) -> Iterable[str]:
     """Yield what is strange about the parameters themselves."""
     structure = found.structure
     if isinstance(structure, PitchStructure) and found.values.get("k_v", 0.0) < 0.0:
@@ -301,9 +303,6 @@ def _unsupported(found: Identification, record: Record) -> Iterable[str]:
             f"{regression.condition:.1e}, at least {CONDITION_MIN:g} is needed; root mean square of "
             f"the regressor of each: {levels})"
         )
-    deviations = np.sqrt(np.maximum(np.diag(found.covariance), 0.0)).tolist()
-    spread = dict(zip(found.values, deviations, strict=True))
-    gains = gains_of(structure, structure.acting(record.inputs[:1]).shape[1])
     check = found.check
     if check is None:
         yield "no second method confirms the estimates: the simulation-error fit failed"
@@ -313,6 +312,21 @@ def _unsupported(found: Identification, record: Record) -> Iterable[str]:
             f"{EXPLAINED_MIN:.0%} is needed: something that the file does not hold moves the plant "
             "more than its inputs do"
         )
+    yield from uncertain(found, structure.acting(record.inputs[:1]).shape[1])
+    if isinstance(structure, PitchStructure) and found.values.get("a_w", 0.0) < 0.0:
+        yield (
+            f"a_w = {found.values['a_w']:.4g} is negative: the data show a body that gains energy by "
+            "itself; is the sign of the angle or of the voltages turned, or does the command act later "
+            "than it is logged?"
+        )
+
+
+def uncertain(found: Identification, inputs: int) -> Iterable[str]:
+    """Yield the parameters that are not known well enough for a model, where that matters."""
+    structure, regression, check = found.structure, found.regression, found.check
+    deviations = np.sqrt(np.maximum(np.diag(found.covariance), 0.0)).tolist()
+    spread = dict(zip(found.values, deviations, strict=True))
+    gains = gains_of(structure, inputs)
     differing = {} if check is None else disagreements(regression, check)
     for equation, one in zip(structure.equations, regression.estimates, strict=True):
         own = gains.intersection(term.name for term in equation.terms)
@@ -328,12 +342,6 @@ def _unsupported(found: Identification, record: Record) -> Iterable[str]:
                 yield f"{term.name}: the record is too short to say how sure the estimate is"
             elif deviation > UNCERTAINTY_MAX * abs(value) and not small:
                 yield f"{term.name} = {value:.4g} is uncertain: its standard error is {deviation:.2g}"
-    if isinstance(structure, PitchStructure) and found.values.get("a_w", 0.0) < 0.0:
-        yield (
-            f"a_w = {found.values['a_w']:.4g} is negative: the data show a body that gains energy by "
-            "itself; is the sign of the angle or of the voltages turned, or does the command act later "
-            "than it is logged?"
-        )
 
 
 def advice(record: Record, structure: Structure) -> str:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import expm
@@ -124,7 +125,7 @@ def _from_best_states(
     starts = np.concatenate([states, *(states + nudge * row for row in np.eye(size))])
     run = _pitch if isinstance(structure, PitchStructure) else _linear
     with np.errstate(all="ignore"):
-        found = run(structure, values, lag_s, segments, acting, starts)  # type: ignore[arg-type]
+        found = run(structure, values, _Given(lag_s, segments, acting, starts))  # type: ignore[arg-type]
     wild = WILD * segments.scale
     found = np.clip(np.nan_to_num(found, nan=0.0), -wild, wild).reshape(samples, size + 1, count, -1)
     errors = found[:, 0] - segments.outputs
@@ -136,6 +137,15 @@ def _from_best_states(
     ridge = 1e-12 * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(size)
     moved = np.linalg.solve(normal + ridge + 1e-300 * np.eye(size), pulled[:, :, None])[:, :, 0]
     return np.asarray(errors - np.einsum("tisp,si->tsp", slopes, moved)), moved
+
+
+class _Given(NamedTuple):
+    """What a simulation of all segments begins with."""
+
+    lag_s: float
+    segments: Segments
+    acting: Array
+    starts: Array
 
 
 def _acting(segments: Segments, lag_s: float) -> Array:
@@ -155,14 +165,8 @@ def _start(segments: Segments) -> Array:
     return np.asarray((basis @ segments.outputs[:steps, :, 0])[:2].T)
 
 
-def _linear(
-    structure: LinearStructure,
-    values: Mapping[str, float],
-    lag_s: float,
-    segments: Segments,
-    acting: Array,
-    starts: Array,
-) -> Array:
+def _linear(structure: LinearStructure, values: Mapping[str, float], given: _Given) -> Array:
+    lag_s, segments, acting, starts = given
     model = structure.state_space(values)
     size, count = model.B.shape
     # States, lagging inputs, inputs, the constant.
@@ -189,15 +193,9 @@ def _linear(
     return found
 
 
-def _pitch(
-    structure: PitchStructure,
-    values: Mapping[str, float],
-    lag_s: float,
-    segments: Segments,
-    acting: Array,
-    starts: Array,
-) -> Array:
+def _pitch(structure: PitchStructure, values: Mapping[str, float], given: _Given) -> Array:
     """Return the simulated angles: (11) by classical Runge-Kutta."""
+    lag_s, segments, acting, starts = given
     damping, stiffness, gain, equilibrium = structure.constants(values)
     h = segments.step_s
     half = math.exp(-0.5 * h / lag_s) if lag_s > 0.0 else 0.0

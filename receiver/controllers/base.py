@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -32,11 +31,6 @@ class ControllerContext:
     def reference(self) -> Any:
         return self.references[0] or Constant(0.0, self.tick_s)
 
-    @property
-    def volts_max(self) -> float:
-        """Return where the first input is clamped, as it was called before inputs had names."""
-        return self.command_max[0]
-
 
 class Controller(Protocol):
     """A law that turns the estimated state into a command, once per control tick.
@@ -59,29 +53,3 @@ class Controller(Protocol):
         Outputs behind the last one given follow nothing either.
         """
         ...
-
-
-class _OfOneReference:
-    """A controller that knows the set-point of its first output only, by the name that it had."""
-
-    def __init__(self, controller: Any) -> None:
-        self._controller = controller
-
-    def command(self, tick: int, state: tuple[float, ...]) -> tuple[float, ...]:
-        command: tuple[float, ...] = self._controller.command(tick, state)
-        return command
-
-    def references(self, tick: int) -> tuple[float | None, ...]:
-        return (self._controller.reference_rad(tick),)
-
-
-def with_references(controller: Any) -> Any:
-    """Return a controller that has `references`; one that has `reference_rad` instead is wrapped."""
-    if hasattr(controller, "references") or not hasattr(controller, "reference_rad"):
-        return controller
-    text = (
-        f"{type(controller).__name__}.reference_rad(tick) is deprecated; define references(tick), "
-        "which returns a tuple with the set-point of each output"
-    )
-    warnings.warn(text, FutureWarning, stacklevel=3)
-    return _OfOneReference(controller)

@@ -63,6 +63,12 @@ class PidConstants(NamedTuple):
     """how much of the loop's sum each input gets"""
     conditional: bool
     """whether the integral rests while more of it would change no input"""
+    steers: int = -1
+    """number of the later loop whose set-point the sum moves; -1: it goes to the inputs"""
+    share: float = 0.0
+    """of the sum, in that set-point"""
+    most: float = 0.0
+    """of that set-point, either way"""
 
 
 def pid_sum(constants: PidConstants, integral: float, error: float, rate: float) -> float:
@@ -89,12 +95,14 @@ def is_stuck(value: float, push: float, largest: float) -> bool:
 def pid_command(
     loops: Sequence[PidConstants],
     integrals: MutableSequence[float],
-    errors: Sequence[float],
+    errors: MutableSequence[float],
     rates: Sequence[float],
     limits: Sequence[float],
     wanted: MutableSequence[float],
 ) -> bool:
     """Add all loops to `wanted`, step their integrals, and clamp; False where a sum is not finite.
+
+    A loop that steers another one adds to that one's error instead.
 
     Sessions run it as it stands, and studies compile it.
     """
@@ -103,12 +111,15 @@ def pid_command(
         total = pid_sum(constants, integrals[place], errors[place], rates[place])
         if not isfinite(total):
             return False
+        if constants.steers >= 0:
+            errors[constants.steers] += clamped(constants.share * total, constants.most)
+            continue
         for index in range(len(constants.mixing)):
             wanted[index] += constants.mixing[index] * total
     for place in range(len(loops)):
         constants = loops[place]
         error = errors[place]
-        stuck = True
+        stuck = constants.steers < 0
         for index in range(len(constants.mixing)):
             if not is_stuck(wanted[index], constants.mixing[index] * error, limits[index]):
                 stuck = False
@@ -132,7 +143,8 @@ class Loop:
     """One output that is steered."""
 
     constants: PidConstants
-    reference: Reference
+    reference: Reference | None
+    """None: 0, to which a loop that steers this one adds"""
     output: int
     """its place among the outputs"""
     value: Reading
@@ -163,7 +175,8 @@ class PidLoops:
     def references(self, tick: int) -> tuple[float | None, ...]:
         found: list[float | None] = [None] * self._outputs
         for loop in self.loops:
-            found[loop.output] = loop.reference.value(tick)
+            if loop.reference is not None:
+                found[loop.output] = loop.reference.value(tick)
         return tuple(found)
 
     def command(self, tick: int, state: Vector) -> Vector:
@@ -176,7 +189,10 @@ class PidLoops:
         if self._last_tick is not None and tick <= self._last_tick:
             raise ValueError(f"tick is {tick}; it must be above the last one, {self._last_tick}")
         wanted = list(self.bias)
-        errors = [loop.reference.value(tick) - loop.value(state) for loop in self.loops]
+        errors = [
+            (0.0 if loop.reference is None else loop.reference.value(tick)) - loop.value(state)
+            for loop in self.loops
+        ]
         rates = [loop.rate(state) for loop in self.loops]
         if not pid_command(self._constants, self.integrals, errors, rates, self.command_max, wanted):
             raise ValueError(f"state at tick {tick} is {state}; it must be finite")

@@ -24,16 +24,8 @@ class Reference(Protocol):
         ...
 
 
-class AngleReference:
-    """What every set-point here offers beside its value: the name that the value had."""
-
-    def angle_rad(self: Reference, tick: int) -> float:
-        """Return the set-point at `tick`; deprecated: `value` is the same."""
-        return self.value(tick)
-
-
 @dataclass(frozen=True, slots=True)
-class Constant(AngleReference):
+class Constant:
     """One value for ever."""
 
     level: float
@@ -48,7 +40,7 @@ class Constant(AngleReference):
 
 
 @dataclass(frozen=True, slots=True)
-class Shifted(AngleReference):
+class Shifted:
     """A set-point about another level than 0."""
 
     about: Reference
@@ -62,7 +54,7 @@ class Shifted(AngleReference):
 
 
 @dataclass(frozen=True, slots=True)
-class Step(AngleReference):
+class Step:
     """0 until `start_s` (at least 0), `amplitude` from there on."""
 
     amplitude: float
@@ -80,18 +72,26 @@ class Step(AngleReference):
 
 
 @dataclass(frozen=True, slots=True)
-class Square(AngleReference):
-    """A square wave between +`amplitude`, where it starts, and -`amplitude`.
-
-    `period_s` is at least two ticks. The defaults of the paper are pi/2 and 25 s.
-    """
+class _Wave:
+    """What repeats every `period_s`, which is at least two ticks."""
 
     amplitude: float
     period_s: float
     tick_s: float
 
     def __post_init__(self) -> None:
-        _require_wave(self.amplitude, self.period_s, self.tick_s)
+        _require_finite("amplitude", self.amplitude)
+        _require_positive("tick_s", self.tick_s)
+        least_s = 2.0 * self.tick_s
+        if not (math.isfinite(self.period_s) and self.period_s >= least_s):
+            raise ValueError(f"period_s is {self.period_s}; it must be finite and at least {least_s}")
+
+
+class Square(_Wave):
+    """A square wave between +`amplitude`, where it starts, and -`amplitude`.
+
+    The defaults of the paper are pi/2 and 25 s.
+    """
 
     def value(self, tick: int) -> float:
         half_periods = tick * self.tick_s / (0.5 * self.period_s)
@@ -100,37 +100,32 @@ class Square(AngleReference):
         return -self.amplitude if odd else self.amplitude
 
 
-@dataclass(frozen=True, slots=True)
-class Sine(AngleReference):
-    """A sine of `amplitude` that starts at 0 and rises; `period_s` is at least two ticks."""
-
-    amplitude: float
-    period_s: float
-    tick_s: float
-
-    def __post_init__(self) -> None:
-        _require_wave(self.amplitude, self.period_s, self.tick_s)
+class Sine(_Wave):
+    """A sine of `amplitude` that starts at 0 and rises."""
 
     def value(self, tick: int) -> float:
         return self.amplitude * math.sin(math.tau * tick * self.tick_s / self.period_s)
 
 
-class Listed(AngleReference):
+class Listed:
     """Values at times of their own, which rise and are at least 0; each holds until the next.
 
-    Before the first time its value holds, after the last one the last.
+    Before the first time its value holds, after the last one the last. ValueError for other times.
     """
 
     def __init__(self, times_s: Sequence[float], values: Sequence[float], tick_s: float) -> None:
         _require_positive("tick_s", tick_s)
+        for before, time_s in zip((-1.0, *times_s), times_s, strict=False):
+            if not before < time_s or time_s < 0.0:
+                raise ValueError(f"a time is {time_s} s; times are at least 0 and rise")
         self._first_ticks = [_first_tick(time_s, tick_s) for time_s in times_s]
-        self._values = list(values)
+        self.values = list(values)
 
     def value(self, tick: int) -> float:
-        return self._values[max(bisect_right(self._first_ticks, tick) - 1, 0)]
+        return self.values[max(bisect_right(self._first_ticks, tick) - 1, 0)]
 
 
-class SteeredReference(AngleReference):
+class SteeredReference:
     """A set-point that is the configured one until a person takes it over in flight.
 
     To be steered between two samples only: every tick of a sample then sees the same hand.
@@ -161,10 +156,3 @@ def _require_finite(name: str, value: float) -> None:
 def _require_positive(name: str, value: float) -> None:
     if not (math.isfinite(value) and value > 0.0):
         raise ValueError(f"{name} is {value}; it must be finite and above 0")
-
-
-def _require_wave(amplitude: float, period_s: float, tick_s: float) -> None:
-    _require_finite("amplitude", amplitude)
-    _require_positive("tick_s", tick_s)
-    if not (math.isfinite(period_s) and period_s >= 2.0 * tick_s):
-        raise ValueError(f"period_s is {period_s}; it must be finite and at least {2.0 * tick_s}")

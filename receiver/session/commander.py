@@ -19,7 +19,7 @@ from channel.protocol.limits import are_plausible, from_steps, to_steps
 from channel.protocol.lockstep import History
 from channel.protocol.recording import Recorder
 from channel.protocol.terms import Terms
-from receiver.controllers.base import Controller, with_references
+from receiver.controllers.base import Controller
 from receiver.session.records import write_commands, write_sample
 from receiver.session.rejoin import carried_to
 
@@ -64,7 +64,7 @@ class Commander:
         self.history = History(codec, 2 * terms.history_samples)
         self.hold = terms.initial_command
         """last command decided"""
-        self._controller: Controller = with_references(controller)
+        self._controller = controller
         self._no_references: tuple[float | None, ...] = (None,) * len(terms.signals.outputs)
         self._recorder = recorder
         self._counts = counts

@@ -6,8 +6,7 @@ from collections.abc import Callable
 
 from channel.codec.codec import CodecState, Vector, Word
 from channel.codec.lead import FlownSample
-from channel.protocol.frames import Desync, Symbol
-from channel.protocol.lockstep import LOCKSTEP_CHANNEL, History
+from channel.protocol.frames import Symbol
 from channel.protocol.recording import ARRIVED_CHANNEL, Field, RecordChannel, Recorder
 from channel.protocol.terms import Terms
 
@@ -62,14 +61,6 @@ def write_commands(
         row = (tick, references(tick), predicted, command)
         recorder.write(TICK_CHANNEL, tick * terms.tick_ns, row)
         tick += 1
-
-
-def write_failure(recorder: Recorder, terms: Terms, history: History, theirs: Desync) -> None:
-    """Write a lockstep failure down, as the transmitter reported it and as this end saw it."""
-    row = history.failure_row(
-        theirs.epoch, theirs.sample, theirs.receiver_digest, theirs.transmitter_digest, theirs.state
-    )
-    recorder.write(LOCKSTEP_CHANNEL, theirs.sample * terms.sample_ns, row)
 
 
 def write_symbol(recorder: Recorder, terms: Terms, symbol: Symbol, now_ns: int, *, taken: bool) -> None:

@@ -35,13 +35,13 @@ from channel.protocol.frames import (
 )
 from channel.protocol.identity import Identity
 from channel.protocol.limits import to_steps
-from channel.protocol.lockstep import History, difference_event
+from channel.protocol.lockstep import History, difference_event, write_failure
 from channel.protocol.recording import NullRecorder, Recorder, write_epoch
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
 from receiver.controllers.base import Controller
 from receiver.session.commander import Commander
-from receiver.session.records import write_failure, write_symbol
+from receiver.session.records import write_symbol
 from receiver.session.rejoin import Greeter, Takeover, Verdict, desync_answer, difference, first_sample
 from receiver.session.schedule import Proven, Schedule, SlotClock, Timing
 
@@ -361,7 +361,8 @@ class ReceiverSession:
             self.desync = theirs
             self.counts["desyncs"] += 1
             self._emit(difference_event(theirs))
-            write_failure(self._recorder, self.terms, self.history, theirs)
+            period_ns = self.terms.sample_ns
+            write_failure(self._recorder, period_ns, self.history, theirs, theirs.state, received=True)
         return [answer]
 
     def _is_current(self, session: int) -> bool:

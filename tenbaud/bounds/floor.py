@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
-from scipy.linalg import solve_continuous_are
+from scipy.linalg import solve_continuous_are, solve_discrete_lyapunov
 from scipy.optimize import brentq
 
 from tenbaud.bounds.closed import LN2
@@ -239,25 +239,13 @@ class _Words:
 
     def start(self, rate_nats: float) -> Matrix:
         """Return a covariance strictly within: the limit of a filter that sees every state."""
-        ahead = self.noise
-        for _ in range(2):
-            ahead = self.transition @ ahead @ self.transition.T + self.noise
-
-        def settled(share: float) -> Matrix:
-            # P = share (F P F' + Q) is a fixed point for a share that contracts; its rate is
-            # -n/2 log share, all of the states' directions alike.
-            covariance = ahead
-            for _ in range(2000):
-                following = share * (self.transition @ covariance @ self.transition.T + self.noise)
-                if np.allclose(following, covariance, rtol=1e-12, atol=0.0):
-                    break
-                covariance = np.asarray(following)
-            return covariance
-
         share = math.exp(-2.0 * 0.9 * rate_nats / self.model.states)
         radius = float(np.abs(np.linalg.eigvals(self.transition)).max())
         if share * radius**2 < 1.0 - 1e-6:
-            return settled(share)
+            # P = share (F P F' + Q) is a fixed point for a share that contracts; its rate is
+            # -n/2 log share, all of the states' directions alike.
+            contracting = math.sqrt(share) * self.transition
+            return np.asarray(solve_discrete_lyapunov(contracting, share * self.noise))
         return self._riccati_start(rate_nats)
 
     def _riccati_start(self, rate_nats: float) -> Matrix:
@@ -268,9 +256,9 @@ class _Words:
             covariance = self.noise
             for _ in range(5000):
                 ahead = self.transition @ covariance @ self.transition.T + self.noise
-                seen = np.linalg.inv(ahead) + gain / size * np.eye(len(ahead))
-                following = np.asarray(np.linalg.inv(seen), dtype=np.float64)
-                if np.allclose(following, covariance, rtol=1e-12, atol=0.0):
+                unseen = np.eye(len(ahead)) + gain / size * ahead
+                following = np.asarray(np.linalg.solve(unseen, ahead), dtype=np.float64)
+                if (np.abs(following - covariance) <= 1e-12 * np.abs(covariance)).all():
                     break
                 covariance = following
             return 0.5 * (covariance + covariance.T)

@@ -108,18 +108,19 @@ def _powers(a: Matrix, columns: Matrix) -> Matrix:
 
 
 def unreached(
-    dynamics: ArrayLike, columns: ArrayLike, least: float = 0.0
+    dynamics: ArrayLike, columns: ArrayLike, least: float = 0.0, growth: float = -math.inf
 ) -> tuple[complex, int] | None:
     """Return a motion of `dynamics` that `columns` do not reach: its eigenvalue, and its largest state.
 
-    None where they reach every motion whose eigenvalue is `least` or larger (Popov, Belevitch and
-    Hautus). Of the transposed matrices: a motion that the outputs do not show.
+    None where they reach every motion whose eigenvalue is `least` or larger, and its real part above
+    `growth` (Popov, Belevitch and Hautus). Of the transposed matrices: a motion that the outputs do not
+    show.
     """
     a, b = (np.atleast_2d(np.asarray(one, dtype=float)) for one in (dynamics, columns))
     scale = max(1.0, float(np.abs(a).max()))
     b = b * (scale / (np.abs(b).max() or 1.0))
     for value in np.linalg.eigvals(a):
-        if abs(value) < least:
+        if abs(value) < least or not value.real > growth:
             continue
         left, sizes, _ = np.linalg.svd(np.hstack([a - value * np.eye(len(a)), b]))
         if sizes[-1] < RANK_TOLERANCE * scale:

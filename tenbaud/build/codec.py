@@ -7,7 +7,7 @@ from channel.codec.coders.pcm import PcmCoder
 from channel.codec.models.hold import HoldModel
 from channel.line.line import bit_rate
 from tenbaud.build.parts import Parts, check_codec
-from tenbaud.build.plugins import build_plugin
+from tenbaud.build.plugins import build_part
 from tenbaud.config.kinds import CODERS, MODELS, kind_of, model_kind
 from tenbaud.config.schema import FlightConfig
 from tenbaud.config.section import OutsideSection
@@ -60,7 +60,7 @@ def build_model(config: FlightConfig, parts: Parts | None = None) -> Model:
     context = ModelContext(config.timing.tick_s, config.timing.symbol_period_s)
     model: Model
     if isinstance(section, OutsideSection):
-        model = build_plugin(config, MODELS, section.kind, context, section.options, Model)
+        model = build_part(config, MODELS, section.kind, context, section.options, Model)
     else:
         model = kind_of(MODELS, section.kind).build(section, context)
         if len(model.initial()) != model.state_size:
@@ -76,7 +76,7 @@ def _build_coder(config: FlightConfig, model: Model) -> Coder:
     context = CoderContext(config.timing.tick_s, config.timing.symbol_period_s, model)
     coder: Coder
     if isinstance(section, OutsideSection):
-        coder = build_plugin(config, CODERS, section.kind, context, section.options, Coder)
+        coder = build_part(config, CODERS, section.kind, context, section.options, Coder)
     else:
         coder = kind_of(CODERS, section.kind).build(section, context)
     return coder

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from operator import itemgetter
 
 from channel.codec.codec import Model
@@ -16,9 +17,10 @@ from tenbaud.build.flight_log import read_flight_log
 from tenbaud.build.plugins import build_part
 from tenbaud.build.references import References, build_references
 from tenbaud.build.signals import build_limits, initial_command
+from tenbaud.config.controllers import PidLoopSection
 from tenbaud.config.kinds import CONTROLLERS
 from tenbaud.config.load import ConfigError
-from tenbaud.config.schema import FlightConfig, PidLoopSection
+from tenbaud.config.schema import FlightConfig
 
 
 def build_controller(
@@ -60,10 +62,25 @@ def pid(config: FlightConfig, context: ControllerContext) -> PidLoops:
     """Return the PID law: one loop, or those of the list."""
     section, signals = config.receiver.pid, context.signals
     listed = [(f"receiver.pid.loops.{place}", one) for place, one in enumerate(section.loops)]
+    conditional = section.anti_windup == "conditional"
     loops = [
-        _loop(field, one, context, section.anti_windup == "conditional")
-        for field, one in listed or [("receiver.pid", section)]
+        _loop(field, one, context, conditional, section.loops[place + 1 :])
+        for place, (field, one) in enumerate(listed or [("receiver.pid", section)])
     ]
+    for place, one in enumerate(section.loops):
+        if one.steers:
+            # The loop that is steered has the set-point that this one gives it, and no other.
+            other = next(
+                number
+                for number, loop in enumerate(loops[place + 1 :], place + 1)
+                if signals.outputs[loop.output].name == one.steers
+            )
+            outer, inner = loops[place], loops[other]
+            constants = outer.constants._replace(
+                steers=other, share=-1.0 if one.reversed else 1.0, most=one.set_point_max
+            )
+            loops[place] = replace(outer, constants=constants)
+            loops[other] = replace(inner, reference=context.references[inner.output])
     places = [loop.output for loop in loops]
     for place in places:
         if places.count(place) > 1:
@@ -74,16 +91,24 @@ def pid(config: FlightConfig, context: ControllerContext) -> PidLoops:
     return PidLoops(loops, context.command_max, (bias,) * len(signals.inputs))
 
 
-def _loop(field: str, section: PidLoopSection, context: ControllerContext, conditional: bool) -> Loop:
+def _loop(
+    field: str,
+    section: PidLoopSection,
+    context: ControllerContext,
+    conditional: bool,
+    later: Sequence[PidLoopSection],
+) -> Loop:
     signals = context.signals
     try:
         place = signals.index("outputs", section.output) if section.output else 0
         output = signals.outputs[place]
-        mixing = _mixing(section, signals)
+        mixing = _mixing(section, signals, [one.output for one in later])
         factors = (section.proportional, section.integral, section.derivative)
         gains = PidGains(*factors, section.unit)
         output_unit = output.unit or "rad"
-        over = signals.inputs[next(place for place, share in enumerate(mixing) if share)].unit
+        steered = [one for one in signals.outputs if one.name == section.steers]
+        steered += [one for one, share in zip(signals.inputs, mixing, strict=True) if share]
+        over = steered[0].unit
         if not section.unit:
             gains = PidGains(*factors, f"{over}/{output_unit}")
         elif over and section.unit.rpartition("/")[0] != over:
@@ -100,8 +125,18 @@ def _loop(field: str, section: PidLoopSection, context: ControllerContext, condi
     return Loop(constants, reference, place, value, rate)
 
 
-def _mixing(section: PidLoopSection, signals: Signals) -> Vector:
-    """Return the share of each input; without names one input has it all, and two share the push."""
+def _mixing(section: PidLoopSection, signals: Signals, later: Sequence[str]) -> Vector:
+    """Return the share of each input; without names one input has it all, and two share the push.
+
+    `later`: outputs of the loops that this one may steer in place of inputs.
+    """
+    if section.steers:
+        if section.inputs or section.steers not in later:
+            raise ValueError(
+                f"steers = {section.steers!r} takes the place of inputs, and names the output of a "
+                f"loop further down the list: {', '.join(later) or 'there is none'}"
+            )
+        return (0.0,) * len(signals.inputs)
     if not section.inputs:
         if len(signals.inputs) > 2:
             raise ValueError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from typing import Literal
 
 from plant_sim.encoder import Encoder
@@ -13,6 +14,8 @@ from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
 from transmitter.rigs.axes import Axis
 from transmitter.rigs.emulator.device import (
+    CHANNELS,
+    OFF,
     PITCH_CHANNEL,
     Body,
     EmulatedDevice,
@@ -31,6 +34,7 @@ from transmitter.rigs.emulator.speech import (
 )
 from transmitter.rigs.quarc import scale_of
 
+MOTORS = len(OFF)
 EmulatedFormat = Literal["ascii", "cobs", "quarc", "qsb"]
 STEP_S = 0.001
 DEFAULT_RATES = {"ascii": 300.0, "cobs": 480.0, "quarc": 500.0, "qsb": 500.0}
@@ -50,49 +54,58 @@ def build_emulator(
 ) -> RigEmulator:
     """Return an emulator that is not yet on its line; ConfigError for settings that cannot be."""
     signals = configured_signals(config)
-    if len(signals.outputs) != 1 or len(signals.inputs) != 2:
+    if len(signals.outputs) > CHANNELS or len(signals.inputs) != MOTORS:
         raise ConfigError(
-            "the rig emulator has the pitch axis and its two motors only, and model.kind = "
-            f"{config.model.kind!r} is another plant"
+            f"the rig emulator has up to {CHANNELS} encoders and {MOTORS} motors, and model.kind = "
+            f"{config.model.kind!r} has {len(signals.outputs)} output(s) and {len(signals.inputs)} "
+            "input(s)"
         )
     if form not in DEFAULT_RATES:
         raise ConfigError(f"format {form!r}: one of {', '.join(DEFAULT_RATES)}")
     rate = DEFAULT_RATES[form] if samples_per_s is None else samples_per_s
     if not 1.0 <= rate <= 5000.0:
         raise ConfigError(f"{rate:g} samples/s: from 1 to 5000")
-    axis = _axis(config, form)
+    axes = _axes(config, form)
     try:
-        device = EmulatedDevice(
-            _body(config, axis), time.monotonic_ns(), watchdog_s, Faults(faults, config.seed)
-        )
+        faulty = PITCH_CHANNEL if PITCH_CHANNEL in axes else next(iter(axes))
+        broken = Faults(faults, config.seed)
+        now_ns = time.monotonic_ns()
+        device = EmulatedDevice(_body(config, axes), now_ns, watchdog_s, broken, faulty)
         line = parse_line(port, config.transmitter.serial.line_baud)
-        speech = _speech(config, form, line_form, polled, axis)
+        speech = _speech(config, form, line_form, polled, axes)
     except ValueError as error:
         raise ConfigError(str(error)) from error
     return RigEmulator(device, speech, line, rate)
 
 
-def _axis(config: FlightConfig, form: EmulatedFormat) -> Axis:
-    """Return the encoder of the one output, whatever it is called."""
-    (name,) = wired_outputs(configured_signals(config))
-    axis = next(one for one in build_axes(config) if one.name == name)
-    if form != "qsb" and axis.channel != PITCH_CHANNEL:
-        raise ConfigError(
-            f"the rig emulator turns the encoder at channel {PITCH_CHANNEL}, and that of the output "
-            f"{name} is at {axis.channel}: set transmitter.bridge.{name}.channel = {PITCH_CHANNEL}"
-        )
-    return axis
+def _axes(config: FlightConfig, form: EmulatedFormat) -> dict[int, Axis]:
+    """Return the axis at each channel, in the order of the model's outputs."""
+    wired = {one.name: one for one in build_axes(config)}
+    axes = [wired[name] for name in wired_outputs(configured_signals(config))]
+    if form == "qsb":
+        # One encoder per adapter; what it reads is the device's pitch.
+        return {PITCH_CHANNEL: axes[0]}
+    for axis in axes:
+        if axis.channel >= CHANNELS:
+            raise ConfigError(
+                f"the rig emulator has the encoders 0 to {CHANNELS - 1}, and that of the output "
+                f"{axis.name} is at {axis.channel}: set transmitter.bridge.{axis.name}.channel"
+            )
+    return {axis.channel: axis for axis in axes}
 
 
-def _body(config: FlightConfig, axis: Axis) -> Body:
-    encoder = Encoder(axis.counts_per_turn, axis.sign, axis.zero_counts or 0, axis.turn)
+def _body(config: FlightConfig, axes: Mapping[int, Axis]) -> Body:
+    encoders = {
+        channel: Encoder(axis.counts_per_turn, axis.sign, axis.zero_counts or 0, axis.turn)
+        for channel, axis in axes.items()
+    }
     if config.transmitter.rig == "replay":
-        return RecordedBody(read_flight_log(config), round(config.timing.tick_s * 1e9), encoder)
-    return SimulatedBody(build_plant(config, STEP_S), round(STEP_S * 1e9), encoder)
+        return RecordedBody(read_flight_log(config), round(config.timing.tick_s * 1e9), encoders)
+    return SimulatedBody(build_plant(config, STEP_S), round(STEP_S * 1e9), encoders)
 
 
 def _speech(
-    config: FlightConfig, form: EmulatedFormat, line_form: str, polled: bool, axis: Axis
+    config: FlightConfig, form: EmulatedFormat, line_form: str, polled: bool, axes: Mapping[int, Axis]
 ) -> Speech:
     match form:
         case "cobs":
@@ -106,5 +119,5 @@ def _speech(
         quarc_fields(config),
         quarc_commands(config),
         section.byte_order,
-        scale_of(section.unit, int(axis.counts_per_turn)),
+        {at: scale_of(section.unit, int(axis.counts_per_turn)) for at, axis in axes.items()},
     )

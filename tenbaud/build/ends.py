@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 
 from channel.codec.codec import Codec
+from channel.codec.coders.direction import DirectionCoder
 from channel.codec.models.learned import plant_model
 from channel.codec.models.linear import LinearModel
 from channel.line.clocks import SkewedClock
@@ -29,7 +30,7 @@ from tenbaud.build.parts import Parts
 from tenbaud.build.references import References, build_references, values_of
 from tenbaud.build.rig import build_rig
 from tenbaud.build.signals import configured_signals, safe_command, soft_limits
-from tenbaud.config.kinds import CONTROLLERS
+from tenbaud.config.kinds import CONTROLLERS, model_kind
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
 from transmitter.endpoint import TransmitterNode
@@ -90,7 +91,14 @@ def build_observer(agreement: Agreement) -> StateObserver | None:
         return None
     config, tick_s = agreement.config, agreement.terms.tick_ns / 1e9
     try:
-        if isinstance(plant_model(codec.model), LinearModel) or len(agreement.signals.outputs) > 1:
+        kind = model_kind(config.model)
+        # A coder that was designed for a plant stands near its limit: it needs the best view of it.
+        is_designed = isinstance(codec.coder, DirectionCoder) and kind is not None and kind.linear
+        if (
+            is_designed
+            or isinstance(plant_model(codec.model), LinearModel)
+            or len(agreement.signals.outputs) > 1
+        ):
             from tenbaud.design.observer import configured_observer
 
             steps = output_steps(config, agreement.signals)
@@ -160,11 +168,27 @@ def check_parts(config: FlightConfig, parts: Parts | None = None) -> None:
     `parts` are objects in place of what is configured; they are checked already.
     """
     parts = parts or Parts()
+    if config.transmitter.rig == "serial":
+        from channel.links.serial.port import check_port
+
+        check_port(config.transmitter.serial.port, insecure=True)
     build_rig(config, parts.plant, configured_signals(config, parts))
     if parts.controller is None:
         controller = build_controller(config, model=parts.model)
         if config.receiver.controller not in CONTROLLERS.built_in:
             _check_command(config, controller, parts)
+
+
+def check_sabotage(agreement: Agreement) -> None:
+    """Raise ConfigError for a sabotage at a sample that the flight does not have."""
+    config = agreement.config
+    samples = agreement.flight_ticks // agreement.terms.ticks_per_sample
+    for role, text in (
+        ("transmitter", config.transmitter.sabotage),
+        ("receiver", config.receiver.sabotage),
+    ):
+        if text and parse_sabotage(text).sample >= samples:
+            raise ConfigError(f"{role}.sabotage = {text!r}: the flight has only {samples} samples")
 
 
 def _check_command(config: FlightConfig, controller: Controller, parts: Parts) -> None:

@@ -44,7 +44,7 @@ def _recording_of(config: FlightConfig, signals: Signals | None) -> _Recording:
     signals = signals or configured_signals(config)
     section, encoders = config.flight_log, build_encoders(config, signals)
     changed = tuple(map(_changed, (section.file, f"{section.file}.toml", *section.join)))
-    text = section.model_dump_json(exclude_unset=True, exclude={"digest"})
+    text = section.as_text(exclude_unset=True, exclude={"digest"})
     return _recording(text, signals, encoders, changed)
 
 
@@ -60,7 +60,7 @@ def _changed(name: str) -> tuple[tuple[str, int, int], ...]:
 def _recording(
     section: str, signals: Signals, encoders: tuple[OutputReader, ...], changed: tuple[Any, ...]
 ) -> _Recording:
-    return _Recording(FlightLogSection.model_validate_json(section), signals, encoders)
+    return _Recording(FlightLogSection.of_text(section), signals, encoders)
 
 
 class _Recording:

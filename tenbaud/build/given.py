@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from channel.codec.signals import Signal
+from tenbaud.config.controllers import ReferenceSection
 from tenbaud.config.load import ConfigError
-from tenbaud.config.schema import ReferenceSection
 from tenbaud.files.whole import write_whole
 
 Set: TypeAlias = "float | ArrayLike | tuple[ArrayLike, ArrayLike] | Callable[[float], Any]"

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 from channel.codec.codec import ERASED, Codec, Coder, Model
 from channel.codec.signals import signals_of
-from plant_sim.plant import Plant, with_measured
-from receiver.controllers.base import Controller, with_references
+from plant_sim.plant import Plant
+from receiver.controllers.base import Controller
 from tenbaud.config.load import ConfigError
 
 OPTIONAL = ("uses_rates",)
@@ -35,11 +35,6 @@ class Parts:
     coder: Coder | None = None
     plant: Plant | None = None
     controller: Controller | None = None
-
-    def __post_init__(self) -> None:
-        """Let a controller or plant with the names of before be one with those of today."""
-        object.__setattr__(self, "controller", with_references(self.controller))
-        object.__setattr__(self, "plant", with_measured(self.plant))
 
     def check(self) -> None:
         """Raise PartError for an object that lacks what its part must have."""

@@ -12,22 +12,17 @@ import difflib
 import inspect
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from importlib import import_module
 from typing import Any
 
 from channel.registry import Registry, RegistryError
-from plant_sim.plant import Plant, with_measured
-from receiver.controllers.base import Controller, with_references
 from tenbaud.build.parts import PartError, check_part
 from tenbaud.config.outside_code import is_object, require_allowed
 from tenbaud.config.schema import FlightConfig
 
-UNDER_OLD_NAMES: dict[type, Callable[[Any], Any]] = {Controller: with_references, Plant: with_measured}
-"""Parts whose members were called otherwise once, and what wraps those."""
 
-
-def build_plugin(
+def build_part(
     config: FlightConfig,
     registry: Registry,
     name: str,
@@ -35,11 +30,14 @@ def build_plugin(
     options: Mapping[str, Any],
     protocol: type,
 ) -> Any:
-    """Return the object that a class from outside builds; PartError if it is not what is needed.
+    """Return what the function or class of this name builds; PartError if it is not what is needed.
 
-    `name` is `module:Class` or what an installed package offers. CodeNotAllowed if nobody allowed the
-    configuration's code to run.
+    `name` is built in, `module:Class` or what an installed package offers. CodeNotAllowed if nobody
+    allowed the configuration's code to run.
     """
+    ours = name in registry.built_in
+    if ours and not inspect.isclass(part := registry.load(name)):
+        return part(config, context)
     require_allowed(config)
     field = registry.field
     if is_object(name):
@@ -48,7 +46,6 @@ def build_plugin(
             "run that program again, or name its class as module:Class"
         )
     found = _load_class(field, name) if ":" in name else _offered(registry, name)
-    ours = name in registry.built_in
     return build_class(f"{field} = {name!r}", found, context, options, protocol, ours=ours)
 
 
@@ -75,8 +72,6 @@ def build_class(
             f"{type(error).__name__}: {error}. It is called with one context object "
             f"({type(context).__name__}: {', '.join(_names(context))}) and its options."
         ) from error
-    if protocol in UNDER_OLD_NAMES:
-        part = UNDER_OLD_NAMES[protocol](part)
     check_part(where, part, protocol)
     return part
 
@@ -111,20 +106,6 @@ def _load_class(field: str, name: str) -> Any:
         hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(classes) or 'no class'}."
         raise PartError(f"{field} = {name!r}: {module_name} has no class {class_name!r}; {hint}")
     return found
-
-
-def build_part(
-    config: FlightConfig,
-    registry: Registry,
-    name: str,
-    context: object,
-    options: Mapping[str, Any],
-    protocol: type,
-) -> Any:
-    """Return a plant or controller: built in as a function of the configuration, or as a class."""
-    if name in registry.built_in and not inspect.isclass(part := registry.load(name)):
-        return part(config, context)
-    return build_plugin(config, registry, name, context, options, protocol)
 
 
 def _offered(registry: Registry, name: str) -> Any:

@@ -10,8 +10,9 @@ import numpy as np
 from channel.codec.signals import Signal, Signals
 from receiver.controllers.references import Constant, Listed, Reference, Shifted, Sine, Square, Step
 from tenbaud.build.signals import check_outputs
+from tenbaud.config.controllers import ReferenceSection
 from tenbaud.config.load import ConfigError
-from tenbaud.config.schema import FlightConfig, ReferenceSection
+from tenbaud.config.schema import FlightConfig
 
 References = tuple[Reference | None, ...]
 PERIODIC = ("square", "sine")
@@ -35,12 +36,32 @@ def reference_sections(
 def build_references(config: FlightConfig, signals: Signals) -> References:
     """Return the set-point of each output over the ticks; None for one that follows nothing."""
     tick_s = config.timing.tick_s
-    return tuple(
-        [
-            None if section is None else reference_of(section, tick_s, output)
-            for output, section in reference_sections(config, signals)
-        ]
-    )
+    found: list[Reference | None] = []
+    stops: dict[str, tuple[float, float]] = getattr(config.model, "stops", {})
+    for output, section in reference_sections(config, signals):
+        found.append(None if section is None else reference_of(section, tick_s, output))
+        if section is not None and output.name in stops:
+            _require_within(stops[output.name], section, found[-1], output)
+    return tuple(found)
+
+
+def _require_within(
+    stops: tuple[float, float], section: ReferenceSection, reference: Reference | None, output: Signal
+) -> None:
+    """Raise ConfigError for a set-point that goes beyond a stop of its output."""
+    about = reference.about if isinstance(reference, Shifted) else reference
+    if isinstance(about, Listed):
+        reached = about.values
+    else:
+        other = {"step": 0.0, "constant": section.amplitude}.get(section.kind, -section.amplitude)
+        reached = [section.amplitude, other]
+    for value in (min(reached) + section.offset, max(reached) + section.offset):
+        if not stops[0] <= value <= stops[1]:
+            raise ConfigError(
+                f"receiver.reference: the set-point of {output.name} reaches {value:.4g} "
+                f"{output.unit}, beyond the plant's stops at {stops[0]:.4g} and {stops[1]:.4g}; make "
+                "its amplitude or offset smaller"
+            )
 
 
 def values_of(references: References) -> Callable[[int], tuple[float | None, ...]]:
@@ -73,6 +94,14 @@ def _about_zero(section: ReferenceSection, tick_s: float, output: Signal) -> Ref
             return Step(section.amplitude, section.start_s, tick_s)
         case "constant":
             return Constant(section.amplitude, tick_s)
+        case "points":
+            if not section.points:
+                raise ConfigError(f"receiver.reference: the points of {output.name} are missing")
+            try:
+                times_s, values = zip(*section.points, strict=True)
+                return Listed(times_s, values, tick_s)
+            except ValueError as error:
+                raise ConfigError(f"receiver.reference: points of {output.name}: {error}") from error
         case "csv":
             if not section.file:
                 raise ConfigError("receiver.reference.file names no file for the csv reference")

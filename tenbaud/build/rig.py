@@ -13,7 +13,6 @@ from tenbaud.build.flight import REAL_RIGS
 from tenbaud.build.flight_log import read_flight_log
 from tenbaud.build.plugins import build_part
 from tenbaud.build.signals import (
-    TURNS,
     build_encoders,
     build_limits,
     configured_signals,
@@ -24,6 +23,7 @@ from tenbaud.config.load import ConfigError
 from tenbaud.config.models import PitchModelSection
 from tenbaud.config.rig_schema import AxisSection
 from tenbaud.config.schema import FlightConfig
+from tenbaud.log.units import turn_in
 from transmitter.rigs.axes import Axis, Motors
 from transmitter.rigs.base import Rig
 from transmitter.rigs.device import DeviceRig, DeviceSettings, Wiring
@@ -135,7 +135,7 @@ def pitch_plant(config: FlightConfig, context: PlantContext) -> PitchPlant:
         nominal_plant(config, context.command_max[0]).mismatched(config.transmitter.plant.mismatch),
         context.step_s,
         disturbance,
-        initial_angle_rad=context.initial_angle_rad,
+        initial_angle_rad=context.initial[0] if context.initial else 0.0,
         sine=context.sine,
     )
 
@@ -182,8 +182,9 @@ def build_axes(config: FlightConfig, signals: Signals | None = None) -> tuple[Ax
     missing = ", ".join(sorted(outputs.keys() - set(names)))
     if missing or len(set(names)) != len(names):
         raise ConfigError(
-            f"transmitter.bridge.axes = {list(names)}: {missing or 'the outputs of the model'} must be "
-            "among them, and none twice"
+            f"transmitter.bridge.axes = {list(names)}: {len(names)} encoder(s), and the model has "
+            f"{len(outputs)} output(s): {missing or ', '.join(outputs)} must be among them, and none "
+            "twice"
         )
     return tuple(_axis(name, sections[name], outputs.get(name, "rad")) for name in names)
 
@@ -191,7 +192,7 @@ def build_axes(config: FlightConfig, signals: Signals | None = None) -> tuple[Ax
 def _axis(name: str, section: AxisSection, unit: str) -> Axis:
     zero = None if section.zero_counts == "first" else section.zero_counts
     counts, turn = (
-        (section.counts_per_turn, TURNS.get(unit))
+        (section.counts_per_turn, turn_in(unit))
         if section.counts_per_unit is None
         else (section.counts_per_unit, 1.0)
     )

@@ -14,9 +14,8 @@ from tenbaud.build.codec import build_model
 from tenbaud.build.parts import Parts
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import EncoderSection, FlightConfig
+from tenbaud.log.units import turn_in
 
-TURNS = {"": math.tau, "rad": math.tau, "deg": 360.0, "°": 360.0}
-"""Unit of an angle to the length of a turn; an output without a unit is taken for an angle."""
 COUNTS_PER_TURN = 4096
 
 
@@ -99,7 +98,7 @@ def encoder_steps(config: FlightConfig, signals: Signals) -> list[float]:
 
 
 def _check_units(field: str, section: EncoderSection, output: Signal) -> None:
-    if section.counts_per_turn is not None and output.unit not in TURNS:
+    if section.counts_per_turn is not None and turn_in(output.unit) is None:
         raise ConfigError(
             f"{field}.counts_per_turn = {section.counts_per_turn}: the output {output.name} is in "
             f"{output.unit}, which has no turns; give counts_per_unit"
@@ -109,7 +108,7 @@ def _check_units(field: str, section: EncoderSection, output: Signal) -> None:
 
 
 def _encoder(section: EncoderSection, output: Signal) -> OutputReader:
-    turn = TURNS.get(output.unit)
+    turn = turn_in(output.unit)
     counts: float = section.counts_per_turn or COUNTS_PER_TURN
     if section.counts_per_unit is not None:
         turn, counts = 1.0, section.counts_per_unit

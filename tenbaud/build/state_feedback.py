@@ -19,8 +19,9 @@ from channel.codec.signals import Signal, Signals, signals_of
 from receiver.controllers.base import ControllerContext
 from receiver.controllers.state_feedback import FeedbackLaw, Rows, StateFeedback
 from tenbaud.bounds.linear import unreached
+from tenbaud.config.controllers import StateFeedbackSection
 from tenbaud.config.load import ConfigError
-from tenbaud.config.schema import FlightConfig, StateFeedbackSection
+from tenbaud.config.schema import FlightConfig
 
 Matrix = npt.NDArray[np.float64]
 FIELD = "receiver.state_feedback"
@@ -58,12 +59,16 @@ def state_feedback(config: FlightConfig, context: ControllerContext) -> StateFee
 
 
 class Linear:
-    """A model about its initial state and a command: x' = A x + B u, y = C x, and `drift` in a tick."""
+    """A model about an operating point: x' = A x + B u, y = C x, and `drift` in a tick.
+
+    The point is the model's own, or else its initial state and a command.
+    """
 
     def __init__(self, model: Model, command: Sequence[float]) -> None:
-        self.state = np.array(model.initial())
+        initial, command = getattr(model, "operating", None) or (model.initial(), command)
+        self.state = np.array(initial)
         self.command = np.array(command)
-        self.outputs = np.array(model.measured(model.initial()))
+        self.outputs = np.array(model.measured(initial))
         nothing = (0.0,) * model.correction_size
 
         def tick(values: Matrix) -> Matrix:

@@ -17,12 +17,16 @@ def main() -> None:
     # Until the imports below are done, some tenths of a second, Ctrl-C ends this process as any other.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     from tenbaud.cli.streams import leave, lost_output, prepare_streams
+    from tenbaud.cli.units import plain_arguments
+    from tenbaud.cli.waiting import begin
     from tenbaud.flight.lifeline import follow_parent
 
     prepare_streams()
+    waiting = begin(sys.argv[1:])
     warnings.formatwarning = lambda message, *_: f"tenbaud: {message}\n"  # no place in the code
     follow_parent()
-    code = run(sys.argv[1:])
+    code = run(plain_arguments(sys.argv[1:]))
+    waiting.end()
     error = lost_output()
     if error is not None:
         from tenbaud.flight.outcome import ExitCode

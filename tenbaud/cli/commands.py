@@ -12,7 +12,6 @@ from tenbaud.cli.checkout import add_commands
 
 app = typer.Typer(
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
     help="""Fly a helicopter over a ten-baud wire.

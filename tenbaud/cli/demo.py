@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from tenbaud.flight.viewing import ViewOptions
     from tenbaud.recording.folder import RunFolder
 
-DEFAULT_MISMATCHES = (0.0, 0.1)
+DEFAULT_PRESET = "tuned-10baud"
+DEFAULT_MISMATCH = 0.1
+"""No model is exact."""
 VIEW_DURATION_S = 3600.0
 """A flight that is looked at lasts until somebody stops it, or this long."""
 
@@ -42,7 +44,9 @@ def demo(
 
     [dim]tenbaud demo[/dim]
 
-    [dim]tenbaud demo --preset tuned-10baud --clock real --duration 20 --mismatch 0.1[/dim]
+    [dim]tenbaud demo --preset paper-10baud --mismatch 0 --mismatch 10%[/dim]
+
+    [dim]tenbaud demo --clock real --duration 20[/dim]
 
     [dim]tenbaud demo --view[/dim]
 
@@ -50,18 +54,18 @@ def demo(
     """
     if view and flight.duration is None and flight.config is None:
         flight = replace(flight, duration=VIEW_DURATION_S)
-    rig = flight.rig or "simulated"
-    flights: list[float | None] = list(mismatch or ())
-    if not flights:
-        single = json or view or flight.config is not None or rig != "simulated"
-        flights = [None] if single else list(DEFAULT_MISMATCHES)
+    flights: list[float | None] = list(mismatch or (None,))
+    if flight.preset is None and flight.config is None and flight.rig in (None, "simulated"):
+        flight = replace(flight, preset=DEFAULT_PRESET)
+        own = any(one.startswith(("model.", "transmitter.plant.")) for one in flight.settings or ())
+        flights = list(mismatch or (None if own else DEFAULT_MISMATCH,))
     changes = [options.overrides(**options.fields_of(flight), mismatch=off, log=log) for off in flights]
     agreements = _agree_all(flight, changes)
     pace = _checked_pace(agreements[0], pace, view)
     view_options = _view_options(agreements, view, view_port, open_browser)
     from tenbaud.flight.demo import fly_demo
 
-    fly = partial(fly_demo, draw=figure, view=view_options, pace=pace)
+    fly = partial(fly_demo, draw=figure, view=view_options, pace=pace, compare=True)
     raise typer.Exit(_fly_all(agreements, out, json, verbose, fly))
 
 
@@ -96,7 +100,7 @@ def _view_options(
 
 def _agree_all(flight: options.FlightOptions, changes: list[dict[str, Any]]) -> list[Agreement]:
     """Return the flights, each checked as far as it can be before anything starts."""
-    from tenbaud.build.ends import check_parts
+    from tenbaud.build.ends import check_parts, check_sabotage
     from tenbaud.build.flight import agree
     from tenbaud.build.recorded import flight_config, replay_notes
 
@@ -106,6 +110,7 @@ def _agree_all(flight: options.FlightOptions, changes: list[dict[str, Any]]) -> 
     agreements = [agree(one, flight.clock.value) for one in configs]
     for agreement in agreements:
         check_parts(agreement.config)
+        check_sabotage(agreement)
     for note in replay_notes(configs[0]):
         typer.echo(f"  {note}", err=True)
     return agreements
@@ -119,7 +124,7 @@ def _fly_all(
     fly: Callable[..., DemoResult],
 ) -> int:
     from tenbaud.flight.display import StatusDisplay
-    from tenbaud.flight.report import show_summaries
+    from tenbaud.flight.report import removed_as_not_begun, removed_unless_begun, show_summaries
     from tenbaud.recording.folder import RunFolder, create_run_folder
 
     results: list[DemoResult] = []
@@ -129,16 +134,21 @@ def _fly_all(
         if out is not None and index:
             explicit = out.with_name(f"{out.name}-{index + 1}")
         folder = RunFolder(create_run_folder(None, agreement.config.preset, explicit))
-        with StatusDisplay() as display:
+        with removed_unless_begun(folder), StatusDisplay() as display:
             result = fly(agreement, folder, display.show)
-        results.append(result)
-        folders.append(folder)
+        begun = not removed_as_not_begun(folder, result.summary, result.code)
         if as_json:
             options.print_json(result.summary)
+        elif begun:
+            results.append(result)
+            folders.append(folder)
+        outcome = str(result.summary["outcome"]).partition("\n")[0]
         for message in result.messages:
-            typer.echo(message, err=True)
+            # The closing lines begin with the outcome.
+            if as_json or not begun or outcome not in message:
+                typer.echo(message if begun else f"tenbaud: {message}", err=True)
         if result.code:
             break
-    if not as_json:
+    if results:
         show_summaries([result.summary for result in results], folders, verbose=verbose)
-    return int(results[-1].code)
+    return int(result.code)

@@ -1,4 +1,4 @@
-"""`tenbaud identify`: a plant's parameters from a rig, a run or a log."""
+"""`tenbaud identify`: a plant's parameters from a rig, a run, its bits or a log."""
 
 from __future__ import annotations
 
@@ -74,6 +74,13 @@ def identify(
     bandwidth: Bandwidth = None,
     damping: Damping = 0.7,
     forgetting: Forgetting = None,
+    from_bits: Annotated[
+        bool,
+        typer.Option(
+            "--from-bits",
+            help="Use only what crossed the wire of a run: symbols and commands.",
+        ),
+    ] = False,
     fly: Annotated[
         bool, typer.Option("--fly/--no-fly", help="Fly the record with what was identified.")
     ] = True,
@@ -87,6 +94,8 @@ def identify(
     [dim]tenbaud identify[/dim]
 
     [dim]tenbaud identify flight.csv --columns angle=pitch,front=u1,rear=u2,time=t --unit deg[/dim]
+
+    [dim]tenbaud identify runs/first --from-bits[/dim]
     """
     from tenbaud.config.load import given_names
     from tenbaud.identification.api import Request, identify_sources, sources_of
@@ -95,7 +104,15 @@ def identify(
     given = given_names(plant.config, options.overrides(**options.fields_of(plant), log=log))
     given |= {"preset"} if plant.preset else set()
     request = Request(
-        structure, lag, equilibrium, bandwidth, damping, forgetting, fly=fly, given=frozenset(given)
+        structure,
+        lag,
+        equilibrium,
+        bandwidth,
+        damping,
+        forgetting,
+        fly=fly,
+        given=frozenset(given),
+        from_bits=from_bits,
     )
     if duration is not None and duration / loaded.timing.tick_s > 10_000_000:
         raise typer.BadParameter(f"--duration: {duration / loaded.timing.tick_s:.3g} ticks")
@@ -138,6 +155,7 @@ def _show(result: Result) -> None:
     from rich.console import Console
     from rich.table import Table
 
+    from tenbaud.identification.beside import MEASURED
     from tenbaud.identification.figures import history_of
 
     console = Console()
@@ -166,6 +184,14 @@ def _show(result: Result) -> None:
                 other = found.structure.parameters(regression.values, regression.covariance)
             name = "regression" if found.by_simulation else "simulation fit"
             table.add_row(name, *(f"{item.value:.4f}" for item in other))
+        table.add_section()
+        for where, values in each.beside.items():
+            table.add_row(where, *(f"{value:.4f}" for value in values))
+            pairs = zip(found.parameters, values, strict=True)
+            off = [
+                f"{100.0 * (item.value / value - 1.0):+.2f} %" if value else "" for item, value in pairs
+            ]
+            table.add_row("off them" if where == MEASURED else "off it", *off)
         console.print(table)
         for line in each.lines():
             console.print(line, highlight=False, markup=False)

@@ -111,6 +111,7 @@ def _run(
     pace: float | None = None,
     figure: bool = False,
 ) -> None:
+    from contextlib import nullcontext
     from dataclasses import replace
 
     from tenbaud.build.ends import check_parts
@@ -121,7 +122,7 @@ def _run(
     from tenbaud.files.whole import write_whole
     from tenbaud.flight import ends
     from tenbaud.flight.outcome import ExitCode, first_code
-    from tenbaud.flight.report import write_up
+    from tenbaud.flight.report import removed_as_not_begun, removed_unless_begun, write_up
     from tenbaud.recording.folder import RunFolder, create_run_folder
     from tenbaud.telemetry.end import TelemetryOptions
 
@@ -134,16 +135,18 @@ def _run(
     telemetry.check(role, endpoints.insecure, endpoints.security is not None)
     whole = node.run_folder is None
     folder = RunFolder(node.run_folder or create_run_folder(None, f"{role}-{config.preset}", node.out))
-    if whole:
-        write_whole(folder.config, dump_config(config))
-        _introduce(role, agreement.identity, config, endpoints, folder)
     run_end = ends.run_transmitter if role == "transmitter" else ends.run_receiver
     mode = node.status if node.status in ("lines", "none") else "auto"
-    outcome, summary = run_end(agreement, endpoints, folder, mode)  # type: ignore[arg-type]
+    with removed_unless_begun(folder) if whole else nullcontext():
+        if whole:
+            write_whole(folder.config, dump_config(config))
+            _introduce(role, agreement.identity, config, endpoints, folder)
+        outcome, summary = run_end(agreement, endpoints, folder, mode)  # type: ignore[arg-type]
     problems = write_up(folder, config, summary, figure and summary["samples"] > 0) if whole else []
+    begun = not whole or not removed_as_not_begun(folder, summary, outcome.code)
     if node.json:
         options.print_json(summary)
-    elif whole and summary["samples"]:
+    elif whole and begun and summary["samples"]:
         from tenbaud.flight.report import show_summaries
 
         show_summaries([summary], [folder], verbose=node.verbose)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tenbaud.cli import rigs
+from tenbaud.cli import completion, rigs
 from tenbaud.cli.log_options import LogOptions as LogOptions
 
 if TYPE_CHECKING:
@@ -23,7 +23,12 @@ class ClockOption(StrEnum):
     VIRTUAL = "virtual"
 
 
-Preset = Annotated[str | None, typer.Option(help="Preset to fly; `tenbaud presets` lists them.")]
+Preset = Annotated[
+    str | None,
+    typer.Option(
+        help="Preset to fly; `tenbaud presets` lists them.", autocompletion=completion.presets
+    ),
+]
 ConfigFile = Annotated[
     Path | None,
     typer.Option("--config", help="TOML file over the preset; the same at both ends."),
@@ -37,7 +42,7 @@ AllowCode = Annotated[
 ]
 Duration = Annotated[
     float | None,
-    typer.Option(help="Flight time in seconds.", min=1e-5, max=1e7),
+    typer.Option(help="Flight time in seconds, or with its unit: 90s, 5min.", min=1e-5, max=1e7),
 ]
 Seed = Annotated[
     int | None,
@@ -66,7 +71,11 @@ Draw = Annotated[
 ]
 Settings = Annotated[
     list[str] | None,
-    typer.Option("--set", help="Any field, such as --set coder.window_signs=3; repeatable."),
+    typer.Option(
+        "--set",
+        help="Any field, such as --set coder.window_signs=3; repeatable.",
+        autocompletion=completion.settings,
+    ),
 ]
 Listen = Annotated[list[str] | None, typer.Option(help="Zenoh endpoint to listen on; repeatable.")]
 Connect = Annotated[list[str] | None, typer.Option(help="Zenoh endpoint to connect to; repeatable.")]
@@ -74,13 +83,13 @@ Mismatches = Annotated[
     list[float] | None,
     typer.Option(
         "--mismatch",
-        help="Model mismatch of the simulated plant, 0.1 for 10 %; repeatable. Not given: 0 "
-        "and 0.1, one flight each (one as configured with --json or --config).",
+        help="Model mismatch of the simulated plant, 10% or 0.1; repeatable, one flight each. Not "
+        "given: as configured, and 10% without --preset, --config, --rig and another plant.",
     ),
 ]
 Mismatch = Annotated[
     float | None,
-    typer.Option(help="Model mismatch of the simulated plant, 0.1 for 10 %."),
+    typer.Option(help="Model mismatch of the simulated plant, 10% or 0.1."),
 ]
 LineRate = Annotated[int | None, typer.Option(help="Bits per second on the serial line (115200).")]
 Downlink = Annotated[
@@ -365,10 +374,13 @@ def print_json(value: object) -> None:
 def _parse_setting(setting: str) -> tuple[str, Any]:
     import tomllib
 
+    from tenbaud.cli.units import plain_setting
+
     name, equals, text = setting.partition("=")
     if not equals:
         raise typer.BadParameter(f"--set {setting}: write FIELD=VALUE")
+    name, text = name.strip(), plain_setting(name.strip(), text)
     try:
-        return name.strip(), tomllib.loads(f"value = {text}")["value"]
+        return name, tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
-        return name.strip(), text
+        return name, text

@@ -13,6 +13,7 @@ import codecs
 import io
 import os
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from typing import TextIO
 
@@ -25,8 +26,10 @@ class KeptStream(io.TextIOWrapper):
     """A text stream that keeps its first error instead of raising it."""
 
     error: OSError | None = None
+    before_write: Callable[[], None] = staticmethod(lambda: None)
 
     def write(self, text: str) -> int:
+        self.before_write()
         try:
             return super().write(text)
         except OSError as error:

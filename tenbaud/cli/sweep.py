@@ -41,6 +41,7 @@ def sweep(
 
     After a stop or a kill the same command continues with the missing flights.
     """
+    from tenbaud.files.whole import remove
     from tenbaud.studies.settings import StudyError
     from tenbaud.studies.study import read_study
     from tenbaud.studies.table import Results
@@ -54,9 +55,13 @@ def sweep(
     try:
         table = _fly(what, results, workers or os.cpu_count() or 1, scheduler)
     except KeyboardInterrupt:
-        typer.echo(
-            f"stopped; finished flights are kept in {folder}. The same command continues", err=True
-        )
+        kept = folder.is_dir() and any(folder.iterdir())
+        if kept:
+            said = f"stopped; finished flights are kept in {folder}. The same command continues"
+        else:
+            said = "stopped before flights were finished"
+            remove(folder)
+        typer.echo(said, err=True)
         raise
     drawn = []
     if plots:
@@ -93,8 +98,9 @@ def _fly(what: Study, results: Results, workers: int, scheduler: str | None) -> 
 
 def _tell(summary: dict[str, Any], why: Counter[str], slow: Counter[str]) -> None:
     """Print the summary; `why` flights have no figures or were not compiled, and how often."""
+    seeds = "seed" if summary["seeds"] == 1 else "seeds"
     typer.echo(
-        f"{summary['flights']} flights ({summary['points']} points, {summary['seeds']} seeds each), "
+        f"{summary['flights']} flights ({summary['points']} points, {summary['seeds']} {seeds} each), "
         f"{summary['flights_compiled']} of them compiled: {summary['results']}"
     )
     if slow:

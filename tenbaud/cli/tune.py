@@ -15,6 +15,7 @@ from tenbaud.cli.spread import spread
 from tenbaud.studies.progress import progress_bar
 
 if TYPE_CHECKING:
+    from tenbaud.config.schema import FlightConfig
     from tenbaud.studies.tuning import Tuned
 
 
@@ -147,8 +148,10 @@ def tune(
     tuning = Tuning(
         preset, config, overrides, {}, split, method.value, evaluations, seed, allow_code, augment
     )
-    tuning.free.update(free_ranges(tuning.config({}), _named(free or []), model=model))
-    units = units_of(tuning.config({}))
+    start = tuning.config({})
+    tuning.free.update(free_ranges(start, _named(free or []), model=model))
+    _need_chance(start)
+    units = units_of(start)
     with StopFlag() as stop, progress_bar("tune", counted=True) as update:
         tuned = fit(
             tuning, lambda n, error: update(n, evaluations, f"best {shown(error, units)}"), stop
@@ -157,6 +160,19 @@ def tune(
     if stop.raised:
         typer.echo(f"stopped after {tuned.evaluations} of {evaluations} evaluations", err=True)
         raise typer.Exit(ExitCode.INTERRUPTED)
+
+
+def _need_chance(config: FlightConfig) -> None:
+    """Refuse simulated flights that are equal for all seeds: the validation would repeat the fit."""
+    from tenbaud.studies.settings import StudyError
+
+    plant = config.transmitter.plant
+    chance = "q=" in plant.disturbance or config.link.impairments or ":" in config.plant_kind
+    if config.transmitter.rig == "simulated" and not chance:
+        raise StudyError(
+            "nothing is random in these flights, so that every seed flies the same one and the "
+            "validation repeats the fit: add --disturbance q=2e-3, or what your plant has, or --impair"
+        )
 
 
 def _make_room(out: Path) -> None:

@@ -25,8 +25,16 @@ MOVED = {
     "receiver.reference.amplitude_rad": "receiver.reference.amplitude",
 }
 """Old full name of a field to the new one."""
-LOG_COLUMNS = {"index_column": "index", "counts_column": "outputs", "volts_columns": "inputs"}
-"""The same in the section of a recorded flight, where the new ones are tables by signal."""
+LOG_COLUMNS = {
+    "time": "time",
+    "index": "index",
+    "index_column": "index",
+    "counts_column": "out:1",
+    "outputs": "out:",
+    "inputs": "in:",
+    "volts_columns": "in:",
+}
+"""Old name to new in `columns` of a recorded flight; behind a colon follow the names of signals."""
 DIGEST_KINDS = {new: old for old, new in RENAMED["coder.kind"].items()}
 """Names in the shared configuration, whose digest both ends compare and recordings hold."""
 
@@ -71,14 +79,13 @@ def _name_log_columns(section: Any, source: str, *, warn: bool) -> None:
     if not isinstance(section, dict):
         return
     for old, new in LOG_COLUMNS.items():
-        if old not in section:
+        value = section.pop(old, None)
+        if not value:
             continue
         if warn:
-            text = f"{source}: 'flight_log.{old}' is deprecated; use 'flight_log.{new}'"
+            text = f"{source}: 'flight_log.{old}' is deprecated; use 'flight_log.columns'"
             warnings.warn(text, FutureWarning, stacklevel=4)
-        value = section.pop(old)
-        if old == "counts_column":
-            value = {"1": value}
-        elif old == "volts_columns" and isinstance(value, (list, tuple)):
+        if isinstance(value, (list, tuple)):
             value = {str(at): name for at, name in enumerate(value, 1)}
-        section.setdefault(new, value)
+        named = {f"{new}{name}": one for name, one in value.items()} if new[-1] == ":" else {new: value}
+        section["columns"] = {**named, **section.get("columns", {})}

@@ -50,6 +50,8 @@ class HelicopterModelSection(ModelSection):
     """stops of elevation and, to either side, pitch"""
     elevation_high_rad: Annotated[float, Field(ge=0.001, le=1.5)] = 0.5235987755982988
     pitch_stop_rad: Annotated[float, Field(ge=0.001, le=1.5)] = 0.5585053606381855
+    travel_stop_rad: Annotated[float, Field(ge=0.01, le=1e6)] = math.pi
+    """to either side; a rig with a slip ring has none: give a large number"""
     motor_lag_s: Annotated[float, Field(ge=0.0, le=10.0)] = 0.08
     hover_rad: Annotated[float, Field(ge=0.001, le=1.5)] = 0.17453292519943295
     """elevation at which both ends begin, and at which design and floor take the plant for linear"""
@@ -69,6 +71,13 @@ class HelicopterModelSection(ModelSection):
                 f"elevation_high_rad = {self.elevation_high_rad:g}"
             )
         return self
+
+    @property
+    def stops(self) -> dict[str, tuple[float, float]]:
+        """Return the range of each output."""
+        travel, pitch = self.travel_stop_rad, self.pitch_stop_rad
+        elevation = self.elevation_low_rad, self.elevation_high_rad
+        return {"travel": (-travel, travel), "elevation": elevation, "pitch": (-pitch, pitch)}
 
     @property
     def parameters(self) -> HelicopterParameters:

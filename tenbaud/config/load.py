@@ -22,6 +22,10 @@ from tenbaud.config.section import OutsideSection, Section
 DEFAULT_PRESET = "paper-10baud"
 OWN = "own"
 """In place of a preset: a plant of one's own, over nothing but the defaults of the fields."""
+FOLDERS = {
+    "preset": files("tenbaud") / "presets",
+    "mission": files("tenbaud") / "presets" / "missions",
+}
 _SPLIT = re.compile(r",\n\s+")
 
 
@@ -29,9 +33,9 @@ class ConfigError(TenbaudError):
     """A configuration that cannot be used; the text names file, field, value and allowed range."""
 
 
-def preset_names() -> list[str]:
-    """Return the presets shipped with the package."""
-    folder = files("tenbaud") / "presets"
+def preset_names(what: str = "preset") -> list[str]:
+    """Return the presets, or the missions, shipped with the package."""
+    folder = FOLDERS[what]
     return sorted(item.name[:-5] for item in folder.iterdir() if item.name.endswith(".toml"))
 
 
@@ -91,8 +95,11 @@ def merged_values(
     if not isinstance(base, str):
         raise ConfigError(f"{path}: preset must be a name in quotes, got {base!r}")
     base = current_name("preset", base, source, warn=not recorded)
-    values = merged(_read_preset(base), from_file)
-    return merged(values, with_current_names(overrides or {}, "the settings")) | {"preset": base}
+    given = with_current_names(overrides or {}, "the settings")
+    values = _read_preset(base)
+    if mission := given.get("mission", from_file.get("mission", "")):
+        values = merged(values, _read_preset(str(mission), "mission"))
+    return merged(merged(values, from_file), given) | {"preset": base}
 
 
 def nested(settings: Mapping[str, Any]) -> dict[str, Any]:
@@ -140,24 +147,28 @@ def toml_text(values: Mapping[str, Any]) -> str:
     return re.sub(r"\[\n\s+([^\[\]{}]*?),\n\s*\]", lambda row: f"[{_SPLIT.sub(', ', row[1])}]", text)
 
 
-def _read_preset(name: str) -> dict[str, Any]:
+def _read_preset(name: str, what: str = "preset") -> dict[str, Any]:
     if name == OWN:
         return {}
-    resource = files("tenbaud") / "presets" / f"{name}.toml"
+    resource = FOLDERS[what] / f"{name}.toml"
     if not resource.is_file():
-        near = difflib.get_close_matches(name, preset_names(), 1)
+        known = preset_names(what)
+        near = difflib.get_close_matches(name, known, 1)
         hint = f" Did you mean {near[0]}?" if near else ""
-        raise ConfigError(f"there is no preset {name!r}.{hint} Known: {', '.join(preset_names())}")
-    return tomllib.loads(resource.read_text())
+        raise ConfigError(f"there is no {what} {name!r}.{hint} Known: {', '.join(known)}")
+    values = tomllib.loads(resource.read_text())
+    base = values.pop("preset", None)
+    return values if base is None else merged(_read_preset(base, what), values)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Return a TOML file's settings; ConfigError where it cannot be read."""
     try:
-        return tomllib.loads(path.read_text())
+        # Names of files that are no UTF-8 have their bytes here, as `write_whole` writes them.
+        return tomllib.loads(path.read_text(encoding="utf-8", errors="surrogateescape"))
     except OSError as error:
         raise ConfigError(f"cannot read the configuration {path}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{path} is not TOML: {error}") from error
 
 

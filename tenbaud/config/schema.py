@@ -14,6 +14,7 @@ from pydantic import AfterValidator, Field, PrivateAttr, field_validator, model_
 from channel.line.impairments import parse_impairments
 from channel.links.registry import LINKS
 from tenbaud.config.coders import ZoomCoderSection
+from tenbaud.config.controllers import PidSection, ReferencesSection, StateFeedbackSection
 from tenbaud.config.deprecated import DIGEST_KINDS
 from tenbaud.config.kinds import (
     CODERS,
@@ -32,11 +33,9 @@ from tenbaud.config.section import (
     Command,
     Counts,
     Factor,
-    Gain,
     KindSection,
     Mismatch,
     NamedSections,
-    NotNegative,
     Options,
     OutsideSection,
     Positive,
@@ -45,7 +44,7 @@ from tenbaud.config.section import (
 )
 
 SHARED_SECTIONS = ("timing", "channel", "model", "coder", "limits")
-ADDED_FIELDS = {"start", "outputs", "floor_gain", "floor_exponent", "learns"}
+ADDED_FIELDS = {"start", "travel_stop_rad", "outputs", "floor_gain", "floor_exponent", "learns"}
 """Of models and coders that were flown before they had them."""
 
 
@@ -164,7 +163,7 @@ class TransmitterSection(Section):
     dry_run: bool = False
     """read the rig and never move it"""
     rate_observer_bandwidth_rad_s: Annotated[float, Field(ge=0.001, le=10_000.0)] = 30.0
-    """bandwidth of the rate observer, for coders that use rates"""
+    """bandwidth of the rate observer, for the coder `history`; `direction` has a Kalman filter"""
     encoders: EncodersSection = EncodersSection()
     plant: PlantSection = PlantSection()
     watchdog_s: Positive | Literal["auto"] = "auto"
@@ -185,76 +184,6 @@ class TransmitterSection(Section):
     """after unequal digests: continue from a common state, or end the flight (exit code 5)"""
     sabotage: SabotageText = ""
     """such as "sample=500,field=range": corrupt one bit of this end's codec on purpose"""
-
-
-class PidLoopSection(Section):
-    """One loop of a PID law: which output, by which inputs."""
-
-    output: str = ""
-    """name of the output; empty: the first"""
-    rate: str = ""
-    """name of the state that is its rate; empty: OUTPUT_rate, or else the output's change"""
-    inputs: dict[str, Factor] = Field(default_factory=dict)
-    """share of the loop's sum that each input gets; empty: a single input has it all, and of two the
-    first has half of it and the second has minus half"""
-    proportional: Gain = 0.0
-    integral: Gain = 0.0
-    derivative: Gain = 0.0
-    unit: str = ""
-    """of the gains, such as V/rad or V/deg; empty: the input's unit per unit of the output"""
-
-
-class PidSection(PidLoopSection):
-    """PID law (24): one loop, or the list `loops` of several."""
-
-    proportional: Gain = 0.1
-    integral: Gain = 0.053
-    derivative: Gain = 0.12
-    unit: str = "V/deg"
-    """the paper prints no unit; only V/deg follows its reference"""
-    anti_windup: Literal["conditional", "none"] = "conditional"
-    normal_force_volts: Factor = 0.0
-    """w of (1): a sum that all inputs share equally"""
-    loops: tuple[PidLoopSection, ...] = ()
-    """[[receiver.pid.loops]]: in place of the one loop that is described here"""
-
-
-class StateFeedbackSection(Section):
-    """Feedback of all states: gains as given, or designed (LQR) from weights."""
-
-    gains: tuple[tuple[Factor, ...], ...] = ()
-    """a row for each input, a column for each state; empty: designed"""
-    integral_gains: tuple[tuple[Factor, ...], ...] = ()
-    """beside given gains: a row for each input, a column for each output"""
-    state_weights: dict[str, NotNegative] = Field(default_factory=dict)
-    """cost of each state by name, 0 for those left out; empty: 1 for every output"""
-    input_weights: dict[str, Positive] = Field(default_factory=dict)
-    """cost of each input by name, 1 for those left out"""
-    integral_weights: dict[str, Positive] = Field(default_factory=dict)
-    """outputs with integral action, and the cost of the integral of their error"""
-    anti_windup: Literal["conditional", "none"] = "conditional"
-
-
-class ReferenceSection(Section):
-    """The set-point of an output."""
-
-    kind: Literal["square", "step", "sine", "constant", "csv", "none"] = "square"
-    """none: the output follows nothing"""
-    amplitude: Factor = 1.5707963267948966
-    """in the unit of the output"""
-    offset: Factor = 0.0
-    """what is added to a set-point of any kind"""
-    period_s: Positive = 25.0
-    start_s: NotNegative = 1.0
-    """time of the step"""
-    file: str = ""
-    """for csv: columns time_s and NAME_UNIT of the output, such as pitch_rad"""
-
-
-class ReferencesSection(ReferenceSection, NamedSections):
-    """The set-point of the first output; those of the others, or of any, by name."""
-
-    __pydantic_extra__: dict[str, ReferenceSection]
 
 
 class ReceiverSection(Section):
@@ -278,15 +207,8 @@ class FlightLogSection(Section):
     join: tuple[str, ...] = ()
     """further files, whose columns are joined by time"""
     columns: dict[str, str] = Field(default_factory=dict)
-    """column, by name or number, of a signal, `angle`, `output`, `input`, `time` or `index`"""
-    outputs: dict[str, str] = Field(default_factory=dict)
-    """the same for outputs only; what is not given is guessed from the names of the columns"""
-    inputs: dict[str, str] = Field(default_factory=dict)
-    """the same for inputs only; "0": there is no such column, and the input is zero"""
-    time: str = ""
-    """column of the clock"""
-    index: str = ""
-    """column that counts the rows, `period_s` apart"""
+    """column, by name or number, of a signal, `angle`, `output`, `input`, `time` or `index` (it counts
+    rows, `period_s` apart); "0": no such input. What is not given is guessed from the names"""
     period_s: Annotated[float, Field(ge=1e-6, le=1e6)] | None = None
     """time between two rows of a file without a clock; none: timing.tick_s"""
     units: dict[str, str] = Field(default_factory=dict)
@@ -346,6 +268,8 @@ class FlightConfig(CodePermission):
 
     preset: str = "paper-10baud"
     """preset that the file is based on"""
+    mission: str = ""
+    """settings of the package over the preset: `square`, or `two-boxes`, which takes off and lands"""
     description: str = ""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
     duration_s: Annotated[float, Field(ge=1e-5, le=1e7)] = 100.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Annotated, Any, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, JsonValue, PrivateAttr
@@ -29,6 +30,15 @@ class Section(BaseModel):
     """Unknown fields are errors; values do not change after loading."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    def as_text(self, **which: Any) -> str:
+        """Return the section as JSON in ASCII: the name of a file may have bytes that are no UTF-8."""
+        return json.dumps(self.model_dump(mode="json", **which))
+
+    @classmethod
+    def of_text(cls, text: str) -> Self:
+        """Return the section that `as_text` has written."""
+        return cls.model_validate(json.loads(text))
 
 
 class NamedSections(Section):

@@ -6,13 +6,14 @@ goes into the shared configuration by value.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
 from plant_sim.zero_order_hold import discretised
+from tenbaud.bounds.linear import rate_needed
 from tenbaud.config.kinds import MODELS, kind_of
 from tenbaud.config.load import ConfigError
 from tenbaud.config.models import LinearModelSection
@@ -20,18 +21,20 @@ from tenbaud.config.schema import Timing
 from tenbaud.config.section import KindSection, Section
 from tenbaud.design.described import corrected_part, linear_of, plant_of, require_rate, require_seen
 from tenbaud.design.direction import design_direction, design_learning
+from tenbaud.design.plant import behind_encoders
 
 DESIGNED = (*("transition", "noise", "noises", "worth", "start", "starts", "reach", "removed", "step"),)
 """settings of a coder that are worked out; what else it has is the user's"""
 SectionKind = TypeVar("SectionKind", bound=Section)
 
 
-def completed(values: Mapping[str, Any]) -> dict[str, Any]:
+def completed(values: Mapping[str, Any], steps: Sequence[float] = ()) -> dict[str, Any]:
     """Return nested settings with the sections `model` and `coder` completed.
 
-    A linear model gets F and E from its A and B, and a coder `direction` or
-    `learning` its constants for the plant;
-    both anew where they are there already. Raises ConfigError where nothing can be designed.
+    A linear model gets F and E from its A and B, and a coder `direction` or `learning` its constants
+    for the plant; both anew where they are there already. `steps` are those of the encoders of the
+    outputs: on a plant that grows the coder is designed for what can be seen of it behind them. Raises
+    ConfigError where nothing can be designed.
     """
     given, coder = dict(values.get("model", {})), dict(values.get("coder", {}))
     try:
@@ -42,7 +45,7 @@ def completed(values: Mapping[str, Any]) -> dict[str, Any]:
             given |= {"F": F.tolist(), "E": E.tolist()}
             section = _checked("model", LinearModelSection, given)
         if coder.get("kind") in ("direction", "learning"):
-            coder |= _designed(section, coder, timing)
+            coder |= _designed(section, coder, timing, steps)
     except ValueError as error:
         raise ConfigError(f"this cannot be designed: {error}") from error
     return {**values, "model": given, "coder": coder}
@@ -60,7 +63,9 @@ def _checked(place: str, sort: type[SectionKind], values: Mapping[str, Any]) -> 
         raise ValueError("; ".join(faults)) from error
 
 
-def _designed(section: KindSection, coder: Mapping[str, Any], timing: Timing) -> dict[str, Any]:
+def _designed(
+    section: KindSection, coder: Mapping[str, Any], timing: Timing, steps: Sequence[float]
+) -> dict[str, Any]:
     linear, plant = linear_of(section), plant_of(section, timing.tick_s)
     if linear is None or plant is None:
         raise ValueError(f"model.kind = {section.kind!r} describes no plant to design for")
@@ -68,6 +73,8 @@ def _designed(section: KindSection, coder: Mapping[str, Any], timing: Timing) ->
     rate = coder.get("bits", 1) / timing.symbol_period_s
     require_seen(plant, section)
     require_rate(plant, rate, section)
+    if all(steps) and len(steps) == len(plant.C) and rate_needed(plant.A):
+        plant, _ = behind_encoders(plant, steps, timing.tick_s)
     design = design_learning if coder["kind"] == "learning" else design_direction
     found = asdict(design(plant, rate, timing.symbol_period_s))
     return {name: _lists(value) for name, value in found.items() if name in DESIGNED}

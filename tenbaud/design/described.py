@@ -19,6 +19,8 @@ from tenbaud.config.schema import FlightConfig
 from tenbaud.config.section import KindSection
 from tenbaud.design.plant import LinearPlant, linear_plant
 
+GROWTH = 1e-6
+"""1/s; a motion that grows more slowly is one that stays, found with errors of rounding"""
 FOLDER = files("tenbaud") / "presets" / "plants"
 
 
@@ -68,6 +70,9 @@ def check_plant(config: FlightConfig, codec: Codec) -> None:
     if plant is None:
         return
     require_rate(plant, bit_rate(codec, tick_s), section)
+    seen = unreached(plant.A.T, plant.C.T * plant.weights, growth=GROWTH)
+    if seen is not None:
+        raise ValueError(_unseen(plant, section, *seen))
 
 
 def require_rate(plant: LinearPlant, rate_bit_s: float, section: KindSection) -> None:
@@ -88,19 +93,39 @@ def state_names(section: KindSection, plant: LinearPlant) -> list[str]:
 
 def require_seen(plant: LinearPlant, section: KindSection) -> None:
     """Raise ValueError, with state and eigenvalue, unless noise and outputs reach every motion."""
-    for reach, pair, found in (
-        ("the disturbance does not reach", "(A, G)", unreached(plant.A, plant.noise)),
-        ("the outputs do not show", "(A, C)", unreached(plant.A.T, plant.C.T * plant.weights)),
-    ):
-        if found is not None:
-            value, place = found
-            lost = f"{value.real:.4g}{f'{value.imag:+.4g}j' if value.imag else ''}"
-            verb = "controllable (G is B where none is given)" if pair == "(A, G)" else "observable"
-            raise ValueError(
-                f"{reach} every state: the motion with the eigenvalue {lost} 1/s, mostly of "
-                f"{state_names(section, plant)[place]}, is left out, as the pair {pair} is not {verb}; "
-                "leave it out of the model, or put such states last, outside `corrected`"
-            )
+    if (found := unreached(plant.A, plant.noise)) is not None:
+        raise ValueError(
+            f"the disturbance does not reach every state: {_motion(plant, section, *found)} is left "
+            "out, as the pair (A, G) is not controllable (G is B where none is given); leave it out of "
+            "the model, or put such states last, outside `corrected`"
+        )
+    if (found := unreached(plant.A.T, plant.C.T * plant.weights)) is not None:
+        raise ValueError(_unseen(plant, section, *found))
+
+
+def _motion(plant: LinearPlant, section: KindSection, value: complex, place: int) -> str:
+    lost = f"{value.real:.4g}{f'{value.imag:+.4g}j' if value.imag else ''}"
+    return f"the motion with the eigenvalue {lost} 1/s, mostly of {state_names(section, plant)[place]},"
+
+
+def _unseen(plant: LinearPlant, section: KindSection, value: complex, place: int) -> str:
+    """Return what a motion lacks that no output of some weight shows."""
+    linear = linear_of(section)
+    assert linear is not None
+    names = [one.name for one in linear.signals(plant.B.shape[1]).outputs]
+    alone = (unreached(plant.A.T, row[:, None], growth=value.real - GROWTH) for row in plant.C)
+    shows = [name for name, found in zip(names, alone, strict=True) if found is None]
+    advice = (
+        f"give {' or '.join(shows)}, which shows it, a weight above 0 (model.weights)"
+        if shows
+        else "add an output that shows it to C"
+    )
+    grows = " It grows by itself." if value.real > GROWTH else ""
+    return (
+        f"the outputs do not show every state: {_motion(plant, section, value, place)} is left out, as "
+        f"the pair (A, C), by the weights, is not observable.{grows} Put it last, outside `corrected`, "
+        f"if the commands alone move it; otherwise {advice}"
+    )
 
 
 def corrected_part(plant: LinearPlant, states: int) -> LinearPlant:

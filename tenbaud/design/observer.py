@@ -44,10 +44,11 @@ def kalman_observer(
 ) -> StateObserver:
     """Return the observer for a noise covariance per tick and the step of each output's encoder.
 
-    `transition` is that of a tick, `C` makes outputs of states. A model that learns is observed as the
-    plant that it is without: what is learned stays zero here.
+    `transition` is that of a tick, `C` makes outputs of states. States of the model beyond these, such
+    as lagging motors, follow from the commands alone; what a model learns stays zero here.
     """
     size, outputs = len(transition), len(C)
+    known = np.zeros((model.state_size - size, outputs))
     seen = np.diag(np.maximum(np.broadcast_to(steps, (outputs,)), LEAST_STEP) ** 2 / 12.0)
     noise = tick_noise + LEAST_NOISE * float(np.trace(tick_noise)) * np.eye(size)
     try:
@@ -57,11 +58,10 @@ def kalman_observer(
             f"the outputs do not show every state, so none is observed: {error}"
         ) from error
     gains: Matrix = ahead @ C.T @ np.linalg.inv(C @ ahead @ C.T + seen)
-    unseen = np.zeros((model.state_size - size, outputs))
     return StateObserver(
         model,
-        rows_of(np.vstack([gains, unseen])),
-        rows_of(np.vstack([np.asarray(np.linalg.pinv(C), dtype=np.float64), unseen])),
+        rows_of(np.vstack([gains, known])),
+        rows_of(np.vstack([np.linalg.pinv(C), known])),
         (STATE_MAX,) * model.state_size,
     )
 

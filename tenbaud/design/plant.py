@@ -5,10 +5,12 @@ dx/dt = A x + B u + G w,     y = C x,     E w(t) w(t')' = diag(q) delta(t - t')
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.linalg import solve_continuous_are
 
 from tenbaud.bounds.linear import LinearModel, Matrix, linear_model
 
@@ -60,6 +62,24 @@ def linear_plant(
     q = np.broadcast_to(np.asarray(densities, dtype=float), (g.shape[1],)).copy()
     w = np.broadcast_to(np.asarray(1.0 if weights is None else weights, dtype=float), (len(c),)).copy()
     return LinearPlant(a, b, c, g, q, w)
+
+
+def behind_encoders(
+    plant: LinearPlant, steps: Sequence[float], tick_s: float
+) -> tuple[LinearPlant, Matrix]:
+    """Return what its Kalman filter shows of a plant, as a plant, and the covariance of its errors.
+
+    Encoders of these steps read the outputs at every tick, and their rounding is taken for white noise
+    of `step^2 / 12` at every tick. Who forms the bits knows the filter's estimate and no more: it is
+    the same plant driven by the innovations, `L r L'`.
+    """
+    if not tick_s > 0.0:
+        raise ValueError(f"tick_s is {tick_s}; it must be above 0")
+    outputs = len(plant.C)
+    seen: Matrix = np.full(outputs, steps, dtype=np.float64) ** 2 / 12.0 * tick_s
+    found = solve_continuous_are(plant.A.T, plant.C.T, plant.noise, np.diag(seen))
+    own: Matrix = np.asarray(found, dtype=np.float64)
+    return replace(plant, G=own @ plant.C.T / seen, densities=seen), own
 
 
 def rows_of(matrix: Matrix) -> tuple[tuple[float, ...], ...]:

@@ -18,16 +18,16 @@ def closing_lines(summary: Summary, folder: RunFolder, *, unicode: bool = True) 
     """Return the lines that end a flight on a terminal; angles are in degrees."""
     lines = [_verdict(summary, unicode)]
     lines += [f"  {'! ' if not unicode else '⚠ '}{text}" for text in warnings_of(summary)]
-    lines += [f"  {label:{LABEL_WIDTH}}{text}" for label, text in _figures(summary, unicode)]
-    lines += [f"  {label:{LABEL_WIDTH}}{text}" for label, text in _what_next(summary, folder)]
-    return lines
+    shown = [*_figures(summary, unicode), _what_next(summary, folder)]
+    return lines + [f"  {label:{LABEL_WIDTH}}{text}" for label, text in shown]
 
 
 def _verdict(summary: Summary, unicode: bool) -> str:
     code = int(summary["exit_code"])
     if code:
         mark = "✗" if unicode else "x"
-        return f"{mark} Flight failed (exit code {code}): {summary['outcome']}"
+        cause = ", ".join(summary.get("not_flown") or ()) or summary["outcome"]
+        return f"{mark} Flight failed (exit code {code}): {cause}"
     mark = "✓" if unicode else "+"
     text = f"{mark} Flight finished: "
     duration_s = summary.get("duration_s")  # a receiver knows samples, and not the flight's time
@@ -57,7 +57,8 @@ def warnings_of(summary: Summary) -> list[str]:
         ("malformed", "{} messages were no frames and were dropped"),
         ("recording_rows_lost", "the recording lost {} rows: the disk was too slow"),
     )
-    found = [text.format(get(name)) for name, text in counted if get(name)]
+    found = str(get("outcome")).splitlines() if get("not_flown") else []
+    found += [text.format(get(name)) for name, text in counted if get(name)]
     if get("sensor_fault"):
         found.append(f"sensor: {get('sensor_fault')}")
     ticks = get("ticks_commanded")
@@ -126,7 +127,9 @@ def _errors(summary: Summary, unicode: bool) -> Iterator[tuple[str, str]]:
             yield "Estimate error", of + error + share + after
         if one["tracking_rms"] is not None:
             tracking = shown(one["tracking_rms"], one["unit"], 1)
-            yield "Tracking error", f"{of}{tracking} rms, steps included"
+            usual = summary.get("usual_loop")
+            beside = f" ({shown(usual['tracking_rms_rad'], 'rad', 1)} over 1000 bit/s)" if usual else ""
+            yield "Tracking error", f"{of}{tracking} rms{beside}, steps of the reference included"
 
 
 def _uplink(summary: Summary) -> str:
@@ -155,19 +158,16 @@ def _link(summary: Summary) -> str:
     return ", ".join(parts)
 
 
-def _what_next(summary: Summary, folder: RunFolder) -> Iterator[tuple[str, str]]:
+def _what_next(summary: Summary, folder: RunFolder) -> tuple[str, str]:
+    """Return what to open and the next command, as a label and its text."""
     path = _shown(folder.path)
-    if folder.figure.is_file():
-        yield "Open", f"{path}/{folder.figure.name}"
-    else:
-        yield "Recorded in", path
+    drawn = folder.figure.is_file()
+    label, place = ("Open", f"{path}/{folder.figure.name}") if drawn else ("Recorded in", path)
     if int(summary["exit_code"]):
-        yield "Next", f"tenbaud inspect {path}   (every figure: --verbose)"
-    else:
-        yield (
-            "Next",
-            f"tenbaud replay {path}   (every figure: --verbose; live page: tenbaud demo --view)",
-        )
+        return label, f"{place}   Next: tenbaud inspect {path}"
+    if summary["clock"] == "real":
+        return label, f"{place}   Next: tenbaud replay {path}"
+    return label, f"{place}   Next: tenbaud demo --view"
 
 
 def _shown(path: Path) -> str:

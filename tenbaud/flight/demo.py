@@ -52,12 +52,14 @@ def fly_demo(
     view: ViewOptions | None = None,
     pace: float | None = None,
     status: StatusMode = "auto",
+    compare: bool = False,
 ) -> DemoResult:
     """Fly once into an existing, empty run folder; write summary and, if wished, figure there.
 
     `view`: serve the live page beside the flight, which may then be steered from it. `pace`: on the
     virtual clock, at most this factor of real time; not for a link within one process. `status`: what a
-    flight within this process writes on the standard error.
+    flight within this process writes on the standard error. `compare`: fly the usual loop beside it,
+    where there is one.
     """
     write_whole(folder.config, dump_config(agreement.config))
     if agreement.link.in_process:
@@ -69,7 +71,15 @@ def fly_demo(
             if pace is not None:
                 viewing = replace(viewing, transmitter=[*viewing.transmitter, "--pace", str(pace)])
             result = _fly_processes(agreement, folder, on_status, viewing, stop)
-    problems = write_up(folder, agreement.config, result.summary, draw)
+    on_status({"role": "run", "phase": "writing its results"})
+    usual = None
+    if compare and result.code is ExitCode.OK and view is None:
+        from tenbaud.flight.usual import usual_flight
+
+        usual = usual_flight(agreement)
+        result.summary |= {"usual_loop": usual.figures} if usual else {}
+    draw = draw and result.summary.get("samples", 0) > 0
+    problems = write_up(folder, agreement.config, result.summary, draw, usual and usual.curve)
     # What ended the flight is said last.
     result.messages[:0] = [problem.text for problem in problems]
     result.code = first_code(result.code, *(problem.code for problem in problems))
@@ -100,6 +110,7 @@ def _result(agreement: Agreement, transmitter: _Child, receiver: _Child) -> Demo
     ends = [transmitter, receiver]
     # Whoever was killed comes first: the other one only noticed.
     ends.sort(key=lambda end: end.process.returncode >= 0)
+    ends = [end for end in ends if not end.dismissed]
     outcomes = [outcome for end in ends if (outcome := end.outcome()).code is not ExitCode.OK]
     config = agreement.config
     known: Summary = {"preset": config.preset, "link": config.link.kind, "clock": agreement.clock}
@@ -111,6 +122,8 @@ def _result(agreement: Agreement, transmitter: _Child, receiver: _Child) -> Demo
     was_killed = ends[0].process.returncode < 0 and not ends[0].died_of_interrupt
     if was_killed or not summary.get("exit_code"):
         summary["outcome"], summary["exit_code"] = outcomes[0].text, int(code)
+        for own in [end.summary for end in ends if end.summary.get("not_flown")]:
+            summary |= {name: own[name] for name in ("outcome", "not_flown")}
     return DemoResult(summary, code, [outcome.text for outcome in reversed(outcomes)])
 
 
@@ -143,6 +156,9 @@ def _wait(ends: tuple[_Child, _Child], stop: StopFlag) -> None:
         if passed_on and ends[0].died_of_interrupt:
             # It had not begun, and says no farewell.
             ends[1].interrupt()
+        for end, other in (ends, ends[::-1]):
+            if end.process.poll() not in (None, 0):
+                other.dismiss()
         if passed_on or any(end.process.poll() is not None for end in ends):
             patience_s -= 0.1
             if patience_s < 0.0:
@@ -163,6 +179,9 @@ class _Child:
     said: list[str] = field(init=False, default_factory=list)
     _threads: list[threading.Thread] = field(init=False, default_factory=list)
     _interrupted: bool = field(init=False, default=False)
+    _begun: bool = field(init=False, default=False)
+    dismissed: bool = field(init=False, default=False)
+    """it waited for the other end, which could not fly"""
 
     def __post_init__(self) -> None:
         verb = "transmit" if self.role == "transmitter" else "receive"
@@ -186,7 +205,9 @@ class _Child:
     def _read_status(self, stream: IO[str]) -> None:
         for line in stream:
             if line.startswith("{"):
-                self.on_status(json.loads(line))
+                status = json.loads(line)
+                self._begun = self._begun or status["phase"] not in ("greeting", "waiting")
+                self.on_status(status)
             elif line.strip():
                 self.said.append(line.rstrip())
 
@@ -195,6 +216,12 @@ class _Child:
         if not self._interrupted and self.process.poll() is None:
             self._interrupted = True
             self.process.send_signal(signal.SIGINT)
+
+    def dismiss(self) -> None:
+        """Have the process end if it has no session yet: there is nobody to fly with."""
+        if not self._begun and self.process.poll() is None:
+            self.dismissed = True
+            self.interrupt()
 
     @property
     def died_of_interrupt(self) -> bool:

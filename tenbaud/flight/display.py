@@ -44,7 +44,7 @@ class StatusDisplay:
 
     def __enter__(self) -> Self:
         if self._live is not None:
-            self._live.start()
+            self._live.start(refresh=True)
         self._told_s = time.monotonic()
         return self
 

@@ -22,7 +22,7 @@ from tenbaud.build.recorded import replay_notes
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.flight import receive, transmit
 from tenbaud.flight.display import StatusReporter
-from tenbaud.flight.outcome import SAFE, Outcome, outcome_of
+from tenbaud.flight.outcome import SAFE, ExitCode, Outcome, outcome_of
 from tenbaud.flight.status import Status, StatusMode, outputs_status
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, gap_part, link_part, receiver_part, transmitter_part
@@ -159,6 +159,9 @@ def run_in_memory(
         endpoint = build_receiver(agreement, receiver_recorder, DATAGRAM)
         with StatusReporter(lambda: transmitter_status(run), status):
             outcome = _guarded(lambda: transmit.fly_virtual(run, endpoint, stop))
+        seen = receive.ended_outcome(agreement, endpoint.session)
+        if outcome.code is ExitCode.OK and seen.code is ExitCode.NOT_FLOWN:
+            outcome = seen
         run.node.flush_records()
         endpoint.session.flush_records()
         upper = transmitter_part(run, outcome)

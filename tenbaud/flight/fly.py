@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -33,8 +32,8 @@ from tenbaud.design.complete import completed
 from tenbaud.design.settings import exact_outputs, settings_of
 from tenbaud.design.simulated import system_plant
 from tenbaud.design.systems import Point, System, is_system, matrices
-from tenbaud.files.whole import remove
 from tenbaud.flight.demo import fly_demo
+from tenbaud.flight.report import removed_unless_begun
 from tenbaud.recording.folder import RunFolder, create_run_folder
 from tenbaud.recording.run import Run
 
@@ -100,7 +99,7 @@ def fly(
     point = (rate_baud, operating_point)
     loaded, parts = _loaded(preset, None if config is None else Path(config), changes, parts, point)
     folder = RunFolder(create_run_folder(None, loaded.preset, None if out is None else Path(out)))
-    with _removed_if_refused(folder):
+    with removed_unless_begun(folder):
         if reference is not None:
             loaded = _following(loaded, reference, parts, folder)
         agreement = _agreement(loaded, clock, parts)
@@ -217,13 +216,3 @@ def _agreement(loaded: FlightConfig, clock: Clock, parts: Mapping[str, Any]) -> 
     agreement = replace(agreement, parts=made)
     check_parts(loaded, made)
     return agreement
-
-
-@contextmanager
-def _removed_if_refused(folder: RunFolder) -> Iterator[None]:
-    """Remove a new folder where what is done within the `with` shows that nothing can be flown."""
-    try:
-        yield
-    except BaseException:
-        remove(folder.path)
-        raise

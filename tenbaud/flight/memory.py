@@ -17,8 +17,8 @@ from channel.protocol.recording import Recorder
 from channel.protocol.terms import Terms
 from channel.protocol.wire import DATAGRAM, Wire
 from plant_sim.encoder import Encoder
-from plant_sim.plant import Plant, with_measured
-from receiver.controllers.base import Controller, with_references
+from plant_sim.plant import Plant
+from receiver.controllers.base import Controller
 from receiver.endpoint import ReceiverEndpoint
 from receiver.session.session import ReceiverSession
 from tenbaud.build.liveness import round_trip, watchdog_ticks
@@ -82,7 +82,6 @@ class MemoryFlight:
         receiver_recorder: Recorder | None = None,
         wire: Wire = DATAGRAM,
     ) -> None:
-        controller, plant = with_references(controller), with_measured(plant)
         _check(codec, terms, plant, controller)
         self.codec = codec
         self.terms = terms

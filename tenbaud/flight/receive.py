@@ -59,6 +59,8 @@ def _not_flown(agreement: Agreement, session: ReceiverSession) -> Outcome | None
         confirmed=flown,
         erased=min(flown, session.counts["erasures"] // agreement.terms.symbols_per_word),
         rejoins=session.counts["rejoins"],
+        bad_commands=session.counts["bad_commands"],
+        commands=flown * agreement.terms.ticks_per_sample,
     )
     faults = faults_of(counts)
     if not faults:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tenbaud.config.load import flattened
 from tenbaud.config.schema import FlightConfig
-from tenbaud.files.whole import WriteError, write_whole
+from tenbaud.files.whole import WriteError, remove, write_whole
 from tenbaud.flight.outcome import ExitCode, Outcome, outcome_of
 from tenbaud.flight.summary import Summary
 from tenbaud.recording.errors import RecordingError
@@ -17,11 +20,18 @@ from tenbaud.recording.folder import RunFolder
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from tenbaud.recording.figure import Curve
 
-def write_up(folder: RunFolder, config: FlightConfig, summary: Summary, draw: bool) -> list[Outcome]:
+
+def write_up(
+    folder: RunFolder, config: FlightConfig, summary: Summary, draw: bool, usual: Curve | None = None
+) -> list[Outcome]:
     """Write `summary.json` and, if wished, the figure; return what went wrong.
 
-    The flight is over by then: what cannot be written is no reason to leave out the rest.
+    `usual`: how the usual loop steers the first output, for the figure.
+
+    The flight is over by then: what cannot be written is no reason to leave out the rest. It is the
+    outcome in `summary` of a flight that has no other.
     """
     problems = []
     recording_error = summary.get("recording_error")
@@ -33,11 +43,45 @@ def write_up(folder: RunFolder, config: FlightConfig, summary: Summary, draw: bo
         problems.append(outcome_of(error))
     if draw:
         try:
-            draw_figure(folder, figure_title(config, summary))
+            draw_figure(folder, figure_title(config, summary), usual)
         except (RecordingError, WriteError) as error:
             code = ExitCode.NOT_WRITTEN if isinstance(error, WriteError) else ExitCode.OK
             problems.append(Outcome(code, f"no figure was drawn: {error}"))
+    failed = [one for one in problems if one.code is not ExitCode.OK]
+    if failed and not summary["exit_code"]:
+        summary |= {"exit_code": int(failed[0].code), "outcome": failed[0].text}
     return problems
+
+
+@contextmanager
+def removed_unless_begun(folder: RunFolder) -> Iterator[None]:
+    """Remove a new folder where an exception ends the `with` before a tick or a sample is recorded."""
+    try:
+        yield
+    except BaseException as error:
+        if not any(map(_holds_rows, folder.recordings())):
+            remove(folder.path)
+            if isinstance(error, KeyboardInterrupt):
+                sys.stderr.write("tenbaud: stopped before the flight\n")
+        raise
+
+
+def removed_as_not_begun(folder: RunFolder, summary: Summary, code: ExitCode) -> bool:
+    """Remove the folder of a run that was refused or interrupted before its first sample, if it was."""
+    unfit = code in (ExitCode.USAGE, ExitCode.INTERRUPTED) and not summary.get("samples")
+    if unfit:
+        remove(folder.path)
+    return unfit
+
+
+def _holds_rows(path: Path) -> bool:
+    from tenbaud.recording.reader import MessageStream, rows_in_blocks
+
+    try:
+        wanted = {"tick": None, "sample": None}
+        return any(rows for block in rows_in_blocks(MessageStream(path), wanted) for rows in block)
+    except RecordingError:
+        return True  # not known
 
 
 def write_summary(folder: RunFolder, summary: Summary) -> None:
@@ -45,12 +89,12 @@ def write_summary(folder: RunFolder, summary: Summary) -> None:
     write_whole(folder.summary, json.dumps(summary, indent=2) + "\n")
 
 
-def draw_figure(folder: RunFolder, title: str) -> None:
+def draw_figure(folder: RunFolder, title: str, usual: Curve | None = None) -> None:
     """Draw the figure of a run from its recordings. Raises RecordingError and WriteError."""
     from tenbaud.recording.figure import draw_flight
 
     receiver = folder.receiver if folder.receiver.is_file() else None
-    draw_flight(folder.transmitter, receiver, folder.figure, title)
+    draw_flight(folder.transmitter, receiver, folder.figure, title, usual)
 
 
 def figure_title(config: FlightConfig, summary: Summary) -> str:

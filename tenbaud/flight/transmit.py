@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 
@@ -25,6 +26,9 @@ from transmitter.loops.flight import Flight
 from transmitter.loops.real import RealFlight
 from transmitter.loops.virtual import VirtualFlight
 from transmitter.session.session import Phase
+
+UPRIGHT = ("pendulum", "rotary pendulum")
+"""Pictures of plants whose last output is 0 upright."""
 
 
 def prepare(agreement: Agreement, recorder: Recorder | None, wire: Wire) -> TransmitterRun:
@@ -180,7 +184,17 @@ def flight_counts(run: TransmitterRun) -> FlightCounts:
         ticks=run.ticks,
         ticks_down=node.ticks_down,
         ticks_commanded=node.ticks_commanded,
+        fell=_fell(run),
     )
+
+
+def _fell(run: TransmitterRun) -> bool:
+    """Return whether the last angle of a pendulum, 0 upright, was ever beyond a right angle."""
+    flown = not run.node.rig.is_recorded and not run.agreement.config.transmitter.dry_run
+    if not flown or run.agreement.signals.picture not in UPRIGHT:
+        return False
+    scores = run.node.scores.outputs[-1]
+    return max(scores.largest, abs(scores.last or 0.0)) > math.pi / 2.0
 
 
 def _desync_outcome(run: TransmitterRun) -> Outcome | None:

@@ -1,7 +1,8 @@
 """Decides from counts whether a completed flight has really flown, and explains it.
 
 A process that came to the end of its flight has shown nothing by that. What counts is that samples were
-confirmed, that most of them brought a word, that the motors had commands, and that epochs lasted.
+confirmed, that most of them brought a word, that the controller worked, that the motors had commands,
+that epochs lasted, and that what should stand upright did.
 """
 
 from __future__ import annotations
@@ -22,6 +23,8 @@ DOWN_SHARE_MAX = 0.5
 """of the ticks, with the guard at the safe voltage or on its way there"""
 COMMANDED_SHARE_MIN = 0.1
 """of the ticks, with their own command"""
+BAD_COMMANDS_SHARE_MAX = 0.01
+"""of the commands that the controller was asked for"""
 REJOINS_MIN = 10
 EPOCH_SAMPLES_MIN = 20
 """This many rejoins, with fewer confirmed samples than this for each, are rejoins without end."""
@@ -33,6 +36,8 @@ class NotFlown(StrEnum):
     NEVER_LOCKED = "never locked"
     REJOINING = "rejoins without end"
     UNCONFIRMED = "too few samples confirmed"
+    CONTROLLER = "the controller failed"
+    FELL = "the plant fell"
     GUARD_DOWN = "guard down"
     NO_COMMANDS = "no commands in time"
     NO_WORDS = "no words"
@@ -52,6 +57,11 @@ class FlightCounts:
     """0: this end does not see the motors"""
     ticks_down: int = 0
     ticks_commanded: int = 0
+    bad_commands: int = 0
+    """ticks at which the controller failed; the transmitter knows of none"""
+    commands: int = 0
+    """that the controller was asked for"""
+    fell: bool = False
 
 
 def faults_of(counts: FlightCounts) -> tuple[NotFlown, ...]:
@@ -62,6 +72,8 @@ def faults_of(counts: FlightCounts) -> tuple[NotFlown, ...]:
         NotFlown.REJOINING: counts.rejoins >= REJOINS_MIN
         and confirmed < EPOCH_SAMPLES_MIN * counts.rejoins,
         NotFlown.UNCONFIRMED: confirmed < CONFIRMED_SHARE_MIN * counts.samples,
+        NotFlown.CONTROLLER: counts.bad_commands > BAD_COMMANDS_SHARE_MAX * counts.commands,
+        NotFlown.FELL: counts.fell,
         NotFlown.GUARD_DOWN: counts.ticks_down > DOWN_SHARE_MAX * ticks,
         NotFlown.NO_COMMANDS: counts.ticks_commanded < COMMANDED_SHARE_MIN * ticks,
         NotFlown.NO_WORDS: confirmed - counts.erased < WORDS_SHARE_MIN * confirmed,
@@ -116,6 +128,8 @@ def verdict_text(
             f"a command in time for {counts.ticks_commanded / counts.ticks:.0%} of the ticks"
         )
     reasons = ", ".join(f"{why} {number}" for why, number in asked.items())
+    if counts.bad_commands:
+        numbers.append(f"no command from the controller at {counts.bad_commands} ticks")
     numbers.append(f"{counts.rejoins} rejoins" + (f" (asked for: {reasons})" if reasons else ""))
     lines = [f"the flight did not fly ({', '.join(faults)}): " + ", ".join(numbers)]
     # One fault brings others with it: what to change follows from the first one that has an answer.
@@ -152,7 +166,15 @@ def _on_rejoins(one: Settings) -> str:
     )
 
 
+def _on_controller(_: Settings) -> str:
+    return (
+        "the last command was held at these ticks; `tenbaud inspect RUN` shows the first failure: a "
+        "command needs one finite value for each input, and an exception counts as none"
+    )
+
+
 ADVICE: Mapping[NotFlown, Callable[[Settings], str]] = {
+    NotFlown.CONTROLLER: _on_controller,
     NotFlown.NO_WORDS: _on_words,
     NotFlown.NO_COMMANDS: _on_commands,
     NotFlown.REJOINING: _on_rejoins,

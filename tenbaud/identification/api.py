@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from channel.codec.signals import Signals
 from plant_sim.identification.errors import IdentificationError
@@ -19,19 +17,23 @@ from plant_sim.identification.record import Record
 from plant_sim.identification.regression import Filters
 from tenbaud.build.signals import build_limits, configured_signals
 from tenbaud.config.load import given_names, load_config, nested
-from tenbaud.config.schema import FlightConfig
+from tenbaud.config.schema import FlightConfig, FlightLogSection
 from tenbaud.identification import written
+from tenbaud.identification.beside import TRUE, Beside, beside, true_values
+from tenbaud.identification.bits import Bits, run_bits
 from tenbaud.identification.closed_loop import with_commands
 from tenbaud.identification.coder import with_coder
 from tenbaud.identification.flown import Flown, fly_record
 from tenbaud.identification.run import Identified, Wanted, run
-from tenbaud.identification.sources import Source, from_log, from_rig
+from tenbaud.identification.sources import Source, from_arrays, from_bits, from_log, from_rig
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 EXCITATIONS = ("square:0.2,0,2.5", "square:0.25,0.1,3")
 DURATION_S = 60.0
+SHARED = ("limits.command_max", "limits.command_slew_per_s", "transmitter.encoders.")
+"""settings of a run that stay, as both ends know them"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +49,8 @@ class Request:
     fly: bool = True
     given: frozenset[str] = frozenset()
     """full names of the settings that a person gives; "preset" where one is named"""
+    from_bits: bool = False
+    """only what crossed the wire of a run may be used"""
 
 
 @dataclass(slots=True, eq=False)
@@ -59,6 +63,8 @@ class Each:
     """a whole configuration; empty where the data support no model, or no flight"""
     flown: Flown | None = None
     config_file: Path | None = None
+    beside: Beside = field(default_factory=dict)
+    """parameters to compare with, by where they are from; empty but for a run's bits"""
 
     @property
     def config(self) -> FlightConfig:
@@ -131,6 +137,7 @@ class Each:
             "excitation": found.regression.condition,
             "filter_bandwidth_rad_s": found.regression.filters.bandwidth_rad_s,
             "equilibrium_source": one.chosen.equilibrium,
+            "beside": self.beside,
             "notes": [*self.source.notes, *one.notes],
             "warnings": list(one.warnings),
             "not_supported": list(found.refused),
@@ -159,7 +166,7 @@ class Result:
 
         found = [one.identified for one in self.each]
         draw_excitation(found, [folder / "figure-3.png", folder / "figure-3.svg"])
-        true = _true_values(self.base) if self.simulated else None
+        true = true_values(self.base) if self.simulated else self.each[0].beside.get(TRUE)
         draw_estimates(found, [folder / "figure-4.png", folder / "figure-4.svg"], true)
         for index, one in enumerate(self.each):
             number = "" if index == 0 else f"-{index + 1}"
@@ -170,7 +177,10 @@ class Result:
 def _finish(one: Each, folder: Path, number: str, fly: bool) -> None:
     """Fly the record with the configured coder and with one fitted to it; write the better one."""
     readable = "file" in one.settings.get("flight_log", {})
-    if not readable and not str(folder).isprintable():
+    if one.source.bits is not None:
+        # Without measurements there is nothing to fly over.
+        fly = fly and readable
+    elif not readable and not str(folder).isprintable():
         # No configuration can name a file there.
         fly = False
     elif not readable:
@@ -179,7 +189,7 @@ def _finish(one: Each, folder: Path, number: str, fly: bool) -> None:
     if fly:
         one.flown = fly_record(one.settings)
         # An experiment that this command made shows the plant, and not what flights are like.
-        if not one.source.excited:
+        if not one.source.excited and one.source.bits is None:
             fitted, note = with_coder(one.settings)
             flown = one.flown if note else fly_record(fitted)
             if flown.error < one.flown.error:
@@ -191,13 +201,6 @@ def _finish(one: Each, folder: Path, number: str, fly: bool) -> None:
     written.write(one.config_file, one.settings, one.identified, said)
 
 
-def _true_values(config: FlightConfig) -> tuple[float, ...]:
-    from tenbaud.build.rig import nominal_plant
-
-    plant = nominal_plant(config).mismatched(config.transmitter.plant.mismatch)
-    return plant.rate_damping_per_s, plant.stiffness_per_s2, plant.torque_gain_rad_per_v_s2
-
-
 def sources_of(
     config: FlightConfig,
     source: Path | None,
@@ -206,6 +209,13 @@ def sources_of(
     duration_s: float | None = None,
 ) -> list[Source]:
     """Return the records: of the excited rig, of a run, or of a log."""
+    if request.from_bits:
+        if source is None or request.given:
+            raise IdentificationError(
+                "--from-bits takes the folder of a run, and all settings from it: give a folder and "
+                f"leave out {', '.join(sorted(request.given)) or 'what is no folder'}"
+            )
+        return [from_bits(source)]
     if source is None:
         rest = config.transmitter.plant.model_copy(
             update={"initial": getattr(config.model, "equilibrium_rad", 0.0)}
@@ -230,6 +240,9 @@ def identify_sources(config: FlightConfig, sources: Sequence[Source], request: R
     """Identify every record, and work out the settings that fly it."""
     each = []
     for source in sources:
+        if source.bits is not None:
+            each.append(_from_bits(source, source.bits, request))
+            continue
         record, dropped = with_commands(source.record)
         told = [f"{name}: a set-point, which moves no plant: left out" for name in dropped]
         source = replace(source, record=record, dropped=dropped, notes=(*source.notes, *told))
@@ -242,6 +255,17 @@ def identify_sources(config: FlightConfig, sources: Sequence[Source], request: R
             one = replace(one, warnings=(*one.warnings, slow))
         each.append(Each(one, source, settings))
     return Result(each, config, sources[0].excited)
+
+
+def _from_bits(source: Source, bits: Bits, request: Request) -> Each:
+    lag_s = None if request.lag == "auto" else _lag(request.lag)
+    one = run_bits(source.name, bits, request.structure, request.equilibrium, lag_s)
+    config, settings = bits.config, {}
+    if one.supported:
+        log = FlightLogSection(file="" if source.file is None else str(source.file))
+        config = config.model_copy(update={"flight_log": log})
+        settings = written.settings(config, one, source, SHARED)
+    return Each(one, source, settings, beside=beside(bits, one.found, source.file))
 
 
 def _as_pitch(record: Record, signals: Signals) -> Record:
@@ -259,10 +283,7 @@ def _wanted(config: FlightConfig, source: Source, request: Request) -> Wanted:
     excited = source.excited
     lag_s: float | None = None
     if request.lag != "auto":
-        with suppress(ValueError):
-            lag_s = float(request.lag)
-        if lag_s is None or not 0.0 <= lag_s < math.inf:
-            raise IdentificationError(f"--lag {request.lag}: give auto or seconds")
+        lag_s = _lag(request.lag)
     elif "model.motor_lag_s" in request.given or (excited and config.transmitter.rig == "simulated"):
         # What a preset says is of the preset's plant.
         lag_s = getattr(config.model, "motor_lag_s", None)
@@ -295,6 +316,13 @@ def _wanted(config: FlightConfig, source: Source, request: Request) -> Wanted:
     )
 
 
+def _lag(text: str) -> float:
+    with suppress(ValueError):
+        if 0.0 <= (lag_s := float(text)) < math.inf:
+            return lag_s
+    raise IdentificationError(f"--lag {text}: give auto or seconds")
+
+
 def identify(
     source: str | Path | Mapping[str, ArrayLike],
     *,
@@ -311,13 +339,15 @@ def identify(
     settings: Mapping[str, Any] | None = None,
     out: str | Path | None = None,
     fly: bool = True,
+    from_bits: bool = False,
 ) -> Each:
     """Identify a plant from a file or from arrays, and return its model and its configuration.
 
     `source` is the path of a log or of a run folder, or a table of arrays by name, of which `outputs`
     and `inputs` name the signals and `tick_s` is the time between two rows. The other arguments are
-    those of `tenbaud identify`: `structure`, `lag`, `equilibrium`, `bandwidth_rad_s`; `settings` are
-    fields by their full names, `{"flight_log.columns": {"angle": "pitch_deg"}, ...}`.
+    those of `tenbaud identify`: `structure`, `lag`, `equilibrium`, `bandwidth_rad_s`; with `from_bits`,
+    only what crossed the wire of a run is used. `settings` are fields by their full names,
+    `{"flight_log.columns": {"angle": "pitch_deg"}, ...}`.
 
     The result has `estimates`, `deviations`, `warnings`, `refused`, the section `model` and, where the
     data support a model, `config`. With `out`, a new folder, figures and `identified.toml` are written,
@@ -329,47 +359,12 @@ def identify(
     loaded = load_config(preset, path, over)
     given = frozenset(given_names(path, over) | ({"preset"} if preset else set()))
     request = Request(structure, str(lag), str(equilibrium), bandwidth_rad_s, fly=fly, given=given)
+    request = replace(request, from_bits=from_bits)
     if isinstance(source, Mapping):
-        sources = [_of_arrays(source, tuple(outputs), tuple(inputs), tick_s, units or {})]
+        sources = [from_arrays(source, tuple(outputs), tuple(inputs), tick_s, units or {})]
     else:
         sources = sources_of(loaded, Path(source), request)
     result = identify_sources(loaded, sources, request)
     if out is not None:
         result.save(create_run_folder(None, "identify", Path(out)), fly=fly)
     return result.each[0]
-
-
-def _of_arrays(
-    arrays: Mapping[str, ArrayLike],
-    outputs: tuple[str, ...],
-    inputs: tuple[str, ...],
-    tick_s: float | None,
-    units: Mapping[str, str],
-) -> Source:
-    if tick_s is None or not outputs:
-        raise IdentificationError(
-            "arrays need tick_s, the time between two rows, and outputs=(name, ...)"
-        )
-    missing = [name for name in (*outputs, *inputs) if name not in arrays]
-    if missing:
-        raise IdentificationError(f"no array is called {missing[0]}; there are {', '.join(arrays)}")
-    columns = {name: np.asarray(arrays[name], dtype=np.float64) for name in (*outputs, *inputs)}
-    lengths = {values.shape for values in columns.values()}
-    if len(lengths) != 1 or len(next(iter(lengths))) != 1:
-        raise IdentificationError(
-            f"the arrays differ in shape: {sorted(lengths)}; give vectors of one length"
-        )
-    from tenbaud.log.angles import step_of
-
-    rows = len(columns[outputs[0]])
-    record = Record(
-        tick_s,
-        np.stack([columns[name] for name in outputs], axis=1),
-        np.stack([columns[name] for name in inputs], axis=1) if inputs else np.empty((rows, 0)),
-        outputs,
-        inputs,
-        tuple(units.get(name, "") for name in outputs),
-        tuple(units.get(name, "") for name in inputs),
-        tuple(step_of(columns[name]) for name in outputs),
-    )
-    return Source("arrays", record)

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from channel.codec.signals import Signals
 from plant_sim.identification.errors import IdentificationError
@@ -13,8 +16,13 @@ from plant_sim.identification.record import Record
 from tenbaud.build.rig import build_rig
 from tenbaud.build.signals import build_encoders, configured_signals, encoder_steps
 from tenbaud.config.schema import FlightConfig, FlightLogSection
+from tenbaud.identification.bits import Bits, read_bits
 from tenbaud.identification.structure import SPEEDS
+from tenbaud.log.angles import step_of
 from tenbaud.log.table import LogError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
 
 ALIASES = ("angle", "output", "input", "time", "index", "front", "rear")
 
@@ -31,6 +39,8 @@ class Source:
     """set-points in the file, which are no inputs"""
     excited: bool = False
     """the configured rig moved as this command made it"""
+    bits: Bits | None = None
+    """what crossed the wire of the run, where nothing else may be used"""
 
 
 def from_rig(config: FlightConfig, excitation: str, duration_s: float) -> Record:
@@ -83,6 +93,49 @@ def from_log(
     return record, log.notes
 
 
+def from_bits(path: Path) -> Source:
+    """Return what crossed the wire of a run; its file is named where it holds measurements too."""
+    bits = read_bits(path)
+    measured = "transmitter" in bits.ends
+    note = () if measured else ("the run holds no measurements, so nothing can be flown over them",)
+    return Source(path.name, bits.record(), note, path if measured else None, bits=bits)
+
+
+def from_arrays(
+    arrays: Mapping[str, ArrayLike],
+    outputs: tuple[str, ...],
+    inputs: tuple[str, ...],
+    tick_s: float | None,
+    units: Mapping[str, str],
+) -> Source:
+    """Return the record in a table of arrays; IdentificationError where they are none of one."""
+    if tick_s is None or not outputs:
+        raise IdentificationError(
+            "arrays need tick_s, the time between two rows, and outputs=(name, ...)"
+        )
+    missing = [name for name in (*outputs, *inputs) if name not in arrays]
+    if missing:
+        raise IdentificationError(f"no array is called {missing[0]}; there are {', '.join(arrays)}")
+    columns = {name: np.asarray(arrays[name], dtype=np.float64) for name in (*outputs, *inputs)}
+    lengths = {values.shape for values in columns.values()}
+    if len(lengths) != 1 or len(next(iter(lengths))) != 1:
+        raise IdentificationError(
+            f"the arrays differ in shape: {sorted(lengths)}; give vectors of one length"
+        )
+    rows = len(columns[outputs[0]])
+    record = Record(
+        tick_s,
+        np.stack([columns[name] for name in outputs], axis=1),
+        np.stack([columns[name] for name in inputs], axis=1) if inputs else np.empty((rows, 0)),
+        outputs,
+        inputs,
+        tuple(units.get(name, "") for name in outputs),
+        tuple(units.get(name, "") for name in inputs),
+        tuple(step_of(columns[name]) for name in outputs),
+    )
+    return Source("arrays", record)
+
+
 def _own_signals(config: FlightConfig, structure: str) -> bool:
     """Return whether a log's signals are its own, and not those of the configured model."""
     if structure:
@@ -93,12 +146,12 @@ def _own_signals(config: FlightConfig, structure: str) -> bool:
     log = with_file_beside(config.flight_log)
     signals = configured_signals(config)
     known = {one.name for one in (*signals.outputs, *signals.inputs)}
-    named = {*log.columns, *log.outputs, *log.inputs}
-    named -= {*known, *ALIASES, *(f"out:{name}" for name in known), *(f"in:{name}" for name in known)}
+    named = {name.removeprefix("out:").removeprefix("in:") for name in log.columns}
+    named -= {*known, *ALIASES}
     if not all(name.isdigit() for name in named):
         return True
-    given = log.columns or log.outputs
-    return config.model.kind == "pitch" and not given and not log.join and _is_no_angle(log, signals)
+    given = log.columns or log.join
+    return config.model.kind == "pitch" and not given and _is_no_angle(log, signals)
 
 
 class _Seen(LogError):

@@ -12,7 +12,6 @@ import numpy as np
 from plant_sim.identification.filters import low_pass
 from plant_sim.identification.record import Record
 from plant_sim.identification.structures import LinearStructure, StateSpace
-from tenbaud.build.signals import TURNS
 from tenbaud.config.load import OWN, load_config, merged, merged_values, toml_text
 from tenbaud.config.schema import FlightConfig
 from tenbaud.design.complete import completed
@@ -21,6 +20,7 @@ from tenbaud.design.systems import Matrices, Names
 from tenbaud.files.whole import whole_file, write_whole
 from tenbaud.identification.run import Identified, model_section
 from tenbaud.identification.sources import Source
+from tenbaud.log.units import turn_in
 
 WHOLE = 1e-6
 DENSITY_LEAST = 1e-3
@@ -68,6 +68,8 @@ def settings(
         values["flight_log"] = {**log, "file": str(source.file.resolve())}
     if isinstance(one.found.structure, LinearStructure):
         return _linear(one, values)
+    if source.bits is not None:
+        values["coder"] = config.coder.model_dump(mode="json", exclude_unset=True, exclude_none=True)
     # What the plant of a simulated flight is like is not known better than its model.
     return {"preset": config.preset, **values, "model": model_section(one.found)}
 
@@ -92,7 +94,7 @@ def _encoders(record: Record) -> dict[str, Any]:
     """Return the encoders whose steps the file shows."""
     found: dict[str, Any] = {}
     for name, unit, step in zip(record.output_names, record.output_units, record.steps, strict=True):
-        turn = TURNS.get(unit)
+        turn = turn_in(unit)
         if step and turn is None:
             found[name] = {"counts_per_unit": 1.0 / step}
         elif step and turn is not None and 2 <= round(turn / step) <= 10_000_000:
@@ -143,7 +145,7 @@ def _linear(one: Identified, values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _densities(one: Identified, space: StateSpace, period_s: float) -> list[float]:
-    """Return q of each equation's disturbance: what the regression leaves unexplained."""
+    """Return q of each equation's disturbance: as found, or what the regression leaves unexplained."""
     filters = one.found.regression.filters
     polynomial = low_pass(one.found.structure.order, filters.bandwidth_rad_s, filters.damping)
     # The filter's noise bandwidth: integral of |H|^2 over all frequencies in Hz.
@@ -153,10 +155,13 @@ def _densities(one: Identified, space: StateSpace, period_s: float) -> list[floa
     width = float(np.trapezoid(np.abs(response) ** 2, omega) / math.tau)
     largest = np.abs(one.record.inputs).max(axis=0)
     found = []
-    for index, estimate in enumerate(one.found.regression.estimates):
+    densities = one.found.densities or [
+        estimate.residual**2 / width for estimate in one.found.regression.estimates
+    ]
+    for index, density in enumerate(densities):
         pushed = float(np.abs(space.B[(index + 1) * one.found.structure.order - 1]) @ largest)
         least = (DENSITY_LEAST * max(pushed, 1e-9)) ** 2 * period_s
-        found.append(float(f"{max(estimate.residual**2 / width, least):.3g}"))
+        found.append(float(f"{max(density, least):.3g}"))
     return found
 
 
@@ -193,8 +198,6 @@ def write_record(path: Path, record: Record) -> dict[str, Any]:
     units = zip(roles, (*record.output_units, *record.input_units), strict=True)
     return {
         "file": str(path.resolve()),
-        "time": "time",
-        "outputs": {name: name for name in record.output_names},
-        "inputs": {name: name for name in record.input_names},
+        "columns": {"time": "time", **dict(zip(roles, names[1:], strict=True))},
         "units": {"time": "s", **{role: unit for role, unit in units if unit}},
     }

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from plant_sim.encoder import EXACT_PER_UNIT, Encoder, OutputReader
 from tenbaud.log.table import Array
+from tenbaud.log.units import turn_in
 
 JUMP = 0.75
 """Share of a turn from which a step between two rows is the seam of a wrapped angle."""
@@ -108,4 +109,4 @@ def turn_of(unit: str, encoder: OutputReader | None) -> float | None:
     if unit == "counts":
         full = isinstance(encoder, Encoder) and encoder.turn in (math.tau, 360.0)
         return encoder.counts_per_turn if full and isinstance(encoder, Encoder) else None
-    return {"rad": math.tau, "deg": 360.0, "turn": 1.0}.get(unit)
+    return turn_in(unit) if unit else None

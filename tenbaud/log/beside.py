@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from tenbaud.config.deprecated import with_current_names
 from tenbaud.config.load import ConfigError, checked, read_toml, toml_text
 from tenbaud.config.schema import FlightLogSection
 from tenbaud.files.whole import write_whole
@@ -16,7 +17,7 @@ def with_file_beside(section: FlightLogSection) -> FlightLogSection:
     if not path.is_file():
         return section
     try:
-        given = read_toml(path)
+        given = with_current_names({"flight_log": read_toml(path)}, str(path))["flight_log"]
         checked({"flight_log": given}, path)
     except ConfigError as error:
         raise LogError(str(error)) from error

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from channel.flight_log import FlightLog
 from tenbaud.config.schema import FlightLogSection
 from tenbaud.log.beside import with_file_beside
 from tenbaud.log.clock import GAP, shown
-from tenbaud.log.join import read_joined
+from tenbaud.log.join import table_of
 from tenbaud.log.look import Look, looks_of
 from tenbaud.log.read import read_log
 from tenbaud.log.reader import read_table
@@ -136,12 +137,8 @@ class Description:
 def describe(section: FlightLogSection) -> tuple[Description, Table]:
     """Return what is said about the log of a section, and its columns. LogError: it holds no table."""
     section = with_file_beside(section)
-    if section.join:
-        time = section.columns.get("time", section.time)
-        unit = section.units.get("time", "")
-        table, _ = read_joined((section.file, *section.join), read_table, time, unit, None)
-    else:
-        table = read_table(section.file)
+    kept = cache(read_table)
+    table, _ = table_of(section, lambda path, _: kept(path))
     looks = looks_of(table)
     suggestion = suggest(section, table, looks)
     section = suggestion.section
@@ -151,7 +148,7 @@ def describe(section: FlightLogSection) -> tuple[Description, Table]:
     ]
     log, problem = None, ""
     try:
-        log = read_log(section, None, table=table)
+        log = read_log(section, None, read=lambda path, wanted: kept(path).only(wanted))
     except LogError as error:
         problem = str(error).removeprefix(section.file).lstrip(",: ")
     found = Description(

@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from tenbaud.config.schema import FlightLogSection
 from tenbaud.log.clock import GAP, seconds_in, shown, without_unit
+from tenbaud.log.reader import Reader
 from tenbaud.log.table import Array, LogError, Table, Wanted, find_column, listed
 from tenbaud.log.units import CLOCK_WORDS, DATE_TIME, stem_of
 
@@ -19,21 +21,21 @@ SEAM = 0.5
 """Share of a column's range from which a step between two rows is not interpolated."""
 
 
-def read_joined(
-    paths: Sequence[str | Path],
-    read: Callable[[Path], Table],
-    time: str,
-    unit: str,
-    wanted: Wanted | None,
+def table_of(
+    section: FlightLogSection,
+    read: Reader,
+    wanted: Wanted | None = None,
     held: Callable[[], Sequence[int | None]] = lambda: (),
 ) -> tuple[Table, tuple[str, ...]]:
-    """Return the columns of all files at the times of the first, and what was done for people.
+    """Return the columns of a log, of all its files at the times of the first, and what was done.
 
-    A column whose name an earlier file has gets the name of its file before it. `time` is the clock
-    of every file, "" where its name says so, `unit` its unit, "" where the files say so. `held` gives
+    A column whose name an earlier file has gets the name of its file before it. `held` gives
     the places of columns that hold their value until the next row, once `wanted` has chosen.
     """
-    tables = [read(Path(path)) for path in paths]
+    if not section.join:
+        return read(section.file, wanted), ()
+    tables = [read(path, None) for path in (section.file, *section.join)]
+    time, unit = (names.get("time", "") for names in (section.columns, section.units))
     first = tables[0]
     clocks = [_clock(table, time, unit) for table in tables]
     names, units, sources = _all_columns(tables, [place for place, _ in clocks])

@@ -10,7 +10,7 @@ import numpy as np
 
 from tenbaud.log.angles import step_of, unwrapped
 from tenbaud.log.table import Array, Table
-from tenbaud.log.units import COUNTS, is_speed, unit_named
+from tenbaud.log.units import COUNTS, is_speed, turn_in, unit_named
 
 LEVELS_MAX = 8
 """Different values of a command that switches between levels."""
@@ -23,7 +23,7 @@ RATE_MATCH = 0.95
 ROWS_MAX = 200_000
 """Looked at where the first rows say enough."""
 RADIANS_MAX = 30.0
-TURNS = {"deg": 360.0, "rad": math.tau}
+TURNS = {unit: turn_in(unit) or 1.0 for unit in ("deg", "rad")}
 KINDS = {
     **dict.fromkeys(("rad", "deg", "turn", "mrad"), "angle"),
     **dict.fromkeys(("rad/s", "deg/s", "rpm"), "rate"),

@@ -66,17 +66,16 @@ def _of_ticks(path: Path, recording: Recording, wanted: Wanted | None) -> Table:
     names = ["tick", *(one.column for _, one in signals)]
     units = ["", *(one.unit for _, one in signals)]
     roles = {"index": "tick"} | {f"{kind}:{one.name}": one.column for kind, one in signals}
-    places = range(len(names)) if wanted is None else wanted(names, units, roles)
     return Table(
         str(path),
         f"recorded flight, ticks of {period_s:g} s, outputs as measured and inputs as applied",
-        tuple([names[place] for place in places]),
-        tuple([units[place] for place in places]),
-        tuple([columns[place][whole] for place in places]),
+        tuple(names),
+        tuple(units),
+        tuple([column[whole] for column in columns]),
         place=lambda row: f"tick {ticks[whole][row]:.0f}",
         period_s=period_s,
         roles=roles,
-    )
+    ).only(wanted)
 
 
 def read_json(path: Path, wanted: Wanted | None = None) -> Table:

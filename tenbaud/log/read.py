@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -14,8 +14,8 @@ from tenbaud.config.schema import FlightLogSection
 from tenbaud.log.angles import counts_of, step_of, turn_of, unwrapped, values_of, without_spikes
 from tenbaud.log.beside import with_file_beside
 from tenbaud.log.clock import Clock, by_index, by_period, by_time, counts_rows, has_fractions
-from tenbaud.log.join import read_joined
-from tenbaud.log.reader import read_table
+from tenbaud.log.join import table_of
+from tenbaud.log.reader import Reader, read_table
 from tenbaud.log.roles import Chosen, Roles
 from tenbaud.log.table import Array, LogError, Table
 from tenbaud.log.units import (
@@ -46,14 +46,13 @@ def read_log(
     signals: Signals | None,
     encoders: tuple[OutputReader, ...] = (),
     tick_s: float | None = None,
-    table: Table | None = None,
+    read: Reader = read_table,
 ) -> Log:
     """Return the log that a section names, in the units of `signals`.
 
     Without signals they are the file's own: those that the section names, or guessed from the
     columns. `encoders` read the outputs; `tick_s` is the time between rows where neither file nor
-    section say it. `table` is the whole of a file that is not joined, if it was read before. LogError
-    names file, line, column and the next step.
+    section say it. `read` is what reads a file. LogError names file, line, column and the next step.
     """
     if not section.file:
         raise LogError("flight_log.file names no recording; give --rig replay:FILE")
@@ -61,23 +60,14 @@ def read_log(
     roles = Roles(section.file, section, signals)
     chosen: list[Chosen] = []
 
-    def wanted(names: object, units: object, known: object) -> list[int]:
-        chosen.append(roles.choose(names, units, known))  # type: ignore[arg-type]
+    def wanted(*columns: Any) -> list[int]:
+        chosen.append(roles.choose(*columns))
         return chosen[-1].places
 
-    notes: tuple[str, ...] = ()
-    if section.join:
-        time = section.columns.get("time", section.time)
-        table, notes = read_joined(
-            (section.file, *section.join),
-            read_table,
-            time,
-            section.units.get("time", ""),
-            wanted,
-            lambda: [place for _, place in chosen[-1].inputs],
-        )
-    else:
-        table = read_table(section.file, wanted) if table is None else table.only(wanted)
+    def held() -> list[int | None]:
+        return [place for _, place in chosen[-1].inputs]
+
+    table, notes = table_of(section, read, wanted, held)
     return _Reading(table, chosen[-1], roles, encoders, tick_s, notes).log()
 
 
@@ -135,9 +125,7 @@ class _Reading:
         )
 
     def _has_inputs(self) -> bool:
-        named = bool(self.section.inputs) or any(
-            self.roles.role(name, "").startswith("in:") for name in self.section.columns
-        )
+        named = any(self.roles.role(name, "").startswith("in:") for name in self.section.columns)
         return named or any(place is not None for _, place in self.chosen.inputs)
 
     def _clock(self) -> Clock:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from tenbaud.log.table import LogError, Table, Wanted
 
+Reader = Callable[[str | Path, Wanted | None], Table]
 MCAP_MAGIC = b"\x89MCAP0\r\n"
 EXPORTED = ("flight.csv", "flight.parquet")
 """What a folder that `tenbaud convert` wrote holds."""

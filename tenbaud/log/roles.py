@@ -82,16 +82,13 @@ class Roles:
             except LogError:
                 self.notes.append(f"column {column}: left out, {role} is no signal of the model")
         if section.period_s is not None:
-            if section.time or "time" in section.columns:
+            if "time" in section.columns:
                 raise LogError(
                     f"{self.path}: both a clock and a period are given; leave out --period, or say "
                     "that the column counts the rows (--columns index=NAME)"
                 )
             if "time" in found:  # as the format suggests; at most it counts the rows
                 found["index"] = found.pop("time")
-        found |= {name: getattr(section, name) for name in CLOCKS if getattr(section, name)}
-        found |= {self.role(name, "out"): column for name, column in section.outputs.items()}
-        found |= {self.role(name, "in"): column for name, column in section.inputs.items()}
         return found | {self.role(name, ""): column for name, column in section.columns.items()}
 
     def role(self, name: str, kind: str) -> str:

@@ -65,8 +65,10 @@ class Table:
         """Return the place of a column by name or number."""
         return find_column(self.path, self.names, wanted)
 
-    def only(self, wanted: Wanted) -> Table:
-        """Return the table with the wanted columns alone."""
+    def only(self, wanted: Wanted | None) -> Table:
+        """Return the table with the wanted columns alone; with all of them where nothing chooses."""
+        if wanted is None:
+            return self
         places = wanted(self.names, self.units, self.roles)
         return replace(
             self,

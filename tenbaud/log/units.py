@@ -91,6 +91,11 @@ def bare_name(name: str) -> str:
     return split_unit(name)[0]
 
 
+def turn_in(unit: str) -> float | None:
+    """Return the length of a turn in the unit of an output, "" for rad; None where it has no turns."""
+    return factor("turn", unit or "rad")
+
+
 def factor(unit: str, into: str) -> float | None:
     """Return what a value in `unit` is multiplied by to be in `into`; None: it cannot be."""
     unit, into = unit_named(unit) or unit, unit_named(into) or into

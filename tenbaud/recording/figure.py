@@ -24,6 +24,7 @@ from tenbaud.recording.overview import (
     marks_of,
     unpacked,
 )
+from tenbaud.recording.pose import draw_poses, poses_of
 from tenbaud.recording.reader import MessageStream, rows_in_blocks, stored_metadata
 from tenbaud.recording.rows import Row
 from tenbaud.recording.style import FAINT, LINE_A, LINE_B, LINE_C, legend_above, new_figure
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 
 ERASURE_COLOUR = "#d01c1f"
 FLIP_COLOUR = "#8e3fb0"
+USUAL_COLOUR = "#f0a000"
 REJOIN_COLOUR = "#2a8c4a"
 COLOURS = (LINE_B, LINE_C, "#2a8c4a", "#8e3fb0", LINE_A, "#b08a00")
 """Of several outputs or inputs in one panel."""
@@ -63,6 +65,8 @@ class _Flight:
     """of each output: which symbols were about it, or their share; nothing where that is not known"""
     cuts_s: list[tuple[float, float]]
     """times in which nothing was to pass, on purpose"""
+    usual: Curve | None = None
+    """the first output over 1000 bit/s"""
 
     @property
     def live_is_coded(self) -> bool:
@@ -75,19 +79,28 @@ class _Flight:
         return any(not np.isnan(self.curves[name][place][1]).all() for place in places)
 
 
-def draw_flight(transmitter: Path, receiver: Path | None, output: Path, title: str) -> None:
+def draw_flight(
+    transmitter: Path, receiver: Path | None, output: Path, title: str, usual: Curve | None = None
+) -> None:
     """Draw a flight that was just flown into the PNG file `output`.
 
+    `usual` is its first output over 1000 bit/s.
     An output is the true one where the rig knows it, else the measured one; the errors are taken
     from it. The receiver's recording adds the reference. Raises RecordingError if the
     transmitter's recording holds no flight.
     """
-    figure = draw_run(transmitter, receiver, title, own=True)
+    figure = draw_run(transmitter, receiver, title, True, usual)
     with whole_file(output) as stream:
         figure.savefig(stream, dpi=150, format="png")
 
 
-def draw_run(transmitter: Path | None, receiver: Path | None, title: str, own: bool = False) -> Figure:
+def draw_run(
+    transmitter: Path | None,
+    receiver: Path | None,
+    title: str,
+    own: bool = False,
+    usual: Curve | None = None,
+) -> Figure:
     """Return the same as a matplotlib figure. Raises RecordingError without a transmitter's file.
 
     `own`: the recordings were made just now, and what they store for the figure is trusted.
@@ -97,7 +110,7 @@ def draw_run(transmitter: Path | None, receiver: Path | None, title: str, own: b
             "There is no transmitter's recording here, and what was measured is recorded there. Give "
             "the folder of the transmitter's run."
         )
-    flight = _read_flight(transmitter, receiver, own)
+    flight = _read_flight(transmitter, receiver, own, usual)
     drawn = _panels(flight)
     ratios = [ratio for ratio, _, _ in drawn]
     height = (0.9 + sum(ratios)) / len(drawn)
@@ -130,9 +143,10 @@ def _panels(flight: _Flight) -> list[tuple[float, str, _Draw]]:
         )
     ][:DRAWN_MAX]
     height = 3.0 if len(values) == 1 else 2.2
-    found: list[tuple[float, str, _Draw]] = [
-        (height, _plain(label), partial(_draw_values, places=places)) for label, places in values
-    ]
+    found: list[tuple[float, str, _Draw]] = []
+    if poses_of(plant.picture, len(plant.outputs)):
+        found.append((1.6, "", _draw_poses))
+    found += [(height, _plain(label), partial(_draw_values, places=places)) for label, places in values]
     for name, height, curve, draw in (
         ("error", 2.0, "error_coded", _draw_errors),
         (r"range $M_k$", 1.6, "range", partial(_draw_steps, curve="range")),
@@ -161,7 +175,7 @@ def _plain(label: str) -> str:
     return label.replace("$", r"\$")
 
 
-def _read_flight(transmitter: Path, receiver: Path | None, own: bool) -> _Flight:
+def _read_flight(transmitter: Path, receiver: Path | None, own: bool, usual: Curve | None) -> _Flight:
     overview, metadata = _read_overview(transmitter, own)
     plant = overview.plant
     times_s = overview.curves["value"][0].curve()[0] if plant.outputs else np.zeros(0)
@@ -182,6 +196,7 @@ def _read_flight(transmitter: Path, receiver: Path | None, own: bool) -> _Flight
         overview.symbols.thinned,
         _about(overview),
         _cuts(metadata.get("impairments", ""), times_s[-1]),
+        usual,
     )
 
 
@@ -243,6 +258,8 @@ def _draw_values(panel: Axes, flight: _Flight, places: list[int]) -> None:
         kinds.append(_Kind("live", "live estimate", LINE_C))
         kinds.append(_Kind("coded", "coded estimate", LINE_B))
     _draw_curves(panel, flight, flight.plant.outputs, places, kinds)
+    if flight.usual is not None and 0 in places:
+        panel.plot(*flight.usual, "--", color=USUAL_COLOUR, linewidth=1.2, label="over 1000 bit/s")
     for index, (start_s, end_s) in enumerate(flight.cuts_s):
         label = "line cut" if index == 0 else ""
         panel.axvspan(start_s, end_s, color=ERASURE_COLOUR, alpha=0.12, linewidth=0, label=label)
@@ -260,6 +277,14 @@ def _draw_values(panel: Axes, flight: _Flight, places: list[int]) -> None:
                 "markersize": 5,
             }
             panel.plot(times_s, low, transform=across, clip_on=False, label=name, **style)
+    legend_above(panel, 7)
+
+
+def _draw_poses(panel: Axes, flight: _Flight) -> None:
+    true, estimated = (
+        np.array([values for _, values in flight.curves[one]]) for one in ("value", "coded")
+    )
+    draw_poses(panel, flight.plant.picture, flight.curves["value"][0][0].tolist(), true, estimated)
     legend_above(panel, 7)
 
 

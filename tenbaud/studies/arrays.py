@@ -16,7 +16,7 @@ from tenbaud.build.ends import guard_settings
 from tenbaud.build.flight import Agreement
 from tenbaud.build.references import reference_of, reference_sections
 from tenbaud.build.signals import build_encoders
-from tenbaud.config.schema import ReferenceSection
+from tenbaud.config.controllers import ReferenceSection
 from tenbaud.studies.flight_data import Work
 from transmitter.encoder_watch import motion_of
 from transmitter.session.state_observer import StateObserver
@@ -112,14 +112,14 @@ def targets_of(agreement: Agreement, ticks: int, replay: bool) -> Any:
     tick_s, fields = agreement.config.timing.tick_s, set(ReferenceSection.model_fields)
     for place, (output, section) in enumerate(reference_sections(agreement.config, agreement.signals)):
         if section is not None and not replay:
-            targets[:, place] = _values(section.model_dump_json(include=fields), tick_s, output, ticks)
+            targets[:, place] = _values(section.as_text(include=fields), tick_s, output, ticks)
     return targets
 
 
 @lru_cache(maxsize=64)
 def _values(section: str, tick_s: float, output: Signal, ticks: int) -> Any:
     """Return the set-point of every tick; the section as JSON, so that it can be remembered."""
-    reference = reference_of(ReferenceSection.model_validate_json(section), tick_s, output)
+    reference = reference_of(ReferenceSection.of_text(section), tick_s, output)
     return np.array([reference.value(tick) for tick in range(ticks)])
 
 

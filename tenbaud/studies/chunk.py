@@ -36,9 +36,7 @@ def task_of(study: Study, index: int) -> ChunkTask:
     for number in study.chunk(index):
         point, seed = study.flight(number)
         by_point.setdefault(point, []).append(seed)
-    points = tuple(
-        (study.configs[point].model_dump_json(), tuple(seeds)) for point, seeds in by_point.items()
-    )
+    points = tuple((study.configs[point].as_text(), tuple(seeds)) for point, seeds in by_point.items())
     return ChunkTask(index, study.file.engine, points, sources_digest())
 
 
@@ -52,7 +50,7 @@ def fly_chunk(task: ChunkTask) -> ChunkResult:
     figures: list[FlightFigures] = []
     for text, seeds in task.points:
         # What the study names was allowed, or refused, in the process that read it.
-        config = FlightConfig.model_validate_json(text).allowing_code()
+        config = FlightConfig.of_text(text).allowing_code()
         figures += fly_point(config, seeds, task.engine)
     return ChunkResult(task.chunk, figures)
 

@@ -29,7 +29,7 @@ from channel.errors import TenbaudError
 
 PACKAGES = ("channel", "plant_sim", "receiver", "transmitter", "tenbaud")
 
-OPTIONS = {"fastmath": False, "error_model": "python", "nogil": True}
+OPTIONS = {"fastmath": False, "error_model": "python", "nogil": True, "no_cfunc_wrapper": True}
 """How everything is compiled: divisions by zero are errors and nothing is reordered, as in Python. No
 memory is allocated, and so none is counted, but where a function says so."""
 
@@ -40,12 +40,16 @@ SOURCES = (
 """Packages that the figures of a flight depend on."""
 
 BESIDE = (
-    *("constants.py", "judging.py", "tuning.py", "records.py", "bench.py"),
-    *("families.py", "quick.py", "search.py"),
-    *("plots.py", "run.py", "table.py", "study.py", "study_file.py", "points.py", "settings.py"),
-    "progress.py",
+    "channel/links/endpoints.py",
+    *(
+        f"tenbaud/studies/{name}.py"
+        for name in (
+            *("constants", "judging", "tuning", "records", "bench", "families", "quick", "search"),
+            *("plots", "run", "table", "study", "study_file", "points", "settings", "progress"),
+        )
+    ),
 )
-"""Modules of the studies that no figure of a flight depends on."""
+"""Modules that no figure of a flight depends on."""
 
 Parts = tuple[tuple[str, Any], ...]
 """Replacements for the placeholders of the flight: (name, compiled function, or a number)."""
@@ -67,12 +71,15 @@ def require(*modules: str) -> None:
 
 @cache
 def compiled(
-    function: Callable[..., Any], parts: Parts = (), inline: bool = False, allocates: bool = False
+    function: Callable[..., Any],
+    parts: Parts = (),
+    allocates: bool = False,
+    inner: bool = False,
 ) -> Any:
     """Return a function of this project, compiled, with all of ours that it calls.
 
-    `parts` replace names in functions of the studies, which are put into their caller (`inline`).
-    `allocates`: they make lists.
+    `parts` replace names in functions of the studies; these are kept on disk within the flight alone.
+    `allocates`: they make lists; `inner`: only compiled functions call this one.
     """
     if not isinstance(function, FunctionType):
         raise TypeError(f"{function!r} is no plain function and cannot be compiled")
@@ -83,23 +90,22 @@ def compiled(
             continue
         package, _, rest = value.__module__.partition(".")
         if value is refuse:
-            names[name] = _jit(_refuse, inline="never")
+            names[name] = _jit(_refuse, no_cpython_wrapper=True)
         elif hasattr(value, "row_function"):
             names[name] = whole_of(value.row_function)
         elif package in PACKAGES:
-            ours = rest.startswith("studies")
-            # Put into its caller: only so are the functions that it is given known by then.
-            inlined = ours or value is fly_ticks
-            names[name] = compiled(value, parts if ours else (), inlined, allocates)
+            of_flight = rest.startswith("studies") or value is fly_ticks
+            names[name] = compiled(value, parts if of_flight else (), allocates, True)
     scope = {**function.__globals__, **names}
     copy = FunctionType(function.__code__, scope, function.__name__, function.__defaults__)
     copy.__module__ = function.__module__
-    # The cache knows a function by its name: with other parts it is another function.
+    # The cache knows a function by its name: with other parts, or for inner use, it is another one.
     named = [getattr(part, "__name__", str(part)) for _, part in parts]
-    own = "_".join([function.__qualname__, *named])
+    own = "_".join([function.__qualname__, *named, *(["inner"] if inner else [])])
     copy.__qualname__ = copy.__name__ = own
     again = function.__name__ in function.__code__.co_names
-    made = _jit(copy, allocates, inline="always" if inline else "never", forceinline=not again)
+    how = {"no_cpython_wrapper": inner, "forceinline": not again}
+    made = _jit(copy, allocates, not (inner and parts), **how)
     if again:  # a function that calls itself
         scope[function.__name__] = made
     return made
@@ -164,12 +170,45 @@ def named(function: Callable[..., Any], name: str) -> Any:
     return _jit(function, forceinline=True)
 
 
-def _jit(function: Callable[..., Any], allocates: bool = False, **more: Any) -> Any:
+def _jit(function: Callable[..., Any], allocates: bool = False, keep: bool = True, **more: Any) -> Any:
     numba: Any = import_module("numba")
-    folder = _cache_folder()
-    if folder is not None:
-        numba.config.CACHE_DIR = str(folder)
-    return numba.njit(**OPTIONS, **more, _nrt=allocates, cache=folder is not None)(function)
+    others = numba.config.CACHE_LOCATOR_CLASSES
+    numba.config.CACHE_LOCATOR_CLASSES = f"{__name__}.{MachineCode.__qualname__}"
+    try:
+        keep = keep and _cache_folder() is not None
+        return numba.njit(**OPTIONS, **more, _nrt=allocates, cache=keep)(function)
+    finally:
+        numba.config.CACHE_LOCATOR_CLASSES = others
+
+
+class MachineCode:
+    """Where numba keeps the machine code of a function: wherever its source is, in one place.
+
+    So a copy of the project, in another folder or another environment, compiles nothing again.
+    """
+
+    def __init__(self, line: int) -> None:
+        self._line = line
+
+    @classmethod
+    def from_function(cls, function: FunctionType, _file: str) -> MachineCode:
+        """Return the place of this function, whose name numba adds."""
+        return cls(function.__code__.co_firstlineno)
+
+    def ensure_cache_path(self) -> None:
+        """Do nothing: the folder is there."""
+
+    def get_cache_path(self) -> str:
+        """Return the folder of all functions of these sources."""
+        return str(_cache_folder())
+
+    def get_source_stamp(self) -> str:
+        """Return nothing more: the folder stands for the sources."""
+        return ""
+
+    def get_disambiguator(self) -> str:
+        """Return what tells functions of one name in a file apart."""
+        return str(self._line)
 
 
 @cache
@@ -187,8 +226,8 @@ def figure_sources() -> list[Path]:
     for package in SOURCES:
         spec = find_spec(package)
         for place in (spec and spec.submodule_search_locations) or ():
-            beside = BESIDE if package == "tenbaud.studies" else ()
-            found += [path for path in sorted(Path(place).rglob("*.py")) if path.name not in beside]
+            paths = sorted(Path(place).rglob("*.py"))
+            found += [path for path in paths if not path.as_posix().endswith(BESIDE)]
     return found
 
 

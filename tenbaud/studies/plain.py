@@ -62,10 +62,11 @@ def fly_plain(config: FlightConfig, window_start: int | None = None, why: str = 
 def _has_flown(outcome: Outcome) -> bool:
     """Return whether a flight's errors are results.
 
-    A study may ask for a line that carries next to nothing: what comes of that is its result.
+    A study may ask for a line that carries next to nothing, or for a rate at which a pendulum falls:
+    what comes of that is its result.
     """
     if outcome.code is ExitCode.NOT_FLOWN:
-        return set(outcome.not_flown) <= {NotFlown.NO_WORDS, NotFlown.NO_COMMANDS}
+        return set(outcome.not_flown) <= {NotFlown.NO_WORDS, NotFlown.NO_COMMANDS, NotFlown.FELL}
     return outcome.code is ExitCode.OK
 
 

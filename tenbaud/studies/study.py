@@ -98,7 +98,7 @@ class Study:
                 self.file.preset, path, self.file.set, point, allow_code=self._allow_code
             )
             outputs = shared_parts(config).signals.outputs
-            _check_parts(config.model_dump_json(include=PARTS))
+            _check_parts(config.as_text(include=PARTS))
         except (TenbaudError, ValueError) as error:
             raise StudyError(f"the point {in_words(point)} is no flight: {error}") from error
         self.outputs = self.outputs or outputs
@@ -121,7 +121,7 @@ class Study:
 def _check_parts(parts: str) -> None:
     """Build what a flight needs beside the codec, given its sections as JSON; ConfigError."""
     # What the study names was allowed, or refused, where its configurations were made.
-    check_parts(FlightConfig.model_validate_json(parts).allowing_code())
+    check_parts(FlightConfig.of_text(parts).allowing_code())
 
 
 def read_study(path: Path, seeds: int | None = None, *, allow_code: bool = False) -> Study:

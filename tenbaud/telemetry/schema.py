@@ -23,7 +23,7 @@ class _Message(BaseModel):
 class SignalName(_Message):
     """One output or input of the plant."""
 
-    name: str
+    name: str = Field(description="as the model names it")
     unit: str = Field(description="as a person writes it; empty: none")
     low: float | None = Field(description="smallest value that makes sense; null: not known")
     high: float | None = Field(description="largest value that makes sense; null: not known")
@@ -34,8 +34,8 @@ class PlantSignals(_Message):
 
     model: str = Field(description="kind of the codec's model")
     picture: str = Field(description="what the plant looks like, see the model's signals; empty: bars")
-    outputs: list[SignalName]
-    inputs: list[SignalName]
+    outputs: list[SignalName] = Field(description="what is measured and steered")
+    inputs: list[SignalName] = Field(description="what a command has a value for")
 
 
 class Point(_Message):
@@ -60,7 +60,7 @@ class Decision(_Message):
 class SentSample(_Message):
     """One sample that the receiver's echo has confirmed."""
 
-    sample: int
+    sample: int = Field(description="index of the sample")
     word_sent: list[int] | None = Field(description="symbols sent; null: none")
     word: list[int] | None = Field(description="symbols as the receiver consumed them; null: erased")
     about: list[int] | None = Field(
@@ -73,7 +73,7 @@ class SentSample(_Message):
 class TakenSample(_Message):
     """One sample as the receiver consumed it."""
 
-    sample: int
+    sample: int = Field(description="index of the sample")
     word: list[int] | None = Field(description="symbols consumed; null: erased")
     digest: str = Field(description="64-bit digest of the receiver's copy after the sample")
 
@@ -82,7 +82,10 @@ _TYPES: dict[str, Any] = {"number": float, "integer": int, "boolean": bool, "str
 _OF_EVENT: dict[str, Any] = {
     one.name: (_TYPES[one.type] | None, Field(None, description=one.description))
     for one in EVENT_CHANNEL.fields
-} | {"time_s": (float, Field(description="flight time")), "kind": EventKind}
+} | {
+    "time_s": (float, Field(description="flight time")),
+    "kind": (EventKind, Field(description="what happened")),
+}
 Happening: Any = create_model("Happening", __base__=_Message, **_OF_EVENT)
 Happening.__doc__ = "An event, as recordings have it; fields without meaning for its kind are left out."
 
@@ -90,25 +93,25 @@ Happening.__doc__ = "An event, as recordings have it; fields without meaning for
 class Lateness(_Message):
     """How late the last ticks of the loop began."""
 
-    p50_ms: float
-    p99_ms: float
-    max_ms: float
+    p50_ms: float = Field(description="median")
+    p99_ms: float = Field(description="of 99 ticks in 100, at most")
+    max_ms: float = Field(description="largest")
 
 
 class _EndMessage(_Message):
     version: Literal[3] = Field(description="of this schema")
     session: str = Field(description="name of the session")
-    plant: PlantSignals
+    plant: PlantSignals = Field(description="its model and signals")
     flight: int = Field(description="number of the session, 0 while there is none")
     number: int = Field(description="counts the messages of this end")
     phase: Literal["greeting", "waiting", "flying", "rejoining", "ended"] = Field(
         description="where the session stands"
     )
     ending: str | None = Field(None, description="how the session ended, by name; null: not yet")
-    clock: Literal["real", "virtual"]
+    clock: Literal["real", "virtual"] = Field(description="virtual: as fast as possible, or at `pace`")
     takes_commands: bool = Field(description="whether the flight was started with control allowed")
     time_s: float = Field(description="flight time reached")
-    epoch: int
+    epoch: int = Field(description="counts the common states that the two ends began from")
     impairments: str = Field(description="what goes wrong on the line, on purpose, at present")
     counts: dict[str, int] = Field(description="erasures, desyncs, rejoins and others, so far")
     events: list[Happening] = Field(description="since the message before")
@@ -119,10 +122,10 @@ class TransmitterTelemetry(_EndMessage):
     """The telemetry of the sensor node."""
 
     role: Literal["transmitter"]
-    preset: str
-    tick_s: float
-    symbol_period_s: float
-    baud_configured: float
+    preset: str = Field(description="that the configuration is based on")
+    tick_s: float = Field(description="control tick")
+    symbol_period_s: float = Field(description="time of a sample, which has one word")
+    baud_configured: float = Field(description="symbols per second that may go up the link")
     duration_s: float = Field(description="of the whole flight as configured")
     points: list[Point] = Field(description="ticks since the message before, some left out")
     samples: list[SentSample] = Field(description="confirmed since the message before")
@@ -158,36 +161,38 @@ class SetPoint(_Message):
     """Steer an output to a value, or (null) follow the configured reference again."""
 
     kind: Literal["set_point"]
-    value: Annotated[float, Field(ge=-SET_POINT_MAX, le=SET_POINT_MAX)] | None
-    output: Annotated[int, Field(ge=0)] = 0
+    value: Annotated[float, Field(ge=-SET_POINT_MAX, le=SET_POINT_MAX)] | None = Field(
+        description="in the output's unit"
+    )
+    output: Annotated[int, Field(ge=0, description="place of the output, from 0")] = 0
 
 
 class Pause(_Message):
     """Stop the virtual clock at the next sample, or let it go on."""
 
     kind: Literal["pause"]
-    paused: bool
+    paused: bool = Field(description="false: go on")
 
 
 class Step(_Message):
     """Let a number of samples pass on the virtual clock, then pause."""
 
     kind: Literal["step"]
-    samples: Annotated[int, Field(ge=1, le=1000)] = 1
+    samples: Annotated[int, Field(ge=1, le=1000, description="how many")] = 1
 
 
 class Pace(_Message):
     """Virtual seconds per second, at most."""
 
     kind: Literal["pace"]
-    factor: Annotated[float, Field(ge=0.05, le=1000.0)]
+    factor: Annotated[float, Field(ge=0.05, le=1000.0, description="multiple of real time")]
 
 
 class Impair(_Message):
     """All impairments of the line from now on; an empty text for a clean line."""
 
     kind: Literal["impair"]
-    text: Annotated[str, Field(max_length=300)]
+    text: Annotated[str, Field(max_length=300, description="as `--impair` takes it")]
 
     @field_validator("text")
     @classmethod
@@ -202,8 +207,8 @@ class Corrupt(_Message):
     """Corrupt the codec of one end in one bit, at its next sample."""
 
     kind: Literal["corrupt"]
-    end: Literal["transmitter", "receiver"]
-    field: Annotated[str, Field(pattern=r"^(range|angle|rate)$")] = "range"
+    end: Literal["transmitter", "receiver"] = Field(description="whose codec")
+    field: Annotated[str, Field(pattern=r"^(range|angle|rate)$", description="of its state")] = "range"
 
 
 Telemetry = TransmitterTelemetry | ReceiverTelemetry

@@ -2,7 +2,8 @@
 
 The commands stand in the pages as people type them. What makes them safe to run in a test is here:
 the copy's default port, and every loopback port of a page, are exchanged for free ones, the environment
-that `make` would build is there already, and the home folder is an empty one. pytest only collects in
+that `make` would build is there already, and the home folder is an empty one; what was compiled for
+studies is shared. pytest only collects in
 it, one folder with tests of both halves: the tests that type in `make test` must not run themselves.
 """
 
@@ -132,6 +133,7 @@ class Sandbox:
             "PYTHONPATH": str(self.top),
             "HOME": str(self.folder / "home"),
             "MPLCONFIGDIR": matplotlib.get_configdir(),
+            "XDG_CACHE_HOME": os.environ.get("XDG_CACHE_HOME", str(Path.home() / ".cache")),
             "COLUMNS": "200",
             "PYTEST_ADDOPTS": "--collect-only tests/transmitter/loops",
             "NO_COLOR": "1",

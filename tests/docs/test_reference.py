@@ -9,6 +9,7 @@ import pytest
 
 from docs.tools import commands_page as commands
 from docs.tools import configuration_page as configuration
+from docs.tools.meanings import MEANINGS
 from docs.tools.reference import PAGES
 from tenbaud.cli.commands import app
 from tenbaud.config.load import load_config, preset_names
@@ -43,6 +44,35 @@ def test_when_a_field_is_looked_up_then_unit_default_range_and_meaning_are_there
     section: str, row: str
 ) -> None:
     assert row in section_of(configuration_page(), section)
+
+
+def cells(line: str) -> list[str]:
+    return [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]]
+
+
+def test_every_field_has_a_meaning_and_the_unit_of_its_name() -> None:
+    rows = [cells(line) for line in configuration_page().splitlines() if line.startswith("| `")]
+    assert len(rows) > 200
+    assert [field for field, *_, meaning in rows if not meaning] == []
+    suffixes = {
+        "_per_s2": "/s²",
+        "_rad_s": "rad/s",
+        "_per_s": "s",
+        "_rad": "rad",
+        "_s": "s",
+        "_hz": "Hz",
+    }
+    for field, unit, *_ in rows:
+        ending = next((one for one in suffixes if field.strip("`").endswith(one)), None)
+        assert ending is None or unit.endswith(suffixes[ending]), (field, unit)
+    assert not re.search(
+        r"(?<!rad)/s$|^s$", dict(row[:2] for row in rows)["`rate_observer_bandwidth_rad_s`"]
+    )
+
+
+def test_no_meaning_is_kept_for_a_field_that_is_gone() -> None:
+    page = configuration_page()
+    assert [name for name, text in MEANINGS.items() if f"| {text} |" not in page] == []
 
 
 def leaves(values: dict[str, object], name: str = "") -> list[tuple[str, str]]:

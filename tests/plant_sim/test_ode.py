@@ -155,6 +155,34 @@ def test_when_an_axis_is_pushed_then_only_that_one_answers_first() -> None:
     assert np.abs(moved[[0, 1, 3, 4]]).max() < 1e-5
 
 
+def test_when_the_mass_is_sent_along_the_arm_then_it_moves_at_its_screw_s_speed() -> None:
+    options = {"mass_moves": [[1.0, 0.08], [4.0, 0.0]], "mass_rad_per_s2_per_m": 5.0}
+    plant = built(HelicopterPlant, 2, step_s=0.5, options=options)
+    pushes = plant.pushes(12)
+    assert pushes[:, 1] == pytest.approx([0, 0, 0, -0.2, *[-0.4] * 5, -0.2, 0, 0])
+    assert [plant._disturbances[1].torque(step) for step in range(12)] == pytest.approx(pushes[:, 1])
+    assert not pushes[:, [0, 2]].any()
+
+
+def test_when_the_helicopter_is_of_the_second_rig_then_it_hovers_on_its_own_parameters() -> None:
+    plant = built(HelicopterPlant, 2, options={"rig": "ctu"})
+    assert plant.motors == pytest.approx((6.33, 6.33), abs=0.01)
+    for _ in range(500):
+        plant.advance(plant.motors)
+    assert plant.measured == pytest.approx((0.0, math.radians(10.0), 0.0), abs=1e-9)
+
+
+def test_when_travel_goes_too_far_then_a_stop_holds_it() -> None:
+    plant = built(HelicopterPlant, 2, options={"travel_stop_rad": 0.3}, initial=(0.25, 0.17, -0.3))
+    for _ in range(1000):
+        plant.advance((2.68, 2.68))
+    assert abs(plant.measured[0]) < 0.4
+    plant = built(HelicopterPlant, 2, initial=(0.0, 0.0))
+    for _ in range(500):
+        plant.advance((0.0, 0.0))
+    assert plant.measured == pytest.approx((0.0, 0.0, 0.0)), "without thrust it rests, level"
+
+
 def test_when_friction_holds_a_servo_then_it_is_slower() -> None:
     free, rubbing = (
         built(ServoPlant, 1, options={"friction_rad_per_s2": friction}) for friction in (0.0, 2.0)
@@ -172,6 +200,11 @@ def test_when_friction_holds_a_servo_then_it_is_slower() -> None:
         (ServoPlant, {"time_constant_s": 0.0}, "time_constant_s is 0.0; it must be above 0"),
         (FurutaPlant, {"friction": -1.0}, "friction is -1.0; it must be finite and at least 0"),
         (HelicopterPlant, {"motor_lag_s": math.inf}, "motor_lag_s is inf"),
+        (HelicopterPlant, {"rig": "mine"}, "rig is 'mine'; known are laas, ctu"),
+        (HelicopterPlant, {"travel_stop_rad": 0.0}, "travel_stop_rad is 0.0"),
+        (HelicopterPlant, {"mass_moves": [[1.0, 0.2]]}, "0.2 m; its screw ends at 0.1397 m"),
+        (HelicopterPlant, {"mass_moves": [[1.0, 0.08], [1.5, 0.0]]}, "moving until 2 s"),
+        (HelicopterPlant, {"mass_moves": [[1.0]]}, r"a move is \[time in s, position in m\]"),
         (ServoPlant, {"winding_lag_s": -1.0}, "winding_lag_s is -1.0"),
     ],
 )

@@ -41,7 +41,7 @@ class Cart:
 
     def __init__(self, context, friction: float = 0.5):
         self.step_s, self.friction = context.step_s, friction
-        self.place, self.speed = context.initial_angle_rad, 0.0
+        self.place, self.speed = (*context.initial, 0.0)[0], 0.0
 
     @property
     def measured(self):

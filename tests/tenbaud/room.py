@@ -15,6 +15,7 @@ from channel.protocol.endings import End, Ending
 from channel.protocol.frames import Frame
 from channel.protocol.wire import decode, encode
 from receiver.loops.many import ManyService
+from tenbaud.build.ends import build_observer
 from tenbaud.build.flight import Agreement, agree
 from tenbaud.config.load import load_config
 from tenbaud.flight.many import ManyHost
@@ -25,8 +26,8 @@ UNHURRIED = {"channel": {"deadline_allowance_s": 6.0}}
 """No slot is erased because the machine was busy."""
 
 
-def agreement(**changes: Any) -> Agreement:
-    return agree(load_config(None, None, {**UNHURRIED, **changes}), "real")
+def agreement(preset: str | None = None, **changes: Any) -> Agreement:
+    return agree(load_config(preset, None, {**UNHURRIED, **changes}), "real")
 
 
 class MemoryHub:
@@ -107,7 +108,13 @@ class Rig:
         self.name = name
         self.hub = room.hub
         self.terms = agreed.terms
-        self.session = TransmitterSession(agreed.codec, agreed.terms, agreed.identity, incarnation)
+        self.session = TransmitterSession(
+            agreed.codec,
+            agreed.terms,
+            agreed.identity,
+            incarnation,
+            state_observer=build_observer(agreed),
+        )
         self._tick = 0
 
     def put(self, data: bytes) -> None:
@@ -138,7 +145,7 @@ class Rig:
         while self.session.counts["digest_checks"] < wanted:
             assert time.monotonic() < give_up_s, f"{self.name}: {self.session.phase}"
             self._tick = max(self._tick, self.session.epoch_tick)
-            measured = (0.4 * math.sin(0.01 * self._tick),)
+            measured = (0.4 * math.sin(0.01 * self._tick),) * len(self.terms.signals.outputs)
             for frame in self.session.on_measurement(self._tick, measured):
                 self.put(encode(frame))
             self._tick += 1

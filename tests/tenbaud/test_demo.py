@@ -3,57 +3,37 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from docs.tools.summary_page import FIELDS, SOMETIMES
 from tenbaud import fly
+from tenbaud.build.flight import agree
 from tenbaud.config.load import load_config
+from tenbaud.flight.usual import usual_flight
 from tenbaud.recording.comparison import Verdict
 from tenbaud.recording.diff import compare_runs
 from tenbaud.recording.folder import RunFolder
+from tenbaud.recording.reader import MessageStream, rows_in_blocks
+from tenbaud.studies.plain import fly_plain
 from tests.tenbaud.confirmed import PATIENT, check_flown, need_idle
 from tests.tenbaud.processes import run
-
-SUMMARY_FIELDS = [
-    "preset",
-    "plant",
-    "link",
-    "clock",
-    "duration_s",
-    "samples",
-    "coder_bits_up",
-    "baud_configured",
-    "baud_measured",
-    "wire_bytes_up",
-    "wire_bytes_down",
-    "erasures",
-    "digest_checks",
-    "desyncs",
-    "pitch_amplitude_rad",
-    "error_coded_max_fraction",
-    "error_coded_rms_fraction",
-    "error_live_max_fraction",
-    "error_live_rms_fraction",
-    "commands_late",
-    "symbols_late",
-    "tracking_rms_rad",
-    "loop_late_ms_p50",
-    "loop_late_ms_p99",
-    "loop_late_ms_max",
-    "realtime_factor",
-    "config_digest",
-    "numerics_probe",
-    "window_start_s",
-]
 
 REAL_FLIGHT = Path(__file__).parents[3] / "shared" / "data" / "uiuc_closed_loop.csv"
 
 
 def test_when_the_demo_flies_the_paper_then_every_sample_is_checked(tmp_path: Path) -> None:
-    ended = run("demo", "--json", "--figure", "--mismatch", "0.1", "--out", "run", cwd=tmp_path)
+    paper = ("--preset", "paper-10baud", "--mismatch", "0.1")
+    ended = run("demo", "--json", "--figure", *paper, "--out", "run", cwd=tmp_path)
     assert ended.code == 0, ended.err
     summary = ended.summary
-    assert set(SUMMARY_FIELDS) <= summary.keys()
+    documented = {name.partition(".")[0] for name in FIELDS}
+    assert documented - SOMETIMES <= summary.keys() <= documented
+    of_output = {f"outputs.NAME.{name}" for name in summary["outputs"]["pitch"]}
+    assert of_output == {name for name in FIELDS if name.startswith("outputs.")}
+    assert "usual_loop" in summary
+    assert {f"usual_loop.{name}" for name in summary["usual_loop"]} <= FIELDS.keys()
     assert summary["samples"] == summary["digest_checks"] == summary["coder_bits_up"] == 1000
     assert summary["desyncs"] == summary["erasures"] == summary["commands_late"] == 0
     assert summary["baud_measured"] == pytest.approx(10.0, abs=1e-6)
@@ -65,18 +45,45 @@ def test_when_the_demo_flies_the_paper_then_every_sample_is_checked(tmp_path: Pa
     assert folder.figure.read_bytes().startswith(b"\x89PNG")
     assert load_config(path=folder.config).transmitter.plant.mismatch == 0.1
     assert compare_runs(folder.path).verdict is Verdict.EQUAL, "the two ends' recordings"
+    for path in (folder.transmitter, folder.receiver):
+        stream = MessageStream(path)
+        rows = sum(
+            len(times)
+            for block in rows_in_blocks(stream, {"tick": None})
+            for times, _ in block.values()
+        )
+        assert rows == 10_000
+        for topic, channel in stream.channels.items():
+            for field in channel.fields:
+                assert field.description, (topic, field.name)
+                ending = field.name.rpartition("_")[2]
+                assert ending not in ("s", "ms", "ns") or field.unit == ending, (topic, field.name)
 
 
-def test_when_a_person_runs_it_then_both_plants_are_shown_and_nothing_else_on_stdout(
-    tmp_path: Path,
-) -> None:
+def test_when_a_person_runs_it_then_one_flight_is_shown_beside_the_usual_loop(tmp_path: Path) -> None:
     ended = run("demo", "--duration", "30", cwd=tmp_path)
     assert ended.code == 0, ended.err
     assert ended.out.startswith("✓ Flight finished: 30 s, both codecs equal in 300 of 300 checks")
-    assert ended.out.count("Flight finished") == 2
     assert "digest_checks" not in ended.out, "that is for --verbose"
-    assert "+10%" in ended.out
-    assert len(list((tmp_path / "runs").iterdir())) == 2
+    assert "pitch off the model by +10%; tuned-10baud over zenoh" in ended.out
+    assert "° over 1000 bit/s), " in ended.out
+    assert len(list((tmp_path / "runs").iterdir())) == 1
+
+
+def test_the_usual_loop_beside_a_flight_is_the_one_that_both_sessions_fly() -> None:
+    changes: dict[str, Any] = {"duration_s": 3.0, "seed": 4}
+    changes["transmitter"] = {"plant": {"mismatch": 0.1, "disturbance": "q=2e-2"}}
+    usual = usual_flight(agree(load_config("tuned-10baud", None, changes), "virtual"))
+    assert usual is not None
+    (flown,) = fly_plain(load_config("usual-1000baud", None, changes)).outputs
+    assert usual.figures["tracking_rms_rad"] == flown.tracking_rms
+    assert usual.figures["error_live_rms_rad"] == flown.error_live_rms
+    assert max(abs(usual.curve[1])) == flown.amplitude
+
+
+@pytest.mark.parametrize("preset", ["servo-10baud", "usual-1000baud"])
+def test_there_is_no_usual_loop_for_other_plants_and_for_itself(preset: str) -> None:
+    assert usual_flight(agree(load_config(preset), "virtual")) is None
 
 
 @pytest.mark.skipif(not REAL_FLIGHT.is_file(), reason="the recorded flights are not beside the tree")

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
+
+import pytest
 
 from channel.protocol.wire import DATAGRAM
 from tenbaud.build.ends import build_receiver
@@ -37,7 +40,47 @@ def test_when_a_flight_did_not_fly_then_exit_code_summary_and_message_say_so(tmp
     assert "nearly all symbols are lost" in ended.err
     shown = run("demo", "--link", "memory", *flight[:-1], "two", cwd=tmp_path)
     assert shown.code == ExitCode.NOT_FLOWN
-    assert "did not fly" in shown.out
+    assert shown.out.startswith("✗ Flight failed (exit code 7): no words\n")
+    assert shown.out.count("did not fly") == 1
+    assert "did not fly" not in shown.err
+
+
+LAWS = """
+class Failing:
+    def __init__(self, context):
+        pass
+    def command(self, tick, state):
+        if tick > 50:
+            raise RuntimeError("no more")
+        return (0.0, 0.0)
+    def references(self, tick):
+        return (None,)
+
+class Nothing(Failing):
+    def command(self, tick, state):
+        return (0.0,)
+"""
+
+
+@pytest.mark.parametrize("link", ["memory", "zenoh"])
+def test_a_controller_that_fails_in_flight_is_no_flight(tmp_path: Path, link: str) -> None:
+    (tmp_path / "laws.py").write_text(LAWS)
+    law = ("--set", "receiver.controller=laws:Failing")
+    ended = run("demo", "--link", link, "--duration", "5", *law, "--out", "run", cwd=tmp_path)
+    assert ended.code == ExitCode.NOT_FLOWN
+    assert ended.out.startswith("✗ Flight failed (exit code 7): the controller failed\n")
+    assert "no command from the controller at 449 ticks" in ended.out
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert (summary["exit_code"], summary["not_flown"]) == (7, ["the controller failed"])
+
+
+def test_a_pendulum_that_fell_is_no_flight(tmp_path: Path) -> None:
+    (tmp_path / "laws.py").write_text(LAWS)
+    pendulum = ("--preset", "pendulum-20baud", "--set", "receiver.controller=laws:Nothing")
+    flight = ("--link", "memory", "--duration", "10", "--out", "run")
+    ended = run("demo", *pendulum, *flight, cwd=tmp_path)
+    assert ended.code == ExitCode.NOT_FLOWN
+    assert ended.out.startswith("✗ Flight failed (exit code 7): the plant fell\n")
 
 
 def test_when_each_end_is_asked_then_both_say_that_it_did_not_fly() -> None:

@@ -17,6 +17,8 @@ from tests.tenbaud.processes import run
     [
         ("demo --pace 2 --clock real", "--pace slows the virtual clock"),
         ("demo --pace 2 --link memory", "--pace slows the virtual clock"),
+        ("demo --duration 3 --sabotage sample=30,field=range", "the flight has only 30 samples"),
+        ("tune --mismatch 0.1 --out found.toml", "nothing is random in these flights"),
         ("demo --open", "it goes with --view"),
         ("transmit --pace 2 --clock real", "--pace slows the virtual clock"),
         ("transmit --link memory", "joins two ends in one process"),

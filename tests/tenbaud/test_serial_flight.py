@@ -46,8 +46,8 @@ class Flown:
     def assert_nothing_silent(self) -> None:
         ours = self.sent.column("sample", "digest")
         theirs = self.received.column("sample", "digest")
-        assert self.transmitter.endpoint.session.counts["digest_checks"] == len(ours) > 0
-        assert self.transmitter.endpoint.session.counts["desyncs"] == 0
+        assert self.transmitter.node.session.counts["digest_checks"] == len(ours) > 0
+        assert self.transmitter.node.session.counts["desyncs"] == 0
         assert ours == theirs[: len(ours)]
 
 
@@ -128,12 +128,12 @@ def test_when_it_flies_at_ten_baud_then_ten_bytes_a_second_go_up_and_ten_baud_ar
     symbol_bytes = meter.wire_bytes - meter.control_bytes
     assert symbol_bytes == meter.symbols == meter.coder_bits
     # A busy machine may hold the loop up past a slot, which is then an erasure and no byte.
-    missed = flown.transmitter.endpoint.session.counts["words_missed"]
+    missed = flown.transmitter.node.session.counts["words_missed"]
     assert symbol_bytes + missed + flown.transmitter.uplink.shaper.refused == 50
     # Beside the symbols only the handshake, the farewell and the links' own notices.
     assert carried == flown.up_bytes
     assert not flown.dropped
-    if missed or flown.transmitter.endpoint.commands_late:
+    if missed or flown.transmitter.node.commands_late:
         pytest.skip("the machine was too busy for the symbols' times")
     assert flown.receiver.session.meter.baud == pytest.approx(10.0, abs=0.1)
 
@@ -206,7 +206,7 @@ def test_when_the_plug_stays_out_then_the_motors_go_to_their_safe_voltage(tmp_pa
         flown = fly(line, changed, line.unplug)
     assert flown.outcome.code is ExitCode.LINK_LOST
     assert "safe voltage" in flown.outcome.text
-    assert flown.transmitter.endpoint.guard.command == (0.0, 0.0)
+    assert flown.transmitter.node.guard.command == (0.0, 0.0)
 
 
 def test_when_the_line_is_too_slow_then_it_is_refused_with_the_arithmetic() -> None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from channel.codec.codec import Codec
-from channel.protocol.frames import Desync
-from channel.protocol.lockstep import LOCKSTEP_CHANNEL, History
 from channel.protocol.recording import Field, RecordChannel, Recorder
 from channel.protocol.terms import Terms
 from transmitter.session.copies import Confirmed
@@ -82,13 +80,3 @@ def write_sample(recorder: Recorder, terms: Terms, codec: Codec, done: Confirmed
     for offset, (coded, live) in enumerate(zip(done.flown.coded, done.live, strict=True)):
         tick = first_tick + offset
         recorder.write(ESTIMATE_CHANNEL, tick * terms.tick_ns, (tick, coded, live))
-
-
-def write_failure(
-    recorder: Recorder, terms: Terms, history: History, own: Desync, peer_state: bytes
-) -> None:
-    """Write a lockstep failure down: when it is found, and once more with the receiver's state."""
-    row = history.failure_row(
-        own.epoch, own.sample, own.transmitter_digest, own.receiver_digest, peer_state
-    )
-    recorder.write(LOCKSTEP_CHANNEL, own.sample * terms.sample_ns, row)

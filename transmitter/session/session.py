@@ -33,13 +33,13 @@ from channel.protocol.frames import (
     Why,
 )
 from channel.protocol.identity import Identity, differing_fields
-from channel.protocol.lockstep import History, difference_event, is_answer
+from channel.protocol.lockstep import History, difference_event, is_answer, write_failure
 from channel.protocol.recording import NullRecorder, Recorder, write_epoch
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
 from transmitter.session.copies import CANNOT_FLY, Confirmed, Copies, EchoOrder, commands_of
 from transmitter.session.owing import Owing
-from transmitter.session.records import write_failure, write_sample
+from transmitter.session.records import write_sample
 from transmitter.session.rejoin import Asking, start_of
 from transmitter.session.state_observer import StateObserver, default_observer
 from transmitter.session.takeover import Takeover
@@ -216,7 +216,7 @@ class TransmitterSession:
                 return self._on_claim(frame)
             case Desync() if not self._report_answered and is_answer(frame, self.desync):
                 self._report_answered = True
-                write_failure(self._recorder, self.terms, self.history, frame, frame.state)
+                write_failure(self._recorder, self.terms.sample_ns, self.history, frame, frame.state)
             case Refuse() if frame.incarnation == self.incarnation:
                 return self._on_refuse(frame)
             case Bye() if self._has_session and frame.session == self.session_number:
@@ -348,7 +348,7 @@ class TransmitterSession:
         digests = (done.digest, done.peer_digest)
         self.desync = Desync(self.session_number, self.epoch, done.sample, *digests, state)
         self._emit(difference_event(self.desync))
-        write_failure(self._recorder, self.terms, self.history, self.desync, b"")
+        write_failure(self._recorder, self.terms.sample_ns, self.history, self.desync, b"")
         if self._stop_on_desync:
             return [self.desync, *self.bye(End(Ending.DESYNC))]
         return self.rejoin(Why.DESYNC, replace(ASKED, sample=done.sample))

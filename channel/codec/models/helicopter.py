@@ -65,6 +65,7 @@ class HelicopterParameters(NamedTuple):
     elevation_low_rad: float
     elevation_high_rad: float
     pitch_stop_rad: float
+    travel_stop_rad: float
 
 
 class HelicopterConstants(NamedTuple):
@@ -116,7 +117,8 @@ def slopes(
         pitch_rate + held[2],
         held[3]
         - p.travel_damping_per_s * travel_rate
-        - p.travel_thrust_rad_per_s2 * cos_e * sin_p * lift,
+        - p.travel_thrust_rad_per_s2 * cos_e * sin_p * lift
+        + stop_of(state[0], travel_rate, -p.travel_stop_rad, p.travel_stop_rad),
         held[4]
         - sin_e * (p.elevation_weight_rad_per_s2 + p.elevation_tilt_rad_per_s2 * cos_p)
         - p.elevation_damping_per_s * elevation_rate
@@ -193,7 +195,10 @@ class HelicopterModel:
     ) -> None:
         """`start` is the initial state; empty: the hover."""
         volts = hover_volts(parameters, hover_rad)
-        self._start = start or (0.0, hover_rad, 0.0, 0.0, 0.0, 0.0, volts, volts)
+        hover = (0.0, hover_rad, 0.0, 0.0, 0.0, 0.0, volts, volts)
+        self._start = start or hover
+        self.operating = (hover, (volts, volts)) if start else None
+        """state and command about which a law is designed; None: those at the start"""
         left_half = exp(-0.5 * tick_s / motor_lag_s) if motor_lag_s > 0.0 else 0.0
         left_whole = exp(-tick_s / motor_lag_s) if motor_lag_s > 0.0 else 0.0
         self.constants = HelicopterConstants(parameters, tick_s, left_half, left_whole)

@@ -35,10 +35,12 @@ class SerialKind(LinkKind):
         return tuple(filter(None, (settings.port, settings.downlink)))
 
     def check(self, settings: LinkSettings, insecure: bool) -> None:
-        """Refuse an invalid port, or one on another machine without `insecure`."""
+        """Refuse a port that is not there, or on another machine without `insecure`."""
         from channel.links.serial.port import check_port
 
         check_port(settings.port, insecure)
+        if settings.downlink not in ("", ZENOH):
+            check_port(settings.downlink, insecure)
 
     def terms(self, settings: LinkSettings, codec: Codec, terms: Terms) -> Terms:
         """Return the terms with the times that bytes take on the line.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 from urllib.parse import urlsplit
 
@@ -16,9 +17,11 @@ WRITE_TIMEOUT_S = 1.0
 
 
 def check_port(url: str, insecure: bool) -> None:
-    """Refuse a port that is on another machine, unless it is allowed."""
+    """Refuse a port that is not there, or on another machine unless that is allowed."""
     if not url:
         raise LinkError("a serial link needs a port, such as --port /dev/ttyUSB0 or --port COM3")
+    if url.startswith("/") and not os.path.exists(url):
+        raise LinkError(_cannot_open(url, FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT))))
     parts = urlsplit(url)
     if parts.scheme not in ("socket", "rfc2217") or insecure:
         return
@@ -63,7 +66,7 @@ def reason_of(error: Exception) -> str:
 def _cannot_open(url: str, error: Exception) -> str:
     # pyserial puts the port's name and the system's error in twice; the error beneath has it once.
     beneath = error.__context__
-    plain = beneath.strerror if isinstance(beneath, OSError) and beneath.strerror else str(error)
+    plain = beneath.strerror if isinstance(beneath, OSError) and beneath.strerror else reason_of(error)
     text = f"{url} cannot be opened: {plain}"
     number = getattr(error, "errno", None)
     if number == 13 or "Permission" in str(error):

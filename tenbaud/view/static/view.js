@@ -1,6 +1,7 @@
 // The page's own script: takes the stream in, keeps the last thirty seconds, and draws them.
 
 import { colours, drawError, drawOutput, drawTape, OUTPUT_COLOURS, shown } from "./draw.js";
+import { pose } from "./pose.js";
 
 const KEPT_S = 32, SAMPLES_KEPT = 160, EVENTS_SHOWN = 7, STALE_MS = 1500, BROKEN_SHOWN_MS = 2500, TEXT_MS = 200;
 const DEGREES = 180 / Math.PI;
@@ -153,12 +154,17 @@ function drawGauges(id, most, signals, each) {
   }
 }
 
-// Turns every part of the picture: `data-turn` has the place of its output and its centre.
+// Turns every part of the picture: `data-turn` has the place of its output and its centre, `data-pose` lines in space.
 function turn(values) {
   for (const part of picture.querySelectorAll("[data-turn]")) {
     const [place, ...centre] = JSON.parse(part.dataset.turn), angle = values[part.classList[0]][place] ?? null;
     part.style.display = angle === null ? "none" : "";
     if (angle !== null) part.setAttribute("transform", `rotate(${(-angle * DEGREES).toFixed(2)} ${centre.join(" ")})`);
+  }
+  for (const part of picture.querySelectorAll("[data-pose]")) {
+    const angles = values[part.parentNode.classList[0]];
+    // An axis without a set-point is shown level.
+    if (angles.length) part.setAttribute("d", pose(part.dataset.pose, [0, 1, 2].map((place) => angles[place] ?? 0)));
   }
 }
 

@@ -27,10 +27,10 @@ class Law:
     def __init__(self, context, bias=0.0):
         self.context, self.bias = context, bias
     def command(self, tick, state):
-        volts = 3.0 * (self.reference_rad(tick) - state[0]) - 3.0 * state[1] + self.bias
+        volts = 3.0 * (self.context.reference.value(tick) - state[0]) - 3.0 * state[1] + self.bias
         return (volts / 2.0, -volts / 2.0)
-    def reference_rad(self, tick):
-        return self.context.reference.angle_rad(tick)
+    def references(self, tick):
+        return (self.context.reference.value(tick),)
 
 class OneMotor(Law):
     def command(self, tick, state):
@@ -43,7 +43,8 @@ class Raising(Law):
 class Cart:
     """A plant: a double integrator with friction."""
     def __init__(self, context, friction=0.5):
-        self.h, self.friction, self.x, self.v = context.step_s, friction, context.initial_angle_rad, 0.0
+        self.h, self.friction = context.step_s, friction
+        self.x, self.v = (*context.initial, 0.0)[0], 0.0
     @property
     def measured(self):
         return (self.x,)
@@ -158,10 +159,7 @@ def test_options_reach_the_class_and_count_in_the_handshake(outside: Path) -> No
     )
     assert one.codec.initial().coder == (0.03,)
     assert one.identity.config_digest != other.identity.config_digest
-    with pytest.warns(
-        FutureWarning, match=r"Law\.reference_rad\(tick\) is deprecated; define references"
-    ):
-        controller = build_controller(one.config)
+    controller = build_controller(one.config)
     (set_point,) = controller.references(0)
     assert set_point is not None
     assert controller.command(0, (set_point, 0.0)) == (0.05, -0.05)
@@ -170,8 +168,7 @@ def test_options_reach_the_class_and_count_in_the_handshake(outside: Path) -> No
 def test_a_named_controller_is_tried_on_the_model_that_is_an_object(outside: Path) -> None:
     model = load_preset("tuned-10baud").codec.model
     given: dict[str, Any] = {"settings": {"duration_s": 1.0}, "out": outside / "run"}
-    with pytest.warns(FutureWarning, match="reference_rad"):
-        run = fly("tuned-10baud", model=model, controller="outside:Law", **given)
+    run = fly("tuned-10baud", model=model, controller="outside:Law", **given)
     assert run.summary["desyncs"] == 0
 
 

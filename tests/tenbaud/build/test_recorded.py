@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from tenbaud.build.flight_log import read_flight_log
 from tenbaud.build.recorded import flight_config, nearest_tick_s, replay_notes
 from tenbaud.config.load import ConfigError, dump_config, merged, nested
 from tenbaud.config.schema import FlightConfig
+from tenbaud.files.whole import write_whole
 from tenbaud.flight.fly import fly
 from tenbaud.log.angles import step_of
 from tenbaud.recording.convert import convert
@@ -273,3 +275,18 @@ def test_a_duration_beyond_the_recording_has_a_note(tmp_path: Path) -> None:
     config = flight_config("tuned-10baud", None, replay(pitch_log(tmp_path), duration_s=60.0))
     assert config.duration_s == 6.0
     assert "60 s were asked for" in replay_notes(config)[1]
+
+
+def test_a_log_in_a_folder_whose_name_is_no_utf_8_is_read_written_and_read_again(
+    tmp_path: Path,
+) -> None:
+    folder = tmp_path / os.fsdecode(b"caf\xe9")
+    folder.mkdir()
+    config = flight_config(None, None, replay(pitch_log(folder)))
+    assert len(read_flight_log(config)) == 300
+    write_whole(tmp_path / "config.toml", dump_config(config))
+    assert (
+        flight_config(None, tmp_path / "config.toml")
+        == config
+        == FlightConfig.of_text(config.as_text())
+    )

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import time
 from typing import Any
 
 import pytest
@@ -126,10 +127,18 @@ def test_an_emulated_rig_has_the_encoder_of_its_output_whatever_it_is_called() -
     model = {"kind": "linear", "C": [[1.0, 0.0]], "outputs": ["tilt"], "output_units": ["rad"]}
     model |= {"A": [[0.0, 1.0], [-0.5, -0.1]], "B": [[0.0, 0.0], [0.35, -0.35]]}
     values = completed({"model": model})
-    with pytest.raises(ConfigError, match=r"set transmitter\.bridge\.tilt\.channel = 1"):
+    values["transmitter"] = {"bridge": {"tilt": {"channel": 3}}}
+    with pytest.raises(ConfigError, match=r"0 to 2, .* tilt is at 3: set .*bridge\.tilt\.channel"):
         build_emulator(load_config(None, None, values), "quarc", "pty")
-    values["transmitter"] = {"bridge": {"tilt": {"channel": 1}}}
-    assert build_emulator(load_config(None, None, values), "quarc", "pty")
+    for channel in (0, 2):
+        values["transmitter"] = {"bridge": {"tilt": {"channel": channel}}}
+        config = load_config(None, None, values)
+        device = build_emulator(config, "quarc", "pty", faults=("jump=50@0",)).device
+        now_ns = time.monotonic_ns()
+        device.command(now_ns, (0.0, 0.0), True)
+        device.sample(now_ns)
+        counts = device.sample(now_ns).counts
+        assert [place for place, one in enumerate(counts) if one == 50] == [channel]
 
 
 def test_columns_that_make_no_sample_name_the_section() -> None:

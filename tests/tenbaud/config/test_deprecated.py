@@ -48,18 +48,6 @@ def test_when_a_setting_has_an_old_name_then_it_is_read_with_a_warning(
     assert read in (*found, config.coder.kind)
 
 
-def test_when_a_plant_has_measured_rad_then_it_flies_with_a_warning() -> None:
-    class Still:
-        measured_rad = (0.25,)
-
-        def advance(self, command: tuple[float, ...]) -> None:
-            pass
-
-    with pytest.warns(FutureWarning, match=r"Still.measured_rad is deprecated; call it measured"):
-        result = fly("paper-10baud", plant=Still(), settings={"duration_s": 0.5})
-    assert result.summary["ticks_commanded"] == 50
-
-
 def test_when_a_preset_has_an_old_name_then_the_new_one_is_loaded() -> None:
     with pytest.warns(FutureWarning, match="use 'open-loop-zoom-10baud'"):
         config = load_config("timed-10baud")

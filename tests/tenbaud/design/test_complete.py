@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,7 @@ from channel.codec.signals import signals_of
 from channel.line.line import bit_rate
 from tenbaud.build.codec import build_codec, configured_rate
 from tenbaud.build.flight import agree
+from tenbaud.build.signals import configured_signals, encoder_steps
 from tenbaud.cli.commands import app
 from tenbaud.config.load import (
     ConfigError,
@@ -35,6 +38,7 @@ PENDULUM: dict[str, Any] = {
     "state_units": ["rad", "rad/s"],
 }
 LONG_DESIGNS = (
+    *("pendulum-13baud", "pendulum-16baud"),
     "servo-10baud",
     "aero-20baud",
     "furuta-50baud",
@@ -135,6 +139,58 @@ def test_when_nothing_can_be_designed_then_the_error_says_why() -> None:
             completed({**AT_20, "model": model, "coder": {"kind": "direction"}})
 
 
+TWO_ROOTS = {
+    "kind": "linear",
+    "A": [[2.0, 0.0], [0.0, -1.0]],
+    "B": [[1.0], [1.0]],
+    "C": [[1.0, 0.0], [0.0, 1.0]],
+    "outputs": ["growing", "steady"],
+}
+
+
+def test_when_the_weights_hide_a_growing_motion_then_design_and_flight_name_who_shows_it() -> None:
+    hidden = {**TWO_ROOTS, "weights": [0.0, 1.0]}
+    text = r"eigenvalue 2 1/s.* grows by itself.*give growing, which shows it, a weight above 0"
+    with pytest.raises(ConfigError, match=text):
+        completed({**AT_20, "model": hidden, "coder": {"kind": "direction"}})
+    whole = completed({**AT_20, "model": TWO_ROOTS, "coder": {"kind": "direction"}})
+    whole["model"]["weights"] = [0.0, 1.0]
+    with pytest.raises(ConfigError, match=text):
+        agree(load_config("paper-10baud", None, whole), "virtual")
+    blind = {**TWO_ROOTS, "C": [[0.0, 1.0]], "outputs": ["steady"]}
+    with pytest.raises(ConfigError, match=r"eigenvalue 2 1/s.*add an output that shows it to C"):
+        completed({**AT_20, "model": blind, "coder": {"kind": "direction"}})
+
+
+def test_when_a_plant_grows_then_its_coder_is_designed_for_what_its_encoders_show() -> None:
+    values = {**AT_20, "model": PENDULUM, "coder": {"kind": "direction"}}
+    exact, coarse = completed(values), completed(values, [math.tau / 4096])
+    assert coarse["coder"]["noise"][0][0] > 2.0 * exact["coder"]["noise"][0][0]
+    steady = {**values, "model": {**PENDULUM, "A": [[0.0, 1.0], [-4.0, 0.0]]}}
+    assert completed(steady, [math.tau / 4096]) == completed(steady)
+
+
+@pytest.mark.parametrize("preset", ["pendulum-13baud", "pendulum-16baud", "pendulum-20baud"])
+def test_when_a_preset_is_slowed_below_its_smallest_rate_then_every_way_to_fly_it_is_refused(
+    preset: str, tmp_path: Path
+) -> None:
+    slow = ["--set", "timing.tick_s=0.005", "--set", "timing.symbol_period_s=0.1"]
+    file = tmp_path / "study.toml"
+    file.write_text(
+        f'preset = "{preset}"\nset = {{timing.tick_s = 0.005}}\n'
+        'grid = {"timing.symbol_period_s" = [0.1]}\n'
+    )
+    for arguments in (
+        ["demo", "--preset", preset, *slow],
+        ["transmit", "--preset", preset, *slow],
+        ["receive", "--preset", preset, *slow],
+        ["sweep", str(file), "--out", str(tmp_path / "swept")],
+    ):
+        done = CliRunner().invoke(app, arguments)
+        assert done.exit_code != 0
+        assert re.search("10 bit/s are too few.*more than 10.49 bit/s", str(done.exception)), arguments
+
+
 def test_when_a_coder_is_of_another_plant_then_it_is_refused() -> None:
     values = completed({**AT_20, "model": PENDULUM, "coder": {"kind": "direction"}})
     three = {"kind": "linear", "F": [[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]], "C": [[1.0, 0, 0]]}
@@ -214,16 +270,17 @@ def test_the_rate_of_a_configuration_is_that_of_its_codec() -> None:
     "preset",
     [
         "integrator-10baud",
+        "pendulum-20baud",
         *(pytest.param(name, marks=pytest.mark.soak) for name in LONG_DESIGNS),
     ],
 )
 def test_the_constants_of_a_preset_are_those_of_the_design(preset: str) -> None:
-    values = merged_values(preset)
-    again = completed(values)
+    values, config = merged_values(preset), load_config(preset)
+    again = completed(values, encoder_steps(config, configured_signals(config)))
     for section, names in (
         ("model", ("F", "E")),
         ("coder", ("transition", "noise", "worth", "start", "removed", "step")),
     ):
-        for name in names:
+        for name in set(names) & values[section].keys():
             carried, designed = (np.array(one[section][name]) for one in (values, again))
             assert np.abs(carried - designed).max() <= 1e-6 * np.abs(designed).max(), name

@@ -84,7 +84,19 @@ WRITERS: dict[str, Arguments] = {
 SLOW_WRITERS: dict[str, Arguments] = {
     "figures": lambda _, out: ["figures", "3", "--out", out],
     "tune": lambda _, out: [
-        *("tune", "--duration", "5", "--seeds", "1", "--test-seeds", "1", "--evaluations", "4"),
+        *(
+            "tune",
+            "--disturbance",
+            "q=2e-3",
+            "--duration",
+            "5",
+            "--seeds",
+            "1",
+            "--test-seeds",
+            "1",
+            "--evaluations",
+            "4",
+        ),
         *("--out", out),
     ],
 }

@@ -102,7 +102,7 @@ def test_a_disk_that_fills_in_flight_ends_the_recording_and_not_the_flight(
         shown, said = capsys.readouterr()
         assert code == ExitCode.NOT_WRITTEN
         summary = json.loads(shown)
-        assert summary["exit_code"] == ExitCode.OK
+        assert summary["exit_code"] == ExitCode.NOT_WRITTEN
         assert summary["digest_checks"] == 600, "the flight was cut short"
         assert os.strerror(28) in summary["recording_error"]
         assert "transmitter.mcap" in said

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import subprocess
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import Any
 import pytest
 
 from tenbaud.build.flight import agree
+from tenbaud.cli.app import run
 from tenbaud.config.load import load_config
 from tenbaud.flight import demo
 from tenbaud.flight.outcome import ExitCode, outcome_of_status
@@ -87,8 +89,10 @@ LASTING: dict[str, tuple[str, ...]] = {
     "router": ("router", "--listen", "tcp/127.0.0.1:0"),
     "identify": ("identify", "--duration", "20000", "--out", "run"),
     "figures": ("figures", "all", "--out", "run"),
-    "tune": ("tune", "--out", "found.toml", "--evaluations", "100000"),
+    "tune": ("tune", "--disturbance", "q=2e-3", "--out", "found.toml", "--evaluations", "100000"),
+    "sweep": ("sweep", "study.toml", "--workers", "2", "--out", "run"),
 }
+STUDY = 'name = "long"\nseeds = 2000\nset = { duration_s = 1000.0 }\ngrid = { loss = [0.0, 0.1] }\n'
 WHEN_IT_WAITS = ("transmit", "receive", "rig")
 
 
@@ -101,6 +105,7 @@ WHEN_IT_WAITS = ("transmit", "receive", "rig")
 def test_a_lasting_command_ends(name: str, after_s: float, number: int, tmp_path: Path) -> None:
     if name in WHEN_IT_WAITS and number is not signal.SIGTERM and after_s < 1.0:
         pytest.skip("covered by the demo, which starts them")
+    (tmp_path / "study.toml").write_text(STUDY)
     process = start(*LASTING[name], cwd=tmp_path)
     time.sleep(after_s)
     process.send_signal(number)
@@ -112,6 +117,57 @@ def test_a_lasting_command_ends(name: str, after_s: float, number: int, tmp_path
     assert "Traceback" not in ended.err, ended.err
     nothing_half_is_left(tmp_path)
     assert not (tmp_path / "port").is_symlink(), "its port is left"
+
+
+@pytest.mark.parametrize("command", ["transmit", "receive", "demo --view"])
+def test_what_is_interrupted_before_its_flight_leaves_no_folder(command: str, tmp_path: Path) -> None:
+    view = ("--view", "--view-port", "0") if "view" in command else ("--listen", "tcp/127.0.0.1:0")
+    process = start(command.split()[0], *view, "--out", "run", cwd=tmp_path)
+    _wait_for(lambda: (tmp_path / "run" / "config.toml").is_file() or process.poll() is not None)
+    process.send_signal(signal.SIGINT)
+    ended = finish(process)
+    assert ended.code == ExitCode.INTERRUPTED, ended.err
+    assert "interrupted" in ended.err or "stopped" in ended.err
+    assert processes_with(str(tmp_path)) == []
+    assert not (tmp_path / "run").exists()
+
+
+WRONG = "/dev/tenbaud-is-not-here"
+NO_PORT: dict[str, tuple[str, ...]] = {
+    "demo with a rig": ("demo", "--clock", "real", "--rig", f"cobs:{WRONG}"),
+    "transmit with a rig": ("transmit", "--rig", f"cobs:{WRONG}"),
+    "transmit": ("transmit", "--link", "serial", "--port", WRONG),
+    "receive": ("receive", "--link", "serial", "--port", WRONG),
+    "receive, second port": (
+        *("receive", "--link", "serial", "--port", "/dev/null", "--downlink", WRONG),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", NO_PORT)
+def test_a_port_that_is_not_there_is_refused_before_anything_starts(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(subprocess, "Popen", None)
+    assert run([*NO_PORT[name], "--out", str(tmp_path / "run")]) == ExitCode.USAGE
+    said = capsys.readouterr().err
+    assert said.startswith(f"tenbaud: {WRONG} cannot be opened: No such file or directory; ")
+    assert not (tmp_path / "run").exists()
+
+
+def test_an_end_that_cannot_begin_takes_the_waiting_one_with_it(tmp_path: Path) -> None:
+    # No serial port, but something that is there: found out by the transmitter alone.
+    started = time.monotonic()
+    rig = ("--clock", "real", "--rig", f"cobs:{tmp_path}")
+    ended = finish(
+        start("demo", *rig, "--set", "link.peer_timeout_s=200", "--out", "run", cwd=tmp_path)
+    )
+    assert time.monotonic() - started < 100.0
+    assert ended.code == ExitCode.USAGE
+    assert f"{tmp_path} cannot be opened" in ended.err
+    assert "interrupted" not in ended.err
+    assert ended.out == ""
+    assert not (tmp_path / "run").exists()
 
 
 def test_nohup_is_respected(tmp_path: Path) -> None:

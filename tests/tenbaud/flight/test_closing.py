@@ -46,15 +46,27 @@ def lines_of(tmp_path: Path, **changes: Any) -> list[str]:
     return closing_lines(FLOWN | changes, RunFolder(tmp_path))
 
 
-def test_a_good_flight_is_ten_lines_at_most_and_begins_with_its_verdict(tmp_path: Path) -> None:
+def test_a_good_flight_is_its_verdict_and_six_lines(tmp_path: Path) -> None:
     lines = lines_of(tmp_path)
     assert lines[0] == "✓ Flight finished: 100 s, both codecs equal in 1000 of 1000 checks"
-    assert len(lines) <= 10
+    assert len(lines) == 1 + 6
     text = "\n".join(lines)
     assert "1000 bits, 10 bit/s" in text
     assert "0.39° rms, 1.13° max (0.30% and 0.88% of the largest), after the first 25 s" in text
     assert "0 symbols lost, 0 late, 0 resyncs" in text
     assert "rad" not in text
+    assert lines[-1].endswith("Next: tenbaud demo --view")
+
+
+def test_the_usual_loop_stands_beside_the_tracking_error(tmp_path: Path) -> None:
+    lines = lines_of(tmp_path, usual_loop={"tracking_rms_rad": 0.84976})
+    assert lines[4].startswith("  Tracking error  48.9° rms (48.7° over 1000 bit/s), steps of")
+
+
+def test_a_flight_that_did_not_fly_says_in_what_and_then_its_numbers(tmp_path: Path) -> None:
+    lines = lines_of(tmp_path, exit_code=7, not_flown=["the plant fell"], outcome="of 9 samples\nhelp")
+    assert lines[0] == "✗ Flight failed (exit code 7): the plant fell"
+    assert lines[1:3] == ["  ⚠ of 9 samples", "  ⚠ help"]
 
 
 @pytest.mark.parametrize("code", [1, 4, 5, 6, 7, 130])
@@ -78,7 +90,7 @@ def test_each_of_several_outputs_has_its_name_and_unit(tmp_path: Path) -> None:
     text = "\n".join(lines_of(tmp_path, outputs=outputs))
     assert "arm angle: 0.39° rms, 1.13° max (0.30% and 0.88% of the largest), after" in text
     assert "place: 0.00677 m rms, 0.0198 m max, after the first 25 s" in text
-    assert "place: 0.854 m rms, steps included" in text
+    assert "place: 0.854 m rms, steps of the reference" in text
 
 
 def test_a_receiver_alone_has_no_checks_to_count(tmp_path: Path) -> None:

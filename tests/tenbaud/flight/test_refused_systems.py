@@ -35,7 +35,7 @@ from tests.tenbaud.flight.systems import NAMED, A, B, C, flown, pendulum
         (
             control.ss([[0.0, 1.0], [0.0, -1.0]], B, [[0.0, 1.0]], 0),
             {},
-            r"eigenvalue 0 1/s, mostly of state_1, .*\(A, C\) is not observable",
+            r"eigenvalue 0 1/s, mostly of state_1, .*\(A, C\), by the weights, is not observable",
         ),
         (
             control.ss([[1.0, 0.0], [0.0, -1.0]], B, [[1.0, 1.0]], 0, states=["up", "down"]),

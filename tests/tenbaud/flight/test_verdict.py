@@ -36,6 +36,9 @@ def test_when_a_flight_has_flown_then_nothing_is_found() -> None:
         ({"ticks_down": 3001}, {"ticks_down": 3000}, NotFlown.GUARD_DOWN),
         ({"ticks_commanded": 599}, {"ticks_commanded": 600}, NotFlown.NO_COMMANDS),
         ({"erased": 541}, {"erased": 540}, NotFlown.NO_WORDS),
+        ({"bad_commands": 61, "commands": 6000}, {"bad_commands": 60, "commands": 6000},
+         NotFlown.CONTROLLER),
+        ({"fell": True}, {"fell": False}, NotFlown.FELL),
     ],
 )  # fmt: skip
 def test_when_one_count_is_beyond_its_bound_then_that_is_the_fault(

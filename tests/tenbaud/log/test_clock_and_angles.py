@@ -116,9 +116,16 @@ def test_from_and_to_of_a_counter_are_its_number_times_the_period(tmp_path: Path
     rows = np.delete(lab_files.table(), slice(500, 550), axis=0)
     rows[:, 0] = 2.0 * np.round(50.0 * rows[:, 0]) + 1000.0
     with pytest.raises(LogError, match=r"21 s after 19\.98 s") as caught:
-        read(tmp_path, rows, period_s=0.02, index="time")
+        read(tmp_path, rows, period_s=0.02, columns={"index": "time"})
     _, end = re.findall(r"--from (\S+) --to (\S+?)(?=,|$)", str(caught.value))
-    log = read(tmp_path, rows, start_s=float(end[0]), end_s=float(end[1]), period_s=0.02, index="time")
+    log = read(
+        tmp_path,
+        rows,
+        start_s=float(end[0]),
+        end_s=float(end[1]),
+        period_s=0.02,
+        columns={"index": "time"},
+    )
     assert (log.tick_s, log.start_s, len(log)) == (0.02, 21.0, 950)
 
 
@@ -145,7 +152,7 @@ def test_a_period_drops_the_clock_that_only_the_format_suggests(step: float, tmp
 
 
 def test_a_clock_that_is_given_as_a_counter_of_rows_is_the_clock_and_said(tmp_path: Path) -> None:
-    log = read(tmp_path, lab_files.table(), index="time")
+    log = read(tmp_path, lab_files.table(), columns={"index": "time"})
     assert log.tick_s == 0.02
     assert "column time: the clock, as its values are not whole" in log.notes
 

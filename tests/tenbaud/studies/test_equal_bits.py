@@ -35,6 +35,7 @@ from tenbaud.studies.plain import fly_plain
 from tenbaud.studies.schedule import Uncommon
 from tenbaud.studies.settings import StudyError, put
 from tests.tenbaud.sum_of_states import SUM_OF_STATES
+from tests.tenbaud.test_three_axes import CASCADE
 from transmitter.session.records import SAMPLE_CHANNEL
 
 PRESETS = (
@@ -206,6 +207,11 @@ COMPILED_LONG = (
 """Few samples each, but machine code of its own for every number of states, inputs and outputs.
 
 `direction` is the coder of `linear` on the plant of the other presets."""
+
+
+@pytest.mark.soak
+def test_when_loops_steer_each_other_then_no_bit_differs() -> None:
+    compare(CompiledPoint(config_of("helicopter-10baud", {"receiver": CASCADE})))
 
 
 @pytest.mark.soak

@@ -87,6 +87,7 @@ def test_when_ctrl_c_ends_the_command_then_the_preset_is_there(
     monkeypatch.setattr(Judge, "__call__", interrupted)
     out = tmp_path / "found.toml"
     fit = [*("tune", "--out", str(out), "--duration", "20", "--mismatch", "0.1"), "--seeds", "2"]
+    fit += ["--disturbance", "q=2e-3"]
     done = CliRunner().invoke(app, fit)
     assert done.exit_code == ExitCode.INTERRUPTED, done.output
     # Twenty flights: those before the fit on both parts, and nineteen sets of constants.

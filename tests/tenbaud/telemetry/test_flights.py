@@ -137,7 +137,7 @@ def test_when_a_flight_is_looked_at_then_every_message_keeps_to_the_schema(tmp_p
 def test_when_a_flight_is_watched_and_could_be_steered_then_it_is_the_same_flight(
     tmp_path: Path,
 ) -> None:
-    flown = ("--clock", "virtual", "--lead", "3")
+    flown = ("--preset", "paper-10baud", "--clock", "virtual", "--lead", "3")
     alone = ("--duration", "20", "--mismatch", "0.1", "--disturbance", "q=2e-3")
     # Paced, so that it still goes on when the viewer has found it.
     paced = (*alone, "--pace", "4")

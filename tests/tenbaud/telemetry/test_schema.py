@@ -17,6 +17,12 @@ def test_the_committed_schema_is_the_present_one() -> None:
     assert json.loads(COMMITTED.read_text()) == schema_json()
 
 
+def test_every_field_has_a_meaning() -> None:
+    for name, message in schema_json()["$defs"].items():
+        for field, described in message.get("properties", {}).items():
+            assert described.get("description") or "const" in described, (name, field)
+
+
 def test_commands_are_taken_in_order() -> None:
     queue = CommandQueue()
     queue.offer(b'{"kind":"set_point","value":0.5}')

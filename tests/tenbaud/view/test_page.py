@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+import numpy as np
 import pytest
 
 from benchmarks.browser import Served, browser, served, state_is, why_no_browser
+from tenbaud.recording.pose import helicopter_lines
 from tenbaud.telemetry.schema import TELEMETRY
 
 pytestmark = pytest.mark.skipif(why_no_browser() is not None, reason=str(why_no_browser()))
@@ -234,8 +236,7 @@ def test_a_plant_of_any_outputs_is_shown_with_its_names_and_units_and_the_gap_to
             page.wait_for_timeout(100.0)
             if page.locator("#f-gap").is_visible():
                 break
-        assert number(page, "#f-gap") == 1.42
-        assert number(page, "#f-late") == 0.25
+        assert (number(page, "#f-gap"), number(page, "#f-late")) == (1.42, 0.25)
         for canvas in ("#value-0", "#error-0", "#value-1", "#error-1"):
             assert page.locator(canvas).is_visible()
         assert "Cart place m, last 30 s of flight" in page.locator("#curves").inner_text()
@@ -266,9 +267,26 @@ def test_a_plant_of_any_outputs_is_shown_with_its_names_and_units_and_the_gap_to
             assert [one.get_attribute("transform") for one in bodies] == [
                 f"rotate(-28.65 {centre})" for centre in turned
             ]
+        check_pose(page, port, message)
         page.get_by_text("takes no commands").wait_for()
         page.close()
     port.close()
+
+
+def check_pose(page: Any, port: Any, message: dict[str, Any]) -> None:
+    """Check that the helicopter of three axes is drawn by the same lines as in figures."""
+    poses = {"body": (0.3, 0.2, -0.4), "estimate": (0.0, 0.0, 0.0)}
+    point = {"time_s": message["time_s"], "true": None, "live": None, "range": [0.1] * 3}
+    message["points"] = [{**point, "measured": poses["body"], "coded": poses["estimate"]}]
+    axes = [{"name": name, "unit": "rad", "low": None, "high": None} for name in ("a", "b", "c")]
+    message["plant"] = {**message["plant"], "picture": "helicopter", "outputs": axes}
+    port.publish(json.dumps(message).encode())
+    page.locator("#helicopter-3").wait_for()
+    for part, pose in poses.items():
+        drawn = page.locator(f"#helicopter-3 .{part} path").first.get_attribute("d")
+        found = [float(one) for one in re.findall(r"[-.\d]+", drawn)]
+        arm = np.array([138.0, 122.0]) + helicopter_lines(*pose)[0] * [118.0, -118.0]
+        assert found[:4] == pytest.approx(arm.ravel().tolist(), abs=0.06), part
 
 
 def test_when_the_flight_falls_silent_or_ends_then_it_says_so(chromium: Any, tmp_path: Path) -> None:

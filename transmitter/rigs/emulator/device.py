@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from channel.flight_log import FlightLog
@@ -27,42 +27,57 @@ PITCH_CHANNEL = 1
 CHANNELS = 3
 
 
-class Body(Protocol):
-    """Whatever turns the pitch encoder."""
+Encoders = Mapping[int, Encoder]
+"""Channel to encoder, in the order of the plant's outputs."""
 
-    def counts_at(self, time_ns: int, volts: tuple[float, float]) -> int:
-        """Return the counts at a time since the motors were first enabled, volts held until then."""
+
+class Body(Protocol):
+    """Whatever turns the encoders."""
+
+    def counts_at(self, time_ns: int, volts: tuple[float, float]) -> list[int]:
+        """Return the counts of every channel at a time since the motors were first enabled.
+
+        The volts are held until then.
+        """
 
 
 class SimulatedBody:
     """A plant that is stepped up to the time asked for."""
 
-    def __init__(self, plant: Plant, step_ns: int, encoder: Encoder) -> None:
+    def __init__(self, plant: Plant, step_ns: int, encoders: Encoders) -> None:
         self._plant = plant
         self._step_ns = step_ns
-        self._encoder = encoder
+        self._encoders = encoders
         self._steps = 0
 
-    def counts_at(self, time_ns: int, volts: tuple[float, float]) -> int:
-        """Advance to this time and read the encoder."""
+    def counts_at(self, time_ns: int, volts: tuple[float, float]) -> list[int]:
+        """Advance to this time and read the encoders."""
         while (self._steps + 1) * self._step_ns <= time_ns:
             self._plant.advance(volts)
             self._steps += 1
-        return self._encoder.counts(self._plant.measured[0])
+        return _read(self._encoders, self._plant.measured)
 
 
 class RecordedBody:
-    """A recorded flight: its output comes again, one row per tick; past the last, the last stays."""
+    """A recorded flight: its outputs come again, one row per tick; past the last, the last stays."""
 
-    def __init__(self, log: FlightLog, tick_ns: int, encoder: Encoder) -> None:
+    def __init__(self, log: FlightLog, tick_ns: int, encoders: Encoders) -> None:
         self._log = log
         self._tick_ns = tick_ns
-        self._encoder = encoder
+        self._encoders = encoders
 
-    def counts_at(self, time_ns: int, volts: tuple[float, float]) -> int:
+    def counts_at(self, time_ns: int, volts: tuple[float, float]) -> list[int]:
         """Return the row of this time."""
         row = min(max(0, time_ns) // self._tick_ns, len(self._log) - 1)
-        return self._encoder.counts(float(self._log.measured[row, 0]))
+        return _read(self._encoders, self._log.measured[row].tolist())
+
+
+def _read(encoders: Encoders, outputs: Sequence[float]) -> list[int]:
+    """Return the counts of every channel; one without an encoder stays at 0."""
+    counts = [0] * CHANNELS
+    for (channel, encoder), value in zip(encoders.items(), outputs, strict=True):
+        counts[channel] = encoder.counts(value)
+    return counts
 
 
 class EmulatedDevice:
@@ -74,8 +89,11 @@ class EmulatedDevice:
         now_ns: int,
         watchdog_s: float = DEFAULT_WATCHDOG_S,
         faults: Faults | None = None,
+        faulty: int = PITCH_CHANNEL,
     ) -> None:
+        """`faulty` is the channel of the encoder that jumps or is stuck where a fault is due."""
         self.faults = faults or Faults()
+        self._faulty_channel = faulty
         self.volts: tuple[float, float] = OFF
         self.enabled = False
         self.tripped = False
@@ -89,7 +107,7 @@ class EmulatedDevice:
         self._heard_ns = now_ns
         self._sequence = 0
         self._zero = [0] * CHANNELS
-        self._pitch = 0
+        self._turned = body.counts_at(0, OFF)
         self._stuck_at: int | None = None
 
     def flight_s(self, now_ns: int) -> float | None:
@@ -123,7 +141,7 @@ class EmulatedDevice:
         self.counts["commands"] += 1
         self._heard_ns = now_ns
         if zero_encoders:
-            self._zero[PITCH_CHANNEL] = self._pitch
+            self._zero = list(self._turned)
         if not enable:
             self.enabled, self.tripped, self.volts = False, False, OFF
             return
@@ -142,14 +160,16 @@ class EmulatedDevice:
         flags |= DeviceFlag.WATCHDOG_TRIPPED if self.tripped else DeviceFlag(0)
         flags |= DeviceFlag.OUTPUT_ENABLED if self.enabled else DeviceFlag(0)
         time_us = (now_ns - self._boot_ns) // 1000
-        return RawSample((0, self._read_pitch(now_ns), 0), self._sequence, time_us, flags)
+        counts = [turned - zero for turned, zero in zip(self._turned, self._zero, strict=True)]
+        counts[self._faulty_channel] = self._faulty(now_ns, counts[self._faulty_channel])
+        return RawSample(tuple(counts), self._sequence, time_us, flags)
 
-    def _read_pitch(self, now_ns: int) -> int:
+    def _faulty(self, now_ns: int, counts: int) -> int:
+        """Return what the faulty encoder says in place of its counts."""
         flight_s = self.flight_s(now_ns)
-        counts = self._pitch - self._zero[PITCH_CHANNEL]
         jump = self.faults.take_due("jump", flight_s)
         if jump is not None:
-            self._zero[PITCH_CHANNEL] -= round(jump.amount)
+            self._zero[self._faulty_channel] -= round(jump.amount)
         if self.faults.active("stuck", flight_s) is None:
             self._stuck_at = None
             return counts
@@ -159,13 +179,13 @@ class EmulatedDevice:
 
     def _move(self, now_ns: int) -> None:
         if self._first_enabled_ns is not None:
-            self._pitch = self._body.counts_at(now_ns - self._first_enabled_ns, self.volts)
+            self._turned = self._body.counts_at(now_ns - self._first_enabled_ns, self.volts)
 
     def _reset(self, now_ns: int) -> None:
         """Begin anew, as a board does after a dip of its supply: counts and clock start at zero."""
         self.counts["resets"] += 1
         self.enabled, self.tripped, self.volts = False, False, OFF
-        self._zero[PITCH_CHANNEL] = self._pitch
+        self._zero = list(self._turned)
         self._sequence = 0
         self._boot_ns = now_ns
 

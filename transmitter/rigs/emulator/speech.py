@@ -6,7 +6,7 @@ import math
 import struct
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from transmitter.rigs.formats.ascii import checked, unchecked
@@ -171,13 +171,17 @@ class DoublesSpeech(Speech):
     """Units of doubles, as a QUARC model sends and takes them."""
 
     def __init__(
-        self, fields: tuple[str, ...], commands: tuple[str, ...], byte_order: str, scale: float
+        self,
+        fields: tuple[str, ...],
+        commands: tuple[str, ...],
+        byte_order: str,
+        scales: Mapping[int, float],
     ) -> None:
         super().__init__()
         self._fields = fields
         self._commands = commands
-        self._scale = scale
-        """turns a pitch count into the unit that is sent"""
+        self._scales = scales
+        """turn a channel's counts into the unit that is sent"""
         self._out = doubles(len(fields), byte_order)
         self._in = doubles(len(commands), byte_order)
 
@@ -188,7 +192,7 @@ class DoublesSpeech(Speech):
             "flags": int(sample.flags),
         }
         for channel, counts in enumerate(sample.counts):
-            known[f"c{channel}"] = counts * self._scale
+            known[f"c{channel}"] = counts * self._scales.get(channel, 1.0)
         return self._out.pack(*(known.get(name, 0.0) for name in self._fields))
 
     def feed(self, data: bytes) -> tuple[list[DeviceCommand], int]:

@@ -17,7 +17,7 @@ S = 1_000 * MS
 
 
 def device(*faults: str) -> EmulatedDevice:
-    body = SimulatedBody(PitchPlant(PitchParameters(), 0.001), MS, QUANSER_PITCH)
+    body = SimulatedBody(PitchPlant(PitchParameters(), 0.001), MS, {1: QUANSER_PITCH})
     return EmulatedDevice(body, 0, 0.1, Faults(faults))
 
 
@@ -91,7 +91,7 @@ def test_a_jump_shifts_the_counts_for_good() -> None:
 def test_a_recorded_flight_comes_again_and_stays_at_its_end() -> None:
     angles = np.array([[5.0], [6.0], [7.0]]) * math.tau / 4096.0
     log = FlightLog(0.01, angles, np.empty((3, 0)), np.zeros((3, 1), np.int64))
-    one = EmulatedDevice(RecordedBody(log, 10 * MS, Encoder(4096)), 0, 0.1)
+    one = EmulatedDevice(RecordedBody(log, 10 * MS, {1: Encoder(4096)}), 0, 0.1)
     one.command(S, (1.0, 1.0), True)
     read = [one.sample(S + ms * MS).counts[1] for ms in (0, 9, 10, 20, 500)]
     assert read == [5, 5, 6, 7, 7]

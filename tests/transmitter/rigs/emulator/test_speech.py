@@ -70,7 +70,7 @@ def test_an_adapter_streams_with_a_stamp_once_it_was_greeted() -> None:
 def test_only_the_newest_unit_of_doubles_is_taken_and_zeros_are_off() -> None:
     import struct
 
-    speech = DoublesSpeech(("seq", "c1"), ("v0", "v1"), "big", 0.5)
+    speech = DoublesSpeech(("seq", "c1"), ("v0", "v1"), "big", {1: 0.5})
     assert struct.unpack(">2d", speech.encode(SAMPLE)) == (65_540.0, -100.0)
     data = struct.pack(">6d", 1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
     assert speech.feed(data[:40]) == ([((3.0, 4.0), True, False)], 0)

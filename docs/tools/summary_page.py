@@ -1,0 +1,142 @@
+"""The reference page of `summary.json`: what `reference.py` writes."""
+
+from __future__ import annotations
+
+INTRODUCTION = """# Summary
+
+<!-- Written by `make reference` from docs/tools/summary_page.py. Change that, not this page. -->
+
+`summary.json` in a run's folder has these figures; `--json` prints them, and `--verbose` shows them. A
+run of both ends has the transmitter's figures and those that only the receiver knows; one of a single
+end has its own. null: not known. Errors and amplitudes count from `window_start_s` on. The fields with
+`pitch` or `rad` in their name are of the first output, in its unit if that is no angle; `outputs` has
+those of every output.
+
+| field | unit | meaning |
+|---|---|---|
+"""
+
+FIELDS: dict[str, tuple[str, str]] = {
+    "preset": ("", "preset that the configuration is based on"),
+    "link": ("", "kind of link"),
+    "clock": ("", "virtual or real"),
+    "outcome": ("", "how the flight ended, for people; no program should read it"),
+    "exit_code": ("", "of the command; 0: the flight has flown and is recorded"),
+    "ending": ("", "how the session ended, by name"),
+    "ended_by_peer": ("", "whether the other end ended it"),
+    "not_flown": ("", "in what a flight with exit code 7 fell short"),
+    "lead_ticks": ("ticks", "command lead D"),
+    "delivery": ("", "whether a symbol arrives at the start or at the end of its slot"),
+    "baud_configured": ("baud", "symbols per second that may go up the link"),
+    "baud_measured": ("baud", "symbols per second that arrived, on the receiver's clock"),
+    "config_digest": ("", "of the shared configuration; equal at both ends"),
+    "numerics_probe": ("", "digest of the codec run over fixed vectors; equal on all machines"),
+    "version": ("", "of the software"),
+    "flight_log_notes": ("", "what was noticed about the recording that is replayed"),
+    "plant": ("", "what was flown"),
+    "seed": ("", "of everything random"),
+    "duration_s": ("s", "flight time flown"),
+    "samples": ("samples", "that both ends have in common"),
+    "coder_bits_up": ("bits", "sent to the receiver: what the rate R is about"),
+    "wire_bytes_up": ("bytes", "of all frames to the receiver, framing included"),
+    "wire_bytes_down": ("bytes", "of all frames to the transmitter, framing included"),
+    "line_bytes_out": ("bytes", "that this end put on a serial line"),
+    "line_bytes_in": ("bytes", "that this end took from a serial line"),
+    "erasures": ("symbols", "that did not arrive within their deadline"),
+    "symbols_late": ("symbols", "that arrived after their deadline"),
+    "symbols_misplaced": ("symbols", "that arrived for a slot of another time"),
+    "symbols_refused": ("symbols", "that the rate limiter refused"),
+    "symbols_per_s_asked": ("symbols/s", "by the configuration"),
+    "symbols_per_s_kept": ("symbols/s", "consumed in time"),
+    "symbols_missing_share": ("", "share of the slots without a symbol in time"),
+    "words_missed": ("words", "that the transmitter could not form in time"),
+    "digest_checks": ("samples", "whose two digests were compared"),
+    "desyncs": ("", "differences of the two codecs that were found"),
+    "rejoins": ("", "new epochs from a common state"),
+    "rejoin_bytes": ("bytes", "of the control frames of all rejoins"),
+    "rejoins_asked": ("", "how often a rejoin was asked for, by reason"),
+    "stale_commands": ("frames", "of commands of an earlier epoch, dropped by the transmitter"),
+    "stale_frames": ("frames", "of an earlier session or epoch, dropped by the receiver"),
+    "out_of_bounds": ("frames", "with values out of bounds, dropped"),
+    "malformed": ("messages", "that were no frames, dropped"),
+    "claims_refused": ("", "requests of a second receiver that were refused"),
+    "take_overs": ("", "receivers that took the flight over"),
+    "connections_refused": ("", "connections turned away, by reason"),
+    "link_dropped": ("", "what the link dropped, by reason"),
+    "reconnects": ("", "lines that were lost and opened again"),
+    "commands_late": ("ticks", "without their own command in time"),
+    "commands_refused": ("", "commands of viewers that were refused"),
+    "ticks_commanded": ("ticks", "with their own command"),
+    "ticks_guard_down": ("ticks", "with the guard at the safe command or on its way there"),
+    "ticks_missed": ("ticks", "that a loop on the real clock left out"),
+    "guard_rearmed": ("", "how often the guard was armed again"),
+    "bad_commands": ("ticks", "at which the controller raised, or gave no finite value for each input"),
+    "sensor_fault": ("", "what was wrong with the sensor"),
+    "impairments": ("", "of the line, on purpose, as `--impair` takes them"),
+    "impaired_up": ("", "what they did to how many messages to the receiver"),
+    "impaired_down": ("", "the same to the transmitter"),
+    "window_start_s": (
+        "s",
+        "flight time from which errors count: the first period is left out",
+    ),
+    "pitch_amplitude_rad": ("rad", "largest value of the first output, either way"),
+    "reference_amplitude_rad": ("rad", "largest set-point of the first output, either way"),
+    "error_coded_max_rad": ("rad", "largest error of the codec's own estimate"),
+    "error_coded_rms_rad": ("rad", "its rms error"),
+    "error_coded_max_fraction": ("", "largest error over the largest value of the output"),
+    "error_coded_rms_fraction": ("", "rms error over the same"),
+    "error_coded_max_of_reference": ("", "largest error over the largest set-point"),
+    "error_live_max_rad": ("rad", "largest error of the estimate that commands are decided with"),
+    "error_live_rms_rad": ("rad", "its rms error"),
+    "error_live_max_fraction": ("", "largest error over the largest value of the output"),
+    "error_live_rms_fraction": ("", "rms error over the same"),
+    "error_live_max_of_reference": ("", "largest error over the largest set-point"),
+    "tracking_rms_rad": ("rad", "rms of set-point minus output, steps of the reference included"),
+    "outputs": ("", "the figures of each output, by its name:"),
+    "outputs.NAME.unit": ("", "unit of the output and of its errors"),
+    "outputs.NAME.largest": ("of the output", "largest value, either way"),
+    "outputs.NAME.error_coded_max": ("of the output", "largest error of the codec's own estimate"),
+    "outputs.NAME.error_coded_rms": ("of the output", "its rms error"),
+    "outputs.NAME.error_live_max": (
+        "of the output",
+        "largest error of the estimate that commands are decided with",
+    ),
+    "outputs.NAME.error_live_rms": ("of the output", "its rms error"),
+    "outputs.NAME.tracking_rms": ("of the output", "rms of set-point minus output"),
+    "outputs.NAME.symbols_share": ("", "share of the symbols that were about this output"),
+    "usual_loop": (
+        "",
+        "the loop over 1000 bit/s that `tenbaud demo` flew with the same plant and law:",
+    ),
+    "usual_loop.rate_baud": ("baud", "its symbols per second"),
+    "usual_loop.tracking_rms_rad": ("rad", "rms of set-point minus output"),
+    "usual_loop.error_live_rms_rad": (
+        "rad",
+        "rms error of the angle that its commands rest on",
+    ),
+    "disturbance_density": ("rad²/s³", "estimated density q of the first disturbance, of a torque"),
+    "rms_over_floor": ("", "rms live error over the least that any code of this rate could reach"),
+    "ideal_bits": ("bits", "that an ideal code would need for the same error"),
+    "loop_late_ms_p50": ("ms", "median lateness of the loop's ticks"),
+    "loop_late_ms_p99": ("ms", "lateness that 99 ticks in 100 keep below"),
+    "loop_late_ms_max": ("ms", "largest lateness"),
+    "realtime_factor": ("", "flight time over the time that it took"),
+    "rig": ("", "what a real rig counted"),
+    "telemetry": ("", "on, off, or why there was none"),
+    "telemetry_sent": ("messages", "of telemetry"),
+    "telemetry_dropped": ("messages", "of telemetry left out: a viewer was too slow"),
+    "telemetry_rows_dropped": ("rows", "of telemetry left out"),
+    "recording_rows": ("rows", "written to this end's recording"),
+    "recording_rows_lost": ("rows", "lost because the disk was too slow"),
+    "recording_error": ("", "why the recording is not whole"),
+}
+SOMETIMES = {
+    *("flight_log_notes", "ticks_missed", "rig", "usual_loop", "commands_refused"),
+}
+"""Fields that only some flights have."""
+
+
+def summary_page() -> str:
+    """Return the whole page."""
+    rows = [f"| `{name}` | {unit} | {text} |" for name, (unit, text) in FIELDS.items()]
+    return INTRODUCTION + "\n".join(rows) + "\n"

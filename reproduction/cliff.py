@@ -1,0 +1,225 @@
+"""Flights near the data-rate theorem: how many stay up, and how good they are, against R over R0.
+
+Each rate has its own coder, designed for the preset's model. `exact`: the simulated plant is that model
+and its outputs are read exactly, so that the line alone limits; otherwise it is the preset's own, with
+lag, friction and encoders. A flight has fallen when the pendulum was ever more than `FALLEN_RAD` from
+upright, or when the ends gave up. What is flown is kept point by point, and not flown again.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import multiprocessing
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
+from functools import cache
+from hashlib import blake2b
+from pathlib import Path
+from typing import Any
+
+from tenbaud.bounds.floor import floor
+from tenbaud.bounds.linear import rate_needed
+from tenbaud.build.signals import configured_signals, encoder_steps
+from tenbaud.config.load import ConfigError, load_config, merged_values
+from tenbaud.config.schema import FlightConfig
+from tenbaud.design.complete import completed
+from tenbaud.design.described import plant_of
+from tenbaud.files.whole import write_whole
+from tenbaud.studies.compiled import sources_digest
+from tenbaud.studies.flights import CompiledPoint
+from tenbaud.studies.schedule import Uncommon
+
+WORKERS = 2
+TICK_S = 0.004
+"""longest tick"""
+FALLEN_RAD = 1.0
+FIRST_SEED = 1001
+"""none of those on which constants were chosen"""
+RATIOS = (1.0, 1.05, 1.1, 1.15, 1.2, 1.3, 1.4, 1.5, 1.75, 2.0)
+"""R over R0"""
+EXACT: dict[str, Any] = {"encoders": {"quantised": False}}
+
+
+@dataclass(frozen=True, slots=True)
+class Plant:
+    """A plant of the figure."""
+
+    preset: str
+    upright: int
+    """place of the output that is 0 upright"""
+    exact: dict[str, Any]
+    """section of the plant that is its model"""
+
+
+PLANTS = {
+    "pendulum": Plant(
+        "pendulum-13baud", 0, {"options": {"motor_lag_s": 0.0, "friction_rad_per_s2": 0.0}}
+    ),
+    "furuta": Plant("furuta-50baud", 1, {"kind": "linear"}),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """What is flown with `seeds` seeds."""
+
+    plant: str
+    rate_bit_s: float
+    exact: bool = True
+    delivery: str = "start"
+    known: bool = False
+    """the coder knows the strength of the disturbance; otherwise it adapts"""
+    mismatch: float = 0.0
+    seeds: int = 100
+    seconds: float = 600.0
+
+    @property
+    def ratio(self) -> float:
+        """Return R over R0."""
+        return self.rate_bit_s / smallest_rate(self.plant)
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What came of a point: flights that stayed up, and their rms error over the floor."""
+
+    up: int
+    mean: float = math.nan
+    half: float = math.nan
+    """half the width of the mean's 95 % interval"""
+    refused: str = ""
+    """why nothing was flown: no coder can hold the plant at this rate"""
+
+
+OnProgress = Callable[[float, float, str], None]
+
+
+@cache
+def smallest_rate(plant: str) -> float:
+    """Return R0, in bit/s."""
+    config = load_config(PLANTS[plant].preset)
+    described = plant_of(config.model, config.timing.tick_s)
+    assert described is not None
+    return rate_needed(described.A)
+
+
+def sweep(seeds: dict[str, int], seconds: dict[str, float], ratios: tuple[float, ...]) -> list[Point]:
+    """Return the points of the figure."""
+    return [
+        Point(
+            plant,
+            ratio * smallest_rate(plant),
+            exact,
+            delivery,
+            seeds=seeds[plant],
+            seconds=seconds[plant],
+        )
+        for plant in PLANTS
+        for exact in (True, False)
+        for delivery in ("start", "end")
+        for ratio in ratios
+    ]
+
+
+def claims() -> list[Point]:
+    """Return the points of the table: a hundred flights of ten minutes each."""
+    rates = (12.7, 15.8, 20.0)
+    exact = [Point("pendulum", rate, known=known) for known in (True, False) for rate in rates]
+    own = [
+        Point("pendulum", rate, False, mismatch=mismatch) for mismatch in (0.0, 0.05) for rate in rates
+    ]
+    end = [Point("pendulum", rate, delivery="end") for rate in (14.0, 15.0, 15.8, 17.0, 18.5, 20.0)]
+    return [*exact, *own, *end, Point("furuta", 50.0, False)]
+
+
+QUICK = sweep({"pendulum": 4, "furuta": 2}, {"pendulum": 20.0, "furuta": 10.0}, (1.0, 1.2, 2.0))
+FULL = sweep({"pendulum": 20, "furuta": 10}, {"pendulum": 120.0, "furuta": 60.0}, RATIOS)
+
+
+def configuration(point: Point) -> FlightConfig:
+    """Return the configuration of a point; ConfigError where there is no coder for its rate."""
+    plant = PLANTS[point.plant]
+    ticks = math.ceil(1.0 / point.rate_bit_s / TICK_S - 1e-6)
+    # Whole nanoseconds, rounded up: the line carries no more than its rate.
+    tick_s = math.ceil(1e9 / point.rate_bit_s / ticks - 1e-6) / 1e9
+    values = merged_values(plant.preset, None)
+    values["timing"] = {"tick_s": tick_s, "symbol_period_s": round(tick_s * ticks, 9)}
+    values["channel"] |= {"rate_baud": point.rate_bit_s, "delivery": point.delivery}
+    given = load_config(plant.preset)
+    steps = () if point.exact else encoder_steps(given, configured_signals(given))
+    values = completed(values, steps)
+    values["coder"]["adapts"] = not point.known
+    transmitter = values["transmitter"]
+    transmitter["plant"] |= {"mismatch": point.mismatch, **(plant.exact if point.exact else {})}
+    if point.exact:
+        transmitter |= EXACT
+    return load_config(None, None, values | {"duration_s": point.seconds})
+
+
+def fly(point: Point) -> Found:
+    """Fly a point, compiled."""
+    try:
+        config = configuration(point)
+    except ConfigError as error:
+        return Found(0, refused=str(error))
+    described = plant_of(config.model, config.timing.tick_s)
+    assert described is not None
+    least = floor(described.model(), point.rate_bit_s)
+    compiled = CompiledPoint(config)
+    ratios = []
+    for seed in range(FIRST_SEED, FIRST_SEED + point.seeds):
+        try:
+            outputs = compiled.fly(seed)[0].outputs
+        except Uncommon:  # the estimate left all bounds
+            continue
+        if outputs[PLANTS[point.plant].upright].amplitude < FALLEN_RAD:
+            squares = [
+                weight * one.error_live_rms**2
+                for weight, one in zip(described.weights, outputs, strict=True)
+            ]
+            ratios.append(math.sqrt(sum(squares) / least))
+    if not ratios:
+        return Found(0)
+    mean = sum(ratios) / len(ratios)
+    spread = math.sqrt(sum((one - mean) ** 2 for one in ratios) / max(1, len(ratios) - 1))
+    return Found(len(ratios), mean, 1.96 * spread / math.sqrt(len(ratios)))
+
+
+def fly_all(points: list[Point], path: Path, on_progress: OnProgress) -> dict[Point, Found]:
+    """Fly what the file does not hold yet, and keep each point in it as it comes."""
+    kept = _kept(path)
+    found = {point: kept[point] for point in points if point in kept}
+    left = [point for point in points if point not in found]
+    context = multiprocessing.get_context("spawn")
+    on_progress(len(found), len(points), "flights")
+    with ProcessPoolExecutor(min(WORKERS, max(1, len(left))), context) as pool:
+        flying = {pool.submit(fly, point): point for point in left}
+        for future in as_completed(flying):
+            found[flying[future]] = future.result()
+            _keep(path, {**kept, **found})
+            on_progress(len(found), len(points), "flights")
+    return {point: found[point] for point in points}
+
+
+def _kept(path: Path) -> dict[Point, Found]:
+    """Return what a file holds; nothing where other sources made it."""
+    if not path.is_file():
+        return {}
+    values = json.loads(path.read_text(encoding="utf-8"))
+    if values["sources"] != _sources():
+        return {}
+    return {Point(**one["point"]): Found(**one["found"]) for one in values["points"]}
+
+
+def _keep(path: Path, found: dict[Point, Found]) -> None:
+    points = [{"point": asdict(point), "found": asdict(one)} for point, one in found.items()]
+    write_whole(path, json.dumps({"sources": _sources(), "points": points}, indent=1) + "\n")
+
+
+def _sources() -> str:
+    """Return what stands for the sources and the presets that the figures rest on."""
+    presets = [merged_values(plant.preset, None) for plant in PLANTS.values()]
+    digest = blake2b(json.dumps(presets, sort_keys=True).encode(), digest_size=8).hexdigest()
+    return f"{sources_digest()} {digest}"

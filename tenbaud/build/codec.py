@@ -45,7 +45,7 @@ def unchecked_codec(config: FlightConfig, parts: Parts | None = None) -> Codec:
 
 def configured_rate(config: FlightConfig) -> float:
     """Return the bit/s of a configuration's words, be they enough for its plant or not."""
-    designed = config.coder.kind != "direction" and getattr(config.model, "F", True)
+    designed = config.coder.kind not in ("direction", "learning") and getattr(config.model, "F", True)
     if isinstance(config.coder, OutsideSection) or designed:
         return bit_rate(unchecked_codec(config), config.timing.tick_s)
     # Without a codec: a linear model and its coder may not have been designed yet.

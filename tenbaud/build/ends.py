@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 from channel.codec.codec import Codec
 from channel.codec.coders.direction import DirectionCoder
+from channel.codec.models.learned import plant_model
 from channel.codec.models.linear import LinearModel
 from channel.line.clocks import SkewedClock
 from channel.line.impairments import Direction, ImpairedLine
@@ -93,7 +94,11 @@ def build_observer(agreement: Agreement) -> StateObserver | None:
         kind = model_kind(config.model)
         # A coder that was designed for a plant stands near its limit: it needs the best view of it.
         is_designed = isinstance(codec.coder, DirectionCoder) and kind is not None and kind.linear
-        if is_designed or isinstance(codec.model, LinearModel) or len(agreement.signals.outputs) > 1:
+        if (
+            is_designed
+            or isinstance(plant_model(codec.model), LinearModel)
+            or len(agreement.signals.outputs) > 1
+        ):
             from tenbaud.design.observer import configured_observer
 
             steps = output_steps(config, agreement.signals)

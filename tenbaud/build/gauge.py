@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from functools import partial
 
+from channel.codec.models.learned import plant_model
 from channel.codec.models.pitch import PitchModel
 from channel.line.line import bit_rate
 from tenbaud.bounds.closed import double_integrator_floor, double_integrator_rate
@@ -57,7 +58,7 @@ def _of_plant(agreement: Agreement, steps: Sequence[float]) -> GapGauge | None:
     if described is None:
         return None
     try:
-        plant = corrected_part(described, codec.model.correction_size)
+        plant = corrected_part(described, plant_model(codec.model).correction_size)
         needed = rate_needed(plant.A)
         model, _ = reached(plant.A, plant.noise, plant.C, plant.weights)
         above = rate - needed

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from channel.codec.codec import Vector
+from channel.codec.models.learned import plant_model
 from channel.codec.signals import STEPS_MAX, Signals, signals_of
 from channel.flight_log import FlightLog
 from channel.protocol.limits import per_input
@@ -206,7 +207,7 @@ class _Adoption:
 
 def start_at(config: FlightConfig, log: FlightLog) -> dict[str, Any]:
     """Return `model.start` with which a codec begins at the first row; {} where it does by itself."""
-    model = build_model(config)
+    model = plant_model(build_model(config))
     first, state = log.measured[0], np.array(model.initial())
     outside = not isinstance(config.model, BuiltInModel)
     if outside or tuple(first.tolist()) == model.measured(model.initial()):

@@ -7,13 +7,15 @@ to ten digits, so that a replay on a machine with another library computes the s
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg import LinAlgError, solve_discrete_are
 
 from channel.codec.codec import Model
-from channel.codec.signals import Signal, Signals
+from channel.codec.models.learned import plant_model
+from channel.codec.signals import Signal, Signals, signals_of
 from receiver.controllers.base import ControllerContext
 from receiver.controllers.state_feedback import FeedbackLaw, Rows, StateFeedback
 from tenbaud.bounds.linear import unreached
@@ -32,7 +34,11 @@ GROWING = 1.0 + 1e-6
 
 def state_feedback(config: FlightConfig, context: ControllerContext) -> StateFeedback:
     """Return the controller of a configuration; ConfigError, with names, for one that cannot be."""
-    section, signals, model = config.receiver.state_feedback, context.signals, context.model
+    whole, model = context.model, plant_model(context.model)
+    # What a model learns is no state of its plant, and is not fed back.
+    learned = (0.0,) * (whole.state_size - model.state_size)
+    context = replace(context, model=model, signals=signals_of(model))
+    section, signals = config.receiver.state_feedback, context.signals
     plant = Linear(model, context.initial_command)
     law = _law(section, plant, context)
     steered = [one is not None for one in context.references]
@@ -40,13 +46,13 @@ def state_feedback(config: FlightConfig, context: ControllerContext) -> StateFee
     return StateFeedback(
         FeedbackLaw(
             _rounded(base[None])[0],
-            _rounded(law[0]),
+            tuple([(*row, *learned) for row in _rounded(law[0])]),
             _rounded(forward),
             _rounded(law[1]),
             section.anti_windup == "conditional",
         ),
         context.references,
-        model.measured,
+        whole.measured,
         context.command_max,
         context.tick_s,
     )

@@ -10,11 +10,13 @@ from channel.codec.codec import Coder, CoderContext, Model
 from channel.codec.coders.base import readout_of
 from channel.codec.coders.direction import DirectionCoder, DirectionParameters
 from channel.codec.coders.history import HistoryCoder, HistoryParameters
+from channel.codec.coders.learning import LearningCoder, LearningParameters
 from channel.codec.coders.open_loop_zoom import OpenLoopZoomCoder, OpenLoopZoomParameters
 from channel.codec.coders.pcm import PcmCoder, PcmParameters
 from channel.codec.coders.signs import Gains
 from channel.codec.coders.static import StaticCoder, StaticParameters
 from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
+from channel.codec.models.learned import LearnedModel
 from channel.codec.signals import signals_of
 from tenbaud.config.kinds import Kind
 from tenbaud.config.section import AngleRange, Factor, KindSection, NotNegative, Positive
@@ -99,30 +101,55 @@ class HistoryCoderSection(KindSection):
 Square = Annotated[tuple[tuple[Factor, ...], ...], Field(min_length=1, max_length=64)]
 
 
-class DirectionCoderSection(KindSection):
-    """Signs asked of the direction that is worth most, for any linear plant; from `tenbaud design`."""
+class _DesignedSection(KindSection):
+    """What the coders that `tenbaud design` makes for a linear plant have in common."""
 
-    kind: Literal["direction"] = "direction"
     bits: Annotated[int, Field(ge=1, le=15)] = 1
     """signs per sample"""
     adapts: bool = True
-    """follow a disturbance of unknown strength; false: it is as `noise` says"""
+    """follow a disturbance of unknown strength; false: it is as `noise` or `noises` say"""
     transition: Square = ()
     """F of a sample, of the corrected states"""
-    noise: Square = ()
-    """Q, covariance of what the disturbance adds in a sample"""
     worth: Square = ()
     """N, what an error costs, now and later"""
-    start: Square = ()
-    """P, covariance before the first word"""
     removed: Annotated[float, Field(ge=0.001, le=0.999)] = 0.67
     """alpha, of the variance along the direction, by a sign"""
     step: Annotated[float, Field(ge=0.001, le=10.0)] = 1.0
     """kappa, correction in standard deviations"""
-    initial_strength: Positive = 1.0
-    """sigma, disturbance in units of the assumed one"""
     minimum_strength: Positive = 0.001
+    """of sigma, the disturbance in units of the assumed one"""
     maximum_strength: Positive = 1000.0
+
+
+class DirectionCoderSection(_DesignedSection):
+    """Signs asked of the direction that is worth most, for any linear plant; from `tenbaud design`."""
+
+    kind: Literal["direction"] = "direction"
+    noise: Square = ()
+    """Q, covariance of what the disturbance adds in a sample"""
+    start: Square = ()
+    """P, covariance before the first word"""
+    initial_strength: Positive = 1.0
+    """sigma before the first word"""
+
+
+class LearningCoderSection(_DesignedSection):
+    """The coder `direction` that learns the model's terms too (`learns`); from `tenbaud design`."""
+
+    kind: Literal["learning"] = "learning"
+    noises: Annotated[tuple[Square, ...], Field(max_length=16)] = ()
+    """Q of each column of the disturbance"""
+    starts: Annotated[tuple[Square, ...], Field(max_length=16)] = ()
+    """P before the first word, of each column"""
+    reach: Square = ()
+    """what a constant rate of each state, a column, adds in a sample"""
+    spreads: Annotated[tuple[Positive, ...], Field(max_length=64)] = ()
+    """standard deviation of each term's error before the first word; empty: 0.1, of a force 0.03"""
+    drift: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0003
+    """by which an error may change in a sample, as a share of its spread"""
+    learned_max: Annotated[float, Field(ge=0.01, le=0.9)] = 0.3
+    """of the size of each error"""
+    minimum_strength: Positive = 0.01
 
 
 def _given(section: KindSection, model: Model | None = None) -> dict[str, Any]:
@@ -174,7 +201,34 @@ def _direction(section: DirectionCoderSection, context: CoderContext) -> Coder:
             "and for both ends"
         )
     parameters = DirectionParameters(**_given(section))
-    coder = DirectionCoder(parameters, readout_of(context.model))
+    return _fitting(DirectionCoder(parameters, readout_of(context.model)), context)
+
+
+def _learning(section: LearningCoderSection, context: CoderContext) -> Coder:
+    model = context.model
+    if not isinstance(model, LearnedModel):
+        raise ValueError(
+            "the coder 'learning' needs a model whose terms are states: set model.learns = true, which "
+            "the kinds linear and helicopter have"
+        )
+    if not (section.transition and section.noises and section.worth and section.starts):
+        raise ValueError(
+            "coder.transition, noises, worth, starts and reach are missing: `tenbaud design` finds "
+            "them, once and for both ends"
+        )
+    given = _given(section)
+    given["spreads"] = section.spreads or model.spreads
+    readout = [row[: len(section.transition)] for row in readout_of(model)]
+    coder = LearningCoder(LearningParameters(**given), model.term_rows, model.plant.state_size, readout)
+    if len(section.transition) != model.plant.correction_size:
+        raise ValueError(
+            f"the coder corrects {len(section.transition)} states of the plant and the model takes "
+            f"corrections of {model.plant.correction_size}: design it for this model"
+        )
+    return _fitting(coder, context)
+
+
+def _fitting(coder: DirectionCoder | LearningCoder, context: CoderContext) -> Coder:
     if coder.correction_size != context.model.correction_size:
         raise ValueError(
             f"the coder corrects {coder.correction_size} states and the model takes corrections of "
@@ -201,3 +255,4 @@ STATIC = Kind(
 PCM = Kind(PcmCoderSection, _pcm)
 HISTORY = Kind(HistoryCoderSection, _history)
 DIRECTION = Kind(DirectionCoderSection, _direction)
+LEARNING = Kind(LearningCoderSection, _learning)

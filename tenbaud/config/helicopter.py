@@ -16,8 +16,9 @@ from channel.codec.models.helicopter import (
     force_of,
     hover_volts,
 )
+from channel.codec.models.learned_helicopter import LearnedHelicopterModel
 from tenbaud.config.kinds import Kind
-from tenbaud.config.models import LinearModelSection, ModelSection
+from tenbaud.config.models import LinearModelSection, ModelSection, freshness
 from tenbaud.config.section import NotNegative, Positive
 
 LAG_LEAST_S = 1e-3
@@ -58,6 +59,9 @@ class HelicopterModelSection(ModelSection):
     """q of the disturbance of travel, elevation and pitch, in rad^2/s^3"""
     weights: tuple[NotNegative, NotNegative, NotNegative] = (1.0, 1.0, 1.0)
     """of the squared error of each angle"""
+    learns: bool = False
+    """whether errors of damping, weight and thrust, and a force on each axis, are states that the coder
+    `learning` corrects"""
 
     @model_validator(mode="after")
     def _hovering(self) -> HelicopterModelSection:
@@ -82,9 +86,12 @@ class HelicopterModelSection(ModelSection):
         return HelicopterParameters(**values)
 
 
-def _build(section: HelicopterModelSection, context: ModelContext) -> HelicopterModel:
+def _build(
+    section: HelicopterModelSection, context: ModelContext
+) -> HelicopterModel | LearnedHelicopterModel:
     hover_rad, lag_s = section.hover_rad, section.motor_lag_s
-    return HelicopterModel(section.parameters, hover_rad, lag_s, context.tick_s, section.start)
+    model = HelicopterModel(section.parameters, hover_rad, lag_s, context.tick_s, section.start)
+    return LearnedHelicopterModel(model, freshness(context)) if section.learns else model
 
 
 def _linear(section: HelicopterModelSection) -> LinearModelSection:

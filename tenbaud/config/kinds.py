@@ -45,6 +45,7 @@ CODERS = Registry(
         "pcm": "tenbaud.config.coders:PCM",
         "history": "tenbaud.config.coders:HISTORY",
         "direction": "tenbaud.config.coders:DIRECTION",
+        "learning": "tenbaud.config.coders:LEARNING",
     },
 )
 PLANTS = Registry(

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from channel.codec.codec import ModelContext
 from channel.codec.models.hold import HoldModel
+from channel.codec.models.learned import LearnedLinearModel
 from channel.codec.models.linear import LinearModel
 from channel.codec.models.pendulum import PendulumModel
 from channel.codec.models.pitch import PitchModel, PitchParameters
@@ -94,6 +95,8 @@ class LinearModelSection(ModelSection):
     output_units: Names = ()
     input_steps_per_unit: tuple[Positive, ...] = ()
     """a command travels in whole steps: 1000 per volt are mV; empty: 1000"""
+    learns: bool = False
+    """whether errors of A and B, and a constant force, are states that the coder `learning` corrects"""
     picture: Picture = ""
     """what displays draw, its parts turned by the outputs in order; empty: a bar for each output"""
 
@@ -193,22 +196,33 @@ def _hold(section: HoldModelSection, context: ModelContext) -> HoldModel:
     return HoldModel(context.tick_s, section.start, section.outputs)
 
 
-def _linear(section: LinearModelSection, context: ModelContext) -> LinearModel:
+def freshness(context: ModelContext) -> float:
+    """Return how far a term's mean moves to its value in a tick: in half a symbol period."""
+    return min(1.0, 2.0 * context.tick_s / context.symbol_period_s)
+
+
+def _linear(section: LinearModelSection, context: ModelContext) -> LinearModel | LearnedLinearModel:
     if not section.F:
         raise ValueError(
             "model.F and model.E, the plant of one tick, are missing: `tenbaud design` finds them from "
             "A and B, once and for both ends"
         )
-    return LinearModel(
+    operating = (section.operating_state, section.operating_command)
+    model = LinearModel(
         section.F,
         section.E,
         section.C,
         context.tick_s,
         corrected=section.corrected or None,
         start=section.start or None,
-        operating=(section.operating_state, section.operating_command),
+        operating=operating,
         signals=section.signals(len(section.E[0])),
     )
+    if not section.learns:
+        return model
+    if not section.A:
+        raise ValueError("model.learns is of the entries of A and B, which are not given")
+    return LearnedLinearModel(model, section.A, section.B, operating, freshness(context))
 
 
 def _pendulum(section: PendulumModelSection, context: ModelContext) -> PendulumModel:

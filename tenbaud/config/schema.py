@@ -44,7 +44,7 @@ from tenbaud.config.section import (
 )
 
 SHARED_SECTIONS = ("timing", "channel", "model", "coder", "limits")
-ADDED_FIELDS = {"start", "travel_stop_rad", "outputs", "floor_gain", "floor_exponent"}
+ADDED_FIELDS = {"start", "travel_stop_rad", "outputs", "floor_gain", "floor_exponent", "learns"}
 """Of models and coders that were flown before they had them."""
 
 
@@ -309,8 +309,9 @@ class FlightConfig(CodePermission):
         shared = self.model_dump(mode="json", include=set(SHARED_SECTIONS))
         shared["timing"]["lead_ticks"] = lead_ticks
         for name, section in (("model", self.model), ("coder", self.coder)):
-            fields = {} if section.kind == "linear" else type(section).model_fields
-            for field in ADDED_FIELDS & fields.keys():
+            fields = type(section).model_fields
+            added = {"learns"} if section.kind == "linear" else ADDED_FIELDS
+            for field in added & fields.keys():
                 if getattr(section, field) == fields[field].default:
                     del shared[name][field]  # recordings from before it have the same digest
         if self.flight_log.digest:

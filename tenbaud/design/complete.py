@@ -20,19 +20,21 @@ from tenbaud.config.models import LinearModelSection
 from tenbaud.config.schema import Timing
 from tenbaud.config.section import KindSection, Section
 from tenbaud.design.described import corrected_part, linear_of, plant_of, require_rate, require_seen
-from tenbaud.design.direction import design_direction
+from tenbaud.design.direction import design_direction, design_learning
 from tenbaud.design.plant import behind_encoders
 
+DESIGNED = (*("transition", "noise", "noises", "worth", "start", "starts", "reach", "removed", "step"),)
+"""settings of a coder that are worked out; what else it has is the user's"""
 SectionKind = TypeVar("SectionKind", bound=Section)
 
 
 def completed(values: Mapping[str, Any], steps: Sequence[float] = ()) -> dict[str, Any]:
     """Return nested settings with the sections `model` and `coder` completed.
 
-    A linear model gets F and E from its A and B, and a coder `direction` its constants for the plant;
-    both anew where they are there already. `steps` are those of the encoders of the outputs: on a plant
-    that grows the coder is designed for what can be seen of it behind them. Raises ConfigError where
-    nothing can be designed.
+    A linear model gets F and E from its A and B, and a coder `direction` or `learning` its constants
+    for the plant; both anew where they are there already. `steps` are those of the encoders of the
+    outputs: on a plant that grows the coder is designed for what can be seen of it behind them. Raises
+    ConfigError where nothing can be designed.
     """
     given, coder = dict(values.get("model", {})), dict(values.get("coder", {}))
     try:
@@ -42,8 +44,8 @@ def completed(values: Mapping[str, Any], steps: Sequence[float] = ()) -> dict[st
             F, E = discretised(section.A, section.B, timing.tick_s)
             given |= {"F": F.tolist(), "E": E.tolist()}
             section = _checked("model", LinearModelSection, given)
-        if coder.get("kind") == "direction":
-            coder |= _direction(section, coder, timing, steps)
+        if coder.get("kind") in ("direction", "learning"):
+            coder |= _designed(section, coder, timing, steps)
     except ValueError as error:
         raise ConfigError(f"this cannot be designed: {error}") from error
     return {**values, "model": given, "coder": coder}
@@ -61,7 +63,7 @@ def _checked(place: str, sort: type[SectionKind], values: Mapping[str, Any]) -> 
         raise ValueError("; ".join(faults)) from error
 
 
-def _direction(
+def _designed(
     section: KindSection, coder: Mapping[str, Any], timing: Timing, steps: Sequence[float]
 ) -> dict[str, Any]:
     linear, plant = linear_of(section), plant_of(section, timing.tick_s)
@@ -73,9 +75,10 @@ def _direction(
     require_rate(plant, rate, section)
     if all(steps) and len(steps) == len(plant.C) and rate_needed(plant.A):
         plant, _ = behind_encoders(plant, steps, timing.tick_s)
-    found = asdict(design_direction(plant, rate, timing.symbol_period_s))
-    designed = ("transition", "noise", "worth", "start", "removed", "step")
-    return {
-        name: [list(row) for row in found[name]] if isinstance(found[name], tuple) else found[name]
-        for name in designed
-    }
+    design = design_learning if coder["kind"] == "learning" else design_direction
+    found = asdict(design(plant, rate, timing.symbol_period_s))
+    return {name: _lists(value) for name, value in found.items() if name in DESIGNED}
+
+
+def _lists(value: Any) -> Any:
+    return [_lists(one) for one in value] if isinstance(value, tuple) else value

@@ -1,4 +1,4 @@
-"""The constants of the `direction` coder, found once and offline from a plant and a rate.
+"""The constants of the coders `direction` and `learning`, found once from a plant and a rate.
 
 What an error costs is not what it costs now: an error of the rate is an error of the angle later. N is
 that cost-to-go under the coder itself, which asks for the direction that N calls the most expensive. So
@@ -15,8 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from channel.codec.coders.direction import SQUARINGS, DirectionParameters
+from channel.codec.coders.learning import LearningParameters
+from plant_sim.zero_order_hold import discretised
 from tenbaud.bounds.floor import ideal_worth, period_cost, require_rate
-from tenbaud.bounds.linear import Matrix, sampled
+from tenbaud.bounds.linear import Matrix, rate_needed, sampled, van_loan
 from tenbaud.design.plant import LinearPlant, rows_of
 
 ROUNDS = 25
@@ -75,6 +77,49 @@ def design_direction(
         adapts=adapts,
         removed=alpha,
         step=kappa,
+    )
+
+
+def design_learning(
+    plant: LinearPlant, rate_bit_s: float, symbol_period_s: float, *, adapts: bool = True
+) -> LearningParameters:
+    """Return what the coder `learning` needs, but for what it learns; see `design_direction`.
+
+    ValueError for a plant that grows: near its smallest rate what is learned goes astray there, and the
+    plant is lost.
+    """
+    found = design_direction(plant, rate_bit_s, symbol_period_s, adapts=adapts)
+    needed = rate_needed(plant.A)
+    if needed > 0.0:
+        raise ValueError(
+            f"the plant grows (smallest rate {needed:.4g} bit/s), and its terms are not learned there: "
+            "use the coder `direction`, and leave model.learns out"
+        )
+    noises = [
+        van_loan(plant.A, density * np.outer(column, column), symbol_period_s)[1]
+        for column, density in zip(plant.G.T, plant.densities, strict=True)
+        if density > 0.0
+    ]
+    F, N = np.array(found.transition), np.array(found.worth)
+    share = 1.0 - math.sqrt(1.0 - found.removed)
+    parts = [np.zeros_like(F) for _ in noises]
+    for sample in range(SAMPLES):
+        parts = [_symmetric(F @ part @ F.T + noise) for part, noise in zip(parts, noises, strict=True)]
+        for _ in range(found.bits if GROWN <= sample < SAMPLES - 1 else 0):
+            c, v = _direction(N, np.sum(parts, axis=0))
+            left = np.eye(len(F)) - share * np.outer(v, c)
+            parts = [_symmetric(left @ part @ left.T) for part in parts]
+    return LearningParameters(
+        transition=found.transition,
+        noises=tuple(rows_of(_symmetric(noise)) for noise in noises),
+        worth=found.worth,
+        starts=tuple(rows_of(part) for part in parts),
+        reach=rows_of(discretised(plant.A, np.eye(len(F)), symbol_period_s)[1]),
+        spreads=(),
+        bits=found.bits,
+        adapts=adapts,
+        removed=found.removed,
+        step=found.step,
     )
 
 

@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
 from channel.codec.codec import STATE_MAX, Codec, Model
 from channel.codec.coders.direction import DirectionCoder
+from channel.codec.coders.learning import LearningCoder
+from channel.codec.models.learned import plant_model
 from channel.codec.models.linear import LinearModel
 from tenbaud.bounds.linear import Matrix, van_loan
 from tenbaud.config.schema import FlightConfig
@@ -28,8 +31,12 @@ LEAST_NOISE = 1e-9
 
 def linear_observer(model: LinearModel, tick_noise: Matrix, steps: Matrix) -> StateObserver:
     """Return the observer of a linear model; see `kalman_observer`."""
-    transition = np.array(model.constants.transition).reshape(model.state_size, model.state_size)
-    return kalman_observer(model, transition, np.array(model.outputs), tick_noise, steps)
+    return _of_linear(model, model, tick_noise, steps)
+
+
+def _of_linear(model: Model, plant: LinearModel, tick_noise: Matrix, steps: Matrix) -> StateObserver:
+    transition = np.array(plant.constants.transition).reshape(plant.state_size, plant.state_size)
+    return kalman_observer(model, transition, np.array(plant.outputs), tick_noise, steps)
 
 
 def kalman_observer(
@@ -38,7 +45,7 @@ def kalman_observer(
     """Return the observer for a noise covariance per tick and the step of each output's encoder.
 
     `transition` is that of a tick, `C` makes outputs of states. States of the model beyond these, such
-    as lagging motors, follow from the commands alone.
+    as lagging motors, follow from the commands alone; what a model learns stays zero here.
     """
     size, outputs = len(transition), len(C)
     known = np.zeros((model.state_size - size, outputs))
@@ -61,15 +68,18 @@ def kalman_observer(
 
 def observer_of_coder(codec: Codec, counts_per_turn: int) -> StateObserver:
     """Return the observer for the disturbance that a coder assumes."""
-    model, coder = codec.model, codec.coder
-    if not (isinstance(model, LinearModel) and isinstance(coder, DirectionCoder)):
+    plant, coder = plant_model(codec.model), codec.coder
+    known = isinstance(coder, DirectionCoder | LearningCoder)
+    if not (isinstance(plant, LinearModel) and known):
         raise ValueError(
-            "a coder that uses rates needs the coder `direction` where the model is linear"
+            "a coder that uses rates needs to be `direction` or `learning` where the model is linear"
         )
-    noise = np.zeros((model.state_size, model.state_size))
-    corrected = model.correction_size
-    noise[:corrected, :corrected] = np.array(coder.parameters.noise) / codec.ticks_per_sample
-    return linear_observer(model, noise, np.array([math.tau / counts_per_turn]))
+    parameters: Any = coder.parameters  # type: ignore[attr-defined]
+    both = np.sum(getattr(parameters, "noises", None) or [parameters.noise], axis=0)
+    noise = np.zeros((plant.state_size, plant.state_size))
+    corrected = plant.correction_size
+    noise[:corrected, :corrected] = both / codec.ticks_per_sample
+    return _of_linear(codec.model, plant, noise, np.array([math.tau / counts_per_turn]))
 
 
 def configured_observer(model: Model, config: FlightConfig, steps: Sequence[float]) -> StateObserver:
@@ -79,6 +89,6 @@ def configured_observer(model: Model, config: FlightConfig, steps: Sequence[floa
     if plant is None:
         raise ValueError(f"model.kind = {config.model.kind!r} describes no plant to observe")
     transition, noise = van_loan(plant.A, plant.noise, tick_s)
-    if isinstance(model, LinearModel):
-        return linear_observer(model, noise, np.array(steps))
+    if isinstance(found := plant_model(model), LinearModel):
+        return _of_linear(model, found, noise, np.array(steps))
     return kalman_observer(model, transition, plant.C, noise, np.array(steps))

@@ -80,6 +80,9 @@ def _figures(summary: Summary, unicode: bool) -> Iterator[tuple[str, str]]:
     if get("coder_bits_up") is not None:
         yield "Uplink", _uplink(summary)
     yield from _errors(summary, unicode)
+    if learned := summary.get("learned"):
+        seen = [learned_text(name, **one) for name, one in learned.items() if is_seen(**one)]
+        yield "Model is off by", ", ".join(seen) or "nothing that was learned"
     yield "Link", _link(summary)
     if get("impairments"):
         yield "Impaired", f"{get('impairments')}"
@@ -88,6 +91,19 @@ def _figures(summary: Summary, unicode: bool) -> Iterator[tuple[str, str]]:
             "Loop lateness",
             f"{get('loop_late_ms_p50'):.2f} ms median, {get('loop_late_ms_p99'):.2f} ms p99",
         )
+
+
+def is_seen(error: float, deviation: float) -> bool:
+    """Return whether an error that was learned is more than twice its standard deviation."""
+    return abs(error) > 2.0 * deviation
+
+
+def learned_text(name: str, error: float, deviation: float) -> str:
+    """Return what was learned of a term: an error in per cent, a force as it is."""
+    words = name.replace("_", " ")
+    if name.endswith("_force"):
+        return f"{words} {error:+.3f} (sd {deviation:.3f})"
+    return f"{words} {error:+.1%} (sd {deviation:.1%})"
 
 
 def _errors(summary: Summary, unicode: bool) -> Iterator[tuple[str, str]]:

@@ -6,6 +6,7 @@ import json
 from dataclasses import asdict
 
 from channel.codec.codec import Codec, Vector
+from channel.codec.models.learned import plant_model
 from channel.codec.models.linear import LinearModel
 from channel.errors import ConfigMismatch, LinkLost
 from channel.line.impairments import LineFaults
@@ -180,7 +181,7 @@ class MemoryFlight:
 
 def _observer(codec: Codec, counts_per_turn: int) -> StateObserver | None:
     """Return what shows a coder all states of a linear model; None: as the session has it."""
-    if not (codec.uses_rates and isinstance(codec.model, LinearModel)):
+    if not (codec.uses_rates and isinstance(plant_model(codec.model), LinearModel)):
         return None
     from tenbaud.design.observer import observer_of_coder
 

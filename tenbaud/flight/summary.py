@@ -6,6 +6,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+from channel.codec.coders.learning import learned_of
 from channel.links.base import Link
 from channel.protocol.bounds import COUNTER
 from channel.protocol.endings import End
@@ -59,6 +60,7 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         **_errors("error_live", scores.live, scores.largest, scores.reference_largest),
         "tracking_rms_rad": scores.tracking.rms,
         "outputs": _outputs(run),
+        **_learned(run),
         **gap_part(node.gauge.whole if node.gauge is not None else None),
         "commands_late": node.commands_late,
         "symbols_refused": run.uplink.shaper.refused,
@@ -218,6 +220,12 @@ def _outputs(run: TransmitterRun) -> Summary:
             "symbols_share": scores.symbols / symbols if symbols else None,
         }
     return figures
+
+
+def _learned(run: TransmitterRun) -> Summary:
+    """Return what both ends have learned of the plant's terms, where they do."""
+    found = learned_of(run.agreement.codec, run.node.session.copies.confirmed)
+    return {"learned": {name: one._asdict() for name, one in found.items()}} if found else {}
 
 
 def _errors(name: str, meter: ErrorMeter, angle_max: float, reference_max: float) -> Summary:

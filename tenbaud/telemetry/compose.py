@@ -9,6 +9,7 @@ from math import isfinite
 from typing import Any
 
 from channel.codec.codec import Vector
+from channel.codec.coders.learning import learned_of
 from channel.codec.signals import Signal
 from channel.protocol.events import EVENT_CHANNEL
 from channel.protocol.recording import RecordChannel
@@ -134,6 +135,7 @@ class TransmitterComposer(Composer):
             "paused": self._live.paused,
             "pace": self._live.pace if self.agreement.clock == "virtual" else None,
             "gap_to_floor": gap and gap.rms_over_floor,
+            "learned": learned_of(self.agreement.codec, session.copies.confirmed),
         }
 
     def _read(self, rows: list[tuple[str, Row]]) -> tuple[list[Any], list[Any]]:

@@ -137,6 +137,11 @@ class TransmitterTelemetry(_EndMessage):
     gap_to_floor: float | None = Field(
         default=None, description="estimation error over the least that any coder could reach"
     )
+    learned: dict[str, tuple[float, float]] = Field(
+        default_factory=dict,
+        description="of each term that the codec learns: its relative error (a force: the force), and "
+        "the standard deviation that both ends assume of it",
+    )
 
 
 class ReceiverTelemetry(_EndMessage):

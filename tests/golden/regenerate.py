@@ -19,11 +19,13 @@ from channel.codec import numerics
 from channel.codec.codec import Codec
 from channel.codec.coders.direction import DirectionCoder, DirectionParameters
 from channel.codec.coders.history import HistoryCoder, HistoryParameters
+from channel.codec.coders.learning import LearningCoder, LearningParameters
 from channel.codec.coders.open_loop_zoom import OpenLoopZoomCoder, OpenLoopZoomParameters
 from channel.codec.coders.pcm import PcmCoder, PcmParameters
 from channel.codec.coders.static import StaticCoder, StaticParameters
 from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
 from channel.codec.models.hold import HoldModel
+from channel.codec.models.learned import LearnedLinearModel
 from channel.codec.models.linear import LinearModel
 from channel.codec.models.pitch import PITCH_SIGNALS, PitchModel, PitchParameters
 from channel.protocol import frames, wire
@@ -139,6 +141,28 @@ PITCH_DIRECTION = DirectionParameters(
     removed=0.7,
 )
 
+LEARNED_PITCH = LearnedLinearModel(
+    LinearModel(
+        ((0.999975, 0.00999483), (-0.00499741, 0.998976)),
+        ((1.7e-05, -1.7e-05), (0.0034982, -0.0034982)),
+        ((1.0, 0.0),),
+        0.01,
+    ),
+    ((0.0, 1.0), (-0.5, -0.1)),
+    ((0.0, 0.0), (0.35, -0.35)),
+    ((), ()),
+    0.2,
+)
+PITCH_LEARNING = LearningParameters(
+    transition=PITCH_DIRECTION.transition,
+    noises=(PITCH_DIRECTION.noise,),
+    worth=PITCH_DIRECTION.worth,
+    starts=(PITCH_DIRECTION.start,),
+    reach=((0.0999169, 0.00498337), (-0.00249169, 0.0994186)),
+    spreads=LEARNED_PITCH.spreads,
+    drift=0.001,
+)
+
 GOLDEN_CODECS: dict[str, Codec] = {
     "paper": Codec(PitchModel(PitchParameters(), 0.01), ZoomCoder(ZoomParameters()), 10),
     "three signs, impulse": Codec(
@@ -170,6 +194,7 @@ GOLDEN_CODECS: dict[str, Codec] = {
     "direction of the pitch": Codec(
         PitchModel(PitchParameters(), 0.01), DirectionCoder(PITCH_DIRECTION), 10
     ),
+    "learning the pitch": Codec(LEARNED_PITCH, LearningCoder(PITCH_LEARNING, (1,) * 5, 2), 10),
 }
 
 

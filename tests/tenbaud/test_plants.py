@@ -116,3 +116,14 @@ def test_it_flies_as_two_processes(preset: str, clock: Clock, tmp_path: Path) ->
     if clock == "virtual" or held_up(run.summary) is None:
         # The first seconds, and on the real clock the command lead, add to the error.
         check(preset, run.summary, 3.0 if clock == "virtual" else 6.0)
+
+
+def test_when_the_helicopter_is_off_then_its_flight_says_by_how_much(tmp_path: Path) -> None:
+    settings = {"duration_s": 60.0, "transmitter.plant.mismatch": (0.1, -0.1, 0.1)}
+    run = fly("helicopter-10baud", settings=settings, out=tmp_path / "run")
+    learned = run.summary["learned"]
+    for name, off in (("pitch_thrust", 0.1), ("elevation_weight", -0.1), ("elevation_thrust", 0.1)):
+        error, deviation = learned[name]["error"], learned[name]["deviation"]
+        assert abs(error - off) < 4.0 * deviation < 0.4, name
+        assert 0.0 < deviation < 0.1, name
+        assert run.values_of(f"estimate_{name}_error")[-1] == pytest.approx(error, abs=0.05), name

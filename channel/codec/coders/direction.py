@@ -37,7 +37,13 @@ from channel.codec.coders.base import (
     SymbolResults,
     Symbols,
 )
-from channel.codec.coders.symmetric import place, variance_of, write_full
+from channel.codec.coders.symmetric import (
+    check_symmetric,
+    deviations,
+    most_correlated,
+    place,
+    write_full,
+)
 from channel.codec.models.linear import Rows, check, flat
 
 SQUARINGS = 4
@@ -111,10 +117,18 @@ def aim(constants: DirectionConstants, coder: Results, c: Results, v: Results) -
         for i in range(n):
             for j in range(i + 1):
                 coder[place(i, j)] += growth * (coder[first + i] * coder[first + j])
-    worth = constants.worth
+    return point(constants.worth, coder, c, v)
+
+
+def point(worth: Numbers, known: Numbers, c: Results, v: Results) -> bool:
+    """Write the direction that N calls the most expensive under a P, and v = P c.
+
+    `known` begins with the lower half of P. Return whether there is a direction.
+    """
+    n = len(c)
     power = [0.0] * (n * n)
     square = [0.0] * (n * n)
-    write_full(coder, n, square)
+    write_full(known, n, square)
     for i in range(n):
         for j in range(n):
             total = 0.0
@@ -148,7 +162,7 @@ def aim(constants: DirectionConstants, coder: Results, c: Results, v: Results) -
     for i in range(n):
         total = 0.0
         for j in range(n):
-            total += coder[place(i, j)] * c[j]
+            total += known[place(i, j)] * c[j]
         v[i] = total
         variance += c[i] * total
     if not variance > 0.0:
@@ -338,54 +352,41 @@ class DirectionCoder(FunctionCoder):
         if len(self.readout) == 1:
             return (0,) * len(word)
         if len(word) == 1:  # along v
-            return (self._most_correlated(coder, correction),)
+            return (most_correlated(self.readout, coder, correction),)
         known = list(coder)
         c, v, correction = ([0.0] * self.correction_size for _ in range(3))
         found = []
         for at, sign in enumerate(word):
             is_asked = aim(self.constants, known, c, v)
-            found.append(self._most_correlated(known, v) if is_asked else 0)
+            found.append(most_correlated(self.readout, known, v) if is_asked else 0)
             if is_asked and at + 1 < len(word):
                 learn(self.constants, known, c, v, sign, correction)
         return tuple(found)
 
-    def _most_correlated(self, coder: Numbers, v: Numbers) -> int:
-        """Return the output C x for which (C v)^2 / (C P C') is largest, the first of equals."""
-        best, most = 0, 0.0
-        for output, row in enumerate(self.readout):
-            common = 0.0
-            for i in range(len(v)):
-                common += row[i] * v[i]
-            variance = variance_of(coder, row)
-            if variance > 0.0 and common * common > most * variance:
-                best, most = output, common * common / variance
-        return best
-
     def ranges(self, coder: Vector) -> Vector:
         """Return, for each output, the standard deviation that both ends assume."""
-        variances = [variance_of(coder, row) for row in self.readout]
-        return tuple([coder[-1] * math.sqrt(one if one > 0.0 else 0.0) for one in variances])
+        return deviations(self.readout, coder, coder[-1])
 
 
 def check_parameters(parameters: DirectionParameters) -> None:
     """Raise ValueError where the parameters make no coder."""
-    if not 1 <= parameters.bits <= 15:
-        raise ValueError(f"bits must be 1 ... 15, got {parameters.bits}")
-    if not 0.0 < parameters.removed < 1.0:
-        raise ValueError(f"removed must be above 0 and below 1, got {parameters.removed}")
-    smallest, largest = parameters.minimum_strength, parameters.maximum_strength
-    if not 0.0 < smallest <= parameters.initial_strength <= largest:
-        raise ValueError(
-            "strengths must be 0 < minimum <= initial <= maximum, got "
-            f"{smallest}, {parameters.initial_strength}, {largest}"
-        )
+    p = parameters
+    check_steps(p.bits, p.removed, p.minimum_strength, p.initial_strength, p.maximum_strength)
     for name in ("noise", "worth", "start"):
         rows = getattr(parameters, name)
+        check_symmetric(name, rows)
         for row in range(len(rows)):
-            for column in range(row + 1):
-                if rows[row][column] != rows[column][row]:
-                    raise ValueError(
-                        f"{name} must be symmetric, and its entries {row + 1}, {column + 1} differ"
-                    )
             if name == "start" and not rows[row][row] > 0.0:
                 raise ValueError(f"start must be above 0 on its diagonal, state {row + 1} is not")
+
+
+def check_steps(bits: int, removed: float, smallest: float, initial: float, largest: float) -> None:
+    """Raise ValueError for a word, a share of the variance or strengths that make no coder."""
+    if not 1 <= bits <= 15:
+        raise ValueError(f"bits must be 1 ... 15, got {bits}")
+    if not 0.0 < removed < 1.0:
+        raise ValueError(f"removed must be above 0 and below 1, got {removed}")
+    if not 0.0 < smallest <= initial <= largest:
+        raise ValueError(
+            f"strengths must be 0 < minimum <= initial <= maximum, got {smallest}, {initial}, {largest}"
+        )

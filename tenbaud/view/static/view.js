@@ -268,6 +268,9 @@ function showText(now) {
     set("tape-text", `one every ${up.symbol_period_s.toFixed(3).replace(/0+$/, "").replace(/\.$/, "")} s of flight, as the controller consumes them`);
     at("gap-box").hidden = up.gap_to_floor === undefined || up.gap_to_floor === null;
     if (!at("gap-box").hidden) set("f-gap", `${up.gap_to_floor.toFixed(2)} ×`);
+    const learned = Object.entries(up.learned || {});
+    at("learned-box").hidden = !learned.length;
+    set("f-learned", learned.map(learnedText).join(", "));
     const baud = down && down.baud_measured !== null ? down.baud_measured.toFixed(2) : "–";
     set("f-baud", `${baud} of ${up.baud_configured}`);
   }
@@ -387,3 +390,9 @@ listen();
 setInterval(() => { showText(performance.now()); draw(); }, TEXT_MS);
 showText(0);
 draw();
+
+function learnedText([name, [error, sd]]) {
+  const words = name.replaceAll("_", " ");
+  if (name.endsWith("_force")) return `${words} ${error.toFixed(3)} (${sd.toFixed(3)})`;
+  return `${words} ${(100 * error).toFixed(1)} % (${(100 * sd).toFixed(1)})`;
+}

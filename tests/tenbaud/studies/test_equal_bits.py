@@ -5,18 +5,21 @@ from __future__ import annotations
 import copy
 import csv
 import math
+import random
 import re
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from channel.codec.codec import CodecState
 from channel.codec.numerics import sin
 from channel.protocol.wire import DATAGRAM
 from tenbaud import MemoryRecorder
+from tenbaud.build.codec import build_codec
 from tenbaud.build.ends import build_receiver
 from tenbaud.build.flight import agree
 from tenbaud.config.kinds import CODERS, MODELS
@@ -26,7 +29,7 @@ from tenbaud.design.complete import completed
 from tenbaud.flight import transmit
 from tenbaud.studies import compiled as compiling
 from tenbaud.studies.chunk import fly_point
-from tenbaud.studies.compiled import compiled
+from tenbaud.studies.compiled import arrays_of, compiled
 from tenbaud.studies.flights import CompiledPoint
 from tenbaud.studies.plain import fly_plain
 from tenbaud.studies.schedule import Uncommon
@@ -149,6 +152,45 @@ def test_when_a_flight_is_compiled_then_no_bit_differs(preset: str, changes: dic
         assert (figures.outcome, figures.erasures) == ("ok", figures.samples)
         return
     compare(point)
+
+
+def test_when_what_a_coder_learns_is_compiled_then_no_bit_differs() -> None:
+    codec = build_codec(load_config("integrator-10baud", None, learning()))
+    chooser = random.Random(7)
+    decode = compiled(codec.coder.functions.decode, allocates=True)  # type: ignore[attr-defined]
+    constants = arrays_of(codec.coder.constants)  # type: ignore[attr-defined]
+    state, coder = codec.initial(), np.array(codec.initial().coder)
+    for sample in range(60):
+        word = None if sample % 7 == 3 else (chooser.choice((-1, 1)),)
+        after, correction = np.empty_like(coder), np.empty(codec.model.correction_size)
+        symbols = np.array(word or (0,))
+        decode(constants, coder, np.array(state.model), symbols, word is None, correction, after)
+        moved, following = codec.coder.decode(state.coder, state.model, word)
+        assert tuple(correction.tolist()) == moved
+        assert tuple(after.tolist()) == following
+        commands = [(chooser.uniform(-1.0, 1.0),)] * codec.ticks_per_sample
+        state, coder = codec.step(state, word, commands), after
+    assert np.abs(state.model[2:4]).max() > 0.0
+
+
+@pytest.mark.soak
+def test_when_the_codec_learns_its_plant_then_no_bit_differs() -> None:
+    values = {
+        **BURSTS,
+        "duration_s": 8.0,
+        "transmitter": {"plant": {"mismatch": 0.1, "disturbance": "q=2e-3"}},
+    }
+    point = CompiledPoint(load_config("integrator-10baud", None, {**values, **learning()}))
+    compare(point)
+    assert np.abs(point._work.models[-1, 2:4]).max() > 0.01  # the errors of its terms
+
+
+@cache
+def learning() -> dict[str, Any]:
+    """Return a model that learns, and its coder."""
+    given = load_config("integrator-10baud").model_dump(mode="json", exclude_unset=True)
+    model = {**given["model"], "learns": True}
+    return completed({"model": model, "coder": {"kind": "learning"}})
 
 
 def test_when_the_smallest_range_follows_the_range_then_no_bit_differs() -> None:

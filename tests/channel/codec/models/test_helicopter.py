@@ -11,6 +11,7 @@ from scipy.linalg import expm
 
 from channel.codec.codec import Vector
 from channel.codec.models.helicopter import HelicopterModel, helicopter_tick
+from channel.codec.models.learned import plant_model
 from plant_sim.helicopter import HelicopterPlant
 from plant_sim.plant import PlantContext
 from tenbaud.build.codec import build_model
@@ -24,7 +25,7 @@ NOTHING: Vector = (0.0,) * 6
 
 def model_and_plant() -> tuple[HelicopterModel, HelicopterPlant]:
     config = load_config("helicopter-10baud")
-    model = build_model(config)
+    model = plant_model(build_model(config))
     assert isinstance(model, HelicopterModel)
     context = PlantContext(
         step_s=config.timing.tick_s, seed=1, command_max=(5.0, 5.0), mismatch=0.0, disturbance=None

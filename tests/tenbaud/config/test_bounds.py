@@ -55,7 +55,7 @@ def _bounds(annotation: Any, metadata: tuple[Any, ...]) -> Iterator[tuple[Any, A
         for part in typing.get_args(annotation):
             yield from _bounds(part, metadata)
     elif origin is tuple:
-        for part in set(typing.get_args(annotation)):
+        for part in dict.fromkeys(typing.get_args(annotation)):
             yield from _bounds(part, ())
 
 

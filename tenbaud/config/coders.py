@@ -117,7 +117,6 @@ class _DesignedSection(KindSection):
     step: Annotated[float, Field(ge=0.001, le=10.0)] = 1.0
     """kappa, correction in standard deviations"""
     minimum_strength: Positive = 0.001
-    """of sigma, the disturbance in units of the assumed one"""
     maximum_strength: Positive = 1000.0
 
 

@@ -168,15 +168,21 @@ def check_parts(config: FlightConfig, parts: Parts | None = None) -> None:
     `parts` are objects in place of what is configured; they are checked already.
     """
     parts = parts or Parts()
-    if config.transmitter.rig == "serial":
-        from channel.links.serial.port import check_port
-
-        check_port(config.transmitter.serial.port, insecure=True)
     build_rig(config, parts.plant, configured_signals(config, parts))
     if parts.controller is None:
         controller = build_controller(config, model=parts.model)
         if config.receiver.controller not in CONTROLLERS.built_in:
             _check_command(config, controller, parts)
+
+
+def check_rig_port(config: FlightConfig) -> None:
+    """Raise LinkError where a serial port of the rig is not there; for a process that opens the rig."""
+    if config.transmitter.rig == "serial":
+        from channel.links.serial.port import check_port
+
+        section = config.transmitter.serial
+        for port in filter(None, (section.port, section.motor_port)):
+            check_port(port, insecure=True)
 
 
 def check_sabotage(agreement: Agreement) -> None:

@@ -100,7 +100,7 @@ def _view_options(
 
 def _agree_all(flight: options.FlightOptions, changes: list[dict[str, Any]]) -> list[Agreement]:
     """Return the flights, each checked as far as it can be before anything starts."""
-    from tenbaud.build.ends import check_parts, check_sabotage
+    from tenbaud.build.ends import check_parts, check_rig_port, check_sabotage
     from tenbaud.build.flight import agree
     from tenbaud.build.recorded import flight_config, replay_notes
 
@@ -110,6 +110,7 @@ def _agree_all(flight: options.FlightOptions, changes: list[dict[str, Any]]) -> 
     agreements = [agree(one, flight.clock.value) for one in configs]
     for agreement in agreements:
         check_parts(agreement.config)
+        check_rig_port(agreement.config)
         check_sabotage(agreement)
     for note in replay_notes(configs[0]):
         typer.echo(f"  {note}", err=True)

@@ -114,7 +114,7 @@ def _run(
     from contextlib import nullcontext
     from dataclasses import replace
 
-    from tenbaud.build.ends import check_parts
+    from tenbaud.build.ends import check_parts, check_rig_port
     from tenbaud.build.flight import agree
     from tenbaud.build.recorded import flight_config
     from tenbaud.cli.addresses import endpoints_of
@@ -132,6 +132,8 @@ def _run(
     agreement = replace(agree(config, node.clock.value), live=telemetry.control)
     endpoints = replace(endpoints_of(role, addresses, config, take_over), telemetry=telemetry)
     check_parts(config)
+    if role == "transmitter":
+        check_rig_port(config)
     telemetry.check(role, endpoints.insecure, endpoints.security is not None)
     whole = node.run_folder is None
     folder = RunFolder(node.run_folder or create_run_folder(None, f"{role}-{config.preset}", node.out))

@@ -157,7 +157,7 @@ def _wait(ends: tuple[_Child, _Child], stop: StopFlag) -> None:
             # It had not begun, and says no farewell.
             ends[1].interrupt()
         for end, other in (ends, ends[::-1]):
-            if end.process.poll() not in (None, 0):
+            if end.process.poll() not in (None, 0) and not end.flew:
                 other.dismiss()
         if passed_on or any(end.process.poll() is not None for end in ends):
             patience_s -= 0.1
@@ -224,6 +224,15 @@ class _Child:
             self.interrupt()
 
     @property
+    def flew(self) -> bool:
+        """Return whether the process, which has ended, flew with the other one, by its summary.
+
+        A status is too seldom to tell of a short flight.
+        """
+        self._read_out()
+        return bool(self.summary.get("samples"))
+
+    @property
     def died_of_interrupt(self) -> bool:
         """Return whether the interrupt came before the process could take it, in its first moments."""
         return self._interrupted and self.process.poll() == -signal.SIGINT
@@ -231,6 +240,9 @@ class _Child:
     def end(self) -> None:
         """Make sure that the process has ended, and read what it left."""
         end_child(self.process, 5.0)
+        self._read_out()
+
+    def _read_out(self) -> None:
         for thread in self._threads:
             thread.join(5.0)
 

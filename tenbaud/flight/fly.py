@@ -16,7 +16,7 @@ from channel.protocol.terms import Clock
 from plant_sim.plant import Plant
 from receiver.controllers.base import Controller
 from tenbaud.build.controllers import controller_context
-from tenbaud.build.ends import check_parts
+from tenbaud.build.ends import check_parts, check_rig_port
 from tenbaud.build.flight import Agreement, agree
 from tenbaud.build.given import Given, feedback_gains, reference_settings, whole_sections
 from tenbaud.build.parts import PartError, Parts
@@ -215,4 +215,5 @@ def _agreement(loaded: FlightConfig, clock: Clock, parts: Mapping[str, Any]) -> 
         )
     agreement = replace(agreement, parts=made)
     check_parts(loaded, made)
+    check_rig_port(loaded)
     return agreement

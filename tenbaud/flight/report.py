@@ -20,7 +20,7 @@ from tenbaud.recording.folder import RunFolder
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from tenbaud.recording.figure import Curve
+    from tenbaud.recording.envelope import Curve
 
 
 def write_up(

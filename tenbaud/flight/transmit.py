@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 
@@ -19,6 +18,7 @@ from tenbaud.build.flight import Agreement
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.flight.outcome import SAFE, ExitCode, Outcome, farewell_of
 from tenbaud.flight.verdict import FlightCounts, faults_of, settings_of, verdict_text
+from tenbaud.log.units import turn_in
 from tenbaud.sentences import endings, events
 from transmitter.endpoint import TransmitterEndpoint
 from transmitter.guard import GuardCause
@@ -189,12 +189,14 @@ def flight_counts(run: TransmitterRun) -> FlightCounts:
 
 
 def _fell(run: TransmitterRun) -> bool:
-    """Return whether the last angle of a pendulum, 0 upright, was ever beyond a right angle."""
+    """Return whether the last output of a pendulum, 0 upright, was ever beyond a right angle."""
     flown = not run.node.rig.is_recorded and not run.agreement.config.transmitter.dry_run
-    if not flown or run.agreement.signals.picture not in UPRIGHT:
+    signals = run.agreement.signals
+    turn = turn_in(signals.outputs[-1].unit) if flown and signals.picture in UPRIGHT else None
+    if turn is None:
         return False
     scores = run.node.scores.outputs[-1]
-    return max(scores.largest, abs(scores.last or 0.0)) > math.pi / 2.0
+    return max(scores.largest, abs(scores.last or 0.0)) > turn / 4.0
 
 
 def _desync_outcome(run: TransmitterRun) -> Outcome | None:

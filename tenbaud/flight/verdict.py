@@ -173,8 +173,16 @@ def _on_controller(_: Settings) -> str:
     )
 
 
+def _on_fall(_: Settings) -> str:
+    return (
+        "the pendulum went beyond 90 degrees from upright: raise the rate (channel.rate_baud) at both "
+        "ends; `tenbaud floor` tells how much the plant needs"
+    )
+
+
 ADVICE: Mapping[NotFlown, Callable[[Settings], str]] = {
     NotFlown.CONTROLLER: _on_controller,
+    NotFlown.FELL: _on_fall,
     NotFlown.NO_WORDS: _on_words,
     NotFlown.NO_COMMANDS: _on_commands,
     NotFlown.REJOINING: _on_rejoins,

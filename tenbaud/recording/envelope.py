@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Series = NDArray[np.float64]
+Curve = tuple[Series, Series]
+"""times and values"""
 
 POINTS = 8000
 """Of a thinned curve; gaps may add half as many."""

@@ -15,7 +15,7 @@ from channel.codec.signals import Signal, Signals
 from channel.line.impairments import parse_impairments
 from tenbaud.files.whole import whole_file
 from tenbaud.recording.encoding import OVERVIEW_METADATA, RUN_METADATA, recorded_signals
-from tenbaud.recording.envelope import Series
+from tenbaud.recording.envelope import Curve, Series
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.overview import (
     FIELDS,
@@ -24,7 +24,7 @@ from tenbaud.recording.overview import (
     marks_of,
     unpacked,
 )
-from tenbaud.recording.pose import draw_poses, poses_of
+from tenbaud.recording.pose import draw_poses, has_poses
 from tenbaud.recording.reader import MessageStream, rows_in_blocks, stored_metadata
 from tenbaud.recording.rows import Row
 from tenbaud.recording.style import FAINT, LINE_A, LINE_B, LINE_C, legend_above, new_figure
@@ -47,7 +47,6 @@ SHARES_DRAWN = 100
 DRAWN_MAX = 8
 """Groups of outputs or of inputs that have a panel."""
 
-Curve = tuple[Series, Series]
 _Draw = Callable[["Axes", "_Flight"], None]
 
 
@@ -144,7 +143,7 @@ def _panels(flight: _Flight) -> list[tuple[float, str, _Draw]]:
     ][:DRAWN_MAX]
     height = 3.0 if len(values) == 1 else 2.2
     found: list[tuple[float, str, _Draw]] = []
-    if poses_of(plant.picture, len(plant.outputs)):
+    if has_poses(plant):
         found.append((1.6, "", _draw_poses))
     found += [(height, _plain(label), partial(_draw_values, places=places)) for label, places in values]
     for name, height, curve, draw in (
@@ -281,10 +280,7 @@ def _draw_values(panel: Axes, flight: _Flight, places: list[int]) -> None:
 
 
 def _draw_poses(panel: Axes, flight: _Flight) -> None:
-    true, estimated = (
-        np.array([values for _, values in flight.curves[one]]) for one in ("value", "coded")
-    )
-    draw_poses(panel, flight.plant.picture, flight.curves["value"][0][0].tolist(), true, estimated)
+    draw_poses(panel, flight.plant, flight.curves["value"], flight.curves["coded"])
     legend_above(panel, 7)
 
 

@@ -11,6 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from channel.codec.signals import Signals
+from tenbaud.log.units import turn_in
+from tenbaud.recording.envelope import Curve
 from tenbaud.recording.style import LINE_A, LINE_B
 
 if TYPE_CHECKING:
@@ -24,36 +27,41 @@ LENGTH, SPAN, RADIUS, MAST, WEIGHT = 1.0, 0.42, 0.24, 0.09, -0.55
 MOMENTS = 6
 
 
-def poses_of(picture: str, outputs: int) -> bool:
-    """Return whether a plant of this picture has poses here."""
-    return (picture, outputs) in _LINES
+def has_poses(plant: Signals) -> bool:
+    """Return whether there are poses of a plant here: of its picture, from outputs that are angles."""
+    return (plant.picture, len(plant.outputs)) in _LINES and all(
+        turn_in(one.unit) for one in plant.outputs
+    )
 
 
-def draw_poses(
-    panel: Axes,
-    picture: str,
-    times_s: Sequence[float],
-    true: npt.NDArray[np.float64],
-    estimated: npt.NDArray[np.float64],
-) -> None:
-    """Draw moments from left to right, at their times; `true` and `estimated` have a row per output."""
-    lines_of, frame = _LINES[picture, len(true)]
-    begin_s, end_s = times_s[0], times_s[-1]
+def draw_poses(panel: Axes, plant: Signals, true: Sequence[Curve], estimated: Sequence[Curve]) -> None:
+    """Draw moments of a flight from left to right, at their times; each output has its curves."""
+    lines_of, frame = _LINES[plant.picture, len(plant.outputs)]
+    scales = [2.0 * np.pi / (turn_in(one.unit) or np.nan) for one in plant.outputs]
+    begin_s, end_s = true[0][0][[0, -1]]
     panel.axis("off")
     width = 1.0 / MOMENTS
     for number in range(MOMENTS):
         share = (number + 0.5) * width
-        at = int(np.searchsorted(times_s, begin_s + share * (end_s - begin_s)))
+        time_s = begin_s + share * (end_s - begin_s)
         one = panel.inset_axes((share - 0.5 * width, 0.0, width, 1.0))
         one.set(xlim=frame[:2], ylim=frame[2:], aspect="equal")
         one.axis("off")
-        for values, color, size in ((true[:, at], LINE_A, 2.6), (estimated[:, at], LINE_B, 1.0)):
-            if np.isfinite(values).all():
-                for line in lines_of(*values):
+        for curves, color, size in ((true, LINE_A, 2.6), (estimated, LINE_B, 1.0)):
+            angles = np.array([value_at(curve, time_s) for curve in curves]) * scales
+            if np.isfinite(angles).all():
+                for line in lines_of(*angles):
                     one.plot(line[:, 0], line[:, 1], color=color, linewidth=size, clip_on=False)
-        one.set_title(f"{times_s[at]:.0f} s", fontsize=8, y=-0.12)
+        one.set_title(f"{time_s:.0f} s", fontsize=8, y=-0.12)
     for color, size, label in ((LINE_A, 2.6, "true"), (LINE_B, 1.0, "estimate")):
         panel.plot([], [], color=color, linewidth=size, label=label)
+
+
+def value_at(curve: Curve, time_s: float) -> float:
+    """Return the last value of a curve by that time; NaN in a gap, before and after it."""
+    times_s, values = curve
+    place = int(np.searchsorted(times_s, time_s, side="right")) - 1
+    return float(values[place]) if place >= 0 and time_s <= times_s[-1] else float("nan")
 
 
 def helicopter_lines(travel: float, elevation: float, pitch: float) -> Lines:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -81,6 +83,20 @@ def test_a_pendulum_that_fell_is_no_flight(tmp_path: Path) -> None:
     ended = run("demo", *pendulum, *flight, cwd=tmp_path)
     assert ended.code == ExitCode.NOT_FLOWN
     assert ended.out.startswith("✗ Flight failed (exit code 7): the plant fell\n")
+    assert "the pendulum went beyond 90 degrees from upright: raise the rate" in ended.out
+
+
+@pytest.mark.parametrize(("unit", "right_angle"), [("rad", math.pi / 2.0), ("deg", 90.0)])
+def test_a_pendulum_falls_beyond_a_right_angle_in_its_own_unit(unit: str, right_angle: float) -> None:
+    agreement = agree(load_config("pendulum-20baud", None, {}), "virtual")
+    signals = agreement.signals
+    outputs = (replace(signals.outputs[0], unit=unit),)
+    terms = replace(agreement.terms, signals=replace(signals, outputs=outputs))
+    flight = transmit.prepare(agreement, None, DATAGRAM)
+    flight.agreement = replace(agreement, terms=terms)
+    for angle, fell in ((0.99 * right_angle, False), (1.01 * right_angle, True)):
+        flight.node.scores.outputs[-1].largest = angle
+        assert transmit.flight_counts(flight).fell is fell
 
 
 def test_when_each_end_is_asked_then_both_say_that_it_did_not_fly() -> None:

@@ -136,6 +136,9 @@ WRONG = "/dev/tenbaud-is-not-here"
 NO_PORT: dict[str, tuple[str, ...]] = {
     "demo with a rig": ("demo", "--clock", "real", "--rig", f"cobs:{WRONG}"),
     "transmit with a rig": ("transmit", "--rig", f"cobs:{WRONG}"),
+    "transmit with a rig's second port": (
+        *("transmit", "--rig", "cobs:/dev/null", "--set", f"transmitter.serial.motor_port={WRONG}"),
+    ),
     "transmit": ("transmit", "--link", "serial", "--port", WRONG),
     "receive": ("receive", "--link", "serial", "--port", WRONG),
     "receive, second port": (
@@ -153,6 +156,23 @@ def test_a_port_that_is_not_there_is_refused_before_anything_starts(
     said = capsys.readouterr().err
     assert said.startswith(f"tenbaud: {WRONG} cannot be opened: No such file or directory; ")
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("sessions", [(), ("--sessions", "rig/*", "--flights", "1")])
+def test_a_receiver_does_not_need_the_port_of_the_rig(
+    sessions: tuple[str, ...], tmp_path: Path
+) -> None:
+    place = ("--listen", "tcp/127.0.0.1:0", "--set", "link.peer_timeout_s=1")
+    process = start(
+        "receive", "--rig", f"cobs:{WRONG}", *sessions, *place, "--out", "run", cwd=tmp_path
+    )
+    if sessions:
+        _wait_for(lambda: (tmp_path / "run").exists() or process.poll() is not None)
+        process.send_signal(signal.SIGINT)
+    ended = finish(process)
+    assert WRONG not in ended.err
+    expected = (ExitCode.OK, ExitCode.INTERRUPTED) if sessions else (ExitCode.LINK_LOST,)
+    assert ended.code in expected, ended.err
 
 
 def test_an_end_that_cannot_begin_takes_the_waiting_one_with_it(tmp_path: Path) -> None:

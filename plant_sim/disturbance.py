@@ -187,6 +187,13 @@ def parse_disturbance(text: str, step_s: float, seed: int, place: int = 0) -> Pl
     return Sum(*parts)
 
 
+def is_random(text: str) -> bool:
+    """Return whether another seed gives another disturbance; ValueError as above."""
+    places = range(1 + text.count(":") if text else 0)
+    seeds = [[parse_disturbance(text, 1.0, seed, at).torque(0) for at in places] for seed in (0, 1)]
+    return seeds[0] != seeds[1]
+
+
 def require_places(text: str, places: int) -> None:
     """Raise ValueError where a disturbance has more values than the plant has places for them."""
     for piece in text.split(","):

@@ -57,6 +57,13 @@ class Impairments:
     def any(self) -> bool:
         return self != Impairments()
 
+    @property
+    def random(self) -> bool:
+        """Return whether another seed may have another effect."""
+        bursts = self.burst_enter > 0.0 and min(self.burst_enter, self.burst_leave) < 1.0
+        moved = self.jitter_ns or self.flip or self.duplicate or self.reorder
+        return bursts or bool(moved) or any(0.0 < one < 1.0 for one in (self.loss, self.raw))
+
     def is_cut(self, now_ns: int) -> bool:
         """Return whether nothing passes at a flight time."""
         return any(start <= now_ns < end for start, end in self.cuts)

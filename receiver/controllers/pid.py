@@ -62,7 +62,7 @@ class PidConstants(NamedTuple):
     mixing: Vector
     """how much of the loop's sum each input gets"""
     conditional: bool
-    """whether the integral rests while more of it would change no input"""
+    """whether the integral rests while more of it would change neither input nor set-point"""
     steers: int = -1
     """number of the later loop whose set-point the sum moves; -1: it goes to the inputs"""
     share: float = 0.0
@@ -77,16 +77,16 @@ def pid_sum(constants: PidConstants, integral: float, error: float, rate: float)
 
 
 def pid_integral(constants: PidConstants, integral: float, error: float, stuck: bool) -> float:
-    """Return the integral term of the next tick; `stuck`: more of it would change no input."""
+    """Return the integral term of the next tick; `stuck`: more of it would change nothing."""
     if constants.conditional and stuck:
         return integral
     return integral + constants.integral_per_tick * error
 
 
 def is_stuck(value: float, push: float, largest: float) -> bool:
-    """Return whether an input of this value would not change if it were pushed further.
+    """Return whether an input, or a set-point, of this value would not change if pushed further.
 
-    A loop's integral rests when all its inputs are. One saturated input is not enough: with a large
+    A loop's integral rests when all that it moves is. One saturated input is not enough: with a large
     bias one always is, the others still steer, and an integral frozen there would leave an error.
     """
     return push == 0.0 or (value >= largest if push > 0.0 else value <= -largest)
@@ -119,11 +119,15 @@ def pid_command(
     for place in range(len(loops)):
         constants = loops[place]
         error = errors[place]
-        stuck = constants.steers < 0
-        for index in range(len(constants.mixing)):
-            if not is_stuck(wanted[index], constants.mixing[index] * error, limits[index]):
-                stuck = False
-                break
+        stuck = True
+        if constants.steers >= 0:
+            moved = constants.share * pid_sum(constants, integrals[place], error, rates[place])
+            stuck = is_stuck(moved, constants.share * error, constants.most)
+        else:
+            for index in range(len(constants.mixing)):
+                if not is_stuck(wanted[index], constants.mixing[index] * error, limits[index]):
+                    stuck = False
+                    break
         integrals[place] = pid_integral(constants, integrals[place], error, stuck)
     for index in range(len(limits)):
         wanted[index] = clamped(wanted[index], limits[index])

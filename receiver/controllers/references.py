@@ -131,8 +131,12 @@ class SteeredReference:
     To be steered between two samples only: every tick of a sample then sees the same hand.
     """
 
-    def __init__(self, programme: Reference) -> None:
+    def __init__(
+        self, programme: Reference, stops: tuple[float, float] = (-math.inf, math.inf)
+    ) -> None:
         self._programme = programme
+        self.stops = stops
+        """least and largest set-point that the plant can reach"""
         self.by_hand: float | None = None
         """the set-point given by hand; None: the configured reference is followed"""
 

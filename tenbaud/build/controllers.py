@@ -112,8 +112,9 @@ def _loop(
         if not section.unit:
             gains = PidGains(*factors, f"{over}/{output_unit}")
         elif over and section.unit.rpartition("/")[0] != over:
+            moved = f"the output {section.steers} that it steers" if section.steers else "the input"
             raise ValueError(
-                f"unit = {section.unit!r}, and the input is in {over}, the output {output.name} in "
+                f"unit = {section.unit!r}, and {moved} is in {over}, the output {output.name} in "
                 f"{output_unit}: give '{over}/{output_unit}'"
             )
         constants = PidConstants(*gains.per_tick(context.tick_s, output_unit), mixing, conditional)

@@ -8,7 +8,14 @@ from typing import Literal
 
 from plant_sim.encoder import Encoder
 from tenbaud.build.flight_log import read_flight_log
-from tenbaud.build.rig import build_axes, build_plant, quarc_commands, quarc_fields, wired_outputs
+from tenbaud.build.rig import (
+    build_axes,
+    build_plant,
+    quarc_commands,
+    quarc_fields,
+    require_one_output,
+    wired_outputs,
+)
 from tenbaud.build.signals import configured_signals
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
@@ -80,8 +87,11 @@ def build_emulator(
 
 def _axes(config: FlightConfig, form: EmulatedFormat) -> dict[int, Axis]:
     """Return the axis at each channel, in the order of the model's outputs."""
+    outputs = wired_outputs(configured_signals(config))
+    if form == "qsb":
+        require_one_output(outputs)
     wired = {one.name: one for one in build_axes(config)}
-    axes = [wired[name] for name in wired_outputs(configured_signals(config))]
+    axes = [wired[name] for name in outputs]
     if form == "qsb":
         # One encoder per adapter; what it reads is the device's pitch.
         return {PITCH_CHANNEL: axes[0]}

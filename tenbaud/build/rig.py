@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 from channel.codec.numerics import sin
@@ -177,7 +178,8 @@ def build_axes(config: FlightConfig, signals: Signals | None = None) -> tuple[Ax
     sections |= bridge.by_name
     if config.transmitter.rig == "serial" and config.transmitter.serial.format == "qsb":
         # One encoder per adapter, whatever channel it would have elsewhere.
-        (name,) = list(outputs)[:1]
+        require_one_output(outputs)
+        (name,) = outputs
         return (_axis(name, sections[name].model_copy(update={"channel": 0}), outputs[name]),)
     missing = ", ".join(sorted(outputs.keys() - set(names)))
     if missing or len(set(names)) != len(names):
@@ -186,7 +188,24 @@ def build_axes(config: FlightConfig, signals: Signals | None = None) -> tuple[Ax
             f"{len(outputs)} output(s): {missing or ', '.join(outputs)} must be among them, and none "
             "twice"
         )
+    at: dict[int, str] = {}
+    for name in outputs:
+        channel = sections[name].channel
+        if at.setdefault(channel, name) != name:
+            raise ConfigError(
+                f"transmitter.bridge: the outputs {at[channel]} and {name} are both on channel "
+                f"{channel}; give each a channel of its own, transmitter.bridge.{name}.channel"
+            )
     return tuple(_axis(name, sections[name], outputs.get(name, "rad")) for name in names)
+
+
+def require_one_output(outputs: Collection[str]) -> None:
+    """Raise ConfigError where an adapter of the format qsb, which has one encoder, is not enough."""
+    if len(outputs) > 1:
+        raise ConfigError(
+            f"format qsb has one encoder, and the model has {len(outputs)} outputs: "
+            f"{', '.join(outputs)}; take another format"
+        )
 
 
 def _axis(name: str, section: AxisSection, unit: str) -> Axis:

@@ -84,7 +84,7 @@ Mismatches = Annotated[
     typer.Option(
         "--mismatch",
         help="Model mismatch of the simulated plant, 10% or 0.1; repeatable, one flight each. Not "
-        "given: as configured, and 10% without --preset, --config, --rig and another plant.",
+        "given: as configured; 10% if none of --preset, --config, --rig or a plant setting is given.",
     ),
 ]
 Mismatch = Annotated[

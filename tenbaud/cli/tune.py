@@ -164,15 +164,26 @@ def tune(
 
 def _need_chance(config: FlightConfig) -> None:
     """Refuse simulated flights that are equal for all seeds: the validation would repeat the fit."""
+    from channel.line.impairments import parse_impairments
+    from plant_sim.disturbance import is_random
+    from tenbaud.config.kinds import FMU, PLANTS
     from tenbaud.studies.settings import StudyError
 
-    plant = config.transmitter.plant
-    chance = "q=" in plant.disturbance or config.link.impairments or ":" in config.plant_kind
-    if config.transmitter.rig == "simulated" and not chance:
-        raise StudyError(
-            "nothing is random in these flights, so that every seed flies the same one and the "
-            "validation repeats the fit: add --disturbance q=2e-3, or what your plant has, or --impair"
-        )
+    kind, faults = config.plant_kind, parse_impairments(config.link.impairments)
+    if (
+        config.transmitter.rig != "simulated"
+        or kind == FMU
+        or kind not in PLANTS.built_in
+        or is_random(config.transmitter.plant.disturbance)
+        or faults.up.random
+        or faults.down.random
+    ):
+        return
+    raise StudyError(
+        "nothing is random in these flights: every seed gives the same flight, and the validation "
+        "would repeat the fit. Add a random disturbance, such as --disturbance q=2e-3, or random "
+        "faults of the line, such as --impair loss=0.05"
+    )
 
 
 def _make_room(out: Path) -> None:

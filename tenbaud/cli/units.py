@@ -1,4 +1,7 @@
-"""Numbers with units on the command line: `10%`, `90ms` and `45deg` become plain numbers."""
+"""Numbers with units on the command line: `10%`, `90ms` and `45deg` become plain numbers.
+
+Options take them, and fields whose names end in a unit, or are `mismatch`.
+"""
 
 from __future__ import annotations
 
@@ -56,4 +59,7 @@ def _plain(text: str, units: Mapping[str, str]) -> str:
     match = _NUMBER.fullmatch(text)
     if match is None or match[2] not in units:
         return text
-    return str(float(Decimal(match[1]) * Decimal(units[match[2]])))
+    try:
+        return str(float(Decimal(match[1]) * Decimal(units[match[2]])))
+    except ArithmeticError:
+        return text

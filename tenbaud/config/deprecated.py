@@ -65,12 +65,13 @@ def with_current_names(values: dict[str, Any], source: str, *, warn: bool = True
         if warn:
             text = f"{source}: {old!r} is deprecated; use {new!r}"
             warnings.warn(text, FutureWarning, stacklevel=3)
-        value = here.pop(field)
-        *sections, field = new.split(".")
-        here = values
+        *sections, name = new.split(".")
+        there: Any = values
         for section in sections:
-            here = here.setdefault(section, {})
-        here.setdefault(field, value)
+            there = there.setdefault(section, {}) if isinstance(there, dict) else None
+        # Where a section is no table, the schema refuses both by name.
+        if isinstance(there, dict):
+            there.setdefault(name, here.pop(field))
     return values
 
 
@@ -78,8 +79,15 @@ def _name_log_columns(section: Any, source: str, *, warn: bool) -> None:
     """Give the columns of a recorded flight, which had fields of their own, to their signals."""
     if not isinstance(section, dict):
         return
+    columns = section.get("columns", {})
+    if not isinstance(columns, dict):
+        return
     for old, new in LOG_COLUMNS.items():
-        value = section.pop(old, None)
+        value = section.get(old)
+        # What is of another type stays where it is: the schema refuses it by name.
+        if value and not isinstance(value, (dict, list, tuple) if new[-1] == ":" else str):
+            continue
+        section.pop(old, None)
         if not value:
             continue
         if warn:
@@ -88,4 +96,4 @@ def _name_log_columns(section: Any, source: str, *, warn: bool) -> None:
         if isinstance(value, (list, tuple)):
             value = {str(at): name for at, name in enumerate(value, 1)}
         named = {f"{new}{name}": one for name, one in value.items()} if new[-1] == ":" else {new: value}
-        section["columns"] = {**named, **section.get("columns", {})}
+        section["columns"] = columns = {**named, **columns}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -153,7 +154,12 @@ def _steered(agreement: Agreement) -> tuple[SteeredReference | None, ...] | None
     if not (agreement.live and agreement.config.receiver.controller in STEERABLE):
         return None
     references = build_references(agreement.config, agreement.signals)
-    return tuple([None if one is None else SteeredReference(one) for one in references])
+    stops: dict[str, tuple[float, float]] = getattr(agreement.config.model, "stops", {})
+    found: list[SteeredReference | None] = []
+    for output, one in zip(agreement.signals.outputs, references, strict=True):
+        of = stops.get(output.name, (-math.inf, math.inf))
+        found.append(None if one is None else SteeredReference(one, of))
+    return tuple(found)
 
 
 def _for_viewers(security: Security, steerable: bool) -> Security:

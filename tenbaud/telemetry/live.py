@@ -194,8 +194,9 @@ class LiveReceiver:
         if steering is None or place >= len(outputs):
             return _ignored("this controller has no such set-point")
         output = outputs[place]
-        if value is not None and not output.low <= value <= output.high:
-            return _ignored(f"{output.name} is within {output.low:g} and {output.high:g} {output.unit}")
+        low, high = max(output.low, steering.stops[0]), min(output.high, steering.stops[1])
+        if value is not None and not low <= value <= high:
+            return _ignored(f"{output.name} is within {low:g} and {high:g} {output.unit}")
         steering.steer(value)
         if value is None:
             return _by_hand(ByHand.FOLLOW)

@@ -29,6 +29,7 @@ from tests.tenbaud.processes import run as run_command
         (["--rate", "20 bit/s"], ["--rate", "20.0"]),
         (["--mismatch", "7s"], ["--mismatch", "7s"]),
         (["--duration", "7%"], ["--duration", "7%"]),
+        (["--duration", "1e9999999s"], ["--duration", "1e9999999s"]),
         (["--out", "10%"], ["--out", "10%"]),
         (["--duration", "5", "--", "1e3s"], ["--duration", "5", "--", "1e3s"]),
     ],

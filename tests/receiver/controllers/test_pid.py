@@ -9,7 +9,7 @@ import pytest
 
 from plant_sim.pitch import PitchParameters, PitchPlant
 from receiver.controllers.base import Controller
-from receiver.controllers.pid import PAPER_GAINS, AntiWindup, Pid, PidGains
+from receiver.controllers.pid import PAPER_GAINS, AntiWindup, Pid, PidConstants, PidGains, pid_command
 from receiver.controllers.references import Constant, Square
 
 TICK_S = 0.01
@@ -58,6 +58,28 @@ def test_while_saturated_only_the_plain_integral_winds_up(
     for tick in range(100):
         assert pid.command(tick, (0.0, 0.0)) == (5.0, -5.0)
     assert pid.integrals[0] == pytest.approx(expected_volts)
+
+
+@pytest.mark.parametrize("share", [1.0, -1.0])
+@pytest.mark.parametrize(
+    ("conditional", "error", "integral", "expected"),
+    [
+        (True, 0.5, 0.0, 0.5),  # the set-point of the other loop is not at its limit
+        (True, 1.0, 0.0, 0.0),  # at its limit
+        (True, -0.5, 2.0, 1.5),  # beyond it, and on the way back
+        (True, -1.0, -3.0, -3.0),
+        (False, 1.0, 0.0, 1.0),
+    ],
+)
+def test_an_integral_rests_while_the_set_point_that_it_moves_is_at_its_limit(
+    share: float, conditional: bool, error: float, integral: float, expected: float
+) -> None:
+    outer = PidConstants(1.0, 1.0, 0.0, (0.0,), conditional, steers=1, share=share, most=0.8)
+    inner = PidConstants(1.0, 0.0, 0.0, (1.0,), conditional)
+    integrals, wanted = [integral, 0.0], [0.0]
+    assert pid_command((outer, inner), integrals, [error, 0.0], [0.0, 0.0], [9.0], wanted)
+    assert integrals == [expected, 0.0]
+    assert wanted == [share * max(-0.8, min(error + integral, 0.8))]
 
 
 def test_while_saturated_the_integral_may_still_leave_saturation() -> None:

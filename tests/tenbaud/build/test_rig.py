@@ -8,7 +8,7 @@ import pytest
 import typer
 
 from plant_sim.encoder import Encoder
-from tenbaud.build.emulator import build_emulator
+from tenbaud.build.emulator import EmulatedFormat, build_emulator
 from tenbaud.build.flight import agree
 from tenbaud.build.rig import build_axes, build_rig, quarc_commands, quarc_fields
 from tenbaud.cli import options
@@ -139,6 +139,22 @@ def test_an_emulated_rig_has_the_encoder_of_its_output_whatever_it_is_called() -
         device.sample(now_ns)
         counts = device.sample(now_ns).counts
         assert [place for place, one in enumerate(counts) if one == 50] == [channel]
+
+
+@pytest.mark.parametrize(
+    ("form", "transmitter", "text"),
+    [
+        ("qsb", {}, "qsb has one encoder, .* 3 outputs: travel, elevation, pitch"),
+        ("cobs", {"bridge": {"pitch": {"channel": 0}}}, "travel and pitch are both on channel 0"),
+        ("cobs", {"rig": "serial", "serial": {"port": "X", "format": "qsb"}}, "qsb has one encoder"),
+    ],
+)
+def test_outputs_that_share_an_encoder_are_refused_with_their_names(
+    form: EmulatedFormat, transmitter: dict[str, Any], text: str
+) -> None:
+    config = load_config("helicopter-10baud", None, {"transmitter": transmitter})
+    with pytest.raises(ConfigError, match=text):
+        build_emulator(config, form, "pty")
 
 
 def test_columns_that_make_no_sample_name_the_section() -> None:

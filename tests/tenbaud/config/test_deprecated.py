@@ -12,7 +12,10 @@ from tenbaud import fly
 from tenbaud.audit.audit import audit
 from tenbaud.build.flight import agree
 from tenbaud.config.deprecated import MOVED, RENAMED
-from tenbaud.config.load import load_config, preset_names
+from tenbaud.config.load import ConfigError, load_config, preset_names, toml_text
+from tenbaud.config.schema import FlightLogSection
+from tenbaud.log.beside import with_file_beside
+from tenbaud.log.table import LogError
 from tenbaud.replay.record import load_record
 from tenbaud.replay.replay import replay
 from tests.tenbaud.processes import run as run_command
@@ -46,6 +49,38 @@ def test_when_a_setting_has_an_old_name_then_it_is_read_with_a_warning(
     found = (transmitter.rate_observer_bandwidth_rad_s, transmitter.encoders.counts_per_turn)
     found += (transmitter.plant.initial, config.limits.command_max)
     assert read in (*found, config.coder.kind)
+
+
+@pytest.mark.parametrize("beside", [False, True])
+@pytest.mark.parametrize(
+    ("section", "refused"),
+    [
+        ({"outputs": "pitch"}, "outputs"),
+        ({"inputs": 3}, "inputs"),
+        ({"time": ["t"]}, "time"),
+        ({"columns": "t", "time": "t"}, "columns"),
+        ({"columns": ["t"], "volts_columns": ["a", "b"]}, "columns"),
+    ],
+)
+def test_when_an_old_field_of_a_log_has_another_type_then_it_is_refused_by_name(
+    section: dict[str, Any], refused: str, beside: bool, tmp_path: Path
+) -> None:
+    log = tmp_path / "log.csv"
+    if beside:
+        (tmp_path / "log.csv.toml").write_text(toml_text(section))
+        given = FlightLogSection(file=str(log))
+        with pytest.raises(LogError, match=rf"(?s)log\.csv\.toml.*flight_log\.{refused}"):
+            with_file_beside(given)
+    else:
+        with pytest.raises(ConfigError, match=rf"flight_log\.{refused}"):
+            load_config("paper-10baud", None, {"flight_log": section})
+
+
+@pytest.mark.filterwarnings("ignore::FutureWarning")
+def test_when_the_section_of_a_new_name_is_no_table_then_it_is_refused_by_name() -> None:
+    given = {"transmitter": {"encoder_sign": -1, "encoders": 3}}
+    with pytest.raises(ConfigError, match=r"transmitter\.encoders"):
+        load_config("paper-10baud", None, given)
 
 
 def test_when_a_preset_has_an_old_name_then_the_new_one_is_loaded() -> None:

@@ -7,6 +7,7 @@ import json
 import math
 import random
 import signal
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,10 +17,12 @@ import pytest
 from typer.testing import CliRunner
 
 from channel.errors import TenbaudError
+from channel.registry import Registry
 from tenbaud.build.codec import build_codec
 from tenbaud.build.flight_log import read_flight_log
 from tenbaud.build.rig import nominal_plant
 from tenbaud.cli.commands import app
+from tenbaud.cli.tune import _need_chance
 from tenbaud.config.load import load_config
 from tenbaud.flight.outcome import ExitCode
 from tenbaud.studies import judging
@@ -369,3 +372,26 @@ def test_when_errors_are_reported_then_their_unit_is_that_of_the_outputs() -> No
     assert shown(0.5, ("rad",)) == "28.65 degrees"
     assert shown(0.5, ("rad/s",)) == "0.5 rad/s"
     assert shown(0.5, ("rad", "m")) == "0.5 rad and m"
+
+
+@pytest.mark.parametrize(
+    ("plant", "impairments", "refused"),
+    [
+        ({"disturbance": "q=0:2e-3", "kind": "furuta"}, "", False),
+        ({"disturbance": "q=0:0", "kind": "furuta"}, "loss=1,down:burst=1/1", True),
+        ({}, "delay=30ms,dead=40s,skew=3ppm", True),
+        ({}, "down:loss=1%", False),
+        ({}, "delay=30ms+-5ms", False),
+        ({}, "burst=0.1/1", False),
+        ({"kind": "my_package:Plant"}, "", False),
+        ({"kind": "offered"}, "", False),
+    ],
+)
+def test_simulated_flights_are_refused_where_every_seed_gives_the_same(
+    plant: dict[str, Any], impairments: str, refused: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Registry, "_offered", lambda self: {"offered": []})
+    given = {"transmitter": {"plant": plant}, "link": {"impairments": impairments}}
+    config = load_config("paper-10baud", None, given, allow_code=True)
+    with pytest.raises(StudyError, match="nothing is random") if refused else nullcontext():
+        _need_chance(config)

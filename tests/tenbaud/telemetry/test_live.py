@@ -16,6 +16,7 @@ from tenbaud.config.load import load_config
 from tenbaud.flight import transmit
 from tenbaud.flight.outcome import ExitCode
 from tenbaud.sentences.events import event_text
+from tenbaud.telemetry.end import _steered
 from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
 from tenbaud.telemetry.tap import CommandQueue
 from tests.events import event_fields
@@ -45,3 +46,18 @@ def test_when_a_field_to_corrupt_is_missing_then_it_is_reported_and_the_flight_g
     ]
     assert len(told) == 1
     assert told[0].endswith("coder state has 0 value(s): ignored")
+
+
+def test_a_set_point_beyond_a_stop_of_the_plant_is_refused_in_words() -> None:
+    config = load_config("helicopter-10baud", None, {"duration_s": 2.0})
+    agreement = replace(agree(config, "virtual"), live=True)
+    steering = _steered(agreement)
+    queue, endpoint = CommandQueue(), build_receiver(agreement, None, DATAGRAM)
+    for value in (0.3, 0.55):
+        queue.offer(json.dumps({"kind": "set_point", "output": 1, "value": value}).encode())
+    LiveReceiver(endpoint, queue, lambda: False, MemoryRecorder(), steering, "")()
+    assert steering is not None
+    assert steering[1] is not None
+    assert steering[1].by_hand == 0.3
+    told = [event_text(event_fields(event)) for event in endpoint.session.events]
+    assert told[-1].endswith("elevation is within -0.488692 and 0.523599 rad: ignored")

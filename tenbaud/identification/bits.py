@@ -43,6 +43,8 @@ class Bits:
     states: list[Vector]
     """the codec's model state before each sample; of a skipped one that of the next epoch's start"""
     commands: Array
+    arrived: int
+    """symbols of all words that were consumed"""
     ends: tuple[str, ...]
     """whose recordings the run holds"""
 
@@ -95,7 +97,8 @@ def read_bits(path: Path) -> Bits:
             row = recorded[state.sample]
             state = CodecState(state.sample + 1, row.state, row.coder)
     commands = _commands(record, epochs, len(states))
-    return Bits(record.agreement, statements, states, commands, tuple(record.tables))
+    arrived = sum(len(word) for epoch in epochs for word in epoch.words if word is not ERASED)
+    return Bits(record.agreement, statements, states, commands, arrived, tuple(record.tables))
 
 
 def _commands(record: FlightRecord, epochs: list[Epoch], samples: int) -> Array:
@@ -161,6 +164,7 @@ def symbols_of(bits: Bits, order: int) -> tuple[Symbols, Linearised]:
         known.state + known.by_corrected @ (states[0] - known.corrected),
         start_deviations,
         known.state + (states - known.corrected) @ known.by_corrected.T,
+        bits.arrived,
     )
     return symbols, known
 
@@ -181,6 +185,5 @@ def run_bits(name: str, bits: Bits, wanted: str, equilibrium: str, lag_s: float 
     symbols, known = symbols_of(bits, chosen.structure.order)
     start = start_values(chosen.structure, known)
     found = identify_symbols(symbols, chosen.structure, lag_s, start, compiled(follow))
-    count = len(symbols.combinations)
-    origin = f"from {count} symbols of {symbols.period_s * len(symbols):.6g} s"
+    origin = f"from {symbols.arrived} symbols of {symbols.period_s * len(symbols):.6g} s"
     return Identified(name, record, found, chosen, (origin, *found.notes), found.warnings, "")

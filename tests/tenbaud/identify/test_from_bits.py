@@ -15,7 +15,7 @@ from plant_sim.identification.structures import parse_linear
 from tenbaud import identify, load_preset
 from tenbaud.cli.commands import app
 from tenbaud.config.load import load_config
-from tenbaud.identification.bits import read_bits
+from tenbaud.identification.bits import read_bits, symbols_of
 from tenbaud.identification.linearised import linearised, start_values
 from tenbaud.identification.statements import statements_of
 from tenbaud.recording.folder import TRANSMITTER_NAME
@@ -71,6 +71,15 @@ def test_when_both_ends_rejoin_later_then_symbols_and_commands_stay_at_their_tic
     rows = bits.record().outputs
     assert len(rows) == len(bits.commands) == 10 * len(bits.states)
     assert rows[after.start.sample * 10, 0] == pytest.approx(after.start.model[0])
+
+
+def test_when_a_word_makes_one_statement_then_all_its_symbols_are_counted(tmp_path: Path) -> None:
+    flown(tmp_path / "run", "usual-1000baud", duration_s=2.0)
+    bits = read_bits(tmp_path / "run")
+    width = bits.agreement.codec.coder.alphabet.symbols_per_word
+    stated = sum(len(one) for one in bits.statements)
+    assert width > 1
+    assert bits.arrived == symbols_of(bits, 1)[0].arrived == width * stated
 
 
 def test_when_the_plant_only_rests_then_no_model_is_written_and_the_parameters_are_named(

@@ -85,6 +85,8 @@ def table(rows: list[dict[str, Any]]) -> Iterator[str]:
         refused = sum(bool(row["refused"]) for row in own)
         yield f"| {case.name} ({len(own)}) | bits | {_errors(off, true)} | {shares} % | {refused} |"
         kept = [place for place, row in enumerate(own) if row["measured"]]
+        if not kept:
+            continue
         measured = np.array([own[place]["measured"] for place in kept])
         yield f"| | measurements | {_errors(measured - true[kept], true[kept])} | | |"
 

@@ -24,7 +24,7 @@ from plant_sim.identification.structures import Structure, holding, names_of
 from plant_sim.identification.symbols import Likelihood, Symbols, likelihood
 
 GUESSED = -math.log(2.0)
-"""log-likelihood of a sign that nothing is known of"""
+"""log-likelihood of a symbol of two values that nothing is known of"""
 DENSITIES = range(6, -28, -2)
 """logarithms of the disturbances tried first, in units of what moves the plant by its first range"""
 WIDER = (3.0, 0.0, 6.0, 1.5)
@@ -80,7 +80,7 @@ def identify_symbols(
         values, covariance = _estimate(found, structure)
     levels = levels_of(chance, values, found.means)
     regression = _history(chance, found, levels, start)
-    count = len(symbols.combinations)
+    count = symbols.arrived
     notes.append(
         f"log-likelihood of a symbol {found.log / count:.3f}; with the model that flew "
         f"{flown / count:.3f}, of guesses {GUESSED:.3f}"
@@ -224,7 +224,7 @@ def _history(
 def _unsupported(found: Identification, maximum: Maximum, inputs: int) -> Iterable[str]:
     """Yield why the symbols support no model."""
     if not maximum.converged:
-        yield "the search for the most likely parameters found no end: fly longer"
+        yield "the search for the most likely parameters did not converge: fly longer"
     yield from uncertain(found, inputs)
     if isinstance(found.structure, PitchStructure) and found.values.get("a_w", 0.0) < 0.0:
         yield (

@@ -28,9 +28,9 @@ class Symbols:
     period_s: float
     """of a sample"""
     firsts: Array
-    """of each sample its first symbol, and the number of all"""
+    """of each sample its first statement, and the number of all"""
     combinations: Array
-    """a row for each symbol: c of the combination c' x of states"""
+    """a row for each statement: c of the combination c' x of states"""
     lows: Array
     highs: Array
     """c' x as it is read lies between them"""
@@ -43,6 +43,8 @@ class Symbols:
     """of the state before the first sample, as both ends assume it"""
     estimates: Array
     """the codec's own estimate of the state before each sample"""
+    arrived: int
+    """symbols of two values; all those of a word may make one statement"""
 
     def __len__(self) -> int:
         """Return the number of samples."""

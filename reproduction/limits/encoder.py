@@ -41,9 +41,9 @@ def floor_behind_encoders(
 ) -> float:
     """Return the least mean square error where encoders of these steps read the outputs at every tick.
 
-    It is the own error of who forms the bits, plus the floor of what it knows (separation of estimation
-    and coding: Wolf and Ziv, IEEE Trans. Inf. Theory 16, 1970). Rounding is not white noise; this is a
-    yardstick, not a bound.
+    It is the estimation error of the transmitter, plus the floor for coding its estimate (separation of
+    estimation and coding: Wolf and Ziv, IEEE Trans. Inf. Theory 16, 1970). Rounding is not white noise;
+    this is a yardstick, not a bound.
     """
     seen, own = behind_encoders(plant, steps, tick_s)
     driven = seen.model()

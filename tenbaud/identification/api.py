@@ -210,10 +210,19 @@ def sources_of(
 ) -> list[Source]:
     """Return the records: of the excited rig, of a run, or of a log."""
     if request.from_bits:
-        if source is None or request.given:
+        unused = {
+            "--bandwidth (bandwidth_rad_s)": request.bandwidth_rad_s is not None,
+            "--damping": request.damping != Request().damping,
+            "--forgetting": request.forgetting_per_s is not None,
+            "--excitation": bool(excitation),
+            "--duration": duration_s is not None,
+        }
+        named = [*sorted(request.given), *(name for name, given in unused.items() if given)]
+        if source is None or named:
+            leave = f" and leave out {', '.join(named)}" if named else ""
             raise IdentificationError(
-                "--from-bits takes the folder of a run, and all settings from it: give a folder and "
-                f"leave out {', '.join(sorted(request.given)) or 'what is no folder'}"
+                "--from-bits takes the folder of a run, and all settings from it: give the folder of a "
+                f"run{leave}"
             )
         return [from_bits(source)]
     if source is None:
@@ -228,8 +237,8 @@ def sources_of(
             Source(one, from_rig(at_rest, one, duration_s or DURATION_S), excited=True)
             for one in signals
         ]
-    named = config.flight_log.model_copy(update={"file": str(source)})
-    config = config.model_copy(update={"flight_log": named})
+    log = config.flight_log.model_copy(update={"file": str(source)})
+    config = config.model_copy(update={"flight_log": log})
     # The tick of a preset that nobody named says nothing about the file.
     tick_s = config.timing.tick_s if request.given & {"timing.tick_s", "preset"} else None
     record, notes = from_log(config, request.structure, tick_s)
@@ -361,6 +370,11 @@ def identify(
     request = Request(structure, str(lag), str(equilibrium), bandwidth_rad_s, fly=fly, given=given)
     request = replace(request, from_bits=from_bits)
     if isinstance(source, Mapping):
+        if from_bits:
+            raise IdentificationError(
+                "from_bits takes the folder of a run, and arrays hold no symbols: give the folder, or "
+                "leave out from_bits"
+            )
         sources = [from_arrays(source, tuple(outputs), tuple(inputs), tick_s, units or {})]
     else:
         sources = sources_of(loaded, Path(source), request)

@@ -23,8 +23,10 @@ from tenbaud.identification.linearised import Linearised, linearised, start_valu
 from tenbaud.identification.run import Identified
 from tenbaud.identification.statements import Statement, statements_of
 from tenbaud.identification.structure import choose
-from tenbaud.replay.record import FlightRecord, epochs_of, load_record
+from tenbaud.replay.record import Epoch, FlightRecord, epochs_of, load_record
 
+SKIPPED_MAX = 1_000_000
+"""samples between two epochs; each of them is computed"""
 UNSURE = 4.0
 """first ranges by which the plant may be off the start that both ends assume"""
 SHARPEST = 1e-5
@@ -37,10 +39,12 @@ class Bits:
 
     agreement: Agreement
     statements: list[list[Statement]]
-    """of each sample; none of an erased one"""
+    """of each sample; none of an erased one, and none of one that was skipped between two epochs"""
     states: list[Vector]
-    """the codec's model state before each sample"""
+    """the codec's model state before each sample; of a skipped one that of the next epoch's start"""
     commands: Array
+    arrived: int
+    """symbols of all words that were consumed"""
     ends: tuple[str, ...]
     """whose recordings the run holds"""
 
@@ -72,28 +76,43 @@ def read_bits(path: Path) -> Bits:
     record = load_record(path)
     codec = record.agreement.codec
     recorded = {row.sample: row for row in record.rows[record.consumer].topics["sample"].rows}
-    statements, states = [], []
-    for epoch in epochs_of(record):
+    epochs = [epoch for epoch in epochs_of(record) if epoch.words]
+    if not epochs:
+        raise IdentificationError(f"{path}: no sample was flown: there is nothing to identify from")
+    statements: list[list[Statement]] = []
+    states: list[Vector] = []
+    for epoch in epochs:
         state = epoch.start
+        skipped = state.sample - epochs[0].start.sample - len(states)
+        if skipped > SKIPPED_MAX:
+            raise IdentificationError(
+                f"{path}: epoch {epoch.number} begins {skipped} samples after the last one ended, and "
+                f"at most {SKIPPED_MAX} are identified over: identify from the run's measurements"
+            )
+        states += [state.model] * skipped
+        statements += [[] for _ in range(skipped)]
         for word in epoch.words:
             states.append(state.model)
             statements.append([] if word is ERASED else list(statements_of(codec, state, word)))
             row = recorded[state.sample]
             state = CodecState(state.sample + 1, row.state, row.coder)
-    commands = _commands(record, len(states))
-    return Bits(record.agreement, statements, states, commands, tuple(record.tables))
+    commands = _commands(record, epochs, len(states))
+    arrived = sum(len(word) for epoch in epochs for word in epoch.words if word is not ERASED)
+    return Bits(record.agreement, statements, states, commands, arrived, tuple(record.tables))
 
 
-def _commands(record: FlightRecord, samples: int) -> Array:
+def _commands(record: FlightRecord, epochs: list[Epoch], samples: int) -> Array:
     """Return the command of every tick; one that is missing is the one before."""
     field = "command" if record.consumer == "receiver" else "commanded"
-    rows = record.rows[record.consumer].topics
-    given = {row.tick: getattr(row, field) for row in rows["tick"].rows}
-    epoch = epochs_of(record)[0]
-    ticks, held = record.agreement.terms.ticks_per_sample, epoch.hold
-    commands = []
-    for tick in range(epoch.start.sample * ticks, (epoch.start.sample + samples) * ticks):
-        held = given.get(tick) or held
+    terms, rows = record.agreement.terms, record.rows[record.consumer].topics
+    given = {row.tick: one for row in rows["tick"].rows if (one := getattr(row, field))}
+    firsts = [epoch.start.sample * terms.ticks_per_sample for epoch in epochs]
+    for first, epoch in zip(firsts, epochs, strict=True):
+        # Until the first command that was decided in the epoch; the one before may reach into it.
+        given |= dict.fromkeys(range(first, first + terms.lead_ticks), epoch.hold)
+    held, commands = epochs[0].hold, []
+    for tick in range(firsts[0], firsts[0] + samples * terms.ticks_per_sample):
+        held = given.get(tick, held)
         commands.append(held)
     return np.array(commands, dtype=np.float64)
 
@@ -145,6 +164,7 @@ def symbols_of(bits: Bits, order: int) -> tuple[Symbols, Linearised]:
         known.state + known.by_corrected @ (states[0] - known.corrected),
         start_deviations,
         known.state + (states - known.corrected) @ known.by_corrected.T,
+        bits.arrived,
     )
     return symbols, known
 
@@ -165,6 +185,5 @@ def run_bits(name: str, bits: Bits, wanted: str, equilibrium: str, lag_s: float 
     symbols, known = symbols_of(bits, chosen.structure.order)
     start = start_values(chosen.structure, known)
     found = identify_symbols(symbols, chosen.structure, lag_s, start, compiled(follow))
-    count = len(symbols.combinations)
-    origin = f"from {count} symbols of {symbols.period_s * len(symbols):.6g} s"
+    origin = f"from {symbols.arrived} symbols of {symbols.period_s * len(symbols):.6g} s"
     return Identified(name, record, found, chosen, (origin, *found.notes), found.warnings, "")

@@ -38,7 +38,7 @@ class Linearised:
 
 
 def linearised(model: Model, order: int, tick_s: float, command: Vector) -> Linearised:
-    """Return the model's derivatives; IdentificationError where its states are no outputs and rates."""
+    """Return the derivatives; IdentificationError where states do not determine outputs and rates."""
     if order > ORDER_MAX:
         raise IdentificationError(
             f"the structure is of order {order}: from the bits, structures up to order {ORDER_MAX} are "
@@ -61,8 +61,8 @@ def linearised(model: Model, order: int, tick_s: float, command: Vector) -> Line
     _, by_input = _differences(lambda u: found(start, u), held)
     if np.linalg.cond(by_corrected) > CONDITION_MAX:
         raise IdentificationError(
-            f"the first {size} states of the codec's model are no outputs and rates of this structure: "
-            "ask for another one"
+            f"the first {size} states of the codec's model do not determine the outputs and rates "
+            "of this structure: ask for another structure"
         )
     by_state = turned @ np.linalg.inv(by_corrected)
     force = highest - by_state @ state - by_input @ held

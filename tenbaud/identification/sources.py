@@ -108,7 +108,7 @@ def from_arrays(
     tick_s: float | None,
     units: Mapping[str, str],
 ) -> Source:
-    """Return the record in a table of arrays; IdentificationError where they are none of one."""
+    """Return the record in a table of arrays; IdentificationError where they cannot form one."""
     if tick_s is None or not outputs:
         raise IdentificationError(
             "arrays need tick_s, the time between two rows, and outputs=(name, ...)"

@@ -68,7 +68,7 @@ def flight(seconds: float, flipped: float, moves: float = 1.0) -> Symbols:
     estimates = np.stack((edges, np.gradient(edges, PERIOD_S)), axis=1)
     return Symbols(
         PERIOD_S, np.arange(samples + 1), combinations, lows, highs, np.full(samples, 1e-8),
-        inputs[:, None], np.zeros(2), np.array([0.1, 1.0]), estimates,
+        inputs[:, None], np.zeros(2), np.array([0.1, 1.0]), estimates, samples,
     )  # fmt: skip
 
 

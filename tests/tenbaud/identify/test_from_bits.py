@@ -9,14 +9,17 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
+from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.pitch import PitchStructure
 from plant_sim.identification.structures import parse_linear
 from tenbaud import identify, load_preset
 from tenbaud.cli.commands import app
 from tenbaud.config.load import load_config
+from tenbaud.identification.bits import read_bits, symbols_of
 from tenbaud.identification.linearised import linearised, start_values
 from tenbaud.identification.statements import statements_of
 from tenbaud.recording.folder import TRANSMITTER_NAME
+from tenbaud.replay.record import epochs_of, load_record
 from tests.tenbaud.flown import flown
 
 TRUE = {"rate_damping_per_s": 0.11, "stiffness_per_s2": 0.55, "torque_gain_rad_per_v_s2": 0.385}
@@ -48,6 +51,37 @@ def test_when_a_flight_is_over_then_its_bits_give_the_plant_without_any_measurem
     assert config.coder == load_preset("tuned-10baud").config.coder
 
 
+def test_when_both_ends_rejoin_later_then_symbols_and_commands_stay_at_their_ticks(
+    tmp_path: Path,
+) -> None:
+    sabotage = {"receiver__sabotage": "sample=60,field=range", "timing__lead_ticks": 40}
+    flown(tmp_path / "run", **sabotage)
+    record = load_record(tmp_path / "run")
+    before, after = epochs_of(record)
+    skipped = range(len(before.words), after.start.sample)
+    assert len(skipped) > 1
+
+    bits = read_bits(tmp_path / "run")
+    assert len(bits.statements) == len(bits.states) == after.start.sample + len(after.words)
+    assert all(not bits.statements[sample] for sample in skipped)
+    assert bits.states[after.start.sample] == after.start.model
+    known = {row.tick: row.commanded for row in record.rows["transmitter"].topics["tick"].rows}
+    late = range(after.start.sample * 10, len(known))
+    assert [tuple(bits.commands[tick]) for tick in late] == [known[tick] for tick in late]
+    rows = bits.record().outputs
+    assert len(rows) == len(bits.commands) == 10 * len(bits.states)
+    assert rows[after.start.sample * 10, 0] == pytest.approx(after.start.model[0])
+
+
+def test_when_a_word_makes_one_statement_then_all_its_symbols_are_counted(tmp_path: Path) -> None:
+    flown(tmp_path / "run", "usual-1000baud", duration_s=2.0)
+    bits = read_bits(tmp_path / "run")
+    width = bits.agreement.codec.coder.alphabet.symbols_per_word
+    stated = sum(len(one) for one in bits.statements)
+    assert width > 1
+    assert bits.arrived == symbols_of(bits, 1)[0].arrived == width * stated
+
+
 def test_when_the_plant_only_rests_then_no_model_is_written_and_the_parameters_are_named(
     tmp_path: Path,
 ) -> None:
@@ -65,6 +99,16 @@ def test_when_settings_are_given_beside_the_bits_then_they_are_refused_by_name()
         assert result.exit_code != 0
         assert "--from-bits takes the folder of a run" in str(result.exception)
     assert "preset" in str(identified("somewhere", "--preset", "paper-10baud").exception)
+    ignored = {"bandwidth": "2", "damping": "1", "forgetting": "0.1", "duration": "9"}
+    ignored["excitation"] = "square:0.2,0,2.5"
+    for name, value in ignored.items():
+        assert f"--{name}" in str(identified("somewhere", f"--{name}", value).exception)
+
+
+def test_when_arrays_are_given_as_bits_then_they_are_refused() -> None:
+    arrays = {"angle": [0.0, 0.1], "input": [1.0, 1.0]}
+    with pytest.raises(IdentificationError, match="arrays hold no symbols"):
+        identify(arrays, outputs=("angle",), inputs=("input",), tick_s=0.01, from_bits=True)
 
 
 @pytest.mark.parametrize(

@@ -27,6 +27,7 @@ HOVER_RAD = math.radians(10.0)
 PITCH_STOP_RAD = math.radians(32.0)
 ELEVATION_STOPS_RAD = (math.radians(-28.0), math.radians(30.0))
 STOP_STIFFNESS_PER_S2, STOP_DAMPING_PER_S = 400.0, 20.0
+MASS_RAD_PER_S2_PER_M, PULL_MOST = 4.0, 1e6
 
 
 class HelicopterConstants(NamedTuple):
@@ -128,13 +129,13 @@ class HelicopterPlant(OdePlant):
         motor_lag_s: float = 0.08,
         rig: str = "laas",
         travel_stop_rad: float = math.pi,
-        mass_rad_per_s2_per_m: float = 4.0,
+        mass_rad_per_s2_per_m: float | None = None,
         mass_moves: Sequence[Sequence[float]] = (),
     ) -> None:
         """`rig`: whose parameters it has, `laas` or `ctu`.
 
         `mass_moves` are (time in s, position in m) of the mass that moves along the arm, from its home
-        outward; a metre of it pulls the elevation down by `mass_rad_per_s2_per_m`.
+        outward; a metre of it pulls the elevation down by `mass_rad_per_s2_per_m`, 4 if not given.
         """
         if rig not in RIGS:
             raise ValueError(f"rig is {rig!r}; known are {', '.join(RIGS)}")
@@ -164,6 +165,17 @@ class HelicopterPlant(OdePlant):
             resting=(hover, hover),
         )
         if mass_moves:
-            mass = MovingMass(mass_moves, -mass_rad_per_s2_per_m, context.step_s)
+            mass = MovingMass(mass_moves, -_pull_of(mass_rad_per_s2_per_m), context.step_s)
             travel, elevated, pitch = self._disturbances or (Sum(), Sum(), Sum())
             self._disturbances = (travel, Sum(elevated, mass), pitch)
+        elif mass_rad_per_s2_per_m is not None:
+            raise ValueError("mass_rad_per_s2_per_m is given, and no mass moves: give mass_moves too")
+
+
+def _pull_of(given: float | None) -> float:
+    pull = MASS_RAD_PER_S2_PER_M if given is None else given
+    if not 0.0 <= pull <= PULL_MOST:
+        raise ValueError(
+            f"mass_rad_per_s2_per_m is {pull}; it must be at least 0 and at most {PULL_MOST:g}"
+        )
+    return pull

@@ -28,9 +28,9 @@ class MovingMass:
         """Take (time, position) in rising order; ValueError for others."""
         times_s, places_m, at_m = [0.0], [0.0], 0.0
         for move in moves:
-            if len(move) != 2 or not all(map(math.isfinite, move)):
-                raise ValueError(f"mass_moves has {list(move)}; a move is [time in s, position in m]")
-            start_s, wanted_m = move
+            start_s, wanted_m = _numbers_of(move)
+            if start_s < 0.0:
+                raise ValueError(f"mass_moves: a move begins at {start_s:g} s, and the flight at 0 s")
             if abs(wanted_m) > RANGE_M:
                 raise ValueError(
                     f"mass_moves sends the mass to {wanted_m:g} m; its screw ends at {RANGE_M:g} m to "
@@ -56,3 +56,13 @@ class MovingMass:
     def _at(self, indices: Torques) -> Torques:
         places_m = np.interp(indices * self._step_s, self._times_s, self._places_m)
         return self._torque_per_m * places_m
+
+
+def _numbers_of(move: object) -> tuple[float, float]:
+    """Return time and position of a move; ValueError for anything else."""
+    match move:
+        case [int() | float() as start_s, int() | float() as wanted_m] if math.isfinite(
+            start_s
+        ) and math.isfinite(wanted_m):
+            return start_s, wanted_m
+    raise ValueError(f"mass_moves has {move!r}; it is a list of moves, [time in s, position in m] each")

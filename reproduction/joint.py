@@ -7,7 +7,7 @@ second half is flown from every sample phase.
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -84,7 +84,7 @@ def settings_of(data: Path, recording: Recording, rate: int, model: dict[str, An
     # 30 bit/s make no whole number of the usual ticks.
     tick_s = 0.01 if rate != 30 else 1.0 / 60.0
     encoders = {name: {"counts_per_turn": COUNTS[name]} for name in recording.outputs}
-    log = {"outputs": recording.outputs, "inputs": recording.inputs, **recording.log}
+    log = {"columns": {**recording.outputs, **recording.inputs}, **recording.log}
     return {
         "timing": {"tick_s": tick_s, "symbol_period_s": 1.0 / rate},
         "channel": {"rate_baud": float(rate)},
@@ -177,16 +177,19 @@ def rows_of(data: Path, recording: Recording, rate: int) -> list[Row]:
     return found
 
 
-def main(arguments: list[str]) -> None:
+def main() -> None:
     """Print the rows that are asked for."""
-    data, *only = arguments
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("data", type=Path, help="folder of the recordings")
+    parser.add_argument("only", nargs="*", help="part of a file's name, or a rate in bit/s")
+    given = parser.parse_args()
     print("| recording | bit/s, all angles | angle | rms | worst phase | rms % | largest error % |")
     print("|---|---|---|---|---|---|---|", flush=True)
     for recording in RECORDINGS:
         for rate in RATES:
-            if not all(one in recording.file or one == str(rate) for one in only):
+            if not all(one in recording.file or one == str(rate) for one in given.only):
                 continue
-            for row in rows_of(Path(data), recording, rate):
+            for row in rows_of(given.data, recording, rate):
                 shares = (100.0 * one / row.largest for one in (row.rms, row.largest_error))
                 degrees = (f"{np.degrees(one):.2f}°" for one in (row.rms, row.worst))
                 percent = (f"{one:.2f}" for one in shares)
@@ -199,4 +202,4 @@ def main(arguments: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

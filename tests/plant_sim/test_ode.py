@@ -194,6 +194,9 @@ def test_when_friction_holds_a_servo_then_it_is_slower() -> None:
     assert rubbing.state[1] == pytest.approx(0.8, abs=0.02)
 
 
+MASS = {"mass_moves": [[1.0, 0.08]]}
+
+
 @pytest.mark.parametrize(
     ("kind", "options", "text"),
     [
@@ -204,7 +207,27 @@ def test_when_friction_holds_a_servo_then_it_is_slower() -> None:
         (HelicopterPlant, {"travel_stop_rad": 0.0}, "travel_stop_rad is 0.0"),
         (HelicopterPlant, {"mass_moves": [[1.0, 0.2]]}, "0.2 m; its screw ends at 0.1397 m"),
         (HelicopterPlant, {"mass_moves": [[1.0, 0.08], [1.5, 0.0]]}, "moving until 2 s"),
-        (HelicopterPlant, {"mass_moves": [[1.0]]}, r"a move is \[time in s, position in m\]"),
+        (HelicopterPlant, {"mass_moves": [[1.0]]}, r"moves, \[time in s, position in m\] each"),
+        (HelicopterPlant, {"mass_moves": [10.0, 0.08]}, r"mass_moves has 10\.0; it is a list of moves"),
+        (
+            HelicopterPlant,
+            {"mass_moves": [["1", 0.08]]},
+            r"mass_moves has \['1', 0\.08\]; it is a list",
+        ),
+        (
+            HelicopterPlant,
+            {"mass_moves": [[-1.0, 0.08]]},
+            "a move begins at -1 s, and the flight at 0 s",
+        ),
+        (HelicopterPlant, {"mass_rad_per_s2_per_m": 4.0}, "no mass moves: give mass_moves too"),
+        *(
+            (
+                HelicopterPlant,
+                {**MASS, "mass_rad_per_s2_per_m": pull},
+                "mass_rad_per_s2_per_m is .* at least 0",
+            )
+            for pull in (-1.0, math.nan, math.inf, 1e300)
+        ),
         (ServoPlant, {"winding_lag_s": -1.0}, "winding_lag_s is -1.0"),
     ],
 )

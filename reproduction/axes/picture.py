@@ -30,10 +30,10 @@ def draw_mission(path: Path, seconds: float | None = None) -> None:
 def _draw(run: Run, path: Path) -> None:
     figure, panels = new_figure(5, 1.25, [1.5, 1.0, 1.0, 1.0, 0.8], width=9.0)
     true, estimated = (
-        np.array([run.signals[f"{kind}{name}"].values for name in OUTPUTS])
+        [(run.time_s, run.signals[f"{kind}{name}"].values) for name in OUTPUTS]
         for kind in ("", "estimate_")
     )
-    draw_poses(panels[0], "helicopter", run.time_s.tolist(), true, estimated)
+    draw_poses(panels[0], run.plant, true, estimated)
     legend_above(panels[0])
     for panel, name in zip(panels[1:4], OUTPUTS, strict=True):
         for signal, color, width in (

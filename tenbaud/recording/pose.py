@@ -12,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from channel.codec.signals import Signals
-from tenbaud.log.units import turn_in
 from tenbaud.recording.envelope import Curve
 from tenbaud.recording.style import LINE_A, LINE_B
 
@@ -25,19 +24,21 @@ Lines = list[npt.NDArray[np.float64]]
 AZIMUTH, TILT = -0.5, 0.6
 LENGTH, SPAN, RADIUS, MAST, WEIGHT = 1.0, 0.42, 0.24, 0.09, -0.55
 MOMENTS = 6
+RADIANS = {"": 1.0, "rad": 1.0, "deg": np.pi / 180.0}
+"""of a unit of the angles that are drawn"""
 
 
 def has_poses(plant: Signals) -> bool:
     """Return whether there are poses of a plant here: of its picture, from outputs that are angles."""
     return (plant.picture, len(plant.outputs)) in _LINES and all(
-        turn_in(one.unit) for one in plant.outputs
+        one.unit in RADIANS for one in plant.outputs
     )
 
 
 def draw_poses(panel: Axes, plant: Signals, true: Sequence[Curve], estimated: Sequence[Curve]) -> None:
     """Draw moments of a flight from left to right, at their times; each output has its curves."""
     lines_of, frame = _LINES[plant.picture, len(plant.outputs)]
-    scales = [2.0 * np.pi / (turn_in(one.unit) or np.nan) for one in plant.outputs]
+    scales = [RADIANS[one.unit] for one in plant.outputs]
     begin_s, end_s = true[0][0][[0, -1]]
     panel.axis("off")
     width = 1.0 / MOMENTS

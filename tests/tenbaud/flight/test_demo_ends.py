@@ -1,4 +1,4 @@
-"""What becomes of one end of a demo when the other one fails."""
+"""How `tenbaud demo` treats one end when the other one fails."""
 
 from __future__ import annotations
 

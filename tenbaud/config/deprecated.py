@@ -83,7 +83,7 @@ def _name_log_columns(section: Any, source: str, *, warn: bool) -> None:
     if not isinstance(columns, dict):
         return
     for old, new in LOG_COLUMNS.items():
-        value = section.get(old)
+        value: Any = section.get(old)
         # What is of another type stays where it is: the schema refuses it by name.
         if value and not isinstance(value, (dict, list, tuple) if new[-1] == ":" else str):
             continue

@@ -129,6 +129,14 @@ def test_a_loop_steers_only_an_output_of_a_later_loop(steers: str, tmp_path: Pat
         fly("helicopter-10baud", settings=dict(flattened(given)), out=tmp_path / "run")
 
 
+def test_the_unit_of_a_loop_that_steers_is_that_of_what_it_steers(tmp_path: Path) -> None:
+    elevation, travel, pitch = CASCADE["pid"]["loops"]
+    loops = [elevation, {**travel, "unit": "V/rad"}, pitch]
+    given = {"receiver": {"controller": "pid", "pid": {"loops": loops}}}
+    with pytest.raises(ConfigError, match=r"the output pitch that it steers is in rad, .* 'rad/rad'"):
+        fly("helicopter-10baud", settings=dict(flattened(given)), out=tmp_path / "run")
+
+
 @pytest.mark.parametrize(
     ("reference", "text"),
     [

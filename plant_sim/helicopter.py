@@ -128,17 +128,20 @@ class HelicopterPlant(OdePlant):
         context: PlantContext,
         motor_lag_s: float = 0.08,
         rig: str = "laas",
-        travel_stop_rad: float = math.pi,
+        travel_stop_rad: float | None = None,
         mass_rad_per_s2_per_m: float | None = None,
         mass_moves: Sequence[Sequence[float]] = (),
     ) -> None:
         """`rig`: whose parameters it has, `laas` or `ctu`.
 
+        `travel_stop_rad` is that of the codec's model if not given, half a turn where it has none.
         `mass_moves` are (time in s, position in m) of the mass that moves along the arm, from its home
         outward; a metre of it pulls the elevation down by `mass_rad_per_s2_per_m`, 4 if not given.
         """
         if rig not in RIGS:
             raise ValueError(f"rig is {rig!r}; known are {', '.join(RIGS)}")
+        if travel_stop_rad is None:
+            travel_stop_rad = float(context.model.get("travel_stop_rad", LAAS.travel_stop_rad))
         if not 0.0 < travel_stop_rad < math.inf:
             raise ValueError(f"travel_stop_rad is {travel_stop_rad}; it must be finite and above 0")
         damping, weight, thrust = fractions(context)

@@ -21,7 +21,6 @@ from typing import Any
 
 from tenbaud.bounds.floor import floor
 from tenbaud.bounds.linear import rate_needed
-from tenbaud.build.signals import configured_signals, encoder_steps
 from tenbaud.config.load import ConfigError, load_config, merged_values
 from tenbaud.config.schema import FlightConfig
 from tenbaud.design.complete import completed
@@ -147,14 +146,12 @@ def configuration(point: Point) -> FlightConfig:
     values = merged_values(plant.preset, None)
     values["timing"] = {"tick_s": tick_s, "symbol_period_s": round(tick_s * ticks, 9)}
     values["channel"] |= {"rate_baud": point.rate_bit_s, "delivery": point.delivery}
-    given = load_config(plant.preset)
-    steps = () if point.exact else encoder_steps(given, configured_signals(given))
-    values = completed(values, steps)
-    values["coder"]["adapts"] = not point.known
     transmitter = values["transmitter"]
     transmitter["plant"] |= {"mismatch": point.mismatch, **(plant.exact if point.exact else {})}
     if point.exact:
         transmitter |= EXACT
+    values = completed(values)
+    values["coder"]["adapts"] = not point.known
     return load_config(None, None, values | {"duration_s": point.seconds})
 
 

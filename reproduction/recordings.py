@@ -9,6 +9,7 @@ sample phase.
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
 from dataclasses import dataclass, field
@@ -130,18 +131,21 @@ def _row_or_reason(data: Path, angle: Angle, rate: int) -> str:
         return f"| {angle.file} | {angle.name} | {rate} | {error} |"
 
 
-def main(arguments: list[str]) -> None:
+def main() -> None:
     """Print the rows that are asked for."""
-    data, *only = arguments
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("data", type=Path, help="folder of the recordings")
+    parser.add_argument("only", nargs="*", help="part of a file's name, an angle, or a rate in bit/s")
+    given = parser.parse_args()
     print("| file | angle | bit/s | rms %, mean of phases | worst phase | largest error % ", end="")
     print("| largest angle, rad | quick_coder, first half, rms % | seconds |")
     print("|---|---|---|---|---|---|---|---|---|", flush=True)
     for angle in ANGLES:
         for rate in RATES:
             chosen = (angle.file.partition("_")[0], angle.name, str(rate))
-            if all(one in chosen or one in angle.file for one in only):
-                print(_row_or_reason(Path(data), angle, rate), flush=True)
+            if all(one in chosen or one in angle.file for one in given.only):
+                print(_row_or_reason(given.data, angle, rate), flush=True)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

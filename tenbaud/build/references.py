@@ -9,10 +9,10 @@ import numpy as np
 
 from channel.codec.signals import Signal, Signals
 from receiver.controllers.references import Constant, Listed, Reference, Shifted, Sine, Square, Step
-from tenbaud.build.signals import check_outputs
 from tenbaud.config.controllers import ReferenceSection
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
+from tenbaud.design.encoders import check_outputs
 
 References = tuple[Reference | None, ...]
 PERIODIC = ("square", "sine")

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
 
 from channel.codec.codec import Vector
-from channel.codec.signals import Signal, Signals, signals_of
+from channel.codec.signals import Signals, signals_of
 from channel.protocol.limits import CommandLimits, per_input, require_carried
-from plant_sim.encoder import Encoder, ExactReader, OutputReader
+from plant_sim.encoder import OutputReader
 from tenbaud.build.codec import build_model
 from tenbaud.build.parts import Parts
 from tenbaud.config.load import ConfigError
-from tenbaud.config.schema import EncoderSection, FlightConfig
-from tenbaud.log.units import turn_in
-
-COUNTS_PER_TURN = 4096
+from tenbaud.config.schema import FlightConfig
+from tenbaud.design.encoders import check_outputs, encoders_of, output_names, steps_of
 
 
 def configured_signals(config: FlightConfig, parts: Parts | None = None) -> Signals:
@@ -65,53 +61,16 @@ def soft_limits(config: FlightConfig, signals: Signals) -> Vector:
     if len(limits) != len(signals.outputs):
         raise ConfigError(
             f"{field} has {len(limits)} values, and the plant {len(signals.outputs)} output(s): "
-            f"{_names(signals)}"
+            f"{output_names(signals)}"
         )
     return limits
 
 
-def check_outputs(field: str, named: Mapping[str, Any], signals: Signals) -> None:
-    """Raise ConfigError for a name that is not an output."""
-    for name in named:
-        if name not in [one.name for one in signals.outputs]:
-            raise ConfigError(f"{field}.{name}: the plant's output(s) are {_names(signals)}")
-
-
-def _names(signals: Signals) -> str:
-    return ", ".join(one.name for one in signals.outputs)
-
-
 def build_encoders(config: FlightConfig, signals: Signals) -> tuple[OutputReader, ...]:
     """Return what reads each output on a simulated rig."""
-    field, section = "transmitter.encoders", config.transmitter.encoders
-    check_outputs(field, section.by_name, signals)
-    for one in signals.outputs:
-        if (own := section.by_name.get(one.name)) is not None:
-            _check_units(f"{field}.{one.name}", own, one)
-    return tuple([_encoder(section.by_name.get(one.name, section), one) for one in signals.outputs])
+    return encoders_of(config.transmitter.encoders, signals)
 
 
 def encoder_steps(config: FlightConfig, signals: Signals) -> list[float]:
     """Return the step of what reads each output, in the output's unit; 0 where it is read exactly."""
-    readers = build_encoders(config, signals)
-    return [one.turn / one.counts_per_turn if isinstance(one, Encoder) else 0.0 for one in readers]
-
-
-def _check_units(field: str, section: EncoderSection, output: Signal) -> None:
-    if section.counts_per_turn is not None and turn_in(output.unit) is None:
-        raise ConfigError(
-            f"{field}.counts_per_turn = {section.counts_per_turn}: the output {output.name} is in "
-            f"{output.unit}, which has no turns; give counts_per_unit"
-        )
-    if section.counts_per_turn is not None and section.counts_per_unit is not None:
-        raise ConfigError(f"{field}: give counts_per_turn or counts_per_unit, not both")
-
-
-def _encoder(section: EncoderSection, output: Signal) -> OutputReader:
-    turn = turn_in(output.unit)
-    counts: float = section.counts_per_turn or COUNTS_PER_TURN
-    if section.counts_per_unit is not None:
-        turn, counts = 1.0, section.counts_per_unit
-    if turn is None or not section.quantised:
-        return ExactReader()
-    return Encoder(counts, section.sign, section.zero_counts, turn)
+    return steps_of(config.transmitter.encoders, signals)

@@ -80,20 +80,15 @@ def design(
 
     [dim]tenbaud design --config plant.toml --out flight.toml[/dim]
     """
-    from tenbaud.build.signals import configured_signals, encoder_steps
-    from tenbaud.config.load import load_config, merged_values, read_toml, toml_text
+    from tenbaud.config.load import checked, merged_values, read_toml, toml_text
     from tenbaud.design.complete import completed
     from tenbaud.files.whole import make_folder, write_whole
 
-    own = read_toml(config)
-    steps: list[float] = []
-    for _ in range(2):  # the encoders are known of a whole configuration only
-        whole = completed(merged_values(preset, config), steps)
-        own |= {name: whole[name] for name in ("model", "coder")}
-        if preset is not None:
-            own["preset"] = preset
-        flown = load_config(None, None, own)
-        steps = encoder_steps(flown, configured_signals(flown))
+    whole = completed(merged_values(preset, config))
+    checked(whole, config)
+    own = read_toml(config) | {name: whole[name] for name in ("model", "coder")}
+    if preset is not None:
+        own["preset"] = preset
     make_folder(out.parent)
     write_whole(out, toml_text(own))
     typer.echo(f"wrote {out}")

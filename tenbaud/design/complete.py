@@ -6,7 +6,7 @@ goes into the shared configuration by value.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any, TypeVar
 
@@ -17,10 +17,11 @@ from tenbaud.bounds.linear import rate_needed
 from tenbaud.config.kinds import MODELS, kind_of
 from tenbaud.config.load import ConfigError
 from tenbaud.config.models import LinearModelSection
-from tenbaud.config.schema import Timing
+from tenbaud.config.schema import EncodersSection, Timing
 from tenbaud.config.section import KindSection, Section
 from tenbaud.design.described import corrected_part, linear_of, plant_of, require_rate, require_seen
 from tenbaud.design.direction import design_direction, design_learning
+from tenbaud.design.encoders import steps_of
 from tenbaud.design.plant import behind_encoders
 
 DESIGNED = (*("transition", "noise", "noises", "worth", "start", "starts", "reach", "removed", "step"),)
@@ -28,31 +29,35 @@ DESIGNED = (*("transition", "noise", "noises", "worth", "start", "starts", "reac
 SectionKind = TypeVar("SectionKind", bound=Section)
 
 
-def completed(values: Mapping[str, Any], steps: Sequence[float] = ()) -> dict[str, Any]:
+def completed(values: Mapping[str, Any]) -> dict[str, Any]:
     """Return nested settings with the sections `model` and `coder` completed.
 
     A linear model gets F and E from its A and B, and a coder `direction` or `learning` its constants
-    for the plant; both anew where they are there already. `steps` are those of the encoders of the
-    outputs: on a plant that grows the coder is designed for what can be seen of it behind them. Raises
-    ConfigError where nothing can be designed.
+    for the plant; both anew where they are there already. On a plant that grows the coder is designed
+    for what the configured encoders show of it. Raises ConfigError where nothing can be designed.
     """
     given, coder = dict(values.get("model", {})), dict(values.get("coder", {}))
     try:
-        timing = _checked("timing", Timing, values.get("timing", {}))
-        section = _checked("model", kind_of(MODELS, given.get("kind", "pitch")).section, given)
+        timing = checked_section("timing", Timing, values.get("timing", {}))
+        section = checked_section("model", kind_of(MODELS, given.get("kind", "pitch")).section, given)
         if isinstance(section, LinearModelSection) and section.A:
             F, E = discretised(section.A, section.B, timing.tick_s)
             given |= {"F": F.tolist(), "E": E.tolist()}
-            section = _checked("model", LinearModelSection, given)
+            section = checked_section("model", LinearModelSection, given)
         if coder.get("kind") in ("direction", "learning"):
-            coder |= _designed(section, coder, timing, steps)
+            encoders = values.get("transmitter", {}).get("encoders", {})
+            coder |= _designed(section, coder, timing, encoders)
     except ValueError as error:
-        raise ConfigError(f"this cannot be designed: {error}") from error
+        raise _undesigned(error) from error
     return {**values, "model": given, "coder": coder}
 
 
-def _checked(place: str, sort: type[SectionKind], values: Mapping[str, Any]) -> SectionKind:
-    """Return a section; ValueError that names its fields."""
+def _undesigned(why: object) -> ConfigError:
+    return ConfigError(f"this cannot be designed: {why}")
+
+
+def checked_section(place: str, sort: type[SectionKind], values: Mapping[str, Any]) -> SectionKind:
+    """Return a section; ConfigError that names its fields."""
     try:
         return sort.model_validate(values)
     except ValidationError as error:
@@ -60,11 +65,11 @@ def _checked(place: str, sort: type[SectionKind], values: Mapping[str, Any]) -> 
             f"{'.'.join([place, *map(str, one['loc'])])}: {one['msg'].removeprefix('Value error, ')}"
             for one in error.errors()
         ]
-        raise ValueError("; ".join(faults)) from error
+        raise _undesigned("; ".join(faults)) from error
 
 
 def _designed(
-    section: KindSection, coder: Mapping[str, Any], timing: Timing, steps: Sequence[float]
+    section: KindSection, coder: Mapping[str, Any], timing: Timing, encoders: Mapping[str, Any]
 ) -> dict[str, Any]:
     linear, plant = linear_of(section), plant_of(section, timing.tick_s)
     if linear is None or plant is None:
@@ -73,8 +78,11 @@ def _designed(
     rate = coder.get("bits", 1) / timing.symbol_period_s
     require_seen(plant, section)
     require_rate(plant, rate, section)
-    if all(steps) and len(steps) == len(plant.C) and rate_needed(plant.A):
-        plant, _ = behind_encoders(plant, steps, timing.tick_s)
+    if rate_needed(plant.A):
+        read = checked_section("transmitter.encoders", EncodersSection, encoders)
+        steps = steps_of(read, linear.signals(plant.B.shape[1]))
+        if all(steps):
+            plant, _ = behind_encoders(plant, steps, timing.tick_s)
     design = design_learning if coder["kind"] == "learning" else design_direction
     found = asdict(design(plant, rate, timing.symbol_period_s))
     return {name: _lists(value) for name, value in found.items() if name in DESIGNED}

@@ -15,6 +15,7 @@ from plant_sim.zero_order_hold import continuous
 from tenbaud.config.load import OWN, ConfigError, load_config
 from tenbaud.config.models import LinearModelSection
 from tenbaud.config.schema import EncoderSection
+from tenbaud.design.complete import checked_section
 from tenbaud.design.systems import Matrices, Names, name_and_unit
 
 RATE_BAUD = 10.0
@@ -100,7 +101,7 @@ def exact_outputs(model: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str
     encoders = over.get("transmitter", {}).get("encoders", {})
     if encoders.keys() & EncoderSection.model_fields.keys():
         return {}
-    section = LinearModelSection.model_validate(model)
+    section = checked_section("model", LinearModelSection, model)
     outputs = section.signals(len((section.B or section.E)[0])).outputs
     exact = {
         one.name: {"quantised": False} for one in outputs if not one.unit and one.name not in encoders

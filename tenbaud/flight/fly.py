@@ -146,10 +146,10 @@ def _loaded(
             parts = {**parts, "plant": preset}
             changes = merged(changes, nested(_names(parts, changes["link"]["kind"])))
         own = merged(settings_of(found, rate_baud, changes), changes)
+        own = merged(exact_outputs(own["model"], changes), own)
         designed = completed(merged_values(OWN, None, own))
         # Whatever was designed: what is given stays as it is given.
-        values = merged(designed, changes)
-        preset, changes = OWN, merged(exact_outputs(values["model"], changes), values)
+        preset, changes = OWN, merged(designed, changes)
     elif any(one is not None for one in plant):
         raise ConfigError("rate_baud and operating_point are for a plant; a preset says them itself")
     elif not isinstance(preset, str | None):

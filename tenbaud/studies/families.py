@@ -83,7 +83,7 @@ class DirectionFamily:
         """Design for the disturbance as configured: another strength scales Q and P alone."""
         # As many as the line carries: rounded up they would come late.
         bits = max(1, math.floor(config.channel.rate_baud * config.timing.symbol_period_s + 1e-6))
-        given = config.model_dump(mode="json", include={"timing", "model"})
+        given = config.model_dump(mode="json", include={"timing", "model", "transmitter"})
         done = completed({**given, "coder": {"kind": "direction", "bits": bits}})
         model = type(config.model).model_validate(done["model"])
         self._coder = DirectionCoderSection.model_validate(done["coder"])

@@ -177,6 +177,9 @@ def test_when_travel_goes_too_far_then_a_stop_holds_it() -> None:
     for _ in range(1000):
         plant.advance((2.68, 2.68))
     assert abs(plant.measured[0]) < 0.4
+    plant = built(HelicopterPlant, 2, model={"travel_stop_rad": 20.0}, initial=(4.0, 0.17, 0.0))
+    plant.advance((0.0, 0.0))
+    assert plant.measured[0] == pytest.approx(4.0), "its default is that of the codec's model"
     plant = built(HelicopterPlant, 2, initial=(0.0, 0.0))
     for _ in range(500):
         plant.advance((0.0, 0.0))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-import math
 import re
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,6 @@ from channel.codec.signals import signals_of
 from channel.line.line import bit_rate
 from tenbaud.build.codec import build_codec, configured_rate
 from tenbaud.build.flight import agree
-from tenbaud.build.signals import configured_signals, encoder_steps
 from tenbaud.cli.commands import app
 from tenbaud.config.load import (
     ConfigError,
@@ -164,10 +163,25 @@ def test_when_the_weights_hide_a_growing_motion_then_design_and_flight_name_who_
 
 def test_when_a_plant_grows_then_its_coder_is_designed_for_what_its_encoders_show() -> None:
     values = {**AT_20, "model": PENDULUM, "coder": {"kind": "direction"}}
-    exact, coarse = completed(values), completed(values, [math.tau / 4096])
+    exactly = {"transmitter": {"encoders": {"quantised": False}}}
+    exact, coarse = completed({**values, **exactly}), completed(values)
     assert coarse["coder"]["noise"][0][0] > 2.0 * exact["coder"]["noise"][0][0]
+    own = completed({**values, "transmitter": {"encoders": {"angle": {"counts_per_turn": 4096}}}})
+    assert own["coder"] == coarse["coder"], "4096 counts are the default"
     steady = {**values, "model": {**PENDULUM, "A": [[0.0, 1.0], [-4.0, 0.0]]}}
-    assert completed(steady, [math.tau / 4096]) == completed(steady)
+    assert completed({**steady, **exactly})["coder"] == completed(steady)["coder"]
+
+
+def test_when_a_file_builds_on_a_preset_then_its_coder_is_designed_for_the_preset_s_encoders(
+    tmp_path: Path,
+) -> None:
+    own, made = tmp_path / "own.toml", tmp_path / "made.toml"
+    own.write_text('preset = "furuta-50baud"\n')
+    done = CliRunner().invoke(app, ["design", "--config", str(own), "--out", str(made)])
+    assert done.exit_code == 0, done.output
+    usual = np.array(merged_values("furuta-50baud")["coder"]["noise"])
+    found = np.array(tomllib.loads(made.read_text())["coder"]["noise"])
+    assert np.abs(found - usual).max() < 1e-6 * np.abs(usual).max()
 
 
 @pytest.mark.parametrize("preset", ["pendulum-13baud", "pendulum-16baud", "pendulum-20baud"])
@@ -275,8 +289,8 @@ def test_the_rate_of_a_configuration_is_that_of_its_codec() -> None:
     ],
 )
 def test_the_constants_of_a_preset_are_those_of_the_design(preset: str) -> None:
-    values, config = merged_values(preset), load_config(preset)
-    again = completed(values, encoder_steps(config, configured_signals(config)))
+    values = merged_values(preset)
+    again = completed(values)
     for section, names in (
         ("model", ("F", "E")),
         ("coder", ("transition", "noise", "worth", "start", "removed", "step")),

@@ -14,6 +14,8 @@ from typing import Any
 from channel.codec.codec import Codec, CodecState, Vector
 from channel.codec.coders.direction import DirectionCoder, aim, learn
 from channel.codec.coders.history import HistoryCoder
+from channel.codec.coders.learning import LearningCoder
+from channel.codec.coders.learning_steps import ask, take
 from channel.codec.coders.pcm import PcmCoder, turn_of
 from channel.codec.coders.signs import SignCoder
 from channel.codec.coders.static import StaticCoder, number_of
@@ -34,6 +36,8 @@ def statements_of(codec: Codec, state: CodecState, word: Sequence[int]) -> Itera
             yield _side(_unit(axis, len(predicted)), predicted[axis], sign)
     elif isinstance(coder, DirectionCoder):
         yield from _directions(coder.constants, aim, learn, state.coder, predicted, word)
+    elif isinstance(coder, LearningCoder):
+        yield from _directions(coder.constants, ask, _take, state.coder, predicted, word)
     elif isinstance(coder, HistoryCoder):
         yield _boundary(coder, state.coder, predicted, word[0])
     elif isinstance(coder, StaticCoder):
@@ -66,10 +70,16 @@ def _cell(c: Sequence[float], lowest: float, width: float, word: Sequence[int]) 
     return c, low if number > 0 else -math.inf, high
 
 
+def _take(
+    constants: Any, known: list[float], c: list[float], _v: object, sign: int, moved: list[float]
+) -> None:
+    take(constants, known, c, sign, moved)
+
+
 def _directions(
     constants: Any,
-    ask: Callable[..., bool],
-    take: Callable[..., None],
+    point: Callable[..., bool],
+    update: Callable[..., None],
     before: Vector,
     predicted: Vector,
     word: Sequence[int],
@@ -78,10 +88,10 @@ def _directions(
     known, size = list(before), len(constants.largest)
     c, v, correction = [0.0] * size, [0.0] * size, [0.0] * len(predicted)
     for sign in word:
-        if ask(constants, known, c, v):
+        if point(constants, known, c, v):
             edge = sum(c[i] * (predicted[i] + correction[i]) for i in range(size))
             yield _side(list(c), edge, sign)
-            take(constants, known, c, v, sign, correction)
+            update(constants, known, c, v, sign, correction)
 
 
 def _boundary(coder: HistoryCoder, before: Vector, predicted: Vector, sign: int) -> Statement:

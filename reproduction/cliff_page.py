@@ -57,7 +57,7 @@ def draw(paths: list[Path], found: dict[Point, Found]) -> None:
         below.set_yticks([], minor=True)
     panels[0, 0].set(ylabel="flights that stay up, %", ylim=(-4.0, 104.0))
     panels[1, 0].set_ylabel("rms error over the floor")
-    panels[0, 1].legend(fontsize=7.5, frameon=False, loc="lower right")
+    panels[0, 0].legend(fontsize=7.5, frameon=False, loc="lower right", borderaxespad=1.2)
     save(figure, paths)
 
 

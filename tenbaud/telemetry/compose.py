@@ -135,7 +135,11 @@ class TransmitterComposer(Composer):
             "paused": self._live.paused,
             "pace": self._live.pace if self.agreement.clock == "virtual" else None,
             "gap_to_floor": gap and gap.rms_over_floor,
-            "learned": learned_of(self.agreement.codec, session.copies.confirmed),
+            # Plain tuples: named ones are no JSON for the encoder.
+            "learned": {
+                name: tuple(one)
+                for name, one in learned_of(self.agreement.codec, session.copies.confirmed).items()
+            },
         }
 
     def _read(self, rows: list[tuple[str, Row]]) -> tuple[list[Any], list[Any]]:

@@ -227,3 +227,12 @@ def test_when_telemetry_is_off_then_nothing_listens_and_the_summary_says_so(tmp_
         transmitter={"arguments": ["--duration", "2"]},
     )
     assert (upper.summary["telemetry"], lower.summary["telemetry"]) == ("off", "off")
+
+
+def test_when_the_codec_learns_its_plant_then_viewers_get_what_it_learned(tmp_path: Path) -> None:
+    flown = ("--preset", "helicopter-10baud", "--clock", "virtual")
+    with watched(tmp_path, *flown, transmitter=("--duration", "20", "--pace", "4")) as pair:
+        pair.wait(lambda: pair.newest("transmitter") and pair.newest("transmitter").time_s > 1.0)
+        learned = pair.newest("transmitter").learned
+        assert {"travel_thrust", "pitch_force"} <= set(learned)
+        assert all(deviation > 0.0 for _, deviation in learned.values())

@@ -6,8 +6,8 @@ message is, its wire can tell. `Inlet` is the other end of a line: bytes counted
 
 `Uplink` is the transmitter's way onto it, and what R baud means there, enforced and measured. Symbols
 leave on a fixed grid of slots, one per slot and none in advance or afterwards: a request for more gets
-an erasure, not a burst. Both loops of the transmitter send through it, so that nobody can go around the
-baud rate. `Downlink` is the receiver's way.
+an erasure, not a burst. Both loops of the transmitter send through it, so that no frame avoids the baud
+rate. `Downlink` is the receiver's way.
 """
 
 from __future__ import annotations

@@ -32,8 +32,8 @@ def build_part(
 ) -> Any:
     """Return what the function or class of this name builds; PartError if it is not what is needed.
 
-    `name` is built in, `module:Class` or what an installed package offers. CodeNotAllowed if nobody
-    allowed the configuration's code to run.
+    `name` is built in, `module:Class` or what an installed package offers. CodeNotAllowed unless
+    the user allowed the configuration's code to run.
     """
     ours = name in registry.built_in
     if ours and not inspect.isclass(part := registry.load(name)):

@@ -218,7 +218,7 @@ class _Child:
             self.process.send_signal(signal.SIGINT)
 
     def dismiss(self) -> None:
-        """Have the process end if it has no session yet: there is nobody to fly with."""
+        """Have the process end if it has no session yet: it has no other end to fly with."""
         if not self._begun and self.process.poll() is None:
             self.dismissed = True
             self.interrupt()

@@ -239,7 +239,7 @@ def sources_of(
         ]
     log = config.flight_log.model_copy(update={"file": str(source)})
     config = config.model_copy(update={"flight_log": log})
-    # The tick of a preset that nobody named says nothing about the file.
+    # The tick of a preset that was not asked for says nothing about the file.
     tick_s = config.timing.tick_s if request.given & {"timing.tick_s", "preset"} else None
     record, notes = from_log(config, request.structure, tick_s)
     return [Source(source.name, record, notes, source)]

@@ -15,6 +15,7 @@ from channel.codec.coders.base import CoderFunctions, FunctionCoder, Numbers
 from channel.codec.coders.direction import GROWTH_MAX, check_steps
 from channel.codec.coders.learning_steps import (
     LearningConstants,
+    add_parts,
     ask,
     columns_of,
     learning_decode,
@@ -149,9 +150,7 @@ class LearningCoder(FunctionCoder):
     def known(self, coder: Numbers) -> list[float]:
         """Return the lower half of P, of the corrected states."""
         found = [0.0] * pairs_of(len(self.constants.largest))
-        for part in range(columns_of(self.constants) + 1):
-            for at in range(len(found)):
-                found[at] += coder[part * self._pairs + at]
+        add_parts(self.constants, coder, found)
         return found
 
     def learned_deviations(self, coder: Vector) -> Vector:

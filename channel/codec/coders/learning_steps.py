@@ -79,14 +79,18 @@ def columns_of(constants: LearningConstants) -> int:
     return len(constants.noises) // (n * n)  # integers
 
 
-def ask(constants: LearningConstants, coder: Numbers, c: Results, v: Results) -> bool:
-    """Write the direction and P_xx c; return whether there is one: not when P is zero."""
-    n = len(constants.largest)
-    pairs = pairs_of(n + len(constants.drifts))
-    known = [0.0] * pairs_of(n)
+def add_parts(constants: LearningConstants, coder: Numbers, known: Results) -> None:
+    """Add the lower halves of all parts of P, of the corrected states."""
+    pairs = pairs_of(len(constants.largest) + len(constants.drifts))
     for part in range(columns_of(constants) + 1):
         for at in range(len(known)):
             known[at] += coder[part * pairs + at]
+
+
+def ask(constants: LearningConstants, coder: Numbers, c: Results, v: Results) -> bool:
+    """Write the direction and P_xx c; return whether there is one: not when P is zero."""
+    known = [0.0] * pairs_of(len(constants.largest))
+    add_parts(constants, coder, known)
     return point(constants.worth, known, c, v)
 
 

@@ -16,7 +16,7 @@ with a deadline, so a second thread sleeps until the deadline and then puts a me
 the channel. It is left alone for as long as messages come in time: a deadline that moves on is noticed
 when the old one is reached, and only one that moves forward wakes the thread up.
 
-That message contains a secret, so that nobody outside can send one: a flood of them would be passed
+That message contains a secret, so that no outside process can send one: a flood of them would be passed
 over without end. A full channel holds up the thread of Zenoh that fills it, and with it the sender.
 """
 

@@ -25,19 +25,17 @@ from scipy.linalg import solve_discrete_are
 from channel.codec.coders.direction import DirectionCoder
 from channel.codec.models.linear import LinearModel
 from plant_sim.zero_order_hold import discretised
+from reproduction.axes.alone import SAMPLES, SETTLING, UNKNOWN, products_of, root_of, squares_of
 from reproduction.limits.encoder import floor_behind_encoders
 from tenbaud.bounds.floor import floor, period_cost
-from tenbaud.bounds.linear import sampled, van_loan
+from tenbaud.bounds.linear import van_loan
 from tenbaud.design.described import plant_of, plant_section
 from tenbaud.design.direction import design_direction
 from tenbaud.design.observer import linear_observer
 from tenbaud.design.plant import LinearPlant
 from tenbaud.studies.compiled import arrays_of, compiled
 
-SAMPLES = 12_000
-SETTLING = 500
 SEEDS = range(8)
-UNKNOWN = 3.0
 STEP = math.tau / 4096
 TICKS = 10
 """per sample, for observer and law"""
@@ -69,28 +67,6 @@ class Ratios(NamedTuple):
     mean: float
     half_width: float
     lost: int = 0
-
-
-@njit(cache=True)
-def estimate(
-    F: Any, root: Any, M: Any, constants: Any, start: Any, samples: int, settling: int, seed: int
-) -> float:
-    """Return the mean of e' M e just after the bits; `root` is that of the noise's covariance."""
-    np.random.seed(seed)  # numba's generator
-    n = len(F)
-    error, zero, correction = np.zeros(n), np.zeros(n), np.zeros(n)
-    coder, after = start.copy(), start.copy()
-    word = np.zeros(1, dtype=np.int64)
-    total = 0.0
-    for sample in range(samples):
-        encode(constants, coder, zero, error, word)
-        decode(constants, coder, zero, word, False, correction, after)
-        coder[:] = after
-        error -= correction
-        if sample >= settling:
-            total += error @ (M @ error)
-        error = F @ error + root @ np.random.standard_normal(n)
-    return total / (samples - settling)
 
 
 @njit(cache=True)
@@ -141,20 +117,11 @@ def plants() -> Iterator[tuple[str, LinearPlant, float]]:
             yield name, plant, rate
 
 
-def root_of(covariance: Any) -> Any:
-    """Return L with L L' = covariance, which may lack rank by rounding."""
-    return np.linalg.cholesky(covariance + 1e-13 * np.diag(np.diag(covariance)))
-
-
 def exact(plant: LinearPlant, rate: float, coder: DirectionCoder, strength: float) -> Ratios:
     """Fly the error alone, which is all there is of an exact plant with an exact view of it."""
-    model = plant.model()
-    F, Q = (np.ascontiguousarray(one) for one in sampled(model, 1.0 / rate))
-    M, between = period_cost(model, 1.0 / rate)
-    fixed = (strength * root_of(Q), M, arrays_of(coder.constants), np.array(coder.initial()))
-    least = floor(model, rate)
-    means = [estimate(F, *fixed, SAMPLES, SETTLING, 1000 + seed) for seed in SEEDS]
-    return ratios([math.sqrt((mean / strength**2 + between) / least) for mean in means])
+    products = products_of(plant, rate, coder, strength, SEEDS, SAMPLES)
+    least = floor(plant.model(), rate)
+    return ratios([math.sqrt(one / least) for one in squares_of(plant, rate, products)])
 
 
 def behind_encoders(plant: LinearPlant, rate: float, coder: DirectionCoder) -> Ratios:

@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 from urllib.request import Request, urlopen
 
@@ -32,6 +33,7 @@ EVERYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}
 SERVING = "tenbaud view: "
 """begins the line with the address of the page"""
 LOOK_ONLY = "tenbaud view, to look only: "
+STATIC = Path(__file__).parent / "static"
 
 
 class PageUnavailable(TenbaudError):
@@ -92,18 +94,17 @@ def require_nicegui() -> None:
 
 
 def serve(feed: Feed, address: Address, *, open_browser: bool = False, view_only: bool = False) -> None:
-    """Serve the page until the process is asked to stop. Raises PageUnavailable.
+    """Serve the page of a live flight until the process is asked to stop. Raises PageUnavailable.
 
     `view_only`: no address is printed that lets anybody steer.
     """
     require_nicegui()
     address.check()
-    import uvicorn
     from fastapi import FastAPI
     from nicegui import app, ui
 
-    from tenbaud.view.gate import GRANT, Gate
-    from tenbaud.view.page import STATIC, build_page
+    from tenbaud.view.gate import GRANT
+    from tenbaud.view.page import build_page
 
     board = Board()
     access = draw_access(address.host, address.is_local, view_only=view_only)
@@ -122,9 +123,26 @@ def serve(feed: Feed, address: Address, *, open_browser: bool = False, view_only
         gzip_middleware_factory=None,  # packing half a megabyte takes longer than loopback does
         reconnect_timeout=5.0,
     )
-    # The gate is the outermost: NiceGUI answers nobody whom it has not let in.
+    with feed:
+        run_page(outer, access, address, open_browser=open_browser, on_startup=app.on_startup)
+
+
+def run_page(
+    inner: Any,
+    access: Access,
+    address: Address,
+    *,
+    open_browser: bool,
+    on_startup: Callable[[Callable[[], Any]], None],
+) -> None:
+    """Serve an application behind the gate until the process is asked to stop."""
+    import uvicorn
+
+    from tenbaud.view.gate import Gate
+
+    # The gate is the outermost: nothing answers anybody whom it has not let in.
     config = uvicorn.Config(
-        Gate(outer, access),
+        Gate(inner, access),
         host=address.host,
         port=address.port,
         ws="wsproto",
@@ -135,9 +153,8 @@ def serve(feed: Feed, address: Address, *, open_browser: bool = False, view_only
         timeout_graceful_shutdown=1,  # an open page would otherwise hold the server up
     )
     with ExitStack() as stack:
-        stack.enter_context(feed)
         shown = stack.enter_context(open_privately()) if open_browser else None
-        app.on_startup(lambda: _first_look(address.url, access, shown))
+        on_startup(lambda: _first_look(address.url, access, shown))
         uvicorn.Server(config).run()
 
 

@@ -1,4 +1,4 @@
-"""Corrupting one copy of the codec on purpose, in its last bit, to see that the difference is reported."""
+"""Corrupting one copy of the codec on purpose, in its last bit; the difference must be reported."""
 
 from __future__ import annotations
 

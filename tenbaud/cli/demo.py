@@ -1,4 +1,4 @@
-"""`tenbaud demo`: both ends on this machine, from nothing to a figure."""
+"""`tenbaud demo`: both ends on this machine, and a figure."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ DEFAULT_PRESET = "tuned-10baud"
 DEFAULT_MISMATCH = 0.1
 """No model is exact."""
 VIEW_DURATION_S = 3600.0
-"""A flight that is looked at lasts until somebody stops it, or this long."""
+"""A viewed flight lasts until it is stopped, or this long."""
 
 
 @spread
@@ -70,7 +70,7 @@ def demo(
 
 
 def _checked_pace(agreement: Agreement, pace: float | None, view: bool) -> float | None:
-    """Return how many times real time to fly at most; a flight that is looked at keeps to 1."""
+    """Return the highest multiple of real time; for a viewed flight it is 1."""
     virtual = agreement.clock == "virtual" and not agreement.link.in_process
     if pace is not None and not virtual:
         raise typer.BadParameter("--pace slows the virtual clock of two processes down, and no other")
@@ -80,7 +80,7 @@ def _checked_pace(agreement: Agreement, pace: float | None, view: bool) -> float
 def _view_options(
     agreements: list[Agreement], view: bool, port: int, open_browser: bool
 ) -> ViewOptions | None:
-    """Return how the flight is to be looked at, if it is, checked before anything starts."""
+    """Return the options of the view, if any, checked before anything starts."""
     if not view:
         if open_browser:
             raise typer.BadParameter("--open opens the live page; it goes with --view")

@@ -65,7 +65,7 @@ def receive(
     log: LogOptions,
     rig: Annotated[
         str | None,
-        typer.Option(help="replay:FILE when the transmitter replays: its voltages are used."),
+        typer.Option(help="replay:FILE when the transmitter replays: use the recorded voltages."),
     ] = None,
     take_over: options.TakeOver = False,
 ) -> None:

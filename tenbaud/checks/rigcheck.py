@@ -14,9 +14,8 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from tenbaud.build.rig import build_device
+from tenbaud.build.rig import build_device, real_rig_name
 from tenbaud.config.schema import FlightConfig
-from tenbaud.flight.summary import real_rig_name
 from transmitter.rigs.axes import Axis
 from transmitter.rigs.formats.samples import DeviceFlag, DeviceSample
 

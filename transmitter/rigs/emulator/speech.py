@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from transmitter.rigs.formats.ascii import checked, unchecked
+from transmitter.rigs.formats.ascii import EMULATOR_LINE, checked, unchecked
 from transmitter.rigs.formats.base import Cutter
 from transmitter.rigs.formats.cobs import (
     COMMAND,
@@ -26,6 +26,8 @@ from transmitter.rigs.formats.qsb import STAMP_US
 from transmitter.rigs.formats.samples import RawSample
 
 COMMAND_BYTES_MAX = 200
+DECLARED_EVERY = 50
+"""In lines of text, one in so many samples has the line before it that declares the emulator."""
 
 
 class DeviceCommand(NamedTuple):
@@ -109,8 +111,14 @@ class AsciiSpeech(Speech):
         super().__init__()
         self.streams = not polled
         self._form = form
+        self._said = 0
 
     def encode(self, sample: RawSample) -> bytes:
+        declared = EMULATOR_LINE + b"\n" if self._said % DECLARED_EVERY == 0 else b""
+        self._said += 1
+        return declared + self._sample_line(sample)
+
+    def _sample_line(self, sample: RawSample) -> bytes:
         cells = list(sample.counts)
         if self._form == "counts":
             return " ".join(map(str, cells)).encode() + b"\r\n"

@@ -90,12 +90,11 @@ def _missing(config: FlightConfig, signals: Signals, parts: Parts) -> Iterator[s
     ]
     if open_outputs:
         yield f"transmitter.soft_limits: none for {', '.join(open_outputs)}; beyond it the flight ends"
-    if not any(one.split(".")[:2] == ["limits", "command_max"] for one in config.given):
+    if "limits.command_max" not in config.given:
         limits = build_limits(config, signals).command_max
-        told = ", ".join(
-            f"{one.name} {most:g} {one.unit}" for one, most in zip(signals.inputs, limits, strict=True)
-        )
-        yield f"limits.command_max: {told} is from the preset, not from you"
+        pairs = zip(signals.inputs, limits, strict=True)
+        values = ", ".join(f"{one.name} {most:g} {one.unit}".rstrip() for one, most in pairs)
+        yield f"limits.command_max: the preset's own ({values}); state the limit of your motors"
     if config.receiver.controller == "recorded" or parts.controller is not None:
         yield "receiver.controller: it follows set-points of its own, so no limit makes them gentle"
         return

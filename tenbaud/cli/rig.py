@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as json_module
+import shlex
 import sys
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
@@ -14,6 +15,7 @@ from tenbaud.cli.spread import spread
 from tenbaud.flight.outcome import ExitCode
 
 if TYPE_CHECKING:
+    from tenbaud.config.schema import FlightConfig
     from transmitter.rigs.emulator.device import RigEmulator
 
 FormatOption = Annotated[str, typer.Option("--format", help="ascii, cobs, quarc or qsb.")]
@@ -66,8 +68,9 @@ def rig(
     """
     from tenbaud.build.emulator import build_emulator
 
+    config = body.load(rig=None if replay is None else f"replay:{replay}", log=log)
     emulator = build_emulator(
-        body.load(rig=None if replay is None else f"replay:{replay}", log=log),
+        config,
         form,  # type: ignore[arg-type]
         port,
         line_form=lines,
@@ -76,10 +79,12 @@ def rig(
         watchdog_s=watchdog,
         faults=tuple(fault or ()),
     )
-    _emulate(emulator, form, duration, json)
+    _emulate(emulator, form, duration, json, _flight_words(body, config))
 
 
-def _emulate(emulator: RigEmulator, form: str, duration_s: float | None, as_json: bool) -> None:
+def _emulate(
+    emulator: RigEmulator, form: str, duration_s: float | None, as_json: bool, flight: list[str]
+) -> None:
     import time
 
     from tenbaud.flight.stop import StopFlag
@@ -90,9 +95,8 @@ def _emulate(emulator: RigEmulator, form: str, duration_s: float | None, as_json
         # The first line, so that a script can read where the device is.
         sys.stdout.write(json_module.dumps({"port": address}) + "\n" if as_json else f"{address}\n")
         sys.stdout.flush()
-        typer.echo(
-            f"tenbaud rig: {form} at {address}; Ctrl-C ends it\n  {_hint(form, address)}", err=True
-        )
+        typer.echo(f"tenbaud rig: {form} at {address}; Ctrl-C ends it", err=True)
+        typer.echo(f"  {_hint(form, address, flight)}", err=True)
         until = None if duration_s is None else time.monotonic() + duration_s
         try:
             emulator.run(lambda: stop() or (until is not None and time.monotonic() > until))
@@ -105,13 +109,26 @@ def _emulate(emulator: RigEmulator, form: str, duration_s: float | None, as_json
         typer.echo(", ".join(f"{name} {value}" for name, value in figures.items()))
 
 
-def _hint(form: str, address: str) -> str:
+def _flight_words(body: options.PlantOptions, config: FlightConfig) -> list[str]:
+    """Return the options of a flight of this rig, safe ones as for a real rig."""
+    from tenbaud.build.first_contact import as_options, first_settings
+    from tenbaud.build.signals import configured_signals
+
+    words = ["--preset", body.preset] if body.preset else []
+    words += ["--config", str(body.config)] if body.config else []
+    for one in body.settings or ():
+        words += ["--set", one]
+    given = [shlex.join(words)] if words else []
+    return [*given, as_options(first_settings(config, configured_signals(config)))]
+
+
+def _hint(form: str, address: str, flight: list[str]) -> str:
     where = f"{form}:{address}"
     if form != "quarc" and not address.startswith("/"):
         where = f"{form}:socket://{address}" if ":" in address else where
     if form == "qsb":
         return f"look at it with: tenbaud rig-check --rig {where}"
-    return f"fly it with: tenbaud demo --clock real --rig {where}"
+    return " ".join([f"fly it with: tenbaud demo --clock real --rig {shlex.quote(where)}", *flight])
 
 
 def rig_check(

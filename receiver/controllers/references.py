@@ -137,8 +137,7 @@ class LimitedReference:
     KEPT = 4096
 
     def __init__(self, programme: Reference, start: float, largest: float, step: float) -> None:
-        self.by_hand: float | None = None
-        """in place of the programme, within the same limits"""
+        self._by_hand: float | None = None
         self.largest = largest
         self._programme, self._step = programme, step
         self._tick = -1
@@ -147,10 +146,14 @@ class LimitedReference:
     def value(self, tick: int) -> float:
         while self._tick < tick:
             self._tick += 1
-            by_hand = self.by_hand
+            by_hand = self._by_hand
             wanted = self._programme.value(self._tick) if by_hand is None else by_hand
             self._kept.append(limited(wanted, self._kept[-1], self.largest, self._step))
         return self._kept[max(tick - self._tick - 1, -len(self._kept))]
+
+    def steer(self, value: float | None) -> None:
+        """Take this in place of the programme, within the same limits; None: the programme again."""
+        self._by_hand = value
 
 
 class SteeredReference:
@@ -173,7 +176,7 @@ class SteeredReference:
         """Take the set-point by hand; None gives it back to the configured reference."""
         self.by_hand = value
         if isinstance(self._programme, LimitedReference):
-            self._programme.by_hand = value
+            self._programme.steer(value)
 
     def value(self, tick: int) -> float:
         if self.by_hand is None or isinstance(self._programme, LimitedReference):

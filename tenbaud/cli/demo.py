@@ -11,6 +11,7 @@ import typer
 
 from tenbaud.cli import options
 from tenbaud.cli.log_options import LogOptions
+from tenbaud.cli.motors import MotorOptions, confirm_motors
 from tenbaud.cli.spread import spread
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ VIEW_DURATION_S = 3600.0
 def demo(
     flight: options.FlightOptions,
     log: LogOptions,
-    risk: options.MotorOptions,
+    risk: MotorOptions,
     mismatch: options.Mismatches = None,
     view: options.View = False,
     view_port: options.ViewPort = 8710,
@@ -100,13 +101,12 @@ def _view_options(
 
 
 def _agree_all(
-    flight: options.FlightOptions, changes: list[dict[str, Any]], risk: options.MotorOptions
+    flight: options.FlightOptions, changes: list[dict[str, Any]], risk: MotorOptions
 ) -> list[Agreement]:
     """Return the flights, each checked as far as it can be before anything starts."""
     from tenbaud.build.ends import check_parts, check_rig, check_sabotage
     from tenbaud.build.flight import agree
     from tenbaud.build.recorded import flight_config, replay_notes
-    from tenbaud.cli.motors import confirm_motors
 
     configs = [
         flight_config(flight.preset, flight.config, change, allow_code=True) for change in changes

@@ -4,12 +4,29 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
     from tenbaud.config.schema import FlightConfig
+
+
+@dataclass(frozen=True, slots=True)
+class MotorOptions:
+    """Before the motors of a real rig turn."""
+
+    accept_risk: Annotated[
+        bool,
+        typer.Option(
+            "--accept-risk",
+            help="Real rig: fly without the soft, input and set-point limits of a first flight.",
+        ),
+    ] = False
+    yes: Annotated[bool, typer.Option("--yes", help="Real rig: do not ask before its motors turn.")] = (
+        False
+    )
 
 
 def confirm_motors(config: FlightConfig, yes: bool) -> None:

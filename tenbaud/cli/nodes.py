@@ -8,6 +8,7 @@ import typer
 
 from tenbaud.cli import options
 from tenbaud.cli.log_options import LogOptions
+from tenbaud.cli.motors import MotorOptions, confirm_motors
 from tenbaud.cli.spread import spread
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ def transmit(
     node: options.NodeOptions,
     addresses: options.Addresses,
     log: LogOptions,
-    risk: options.MotorOptions,
+    risk: MotorOptions,
     duration: options.Duration = None,
     seed: options.Seed = None,
     rig: options.Rig = None,
@@ -111,7 +112,7 @@ def _run(
     take_over: bool = False,
     pace: float | None = None,
     figure: bool = False,
-    risk: options.MotorOptions | None = None,
+    risk: MotorOptions | None = None,
 ) -> None:
     from contextlib import nullcontext
     from dataclasses import replace
@@ -120,7 +121,6 @@ def _run(
     from tenbaud.build.flight import agree
     from tenbaud.build.recorded import flight_config
     from tenbaud.cli.addresses import endpoints_of
-    from tenbaud.cli.motors import confirm_motors
     from tenbaud.config.load import dump_config
     from tenbaud.files.whole import write_whole
     from tenbaud.flight import ends

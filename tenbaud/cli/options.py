@@ -189,22 +189,6 @@ class Addresses:
 
 
 @dataclass(frozen=True, slots=True)
-class MotorOptions:
-    """Before the motors of a real rig turn."""
-
-    accept_risk: Annotated[
-        bool,
-        typer.Option(
-            "--accept-risk",
-            help="Real rig: fly without the soft, input and set-point limits of a first flight.",
-        ),
-    ] = False
-    yes: Annotated[bool, typer.Option("--yes", help="Real rig: do not ask before its motors turn.")] = (
-        False
-    )
-
-
-@dataclass(frozen=True, slots=True)
 class ManyOptions:
     """`--sessions` of `receive`, and its options."""
 

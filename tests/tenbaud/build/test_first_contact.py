@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import subprocess
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +22,8 @@ from tenbaud.cli import options
 from tenbaud.cli.app import run
 from tenbaud.config.load import ConfigError, dump_config, load_config
 from tenbaud.flight.outcome import ExitCode
-from transmitter.rigs.formats.samples import DeviceFlag, flags_of
 from tests.transmitter.rigs.emulated import emulated
+from transmitter.rigs.formats.samples import DeviceFlag, flags_of
 
 FIELDS = (
     "transmitter.soft_limits",
@@ -189,7 +190,7 @@ def test_a_set_point_moves_from_the_start_within_its_limits() -> None:
     assert values[99:1250] == pytest.approx([0.1] * 1151)
     assert values[1250] == pytest.approx(0.098), "the square wave turns round, slowly"
     assert values[1349:] == pytest.approx([-0.1] * 651)
-    steps = [abs(after - before) for before, after in zip(values, values[1:], strict=False)]
+    steps = [abs(after - before) for before, after in pairwise(values)]
     assert max(steps) < 0.00201
     assert reference.value(1300) == values[1300], "an earlier tick is still known"
 

@@ -23,11 +23,11 @@ from transmitter.rigs.formats.cobs import (
 )
 from transmitter.rigs.formats.doubles import doubles
 from transmitter.rigs.formats.qsb import STAMP_US
-from transmitter.rigs.formats.samples import RawSample
+from transmitter.rigs.formats.samples import DeviceFlag, RawSample
 
 COMMAND_BYTES_MAX = 200
 DECLARED_EVERY = 50
-"""In lines of text, one in so many samples has the line before it that declares the emulator."""
+"""In lines of text, one sample in this number follows the line that declares the emulator."""
 
 
 class DeviceCommand(NamedTuple):
@@ -114,9 +114,9 @@ class AsciiSpeech(Speech):
         self._said = 0
 
     def encode(self, sample: RawSample) -> bytes:
-        declared = EMULATOR_LINE + b"\n" if self._said % DECLARED_EVERY == 0 else b""
         self._said += 1
-        return declared + self._sample_line(sample)
+        declares = DeviceFlag.EMULATED in sample.flags and self._said % DECLARED_EVERY == 1
+        return (EMULATOR_LINE + b"\n" if declares else b"") + self._sample_line(sample)
 
     def _sample_line(self, sample: RawSample) -> bytes:
         cells = list(sample.counts)

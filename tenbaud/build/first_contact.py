@@ -107,7 +107,7 @@ def _missing(config: FlightConfig, signals: Signals, parts: Parts) -> Iterator[s
                 now = "none" if value == math.inf else f"{value:g} {output.unit}{what}"
                 yield (
                     f"limits.{field}: {now} for {output.name}; gentle is up to "
-                    f"{_rounded_down(gentle):g} {output.unit}{what}"
+                    f"{rounded_down(gentle):g} {output.unit}{what}"
                 )
 
 
@@ -133,12 +133,11 @@ def first_settings(
         for one, most in zip(signals.outputs, known, strict=True)
     ]
     gentle = [
-        _rounded_down(gentle_limit(one, most))
-        for one, most in zip(signals.outputs, limits, strict=True)
+        rounded_down(gentle_limit(one, most)) for one, most in zip(signals.outputs, limits, strict=True)
     ]
     inputs: Vector = build_limits(config, signals).command_max
     if "limits.command_max" not in config.given:
-        inputs = tuple([_rounded_down(one * FIRST_COMMAND_SHARE) for one in inputs])
+        inputs = tuple([rounded_down(one * FIRST_COMMAND_SHARE) for one in inputs])
     return {
         "transmitter.soft_limits": _shortest(limits),
         "limits.command_max": _shortest(inputs),
@@ -185,7 +184,7 @@ def _first_soft_limit(output: Signal, stops: tuple[float, float] | None = None) 
     return largest if stops is None else min(largest, 0.9 * min(abs(stops[0]), abs(stops[1])))
 
 
-def _rounded_down(value: float) -> float:
+def rounded_down(value: float) -> float:
     """Return a value to two digits, not above it."""
     unit = 10.0 ** (math.floor(math.log10(value)) - 1)
     return float(f"{math.floor(value / unit + 1e-9) * unit:.2g}")

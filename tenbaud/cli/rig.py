@@ -6,6 +6,7 @@ import json as json_module
 import shlex
 import sys
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -137,19 +138,34 @@ def rig_check(
     config: options.ConfigFile = None,
     seconds: Annotated[float, typer.Option(help="Seconds to read.", min=0.1, max=86_400.0)] = 10.0,
     settings: options.Settings = None,
+    write: Annotated[
+        Path | None, typer.Option(help="New file for the proposed settings of a first flight.")
+    ] = None,
     json: options.AsJson = False,
 ) -> None:
     """Read encoders and check the samples; motors stay disabled.
 
-    Turn each axis by hand while it runs: counts, angles, signs, rates and gaps are shown.
+    Turn each axis by hand to both of its ends while it runs: counts, angles, rates and gaps are shown,
+    and the limits of a first flight that follow from them.
 
     [dim]tenbaud rig-check --rig cobs:/dev/ttyACM0[/dim]
-    """
-    from tenbaud.checks.rigcheck import check_rig, show_check
-    from tenbaud.config.load import load_config
 
+    [dim]tenbaud rig-check --rig cobs:/dev/ttyACM0 --write rig.toml[/dim]
+    """
+    from tenbaud.build.recorded import flight_config
+    from tenbaud.checks.rigcheck import check_rig, show_check
+    from tenbaud.config.load import nested, toml_text
+    from tenbaud.files.whole import write_whole
+
+    if write is not None and write.exists():
+        raise typer.BadParameter(f"--write {write}: it exists already; name a new file")
     changed = options.overrides(rig=rig, settings=settings)
-    result = check_rig(load_config(preset, config, changed), seconds, live=not json)
+    result = check_rig(flight_config(preset, config, changed), seconds, live=not json)
+    if write is not None:
+        write_whole(write, toml_text(nested(result.proposal)))
+        typer.echo(
+            f"the proposed settings are in {write}: check them, then add --config {write}", err=True
+        )
     if json:
         options.print_json(asdict(result))
     else:

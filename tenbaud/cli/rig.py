@@ -1,4 +1,4 @@
-"""`tenbaud rig`: an emulated device. `rig-check` and `doctor`: look at the rig, and at the machine."""
+"""`tenbaud rig`: an emulated device. `rig-check` and `doctor`: check the rig, and the machine."""
 
 from __future__ import annotations
 
@@ -181,9 +181,9 @@ def doctor(
     allow_code: options.AllowCode = False,
     json: options.AsJson = False,
 ) -> None:
-    """Look at ports, permissions, clock, arithmetic and Zenoh; print a report to paste.
+    """Check ports, permissions, clock, arithmetic and Zenoh; print a report to paste.
 
-    Exit code 1 if something is a problem.
+    Exit code 1 if there is a problem.
 
     [dim]tenbaud doctor[/dim]
 

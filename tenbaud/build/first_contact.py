@@ -181,7 +181,9 @@ def _within(value: float, unit: str, word: str = "beyond") -> str:
 def _first_soft_limit(output: Signal, stops: tuple[float, float] | None = None) -> float:
     turn = turn_in(output.unit)
     largest = 1.0 if turn is None else turn * FIRST_SOFT_TURN
-    return largest if stops is None else min(largest, 0.9 * min(abs(stops[0]), abs(stops[1])))
+    if stops is None:
+        return largest
+    return min(largest, rounded_down(0.9 * min(abs(stops[0]), abs(stops[1]))))
 
 
 def rounded_down(value: float) -> float:

@@ -133,7 +133,9 @@ def check_rig(config: FlightConfig, seconds: float, live: bool) -> RigCheck:
         samples_per_s=samples / seconds,
         longest_gap_ms=watcher.longest_gap_ns / 1e6,
         device_clock_ppm=_clock_ppm(first, last),
-        flags=[str(flag.name).lower() for flag in DeviceFlag if flag & last.flags],
+        flags=[
+            str(flag.name).lower() for flag in (*DeviceFlag, DeviceFlag.EMULATED) if flag in last.flags
+        ],
         axes=watcher.axes,
         counts=figures,
     )

@@ -65,8 +65,8 @@ def require_safe(config: FlightConfig, accept_risk: bool = False, parts: Parts |
         + "\n  ".join(missing)
         + "\nTo begin with, after checking these values against the stand and its motors, add\n  "
         + as_options(values)
-        + "\n`tenbaud rig-check` proposes them from what it reads, motors disabled. Who flies without "
-        "types --accept-risk (in Python: accept_risk=True)"
+        + "\n`tenbaud rig-check` proposes them from what it reads, motors disabled. To fly without "
+        "these limits, add --accept-risk (in Python: accept_risk=True)"
     )
 
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 Host = Annotated[
     str | None,
     typer.Option(
-        help="Address of the page; one beyond this machine needs --insecure. Not given: 127.0.0.1, or "
+        help="Address of the page; others than loopback need --insecure. Not given: 127.0.0.1, or "
         "::1 where there is no IPv4."
     ),
 ]
@@ -58,7 +58,7 @@ def view(
 
     With RUN the same page replays finished flights: scrub, play at any speed, compare. Of a live
     flight two addresses are printed: one that can control the flight, if the flight allows it, and one
-    that is view-only. Each contains a secret; without a secret nothing of the page is served.
+    that is view-only. Each contains a secret; requests without it are refused.
 
     [dim]tenbaud demo --view[/dim]
 

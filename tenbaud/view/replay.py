@@ -50,7 +50,7 @@ def serve_recorded(
                 await browser.send_text(answer.decode())
         except (WebSocketDisconnect, RuntimeError):
             return
-        except (ValueError, TypeError, KeyError):
+        except (ValueError, TypeError):
             await browser.close(1003)  # no question of the page's script
 
     ready: list[Any] = []
@@ -101,10 +101,12 @@ def described(flights: list[RecordedFlight]) -> dict[str, Any]:
 def moments(flights: list[RecordedFlight], question: str) -> bytes:
     """Return the messages of all flights at the moment that a browser asks for.
 
-    `from_s` and `to_s` beside `at_s`: with the curves of this window. ValueError, TypeError or KeyError
-    for what is no question.
+    `from_s` and `to_s` beside `at_s`: with the curves of this window. ValueError or TypeError for what
+    is no question.
     """
     asked = orjson.loads(question)
+    if not isinstance(asked, dict):
+        raise ValueError("a question is an object")
     at_s, from_s, to_s = (asked.get(name) for name in ("at_s", "from_s", "to_s"))
     window = None if from_s is None else (float(from_s), float(to_s))
     return orjson.dumps({"runs": [flight.moment(float(at_s), window) for flight in flights]})

@@ -152,7 +152,7 @@ def test_ticks_without_estimates_are_shown_as_such(tmp_path: Path) -> None:
 
 def test_runs_of_unlike_outputs_and_too_many_runs_are_refused(lossy: Run, tmp_path: Path) -> None:
     other = flown(tmp_path / "furuta", "furuta-50baud", duration_s=1.0)
-    with pytest.raises(RunsDiffer, match="lossy has pitch, rad, .*furuta has arm, rad; pendulum, rad"):
+    with pytest.raises(RunsDiffer, match=r"lossy has pitch, rad, .*furuta has arm, rad; pendulum, rad"):
         recorded_flights([lossy, other])
     with pytest.raises(RunsDiffer, match="at most 4"):
         recorded_flights([lossy] * 5)

@@ -317,10 +317,31 @@ def test_a_plant_of_any_outputs_is_shown_with_its_names_and_units_and_the_gap_to
             assert [one.get_attribute("transform") for one in bodies] == [
                 f"rotate(-28.65 {centre})" for centre in turned
             ]
+        degrees = {"name": "tilt", "unit": "deg", "low": -45.0, "high": 45.0}
+        message["plant"] = {**message["plant"], "picture": "pendulum", "outputs": [degrees]}
+        message["points"] = [{**point, "time_s": message["time_s"], "measured": [30.0],
+                              "coded": [29.0], "range": [2.0]}]  # fmt: skip
+        port.publish(json.dumps(message).encode())
+        wait(page, "() => document.getElementById('value').textContent === '+30.0°'")
+        turned_by = page.locator("#pendulum .body").get_attribute("transform")
+        assert turned_by == "rotate(-30.00 160 132)", "an angle in degrees is turned once"
         check_pose(page, port, message)
         page.get_by_text("takes no commands").wait_for()
         page.close()
     port.close()
+
+
+@pytest.mark.parametrize(
+    ("unit", "high", "factor"),
+    [("rad", np.pi / 4.0, np.pi / 180.0), ("mrad", 250.0 * np.pi, np.pi / 0.18), ("deg", 45.0, 1.0)],
+)
+def test_a_set_point_slider_is_in_degrees_whatever_the_unit_of_the_angle(
+    unit: str, high: float, factor: float
+) -> None:
+    from tenbaud.view.page import slider_spread
+
+    spread, shown, found = slider_spread({"low": -high * 1.0001, "high": high * 1.0001, "unit": unit})
+    assert (spread, shown, found) == ((-45, 45, 5), "°", pytest.approx(factor))
 
 
 def check_pose(page: Any, port: Any, message: dict[str, Any]) -> None:

@@ -14,7 +14,7 @@ from nicegui import ui
 from channel.line.impairments import parse_impairments
 from tenbaud.view.board import Board
 from tenbaud.view.feed import Feed
-from tenbaud.view.server import STATIC
+from tenbaud.view.files import STATIC
 
 REFRESH_S = 0.25
 SET_POINT_STEP_DEG = 5
@@ -271,11 +271,10 @@ class _Line(_Panel):
         if under_way or text == self._reported:
             return
         self._reported = text
-        if text != self._sent:
-            up = parse_impairments(text).up
-            self.loss.show(round(100.0 * up.loss))
-            self.flips.show(round(100.0 * up.flip))
-            self.delay.show(round(up.delay_ns / 1e6))
+        up = parse_impairments(text).up
+        self.loss.show(round(100.0 * up.loss))
+        self.flips.show(round(100.0 * up.flip))
+        self.delay.show(round(up.delay_ns / 1e6))
 
 
 class _Break(_Panel):

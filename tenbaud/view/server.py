@@ -15,7 +15,6 @@ from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 from urllib.request import Request, urlopen
 
@@ -25,6 +24,7 @@ from tenbaud.view.access import COOKIE, Access, draw_access
 from tenbaud.view.board import Board
 from tenbaud.view.browser import open_privately
 from tenbaud.view.feed import Feed
+from tenbaud.view.files import STATIC
 
 STREAM_PERIOD_S = 0.05
 IDLE_PERIOD_S = 0.5
@@ -34,7 +34,6 @@ EVERYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}
 SERVING = "tenbaud view: "
 """begins the line with the address of the page"""
 LOOK_ONLY = "tenbaud view, to look only: "
-STATIC = Path(__file__).parent / "static"
 
 
 class PageUnavailable(TenbaudError):

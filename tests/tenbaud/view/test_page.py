@@ -201,15 +201,21 @@ def test_the_clock_stands_still_steps_and_goes_on(page: Any) -> None:
     wait(page, f"(old) => {NUMBER.format('f-time')} > old + 0.5", stood)
 
 
-def test_a_bad_wire_is_seen_and_repaired(page: Any) -> None:
+def test_a_bad_wire_is_seen_and_repaired_by_every_visitor(page: Any, flight: Served) -> None:
     erased = number(page, "#f-erasures")
+    other = page.context.new_page()
+    other.goto(flight.url)
+    other.get_by_role("slider", name="Bits lost").wait_for()
     slider = page.get_by_role("slider", name="Bits lost")
     slider.focus()
     for _ in range(10):
         page.keyboard.press("ArrowRight")
     wait(page, "() => document.getElementById('flight').textContent.includes('up:loss=0.5')")
     wait(page, f"(old) => {NUMBER.format('f-erasures')} > old + 2", erased)
+    value_is = "(value) => document.querySelector('[aria-label=\"Bits lost\"]').value === value"
+    wait(other, value_is, "50")
     page.get_by_role("button", name="Repair the line").click()
+    wait(other, value_is, "0")
     wait(page, "() => !document.getElementById('flight').textContent.includes('impaired')")
     wait(page, "() => document.querySelector('[aria-label=\"Bits lost\"]').value === '0'")
     assert slider.get_attribute("aria-valuetext") == "0 %"

@@ -7,6 +7,7 @@ alike, and the handshake compares their digest. The others concern one end, or h
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field, PrivateAttr, field_validator, model_validator
@@ -43,6 +44,8 @@ from tenbaud.config.section import (
     Section,
 )
 
+PerOutput: TypeAlias = Positive | tuple[Positive, ...] | dict[str, Positive] | None
+"""A number for all outputs, a list with one for each, or a table by name."""
 SHARED_SECTIONS = ("timing", "channel", "model", "coder", "limits")
 ADDED_FIELDS = {"start", "travel_stop_rad", "outputs", "floor_gain", "floor_exponent", "learns"}
 """Of models and coders that were flown before they had them."""
@@ -99,9 +102,10 @@ KINDS: dict[str, dict[str, type[KindSection]]] = {
 
 
 class Limits(Section):
-    """Limits of a command; the receiver applies them and the guard beside the motors checks them.
+    """Limits of commands and set-points; the receiver applies them.
 
-    Each field is a number for all inputs or a list with one for each, in the unit of the input.
+    The guard beside the motors checks those of commands: a number for all inputs or a list with one for
+    each, in the unit of the input.
     """
 
     command_max: Positive | tuple[Positive, ...] | None = None
@@ -110,6 +114,11 @@ class Limits(Section):
     """fastest change of an input"""
     initial_command: Command = 0.0
     """command until the first one from the receiver"""
+    set_point_max: PerOutput = None
+    """largest set-point of an output, either way: a number for all outputs, a list with one for each,
+    or a table by name; none: no limit"""
+    set_point_slew_per_s: PerOutput = None
+    """fastest change of a set-point, from the output at the model's start on; none: no limit"""
 
 
 class PlantSection(Section):
@@ -173,7 +182,7 @@ class TransmitterSection(Section):
     """time from the held command to the safe one"""
     safe_command: Command = 0.0
     """a number for all inputs, or a list with one for each"""
-    soft_limits: Positive | tuple[Positive, ...] | dict[str, Positive] | None = None
+    soft_limits: PerOutput = None
     """largest measured value before the guard ramps down: a number for all outputs, a list with one for
     each, or a table by name; none: no limit"""
     bridge: BridgeSection = BridgeSection()
@@ -284,6 +293,7 @@ class FlightConfig(CodePermission):
     link: LinkSection = LinkSection()
     telemetry: TelemetrySection = TelemetrySection()
     _notes: tuple[str, ...] = PrivateAttr(default=())
+    _given: frozenset[str] = PrivateAttr(default=frozenset())
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -295,6 +305,17 @@ class FlightConfig(CodePermission):
         noted = self.model_copy()
         noted._notes = notes
         return noted
+
+    @property
+    def given(self) -> frozenset[str]:
+        """Return the full names of the settings that a person gave; through text they are forgotten."""
+        return self._given
+
+    def giving(self, names: Iterable[str]) -> FlightConfig:
+        """Return the same configuration with the names of the settings that were given."""
+        marked = self.model_copy()
+        marked._given = frozenset(names)
+        return marked
 
     @property
     def plant_kind(self) -> str:
@@ -314,6 +335,9 @@ class FlightConfig(CodePermission):
             for field in added & fields.keys():
                 if getattr(section, field) == fields[field].default:
                     del shared[name][field]  # recordings from before it have the same digest
+        for field in ("set_point_max", "set_point_slew_per_s"):
+            if shared["limits"][field] is None:
+                del shared["limits"][field]  # likewise
         if self.flight_log.digest:
             shared["flight_log"] = {"digest": self.flight_log.digest}
         shared["coder"]["kind"] = DIGEST_KINDS.get(self.coder.kind, self.coder.kind)

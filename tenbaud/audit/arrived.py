@@ -1,4 +1,4 @@
-"""Symbols as they came: one a slot at most, not before they could be there, and those of the words."""
+"""Received symbols: at most one a slot, not before their possible arrival, and those of the words."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ from tenbaud.replay.replay import compare
 
 @dataclass(frozen=True, slots=True)
 class Counted:
-    """What was counted in the recordings, not what the ends said of themselves."""
+    """Counts from the recordings, not from the ends' own summaries."""
 
     symbols_sent: int | None
     symbols_refused: int | None
@@ -46,7 +46,7 @@ class Counted:
 
 
 def count(evidence: Evidence) -> Counted:
-    """Count what went over the line."""
+    """Count the traffic on the line."""
     sent = evidence.topic("transmitter", "symbol")
     arrived = evidence.topic("receiver", "symbol")
     paid = [row for row in sent if row.left_ns is not None] if sent.recorded else None
@@ -83,7 +83,7 @@ class Audit:
     counted: Counted
     leaks: list[str] = field(default_factory=list)
     gaps: list[str] = field(default_factory=list)
-    """what the recordings do not show"""
+    """unverified claims"""
     notes: list[str] = field(default_factory=list)
     digests_compared: int = 0
     jittered_states: int = 0
@@ -106,7 +106,7 @@ def audit(path: Path, other: Path | None = None, *, allow_code: bool = False) ->
 
 
 def audit_record(record: FlightRecord) -> Audit:
-    """Audit what was recorded of a flight."""
+    """Audit the recordings of a flight."""
     evidence = Evidence(record)
     _fly(evidence)
     for claim in CLAIMS:

@@ -1,4 +1,4 @@
-"""The ticks beside the plant: commands as the receiver gave them, volts as the guard let them pass."""
+"""The ticks at the plant: the receiver's commands, and the guard's voltages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Both recordings against the flight flown again: each row there, each field as the words give it."""
+"""Both recordings against the replayed flight: every row present, every field as computed."""
 
 from __future__ import annotations
 

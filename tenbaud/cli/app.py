@@ -37,7 +37,7 @@ def main() -> None:
 
 
 def run(arguments: list[str]) -> int:
-    """Run one command in this process, say what went wrong, and return its exit code."""
+    """Run one command in this process, print its error, and return its exit code."""
     from channel.errors import TenbaudError
     from tenbaud.cli.commands import app_for
     from tenbaud.flight.outcome import ExitCode, outcome_of

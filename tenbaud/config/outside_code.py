@@ -1,4 +1,4 @@
-"""Decides whether the classes from outside that a configuration names may be imported.
+"""Decides whether the external classes that a configuration names may be imported.
 
 A configuration is data, and often somebody else's: there is one in every run folder and in every file
 of symbols. Opening a recording must not run what it names. So a configuration may name what it likes,

@@ -26,7 +26,7 @@ LEAST = 1e-9
 REST_MAX = 1e-6
 """fastest change of a state at rest, and largest error of an output, per unit of size"""
 LATER_S = (0.37, 11.3)
-"""times at which an autonomous system does what it does at time 0"""
+"""times at which an autonomous system behaves as at time 0"""
 LABEL = re.compile(r"(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\)|,\s*(.*))?")
 NUMBERED = re.compile(r"[A-Za-z]+\[\d+\]")
 """A name that python-control gives to a signal without one."""
@@ -65,14 +65,14 @@ Point: TypeAlias = tuple[ArrayLike, ArrayLike]
 
 
 class Names(NamedTuple):
-    """What a system calls its signals; none where it does not name them."""
+    """The names of a system's signals; none if it has no names."""
 
     state: tuple[str, ...]
     input: tuple[str, ...]
     output: tuple[str, ...]
 
     def of(self, what: str, place: int) -> str:
-        """Return what a signal is called in an error."""
+        """Return the name of a signal in an error."""
         names: tuple[str, ...] = getattr(self, what)
         return f"{what} {names[place] if names else place + 1}"
 

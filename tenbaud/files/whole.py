@@ -1,4 +1,4 @@
-"""Writes every file of a command whole or not at all.
+"""Writes every file of a command completely or not at all.
 
 A file is written beside its place under a temporary name, flushed to the disk and renamed. A process
 that is stopped, killed or out of space leaves the old file or none, and never half of the new one.
@@ -34,7 +34,7 @@ _ADVICE = {
 
 
 class WriteError(TenbaudError):
-    """A file or folder could not be written; the text names it, the reason, and what to do."""
+    """A file or folder could not be written; the text names it, the reason and the remedy."""
 
 
 def write_error(path: Path | str, error: OSError) -> WriteError:

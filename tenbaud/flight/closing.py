@@ -1,4 +1,4 @@
-"""The end of a flight at a glance: verdict, warnings, a few figures, what to open and do next."""
+"""The closing lines of a flight: verdict, warnings, a few figures, files to open, next command."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def _verdict(summary: Summary, unicode: bool) -> str:
 
 
 def warnings_of(summary: Summary) -> list[str]:
-    """Return what a person should know before the figures, most serious first."""
+    """Return the warnings before the figures, most serious first."""
     get = summary.get
     counted = (
         (
@@ -99,7 +99,7 @@ def is_seen(error: float, deviation: float) -> bool:
 
 
 def learned_text(name: str, error: float, deviation: float) -> str:
-    """Return what was learned of a term: an error in per cent, a force as it is."""
+    """Return the learned value of a term: an error in per cent, a force as it is."""
     words = name.replace("_", " ")
     if name.endswith("_force"):
         return f"{words} {error:+.3f} (sd {deviation:.3f})"
@@ -159,7 +159,7 @@ def _link(summary: Summary) -> str:
 
 
 def _what_next(summary: Summary, folder: RunFolder) -> tuple[str, str]:
-    """Return what to open and the next command, as a label and its text."""
+    """Return the file to open and the next command, as a label and its text."""
     path = _shown(folder.path)
     drawn = folder.figure.is_file()
     label, place = ("Open", f"{path}/{folder.figure.name}") if drawn else ("Recorded in", path)

@@ -58,7 +58,7 @@ def describe_json(path: Path) -> list[dict[str, Any]]:
 
 
 def _headline(path: Path) -> str:
-    """Return what `summary.json` says in one line; empty without it."""
+    """Return `summary.json` in one line; empty without it."""
     summary = read_summary(RunFolder(path).summary)
     if not summary:
         return ""

@@ -1,4 +1,4 @@
-"""Reads a recording from its beginning to its end, and finds where to go on after what is damaged."""
+"""Reads a recording from beginning to end, and resynchronises after damaged parts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A recorded flight flown again from its symbols alone, and compared with what was recorded."""
+"""A recorded flight replayed from its symbols alone, and compared with the recording."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Replayed:
     digests_compared: int
     """samples of either end whose digest was compared"""
     differences: list[str]
-    """what differs, the first of each end and topic; empty: nothing"""
+    """differences, the first of each end and topic; empty: none"""
     packed: Packed
     erased: int
     epochs: int
@@ -40,7 +40,7 @@ class Replayed:
 
 
 def replay(record: FlightRecord) -> Replayed:
-    """Fly a recorded flight again from its symbols and compare."""
+    """Replay a recorded flight from its symbols and compare."""
     agreement = record.agreement
     _check_shape(record)
     epochs = epochs_of(record)
@@ -77,7 +77,7 @@ def replay_symbols(unpacked: Unpacked) -> tuple[int, str]:
 
 
 def compare(record: FlightRecord, flown: Sequence[Reflown]) -> tuple[list[str], int]:
-    """Return what differs from the recordings, and how many digests were compared."""
+    """Return the differences from the recordings, and the number of compared digests."""
     differences: list[str] = []
     compared = 0
     for end, rows in record.rows.items():

@@ -77,7 +77,7 @@ def flying_in_pool(tasks: list[ChunkTask], workers: int) -> Iterator[ChunkResult
 
 
 def _in_one_pool(left: dict[int, ChunkTask], workers: int) -> Iterator[ChunkResult]:
-    """Fly what is left, in the order of completion; BrokenProcessPool when a process vanished."""
+    """Fly the missing chunks, in the order of completion; BrokenProcessPool when a process died."""
     pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_end_with_parent)
     try:
         waiting = iter(list(left.values()))

@@ -181,9 +181,9 @@ def _notes(record: FlightRecord) -> list[str]:
     if "transmitter" not in record.tables:
         notes.append("only the receiver's recording is here: when each symbol left is not shown")
     if "receiver" not in record.tables:
-        notes.append("only the transmitter's recording is here: what arrived, and when, is not shown")
+        notes.append("only the transmitter's recording is here: arrivals and their times are unknown")
     if "transmitter" in record.rows and not record.summaries.get("transmitter"):
-        notes.append("there is no summary: how many symbols left in all is not shown")
+        notes.append("there is no summary: the total number of sent symbols is unknown")
     for end, tables in record.tables.items():
         notes += version_notes(tables.path, tables.metadata)
         if not tables.end:

@@ -107,7 +107,7 @@ def check_guard(evidence: Evidence) -> None:
             return
         if by_guard and not is_same(passed.volts, row.applied):
             detail = f"recorded {row.applied}, computed {passed.volts}"
-            place.leak("applied", "it is not what the guard lets pass", detail)
+            place.leak("applied", "it is not the guard's output", detail)
         if passed.changed and row.guard != "running":
             changes.append(now_ns)
         if passed.armed_again and not {now_ns, now_ns - tick_ns} & told:

@@ -106,7 +106,7 @@ def _method_fault(part: object, name: str, takes: Sequence[str]) -> str:
         return f"it has no method {name}{call}"
     method = getattr(part, name)
     if not callable(method):
-        return f"its {name} is no method; it must be one that takes {call}"
+        return f"its {name} is not a method; it must be one that takes {call}"
     try:
         signature = inspect.signature(method)
     except ValueError:  # a builtin whose signature is not known

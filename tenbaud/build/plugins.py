@@ -91,8 +91,8 @@ def _load_class(field: str, name: str) -> Any:
                 "installed."
             ) from error
         raise PartError(
-            f"{field} = {name!r}: there is no module {module_name}. It is looked for in the folder "
-            f"that this command was started in ({here}), in PYTHONPATH and among what is installed."
+            f"{field} = {name!r}: there is no module {module_name}. It is searched in the folder in "
+            f"which this command was started ({here}), in PYTHONPATH and among the installed packages."
         ) from error
     except Exception as error:  # the module is the user's code
         raise PartError(

@@ -31,7 +31,7 @@ def main() -> None:
     if error is not None:
         from tenbaud.flight.outcome import ExitCode
 
-        _say(f"standard output cannot be written: {_reason(error)}; what belongs there is lost")
+        _say(f"standard output cannot be written: {_reason(error)}; that output is lost")
         code = code or int(ExitCode.NOT_WRITTEN)
     leave(code)
 

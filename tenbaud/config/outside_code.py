@@ -71,7 +71,7 @@ def require_allowed(config: FlightConfig) -> None:
         return
     named = [f"{part.registry.field} = {part.name!r}: {_what_would_run(part)}" for part in parts]
     raise CodeNotAllowed(
-        "\n  ".join(["the configuration names code that is no part of tenbaud:", *named])
+        "\n  ".join(["the configuration names external code:", *named])
         + "\nNone of it was imported. Imported code can do whatever you can do on this machine. "
         f"If you trust it, add {ALLOW_OPTION} (in Python: config.allowing_code())."
     )

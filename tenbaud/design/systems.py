@@ -209,8 +209,9 @@ def _linearised(
     rest = here[:size] - x if discrete else here[:size]
     for place in np.flatnonzero(~(abs(rest) <= REST_MAX * (1.0 + abs(x))))[:1]:
         raise ConfigError(
-            f"the operating point is no rest: {names.of('state', place)} moves by {rest[place]:.6g} "
-            f"{'a step' if discrete else 'a second'} there; control.find_operating_point finds one"
+            f"the operating point is not an equilibrium: {names.of('state', place)} moves by "
+            f"{rest[place]:.6g} {'a step' if discrete else 'a second'} there; "
+            "control.find_operating_point finds one"
         )
     slopes = _slopes(both, x, u)
     A, B, C, D = slopes[:size, :size], slopes[:size, size:], slopes[size:, :size], slopes[size:, size:]

@@ -27,7 +27,7 @@ _ADVICE = {
     errno.EROFS: "The file system is read-only: choose another place",
     errno.EACCES: "Choose a place that this user may write to",
     errno.EPERM: "Choose a place that this user may write to",
-    errno.ENOTDIR: "A file stands where a folder should be: choose another place",
+    errno.ENOTDIR: "A file is in the place of the folder: choose another place",
     errno.ENAMETOOLONG: "Choose a shorter name",
     errno.ELOOP: "It is a symbolic link, and links are not followed: remove it or choose another place",
 }

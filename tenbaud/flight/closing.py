@@ -53,7 +53,7 @@ def warnings_of(summary: Summary) -> list[str]:
             "desyncs",
             "differences of the two codecs, resynchronised: {} (`tenbaud diff` names the field)",
         ),
-        ("out_of_bounds", "{} frames held values out of bounds and were dropped"),
+        ("out_of_bounds", "{} frames with values out of bounds were dropped"),
         ("malformed", "{} messages were no frames and were dropped"),
         ("recording_rows_lost", "the recording lost {} rows: the disk was too slow"),
     )

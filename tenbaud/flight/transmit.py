@@ -141,7 +141,7 @@ def _outcome(run: TransmitterRun, peer_present: bool) -> Outcome:
     node, session = run.node, run.node.session
     if session.refusal is not None:
         text = endings.refusal_text(session.refusal)
-        raise ConfigMismatch(f"the receiver refused to go on: {text}")
+        raise ConfigMismatch(f"the receiver refused to continue: {text}")
     if session.desync is not None and session.phase is Phase.ENDED:
         return Outcome(ExitCode.DESYNC, endings.desync_text(session.desync))
     if node.guard.reason is not None and node.guard.reason.cause is GuardCause.STOPPED:

@@ -48,9 +48,7 @@ def with_commands(record: Record) -> tuple[Record, tuple[str, ...]]:
     lines = [_motion(record, index) for index in range(record.outputs.shape[1])]
     lines += [_loop(record, index) for index in wanted]
     missing = (
-        "a set-point was logged, and not what the controller commanded"
-        if wanted
-        else "no input was logged"
+        "a set-point was logged, not the controller's command" if wanted else "no input was logged"
     )
     raise IdentificationError(
         "\n  ".join(

@@ -293,7 +293,7 @@ class _Reading:
                 clock.rows.start + row,
                 column,
                 f"'{values[row]:g}' is not a whole number within +-2^53, and the column is in counts; "
-                "--units says in what it is: rad or deg",
+                "give its unit with --units: rad or deg",
             )
 
     def _input(self, signal: Signal, column: int, clock: Clock) -> Array:

@@ -164,7 +164,7 @@ class Roles:
                 key = "angle" if not at else signal.name
                 raise LogError(
                     f"{self.path}: which column is the {signal.name}? Give --columns {key}=NAME; "
-                    f"present: {listed(names)}; `tenbaud log` shows what each looks like"
+                    f"present: {listed(names)}; `tenbaud log` describes each"
                 )
             taken.add(place)
             outputs.append((signal, place))

@@ -117,13 +117,13 @@ def recorded_signals(metadata: Mapping[str, str]) -> Signals:
     try:
         plant = _signals_adapter().validate_json(text)
     except ValueError as error:
-        raise RecordingError(f"The recording's description of the signals is none: {error}") from error
+        raise RecordingError(f"The recording's description of the signals is wrong: {error}") from error
     signals = (*plant.states, *plant.inputs, *plant.outputs)
     texts = [one.unit + one.group for one in signals]
     if len(signals) > SIGNALS_MAX or any(len(text) > UNIT_LENGTH_MAX for text in texts):
         raise RecordingError("The recording describes more signals, or longer units, than a plant has.")
     if not all(text.isprintable() for text in texts):
-        raise RecordingError("A unit or group in the recording's description is no plain text.")
+        raise RecordingError("A unit or group in the recording's description is not plain text.")
     return plant
 
 

@@ -310,7 +310,7 @@ def open_recording(path: Path) -> BinaryIO:
         if not stat.S_ISREG(os.fstat(handle).st_mode):
             os.close(handle)
             raise RecordingError(
-                f"The recording {path} cannot be read: it is no file. "
+                f"The recording {path} cannot be read: it is not a file. "
                 "Check the path; `runs/` holds one folder per run."
             )
         return open(handle, "rb")

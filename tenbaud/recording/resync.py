@@ -104,7 +104,7 @@ def blocks_of_file(stream: BinaryIO, size: int) -> Iterator[Block | Damage]:
             block, confirmed = read_record(stream, *head, kinds)
         except BROKEN as error:
             found = resync.after(at, certain)
-            yield Damage(at, found, str(error) or "a record is not what was written")
+            yield Damage(at, found, str(error) or "a record is corrupt")
             at = certain = found
             continue
         if block is not None:

@@ -95,8 +95,8 @@ def _check_shape(record: FlightRecord) -> None:
         if rows.misfits:
             first = rows.misfits[0]
             raise RecordingError(
-                f"The {end}'s recording holds what no node writes: topic {first.topic}, {first.row}, "
-                f"field {first.field}: {first.text}."
+                f"The {end}'s recording holds data that no node writes: topic {first.topic}, "
+                f"{first.row}, field {first.field}: {first.text}."
             )
 
 
@@ -147,7 +147,7 @@ def _compare_commands(rows: EndRows, flown: Sequence[Reflown]) -> list[str]:
                 first = first or f"tick {tick}: recorded {row.command}, computed {command}"
     if not unlike:
         return []
-    return [f"receiver: {unlike} commands differ from what the states give, first at {first}"]
+    return [f"receiver: {unlike} commands differ from those of the states, first at {first}"]
 
 
 def save_symbols(replayed: Replayed, path: Path) -> None:
@@ -168,14 +168,14 @@ def replay_text(replayed: Replayed) -> str:
         size += f" and {len(packed.erasures)} that mark {replayed.erased} erasures"
     lines = [
         f"{replayed.samples} samples, {replayed.bits_sent:g} bits: the whole flight is {size}",
-        f"beside it, known beforehand: {len(packed.head)} bytes of configuration, packed",
+        f"known in advance: {len(packed.head)} bytes of configuration, packed",
     ]
     if replayed.epochs > 1:
         lines.append(
             f"{replayed.epochs} epochs; rejoins sent {packed.start_bytes} bytes of states down the link"
         )
     if replayed.steps:
-        lines.append(f"the set-point was moved by hand; {len(replayed.steps)} steps were recorded")
+        lines.append(f"the set-point was changed manually; {len(replayed.steps)} steps were recorded")
     if replayed.equal:
         lines.append(
             f"flown again: all {replayed.digests_compared} digests of both recordings are equal, and "

@@ -149,13 +149,17 @@ def _bytes(count: int) -> str:
 
 def _link(summary: Summary) -> str:
     get = summary.get
-    parts = [f"{get('erasures') or 0} symbols lost", f"{get('symbols_late') or 0} late"]
+    parts = [_number(get("erasures"), "symbol") + " lost", f"{get('symbols_late') or 0} late"]
     if get("rejoins") is not None:
         cost = f" ({get('rejoin_bytes')} bytes)" if get("rejoins") and get("rejoin_bytes") else ""
-        parts.append(f"{get('rejoins')} resyncs{cost}")
+        parts.append(_number(get("rejoins"), "resync") + cost)
     if get("reconnects"):
-        parts.append(f"{get('reconnects')} reconnects")
+        parts.append(_number(get("reconnects"), "reconnect"))
     return ", ".join(parts)
+
+
+def _number(count: int | None, thing: str) -> str:
+    return f"{count or 0} {thing}{'' if count == 1 else 's'}"
 
 
 def _what_next(summary: Summary, folder: RunFolder) -> tuple[str, str]:

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tenbaud.flight.status import in_degrees
 from tenbaud.flight.summary import Summary
 from tenbaud.recording.folder import RunFolder
+from tenbaud.sentences.quantities import in_degrees
 
 LATE_SHARE_WORTH_A_WARNING = 0.01
 LABEL_WIDTH = 16

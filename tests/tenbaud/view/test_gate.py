@@ -48,7 +48,7 @@ def test_each_printed_address_opens_the_page_and_one_of_them_has_no_controls(pag
     whole = ask(page.port, path, Cookie=cookie).text
     look = ask(page.port, look_path, Cookie=look_cookie).text
     assert "view-only" in look
-    for part in ("Corrupt the sensor's codec", "Bits lost", '"type":"click"', '"type":"change"'):
+    for part in ("Corrupt the transmitter's codec", "Bits lost", '"type":"click"', '"type":"change"'):
         assert part in whole, part
         assert part not in look, part
     # The secret for looking opens nothing at the path of the one that steers.

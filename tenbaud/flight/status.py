@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any, Literal
 
@@ -26,11 +25,6 @@ def outputs_status(
         known = [each[place] if place < len(each) else None for each in (values, ranges, errors)]
         told.append({"name": one.words, "unit": one.unit, **dict(zip(names, known, strict=True))})
     return told
-
-
-def in_degrees(value: float, unit: str) -> tuple[float, str]:
-    """Return a value as a person reads it, and its unit: angles in degrees."""
-    return (math.degrees(value), "deg") if unit == "rad" else (value, unit)
 
 
 def status_line(status: Status) -> str:

@@ -34,13 +34,17 @@ from tenbaud.recording.folder import (
 )
 from tenbaud.recording.reader import Recording
 from tenbaud.recording.signals import Definition, Signal, Source, TimeBase, definitions
+from tenbaud.recording.steps import SETTLING_BAND
 from tenbaud.recording.table import Series, Table
 from tenbaud.sentences import events
 
 if TYPE_CHECKING:
+    import pandas
+    import xarray
     from matplotlib.figure import Figure
 
     from tenbaud.config.schema import FlightConfig
+    from tenbaud.recording.metrics import RunMetrics
 
 ENDS = ("transmitter", "receiver")
 
@@ -84,6 +88,11 @@ class Run:
             f"<Run {self.path}: {len(base.ticks)} ticks of {base.tick_s:g} s, "
             f"{' and '.join(self._files)}{'' if self.complete else ', cut'}>"
         )
+
+    def _repr_html_(self) -> str:
+        from tenbaud.recording.display import run_html
+
+        return run_html(self)
 
     # Signals
 
@@ -212,7 +221,37 @@ class Run:
             raise RecordingError(f"{self.folder.path} holds no {self.folder.config.name}.")
         return load_config(path=self.folder.config, recorded=True)
 
-    # Pictures
+    # Figures and pictures
+
+    def metrics(
+        self,
+        *,
+        from_s: float | None = None,
+        to_s: float | None = None,
+        settling_band: float = SETTLING_BAND,
+    ) -> RunMetrics:
+        """Return estimation errors, tracking error, step responses, bits and erasures.
+
+            run.metrics()["outputs"]["pitch"]["error_live_rms"]
+
+        Errors count from `from_s`, by default where the flight's own summary begins, to `to_s`.
+        `settling_band` is a fraction of each step.
+        """
+        from tenbaud.recording.metrics import metrics_of
+
+        return metrics_of(self, (from_s, to_s), settling_band)
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return a row per tick, by flight time, and a column per signal; units are in `attrs`."""
+        from tenbaud.recording.frames import data_frame
+
+        return data_frame(self)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Return the signals over `time_s`, each with unit and meaning; needs the extra `xarray`."""
+        from tenbaud.recording.frames import data_set
+
+        return data_set(self)
 
     def plot(self, output: str | Path | None = None) -> Figure:
         """Draw the flight as `flight.png` shows it; also into the file `output`, if given."""

@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-    from tenbaud.recording.run import Run
+    from tenbaud.recording.recorded import RecordedRun
 
 DASHES = ("-", "--")
 
 
 def draw_outputs(
-    runs: Sequence[tuple[str, Run]], outputs: Sequence[str], end_s: float, size: float = 1.0
+    runs: Sequence[tuple[str, RecordedRun]], outputs: Sequence[str], end_s: float, size: float = 1.0
 ) -> Figure:
     """Return a figure with a panel for each output and one for its live error, up to a flight time.
 
@@ -71,7 +71,9 @@ def _size(line: Line2D) -> float:
     return float(np.nanmax(np.abs(np.asarray(line.get_ydata())), initial=0.0))
 
 
-def _draw(panel: Axes, run: Run, name: str, unit: str, end_s: float, style: dict[str, object]) -> None:
+def _draw(
+    panel: Axes, run: RecordedRun, name: str, unit: str, end_s: float, style: dict[str, object]
+) -> None:
     """Draw a signal, if the run has it, angles in degrees."""
     signal = run.signal(name)
     if signal is not None:

@@ -13,13 +13,13 @@ from tenbaud.sentences.flown import figures_of, verdict_of, warnings_of
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from tenbaud.recording.run import Run
+    from tenbaud.recording.recorded import RecordedRun
 
 OUTPUTS_DRAWN = 3
 SIZE = 0.75
 
 
-def run_html(run: Run) -> str:
+def run_html(run: RecordedRun) -> str:
     """Return a run as HTML: the closing lines of its flight, and its outputs."""
     parts = [f"<div><strong>{escape(_verdict(run))}</strong><br><code>{escape(str(run.path))}</code>"]
     warnings = [*(warnings_of(run.summary) if run.summary else ()), *run.notes]
@@ -38,7 +38,7 @@ def run_html(run: Run) -> str:
     return "".join(parts) + "</div>"
 
 
-def _verdict(run: Run) -> str:
+def _verdict(run: RecordedRun) -> str:
     return verdict_of(run.summary) if run.summary else f"{run!r}, no summary"
 
 

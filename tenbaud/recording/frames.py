@@ -11,10 +11,10 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-    from tenbaud.recording.run import Run
+    from tenbaud.recording.recorded import RecordedRun
 
 
-def data_frame(run: Run) -> pandas.DataFrame:
+def data_frame(run: RecordedRun) -> pandas.DataFrame:
     """Return a row per tick and a column per signal; units and meanings are in `attrs`."""
     library = _library("pandas", "pandas")
     columns = {name: one.values for name, one in run.signals.items()}
@@ -27,7 +27,7 @@ def data_frame(run: Run) -> pandas.DataFrame:
     return frame
 
 
-def data_set(run: Run) -> xarray.Dataset:
+def data_set(run: RecordedRun) -> xarray.Dataset:
     """Return the signals over `time_s`, units and meanings in the attributes of each."""
     library = _library("xarray", "tenbaud[xarray]")
     variables = {

@@ -11,7 +11,7 @@ from tenbaud.recording.steps import Step, steps_of
 from tenbaud.recording.table import Series
 
 if TYPE_CHECKING:
-    from tenbaud.recording.run import Run
+    from tenbaud.recording.recorded import RecordedRun
 
 
 class OutputMetrics(TypedDict):
@@ -47,7 +47,7 @@ class RunMetrics(TypedDict):
     outputs: dict[str, OutputMetrics]
 
 
-def metrics_of(run: Run, span_s: tuple[float | None, float | None], band: float) -> RunMetrics:
+def metrics_of(run: RecordedRun, span_s: tuple[float | None, float | None], band: float) -> RunMetrics:
     """Return the figures of a run; `span_s` as for `Run.metrics`."""
     summary, times_s = run.summary, run.time_s
     start_s, end_s = span_s
@@ -73,7 +73,9 @@ def metrics_of(run: Run, span_s: tuple[float | None, float | None], band: float)
     }
 
 
-def _output(run: Run, place: int, inside: np.ndarray, so_far: np.ndarray, band: float) -> OutputMetrics:
+def _output(
+    run: RecordedRun, place: int, inside: np.ndarray, so_far: np.ndarray, band: float
+) -> OutputMetrics:
     def found(what: str) -> Series | None:
         signal = run.signal(output_name(run.plant, what, place))
         return None if signal is None else signal.values

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tenbaud.files.whole import make_folder
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.metrics import OutputMetrics, RunMetrics
 from tenbaud.recording.run import Run
@@ -74,6 +75,7 @@ class SideBySide:
         labelled = [(f"{letter}: {about.partition(',')[0]}", run) for letter, run, about in pairs]
         figure = draw_outputs(labelled, self.outputs, self.metrics[0]["to_s"])
         if output is not None:
+            make_folder(Path(output).parent)
             save(figure, [Path(output)])
         return figure
 
@@ -182,7 +184,7 @@ def _common_span(runs: Sequence[Run]) -> tuple[tuple[float, float], list[str]]:
 
 
 def _of_each(runs: Sequence[Run]) -> list[str]:
-    """Return what should be known before the figures of each run are believed."""
+    """Return what to know about each run before reading its figures."""
     found = []
     for label, run in zip(ascii_uppercase, runs, strict=False):
         if run.summary.get("exit_code"):

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 RUNS_MAX = 12
-"""More curves in one panel cannot be told apart."""
+"""More curves in one panel are not legible."""
 REFERENCE_POINTS, REFERENCE_SHARE = 500, 0.05
-"""Set-points differ if they do at more than this share of so many moments."""
+"""Set-points differ if they do at more than this share of the moments that are looked at."""
 GAP = 2
 """Spaces between columns."""
 NOTHING = "-"

@@ -11,8 +11,9 @@ from typing import Any
 import orjson
 
 from tenbaud.view.access import draw_access
+from tenbaud.view.browser import STATIC
 from tenbaud.view.recorded import HIDDEN, RecordedFlight
-from tenbaud.view.server import STATIC, Address, require_nicegui, run_page
+from tenbaud.view.server import Address, require_nicegui, run_page
 
 HEAD = """<!doctype html><html lang="en"><head><meta charset="utf-8"><title>tenbaud</title>
 <meta name="viewport" content="width=device-width, initial-scale=1">

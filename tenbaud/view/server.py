@@ -15,7 +15,6 @@ from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 from urllib.request import Request, urlopen
 
@@ -23,7 +22,7 @@ from channel.errors import TenbaudError
 from channel.links.endpoints import is_loopback
 from tenbaud.view.access import COOKIE, Access, draw_access
 from tenbaud.view.board import Board
-from tenbaud.view.browser import open_privately
+from tenbaud.view.browser import STATIC, open_privately
 from tenbaud.view.feed import Feed
 
 STREAM_PERIOD_S = 0.05
@@ -34,7 +33,6 @@ EVERYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}
 SERVING = "tenbaud view: "
 """begins the line with the address of the page"""
 LOOK_ONLY = "tenbaud view, to look only: "
-STATIC = Path(__file__).parent / "static"
 
 
 class PageUnavailable(TenbaudError):

@@ -44,7 +44,7 @@ def warnings_of(summary: Summary) -> list[str]:
             "desyncs",
             "differences of the two codecs, resynchronised: {} (`tenbaud diff` names the field)",
         ),
-        ("out_of_bounds", "{} frames held values out of bounds and were dropped"),
+        ("out_of_bounds", "{} frames with values out of bounds were dropped"),
         ("malformed", "{} messages were no frames and were dropped"),
         ("recording_rows_lost", "the recording lost {} rows: the disk was too slow"),
     )
@@ -99,7 +99,7 @@ def is_seen(error: float, deviation: float) -> bool:
 
 
 def learned_text(name: str, error: float, deviation: float) -> str:
-    """Return what was learned of a term: an error in per cent, a force as it is."""
+    """Return the learned value of a term: an error in per cent, a force as it is."""
     words = name.replace("_", " ")
     if name.endswith("_force"):
         return f"{words} {error:+.3f} (sd {deviation:.3f})"

@@ -148,7 +148,7 @@ class DeviceRig(Rig):
         if not self.settings.output:
             return
         if not all(math.isfinite(value) for value in volts):
-            self._fail(f"the voltages of tick {tick} are no numbers: {volts}")
+            self._fail(f"the voltages of tick {tick} are not numbers: {volts}")
         if self.hard_fault is not None:
             self._send(self.motors.off(), False)
             return

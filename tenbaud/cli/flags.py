@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from functools import partial
 from typing import Any
 
 from typer.core import TyperCommand, TyperGroup
@@ -40,7 +41,9 @@ def _without_table(command: Command | Group, formatter: Any) -> None:
         return
     from rich.text import Text
 
-    formatter.width = columns
+    formatter.width = columns - 1
+    # A longer name of an option has its text below it, not in a column that is left.
+    formatter.write_dl = partial(formatter.write_dl, col_max=columns // 3)
     command.rich_markup_mode = None
     command.help = Text.from_markup(command.help or "").plain
 

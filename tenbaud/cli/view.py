@@ -26,7 +26,7 @@ def view(
     runs: Annotated[
         list[Path] | None,
         typer.Argument(
-            metavar="[RUN]...",
+            metavar="RUN",
             help="Folders of finished runs, up to four of the same outputs, or recordings: the page "
             "replays them, laid over each other. Not given: a live flight.",
         ),

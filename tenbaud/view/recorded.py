@@ -21,7 +21,7 @@ from tenbaud.recording.run import Run
 from tenbaud.recording.signals import Source
 from tenbaud.recording.table import Series, Table
 from tenbaud.telemetry.schema import named_signal
-from tenbaud.view.board import EVENTS_KEPT, SAMPLES_KEPT
+from tenbaud.view.board import EVENTS_KEPT, OF_TRANSMITTER, SAMPLES_KEPT, is_shown
 from tenbaud.view.samples import SAMPLE_FIELDS, RecordedSamples
 
 RUNS_MAX = 4
@@ -29,8 +29,6 @@ RUNS_MAX = 4
 POINTS = 1000
 """Of each curve; a window of fewer ticks is not thinned."""
 LATENESS_TICKS = 1000
-HIDDEN = ("erased", "late_symbol")
-"""Events that the tape shows."""
 PHASES = {"started": "flying", "rejoin": "flying", "rejoin_asked": "rejoining", "ended": "ended"}
 COLUMNS: dict[str, dict[str, Sequence[str]]] = {
     "transmitter": {
@@ -109,6 +107,14 @@ class RecordedFlight:
         missing = [what for what, there in absent.items() if not there]
         return [*self.run.notes, *(f"{self.name} is without {what}" for what in missing)]
 
+    def _lists(self, event: dict[str, Any]) -> bool:
+        return is_shown(event) or (not self._has["transmitter"] and event["kind"] in OF_TRANSMITTER)
+
+    @property
+    def events_s(self) -> set[float]:
+        """The times of the events that the page lists."""
+        return {max(0.0, one["time_s"]) for one in self.events if self._lists(one)}
+
     def _columns(self, found: Sequence[Series | None]) -> Series:
         nothing = np.full(len(self.base.ticks), np.nan)
         columns = [nothing if one is None else one for one in found]
@@ -121,7 +127,6 @@ class RecordedFlight:
         (point,), (decision,) = self._points([tick]), self._decisions([tick])
         sample = math.floor(at_s / self.sample_s + 1e-9) - 1
         after = int(np.searchsorted(self._events_s, at_s + 1e-9, side="right"))
-        shown = [one for one in self.events[:after] if one["kind"] not in HIDDEN]
         message = {
             "reset": True,
             "at_s": at_s,
@@ -129,7 +134,7 @@ class RecordedFlight:
             "decision": decision,
             "heads": self._heads(at_s, tick, sample, self.events[:after]),
             "samples": self.samples.last(sample, SAMPLES_KEPT),
-            "events": shown[-EVENTS_KEPT:],
+            "events": [one for one in self.events[:after] if self._lists(one)][-EVENTS_KEPT:],
         }
         if window is not None:
             first, last = (self._index(end) for end in window)

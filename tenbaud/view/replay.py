@@ -12,7 +12,7 @@ import orjson
 
 from tenbaud.view.access import draw_access
 from tenbaud.view.browser import STATIC
-from tenbaud.view.recorded import HIDDEN, RecordedFlight
+from tenbaud.view.recorded import RecordedFlight
 from tenbaud.view.server import Address, require_nicegui, run_page
 
 HEAD = """<!doctype html><html lang="en"><head><meta charset="utf-8"><title>tenbaud</title>
@@ -51,7 +51,7 @@ def serve_recorded(
                 await browser.send_text(answer.decode())
         except (WebSocketDisconnect, RuntimeError):
             return
-        except (ValueError, TypeError, KeyError):
+        except (ValueError, TypeError):
             await browser.close(1003)  # no question of the page's script
 
     ready: list[Any] = []
@@ -84,28 +84,24 @@ def _starting(ready: list[Any]) -> Any:
 
 def described(flights: list[RecordedFlight]) -> dict[str, Any]:
     """Return what a browser needs to know once."""
-    shown = {
-        one["time_s"]
-        for flight in flights
-        for one in flight.events
-        if one["kind"] not in HIDDEN and one.get("state") != "holding"
-    }
     return {
         "flights": [{"name": flight.name, "missing": flight.missing} for flight in flights],
         "duration_s": max(flight.duration_s for flight in flights),
         "step_s": min(flight.sample_s for flight in flights),
         "notes": [note for flight in flights for note in flight.notes],
-        "events_s": sorted(max(0.0, time_s) for time_s in shown),
+        "events_s": sorted(set().union(*(flight.events_s for flight in flights))),
     }
 
 
 def moments(flights: list[RecordedFlight], question: str) -> bytes:
     """Return the messages of all flights at the moment that a browser asks for.
 
-    `from_s` and `to_s` beside `at_s`: with the curves of this window. ValueError, TypeError or KeyError
-    for what is no question.
+    `from_s` and `to_s` beside `at_s`: with the curves of this window. ValueError or TypeError for what
+    is no question.
     """
-    asked = orjson.loads(question)
-    at_s, from_s, to_s = (asked.get(name) for name in ("at_s", "from_s", "to_s"))
-    window = None if from_s is None else (float(from_s), float(to_s))
+    asked: dict[str, Any] = orjson.loads(question)
+    if not isinstance(asked, dict):
+        raise ValueError("a question is an object")
+    at_s: Any = asked.get("at_s")
+    window = None if "from_s" not in asked else (float(asked["from_s"]), float(asked.get("to_s", "")))
     return orjson.dumps({"runs": [flight.moment(float(at_s), window) for flight in flights]})

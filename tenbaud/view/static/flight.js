@@ -57,9 +57,6 @@ export class Flight {
     if (role === "transmitter" && kind === "rejoin" && this.broken) {
       this.repaired = `broken after sample ${this.broken.sample}, at ${this.broken.time_s.toFixed(1)} s; equal again from sample ${event.sample}`;
     }
-    // Left out: what the tape shows, what passes by itself, and what the other end has reported already.
-    if (kind === "erased" || kind === "late_symbol" || event.state === "holding") return;
-    if (role === "receiver" && ["desync", "rejoin", "ended"].includes(kind)) return;
     if (this.events[0] && same(this.events[0], event)) return;
     this.events.unshift(event);
     this.events.length = Math.min(this.events.length, EVENTS_KEPT);

@@ -151,8 +151,8 @@ export function replay(news) {
 
   const KEYS = { ArrowLeft: () => step(-1), ArrowDown: () => step(-1), ArrowRight: () => step(1), ArrowUp: () => step(1), Home: () => jump(0), End: () => jump(known.duration_s), PageUp: () => jump(timeS + PAGE_S), PageDown: () => jump(timeS - PAGE_S), " ": toggle };
   addEventListener("keydown", (key) => {
-    const { target } = key, own = target === cursor || target === document.body || target === play;
-    if (!own || key.ctrlKey || key.altKey || key.metaKey || !KEYS[key.key]) return;
+    const { target } = key, pressed = target.matches("button") && target !== play && key.key === " ";
+    if (pressed || target.matches("select, input:not(#cursor), ol") || key.ctrlKey || key.altKey || key.metaKey || !KEYS[key.key]) return;
     key.preventDefault();
     KEYS[key.key]();
   });

@@ -118,13 +118,13 @@ export function showText(flights, banner, jump) {
 }
 
 function showBanner({ text, state: name }) {
-  const banner = document.getElementById("banner");
-  if (banner.dataset.text !== text) {
-    banner.dataset.text = text;
-    // Commands stand between backquotes.
-    banner.replaceChildren(...text.split("`").map((part, place) => (place % 2 ? make("code", "", part) : part)));
+  const banner = document.getElementById("banner"), parts = [text].flat(), key = parts.join("");
+  if (banner.dataset.text !== key) {
+    banner.dataset.text = key;
+    // Every second part is a command.
+    banner.replaceChildren(...parts.map((part, place) => (place % 2 ? make("code", "", part) : part)));
   }
-  banner.hidden = !text;
+  banner.hidden = !key;
   document.body.classList.toggle("silent", name === "No data");
 }
 
@@ -134,7 +134,7 @@ export function liveBanner(flight, connected) {
   if (!connected && ever && ended) return { text: "The flight is over, and the page's server has stopped.", state: "The server has stopped" };
   if (!connected && ever) return { text: "The page's server does not answer. Retrying every second. If it was restarted, open the address that it printed.", state: "No data" };
   if (!connected) return { text: "Connecting to the page's server.", state: "" };
-  if (!ever) return { text: "No flight found. Start one with `tenbaud demo --view`, or with `tenbaud receive` and `tenbaud transmit`.", state: "No flight found" };
+  if (!ever) return { text: ["No flight found. Start one with ", "tenbaud demo --view", ", or with ", "tenbaud receive", " and ", "tenbaud transmit", ", or give ", "tenbaud view", " the folder of a run."], state: "No flight found" };
   if (ended) return { text: "The flight is over. The page shows its last state.", state: "" };
   if (isSilent(flight)) return { text: `No data for ${((performance.now() - flight.heardAt) / 1000).toFixed(0)} s: the page shows old values.`, state: "No data" };
   return { text: "", state: "" };

@@ -286,7 +286,6 @@ class ReceiverSession:
         for slot in self._clock.take(symbol.slot):
             frames += self._settle(slot, None, now_ns)
         self._clock.anchor(self._schedule.take(symbol.slot, now_ns, anew=anew))
-        self.meter.on_symbol(now_ns)
         write_symbol(self._recorder, self.terms, symbol, now_ns, taken=True)
         value = self.codec.coder.alphabet.symbols[symbol.number]
         return frames + self._settle(symbol.slot, value, now_ns)
@@ -335,6 +334,7 @@ class ReceiverSession:
 
     def _settle(self, slot: int, symbol: int | None, now_ns: int) -> list[Frame]:
         """Decide what this slot's symbol was; at the end of a word, fly its sample."""
+        self.meter.on_slot(now_ns, came=symbol is not None)
         if symbol is None:
             self.counts["erasures"] += 1
             self._emit(Event(EventKind.ERASED, slot=slot))

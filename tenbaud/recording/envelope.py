@@ -128,13 +128,19 @@ def stretches(times: Series, count: int) -> NDArray[np.intp]:
 
 
 def thin(times: Series, values: Series, points: int) -> tuple[Series, Series]:
-    """Thin a curve to some `points` points, keeping the lowest and highest of every stretch of time.
+    """Thin a curve to its `extremes`."""
+    if len(values) <= points:
+        return times, values
+    chosen = extremes(times, values, points)
+    return times[chosen], values[chosen]
+
+
+def extremes(times: Series, values: Series, points: int) -> NDArray[np.intp]:
+    """Return the places of some `points` points: the lowest and highest of every stretch of time.
 
     A stretch with a NaN keeps one, so that the curve stays interrupted there; such a stretch may have
     three points.
     """
-    if len(values) <= points:
-        return times, values
     starts = stretches(times, points // 2)
     lengths = np.diff(np.append(starts, len(values)))
     kept = [
@@ -142,8 +148,7 @@ def thin(times: Series, values: Series, points: int) -> tuple[Series, Series]:
         for extreme in (np.fmin.reduceat(values, starts), np.fmax.reduceat(values, starts))
     ]
     kept.append(_first_of(np.isnan(values), starts, lengths))
-    chosen = np.unique(np.concatenate(kept))
-    return times[chosen], values[chosen]
+    return np.unique(np.concatenate(kept))
 
 
 def _first_of(

@@ -27,7 +27,7 @@ from tenbaud.recording.notes import recording_notes
 from tenbaud.recording.old_rows import of_today
 from tenbaud.recording.resync import blocks_of_file
 from tenbaud.recording.rows import Row, RowDecoder, channel_of_names, check_channel
-from tenbaud.recording.table import Table
+from tenbaud.recording.table import Filling, Table
 
 METADATA_RECORDS_MAX = 100
 
@@ -239,6 +239,20 @@ class Recording:
                 + ("" if self.complete else " It was cut or damaged before one.")
             )
         return self.topics[name]
+
+    def read(self, wanted: Mapping[str, Sequence[str]]) -> None:
+        """Read columns of several topics in one pass over the file: those that are there."""
+        names = {
+            topic: [name for name in columns if name in self.topics[topic].names]
+            for topic, columns in wanted.items()
+            if topic in self.topics
+        }
+        found = {topic: Filling(self.topics[topic], columns) for topic, columns in names.items()}
+        for block in rows_in_blocks(MessageStream(self.path, size=self._survey.size), names):
+            for topic, (times_ns, rows) in block.items():
+                found[topic].add(times_ns, rows)
+        for filling in found.values():
+            filling.finish()
 
     def rows(self, topic: str) -> Iterator[tuple[int, Row]]:
         """Stream (flight time in ns, row) of one topic; nothing if the topic is absent."""

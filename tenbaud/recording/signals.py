@@ -252,7 +252,9 @@ def definitions(plant: Signals) -> dict[str, Definition]:
 
     for what, meaning, make in _OF_OUTPUT:
         for place, one in enumerate(plant.outputs):
-            name = output_name(plant, what, place)
+            name = one.name
+            if what:
+                name = what if len(plant.outputs) == 1 else f"{what}_{one.name}"
             add(name, one.unit, meaning.format(one.words), _made(make, place, plant.row(place)))
     only = f"{plant.outputs[0].name}_" if len(plant.outputs) == 1 else ""
     for state, one in enumerate(plant.states):
@@ -282,8 +284,6 @@ def _made(make: _OfOutput, place: int, row: Row) -> Maker:
 
 
 def output_name(plant: Signals, what: str, place: int) -> str:
-    """Return the name of what belongs to an output; `what` empty: of the output itself."""
-    name = plant.outputs[place].name
-    if not what or len(plant.outputs) == 1:
-        return what or name
-    return f"{what}_{name}"
+    """Return the signal that is `what` of an output; `what` empty: the output itself."""
+    row = [one for one, _, _ in _OF_OUTPUT].index(what)
+    return list(definitions(plant))[row * len(plant.outputs) + place]

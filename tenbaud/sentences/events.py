@@ -11,6 +11,7 @@ from typing import Any
 
 from channel.protocol.endings import Ending
 from tenbaud.sentences import endings
+from tenbaud.sentences.quantities import amount
 from transmitter.guard import GuardReason
 
 Fields = Mapping[str, Any]
@@ -123,9 +124,10 @@ def _guard_cause(one: Fields) -> str:
         case "sensor":
             return f"tick {tick}: {one['detail']}"
         case "angle_limit":
+            name, _, unit = str(one["detail"] or f"axis {axis}, rad").partition(", ")
             return (
-                f"{one['detail'] or f'axis {axis}, rad'}: {value:.3f} at tick {tick} is beyond the "
-                f"soft limit of {limit:g}"
+                f"{name}: {amount(value, unit)} at tick {tick} is beyond the soft limit of "
+                f"{amount(limit, unit)}"
             )
         case "no_angle":
             return f"{one['detail'] or f'axis {axis}'} has no valid reading at tick {tick}"
@@ -164,11 +166,10 @@ def _rate(one: Fields) -> str:
 def _control(one: Fields) -> str:
     tick = one["tick"]
     before = f"tick {tick}" if tick is not None else f"sample {one['sample']}"
+    # In a recording without the unit it is an angle.
+    unit = "rad" if one["detail"] is None else str(one["detail"])
     texts: dict[str, Callable[[], str]] = {
-        # In a recording without the unit it is an angle.
-        "set_point": lambda: " ".join(
-            ("set-point", repr(one["value"]), "rad" if one["detail"] is None else one["detail"])
-        ).rstrip(),
+        "set_point": lambda: f"set-point {amount(one['value'], unit)}",
         "follow": lambda: "follow the reference",
         "pause": lambda: f"pause before tick {one['number']}",
         "go_on": lambda: "continue",

@@ -73,12 +73,9 @@ class SerialLine(_Handled):
         self._line_baud = line_baud
 
     def plug(self) -> None:
-        import serial
+        from channel.links.serial.port import open_port
 
-        try:
-            self._port = serial.Serial(self.address, self._line_baud, timeout=0, exclusive=True)
-        except (serial.SerialException, OSError) as error:
-            raise RigError(f"{self.address} cannot be opened: {error}") from error
+        self._port = open_port(self.address, self._line_baud, 0.0)
         self.handle = self._port.fileno()
         os.set_blocking(self.handle, False)
 

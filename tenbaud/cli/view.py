@@ -10,6 +10,7 @@ import typer
 from tenbaud.cli import options
 
 if TYPE_CHECKING:
+    from tenbaud.view.feed import Feed
     from tenbaud.view.server import Address
 
 Host = Annotated[
@@ -73,7 +74,7 @@ def view(
 
         options.print_json(schema_json())
         return
-    from channel.links.endpoints import check_endpoints, loopback_host
+    from channel.links.endpoints import loopback_host
     from tenbaud.view.server import Address, free_port
 
     # As in a URL, or bare.
@@ -86,9 +87,16 @@ def view(
             )
         _replay(runs, address, open_browser)
         return
+    feed = _feed(tuple(connect or ()), session, keys)
+    from tenbaud.view.server import serve
+
+    serve(feed, address, open_browser=open_browser, view_only=view_only)
+
+
+def _feed(connect: tuple[str, ...], session: str, keys: Path | None) -> Feed:
+    from channel.links.endpoints import check_endpoints
     from channel.links.zenoh.hub import is_session_pattern
     from tenbaud.view.feed import Feed
-    from tenbaud.view.server import serve
 
     if not is_session_pattern(session):
         raise typer.BadParameter(
@@ -99,10 +107,9 @@ def view(
         from tenbaud.cli.addresses import credentials_of
 
         credentials = credentials_of(keys, "viewer")
-    protected = tuple(one for one in connect or () if not one.startswith("unixsock"))
+    protected = tuple(one for one in connect if not one.startswith("unixsock"))
     check_endpoints(protected, insecure=True, secured=credentials is not None)
-    feed = Feed(tuple(connect or ()), session, credentials)
-    serve(feed, address, open_browser=open_browser, view_only=view_only)
+    return Feed(connect, session, credentials)
 
 
 def _replay(runs: list[Path], address: Address, open_browser: bool) -> None:

@@ -19,7 +19,7 @@ def outputs_status(
     ranges: Sequence[float],
     errors: Sequence[float | None] = (),
 ) -> list[Status]:
-    """Return what a status says of each output; None for what is not known."""
+    """Return the values of each output in a status; None if unknown."""
     names = ("value", "range", "error")
     told = []
     for place, one in enumerate(plant.outputs):

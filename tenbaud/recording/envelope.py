@@ -1,4 +1,4 @@
-"""Curves of any length in bounded memory, thinned while they come to what a picture can show.
+"""Curves of any length in bounded memory, thinned to the resolution of a picture.
 
 Time is divided into stretches of one width, which doubles as the curve grows. Of every stretch the
 lowest and the highest point are kept, and one gap if there is one. The extremes of extremes are
@@ -100,7 +100,7 @@ class Means:
             return self._times, self._sums / self._counts
 
     def restore(self, times: Series, means: Series, thinned: bool) -> None:
-        """Take over what `curve` of another one gave."""
+        """Load the result of another one's `curve`."""
         self.add(times, means)
         self.thinned = thinned
 

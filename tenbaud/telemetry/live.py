@@ -1,4 +1,4 @@
-"""Commands from outside, applied by the loop between two ticks or two messages, and written down.
+"""Commands of viewers, applied by the loop between two ticks or two messages, and recorded.
 
 The recording of a steered flight holds every command as an event, with the sample before which it
 took hold. Which of them were obeyed where:

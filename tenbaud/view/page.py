@@ -13,8 +13,8 @@ from nicegui import ui
 
 from channel.line.impairments import parse_impairments
 from tenbaud.view.board import Board
+from tenbaud.view.browser import STATIC
 from tenbaud.view.feed import Feed
-from tenbaud.view.files import STATIC
 
 REFRESH_S = 0.25
 SET_POINT_STEP_DEG = 5

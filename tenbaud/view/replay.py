@@ -11,7 +11,7 @@ from typing import Any
 import orjson
 
 from tenbaud.view.access import draw_access
-from tenbaud.view.files import STATIC
+from tenbaud.view.browser import STATIC
 from tenbaud.view.recorded import RecordedFlight
 from tenbaud.view.server import Address, require_nicegui, run_page
 

@@ -22,9 +22,8 @@ from channel.errors import TenbaudError
 from channel.links.endpoints import is_loopback
 from tenbaud.view.access import COOKIE, Access, draw_access
 from tenbaud.view.board import Board
-from tenbaud.view.browser import open_privately
+from tenbaud.view.browser import STATIC, open_privately
 from tenbaud.view.feed import Feed
-from tenbaud.view.files import STATIC
 
 STREAM_PERIOD_S = 0.05
 IDLE_PERIOD_S = 0.5

@@ -86,6 +86,11 @@ LASTING: dict[str, tuple[str, ...]] = {
     "receive": ("receive", "--listen", "tcp/127.0.0.1:0", "--out", "run"),
     "receive --sessions": ("receive", "--sessions", "*", "--listen", "tcp/127.0.0.1:0", "--out", "run"),
     "rig": ("rig", "--port", "pty:port"),
+    "rig-check": (
+        *("rig-check", "--rig", "quarc-server:0", "--seconds", "60"),
+        *("--set", "transmitter.bridge.first_sample_timeout_s=60"),
+    ),
+    "view": ("view", "--port", "0"),
     "router": ("router", "--listen", "tcp/127.0.0.1:0"),
     "view RUN": ("view", str(REPOSITORY / "tests/golden/recordings/two-epochs-0.1.0"), "--port", "0"),
     "identify": ("identify", "--duration", "20000", "--out", "run"),
@@ -94,7 +99,7 @@ LASTING: dict[str, tuple[str, ...]] = {
     "sweep": ("sweep", "study.toml", "--workers", "2", "--out", "run"),
 }
 STUDY = 'name = "long"\nseeds = 2000\nset = { duration_s = 1000.0 }\ngrid = { loss = [0.0, 0.1] }\n'
-WHEN_IT_WAITS = ("transmit", "receive", "rig", "view RUN")
+WHEN_IT_WAITS = ("transmit", "receive", "rig", "rig-check", "view", "view RUN")
 
 
 @pytest.mark.parametrize("number", SIGNALS, ids=lambda one: one.name)
@@ -140,6 +145,8 @@ NO_PORT: dict[str, tuple[str, ...]] = {
     "transmit with a rig's second port": (
         *("transmit", "--rig", "cobs:/dev/null", "--set", f"transmitter.serial.motor_port={WRONG}"),
     ),
+    "rig-check": ("rig-check", "--rig", f"cobs:{WRONG}"),
+    "rig": ("rig", "--port", WRONG),
     "transmit": ("transmit", "--link", "serial", "--port", WRONG),
     "receive": ("receive", "--link", "serial", "--port", WRONG),
     "receive, second port": (
@@ -153,7 +160,8 @@ def test_a_port_that_is_not_there_is_refused_before_anything_starts(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(subprocess, "Popen", None)
-    assert run([*NO_PORT[name], "--out", str(tmp_path / "run")]) == ExitCode.USAGE
+    out = () if name.startswith("rig") else ("--out", str(tmp_path / "run"))
+    assert run([*NO_PORT[name], *out]) == ExitCode.USAGE
     said = capsys.readouterr().err
     assert said.startswith(f"tenbaud: {WRONG} cannot be opened: No such file or directory; ")
     assert not (tmp_path / "run").exists()

@@ -56,7 +56,11 @@ REFERENCE_NAME = "reference.csv"
 
 
 class FlightFailed(TenbaudError):
-    """A flight that did not end well; the text says how, and where its recordings are."""
+    """A flight that did not end well; the text says how, and `run` is what was recorded of it."""
+
+    def __init__(self, text: str, run: Run) -> None:
+        super().__init__(f"{text}\n  the recordings are in {run.path}")
+        self.run = run
 
 
 def fly(
@@ -124,8 +128,8 @@ def fly(
         on_status = display.show if display is not None else _unseen
         result = fly_demo(agreement, folder, on_status, draw=draw, status="none", **looks)
     if result.code:
-        said = "\n  ".join([str(result.summary["outcome"]), *result.messages])
-        raise FlightFailed(f"{said}\n  the recordings are in {folder.path}")
+        texts = dict.fromkeys([str(result.summary["outcome"]), *result.messages])
+        raise FlightFailed("\n  ".join(texts), Run(folder.path))
     return Run(folder.path)
 
 

@@ -36,7 +36,9 @@ def settings_for(rate: float) -> dict[str, object]:
 
 if __name__ == "__main__":
     config = load_config("pendulum-13baud")
-    least = rate_needed(plant_of(config.model, config.timing.tick_s).A)
+    plant = plant_of(config.model, config.timing.tick_s)
+    assert plant is not None  # the kind pendulum has matrices
+    least = rate_needed(plant.A)
     print(f"No code of {least:.2f} bit/s or less can hold this pendulum.")
     figure, (panel,) = new_figure(1, 4.0)
     for rate, colour in zip(RATES, COLOURS, strict=False):
@@ -51,8 +53,8 @@ if __name__ == "__main__":
             continue
         angle = np.degrees(run.angle)
         rms = np.sqrt(np.mean(np.degrees(run.error_live) ** 2))
-        print(f"{rate:4.1f} bit/s  {outcome:8}  estimate error {rms:.2f} deg rms", end="")
-        print(f", at most {abs(angle).max():.2f} deg from upright")
+        most = f"at most {abs(angle).max():.2f} deg from upright"
+        print(f"{rate:4.1f} bit/s  {outcome:8}  estimate error {rms:.2f} deg rms, {most}")
         panel.plot(run.time_s, angle, color=colour, linewidth=0.9, label=f"{rate:g} bit/s: {outcome}")
     panel.set(xlabel="time, s", ylabel="angle, deg", ylim=(-6.0, 6.0))
     legend_above(panel)

@@ -29,7 +29,7 @@ from tenbaud.flight.status import Status, StatusMode, outputs_status
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, gap_part, link_part, receiver_part, transmitter_part
 from tenbaud.flight.trouble import Trouble
-from tenbaud.flight.viewing import ALONE, Viewing
+from tenbaud.flight.viewing import ALONE, ENDS, Viewing
 from tenbaud.recording.encoding import SIGNALS_KEY, signals_text
 from tenbaud.recording.folder import RunFolder
 from tenbaud.recording.overview import OverviewRecorder
@@ -163,17 +163,16 @@ def run_in_memory(
         _end(agreement, "transmitter", folder) as (recorder, stop),
         open_recorder(agreement, "receiver", folder.receiver) as receiver_recorder,
     ):
-        upper_recorder, lower_recorder = recorder, receiver_recorder
+        rows: tuple[Recorder, Recorder] = recorder, receiver_recorder
         if drawing is not None:
-            upper_recorder, lower_recorder = drawing.recorders(recorder, receiver_recorder)
-        up, down = (
-            _telemetry(agreement, role, one, Endpoints(telemetry=viewing.options(role)))
-            for role, one in (("transmitter", upper_recorder), ("receiver", lower_recorder))
-        )
+            rows = drawing.recorders(*rows)
+        looked_at = [Endpoints(telemetry=viewing.options(role)) for role in ENDS]
+        up = _telemetry(agreement, "transmitter", rows[0], looked_at[0])
+        down = _telemetry(agreement, "receiver", rows[1], looked_at[1])
         run = transmit.prepare(agreement, up.recorder, DATAGRAM)
         endpoint = build_receiver(agreement, down.recorder, DATAGRAM, references=down.steering)
         obeyed = down.fly_receiver(endpoint, stop)
-        live = up.fly_transmitter(run, stop, obeyed)
+        live = up.fly_transmitter(run, stop, lambda: _obey(obeyed))
         if viewing.endpoints or drawing is not None:
             run.node.before_every_tick(_each_tick(live, obeyed, drawing))
         with (
@@ -194,13 +193,18 @@ def run_in_memory(
         return outcome, _with_recording(upper, recorder), lower
 
 
+def _obey(receiver: LiveReceiver) -> None:
+    """Have the receiver's commands take hold, also while the flight is paused."""
+    receiver()
+
+
 def _each_tick(
     live: LiveTransmitter, obeyed: LiveReceiver, drawing: NotebookDrawing | None
 ) -> Callable[[int], None]:
     """Return what both ends have done before every tick of a flight that is looked at."""
 
     def act(tick: int) -> None:
-        obeyed()
+        _obey(obeyed)
         live.at_tick(tick)
         if drawing is not None:
             drawing.at_tick(tick)

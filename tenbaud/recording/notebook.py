@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from html import escape
+from typing import Any
 
 PERIOD_S = 0.2
 
@@ -19,10 +20,11 @@ class Cell:
     """An output of the cell that runs now."""
 
     def __init__(self) -> None:
-        from IPython.display import HTML, display
+        from IPython import display
 
-        self._html = HTML
-        self._handle = display(HTML(""), display_id=True)  # type: ignore[no-untyped-call]
+        self._html: Any = display.HTML
+        show: Any = display.display
+        self._handle = show(self._html(""), display_id=True)
         self._shown_s = 0.0
 
     def show(self, html: str) -> None:

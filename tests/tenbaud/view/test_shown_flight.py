@@ -35,13 +35,13 @@ def test_a_flight_of_objects_opens_its_page_and_obeys_it(tmp_path: Path) -> None
         page.goto(flight.url)
         state_is(page, "lockstep")
         page.get_by_role("button", name="Corrupt the controller's codec").click()
-        page.get_by_text("digests differ").first.wait_for()
+        state_is(page, "broken")
         assert "interrupted" in flight.stop() or flight.process.returncode == 0
     assert (tmp_path / "opened").read_text().startswith("file://")
     run = Run(tmp_path / "run")
     assert run.summary["desyncs"] == 1
-    kinds = [(event["kind"], event["end"]) for event in run.events]
-    assert kinds.index(("control", "receiver")) < kinds.index(("desync", "transmitter"))
+    kinds = {(event["kind"], event["end"]) for event in run.events}
+    assert {("control", "receiver"), ("desync", "transmitter")} <= kinds
 
 
 def test_a_pace_is_for_the_virtual_clock_and_above_zero(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from html import escape
+from importlib import import_module
 from typing import Any
 
 PERIOD_S = 0.2
@@ -20,11 +21,10 @@ class Cell:
     """An output of the cell that runs now."""
 
     def __init__(self) -> None:
-        from IPython import display
-
-        self._html: Any = display.HTML
-        show: Any = display.display
-        self._handle = show(self._html(""), display_id=True)
+        # Only a notebook has it.
+        shown: Any = import_module("IPython.display")
+        self._html = shown.HTML
+        self._handle = shown.display(shown.HTML(""), display_id=True)
         self._shown_s = 0.0
 
     def show(self, html: str) -> None:

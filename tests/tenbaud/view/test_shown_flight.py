@@ -33,9 +33,9 @@ def test_a_flight_of_objects_opens_its_page_and_obeys_it(tmp_path: Path) -> None
     ):
         page = chromium.new_page()
         page.goto(flight.url)
-        state_is(page, "lockstep")
+        state_is(page, "lockstep", 60.0)
         page.get_by_role("button", name="Corrupt the controller's codec").click()
-        state_is(page, "broken")
+        state_is(page, "broken", 60.0)
         assert "interrupted" in flight.stop() or flight.process.returncode == 0
     assert (tmp_path / "opened").read_text().startswith("file://")
     run = Run(tmp_path / "run")
@@ -52,7 +52,7 @@ def test_a_pace_is_for_the_virtual_clock_and_above_zero(tmp_path: Path) -> None:
 
 
 def test_a_flight_that_failed_gives_its_run(tmp_path: Path) -> None:
-    low = {"duration_s": 5.0, "link.impairments": "up:loss=1.0"}
+    low = {"duration_s": 5.0, "link.impairments": "up:loss=0.97"}
     with pytest.raises(errors.FlightFailed) as failed:
         fly("tuned-10baud", settings=low, out=tmp_path / "run")
     assert failed.value.run.summary["not_flown"]

@@ -9,8 +9,10 @@ import typer
 
 from tenbaud.cli import demo, design, identify, keys, log, nodes, rig, router, runs, sweep, tune, view
 from tenbaud.cli.checkout import add_commands
+from tenbaud.cli.flags import Command, Group
 
 app = typer.Typer(
+    cls=Group,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
@@ -61,7 +63,8 @@ for panel, commands in (
     ),
 ):
     for command in commands:
-        app.command(command.__name__.replace("_", "-"), rich_help_panel=panel)(command)
+        name = command.__name__.replace("_", "-")
+        app.command(name, cls=Command, rich_help_panel=panel)(command)
 app.add_typer(keys.app, name="keys", rich_help_panel="Rigs and machines")
 add_commands(app)
 

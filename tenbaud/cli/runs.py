@@ -23,12 +23,13 @@ def inspect(
 
     [dim]tenbaud inspect runs/2026-11-23T10-00-00_paper-10baud[/dim]
     """
+    from tenbaud.flight.narrow import for_terminal
     from tenbaud.recording.inspect import describe_json, describe_text
 
     if json:
         options.print_json(describe_json(run))
         return
-    typer.echo(describe_text(run))
+    typer.echo(for_terminal(describe_text(run)))
 
 
 def diff(
@@ -95,6 +96,7 @@ def compare(
 def presets() -> None:
     """List the presets that come with tenbaud by plant, with their rates."""
     from tenbaud.config.load import load_config, preset_names
+    from tenbaud.flight.narrow import for_terminal
 
     configs = {name: load_config(name) for name in preset_names()}
     plants: dict[str, list[str]] = {}
@@ -107,7 +109,8 @@ def presets() -> None:
         typer.echo(plant)
         for name in sorted(plants[plant], key=lambda one: configs[one].channel.rate_baud):
             config = configs[name]
-            typer.echo(f"  {name:{width}} {config.channel.rate_baud:7.4g} baud  {config.description}")
+            line = f"  {name:{width}} {config.channel.rate_baud:7.4g} baud  {config.description}"
+            typer.echo(for_terminal(line))
 
 
 class Form(StrEnum):

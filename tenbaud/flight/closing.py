@@ -1,4 +1,4 @@
-"""The end of a flight on a terminal: verdict, warnings, a few figures, what to open and do next."""
+"""The closing lines of a flight: verdict, warnings, a few figures, files to open, next command."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def closing_lines(summary: Summary, folder: RunFolder, *, unicode: bool = True) 
 
 
 def _what_next(summary: Summary, folder: RunFolder) -> tuple[str, str]:
-    """Return what to open and the next command, as a label and its text."""
+    """Return the file to open and the next command, as a label and its text."""
     path = _shown(folder.path)
     drawn = folder.figure.is_file()
     label, place = ("Open", f"{path}/{folder.figure.name}") if drawn else ("Recorded in", path)

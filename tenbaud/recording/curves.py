@@ -10,7 +10,7 @@ import numpy as np
 from tenbaud.recording.figure import COLOURS
 from tenbaud.recording.signals import output_name
 from tenbaud.recording.style import FAINT, LINE_C, decimated, legend_above, new_figure
-from tenbaud.sentences.flown import in_degrees
+from tenbaud.sentences.quantities import in_degrees
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

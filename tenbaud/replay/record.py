@@ -167,7 +167,7 @@ def epochs_of(record: FlightRecord) -> list[Epoch]:
         if row.sample > expected:
             raise RecordingError(
                 f"{tables.path} lacks sample {expected}: the next one recorded is {row.sample}. "
-                "Rows were lost, so what follows cannot be computed from the symbols."
+                "Rows were lost, so later states cannot be computed from the symbols."
             )
         if row.sample < expected:
             raise RecordingError(

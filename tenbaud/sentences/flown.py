@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from typing import Any
+
+from tenbaud.sentences.quantities import in_degrees
 
 Summary = dict[str, Any]
 
@@ -43,7 +44,7 @@ def warnings_of(summary: Summary) -> list[str]:
             "desyncs",
             "differences of the two codecs, resynchronised: {} (`tenbaud diff` names the field)",
         ),
-        ("out_of_bounds", "{} frames held values out of bounds and were dropped"),
+        ("out_of_bounds", "{} frames with values out of bounds were dropped"),
         ("malformed", "{} messages were no frames and were dropped"),
         ("recording_rows_lost", "the recording lost {} rows: the disk was too slow"),
     )
@@ -84,11 +85,6 @@ def figures_of(summary: Summary, unicode: bool = True) -> Iterator[tuple[str, st
         )
 
 
-def in_degrees(value: float, unit: str) -> tuple[float, str]:
-    """Return a value as a person reads it, and its unit: angles in degrees."""
-    return (math.degrees(value), "deg") if unit == "rad" else (value, unit)
-
-
 def value_text(value: float, unit: str, digits: int = 2, unicode: bool = True) -> str:
     """Return a value with its unit; `digits` are those of an angle."""
     value, unit = in_degrees(value, unit)
@@ -103,7 +99,7 @@ def is_seen(error: float, deviation: float) -> bool:
 
 
 def learned_text(name: str, error: float, deviation: float) -> str:
-    """Return what was learned of a term: an error in per cent, a force as it is."""
+    """Return the learned value of a term: an error in per cent, a force as it is."""
     words = name.replace("_", " ")
     if name.endswith("_force"):
         return f"{words} {error:+.3f} (sd {deviation:.3f})"
@@ -150,10 +146,14 @@ def _bytes(count: int) -> str:
 
 def _link(summary: Summary) -> str:
     get = summary.get
-    parts = [f"{get('erasures') or 0} symbols lost", f"{get('symbols_late') or 0} late"]
+    parts = [_number(get("erasures"), "symbol") + " lost", f"{get('symbols_late') or 0} late"]
     if get("rejoins") is not None:
         cost = f" ({get('rejoin_bytes')} bytes)" if get("rejoins") and get("rejoin_bytes") else ""
-        parts.append(f"{get('rejoins')} resyncs{cost}")
+        parts.append(_number(get("rejoins"), "resync") + cost)
     if get("reconnects"):
-        parts.append(f"{get('reconnects')} reconnects")
+        parts.append(_number(get("reconnects"), "reconnect"))
     return ", ".join(parts)
+
+
+def _number(count: int | None, thing: str) -> str:
+    return f"{count or 0} {thing}{'' if count == 1 else 's'}"

@@ -34,7 +34,7 @@ def test_a_flight_of_objects_opens_its_page_and_obeys_it(tmp_path: Path) -> None
         page = chromium.new_page()
         page.goto(flight.url)
         state_is(page, "lockstep", 60.0)
-        page.get_by_role("button", name="Corrupt the controller's codec").click()
+        page.get_by_role("button", name="Corrupt the receiver's codec").click()
         state_is(page, "broken", 60.0)
         assert "interrupted" in flight.stop() or flight.process.returncode == 0
     assert (tmp_path / "opened").read_text().startswith("file://")

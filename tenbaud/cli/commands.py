@@ -44,7 +44,18 @@ def _root(
 
 for panel, commands in (
     ("Fly", (demo.demo, nodes.transmit, nodes.receive, view.view, runs.presets)),
-    ("What was flown", (runs.inspect, runs.diff, runs.replay, runs.audit, runs.convert, runs.recover)),
+    (
+        "What was flown",
+        (
+            runs.inspect,
+            runs.compare,
+            runs.diff,
+            runs.replay,
+            runs.audit,
+            runs.convert,
+            runs.recover,
+        ),
+    ),
     ("Rigs and machines", (rig.doctor, rig.rig, rig.rig_check, router.router)),
     (
         "Models, coders, studies",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -56,6 +58,39 @@ def diff(
         raise typer.Exit(int(ExitCode.FAILED))
     if compared.verdict is Verdict.NOT_COMPARABLE:
         raise typer.Exit(int(ExitCode.USAGE))
+
+
+def compare(
+    runs: Annotated[list[Path], typer.Argument(help="Folders of two or more runs, or recordings.")],
+    figure: Annotated[
+        Path | None,
+        typer.Option(help="Draw outputs and errors over each other into this .png, .svg or .pdf file."),
+    ] = None,
+    json: Annotated[
+        bool, typer.Option("--json", help="The figures as JSON, in the units of the recordings.")
+    ] = False,
+) -> None:
+    """Put the figures of runs side by side: errors, tracking, rise, overshoot, settling, bits.
+
+    Compared are the outputs and the flight time that all runs have; what differs is noted. Exit code 2
+    if they have none in common. No file is written without --figure.
+
+    [dim]tenbaud compare runs/slow runs/fast --figure slow-and-fast.png[/dim]
+    """
+    from tenbaud.recording.side_by_side import compare as compare_runs
+    from tenbaud.recording.style import FIGURE_FORMATS
+
+    if figure is not None and figure.suffix not in FIGURE_FORMATS:
+        raise typer.BadParameter(f"--figure {figure}: end the name in {', '.join(FIGURE_FORMATS)}")
+    compared = compare_runs(*runs)
+    if json:
+        options.print_json(compared.as_json())
+    else:
+        unicode = (sys.stdout.encoding or "").lower().startswith("utf")
+        typer.echo(compared.text(shutil.get_terminal_size((10_000, 24)).columns, unicode=unicode))
+    if figure is not None:
+        compared.plot(figure)
+        typer.echo(str(figure), err=json)
 
 
 def presets() -> None:

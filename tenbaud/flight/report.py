@@ -98,7 +98,7 @@ def draw_figure(folder: RunFolder, title: str, usual: Curve | None = None) -> No
 
 
 def figure_title(config: FlightConfig, summary: Summary) -> str:
-    """Return what stands over a flight's figure."""
+    """Return the title of a flight's figure."""
     return f"{config.preset}: {summary.get('plant', '')}, {config.channel.rate_baud:g} bit/s"
 
 

@@ -13,8 +13,9 @@ from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderR
 from rich.table import Table
 from rich.text import Text
 
-from tenbaud.flight.status import Status, in_degrees
+from tenbaud.flight.status import Status
 from tenbaud.sentences import endings
+from tenbaud.sentences.quantities import in_degrees
 
 GAUGE_DEGREES = 180
 GAUGE_CELLS = 41

@@ -39,7 +39,7 @@ MAPS_MAX = 12
 
 
 class Drawn(NamedTuple):
-    """What the plots of one output have in common."""
+    """The common data of one output's plots."""
 
     columns: dict[str, Any]
     """settings, and the quantities in `unit`"""

@@ -16,10 +16,10 @@ READ_BYTES = 4096
 
 
 class DeviceLine(Protocol):
-    """Bytes in and out, without ever waiting; what nobody takes is lost, as on a real line."""
+    """Bytes in and out, without waiting; bytes that are not read are lost, as on a real line."""
 
     address: str
-    """what the other side opens"""
+    """the name that the other side opens"""
 
     def plug(self) -> None:
         """Put the device on its line."""
@@ -31,7 +31,7 @@ class DeviceLine(Protocol):
         """Wait until something came, or for this long."""
 
     def read(self) -> bytes:
-        """Return what has come."""
+        """Return the received bytes."""
 
     def write(self, data: bytes) -> bool:
         """Send; return whether it went out whole."""

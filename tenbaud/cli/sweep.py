@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tenbaud.cli import options
+from tenbaud.cli.waiting import Waiting
 from tenbaud.studies.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -67,9 +68,11 @@ def sweep(
         raise
     drawn = []
     if plots:
-        from tenbaud.studies.plots import draw_study
+        title = what.file.description or name
+        with Waiting("tenbaud sweep", doing="drawing"):
+            from tenbaud.studies.plots import draw_study
 
-        drawn = draw_study(table, what.names, what.file.description or name, folder, what.outputs)
+            drawn = draw_study(table, what.names, title, folder, what.outputs)
     why = Counter(one for one in table["outcome"].to_pylist() if one != "ok")
     slow = Counter(one for one in table["not_compiled"].to_pylist() if one)
     summary = {

@@ -15,6 +15,7 @@ from receiver.controllers.references import Constant, LimitedReference, Square, 
 from tenbaud import fly
 from tenbaud.build.codec import build_model
 from tenbaud.build.first_contact import drives_motors, require_safe
+from tenbaud.build.flight import agree
 from tenbaud.build.recorded import flight_config
 from tenbaud.build.references import build_references
 from tenbaud.build.signals import configured_signals
@@ -206,3 +207,10 @@ def test_a_set_point_by_hand_keeps_to_the_limits() -> None:
     free = SteeredReference(Constant(2.0, 0.01))
     free.steer(7.0)
     assert free.value(0) == 7.0
+
+
+def test_a_receiver_with_other_set_point_limits_is_refused_in_the_handshake() -> None:
+    own = agree(configured("simulated", *SETTINGS), "virtual").identity
+    assert agree(configured("simulated", *SETTINGS), "virtual").identity == own
+    other = agree(configured("simulated", *SETTINGS, "limits.set_point_max=0.3"), "virtual").identity
+    assert other.config_digest != own.config_digest

@@ -23,6 +23,7 @@ from tenbaud.cli import options
 from tenbaud.cli.app import run
 from tenbaud.config.load import ConfigError, dump_config, load_config
 from tenbaud.flight.outcome import ExitCode
+from tenbaud.studies.arrays import targets_of
 from tests.transmitter.rigs.emulated import emulated
 from transmitter.rigs.formats.samples import DeviceFlag, flags_of
 
@@ -214,3 +215,13 @@ def test_a_receiver_with_other_set_point_limits_is_refused_in_the_handshake() ->
     assert agree(configured("simulated", *SETTINGS), "virtual").identity == own
     other = agree(configured("simulated", *SETTINGS, "limits.set_point_max=0.3"), "virtual").identity
     assert other.config_digest != own.config_digest
+
+
+def test_a_study_follows_the_same_limited_set_points() -> None:
+    agreement = agree(configured("simulated", *SETTINGS), "virtual")
+    model = agreement.codec.model
+    (reference,) = build_references(agreement.config, agreement.signals, model)
+    assert reference is not None
+    values = [reference.value(tick) for tick in range(3000)]
+    assert targets_of(agreement, 3000, False)[:, 0].tolist() == values
+    assert max(values) == 0.16

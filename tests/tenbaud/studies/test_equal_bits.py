@@ -299,7 +299,9 @@ def test_when_a_recorded_flight_is_compiled_then_no_figure_differs(tmp_path: Pat
         "receiver": {"controller": "recorded"},
         "flight_log": {"file": str(log)},
     }
-    config = load_config("uiuc-10baud", None, {**changes, "duration_s": 100.0})
+    # With the coder that `identify` fits to a record: its tests need not compile another flight.
+    coder = load_config("history-10baud").coder.model_dump(mode="json")
+    config = load_config("uiuc-10baud", None, {**changes, "coder": coder, "duration_s": 100.0})
     figures, _ = CompiledPoint(config).fly(1)
     plain = fly_plain(config)
     assert repr(figures._replace(engine="")) == repr(plain._replace(engine=""))

@@ -6,7 +6,8 @@ environment, folder and session of its own, and a child of the one that asked fo
 starting, ending or finding processes is tested with ordinary ones, and so is whatever a shell starts:
 every command of the documentation.
 
-A process that starts others, as `tenbaud demo` does, keeps an untouched copy of itself for that.
+A process that starts others, as `tenbaud demo` does, keeps an untouched copy of itself for that; an
+ordinary one does so too, when it is started as `python -m tests.warm` in place of `python -m tenbaud`.
 """
 
 from __future__ import annotations
@@ -55,15 +56,14 @@ class Popen(subprocess.Popen):  # type: ignore[type-arg]
         plain = plain and (gid, gids, uid, umask) == (None, None, None, -1)
         words = [os.fsdecode(one) for one in args] if plain and not isinstance(args, str) else []
         environment = dict(os.environ if env is None else env)
-        copied = (
-            words[:3] == [sys.executable, "-m", "tenbaud"] and _at_start(environment) == _at_start()
-        )
+        folder = os.fsdecode(cwd or os.getcwd())
+        copied = words[:3] == [sys.executable, "-m", "tenbaud"] and _is_same(folder, environment)
         if self.server is None or not copied:
             super()._execute_child(args, executable, preexec_fn, *rest)  # type: ignore[misc]
             return
         request = {
             "arguments": words[3:],
-            "folder": os.fsdecode(cwd or os.getcwd()),
+            "folder": folder,
             "environment": environment,
             "own_session": own_session,
         }
@@ -74,7 +74,17 @@ class Popen(subprocess.Popen):  # type: ignore[type-arg]
         self._close_pipe_fds(*pipes)  # type: ignore[attr-defined]
 
 
-def _at_start(environment: Any = os.environ) -> dict[str, str]:
+def _is_same(folder: str, environment: Any) -> bool:
+    """Return whether a process there would import what this one does, and in the same way."""
+    for place in [folder, *environment.get("PYTHONPATH", "").split(os.pathsep)]:
+        if (Path(place or folder) / "tenbaud" / "__main__.py").is_file():
+            if Path(place or folder).resolve() != TOP:
+                return False  # a changed copy of the project
+            break
+    return _at_start(environment) == _at_start(os.environ)
+
+
+def _at_start(environment: Any) -> dict[str, str]:
     names = [name for name in environment if name.startswith(READ_AT_START) and name != "PYTHONPATH"]
     return {name: environment[name] for name in names}
 
@@ -119,11 +129,16 @@ def _pair() -> tuple[socket.socket, socket.socket]:
     return ours, its
 
 
-def main(number: int) -> None:
-    """Import, and make copies until the other side has gone."""
+def load() -> None:
+    """Import what a process of `tenbaud` needs."""
     for name in IMPORTED:
         importlib.import_module(name)
     gc.freeze()
+
+
+def main(number: int) -> None:
+    """Import, and make copies until the other side has gone."""
+    load()
     serve(socket.socket(fileno=number))
     os._exit(0)
 
@@ -163,7 +178,7 @@ def _begin(request: dict[str, Any], streams: list[int]) -> None:
         if request["own_session"]:
             os.setsid()
         if request["arguments"][:1] and request["arguments"][0] in STARTS_OTHERS:
-            _keep_a_copy()
+            keep_a_copy()
         for number, stream in enumerate(streams):
             os.dup2(stream, number)
             os.close(stream)
@@ -191,7 +206,7 @@ def _begin(request: dict[str, Any], streams: list[int]) -> None:
         os._exit(code)
 
 
-def _keep_a_copy() -> None:
+def keep_a_copy() -> None:
     """Let an untouched copy of this process start what it starts."""
     ours, its = _pair()
     if os.fork() == 0:
@@ -201,3 +216,12 @@ def _keep_a_copy() -> None:
     its.close()
     Popen.server = Server(ours)
     subprocess.Popen = Popen  # type: ignore[misc]
+
+
+if __name__ == "__main__":
+    from tests import warm
+
+    if sys.argv[1:2] and sys.argv[1] in STARTS_OTHERS and CLONE is not None:
+        warm.load()
+        warm.keep_a_copy()
+    importlib.import_module("tenbaud.cli.app").main()

@@ -54,8 +54,8 @@ COMPILED_BEFORE = "[docs/howto/your-log.md]"
 """A page that flies what those above compile: it comes when they are through."""
 
 COLD = ("tests/tenbaud/endings/", "tests/tenbaud/view/", "tests/network/", "tests/docs/")
-"""Tests of processes as the system shows them: theirs are ordinary ones, and so are those on the real
-clock. Elsewhere a process begins with everything imported (`tests/warm.py`)."""
+"""Tests of processes as the system shows them: theirs are ordinary ones. Elsewhere a process begins with
+everything imported (`tests/warm.py`), which disturbs less what flies on the real clock beside it."""
 
 _MACHINE = Path(tempfile.gettempdir()) / f"tenbaud-tests-{os.getuid()}.lock"
 
@@ -107,8 +107,7 @@ def _server() -> Iterator[warm.Server | None]:
 @pytest.fixture(autouse=True)
 def _warm(request: pytest.FixtureRequest, _server: warm.Server | None) -> None:
     """Let the processes of most tests begin with everything imported."""
-    cold = request.node.nodeid.startswith(COLD) or request.node.get_closest_marker("real_time")
-    warm.Popen.server = None if cold else _server
+    warm.Popen.server = None if request.node.nodeid.startswith(COLD) else _server
 
 
 @pytest.fixture(autouse=True)

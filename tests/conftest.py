@@ -54,8 +54,8 @@ COMPILED_BEFORE = "[docs/howto/your-log.md]"
 """A page that flies what those above compile: it comes when they are through."""
 
 COLD = ("tests/tenbaud/endings/", "tests/tenbaud/view/", "tests/network/", "tests/docs/")
-"""Tests of processes as the system shows them: theirs are ordinary ones. Elsewhere a process begins with
-everything imported (`tests/warm.py`), which disturbs less what flies on the real clock beside it."""
+"""Tests of processes as the system shows them: theirs are ordinary ones. Elsewhere a process begins
+with everything imported (`tests/warm.py`): it disturbs less what flies on the real clock beside it."""
 
 _MACHINE = Path(tempfile.gettempdir()) / f"tenbaud-tests-{os.getuid()}.lock"
 

@@ -53,7 +53,15 @@ LONGEST_FIRST = (
 COMPILED_BEFORE = "[docs/howto/your-log.md]"
 """A page that flies what those above compile: it comes when they are through."""
 
-COLD = ("tests/tenbaud/endings/", "tests/tenbaud/view/", "tests/network/", "tests/docs/")
+COLD = (
+    "tests/tenbaud/endings/test_signals.py",
+    "tests/tenbaud/endings/test_streams.py",
+    "tests/tenbaud/endings/test_containers.py",
+    "tests/tenbaud/view/test_gate.py",
+    "tests/tenbaud/view/test_beside.py",
+    "tests/network/",
+    "tests/docs/",
+)
 """Tests of processes as the system shows them: theirs are ordinary ones. Elsewhere a process begins
 with everything imported (`tests/warm.py`): it disturbs less what flies on the real clock beside it."""
 

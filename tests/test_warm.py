@@ -39,12 +39,17 @@ def started(folder: Path, *arguments: str, **more: Any) -> subprocess.Popen[str]
 
 def test_a_copy_is_a_child_with_a_folder_and_a_session_of_its_own(tmp_path: Path) -> None:
     waiting = ("receive", "--listen", free_endpoint(), "--out", "run")
-    with started(tmp_path, *waiting, start_new_session=True) as process:
+    with started(
+        tmp_path, *waiting, start_new_session=True, env={**os.environ, "ONLY_HERE": "1"}
+    ) as process:
         wait_for((tmp_path / "run").is_dir, lambda: "no folder")
         status = Path(f"/proc/{process.pid}/status").read_text()
         assert f"PPid:\t{os.getpid()}\n" in status
         assert os.getsid(process.pid) == process.pid
-        assert b"-m\0tenbaud" not in Path(f"/proc/{process.pid}/cmdline").read_bytes(), "it is a copy"
+        words = Path(f"/proc/{process.pid}/cmdline").read_text().rstrip("\0").split("\0")
+        assert words == [*TENBAUD, *waiting]
+        variables = Path(f"/proc/{process.pid}/environ").read_bytes()
+        assert b"ONLY_HERE" not in variables, "an ordinary process has its own"
         process.send_signal(signal.SIGINT)
         assert process.wait(60.0) == 130
 

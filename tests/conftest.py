@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import gc
 import os
 import signal
 import subprocess
@@ -54,9 +55,7 @@ COMPILED_BEFORE = "[docs/howto/your-log.md]"
 """A page that flies what those above compile: it comes when they are through."""
 
 COLD = (
-    "tests/tenbaud/endings/test_signals.py",
-    "tests/tenbaud/endings/test_streams.py",
-    "tests/tenbaud/endings/test_containers.py",
+    "tests/tenbaud/endings/",
     "tests/tenbaud/view/test_gate.py",
     "tests/tenbaud/view/test_beside.py",
     "tests/network/",
@@ -71,6 +70,11 @@ _MACHINE = Path(tempfile.gettempdir()) / f"tenbaud-tests-{os.getuid()}.lock"
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Bring the longest to the front."""
     items.sort(key=_rank)
+
+
+def pytest_collection_finish() -> None:
+    """Let the garbage collector pass over what all tests together have imported."""
+    gc.freeze()
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -55,7 +55,7 @@ BESIDE = (
 
 KEPT_FOLDERS = 8
 KEPT_S = 86_400.0
-"""Machine code of sources that were not used for so long goes, but for that of so many versions."""
+"""How long machine code is kept unused, and of how many versions of the sources in any case."""
 
 Parts = tuple[tuple[str, Any], ...]
 """Replacements for the placeholders of the flight: (name, compiled function, or a number)."""

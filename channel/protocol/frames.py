@@ -136,6 +136,19 @@ class Echo:
     """of the codec state after the sample, 64 bits"""
     steps: tuple[int, ...]
     """commands of ticks `kN + D ... (k+1)N + D - 1`, all inputs of a tick together"""
+    digest_bits: int = 64
+    """how many of the digest's low bits came with the echo"""
+
+
+@dataclass(frozen=True, slots=True)
+class DigestPart:
+    """Some bits of the digest of an earlier sample."""
+
+    sample: int
+    shift: int
+    """place of the lowest of them"""
+    bits: int
+    value: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +158,18 @@ class Commands:
     session: int
     epoch: int
     echoes: tuple[Echo, ...]
+    part: DigestPart | None = None
+    """with the compact downlink"""
+
+
+@dataclass(frozen=True, slots=True)
+class ShortCommands:
+    """Commands as the compact downlink carries them, packed; `channel.protocol.compact` has the bits.
+
+    Only a session knows the sample, the session and the epoch that they belong to.
+    """
+
+    data: bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,6 +233,7 @@ Frame: TypeAlias = (
     | ShortSymbol
     | LocatedSymbol
     | Commands
+    | ShortCommands
     | Desync
     | Unknown
     | Claim

@@ -43,6 +43,8 @@ class Confirmed(NamedTuple):
     """of our copy after the sample"""
     peer_digest: int
     """of the receiver's"""
+    peer_bits: int
+    """how many of its low bits the receiver sent; the others are taken from ours"""
     lag_samples: int
     """samples that had been sent beyond this one when its echo came"""
     about: tuple[int, ...] | None = None
@@ -112,10 +114,13 @@ class Copies:
         self._sent.extend([ERASED] * missed)
         return missed
 
-    def confirm(self, word: Word, commands: list[Vector], peer_digest: int) -> Confirmed:
+    def confirm(
+        self, word: Word, commands: list[Vector], peer_digest: int, peer_bits: int = 64
+    ) -> Confirmed:
         """Advance the confirmed copy by the echo of its next sample.
 
-        `commands` are those of ticks `kN + D ... (k+1)N + D - 1`.
+        `commands` are those of ticks `kN + D ... (k+1)N + D - 1`; of the receiver's digest the lowest
+        `peer_bits` are known.
         """
         before = self.confirmed
         arriving = iter(commands)
@@ -133,7 +138,8 @@ class Copies:
         self.confirmed = flown.state
         self._keep_provisional(word, taken)
         digest = self.codec.digest(flown.state)
-        return Confirmed(before.sample, before, sent, word, flown, live, digest, peer_digest, lag)
+        peer = digest >> peer_bits << peer_bits | peer_digest
+        return Confirmed(before.sample, before, sent, word, flown, live, digest, peer, peer_bits, lag)
 
     def explained(self, done: Confirmed) -> Confirmed:
         """Return a confirmed sample with what its symbols were about, on which no state depends."""
@@ -188,7 +194,8 @@ class EchoOrder:
         if echoes[0].sample > expected:
             latest = min(latest, sample)
         for echo in echoes:
-            if expected <= echo.sample <= latest:
+            repeated = not echo.digest_bits and echo.sample in self._early
+            if expected <= echo.sample <= latest and not repeated:
                 self._early[echo.sample] = echo
         if echoes[0].sample > expected and self._missing != expected:
             self._missing, self._until_tick = expected, tick + self._overtaking_ticks

@@ -53,7 +53,7 @@ SAMPLE_CHANNEL = RecordChannel(
         Field("state", "numbers", "", "codec's model state after the sample"),
         Field("coder", "numbers", "", "coder state after the sample"),
         Field("digest", "string", "", "64-bit digest of the codec state after the sample"),
-        Field("peer_digest", "string", "", "the receiver's digest of the same sample"),
+        Field("peer_digest", "string", "", "the receiver's digest of it, as far as it was sent"),
         Field("lag_samples", "integer", "", "samples sent beyond it when its echo came", timing=True),
         Field("about", "integers", "", "output that each symbol was about, from 0; null: erased"),
     ),
@@ -72,7 +72,7 @@ def write_sample(recorder: Recorder, terms: Terms, codec: Codec, done: Confirmed
         state.model,
         state.coder,
         f"{done.digest:016x}",
-        f"{done.peer_digest:016x}",
+        f"{done.peer_digest:016x}"[16 - done.peer_bits // 4 :],
         done.lag_samples,
         done.about,
     )

@@ -15,6 +15,7 @@ from enum import Enum
 
 from channel.codec.codec import ERASED, Codec, Vector
 from channel.protocol.bounds import Bounds, shown, within_text_bounds
+from channel.protocol.compact import PART_SAMPLES, CompactForm
 from channel.protocol.endings import End, Ending
 from channel.protocol.events import ASKED, Event, EventKind, ended_event, write_event
 from channel.protocol.frames import (
@@ -22,11 +23,13 @@ from channel.protocol.frames import (
     Claim,
     Commands,
     Desync,
+    DigestPart,
     Echo,
     ForeignVersion,
     Frame,
     Hello,
     Refuse,
+    ShortCommands,
     Symbol,
     Unknown,
     Welcome,
@@ -84,7 +87,7 @@ class TransmitterSession:
         self.epoch = 0
         self.copies = Copies(codec, terms)
         self.counts: Counter[str] = Counter()
-        """digest_checks, desyncs, rejoins, stale_frames, words_missed, erasures, claims_refused,
+        """confirmed, digest_checks, desyncs, rejoins, stale_frames, words_missed, erasures, claims_refused,
         take_overs, out_of_bounds, diverged"""
         self.rejoins_asked: Counter[Why] = Counter()
         self.end: End | None = None
@@ -117,6 +120,11 @@ class TransmitterSession:
         self._tick = -1
         self._command: Vector = terms.initial_command
         """the last one given out"""
+        self._compact = CompactForm(codec, terms) if terms.downlink == "compact" else None
+        self._unproven: list[tuple[int, Vector]] = []
+        """commands of echoes without a digest, until a later one has proved them"""
+        self._parted: Confirmed | None = None
+        """the sample whose whole digest comes in parts"""
 
     # What happens at a tick
 
@@ -205,6 +213,8 @@ class TransmitterSession:
         match frame:
             case Commands() if self._is_current(frame.session) and frame.epoch == self.epoch:
                 return self._on_commands(frame)
+            case ShortCommands() if commands := self._unpacked(frame):
+                return self._on_commands(commands)
             case Welcome() if self._asking.is_answered_by(frame):
                 return self._on_welcome(frame)
             case Welcome() if self._is_current(frame.session) and self._is_left_behind(frame):
@@ -268,6 +278,7 @@ class TransmitterSession:
         self.heard_tick = self._tick
         self.copies.restart(state, hold)
         self._echoes.clear()
+        self._unproven, self._parted = [], None
         self.epoch_tick = state.sample * self.terms.ticks_per_sample
         held = self.owing.begin(self.epoch_tick, self._tick, self._asking.why)
         self._due = deque(enumerate([hold] * held, self.epoch_tick))
@@ -300,6 +311,11 @@ class TransmitterSession:
             self._end(refusal)
         return [Bye(0, refusal.ending, refusal.text)]
 
+    def _unpacked(self, frame: ShortCommands) -> Commands | None:
+        if self._compact is None or self.phase is not Phase.FLYING:
+            return None
+        return self._compact.unpacked(frame, self.session_number, self.epoch, self._sample)
+
     def _on_commands(self, frame: Commands) -> list[Frame]:
         if frame.echoes[-1].sample < self.copies.confirmed.sample:
             # A copy, or a recording: it brings nothing, and proves nobody alive.
@@ -314,7 +330,7 @@ class TransmitterSession:
         while (echo := self._echoes.take(self.copies.confirmed.sample)) is not None:
             if frames := self._confirm(echo):
                 return frames
-        return self._check_gap()
+        return self._check_part(frame.part) or self._check_gap()
 
     def _check_gap(self) -> list[Frame]:
         if not self._echoes.is_lost(expected := self.copies.confirmed.sample, self._tick):
@@ -326,20 +342,40 @@ class TransmitterSession:
         word = self.codec.coder.alphabet.word(echo.word_number)
         commands = commands_of(echo, self.terms)
         try:
-            done = self.copies.confirm(word, commands, echo.digest)
+            done = self.copies.confirm(word, commands, echo.digest, echo.digest_bits)
         except CANNOT_FLY as error:
             return self._on_diverged(error)
         self.confirmed.append(done)
         self.history.add(self.epoch, word, done.flown.state)
         unsent = done.lag_samples == 0
-        self.counts.update(digest_checks=1, erasures=word is ERASED, words_missed=unsent)
-        if done.digest != echo.digest:
+        self.counts.update(
+            confirmed=1,
+            digest_checks=echo.digest_bits > 0,
+            erasures=word is ERASED,
+            words_missed=unsent,
+        )
+        if done.digest != done.peer_digest:
             return self._on_desync(done)
-        # Only now: a receiver with a different state must move no motor.
-        self.owing.on_confirmed()
+        if done.sample % PART_SAMPLES == 0:
+            self._parted = done
         first_tick = echo.sample * self.terms.ticks_per_sample + self.terms.lead_ticks
-        self._due.extend(enumerate(commands, first_tick))
+        self._unproven += enumerate(commands, first_tick)
+        if echo.digest_bits:
+            # Only now: a receiver with a different state must move no motor.
+            self.owing.on_confirmed()
+            self._due.extend(self._unproven)
+            self._unproven = []
         return []
+
+    def _check_part(self, part: DigestPart | None) -> list[Frame]:
+        """Compare the part of an earlier digest that came with a frame."""
+        done = self._parted
+        if part is None or done is None or done.sample != part.sample:
+            return []
+        differing = (done.digest >> part.shift) % (1 << part.bits) ^ part.value
+        if not differing:
+            return []
+        return self._on_desync(done._replace(peer_digest=done.digest ^ differing << part.shift))
 
     def _on_desync(self, done: Confirmed) -> list[Frame]:
         self.counts["desyncs"] += 1

@@ -1,14 +1,16 @@
 """The load of a serial line and its transmission times: the arithmetic behind a refusal.
 
 Up the line goes one byte per symbol; down it one command frame per sample, which is
-`(head + CRC) + (1 + W) * echo` bytes before COBS. A line of 8N1 spends ten bits on a byte, and each
+`(head + CRC) + (1 + W) * echo` bytes before COBS, or that of the compact downlink. A line of 8N1 spends ten bits on a byte, and each
 direction has its own wire.
 """
 
 from __future__ import annotations
 
+from channel.codec.codec import Codec
 from channel.links.serial.cobs import cobs_encode
 from channel.links.serial.wire import SerialWire
+from channel.protocol.compact import CompactForm
 from channel.protocol.frames import Commands, Echo
 from channel.protocol.terms import Terms
 from channel.protocol.wire import encode
@@ -16,12 +18,19 @@ from channel.protocol.wire import encode
 LINE_BITS_PER_BYTE = 10
 
 
-def command_bytes(terms: Terms, inputs: int) -> int:
-    """Return the bytes of a command frame of `inputs` values a tick, COBS and delimiters included."""
-    steps = (1,) * (terms.ticks_per_sample * inputs)
+def message_bytes(terms: Terms, codec: Codec) -> int:
+    """Return the bytes of a command frame, without a line's framing."""
+    if terms.downlink == "compact":
+        return CompactForm(codec, terms).frame_bytes
+    steps = (1,) * (terms.ticks_per_sample * codec.model.input_size)
     echoes = tuple(Echo(sample, 1, 1, steps) for sample in range(terms.repeats + 1))
+    return len(encode(Commands(1, 1, echoes)))
+
+
+def command_bytes(terms: Terms, codec: Codec) -> int:
+    """Return the bytes of a command frame, COBS and delimiters included."""
     # COBS adds a byte for every 254; a frame full of zeros is not shorter.
-    content = len(encode(Commands(1, 1, echoes)))
+    content = message_bytes(terms, codec)
     return len(cobs_encode(b"\1" * content)) + 2
 
 

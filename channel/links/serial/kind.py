@@ -54,7 +54,7 @@ class SerialKind(LinkKind):
             down_ns = 0
         else:
             rate = settings.downlink_rate_baud if settings.downlink else settings.line_rate_baud
-            frame_bytes = command_bytes(terms, codec.model.input_size)
+            frame_bytes = command_bytes(terms, codec)
             check_down(terms, frame_bytes, rate)
             down_ns = byte_ns(frame_bytes, rate)
         up_ns = byte_ns(1, settings.line_rate_baud)

@@ -127,7 +127,7 @@ def foreign_version_text(peer: str, version: int) -> str:
 def encode(frame: Frame) -> bytes:
     """Return the bytes of a frame; ValueError for values that no frame can carry."""
     if isinstance(frame, ShortCommands):
-        if not is_short(frame.data):
+        if frame.data[:1] < b"\x80" or frame.data[:1] >= b"\xc0":
             raise ValueError("compact commands begin with the bits 10")
         return frame.data + _CRC.pack(crc_hqx(frame.data, CRC_START))
     try:

@@ -1,6 +1,6 @@
 """The command frame of the compact downlink: the same echo in few bits.
 
-    10 | epoch 2 | session 4 | sample 8 or more | digest 16 | part 3 | W + 1 echoes | zeros | CRC-16
+    10 | epoch 2 | session 4 | sample 8 or more | digest 16 | 3 more | W + 1 echoes | zeros | CRC-16
 
 Bits in order, the highest first, and zeros up to a whole byte. An echo, the newest first, is a word's
 number (an erasure is the one after the last word) and one command for each input, held over all ticks of
@@ -11,8 +11,9 @@ the first sample of an epoch echoes are zeros.
 A command is a number of *held steps* of its input: the steps of a full frame, or as many of them
 together as make the input's limit fit `COMMAND_BITS`. So both codecs use exactly what came.
 
-The digest of each sample has its low 16 bits here. The other 48 of every sixteenth sample follow, three
-in its own frame and in each of the next fifteen.
+Of the newest sample's digest the low 16 bits are here and three of the others: those of sample `k` begin
+at bit `16 + 3 (k mod 16)`. So two states that differ stay unseen for `n` samples with a probability of
+2^(-19 n), and a difference in any one bit of the digests for 15 samples at most.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from channel.codec.codec import WIRE_ERASED, Codec, Vector
-from channel.protocol.frames import Commands, DigestPart, Echo, ShortCommands
+from channel.protocol.frames import Commands, Echo, ShortCommands
 from channel.protocol.limits import to_steps
 from channel.protocol.terms import Terms
 from channel.protocol.wire import SHORT_MARK
@@ -29,7 +30,7 @@ COMMAND_BITS = 11
 DIGEST_BITS = 16
 PART_BITS = 3
 PART_SAMPLES = 16
-"""Every so many samples all 64 bits of a digest go down."""
+"""In so many samples each of a digest's 64 bits goes down."""
 EPOCH_BITS, SESSION_BITS = 2, 4
 SAMPLE_BITS_MIN = 8
 
@@ -54,8 +55,6 @@ class CompactForm:
         bits = self._sample_bits + DIGEST_BITS + PART_BITS + self._echoes * echo_bits
         self._padding = -bits % 8
         self._bytes = 1 + (bits + self._padding) // 8
-        self._parted = (-1, 0)
-        """the last sample whose whole digest goes down, and that digest"""
 
     @property
     def frame_bytes(self) -> int:
@@ -77,20 +76,12 @@ class CompactForm:
             steps.append(per * max(-most, min(most, round(value * unit / per))))
         return tuple(steps)
 
-    def begin(self) -> None:
-        """Begin an epoch: of the samples before it no digest goes down."""
-        self._parted = (-1, 0)
-
     def packed(self, session: int, epoch: int, echoes: Sequence[Echo]) -> ShortCommands:
         """Return the frame of echoes, of which the last is new."""
         newest = echoes[-1]
-        start, shift = _part_of(newest.sample)
-        if newest.sample == start:
-            self._parted = (start, newest.digest)
-        digest = self._parted[1] if self._parted[0] == start else 0
         bits = newest.sample % (1 << self._sample_bits)
         bits = bits << DIGEST_BITS | newest.digest % (1 << DIGEST_BITS)
-        bits = bits << PART_BITS | (digest >> shift) % (1 << PART_BITS)
+        bits = bits << PART_BITS | (newest.digest >> _part_of(newest.sample)) % (1 << PART_BITS)
         inputs = len(self._per_held)
         missing = self._echoes - len(echoes)
         for echo in reversed(echoes):
@@ -131,9 +122,12 @@ class CompactForm:
             if sample >= 0
         ]
         number, steps = echoes[-1]
-        new = Echo(newest, number, digest, steps * self._terms.ticks_per_sample, DIGEST_BITS)
-        start, shift = _part_of(newest)
-        return Commands(session, epoch, (*known, new), DigestPart(start, shift, PART_BITS, part))
+        shift = _part_of(newest)
+        mask = (1 << DIGEST_BITS) - 1 | (1 << PART_BITS) - 1 << shift
+        new = Echo(
+            newest, number, digest | part << shift, steps * self._terms.ticks_per_sample, mask
+        )
+        return Commands(session, epoch, (*known, new))
 
     def _echo(self, bits: _Bits) -> tuple[int, tuple[int, ...]]:
         """Take an echo; return its word's number and the command's steps."""
@@ -157,7 +151,6 @@ class _Bits:
         return taken
 
 
-def _part_of(sample: int) -> tuple[int, int]:
-    """Return the sample whose digest a frame has a part of, and the place of its lowest bit."""
-    place = sample % PART_SAMPLES
-    return sample - place, DIGEST_BITS + PART_BITS * place
+def _part_of(sample: int) -> int:
+    """Return the place of the lowest of the three more bits of a sample's digest."""
+    return DIGEST_BITS + PART_BITS * (sample % PART_SAMPLES)

@@ -136,19 +136,8 @@ class Echo:
     """of the codec state after the sample, 64 bits"""
     steps: tuple[int, ...]
     """commands of ticks `kN + D ... (k+1)N + D - 1`, all inputs of a tick together"""
-    digest_bits: int = 64
-    """how many of the digest's low bits came with the echo"""
-
-
-@dataclass(frozen=True, slots=True)
-class DigestPart:
-    """Some bits of the digest of an earlier sample."""
-
-    sample: int
-    shift: int
-    """place of the lowest of them"""
-    bits: int
-    value: int
+    digest_mask: int = 2**64 - 1
+    """which bits of the digest came with the echo; the others are zeros"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,8 +147,6 @@ class Commands:
     session: int
     epoch: int
     echoes: tuple[Echo, ...]
-    part: DigestPart | None = None
-    """with the compact downlink"""
 
 
 @dataclass(frozen=True, slots=True)

@@ -233,8 +233,6 @@ class ReceiverSession:
         self._clock, self._word, self._advanced = SlotClock(self.terms, first * count), [], False
         self._schedule = Schedule(self.terms)
         self._schedule.begin(first * count, now_ns)
-        if self._compact is not None:
-            self._compact.begin()
         hold = self._commander.hold
         told = () if hold == self.terms.initial_command else to_steps(hold, self.terms.signals)
         asked = (hello.incarnation, hello.request)

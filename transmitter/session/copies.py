@@ -43,8 +43,8 @@ class Confirmed(NamedTuple):
     """of our copy after the sample"""
     peer_digest: int
     """of the receiver's"""
-    peer_bits: int
-    """how many of its low bits the receiver sent; the others are taken from ours"""
+    peer_mask: int
+    """which of its bits the receiver sent; the others are taken from ours"""
     lag_samples: int
     """samples that had been sent beyond this one when its echo came"""
     about: tuple[int, ...] | None = None
@@ -115,12 +115,12 @@ class Copies:
         return missed
 
     def confirm(
-        self, word: Word, commands: list[Vector], peer_digest: int, peer_bits: int = 64
+        self, word: Word, commands: list[Vector], peer_digest: int, peer_mask: int = 2**64 - 1
     ) -> Confirmed:
         """Advance the confirmed copy by the echo of its next sample.
 
-        `commands` are those of ticks `kN + D ... (k+1)N + D - 1`; of the receiver's digest the lowest
-        `peer_bits` are known.
+        `commands` are those of ticks `kN + D ... (k+1)N + D - 1`; of the receiver's digest the bits of
+        `peer_mask` are known.
         """
         before = self.confirmed
         arriving = iter(commands)
@@ -138,8 +138,8 @@ class Copies:
         self.confirmed = flown.state
         self._keep_provisional(word, taken)
         digest = self.codec.digest(flown.state)
-        peer = digest >> peer_bits << peer_bits | peer_digest
-        return Confirmed(before.sample, before, sent, word, flown, live, digest, peer, peer_bits, lag)
+        peer = digest & ~peer_mask | peer_digest
+        return Confirmed(before.sample, before, sent, word, flown, live, digest, peer, peer_mask, lag)
 
     def explained(self, done: Confirmed) -> Confirmed:
         """Return a confirmed sample with what its symbols were about, on which no state depends."""
@@ -194,7 +194,7 @@ class EchoOrder:
         if echoes[0].sample > expected:
             latest = min(latest, sample)
         for echo in echoes:
-            repeated = not echo.digest_bits and echo.sample in self._early
+            repeated = not echo.digest_mask and echo.sample in self._early
             if expected <= echo.sample <= latest and not repeated:
                 self._early[echo.sample] = echo
         if echoes[0].sample > expected and self._missing != expected:

@@ -15,7 +15,7 @@ from enum import Enum
 
 from channel.codec.codec import ERASED, Codec, Vector
 from channel.protocol.bounds import Bounds, shown, within_text_bounds
-from channel.protocol.compact import PART_SAMPLES, CompactForm
+from channel.protocol.compact import CompactForm
 from channel.protocol.endings import End, Ending
 from channel.protocol.events import ASKED, Event, EventKind, ended_event, write_event
 from channel.protocol.frames import (
@@ -23,7 +23,6 @@ from channel.protocol.frames import (
     Claim,
     Commands,
     Desync,
-    DigestPart,
     Echo,
     ForeignVersion,
     Frame,
@@ -123,8 +122,6 @@ class TransmitterSession:
         self._compact = CompactForm(codec, terms) if terms.downlink == "compact" else None
         self._unproven: list[tuple[int, Vector]] = []
         """commands of echoes without a digest, until a later one has proved them"""
-        self._parted: Confirmed | None = None
-        """the sample whose whole digest comes in parts"""
 
     # What happens at a tick
 
@@ -278,7 +275,7 @@ class TransmitterSession:
         self.heard_tick = self._tick
         self.copies.restart(state, hold)
         self._echoes.clear()
-        self._unproven, self._parted = [], None
+        self._unproven = []
         self.epoch_tick = state.sample * self.terms.ticks_per_sample
         held = self.owing.begin(self.epoch_tick, self._tick, self._asking.why)
         self._due = deque(enumerate([hold] * held, self.epoch_tick))
@@ -330,7 +327,7 @@ class TransmitterSession:
         while (echo := self._echoes.take(self.copies.confirmed.sample)) is not None:
             if frames := self._confirm(echo):
                 return frames
-        return self._check_part(frame.part) or self._check_gap()
+        return self._check_gap()
 
     def _check_gap(self) -> list[Frame]:
         if not self._echoes.is_lost(expected := self.copies.confirmed.sample, self._tick):
@@ -342,7 +339,7 @@ class TransmitterSession:
         word = self.codec.coder.alphabet.word(echo.word_number)
         commands = commands_of(echo, self.terms)
         try:
-            done = self.copies.confirm(word, commands, echo.digest, echo.digest_bits)
+            done = self.copies.confirm(word, commands, echo.digest, echo.digest_mask)
         except CANNOT_FLY as error:
             return self._on_diverged(error)
         self.confirmed.append(done)
@@ -350,32 +347,20 @@ class TransmitterSession:
         unsent = done.lag_samples == 0
         self.counts.update(
             confirmed=1,
-            digest_checks=echo.digest_bits > 0,
+            digest_checks=echo.digest_mask > 0,
             erasures=word is ERASED,
             words_missed=unsent,
         )
         if done.digest != done.peer_digest:
             return self._on_desync(done)
-        if done.sample % PART_SAMPLES == 0:
-            self._parted = done
         first_tick = echo.sample * self.terms.ticks_per_sample + self.terms.lead_ticks
         self._unproven += enumerate(commands, first_tick)
-        if echo.digest_bits:
+        if echo.digest_mask:
             # Only now: a receiver with a different state must move no motor.
             self.owing.on_confirmed()
             self._due.extend(self._unproven)
             self._unproven = []
         return []
-
-    def _check_part(self, part: DigestPart | None) -> list[Frame]:
-        """Compare the part of an earlier digest that came with a frame."""
-        done = self._parted
-        if part is None or done is None or done.sample != part.sample:
-            return []
-        differing = (done.digest >> part.shift) % (1 << part.bits) ^ part.value
-        if not differing:
-            return []
-        return self._on_desync(done._replace(peer_digest=done.digest ^ differing << part.shift))
 
     def _on_desync(self, done: Confirmed) -> list[Frame]:
         self.counts["desyncs"] += 1

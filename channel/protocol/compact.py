@@ -3,17 +3,17 @@
     10 | epoch 2 | session 4 | sample 8 or more | digest 16 | 3 more | W + 1 echoes | zeros | CRC-16
 
 Bits in order, the highest first, and zeros up to a whole byte. An echo, the newest first, is a word's
-number (an erasure is the one after the last word) and one command for each input, held over all ticks of
-the sample. Session, epoch and sample are what remains of them after division by 16, by 4 and by 2 to the
-power of the sample's bits; the sample is the one nearest to where the transmitter's clock stands. Before
-the first sample of an epoch echoes are zeros.
+number (an erasure is the one after the last word) and one command for each input, held over all ticks
+of the sample. Session, epoch and sample are what remains of them after division by 16, by 4 and by 2 to
+the power of the sample's bits; the sample is the one nearest to where the transmitter's clock stands.
+Before the first sample of an epoch echoes are zeros.
 
 A command is a number of *held steps* of its input: the steps of a full frame, or as many of them
 together as make the input's limit fit `COMMAND_BITS`. So both codecs use exactly what came.
 
-Of the newest sample's digest the low 16 bits are here and three of the others: those of sample `k` begin
-at bit `16 + 3 (k mod 16)`. So two states that differ stay unseen for `n` samples with a probability of
-2^(-19 n), and a difference in any one bit of the digests for 15 samples at most.
+Of the newest sample's digest the low 16 bits are here and three of the others: those of sample `k`
+begin at bit `16 + 3 (k mod 16)`. So two states that differ stay unseen for `n` samples with a
+probability of 2^(-19 n), and a difference in any one bit of the digests for 15 samples at most.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ COMMAND_BITS = 11
 DIGEST_BITS = 16
 PART_BITS = 3
 PART_SAMPLES = 16
-"""In so many samples each of a digest's 64 bits goes down."""
+"""In this many samples each of a digest's 64 bits goes down."""
 EPOCH_BITS, SESSION_BITS = 2, 4
 SAMPLE_BITS_MIN = 8
 
@@ -44,9 +44,9 @@ class CompactForm:
         self._word_bits = self._words.bit_length()
         # Echoes are taken from one history behind the clock to two before it.
         self._sample_bits = max(SAMPLE_BITS_MIN, (4 * terms.history_samples - 1).bit_length())
-        most = 2 ** (COMMAND_BITS - 1) - 1
+        most = (1 << COMMAND_BITS - 1) - 1
         largest = to_steps(terms.limits.command_max, terms.signals)
-        self._per_held = tuple([-(-one // most) for one in largest])
+        self._per_held = tuple([max(1, -(-one // most)) for one in largest])
         """steps of a full frame in one held step, for each input"""
         self._largest = tuple([a // b for a, b in zip(largest, self._per_held, strict=True)])
         self._command_bits = tuple([(2 * one).bit_length() for one in self._largest])
@@ -124,9 +124,7 @@ class CompactForm:
         number, steps = echoes[-1]
         shift = _part_of(newest)
         mask = (1 << DIGEST_BITS) - 1 | (1 << PART_BITS) - 1 << shift
-        new = Echo(
-            newest, number, digest | part << shift, steps * self._terms.ticks_per_sample, mask
-        )
+        new = Echo(newest, number, digest | part << shift, steps * self._terms.ticks_per_sample, mask)
         return Commands(session, epoch, (*known, new))
 
     def _echo(self, bits: _Bits) -> tuple[int, tuple[int, ...]]:

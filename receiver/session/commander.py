@@ -137,8 +137,8 @@ class Commander:
         flown = fly_sample(self.codec, self.state, word, known, self._decide)
         if self._compact is None:
             return flown
-        # Held from its first tick on, a command would steer half a sample late. The mean moves the plant
-        # as the course of the law would, and the law keeps its own time.
+        # The law's first command, held, would steer half a sample late. The mean moves the plant as the
+        # law's own course would, and the law is asked at every tick as ever.
         steps = self._compact.held(flown.commands, held)
         self.hold = from_steps(steps, self.terms.signals)
         self._steps = [*steps] * self.terms.ticks_per_sample

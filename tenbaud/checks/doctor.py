@@ -139,7 +139,9 @@ def _line_rate(config: FlightConfig) -> Finding:
         needs = ", ".join(f"{least} baud {rung}" for rung, least in line_rates(config).items())
     except ValueError as error:
         return Finding("note", "serial line", f"none carries preset {config.preset}: {error}")
-    return Finding("ok", "serial line", f"preset {config.preset} needs at least {needs} (channel.downlink)")
+    return Finding(
+        "ok", "serial line", f"preset {config.preset} needs at least {needs} (channel.downlink)"
+    )
 
 
 def line_rates(config: FlightConfig) -> dict[Rung, int]:

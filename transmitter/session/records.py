@@ -53,7 +53,12 @@ SAMPLE_CHANNEL = RecordChannel(
         Field("state", "numbers", "", "codec's model state after the sample"),
         Field("coder", "numbers", "", "coder state after the sample"),
         Field("digest", "string", "", "64-bit digest of the codec state after the sample"),
-        Field("peer_digest", "string", "", "the receiver's digest of the same sample: its last digits, as many as were sent"),
+        Field(
+            "peer_digest",
+            "string",
+            "",
+            "the receiver's digest of it: the last digits that were sent",
+        ),
         Field("lag_samples", "integer", "", "samples sent beyond it when its echo came", timing=True),
         Field("about", "integers", "", "output that each symbol was about, from 0; null: erased"),
     ),

@@ -40,6 +40,7 @@ from channel.protocol.recording import NullRecorder, Recorder, write_epoch
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
 from transmitter.session.copies import CANNOT_FLY, Confirmed, Copies, EchoOrder, commands_of
+from transmitter.session.due import DueCommands
 from transmitter.session.owing import Owing
 from transmitter.session.records import write_sample
 from transmitter.session.rejoin import Asking, start_of
@@ -86,8 +87,8 @@ class TransmitterSession:
         self.epoch = 0
         self.copies = Copies(codec, terms)
         self.counts: Counter[str] = Counter()
-        """confirmed, digest_checks, desyncs, rejoins, stale_frames, words_missed, erasures, claims_refused,
-        take_overs, out_of_bounds, diverged"""
+        """confirmed, digest_checks, desyncs, rejoins, stale_frames, words_missed, erasures,
+        claims_refused, take_overs, out_of_bounds, diverged"""
         self.rejoins_asked: Counter[Why] = Counter()
         self.end: End | None = None
         self.refusal: End | None = None
@@ -112,16 +113,9 @@ class TransmitterSession:
         """Echoes may be this many samples behind before a rejoin is asked for."""
         self._observer = state_observer or default_observer(codec, terms.tick_ns / 1e9)
         self._recorder = recorder or NullRecorder()
-        self._due: deque[tuple[int, Vector]] = deque(
-            enumerate([terms.initial_command] * terms.lead_ticks)
-        )
-        """commands of coming ticks"""
+        self._due = DueCommands(terms.initial_command, terms.lead_ticks)
         self._tick = -1
-        self._command: Vector = terms.initial_command
-        """the last one given out"""
         self._compact = CompactForm(codec, terms) if terms.downlink == "compact" else None
-        self._unproven: list[tuple[int, Vector]] = []
-        """commands of echoes without a digest, until a later one has proved them"""
 
     # What happens at a tick
 
@@ -139,7 +133,7 @@ class TransmitterSession:
         """
         self._tick = tick
         if self._observer is not None:
-            measurement = self._observer.look(tick, measurement, self._command)
+            measurement = self._observer.look(tick, measurement, self._due.last)
         if self.phase is Phase.REJOINING:
             return self._ask()
         if self.phase is not Phase.FLYING:
@@ -187,12 +181,7 @@ class TransmitterSession:
 
     def command(self, tick: int) -> Vector | None:
         """Return the command of this tick, None when it has not come; earlier ones are forgotten."""
-        while self._due and self._due[0][0] < tick:
-            self._due.popleft()
-        if not self._due or self._due[0][0] != tick:
-            return None
-        self._command = self._due[0][1]
-        return self._command
+        return self._due.take(tick)
 
     def take_confirmed(self) -> list[Confirmed]:
         """Write down and return what was confirmed since the last call; the next symbol goes first."""
@@ -275,10 +264,9 @@ class TransmitterSession:
         self.heard_tick = self._tick
         self.copies.restart(state, hold)
         self._echoes.clear()
-        self._unproven = []
         self.epoch_tick = state.sample * self.terms.ticks_per_sample
         held = self.owing.begin(self.epoch_tick, self._tick, self._asking.why)
-        self._due = deque(enumerate([hold] * held, self.epoch_tick))
+        self._due.restart(self.epoch_tick, hold, held)
         self.phase = Phase.FLYING
         write_epoch(self._recorder, self.terms.sample_ns, self.epoch, state, hold)
         self.counts["rejoins"] += again
@@ -345,21 +333,15 @@ class TransmitterSession:
         self.confirmed.append(done)
         self.history.add(self.epoch, word, done.flown.state)
         unsent = done.lag_samples == 0
-        self.counts.update(
-            confirmed=1,
-            digest_checks=echo.digest_mask > 0,
-            erasures=word is ERASED,
-            words_missed=unsent,
-        )
+        checked, erased = echo.digest_mask > 0, word is ERASED
+        self.counts.update(confirmed=1, digest_checks=checked, erasures=erased, words_missed=unsent)
         if done.digest != done.peer_digest:
             return self._on_desync(done)
-        first_tick = echo.sample * self.terms.ticks_per_sample + self.terms.lead_ticks
-        self._unproven += enumerate(commands, first_tick)
-        if echo.digest_mask:
-            # Only now: a receiver with a different state must move no motor.
+        # Only now: a receiver with a different state must move no motor.
+        if checked:
             self.owing.on_confirmed()
-            self._due.extend(self._unproven)
-            self._unproven = []
+        first_tick = echo.sample * self.terms.ticks_per_sample + self.terms.lead_ticks
+        self._due.add(first_tick, commands, proven=checked)
         return []
 
     def _on_desync(self, done: Confirmed) -> list[Frame]:

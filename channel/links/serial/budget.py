@@ -1,8 +1,8 @@
 """The load of a serial line and its transmission times: the arithmetic behind a refusal.
 
 Up the line goes one byte per symbol; down it one command frame per sample, which is
-`(head + CRC) + (1 + W) * echo` bytes before COBS, or that of the compact downlink. A line of 8N1 spends ten bits on a byte, and each
-direction has its own wire.
+`(head + CRC) + (1 + W) * echo` bytes before COBS, or what the compact downlink makes of it. A line of
+8N1 spends ten bits on a byte, and each direction has its own wire.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The frames of the compact downlink: bits there and back, whose they are, what a command is held to."""
+"""The frames of the compact downlink: bits there and back, whose they are, which command is held."""
 
 from __future__ import annotations
 
@@ -47,7 +47,11 @@ def test_when_the_papers_echoes_are_packed_then_these_are_the_16_bytes() -> None
 def test_when_a_frame_comes_within_half_a_turn_of_the_clock_then_it_says_what_was_packed(
     near: int,
 ) -> None:
-    echoes = (echo(998, 0), echo(999, WIRE_ERASED, (0, 5)), echo(1000, 1, (-5000, 5000), 0x8100_0001_ABCD))
+    echoes = (
+        echo(998, 0),
+        echo(999, WIRE_ERASED, (0, 5)),
+        echo(1000, 1, (-5000, 5000), 0x8100_0001_ABCD),
+    )
     got = through(form(), *echoes, near=1000 + near)
     assert got is not None
     assert (got.session, got.epoch) == (SESSION, EPOCH)

@@ -51,7 +51,7 @@ def examine(config: FlightConfig, connect: tuple[str, ...] = ()) -> list[Finding
         *_numerics(config),
         *_clock(config),
         *_ports(),
-        _line_rate(config),
+        serial_line(config),
         *_vendor(),
         *_zenoh(),
         *(_reach(endpoint) for endpoint in connect),
@@ -133,7 +133,7 @@ def _ports() -> list[Finding]:
     ]
 
 
-def _line_rate(config: FlightConfig) -> Finding:
+def serial_line(config: FlightConfig) -> Finding:
     """Say which serial line carries the flight, with either downlink."""
     try:
         needs = ", ".join(f"{least} baud {rung}" for rung, least in line_rates(config).items())

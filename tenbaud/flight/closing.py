@@ -78,8 +78,9 @@ def _figures(summary: Summary, unicode: bool) -> Iterator[tuple[str, str]]:
     flown = f"{get('preset')} over {get('link')}, {get('clock')} clock"
     yield "Flown", f"{get('plant')}; {flown}" if get("plant") else flown
     if get("coder_bits_up") is not None:
-        yield "Uplink", _bits(summary, "up")
-        yield "Downlink", f"{get('downlink', 'full')}: {_bits(summary, 'down')}"
+        yield "Uplink", _uplink(summary)
+    if get("downlink", "full") != "full":
+        yield "Downlink", f"{get('downlink')}: {_bits(summary, 'down')}"
     yield from _errors(summary, unicode)
     if learned := summary.get("learned"):
         seen = [learned_text(name, **one) for name, one in learned.items() if is_seen(**one)]
@@ -133,14 +134,18 @@ def _errors(summary: Summary, unicode: bool) -> Iterator[tuple[str, str]]:
             yield "Tracking error", f"{of}{tracking} rms{beside}, steps of the reference included"
 
 
+def _uplink(summary: Summary) -> str:
+    text = _bits(summary, "up")
+    up, down = summary.get("wire_bytes_up"), summary.get("wire_bytes_down")
+    if up is not None and down is not None:
+        text += f"; with framing {_bytes(up)} up, {_bytes(down)} down"
+    return text
+
+
 def _bits(summary: Summary, way: str) -> str:
-    """Return what went one way: the coder's bits and the bytes of all frames."""
     bits = summary[f"coder_bits_{way}"]
-    text = f"{bits:.0f} bits"
-    if summary.get("duration_s"):
-        text += f", {bits / float(summary['duration_s']):.4g} bit/s"
-    size = summary.get(f"wire_bytes_{way}")
-    return text if size is None else f"{text}; with framing {_bytes(size)}"
+    seconds = summary.get("duration_s")
+    return f"{bits:.12g} bits" + (f", {bits / float(seconds):.4g} bit/s" if seconds else "")
 
 
 def _bytes(count: int) -> str:

@@ -1,4 +1,4 @@
-"""One direction of a line as the flight experiences it: when, and whether, a message arrives.
+"""One direction of a line: when, and whether, a message arrives.
 
 On the virtual clock the transmitter's process asks the line of each direction; on a real clock each
 sender asks its own and holds the message back until it is due (`Outbox`). A line carries bytes: what a
@@ -42,7 +42,7 @@ class Line(Protocol):
 
     @property
     def counts(self) -> Counter[str]:
-        """Return how many messages it did what to, on purpose."""
+        """Return the number of messages that it impaired on purpose, by kind."""
 
     def carry(self, data: bytes, now_ns: int) -> list[Delivery]:
         """Return the arrivals of a message put on the line at flight time `now_ns`."""
@@ -77,7 +77,7 @@ class Outbox:
         return self._waiting[0][0] if self._waiting else None
 
     def put(self, deliveries: Iterable[Delivery]) -> None:
-        """Hold what a line makes of a message; a lost one leaves nothing."""
+        """Hold the deliveries of a message; a lost one has none."""
         for arrival_ns, data in deliveries:
             if data is not None:
                 self._order += 1
@@ -193,7 +193,7 @@ def bits_per_symbol(alphabet: Alphabet) -> float:
 
 
 class UplinkMeter:
-    """Counts what the transmitter put on the line."""
+    """Counts the transmitter's messages on the line."""
 
     def __init__(self, alphabet: Alphabet) -> None:
         self._bits_per_symbol = bits_per_symbol(alphabet)

@@ -20,13 +20,13 @@ class Why(IntEnum):
     DESYNC = 1
     """the digests of a sample differed"""
     GAP = 2
-    """echoes were lost, more in a row than command frames repeat"""
+    """more consecutive echoes were lost than command frames repeat"""
     LAG = 3
-    """no echo came for as long as the history lasts"""
+    """no echo came within the history"""
     UNKNOWN = 4
-    """the receiver does not know the session: it was restarted, or lost track"""
+    """the receiver does not know the session: it was restarted, for example"""
     GUARD = 5
-    """commands stayed away until the watchdog took the voltage down"""
+    """without commands the watchdog ramped the voltage down"""
     TAKEN_OVER = 6
     """another receiver takes the flight over, on purpose"""
 
@@ -88,7 +88,7 @@ class Refuse:
 
 @dataclass(frozen=True, slots=True)
 class Symbol:
-    """One paid symbol in its slot."""
+    """One coded symbol in its slot."""
 
     session: int
     epoch: int
@@ -119,7 +119,7 @@ class LocatedSymbol:
     slot: int | None
     """None: no slot that may come now has it"""
     slot_low: int
-    """what its byte said of the slot"""
+    """the slot's digits in its byte"""
     in_time: bool
     anchor: tuple[int, int] | None
     """(slot, time in ns): where deadlines count from now on, if that has changed"""
@@ -163,7 +163,7 @@ class ShortCommands:
 class Desync:
     """The transmitter's copy differs from the receiver's after this sample.
 
-    The receiver answers with the same frame and its own state, so that both can write both down.
+    The receiver answers with the same frame and its own state, so that both can record both.
     """
 
     session: int
@@ -207,7 +207,7 @@ class Bye:
 
 @dataclass(frozen=True, slots=True)
 class ForeignVersion:
-    """A whole frame of another wire version: not read further, but worth telling about."""
+    """A whole frame of another wire version: not decoded further, but reported."""
 
     version: int
 

@@ -117,7 +117,7 @@ class Wire(SymbolWire, Protocol):
 
 
 def foreign_version_text(peer: str, version: int) -> str:
-    """Return what to do about a peer whose frames are of another wire version."""
+    """Return the advice for a peer whose frames are of another wire version."""
     return (
         f"the {peer} speaks wire version {version}, this end {WIRE_VERSION}: install the same tenbaud "
         "on both"

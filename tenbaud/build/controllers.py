@@ -45,7 +45,7 @@ def controller_context(
     signals = signals_of(model)
     return ControllerContext(
         config.timing.tick_s,
-        build_references(config, signals) if references is None else references,
+        build_references(config, signals, model) if references is None else references,
         build_limits(config, signals).command_max,
         initial_command(config, signals),
         signals,

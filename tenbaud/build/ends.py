@@ -22,6 +22,7 @@ from receiver.endpoint import ReceiverEndpoint, SteppedEndpoint
 from receiver.session.session import ReceiverSession
 from tenbaud.build.codec import build_codec
 from tenbaud.build.controllers import build_controller
+from tenbaud.build.first_contact import require_safe
 from tenbaud.build.flight import Agreement, ticks_of, watchdog_wanted_s
 from tenbaud.build.flight_log import output_steps
 from tenbaud.build.gauge import build_gauge
@@ -81,7 +82,7 @@ def _followed(agreement: Agreement) -> Callable[[int], tuple[float | None, ...]]
         return agreement.parts.controller.references
     if agreement.config.receiver.controller == "recorded":
         return values_of((None,) * len(agreement.signals.outputs))
-    return values_of(build_references(agreement.config, agreement.signals))
+    return values_of(build_references(agreement.config, agreement.signals, agreement.codec.model))
 
 
 def build_observer(agreement: Agreement) -> StateObserver | None:
@@ -175,14 +176,19 @@ def check_parts(config: FlightConfig, parts: Parts | None = None) -> None:
             _check_command(config, controller, parts)
 
 
-def check_rig_port(config: FlightConfig) -> None:
-    """Raise LinkError where a serial port of the rig is not there; for a process that opens the rig."""
+def check_rig(config: FlightConfig, accept_risk: bool = False, parts: Parts | None = None) -> bool:
+    """Return whether motors of a real rig will turn; for a process that opens the rig.
+
+    LinkError where a serial port of the rig is not there, ConfigError where its motors would turn
+    without what `require_safe` asks for.
+    """
     if config.transmitter.rig == "serial":
         from channel.links.serial.port import check_port
 
         section = config.transmitter.serial
         for port in filter(None, (section.port, section.motor_port)):
             check_port(port, insecure=True)
+    return require_safe(config, accept_risk, parts)
 
 
 def check_sabotage(agreement: Agreement) -> None:

@@ -11,9 +11,9 @@ PANEL = "Models, coders, studies"
 
 
 def add_commands(app: typer.Typer) -> None:
-    """Add `figures` and `bench coders`; where there is no checkout, what says that they need one."""
+    """Add `figures` and `bench coders`; without a checkout, commands that report the need for one."""
     bench = typer.Typer(no_args_is_help=True, help="Compare coders with the theoretical minimum.")
-    # Keeps `coders` a command of its own, however few there are.
+    # Keeps `coders` a subcommand although it is the only one.
     bench.callback()(lambda: None)
     app.add_typer(bench, name="bench", rich_help_panel=PANEL)
     if find_spec("reproduction") is not None:

@@ -1,4 +1,4 @@
-"""The commands, gathered. Each lives in a separate module beside this one."""
+"""All commands. Each is in a separate module beside this one."""
 
 from __future__ import annotations
 
@@ -56,9 +56,9 @@ add_commands(app)
 
 
 def app_for(arguments: list[str]) -> typer.Typer:
-    """Return the app with the one command that is asked for: the others take time to build.
+    """Return the app with only the requested command: the others take time to build.
 
-    Where the first argument is no command of its own, it is the whole app.
+    If the first argument is not a command, return the whole app.
     """
     commands = [one for one in app.registered_commands if [one.name] == arguments[:1]]
     if not commands:

@@ -1,4 +1,4 @@
-"""Commands about runs: look at them, compare, fly them again, judge, convert; and about presets."""
+"""Commands about runs: inspect, compare, replay, audit, convert; and about presets."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ RunArgument = Annotated[Path, typer.Argument(help="Folder of a run, or one recor
 def inspect(
     run: RunArgument, json: Annotated[bool, typer.Option("--json", help="The same as JSON.")] = False
 ) -> None:
-    """Show what a run's recordings hold: channels, units, spans, events.
+    """Show the content of a run's recordings: channels, units, spans, events.
 
     [dim]tenbaud inspect runs/2026-11-23T10-00-00_paper-10baud[/dim]
     """
@@ -32,13 +32,13 @@ def inspect(
 def diff(
     run_a: RunArgument,
     run_b: Annotated[
-        Path | None, typer.Argument(help="Another; not given: the two ends of the first are compared.")
+        Path | None, typer.Argument(help="Another; not given: compare the two ends of the first.")
     ] = None,
 ) -> None:
-    """Name the first sample at which two recordings differ, and the field.
+    """Find the first sample and field in which two recordings differ.
 
-    Exit code 0: equal. 1: a value differs. 2: not comparable, because rows are missing that both should
-    hold, or because there is nothing to compare; what is missing is named.
+    Exit code 0: equal. 1: a value differs. 2: not comparable, because rows that both should hold
+    are missing (they are listed), or there is nothing to compare.
 
     [dim]tenbaud diff runs/monday runs/tuesday[/dim]
     """
@@ -64,7 +64,7 @@ def presets() -> None:
     configs = {name: load_config(name) for name in preset_names()}
     plants: dict[str, list[str]] = {}
     for name, config in configs.items():
-        # A plant that is nothing but matrices has its name from its preset.
+        # A linear plant is named after its preset.
         own = config.plant_kind == "linear"
         plants.setdefault(name.rpartition("-")[0] if own else config.plant_kind, []).append(name)
     width = max(map(len, configs))
@@ -76,7 +76,7 @@ def presets() -> None:
 
 
 class Form(StrEnum):
-    """What a run can become."""
+    """The formats of `convert`."""
 
     CSV = "csv"
     MAT = "mat"
@@ -138,13 +138,13 @@ def replay(
     run: Annotated[Path, typer.Argument(help="Folder of a run, or a file of symbols.")],
     other: OtherRun = None,
     save: Annotated[
-        Path | None, typer.Option(help="Write the symbols into this new file: the whole flight.")
+        Path | None, typer.Option(help="Write the symbols, the whole flight, into this new file.")
     ] = None,
     allow_code: options.AllowCode = False,
 ) -> None:
-    """Fly a recorded flight again from its symbols alone, and compare every state to the last bit.
+    """Replay a recorded flight from its symbols alone, and compare every state to the last bit.
 
-    Exit code 1 if one differs.
+    Exit code 1 if a state differs.
 
     [dim]tenbaud replay runs/2026-11-23T10-00-00_paper-10baud --save flight.symbols[/dim]
 

@@ -1,4 +1,4 @@
-"""`tenbaud sweep`: fly a study and draw it."""
+"""`tenbaud sweep`: fly a study and plot it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,9 @@ def sweep(
     study: Annotated[Path, typer.Argument(help="Study file (TOML); see docs/studies.md.")],
     out: Annotated[
         Path | None,
-        typer.Option(help="Folder of the results; studies/<name> if not given. Resumes what is there."),
+        typer.Option(
+            help="Folder of the results; studies/<name> if not given. Resumes an existing study."
+        ),
     ] = None,
     workers: Annotated[
         int | None, typer.Option(min=1, max=1024, help="Processes on this machine; default: all cores.")

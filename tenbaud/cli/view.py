@@ -12,7 +12,7 @@ from tenbaud.cli import options
 Host = Annotated[
     str | None,
     typer.Option(
-        help="Address of the page; one beyond this machine needs --insecure. Not given: 127.0.0.1, or "
+        help="Address of the page; others than loopback need --insecure. Not given: 127.0.0.1, or "
         "::1 where there is no IPv4."
     ),
 ]
@@ -46,7 +46,7 @@ def view(
     """Serve a live page of a flight, for the browser: picture, curves, bits, lockstep, controls.
 
     Two addresses are printed: one that can control the flight, if the flight allows it, and one that
-    is view-only. Each contains a secret; without a secret nothing of the page is served.
+    is view-only. Each contains a secret; requests without it are refused.
 
     [dim]tenbaud demo --view[/dim]
 

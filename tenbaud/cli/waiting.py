@@ -1,4 +1,4 @@
-"""A line on the terminal for as long as a command says nothing: `tenbaud audit: working, 3 s`."""
+"""A line on the terminal while a command prints nothing: `tenbaud audit: working, 3 s`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ COMPLETES = "_TENBAUD_COMPLETE"
 
 
 class Waiting:
-    """Begins after `AFTER_S`, and is gone with the first output of the command or with `end`."""
+    """Begins after `AFTER_S`, and disappears with the command's first output or with `end`."""
 
     def __init__(self, what: str, number: int = 2) -> None:
         self._what = what

@@ -16,7 +16,7 @@ from channel.protocol.terms import Clock
 from plant_sim.plant import Plant
 from receiver.controllers.base import Controller
 from tenbaud.build.controllers import controller_context
-from tenbaud.build.ends import check_parts, check_rig_port
+from tenbaud.build.ends import check_parts, check_rig
 from tenbaud.build.flight import Agreement, agree
 from tenbaud.build.given import Given, feedback_gains, reference_settings, whole_sections
 from tenbaud.build.parts import PartError, Parts
@@ -67,6 +67,7 @@ def fly(
     model: Model | str | None = None,
     coder: Coder | str | None = None,
     plant: Plant | Callable[..., Plant] | str | None = None,
+    accept_risk: bool = False,
 ) -> Run:
     """Fly once, a preset or a plant of your own, and return the recorded run.
 
@@ -84,7 +85,8 @@ def fly(
     configuration, or an object that you build for the tick that is flown; a class of a plant is called
     with its context. With the link "memory" both ends are in this process and the flight is as fast as
     it computes; the others start two processes and take names only. `out` is a new folder; without it
-    one is made in `runs/`.
+    one is made in `runs/`. `accept_risk`: turn the motors of a real rig without the limits of a first
+    flight (docs/rigs).
 
     Raises ConfigError for plants, settings and parts that make no flight, and FlightFailed for a flight
     that did not end well.
@@ -102,7 +104,7 @@ def fly(
     with removed_unless_begun(folder):
         if reference is not None:
             loaded = _following(loaded, reference, parts, folder)
-        agreement = _agreement(loaded, clock, parts)
+        agreement = _agreement(loaded, clock, parts, accept_risk)
     result = fly_demo(agreement, folder, lambda _status: None, draw=draw, status="none")
     if result.code:
         said = "\n  ".join([str(result.summary["outcome"]), *result.messages])
@@ -178,7 +180,8 @@ def _following(
     )
     values = loaded.model_dump(mode="json", exclude_none=True)
     over = {"receiver": {"reference": whole_sections(section, outputs[0].name)}}
-    return load_config(loaded.preset, None, merged(values, over), allow_code=True)
+    followed = load_config(loaded.preset, None, merged(values, over), allow_code=True)
+    return followed.giving(loaded.given)
 
 
 def _objects(parts: Mapping[str, Any]) -> Parts:
@@ -198,7 +201,9 @@ def _is_built(name: str, part: object) -> bool:
     return name in ("plant", "controller") and inspect.isclass(part)
 
 
-def _agreement(loaded: FlightConfig, clock: Clock, parts: Mapping[str, Any]) -> Agreement:
+def _agreement(
+    loaded: FlightConfig, clock: Clock, parts: Mapping[str, Any], accept_risk: bool
+) -> Agreement:
     """Return what both ends share, with every part built and checked."""
     agreement = agree(loaded, clock, _objects(parts))
     plant, controller = parts.get("plant"), parts.get("controller")
@@ -215,5 +220,5 @@ def _agreement(loaded: FlightConfig, clock: Clock, parts: Mapping[str, Any]) -> 
         )
     agreement = replace(agreement, parts=made)
     check_parts(loaded, made)
-    check_rig_port(loaded)
+    check_rig(loaded, accept_risk, made)
     return agreement

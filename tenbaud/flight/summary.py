@@ -13,8 +13,8 @@ from channel.protocol.endings import End
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build.flight import Agreement
 from tenbaud.build.recorded import replay_notes
+from tenbaud.build.rig import real_rig_name
 from tenbaud.build.transmitter_run import TransmitterRun
-from tenbaud.config.schema import TransmitterSection
 from tenbaud.flight.outcome import Outcome
 from tenbaud.sentences import events
 from transmitter.metrics.gap import Gap
@@ -196,17 +196,6 @@ def _plant_name(agreement: Agreement) -> str:
     if section.plant.disturbance:
         name += f", disturbed by {section.plant.disturbance}"
     return name
-
-
-def real_rig_name(section: TransmitterSection) -> str:
-    """Return where a real rig is, in a few words."""
-    match section.rig:
-        case "serial":
-            return f"rig at {section.serial.port}, {section.serial.format}"
-        case "quarc":
-            return f"QUARC model at {section.quarc.host}:{section.quarc.port}"
-        case _:
-            return f"Quanser {section.hil.card_type} {section.hil.card_identifier}"
 
 
 def _outputs(run: TransmitterRun) -> Summary:

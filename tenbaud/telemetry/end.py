@@ -153,7 +153,7 @@ class TelemetryEnd:
 def _steered(agreement: Agreement) -> tuple[SteeredReference | None, ...] | None:
     if not (agreement.live and agreement.config.receiver.controller in STEERABLE):
         return None
-    references = build_references(agreement.config, agreement.signals)
+    references = build_references(agreement.config, agreement.signals, agreement.codec.model)
     stops: dict[str, tuple[float, float]] = getattr(agreement.config.model, "stops", {})
     found: list[SteeredReference | None] = []
     for output, one in zip(agreement.signals.outputs, references, strict=True):

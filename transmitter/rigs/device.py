@@ -199,6 +199,15 @@ class DeviceRig(Rig):
             self._unread = 0
             return self.latest
 
+    def declares_emulation(self, timeout_s: float) -> bool:
+        """Return whether the device says within this time that it is the rig emulator."""
+        until = time.monotonic() + timeout_s
+        while self.latest is None or DeviceFlag.EMULATED not in self.latest.flags:
+            if (left_s := until - time.monotonic()) <= 0.0:
+                return False
+            self.wait_for_sample(left_s)
+        return True
+
     # The reader's side
 
     def _take(self, raw: RawSample, host_ns: int) -> None:

@@ -1,4 +1,4 @@
-"""A serial line as a kind of link: what it can carry, how long bytes take, and how an end opens it."""
+"""A serial line as a kind of link: its capacity, its transmission times, and how an end opens it."""
 
 from __future__ import annotations
 

@@ -156,7 +156,7 @@ class EmulatedDevice:
         self.advance(now_ns)
         self.counts["samples"] += 1
         self._sequence += 1
-        flags = self.flags
+        flags = self.flags | DeviceFlag.EMULATED
         flags |= DeviceFlag.WATCHDOG_TRIPPED if self.tripped else DeviceFlag(0)
         flags |= DeviceFlag.OUTPUT_ENABLED if self.enabled else DeviceFlag(0)
         time_us = (now_ns - self._boot_ns) // 1000

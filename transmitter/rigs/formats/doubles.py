@@ -10,7 +10,7 @@ import math
 import struct
 from typing import Literal
 
-from transmitter.rigs.formats.samples import DeviceFlag, RawSample, Wraps
+from transmitter.rigs.formats.samples import DeviceFlag, RawSample, Wraps, flags_of
 
 ByteOrder = Literal["little", "big"]
 AngleUnit = Literal["counts", "rad", "deg"]
@@ -71,7 +71,7 @@ class DoublesLayout:
             elif name == "time_s":
                 time_us = round(value * 1e6)
             elif name == "flags":
-                flags = DeviceFlag(round(value) & 0x0F)
+                flags = flags_of(round(value) & 0xFF)
             else:
                 channel = int(name[1:])
                 counts[channel] = math.floor(value * self._scales.get(channel, 1.0) + 0.5)

@@ -284,6 +284,9 @@ def test_when_a_flight_cannot_be_compiled_then_the_nodes_fly_it_and_it_says_why(
     assert (figures.engine, figures.not_compiled) == ("plain", "sabotage and dry runs")
     with pytest.raises(StudyError, match="cannot fly sabotage and dry runs"):
         fly_point(config, [1], "compiled")
+    compact = config_of("paper-10baud", {"channel": {"downlink": "compact"}})
+    with pytest.raises(StudyError, match="cannot fly the compact downlink"):
+        fly_point(compact, [1], "compiled")
 
 
 def test_when_a_recorded_flight_is_compiled_then_no_figure_differs(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import { shown } from "./units.js";
 import { set, showText } from "./words.js";
 
 const TEXT_MS = 200;
-let ink = colours(), asked = false, dirty = true;
+let ink = colours(), asked = false, dirty = true, begun = false;
 
 // Drawing at the pace of the source and never faster.
 function news() {
@@ -45,6 +45,10 @@ function draw() {
     flight.tapeDirty = false;
   }
   source.shown();
+  if (!begun) {
+    begun = true;
+    text();
+  }
 }
 
 function anew() {

@@ -68,6 +68,8 @@ class Served:
     look_url: str = ""
     """with the secret of who may only look"""
     folder: Path = Path()
+    alone: bool = False
+    """whether one address is printed: of a replay, or with --view-only"""
     said: list[str] = field(default_factory=list)
     _up: threading.Event = field(default_factory=threading.Event)
 
@@ -80,7 +82,7 @@ class Served:
                 self.url = line.split()[-1]
             if line.startswith(LOOK_ONLY):
                 self.look_url = line.split()[-1]
-            if self.url and (self.look_url or "--view-only" in self.process.args):
+            if self.url and (self.look_url or self.alone):
                 self._up.set()
 
     @property
@@ -126,7 +128,8 @@ def served(
         stderr=subprocess.PIPE,
         text=True,
     )
-    one = Served(process, folder=folder)
+    alone = "--view-only" in arguments or (arguments[0] == "view" and not arguments[1].startswith("-"))
+    one = Served(process, folder=folder, alone=alone)
     threading.Thread(target=one.read, daemon=True).start()
     try:
         one.wait_until_up()

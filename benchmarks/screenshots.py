@@ -44,7 +44,7 @@ def make(folder: Path) -> list[Path]:
         for _ in range(6):
             light.keyboard.press("ArrowRight")
         light.wait_for_timeout(4000.0)
-        light.get_by_role("button", name="Corrupt the controller's codec").click()
+        light.get_by_role("button", name="Corrupt the receiver's codec").click()
         state_is(light, "broken")
         take(light, "broken")
         light.get_by_role("button", name="Repair the line").click()

@@ -38,7 +38,7 @@ def check_endpoints(
         protocol, slash, address = endpoint.partition("/")
         if not slash or ":" not in address:
             raise LinkError(
-                f"{endpoint!r} is no endpoint; write PROTOCOL/HOST:PORT, such as {DEFAULT_ENDPOINT}"
+                f"{endpoint!r} is not an endpoint; write PROTOCOL/HOST:PORT, such as {DEFAULT_ENDPOINT}"
             )
         if secured and protocol != "tls":
             raise LinkError(

@@ -1,6 +1,6 @@
 """From words to commands: the receiver's copy of the codec, its controller, and the echoes.
 
-The session decides what was received; this is what follows from it. Each word advances the codec by
+The session decides which word was received; this module applies it. Each word advances the codec by
 one sample, the controller is asked for the commands of the sample's ticks `D` ahead, and what was
 consumed and decided becomes an echo. It knows no slot, no frame and no peer.
 """
@@ -145,7 +145,7 @@ class Commander:
         return fly_sample(self.codec, self.state, word, known, lambda _tick, _state: self.hold)
 
     def write_down(self) -> None:
-        """Record what was flown since the last call. It can wait until the commands have left."""
+        """Record the samples since the last call. It can wait until the commands were sent."""
         unwritten, self._unwritten = self._unwritten, []
         for before, word, flown, digest, now_ns in unwritten:
             ranges = self.codec.coder.ranges(before.coder)
@@ -153,7 +153,7 @@ class Commander:
             write_commands(self._recorder, self.terms, before.sample, flown, self._references)
 
     def _decide(self, tick: int, state: Vector) -> Vector:
-        """Ask the controller, limit what it wants, and return it as the wire will carry it."""
+        """Ask the controller, limit its command, and return it as sent on the wire."""
         limited = self.terms.limits.apply(self._ask(tick, state), self.hold)
         steps = to_steps(limited, self.terms.signals)
         self._steps += steps
@@ -176,7 +176,7 @@ class Commander:
         return self._no_references
 
     def _ask(self, tick: int, state: Vector) -> Vector:
-        """Return what the controller wants; its last command where it fails or wants nonsense."""
+        """Return the controller's command; its last one if it fails or is not finite."""
         try:
             command = self._controller.command(tick, state)
             if len(command) == len(self.hold) and are_plausible(command):

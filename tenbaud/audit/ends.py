@@ -1,4 +1,4 @@
-"""The two accounts of one flight against each other, and each against its own epochs."""
+"""The two recordings of one flight against each other, and each against its own epochs."""
 
 from __future__ import annotations
 

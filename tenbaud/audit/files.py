@@ -1,4 +1,4 @@
-"""The files: whose they are, that they hold all rows that were written, and that none was lost."""
+"""The files: the flight that they belong to, and that no written row is missing."""
 
 from __future__ import annotations
 

@@ -86,7 +86,7 @@ def _followed(agreement: Agreement) -> Callable[[int], tuple[float | None, ...]]
 
 
 def build_observer(agreement: Agreement) -> StateObserver | None:
-    """Return what gives a coder its rates, None for one that does without."""
+    """Return the observer of a coder that uses rates, None for others."""
     codec = agreement.codec
     if not codec.uses_rates:
         return None
@@ -116,7 +116,7 @@ def build_uplink(agreement: Agreement, wire: Wire, recorder: Recorder | None = N
 
 
 def build_line(agreement: Agreement, direction: Direction, wire: SymbolWire) -> Line:
-    """Return one direction of the line, with what goes wrong on it."""
+    """Return one direction of the line, with its impairments."""
     one = agreement.faults.up if direction == "up" else agreement.faults.down
     if not one.any and not agreement.live:
         return CleanLine()
@@ -164,7 +164,7 @@ def build_receiver(
 
 
 def check_parts(config: FlightConfig, parts: Parts | None = None) -> None:
-    """Build what can be wrong in files and texts, so that it is reported before anything starts.
+    """Build the parts from files and texts, so that errors are reported before anything starts.
 
     `parts` are objects in place of what is configured; they are checked already.
     """

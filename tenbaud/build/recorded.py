@@ -1,4 +1,4 @@
-"""The configuration of a flight; one that replays a recording takes from it what is not set.
+"""The configuration of a flight; a replay takes unset fields from the recording.
 
 Both ends call this with the same file and the same settings, and come to the same shared configuration.
 Only `tenbaud.log` knows what files look like; here it is known what a flight needs of them.
@@ -106,7 +106,7 @@ class _Adoption:
         self._config = config
 
     def config(self) -> FlightConfig:
-        """Return the configuration with what the recording decides."""
+        """Return the configuration with the recording's settings."""
         self._take_tick(recorded_tick_s(self._config))
         # From here on in its own ticks.
         log = read_flight_log(self._config)
@@ -274,7 +274,7 @@ def largest_commands(log: FlightLog, signals: Signals) -> Vector:
 
 
 def replay_notes(config: FlightConfig) -> tuple[str, ...]:
-    """Return what a replay does with its recording, a line each, for people; () for other flights."""
+    """Return notes on a replay's use of its recording, a line each; () for other flights."""
     return tuple(_notes(config)) if config.transmitter.rig == "replay" else ()
 
 

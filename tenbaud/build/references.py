@@ -105,7 +105,7 @@ def _require_within(
 
 
 def values_of(references: References) -> Callable[[int], tuple[float | None, ...]]:
-    """Return what gives the values of all set-points at a tick."""
+    """Return the function from a tick to all set-points."""
     if len(references) == 1 and references[0] is not None:
         value = references[0].value
         return lambda tick: (value(tick),)

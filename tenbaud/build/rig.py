@@ -73,7 +73,7 @@ def build_device(config: FlightConfig, output: bool, signals: Signals | None = N
     except ValueError as error:
         raise ConfigError(f"transmitter.{section.rig}: {error}") from error
     raise ConfigError(
-        f"rig = {section.rig!r} is no device; name one: --rig cobs:PORT, ascii:PORT, qsb:PORT, "
+        f"rig = {section.rig!r} is not a device; name one: --rig cobs:PORT, ascii:PORT, qsb:PORT, "
         "quarc:HOST:PORT, quarc-server:PORT or hil"
     )
 

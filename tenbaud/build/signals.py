@@ -1,4 +1,4 @@
-"""What a configuration gives for the inputs and outputs of its model, in their order."""
+"""The settings of a configuration for the inputs and outputs of its model, in their order."""
 
 from __future__ import annotations
 

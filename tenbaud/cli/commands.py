@@ -9,8 +9,10 @@ import typer
 
 from tenbaud.cli import demo, design, identify, keys, log, nodes, rig, router, runs, sweep, tune, view
 from tenbaud.cli.checkout import add_commands
+from tenbaud.cli.flags import Command, Group
 
 app = typer.Typer(
+    cls=Group,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
@@ -42,7 +44,18 @@ def _root(
 
 for panel, commands in (
     ("Fly", (demo.demo, nodes.transmit, nodes.receive, view.view, runs.presets)),
-    ("What was flown", (runs.inspect, runs.diff, runs.replay, runs.audit, runs.convert, runs.recover)),
+    (
+        "What was flown",
+        (
+            runs.inspect,
+            runs.compare,
+            runs.diff,
+            runs.replay,
+            runs.audit,
+            runs.convert,
+            runs.recover,
+        ),
+    ),
     ("Rigs and machines", (rig.doctor, rig.rig, rig.rig_check, router.router)),
     (
         "Models, coders, studies",
@@ -50,7 +63,8 @@ for panel, commands in (
     ),
 ):
     for command in commands:
-        app.command(command.__name__.replace("_", "-"), rich_help_panel=panel)(command)
+        name = command.__name__.replace("_", "-")
+        app.command(name, cls=Command, rich_help_panel=panel)(command)
 app.add_typer(keys.app, name="keys", rich_help_panel="Rigs and machines")
 add_commands(app)
 

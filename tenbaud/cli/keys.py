@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from channel.links.endpoints import DEFAULT_PORT
+from tenbaud.cli.flags import Command, Group
 
 if TYPE_CHECKING:
     from tenbaud.keys.authority import Certified
     from tenbaud.keys.store import NodeKeys
 
 app = typer.Typer(
+    cls=Group,
     no_args_is_help=True,
     rich_markup_mode="rich",
     help="""Keys for a flight between two machines.
@@ -38,7 +40,7 @@ Name = Annotated[str, typer.Argument(help="Name of the node, such as rig.")]
 DEFAULT_FOLDER = Path("keys")
 
 
-@app.command()
+@app.command(cls=Command)
 def init(folder: Folder = DEFAULT_FOLDER) -> None:
     """Make the authority that signs the nodes' certificates; once, on one machine."""
     from tenbaud.keys.store import create_authority
@@ -48,7 +50,7 @@ def init(folder: Folder = DEFAULT_FOLDER) -> None:
     typer.echo(next_steps(()))
 
 
-@app.command()
+@app.command(cls=Command)
 def add(
     name: Name,
     role: Annotated[str | None, typer.Option(help="transmitter, receiver, router or viewer.")] = None,
@@ -68,7 +70,7 @@ def add(
     typer.echo(next_steps(read_nodes(folder)))
 
 
-@app.command()
+@app.command(cls=Command)
 def renew(name: Name, host: Hosts = None, days: Days = 365.0, folder: Folder = DEFAULT_FOLDER) -> None:
     """Renew a node's key and certificate, expired or not; then copy its folder again."""
     from tenbaud.keys.store import renew_node
@@ -78,7 +80,7 @@ def renew(name: Name, host: Hosts = None, days: Days = 365.0, folder: Folder = D
     typer.echo(f"Copy {node.folder} to its machine again, and start its end again there.")
 
 
-@app.command()
+@app.command(cls=Command)
 def show(
     folder: Annotated[
         Path, typer.Argument(help="Folder of all keys, or of one node.")

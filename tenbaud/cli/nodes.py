@@ -117,7 +117,7 @@ def _run(
     from contextlib import nullcontext
     from dataclasses import replace
 
-    from tenbaud.build.ends import check_parts, check_rig
+    from tenbaud.build.ends import check_parts, check_rig, check_sabotage
     from tenbaud.build.flight import agree
     from tenbaud.build.recorded import flight_config
     from tenbaud.cli.addresses import endpoints_of
@@ -135,6 +135,7 @@ def _run(
     agreement = replace(agree(config, node.clock.value), live=telemetry.control)
     endpoints = replace(endpoints_of(role, addresses, config, take_over), telemetry=telemetry)
     check_parts(config)
+    check_sabotage(agreement)
     # Whoever started this end with a folder has checked the rig.
     if risk is not None and node.run_folder is None and check_rig(config, risk.accept_risk):
         confirm_motors(config, risk.yes)

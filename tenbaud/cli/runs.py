@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -21,12 +23,13 @@ def inspect(
 
     [dim]tenbaud inspect runs/2026-11-23T10-00-00_paper-10baud[/dim]
     """
+    from tenbaud.flight.narrow import for_terminal
     from tenbaud.recording.inspect import describe_json, describe_text
 
     if json:
         options.print_json(describe_json(run))
         return
-    typer.echo(describe_text(run))
+    typer.echo(for_terminal(describe_text(run)))
 
 
 def diff(
@@ -57,9 +60,43 @@ def diff(
         raise typer.Exit(int(ExitCode.USAGE))
 
 
+def compare(
+    runs: Annotated[list[Path], typer.Argument(help="Folders of two or more runs, or recordings.")],
+    figure: Annotated[
+        Path | None,
+        typer.Option(help="Draw outputs and errors over each other into this .png, .svg or .pdf file."),
+    ] = None,
+    json: Annotated[
+        bool, typer.Option("--json", help="The figures as JSON, in the units of the recordings.")
+    ] = False,
+) -> None:
+    """Put the figures of runs side by side: errors, tracking, rise, overshoot, settling, bits.
+
+    Compared are the outputs and the flight time that all runs have; what differs is noted. Exit code 2
+    if they have none in common. No file is written without --figure.
+
+    [dim]tenbaud compare runs/slow runs/fast --figure slow-and-fast.png[/dim]
+    """
+    from tenbaud.recording.side_by_side import compare as compare_runs
+    from tenbaud.recording.style import FIGURE_FORMATS
+
+    if figure is not None and figure.suffix not in FIGURE_FORMATS:
+        raise typer.BadParameter(f"--figure {figure}: end the name in {', '.join(FIGURE_FORMATS)}")
+    compared = compare_runs(*runs)
+    if json:
+        options.print_json(compared.as_json())
+    else:
+        unicode = (sys.stdout.encoding or "").lower().startswith("utf")
+        typer.echo(compared.text(shutil.get_terminal_size((10_000, 24)).columns, unicode=unicode))
+    if figure is not None:
+        compared.plot(figure)
+        typer.echo(str(figure), err=json)
+
+
 def presets() -> None:
     """List the presets that come with tenbaud by plant, with their rates."""
     from tenbaud.config.load import load_config, preset_names
+    from tenbaud.flight.narrow import for_terminal
 
     configs = {name: load_config(name) for name in preset_names()}
     plants: dict[str, list[str]] = {}
@@ -72,7 +109,8 @@ def presets() -> None:
         typer.echo(plant)
         for name in sorted(plants[plant], key=lambda one: configs[one].channel.rate_baud):
             config = configs[name]
-            typer.echo(f"  {name:{width}} {config.channel.rate_baud:7.4g} baud  {config.description}")
+            line = f"  {name:{width}} {config.channel.rate_baud:7.4g} baud  {config.description}"
+            typer.echo(for_terminal(line))
 
 
 class Form(StrEnum):

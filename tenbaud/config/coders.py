@@ -1,4 +1,4 @@
-"""The kinds of coders: what each one's section may hold, and what is built from it."""
+"""The kinds of coders: the section of each, and the object built from it."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ Square = Annotated[tuple[tuple[Factor, ...], ...], Field(min_length=1, max_lengt
 
 
 class _DesignedSection(KindSection):
-    """What the coders that `tenbaud design` makes for a linear plant have in common."""
+    """Common fields of the coders that `tenbaud design` makes for a linear plant."""
 
     bits: Annotated[int, Field(ge=1, le=15)] = 1
     """signs per sample"""

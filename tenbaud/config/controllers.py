@@ -1,4 +1,4 @@
-"""The sections of the controllers that are built in, and of the set-points that they follow."""
+"""The sections of the built-in controllers, and of their set-points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The kinds of models: what each one's section may hold, and what is built from it."""
+"""The kinds of models: the section of each, and the object built from it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tenbaud.config.section import Factor, KindSection, NotNegative, Positive
 
 
 class ModelSection(KindSection):
-    """What every kind of model that is built in may be given."""
+    """Common fields of the built-in models."""
 
     start: tuple[Factor, ...] = ()
     """state that both ends begin with; empty: at rest, a linear model's operating state"""

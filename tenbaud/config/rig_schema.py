@@ -1,4 +1,4 @@
-"""The configuration of a real rig: its encoders and motors, and the way to it."""
+"""The configuration of a real rig: its encoders, motors and connection."""
 
 from __future__ import annotations
 

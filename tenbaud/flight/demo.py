@@ -1,6 +1,6 @@
 """Both ends on this machine: two processes of the same command.
 
-Zenoh on loopback joins them, or whatever the configured kind of link has for two processes.
+Zenoh on loopback joins them, or another configured kind of link.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class DemoResult:
     summary: Summary
     code: ExitCode
     messages: list[str]
-    """what the two ends said on their way out, if it was not a plain success"""
+    """the last lines of the two ends, if they were not a plain success"""
 
 
 def fly_demo(
@@ -80,7 +80,7 @@ def fly_demo(
         result.summary |= {"usual_loop": usual.figures} if usual else {}
     draw = draw and result.summary.get("samples", 0) > 0
     problems = write_up(folder, agreement.config, result.summary, draw, usual and usual.curve)
-    # What ended the flight is said last.
+    # The cause of the end comes last.
     result.messages[:0] = [problem.text for problem in problems]
     result.code = first_code(result.code, *(problem.code for problem in problems))
     return result
@@ -106,7 +106,7 @@ def _fly_processes(
 
 
 def _result(agreement: Agreement, transmitter: _Child, receiver: _Child) -> DemoResult:
-    """Return what both said, the first cause of the end last."""
+    """Return the lines of both, the first cause of the end last."""
     ends = [transmitter, receiver]
     # Whoever was killed comes first: the other one only noticed.
     ends.sort(key=lambda end: end.process.returncode >= 0)
@@ -238,7 +238,7 @@ class _Child:
         return self._interrupted and self.process.poll() == -signal.SIGINT
 
     def end(self) -> None:
-        """Make sure that the process has ended, and read what it left."""
+        """Make sure that the process has ended, and read its output."""
         end_child(self.process, 5.0)
         self._read_out()
 

@@ -1,4 +1,4 @@
-"""One end, run whole: recording opened, link opened, flown, everything closed, figures returned."""
+"""The complete run of one end: open recording and link, fly, close everything, return figures."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Endpoints:
     telemetry: TelemetryOptions = DEFAULT_OPTIONS
 
     def node(self) -> NodePlace:
-        """Return what opens this end's Zenoh session."""
+        """Return the function that opens this end's Zenoh session."""
         return {
             "listen": self.listen,
             "connect": self.connect,
@@ -172,7 +172,7 @@ def run_in_memory(
 def open_recorder(
     agreement: Agreement, role: Role, path: Path, writer: SharedWriter | None = None
 ) -> McapRecorder:
-    """Return a recorder for one end, its file headed by what was flown.
+    """Return a recorder for one end, its file headed by the flight's description.
 
     `writer`: a thread that it shares with others, instead of one of its own.
     """
@@ -200,7 +200,7 @@ def open_recorder(
 
 
 def transmitter_status(run: TransmitterRun) -> Status:
-    """Return what a person wants to know of a running transmitter."""
+    """Return the status of a running transmitter, for people."""
     node = run.node
     coder = run.agreement.codec.coder
     tick_s = run.agreement.terms.tick_ns / 1e9
@@ -233,7 +233,7 @@ def _tape(words: Sequence[tuple[Word, tuple[int, ...] | None]]) -> Status:
 
 
 def receiver_status(agreement: Agreement, endpoint: ReceiverEndpoint) -> Status:
-    """Return what a person wants to know of a running receiver."""
+    """Return the status of a running receiver, for people."""
     session, model = endpoint.session, agreement.codec.model
     return {
         "role": "receiver",
@@ -257,7 +257,7 @@ def _end(
     path = folder.transmitter if role == "transmitter" else folder.receiver
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     with StopFlag() as stop, open_recorder(agreement, role, path) as recorder:
-        # What was built so far stays; the collector need not look at it in flight.
+        # Objects built so far stay; the collector need not scan them in flight.
         gc.collect()
         gc.freeze()
         yield recorder, stop
@@ -298,7 +298,7 @@ def _guarded(fly: Callable[[], Outcome]) -> Outcome:
 
 
 def _with_recording(summary: Summary, recorder: McapRecorder) -> Summary:
-    """Close the recording and add what became of it."""
+    """Close the recording and add its outcome."""
     recorder.close()
     return {
         **summary,

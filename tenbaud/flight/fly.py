@@ -16,7 +16,7 @@ from channel.protocol.terms import Clock
 from plant_sim.plant import Plant
 from receiver.controllers.base import Controller
 from tenbaud.build.controllers import controller_context
-from tenbaud.build.ends import check_parts, check_rig
+from tenbaud.build.ends import check_parts, check_rig, check_sabotage
 from tenbaud.build.flight import Agreement, agree
 from tenbaud.build.given import Given, feedback_gains, reference_settings, whole_sections
 from tenbaud.build.parts import PartError, Parts
@@ -220,5 +220,6 @@ def _agreement(
         )
     agreement = replace(agreement, parts=made)
     check_parts(loaded, made)
+    check_sabotage(agreement)
     check_rig(loaded, accept_risk, made)
     return agreement

@@ -1,4 +1,4 @@
-"""The figures of a flight: what each end can say, joined into one `summary.json`."""
+"""The figures of a flight: those of each end, joined into one `summary.json`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Summary = dict[str, Any]
 
 
 def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
-    """Return what the transmitter knows: plant, errors, bits sent, its loop."""
+    """Return the transmitter's figures: plant, errors, bits sent, its loop."""
     node, terms, config = run.node, run.agreement.terms, run.agreement.config
     session, scores, meter = node.session, node.scores.first, run.uplink.meter
     flown_s = run.ticks * terms.tick_ns / 1e9
@@ -101,7 +101,7 @@ def gap_part(gap: Gap | None) -> Summary:
 
 
 def receiver_part(agreement: Agreement, endpoint: ReceiverEndpoint, outcome: Outcome) -> Summary:
-    """Return what the receiver knows: symbols as they arrived, on its own clock."""
+    """Return the receiver's figures: symbols as they arrived, on its own clock."""
     session = endpoint.session
     return {
         **_common(agreement, outcome, session.end),
@@ -124,7 +124,7 @@ def receiver_part(agreement: Agreement, endpoint: ReceiverEndpoint, outcome: Out
 
 
 def link_part(link: Link, refused: Counter[str] | None = None) -> Summary:
-    """Return what an end's link saw of its line: what it dropped and why, and its own bytes if any.
+    """Return the figures of an end's link: dropped messages by reason, and its own bytes if any.
 
     `refused` are connections that were turned away before the link knew of them.
     """
@@ -217,7 +217,7 @@ def _outputs(run: TransmitterRun) -> Summary:
 
 
 def _learned(run: TransmitterRun) -> Summary:
-    """Return what both ends have learned of the plant's terms, where they do."""
+    """Return the plant's terms as learned by both ends, if they do."""
     found = learned_of(run.agreement.codec, run.node.session.copies.confirmed)
     return {"learned": {name: one._asdict() for name, one in found.items()}} if found else {}
 

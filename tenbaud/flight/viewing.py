@@ -1,4 +1,4 @@
-"""The live page beside a demonstration: a separate process, and where the two ends meet it."""
+"""The live page beside a demonstration: a separate process, and the addresses to reach it."""
 
 from __future__ import annotations
 

@@ -127,7 +127,7 @@ def draw_run(
 
 
 def _panels(flight: _Flight) -> list[tuple[float, str, _Draw]]:
-    """Return what is drawn below each other: height, label, and what draws it."""
+    """Return the panels, top to bottom: height, label, and drawing function."""
     plant = flight.plant
     outputs = plant.groups("outputs")[:DRAWN_MAX]
     inputs = plant.groups("inputs")[:DRAWN_MAX]

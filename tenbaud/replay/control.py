@@ -1,4 +1,4 @@
-"""The controller of a flight that is flown again: built as then, or repeating what it commanded."""
+"""The controller of a replayed flight: built as in the flight, or repeating its commands."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class RecordedCommands:
 
 @dataclass(frozen=True, slots=True)
 class SteppedReference:
-    """The set-point of the configuration, with what was set by hand over it: (tick, angle) steps."""
+    """The configured set-point, with manual changes over it: (tick, angle) steps."""
 
     configured: Reference
     steps: tuple[tuple[int, float], ...]

@@ -1,7 +1,7 @@
 """The nodes' own functions, compiled: one text for each formula.
 
-`compiled` takes a plain function of this project and returns what numba makes of it. The functions that
-it calls, wherever in the project they are defined, are compiled with it; nothing is rewritten. Neither
+`compiled` takes a plain function of the project and returns it compiled by numba. The functions that it
+calls, wherever in the project they are defined, are compiled with it; nothing is rewritten. Neither
 `fastmath` nor fused multiply-adds are allowed, so the bits stay those of plain Python.
 
 Machine code is kept in the user's cache folder under a digest of all sources that could matter, so that
@@ -213,13 +213,13 @@ class MachineCode:
         return ""
 
     def get_disambiguator(self) -> str:
-        """Return what tells functions of one name in a file apart."""
+        """Return the line, which distinguishes functions of one name in a file."""
         return str(self._line)
 
 
 @cache
 def sources_digest() -> str:
-    """Return what stands for all sources that the figures of a flight depend on."""
+    """Return a digest of all sources that the figures of a flight depend on."""
     digest = blake2b(digest_size=12)
     for path in figure_sources():
         digest.update(path.read_bytes())

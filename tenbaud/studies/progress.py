@@ -6,6 +6,8 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+TEXT_CELLS = 45
+"""What stands beside the bar needs about so much of a line."""
 Update = Callable[[float, float, str], None]
 """(done, of how much, what is being done)"""
 
@@ -26,13 +28,15 @@ def progress_bar(what: str, *, counted: bool = False) -> Iterator[Update]:
         TimeElapsedColumn,
         TimeRemainingColumn,
     )
+    from rich.table import Column
 
+    console = Console(stderr=True)
     bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
+        TextColumn("{task.description}", table_column=Column(no_wrap=True)),
+        BarColumn(max(5, min(40, console.width - TEXT_CELLS))),
         MofNCompleteColumn() if counted else TimeElapsedColumn(),
         TimeRemainingColumn(),
-        console=Console(stderr=True),
+        console=console,
         transient=not counted,
         disable=not counted and not sys.stderr.isatty(),
     )

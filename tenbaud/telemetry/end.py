@@ -82,7 +82,7 @@ class TelemetryEnd:
             )
         self.tap = None if self.endpoint is None else Tap(recorder)
         self.recorder: Recorder = self.tap or recorder
-        """what the end records into: the tap, where there is one"""
+        """the recorder of the end: the tap, if there is one"""
         self.queue = CommandQueue() if steerable else None
         self.steering = _steered(agreement)
         self.pace = options.pace if agreement.clock == "virtual" else None

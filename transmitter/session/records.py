@@ -66,7 +66,7 @@ SAMPLE_CHANNEL = RecordChannel(
 
 
 def write_sample(recorder: Recorder, terms: Terms, codec: Codec, done: Confirmed) -> None:
-    """Write down a confirmed sample, and what was estimated at each of its ticks."""
+    """Record a confirmed sample, and the estimates of its ticks."""
     first_tick = done.sample * terms.ticks_per_sample
     state = done.flown.state
     # The low ones, up to the first that did not come.

@@ -58,7 +58,7 @@ class Phase(Enum):
 
 
 class TransmitterSession:
-    """Turns measurements into symbols and echoes into commands; see the module's text.
+    """Converts measurements to symbols and echoes to commands; see the module's text.
 
     `incarnation` is drawn by the caller (32 bits), so that the session itself stays deterministic.
     `stop_on_desync`: end the flight at the first digest that differs, instead of rejoining.
@@ -101,7 +101,7 @@ class TransmitterSession:
         """first tick of the present epoch"""
         self.owing = Owing(terms)
         self.confirmed: deque[Confirmed] = deque(maxlen=2 * terms.history_samples)
-        """samples confirmed and not yet written down (`take_confirmed`)"""
+        """samples confirmed and not yet recorded (`take_confirmed`)"""
         self.events: deque[Event] = deque(maxlen=1000)
         self.history = History(codec, 2 * terms.history_samples)
         self._asking = Asking(identity, incarnation, terms)
@@ -120,7 +120,7 @@ class TransmitterSession:
     # What happens at a tick
 
     def hello(self) -> Hello:
-        """Return the frame that asks for a session; to be repeated until there is one."""
+        """Return the frame that requests a session; to be repeated until there is one."""
         return self._asking.hello(self.session_number, self.epoch, self._tick)
 
     def on_measurement(self, tick: int, measurement: Vector) -> list[Frame]:
@@ -184,7 +184,7 @@ class TransmitterSession:
         return self._due.take(tick)
 
     def take_confirmed(self) -> list[Confirmed]:
-        """Write down and return what was confirmed since the last call; the next symbol goes first."""
+        """Record and return the samples confirmed since the last call; the next symbol goes first."""
         taken = [self.copies.explained(done) for done in self.confirmed]
         self.confirmed.clear()
         for done in taken:
@@ -230,7 +230,7 @@ class TransmitterSession:
         return [Bye(self.session_number, end.ending, end.text)] if had_session else []
 
     def _on_unknown(self) -> list[Frame]:
-        """Believe it of a receiver that has stopped commanding; refuse it of a second one."""
+        """Accept it from a receiver that has stopped commanding; refuse it from a second one."""
         if self._takeover.is_lost(self._tick, self.heard_tick):
             return self.rejoin(Why.UNKNOWN)
         if not self._takeover.is_second():
@@ -357,7 +357,7 @@ class TransmitterSession:
         return self.rejoin(Why.DESYNC, replace(ASKED, sample=done.sample))
 
     def _on_diverged(self, error: Exception) -> list[Frame]:
-        """Ask for another state: the receiver flies on from its own, so this one is not the same."""
+        """Request another state: the receiver continues from its own, so this one differs."""
         self.counts["diverged"] += 1
         return self.rejoin(Why.LAG, replace(ASKED, detail=repr(error)))
 
@@ -365,11 +365,11 @@ class TransmitterSession:
 
     @property
     def _sample(self) -> int:
-        """Return the sample that this end's clock stands in."""
+        """Return the sample at this end's clock."""
         return max(0, self._tick) // self.terms.ticks_per_sample
 
     def _is_left_behind(self, welcome: Welcome) -> bool:
-        """Return whether somebody else was answered in our name, and commands stay away."""
+        """Return whether another transmitter was answered in our name, and commands are missing."""
         later = welcome.incarnation == self.incarnation and welcome.epoch > self.epoch
         return later and self._takeover.is_lost(self._tick, self.heard_tick)
 

@@ -75,6 +75,9 @@ WRITERS: dict[str, Arguments] = {
     "identify": lambda _, out: [
         *("identify", "--excitation", "square:0.2,0,2.5", "--duration", "30", "--out", out),
     ],
+    "compare figure": lambda inputs, out: [
+        *("compare", inputs.run, inputs.run, "--figure", f"{out}.png"),
+    ],
     "sweep": lambda inputs, out: ["sweep", inputs.study, "--workers", "1", "--no-plots", "--out", out],
     "keys init": lambda _, out: ["keys", "init", "--folder", out],
     "design": lambda inputs, out: ["design", "--config", inputs.plant, "--out", out],
@@ -105,6 +108,7 @@ READERS: dict[str, Arguments] = {
     "presets": lambda *_: ["presets"],
     "inspect": lambda inputs, _: ["inspect", inputs.run],
     "log": lambda inputs, _: ["log", inputs.run],
+    "compare": lambda inputs, _: ["compare", inputs.run, inputs.run],
     "diff": lambda inputs, _: ["diff", inputs.run],
     "audit": lambda inputs, _: ["audit", inputs.run],
     "recover": lambda inputs, _: ["recover", inputs.run],

@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
-from tenbaud.flight.closing import closing_lines, warnings_of
+from tenbaud.flight.closing import closing_lines
 from tenbaud.recording.folder import RunFolder
+from tenbaud.sentences.flown import warnings_of
 
 FLOWN: dict[str, Any] = {
     "preset": "tuned-10baud",

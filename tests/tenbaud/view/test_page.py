@@ -54,7 +54,7 @@ def page(chromium: Any, flight: Served) -> Iterator[Any]:
     page.on("websocket", lambda socket: page.asked.append(socket.url))
     page.goto(flight.url)
     state_is(page, "lockstep")
-    page.get_by_role("button", name="Corrupt the sensor's codec").wait_for()
+    page.get_by_role("button", name="Corrupt the transmitter's codec").wait_for()
     yield page
     assert page.told == []
     context.close()
@@ -108,9 +108,15 @@ def test_the_set_point_steers_the_flight_from_the_keyboard_alone(page: Any) -> N
         page.keyboard.press("Tab")
     else:
         raise AssertionError("the set-point is not reached by Tab")
-    for _ in range(4):
+    slider = page.get_by_role("slider", name="Set-point")
+    # It shows the reference that is followed, a square wave of 90 degrees, until the visitor moves it.
+    wait(page, "() => [90, -90].includes(Number(document.activeElement.value))")
+    assert slider.get_attribute("aria-valuetext") in ("90°", "\u221290°")
+    page.keyboard.press("Home")
+    for _ in range(22):
         page.keyboard.press("ArrowRight")
-    page.get_by_text("set-point 0.349").first.wait_for()
+    assert slider.get_attribute("aria-valuetext") == "20°"
+    page.get_by_text("set-point 20.0 deg").first.wait_for()
     page.get_by_role("button", name="25", exact=True).click()
     wait(page, f"() => Math.abs({NUMBER.format('value')} - 20) < 4")
     page.get_by_role("button", name="1", exact=True).click()
@@ -118,9 +124,51 @@ def test_the_set_point_steers_the_flight_from_the_keyboard_alone(page: Any) -> N
     page.get_by_text("follow the reference").first.wait_for()
 
 
+LIVE_CHANGES = """async () => {
+  const changed = [];
+  const seen = new MutationObserver((all) => all.forEach((one) => changed.push(one.target.id)));
+  for (const one of document.querySelectorAll("[aria-live], [role=status], [role=alert], output"))
+    seen.observe(one, { subtree: true, childList: true, characterData: true });
+  const time = () => parseFloat(document.getElementById("f-time").textContent), from = time();
+  while (time() < from + 2) await new Promise((go) => setTimeout(go, 100));
+  return changed;
+}"""
+
+
+def test_a_screen_reader_hears_changes_of_state_alone_and_finds_one_main_part(page: Any) -> None:
+    assert page.evaluate(LIVE_CHANGES) == []
+    assert page.get_by_role("main").count() == 1
+    assert page.locator("#announcement").inner_text() == "In lockstep"
+    sliders = page.get_by_role("slider").all()
+    assert [one.get_attribute("aria-valuetext") for one in sliders[1:]] == ["0 %", "0 %", "0 ms"]
+
+
+def test_all_controls_are_in_the_first_view_of_a_small_screen(page: Any) -> None:
+    page.set_viewport_size({"width": 1280, "height": 900})
+    page.evaluate("scrollTo(0, 0)")
+    bottoms = page.locator(".controls :is(button, input)").evaluate_all(
+        "(all) => all.map((one) => one.getBoundingClientRect().bottom)"
+    )
+    assert len(bottoms) > 10
+    assert max(bottoms) <= 900.0
+
+
+def test_a_figure_is_explained_on_hover_and_on_focus(page: Any) -> None:
+    term, tip = page.get_by_role("button", name="Range M"), page.get_by_role("tooltip")
+    assert tip.count() == 0
+    term.focus()
+    page.keyboard.press("Shift+Tab")
+    page.keyboard.press("Tab")
+    assert "between \u2212M and +M" in tip.inner_text()
+    page.keyboard.press("Escape")
+    assert tip.count() == 0
+    term.hover()
+    assert "between \u2212M and +M" in tip.inner_text()
+
+
 def test_a_corrupted_end_turns_the_light_and_the_flight_recovers(page: Any) -> None:
     before = page.locator("#f-rejoins").inner_text()
-    for name in ("Corrupt the sensor's codec", "Corrupt the controller's codec"):
+    for name in ("Corrupt the transmitter's codec", "Corrupt the receiver's codec"):
         page.get_by_role("button", name=name).click()
         state_is(page, "broken")
         up, down = (page.locator(f"#digest-{way}").inner_text() for way in ("up", "down"))
@@ -139,6 +187,7 @@ def test_a_corrupted_end_turns_the_light_and_the_flight_recovers(page: Any) -> N
 def test_the_clock_stands_still_steps_and_goes_on(page: Any) -> None:
     page.get_by_role("button", name="Pause").click()
     page.get_by_role("button", name="Resume").wait_for()
+    wait(page, "() => document.getElementById('light-title').textContent === 'In lockstep, paused'")
     stood = None
     while stood != (stood := number(page, "#f-time")):
         page.wait_for_timeout(500.0)  # what was sent before may still be on its way
@@ -162,7 +211,8 @@ def test_a_bad_wire_is_seen_and_repaired(page: Any) -> None:
     wait(page, f"(old) => {NUMBER.format('f-erasures')} > old + 2", erased)
     page.get_by_role("button", name="Repair the line").click()
     wait(page, "() => !document.getElementById('flight').textContent.includes('impaired')")
-    assert slider.input_value() == "0"
+    wait(page, "() => document.querySelector('[aria-label=\"Bits lost\"]').value === '0'")
+    assert slider.get_attribute("aria-valuetext") == "0 %"
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -195,8 +245,8 @@ def test_without_a_flight_it_says_so(chromium: Any, tmp_path: Path) -> None:
     with served(tmp_path, "view", "--port", "0", "--connect", nowhere) as one:
         page = chromium.new_page()
         page.goto(one.url)
-        page.get_by_text("No flight found").wait_for()
-        assert page.get_by_role("button", name="Corrupt the sensor's codec").is_disabled()
+        page.get_by_text("No flight found. Start one").wait_for()
+        assert page.get_by_role("button", name="Corrupt the transmitter's codec").is_disabled()
         state_is(page, "waiting")
         page.close()
 

@@ -1,4 +1,4 @@
-"""How an emulated device talks: the other side of every format."""
+"""The formats of an emulated device: the other side of each."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Speech(ABC):
         return [line.strip() for line in lines if line.strip()]
 
     def _each(self, pieces: list[bytes], read: Callable[[bytes], DeviceCommand]) -> list[DeviceCommand]:
-        """Return the commands in some pieces; what is none is counted."""
+        """Return the commands in some pieces; invalid pieces are counted."""
         commands = []
         for piece in pieces:
             try:

@@ -1,4 +1,4 @@
-"""Lines of text: what a lab's sketch prints already, or nearly.
+"""Lines of text, as many sketches print them already.
 
 A sample is one line, ended by LF or CR LF, with decimal columns between commas, spaces or tabs; which
 column is what comes from the configuration. A line that begins with `E,` has a separate form, with a

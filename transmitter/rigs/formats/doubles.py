@@ -1,4 +1,4 @@
-"""Vectors of doubles without any framing: what QUARC's Stream blocks put on a line.
+"""Vectors of doubles without any framing, as QUARC's Stream blocks send them.
 
 `N` doubles are `8 N` bytes and nothing else: no length, no type, no checksum. Alignment that is lost
 is lost for good, so a unit that makes no sense is an error and the caller reconnects.
@@ -27,7 +27,7 @@ def doubles(count: int, byte_order: str) -> struct.Struct:
 
 
 class UnitError(ValueError):
-    """A unit that cannot be what was agreed: alignment or byte order is lost."""
+    """An impossible unit: alignment or byte order is lost."""
 
 
 class DoublesLayout:

@@ -1,4 +1,4 @@
-"""One sample of a device: its counts, and what it says about itself."""
+"""One sample of a device: its counts and its status."""
 
 from __future__ import annotations
 

@@ -135,7 +135,8 @@ def _run(
     agreement = replace(agree(config, node.clock.value), live=telemetry.control)
     endpoints = replace(endpoints_of(role, addresses, config, take_over), telemetry=telemetry)
     check_parts(config)
-    check_sabotage(agreement)
+    if role == "transmitter":  # it alone knows how long the flight is
+        check_sabotage(agreement)
     # Whoever started this end with a folder has checked the rig.
     if risk is not None and node.run_folder is None and check_rig(config, risk.accept_risk):
         confirm_motors(config, risk.yes)

@@ -15,6 +15,7 @@ from receiver.controllers.references import Constant, LimitedReference, Square, 
 from tenbaud import fly
 from tenbaud.build.codec import build_model
 from tenbaud.build.first_contact import drives_motors, require_safe
+from tenbaud.build.flight import agree
 from tenbaud.build.recorded import flight_config
 from tenbaud.build.references import build_references
 from tenbaud.build.signals import configured_signals
@@ -22,6 +23,7 @@ from tenbaud.cli import options
 from tenbaud.cli.app import run
 from tenbaud.config.load import ConfigError, dump_config, load_config
 from tenbaud.flight.outcome import ExitCode
+from tenbaud.studies.arrays import targets_of
 from tests.transmitter.rigs.emulated import emulated
 from transmitter.rigs.formats.samples import DeviceFlag, flags_of
 
@@ -206,3 +208,20 @@ def test_a_set_point_by_hand_keeps_to_the_limits() -> None:
     free = SteeredReference(Constant(2.0, 0.01))
     free.steer(7.0)
     assert free.value(0) == 7.0
+
+
+def test_a_receiver_with_other_set_point_limits_is_refused_in_the_handshake() -> None:
+    own = agree(configured("simulated", *SETTINGS), "virtual").identity
+    assert agree(configured("simulated", *SETTINGS), "virtual").identity == own
+    other = agree(configured("simulated", *SETTINGS, "limits.set_point_max=0.3"), "virtual").identity
+    assert other.config_digest != own.config_digest
+
+
+def test_a_study_follows_the_same_limited_set_points() -> None:
+    agreement = agree(configured("simulated", *SETTINGS), "virtual")
+    model = agreement.codec.model
+    (reference,) = build_references(agreement.config, agreement.signals, model)
+    assert reference is not None
+    values = [reference.value(tick) for tick in range(3000)]
+    assert targets_of(agreement, 3000, False)[:, 0].tolist() == values
+    assert max(values) == 0.16

@@ -112,15 +112,21 @@ class Served:
 
 @contextmanager
 def served(
-    folder: Path, *arguments: str, environment: dict[str, str] | None = None
+    folder: Path,
+    *arguments: str,
+    environment: dict[str, str] | None = None,
+    program: tuple[str, ...] = ("-m", "tenbaud"),
 ) -> Iterator[Served]:
-    """Within the `with`, `tenbaud` with these arguments serves a page; they name a port of 0."""
+    """Within the `with`, `tenbaud` with these arguments serves a page; they name a port of 0.
+
+    `program`: other words for the interpreter.
+    """
     top = Path(__file__).parents[1]
     path = os.pathsep.join([str(top), os.environ.get("PYTHONPATH", "")])
     # NiceGUI behaves differently in a process that it takes for a test.
     own = {name: value for name, value in os.environ.items() if name != "PYTEST_CURRENT_TEST"}
     process = subprocess.Popen(
-        [sys.executable, "-m", "tenbaud", *arguments],
+        [sys.executable, *program, *arguments],
         cwd=folder,
         env={**own, "PYTHONPATH": path, **(environment or {})},
         stdin=subprocess.DEVNULL,

@@ -85,7 +85,8 @@ class Alphabet:
         self.symbols = symbols
         self.symbols_per_word = symbols_per_word
         self._digit = {symbol: digit for digit, symbol in enumerate(symbols)}
-        self._words = words
+        self.words = words
+        """how many kinds of words there are"""
 
     def symbol_number(self, symbol: int) -> int:
         """Return the digit that stands for one symbol; ValueError for a foreign one."""
@@ -108,14 +109,14 @@ class Alphabet:
         return number
 
     def has_word(self, number: int) -> bool:
-        return 0 <= number < self._words or number == WIRE_ERASED
+        return 0 <= number < self.words or number == WIRE_ERASED
 
     def word(self, number: int) -> Word:
         """Return the word with this wire number; ValueError when there is none."""
         if number == WIRE_ERASED:
             return ERASED
-        if not 0 <= number < self._words:
-            raise ValueError(f"word number {number} is outside 0 ... {self._words - 1}")
+        if not 0 <= number < self.words:
+            raise ValueError(f"word number {number} is outside 0 ... {self.words - 1}")
         digits = []
         for _ in range(self.symbols_per_word):
             number, digit = divmod(number, len(self.symbols))  # integers

@@ -5,11 +5,14 @@ from __future__ import annotations
 import contextlib
 import ipaddress
 import socket
+from collections import deque
 
 from channel.errors import LinkError
 
 DEFAULT_PORT = 7447
 DEFAULT_ENDPOINT = f"tcp/127.0.0.1:{DEFAULT_PORT}"
+
+_held: deque[socket.socket] = deque(maxlen=256)
 
 
 def is_loopback(endpoint: str) -> bool:
@@ -86,11 +89,16 @@ def default_endpoint() -> str:
 
 
 def free_endpoint() -> str:
-    """Return a loopback TCP endpoint with a port that was free a moment ago."""
+    """Return a loopback TCP endpoint whose port the system gives to nobody else for now.
+
+    This process holds the port without listening. A server sets SO_REUSEADDR and may listen there.
+    """
     host = loopback_host()
-    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
-        probe.bind((host, 0))
-        return _on_loopback(probe.getsockname()[1])
+    holder = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
+    holder.bind((host, 0))
+    holder.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    _held.append(holder)
+    return _on_loopback(holder.getsockname()[1])
 
 
 def _on_loopback(port: int) -> str:

@@ -136,6 +136,8 @@ class Echo:
     """of the codec state after the sample, 64 bits"""
     steps: tuple[int, ...]
     """commands of ticks `kN + D ... (k+1)N + D - 1`, all inputs of a tick together"""
+    digest_mask: int = 2**64 - 1
+    """which bits of the digest came with the echo; the others are zeros"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,6 +147,16 @@ class Commands:
     session: int
     epoch: int
     echoes: tuple[Echo, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ShortCommands:
+    """Commands as the compact downlink carries them, packed; `channel.protocol.compact` has the bits.
+
+    Only a session knows the sample, the session and the epoch that they belong to.
+    """
+
+    data: bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,6 +220,7 @@ Frame: TypeAlias = (
     | ShortSymbol
     | LocatedSymbol
     | Commands
+    | ShortCommands
     | Desync
     | Unknown
     | Claim

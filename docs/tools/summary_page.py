@@ -38,6 +38,8 @@ FIELDS: dict[str, tuple[str, str]] = {
     "duration_s": ("s", "flight time flown"),
     "samples": ("samples", "that both ends share"),
     "coder_bits_up": ("bits", "sent to the receiver; the rate R limits these"),
+    "downlink": ("", "how commands and echoes come back: full or compact"),
+    "coder_bits_down": ("bits", "of command frames from the receiver, without a serial line's framing"),
     "wire_bytes_up": ("bytes", "of all frames to the receiver, framing included"),
     "wire_bytes_down": ("bytes", "of all frames to the transmitter, framing included"),
     "line_bytes_out": ("bytes", "that this end put on a serial line"),

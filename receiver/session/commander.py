@@ -13,6 +13,7 @@ from typing import NamedTuple
 from channel.codec.codec import Codec, CodecState, Vector, Word
 from channel.codec.lead import FlownSample, fly_sample
 from channel.errors import CodecDiverged
+from channel.protocol.compact import CompactForm
 from channel.protocol.events import Event, EventKind, Failing, Tell
 from channel.protocol.frames import Echo
 from channel.protocol.limits import are_plausible, from_steps, to_steps
@@ -74,6 +75,7 @@ class Commander:
         self._echoes: deque[Echo] = deque(maxlen=terms.repeats + 1)
         self._steps: list[int] = []
         """decided for the sample that is being flown"""
+        self._compact = CompactForm(codec, terms) if terms.downlink == "compact" else None
         self._unwritten: list[_Flown] = []
 
     @property
@@ -113,7 +115,7 @@ class Commander:
         before = self.state
         self._steps = []
         try:
-            flown = fly_sample(self.codec, before, word, tuple(self._commands), self._decide)
+            flown = self._flown(word)
         except (ArithmeticError, ValueError) as error:
             raise CodecDiverged(f"the estimate diverged in sample {before.sample}: {error}") from error
         self._commands.extend(flown.commands)
@@ -128,6 +130,19 @@ class Commander:
         if len(self._unwritten) >= UNWRITTEN_MAX:
             self.write_down()
         return tuple(self._echoes)
+
+    def _flown(self, word: Word) -> FlownSample:
+        """Fly a sample with the commands that the controller decides, or with their mean held."""
+        known, held = tuple(self._commands), self.hold
+        flown = fly_sample(self.codec, self.state, word, known, self._decide)
+        if self._compact is None:
+            return flown
+        # The law's first command, held, would steer half a sample late. The mean moves the plant as the
+        # law's own course would, and the law is asked at every tick as ever.
+        steps = self._compact.held(flown.commands, held)
+        self.hold = from_steps(steps, self.terms.signals)
+        self._steps = [*steps] * self.terms.ticks_per_sample
+        return fly_sample(self.codec, self.state, word, known, lambda _tick, _state: self.hold)
 
     def write_down(self) -> None:
         """Record the samples since the last call. It can wait until the commands were sent."""

@@ -27,7 +27,8 @@ def check_samples(evidence: Evidence) -> None:
     outputs = len(evidence.agreement.signals.outputs)
     corrected = evidence.agreement.codec.model.correction_size
     for end in evidence.rows:
-        fields = SAMPLE_FIELDS if end == "receiver" else (*SAMPLE_FIELDS, "peer_digest")
+        whole = end == "transmitter" and evidence.terms.downlink == "full"
+        fields = (*SAMPLE_FIELDS, "peer_digest") if whole else SAMPLE_FIELDS
         without = tuple(name for name in fields if name != "range")
         for place, row in evidence.each(end, "sample"):
             # None: flown with another receiver, or after the receiver's recording was cut.

@@ -14,6 +14,7 @@ from pydantic import AfterValidator, Field, PrivateAttr, field_validator, model_
 
 from channel.line.impairments import parse_impairments
 from channel.links.registry import LINKS
+from channel.protocol.identity import LEFT_OUT
 from tenbaud.config.coders import ZoomCoderSection
 from tenbaud.config.controllers import PidSection, ReferencesSection, StateFeedbackSection
 from tenbaud.config.deprecated import DIGEST_KINDS
@@ -85,6 +86,8 @@ class ChannelSection(Section):
     """time reserved for a command frame to reach the plant"""
     repeats: Annotated[int, Field(ge=0, le=32)] = 2
     """W: earlier samples that each command frame repeats"""
+    downlink: Literal["full", "compact"] = "full"
+    """a command for every tick, or one for each sample in frames of at most 16 bytes for two motors"""
 
 
 if TYPE_CHECKING:
@@ -338,6 +341,10 @@ class FlightConfig(CodePermission):
         for field in ("set_point_max", "set_point_slew_per_s"):
             if shared["limits"][field] is None:
                 del shared["limits"][field]  # likewise
+        for place, value in LEFT_OUT.items():
+            name, field = place.split(".")
+            if shared[name][field] == value:
+                del shared[name][field]
         if self.flight_log.digest:
             shared["flight_log"] = {"digest": self.flight_log.digest}
         shared["coder"]["kind"] = DIGEST_KINDS.get(self.coder.kind, self.coder.kind)

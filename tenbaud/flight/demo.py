@@ -19,6 +19,7 @@ from channel.links.kind import Meeting
 from tenbaud.build.flight import Agreement
 from tenbaud.config.load import dump_config, flattened
 from tenbaud.files.whole import write_whole
+from tenbaud.flight.drawing import NotebookDrawing
 from tenbaud.flight.ends import run_in_memory
 from tenbaud.flight.lifeline import end_child, start_child
 from tenbaud.flight.outcome import ExitCode, Outcome, first_code, outcome_of_status
@@ -53,23 +54,23 @@ def fly_demo(
     pace: float | None = None,
     status: StatusMode = "auto",
     compare: bool = False,
+    drawing: NotebookDrawing | None = None,
 ) -> DemoResult:
     """Fly once into an existing, empty run folder; write summary and, if wished, figure there.
 
     `view`: serve the live page beside the flight, which may then be steered from it. `pace`: on the
-    virtual clock, at most this factor of real time; not for a link within one process. `status`: what a
+    virtual clock, at most this factor of real time. `status`: what a
     flight within this process writes on the standard error. `compare`: fly the usual loop beside it,
-    where there is one.
+    where there is one. `drawing` shows a flight within this process.
     """
     write_whole(folder.config, dump_config(agreement.config))
-    if agreement.link.in_process:
-        outcome, upper, lower = run_in_memory(agreement, folder, status)
-        messages = [] if outcome.code is ExitCode.OK else [outcome.text]
-        result = DemoResult(joined(upper, lower), outcome.code, messages)
-    else:
-        with StopFlag() as stop, page_beside(view, stop) as viewing:
-            if pace is not None:
-                viewing = replace(viewing, transmitter=[*viewing.transmitter, "--pace", str(pace)])
+    with StopFlag() as stop, page_beside(view, stop, pace) as viewing:
+        if agreement.link.in_process:
+            flown = replace(agreement, live=view is not None)
+            outcome, upper, lower = run_in_memory(flown, folder, status, viewing, drawing)
+            messages = [] if outcome.code is ExitCode.OK else [outcome.text]
+            result = DemoResult(joined(upper, lower), outcome.code, messages)
+        else:
             result = _fly_processes(agreement, folder, on_status, viewing, stop)
     on_status({"role": "run", "phase": "writing its results"})
     usual = None
@@ -90,7 +91,8 @@ def _fly_processes(
     agreement: Agreement, folder: RunFolder, on_status: OnStatus, viewing: Viewing, stop: StopFlag
 ) -> DemoResult:
     with agreement.link.meeting(agreement.config.link) as meetings:
-        up, down = _words(meetings[0]) + viewing.transmitter, _words(meetings[1]) + viewing.receiver
+        up = _words(meetings[0]) + viewing.words("transmitter")
+        down = _words(meetings[1]) + viewing.words("receiver")
         receiver = _Child("receiver", agreement, folder, down, on_status)
         transmitter = _Child("transmitter", agreement, folder, up, on_status)
         ends = (transmitter, receiver)

@@ -36,6 +36,7 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         "samples": session.copies.next_sample,
         "coder_bits_up": meter.coder_bits,
         "wire_bytes_up": meter.wire_bytes,
+        "coder_bits_down": 8 * run.endpoint.inlet.command_bytes,
         "wire_bytes_down": run.wire_bytes_down,
         "erasures": session.counts["erasures"],
         "digest_checks": session.counts["digest_checks"],
@@ -82,7 +83,7 @@ def _rate(run: TransmitterRun) -> Summary:
     if not run.ticks:
         return {"symbols_per_s_asked": asked, "symbols_per_s_kept": None, "symbols_missing_share": None}
     samples = run.ticks / terms.ticks_per_sample
-    share = min(1.0, (counts["digest_checks"] - counts["erasures"]) / samples)
+    share = min(1.0, (counts["confirmed"] - counts["erasures"]) / samples)
     return {
         "symbols_per_s_asked": asked,
         "symbols_per_s_kept": share * asked,
@@ -107,6 +108,7 @@ def receiver_part(agreement: Agreement, endpoint: ReceiverEndpoint, outcome: Out
         "samples": session.state.sample,
         "baud_measured": session.meter.baud,
         "wire_bytes_up": endpoint.inlet.wire_bytes,
+        "coder_bits_down": 8 * endpoint.downlink.command_bytes,
         "wire_bytes_down": endpoint.downlink.wire_bytes,
         "erasures": session.counts["erasures"],
         "symbols_late": session.counts["symbols_late"],
@@ -151,6 +153,8 @@ def joined(transmitter: Summary, receiver: Summary) -> Summary:
     for name in ("reconnects", "malformed", "recording_rows_lost", COUNTER):
         both[name] = transmitter.get(name, 0) + receiver.get(name, 0)
     both["recording_error"] = transmitter.get("recording_error") or receiver.get("recording_error")
+    if receiver.get("coder_bits_down"):
+        both["coder_bits_down"] = receiver["coder_bits_down"]
     if receiver.get("impaired_down"):
         both["impaired_down"] = receiver["impaired_down"]
     return {**transmitter, **both, **{name: receiver.get(name) for name in own}}
@@ -170,6 +174,7 @@ def _common(agreement: Agreement, outcome: Outcome, end: End | None) -> Summary:
         "lead_ticks": agreement.terms.lead_ticks,
         "delivery": config.channel.delivery,
         "baud_configured": config.channel.rate_baud,
+        "downlink": config.channel.downlink,
         "config_digest": agreement.identity.config_digest.hex(),
         "numerics_probe": agreement.identity.numerics_probe.hex(),
         "version": agreement.identity.version,

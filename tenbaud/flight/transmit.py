@@ -178,7 +178,7 @@ def flight_counts(run: TransmitterRun) -> FlightCounts:
     node, session = run.node, run.node.session
     return FlightCounts(
         samples=-(-run.ticks // run.agreement.terms.ticks_per_sample),
-        confirmed=session.counts["digest_checks"],
+        confirmed=session.counts["confirmed"],
         erased=session.counts["erasures"],
         rejoins=session.counts["rejoins"],
         ticks=run.ticks,

@@ -42,9 +42,9 @@ def _verdict(run: RecordedRun) -> str:
     return verdict_of(run.summary) if run.summary else f"{run!r}, no summary"
 
 
-def picture_html(figure: Figure) -> str:
+def picture_html(figure: Figure, dots_per_inch: int = 90) -> str:
     """Return a figure as an image in HTML."""
     stream = BytesIO()
-    figure.savefig(stream, format="png", dpi=90)
+    figure.savefig(stream, format="png", dpi=dots_per_inch)
     data = b64encode(stream.getvalue()).decode()
     return f'<img alt="outputs and estimate errors over time" src="data:image/png;base64,{data}">'

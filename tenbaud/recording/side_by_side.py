@@ -32,7 +32,7 @@ GAP = 2
 NOTHING = "-"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class SideBySide:
     """What `compare` found. Printed it is a table; a notebook shows table and figure."""
 
@@ -49,7 +49,7 @@ class SideBySide:
         """The letter of each run."""
         return ascii_uppercase[: len(self.runs)]
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         return self.text()
 
     def text(self, width: int | None = None, *, unicode: bool = True) -> str:
@@ -71,8 +71,11 @@ class SideBySide:
         from tenbaud.recording.curves import draw_outputs
         from tenbaud.recording.style import save
 
-        pairs = zip(self.labels, self.runs, self._described(), strict=True)
-        labelled = [(f"{letter}: {about.partition(',')[0]}", run) for letter, run, about in pairs]
+        names = [run.metadata.get("preset", "") for run in self.runs]
+        if len(set(names)) < len(names):
+            names = [run.path.name for run in self.runs]
+        labels = (f"{letter}: {name}" for letter, name in zip(self.labels, names, strict=True))
+        labelled = list(zip(labels, self.runs, strict=True))
         figure = draw_outputs(labelled, self.outputs, self.metrics[0]["to_s"])
         if output is not None:
             make_folder(Path(output).parent)

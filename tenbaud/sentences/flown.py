@@ -71,6 +71,8 @@ def figures_of(summary: Summary, unicode: bool = True) -> Iterator[tuple[str, st
     yield "Flown", f"{get('plant')}; {flown}" if get("plant") else flown
     if get("coder_bits_up") is not None:
         yield "Uplink", _uplink(summary)
+    if get("downlink", "full") != "full":
+        yield "Downlink", f"{get('downlink')}: {_bits(summary, 'down')}"
     yield from _errors(summary, unicode)
     if learned := summary.get("learned"):
         seen = [learned_text(name, **one) for name, one in learned.items() if is_seen(**one)]
@@ -130,14 +132,17 @@ def _errors(summary: Summary, unicode: bool) -> Iterator[tuple[str, str]]:
 
 
 def _uplink(summary: Summary) -> str:
-    bits = summary["coder_bits_up"]
-    text = f"{bits:g} bits"
-    if summary.get("duration_s"):
-        text += f", {bits / float(summary['duration_s']):.3g} bit/s"
+    text = _bits(summary, "up")
     up, down = summary.get("wire_bytes_up"), summary.get("wire_bytes_down")
     if up is not None and down is not None:
         text += f"; with framing {_bytes(up)} up, {_bytes(down)} down"
     return text
+
+
+def _bits(summary: Summary, way: str) -> str:
+    bits = summary[f"coder_bits_{way}"]
+    seconds = summary.get("duration_s")
+    return f"{bits:.12g} bits" + (f", {bits / float(seconds):.4g} bit/s" if seconds else "")
 
 
 def _bytes(count: int) -> str:

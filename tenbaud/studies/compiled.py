@@ -11,7 +11,9 @@ a second study, or a second worker, does not compile again and no stale code is 
 from __future__ import annotations
 
 import os
+import shutil
 import sys
+import time
 from collections.abc import Callable
 from functools import cache
 from hashlib import blake2b
@@ -50,6 +52,10 @@ BESIDE = (
     ),
 )
 """Modules that no figure of a flight depends on."""
+
+KEPT_FOLDERS = 8
+KEPT_S = 86_400.0
+"""How long machine code is kept unused, and of how many versions of the sources in any case."""
 
 Parts = tuple[tuple[str, Any], ...]
 """Replacements for the placeholders of the flight: (name, compiled function, or a number)."""
@@ -243,7 +249,18 @@ def _cache_folder() -> Path | None:
     try:
         base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
         folder = Path(base) / "tenbaud" / sources_digest()
-        folder.mkdir(parents=True, exist_ok=True)
+        if not folder.is_dir():
+            folder.mkdir(parents=True)
+            prune(folder.parent)
+        os.utime(folder)
     except (OSError, RuntimeError):  # the latter for a user without a home, as in containers
         return None
     return folder if os.access(folder, os.W_OK) else None
+
+
+def prune(base: Path) -> None:
+    """Remove the machine code of sources that are in use no more."""
+    folders = sorted(base.iterdir(), key=lambda one: one.stat().st_mtime, reverse=True)
+    for folder in folders[KEPT_FOLDERS:]:
+        if time.time() - folder.stat().st_mtime > KEPT_S:
+            shutil.rmtree(folder, ignore_errors=True)

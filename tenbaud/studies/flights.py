@@ -279,6 +279,8 @@ def _require_ordinary(config: FlightConfig, codec: Codec) -> None:
         raise Uncommon("a plant from outside")
     if config.transmitter.sabotage or config.receiver.sabotage or config.transmitter.dry_run:
         raise Uncommon("sabotage and dry runs")
+    if config.channel.downlink != "full":
+        raise Uncommon(f"the {config.channel.downlink} downlink")
     if kind_of_link(config).changes_terms:
         raise Uncommon("a link on which bytes take time, such as a serial line")
     model, coder = codec.model, codec.coder

@@ -1,4 +1,4 @@
-"""A progress bar on standard error, for commands that compute for a while."""
+"""A progress bar on standard error or in a notebook, for commands that compute for a while."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from tenbaud.recording.notebook import Cell, in_notebook
+
 TEXT_CELLS = 45
 """What stands beside the bar needs about so much of a line."""
+
 Update = Callable[[float, float, str], None]
 """(done, of how much, what is being done)"""
 
@@ -19,6 +22,10 @@ def progress_bar(what: str, *, counted: bool = False) -> Iterator[Update]:
     `counted`: with how many of how many beside it, left on the terminal at the end, and written to a
     file too; else a bar that a terminal alone shows, and that vanishes.
     """
+    if in_notebook():
+        cell = Cell()
+        yield cell.show_progress
+        return
     from rich.console import Console
     from rich.progress import (
         BarColumn,

@@ -169,7 +169,7 @@ class _SetPoint(_Panel):
             for place, (output, can) in enumerate(zip(outputs, steerable, strict=False)):
                 if not can:
                     continue
-                spread, unit, factor = _spread(output)
+                spread, unit, factor = slider_spread(output)
                 words = str(output["name"]).replace("_", " ")
                 name = "Set-point" if len(outputs) == 1 else f"Set-point of {words}"
                 _Slider(
@@ -186,7 +186,7 @@ class _SetPoint(_Panel):
         self.enable(allowed and any(lower.get("steerable", ())))
 
 
-def _spread(output: dict[str, Any]) -> tuple[Spread, str, float]:
+def slider_spread(output: dict[str, Any]) -> tuple[Spread, str, float]:
     """Return least, most and step of a slider, its unit, and what its value is multiplied by.
 
     Angles are in degrees. Without a range in the plant's description: 90 degrees, or 1.
@@ -271,11 +271,10 @@ class _Line(_Panel):
         if under_way or text == self._reported:
             return
         self._reported = text
-        if text != self._sent:
-            up = parse_impairments(text).up
-            self.loss.show(round(100.0 * up.loss))
-            self.flips.show(round(100.0 * up.flip))
-            self.delay.show(round(up.delay_ns / 1e6))
+        up = parse_impairments(text).up
+        self.loss.show(round(100.0 * up.loss))
+        self.flips.show(round(100.0 * up.flip))
+        self.delay.show(round(up.delay_ns / 1e6))
 
 
 class _Break(_Panel):

@@ -216,8 +216,8 @@ class RecordedFlight:
     def _described(self) -> dict[str, Any]:
         return {
             "picture": self.plant.picture,
-            "outputs": [named_signal(one) for one in self.plant.outputs],
-            "inputs": [named_signal(one) for one in self.plant.inputs],
+            "outputs": _named(self.plant.outputs, self._values),
+            "inputs": _named(self.plant.inputs, self._applied),
         }
 
     def _text_at(self, name: str, tick: int) -> str:
@@ -237,6 +237,16 @@ class RecordedFlight:
             math.nan if self._gap is None or row is None else float(self._gap["rms_over_floor"][row])
         )
         return None if math.isnan(found) else found
+
+
+def _named(signals: Sequence[Signal], values: Series) -> list[dict[str, Any]]:
+    """Return signals as messages name them; one without limits gets its largest value for its bar."""
+    named = [named_signal(one) for one in signals]
+    for one, column in zip(named, values.T, strict=True):
+        if (one["low"] is None or one["high"] is None) and not np.isnan(column).all():
+            one["high"] = float(np.nanmax(np.abs(column)))
+            one["low"] = -one["high"]
+    return named
 
 
 def _row_of(table: Table | None, key: int) -> int | None:

@@ -44,6 +44,8 @@ class Confirmed(NamedTuple):
     """of our copy after the sample"""
     peer_digest: int
     """of the receiver's"""
+    peer_mask: int
+    """which of its bits the receiver sent; the others are taken from ours"""
     lag_samples: int
     """samples that had been sent beyond this one when its echo came"""
     about: tuple[int, ...] | None = None
@@ -113,10 +115,13 @@ class Copies:
         self._sent.extend([ERASED] * missed)
         return missed
 
-    def confirm(self, word: Word, commands: list[Vector], peer_digest: int) -> Confirmed:
+    def confirm(
+        self, word: Word, commands: list[Vector], peer_digest: int, peer_mask: int = 2**64 - 1
+    ) -> Confirmed:
         """Advance the confirmed copy by the echo of its next sample.
 
-        `commands` are those of ticks `kN + D ... (k+1)N + D - 1`.
+        `commands` are those of ticks `kN + D ... (k+1)N + D - 1`; of the receiver's digest the bits of
+        `peer_mask` are known.
         """
         before = self.confirmed
         arriving = iter(commands)
@@ -134,7 +139,8 @@ class Copies:
         self.confirmed = flown.state
         self._keep_provisional(word, taken)
         digest = self.codec.digest(flown.state)
-        return Confirmed(before.sample, before, sent, word, flown, live, digest, peer_digest, lag)
+        peer = digest & ~peer_mask | peer_digest
+        return Confirmed(before.sample, before, sent, word, flown, live, digest, peer, peer_mask, lag)
 
     def explained(self, done: Confirmed) -> Confirmed:
         """Return a confirmed sample with the outputs of its symbols; no state depends on them."""
@@ -189,7 +195,8 @@ class EchoOrder:
         if echoes[0].sample > expected:
             latest = min(latest, sample)
         for echo in echoes:
-            if expected <= echo.sample <= latest:
+            repeated = not echo.digest_mask and echo.sample in self._early
+            if expected <= echo.sample <= latest and not repeated:
                 self._early[echo.sample] = echo
         if echoes[0].sample > expected and self._missing != expected:
             self._missing, self._until_tick = expected, tick + self._overtaking_ticks

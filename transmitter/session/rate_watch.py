@@ -78,4 +78,4 @@ class RateWatch:
 
 def _received(session: TransmitterSession) -> int:
     """Return how many samples the receiver says it has received whole."""
-    return session.counts["digest_checks"] - session.counts["erasures"]
+    return session.counts["confirmed"] - session.counts["erasures"]

@@ -59,6 +59,12 @@ def test_a_good_flight_is_its_verdict_and_six_lines(tmp_path: Path) -> None:
     assert lines[-1].endswith("Next: tenbaud demo --view")
 
 
+def test_a_downlink_that_is_not_full_says_its_bits(tmp_path: Path) -> None:
+    changed = {"downlink": "compact", "coder_bits_down": 128_000, "duration_s": 100.0}
+    lines = closing_lines(FLOWN | changed, RunFolder(tmp_path))
+    assert "  Downlink        compact: 128000 bits, 1280 bit/s" in lines
+
+
 def test_the_usual_loop_stands_beside_the_tracking_error(tmp_path: Path) -> None:
     lines = lines_of(tmp_path, usual_loop={"tracking_rms_rad": 0.84976})
     assert lines[4].startswith("  Tracking error  48.9° rms (48.7° over 1000 bit/s), steps of")

@@ -84,7 +84,7 @@ def test_the_figure_has_every_run_in_both_panels_the_smallest_error_in_front(
 ) -> None:
     values, errors = compare(fast, slow).plot().axes
     labels = [str(line.get_label()) for line in values.lines]
-    assert labels == ["set-point", "A: fast", "B: slow"]
+    assert labels == ["set-point", "A: usual-1000baud", "B: tuned-10baud"]
     assert errors.lines[1].get_zorder() > errors.lines[0].get_zorder()
     assert max(values.lines[1].get_ydata()) == pytest.approx(57.29578 * fast.pitch.max())
 

@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from benchmarks.browser import Served, browser, served, state_is, why_no_browser
+from benchmarks.browser import Served, served, state_is, why_no_browser
 from tenbaud import Run
 from tests.tenbaud.flown import SECONDS, flown
 
@@ -27,12 +27,6 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Run]:
         "transmitter__sabotage": f"sample={BROKEN_AFTER},field=range",
     }
     return flown(folder / "ten", **faults), flown(folder / "usual", "usual-1000baud")
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    with browser() as one:
-        yield one
 
 
 @pytest.fixture(scope="module")

@@ -57,6 +57,8 @@ class TransmitterNode:
         self.commands_late = 0
         self.ticks_commanded = 0
         """whose own command passed the guard"""
+        self.ticks_at_limit = 0
+        """of these, with an input at its limit"""
         self.ticks_down = 0
         """with the guard at the safe voltage, or on its way there"""
         self.sensor_fault: GuardReason | None = None
@@ -143,7 +145,9 @@ class TransmitterNode:
         self.commands_late += late
         volts = self.guard.apply(tick, command, session.owing.owed_ticks(tick))
         self.ticks_down += self.guard.stopped
-        self.ticks_commanded += command is not None and not self.guard.stopped
+        if command is not None and not self.guard.stopped:
+            self.ticks_commanded += 1
+            self.ticks_at_limit += session.terms.limits.reached(command)
         self.rig.write(tick, volts)
         self._applied = volts if reading.applied_volts is None else reading.applied_volts
         time_ns = tick * self.session.terms.tick_ns

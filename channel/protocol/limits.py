@@ -21,6 +21,8 @@ COMMAND_MAX = 5.0
 PLAUSIBLE_MAX = 1e6
 """A law that wants more has lost its way; anything less is only clamped."""
 
+NEARLY = 0.99
+
 
 @dataclass(frozen=True, slots=True)
 class CommandLimits:
@@ -70,6 +72,13 @@ class CommandLimits:
             )
         wanted = zip(command, previous, largest, step, strict=True)
         return tuple([limited(*one) for one in wanted])
+
+    def reached(self, command: Vector) -> bool:
+        """Return whether an input is at its limit, as near as the rounding of the wire lets it come."""
+        for value, largest in zip(command, self.command_max, strict=True):
+            if abs(value) >= NEARLY * largest:
+                return True
+        return False
 
 
 def limited(wanted: float, before: float, largest: float, step: float) -> float:

@@ -69,6 +69,7 @@ FIELDS: dict[str, tuple[str, str]] = {
     "commands_late": ("ticks", "without their own command in time"),
     "commands_refused": ("", "commands of viewers that were refused"),
     "ticks_commanded": ("ticks", "with their own command"),
+    "ticks_at_limit": ("ticks", "of these, with an input at `limits.command_max`"),
     "ticks_guard_down": ("ticks", "with the guard at the safe command or ramping to it"),
     "ticks_missed": ("ticks", "that a loop on the real clock skipped"),
     "guard_rearmed": ("", "how often the guard was armed again"),

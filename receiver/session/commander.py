@@ -8,6 +8,7 @@ consumed and decided becomes an echo. It knows no slot, no frame and no peer.
 from __future__ import annotations
 
 from collections import Counter, deque
+from collections.abc import Sized
 from typing import NamedTuple
 
 from channel.codec.codec import Codec, CodecState, Vector, Word
@@ -77,6 +78,8 @@ class Commander:
         """decided for the sample that is being flown"""
         self._compact = CompactForm(codec, terms) if terms.downlink == "compact" else None
         self._unwritten: list[_Flown] = []
+        self.first_problem = ""
+        """of the controller's commands"""
 
     @property
     def standing(self) -> Standing:
@@ -179,12 +182,16 @@ class Commander:
         """Return the controller's command; its last one if it fails or is not finite."""
         try:
             command = self._controller.command(tick, state)
-            if len(command) == len(self.hold) and are_plausible(command):
-                return command
-            problem = f"wants {command}"
+            if isinstance(command, Sized):
+                if len(command) == len(self.hold) and are_plausible(command):
+                    return command
+                problem = f"wants {command}"
+            else:
+                problem = f"wants {command!r}, and not a tuple of {len(self.hold)} number(s)"
         except Exception as error:  # a controller is the user's code; the flight goes on without it
             problem = f"failed: {type(error).__name__}: {error}"
         self._counts["bad_commands"] += 1
         if self._counts["bad_commands"] == 1:
+            self.first_problem = problem
             self._emit(Event(EventKind.CONTROLLER, tick=tick, cause=Failing.COMMAND, detail=problem))
         return self.hold

@@ -109,6 +109,11 @@ class ReceiverSession:
         return self._commander.state
 
     @property
+    def controller_problem(self) -> str:
+        """Return what was wrong with the controller's first bad command; empty without one."""
+        return self._commander.first_problem
+
+    @property
     def due_slot(self) -> int | None:
         """Return the slot that is not settled yet; None while no flight is on."""
         return self._clock.slot if self.phase is Phase.FLYING else None

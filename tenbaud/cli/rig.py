@@ -115,7 +115,8 @@ def _flight_words(body: options.PlantOptions, config: FlightConfig) -> list[str]
     from tenbaud.build.first_contact import as_options, first_settings
     from tenbaud.build.signals import configured_signals
 
-    words = ["--preset", body.preset] if body.preset else []
+    # The paper's constants, the default of `transmit`, lose the small angles of a first flight.
+    words = ["--preset", body.preset or "tuned-10baud"] if body.preset or not body.config else []
     words += ["--config", str(body.config)] if body.config else []
     for one in body.settings or ():
         words += ["--set", one]

@@ -66,4 +66,6 @@ def _not_flown(agreement: Agreement, session: ReceiverSession) -> Outcome | None
     if not faults:
         return None
     text = verdict_text(faults, counts, settings_of(agreement), {})
+    if session.controller_problem:
+        text += f"\n  its first fault: the controller {session.controller_problem}"
     return Outcome(ExitCode.NOT_FLOWN, text, faults)

@@ -51,6 +51,7 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         "guard_rearmed": node.rearmed,
         "ticks_guard_down": node.ticks_down,
         "ticks_commanded": node.ticks_commanded,
+        "ticks_at_limit": node.ticks_at_limit,
         "impairments": config.link.impairments,
         "impaired_up": dict(run.uplink.line.counts),
         "impaired_down": dict(run.downlink.counts),

@@ -129,7 +129,9 @@ def _hint(form: str, address: str, flight: list[str]) -> str:
         where = f"{form}:socket://{address}" if ":" in address else where
     if form == "qsb":
         return f"look at it with: tenbaud rig-check --rig {where}"
-    return " ".join([f"fly it with: tenbaud demo --clock real --rig {shlex.quote(where)}", *flight])
+    # Nobody stands beside an emulator, so its flight asks no question.
+    command = f"fly it with: tenbaud demo --clock real --yes --rig {shlex.quote(where)}"
+    return " ".join([command, *flight])
 
 
 def rig_check(

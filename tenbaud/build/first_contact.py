@@ -19,6 +19,7 @@ from tenbaud.build.parts import Parts
 from tenbaud.build.references import reference_sections
 from tenbaud.build.rig import build_device, real_rig_name
 from tenbaud.build.signals import build_limits, configured_signals, per_output, soft_limits
+from tenbaud.config.kinds import CONTROLLERS
 from tenbaud.config.load import ConfigError, toml_text
 from tenbaud.config.schema import FlightConfig
 from tenbaud.log.units import turn_in
@@ -95,7 +96,9 @@ def _missing(config: FlightConfig, signals: Signals, parts: Parts) -> Iterator[s
         pairs = zip(signals.inputs, limits, strict=True)
         values = ", ".join(f"{one.name} {most:g} {one.unit}".rstrip() for one, most in pairs)
         yield f"limits.command_max: the preset's own ({values}); state the limit of your motors"
-    if config.receiver.controller == "recorded" or parts.controller is not None:
+    controller = config.receiver.controller
+    outside = controller == "recorded" or controller not in CONTROLLERS.built_in
+    if outside or parts.controller is not None:
         yield "receiver.controller: it follows set-points of its own, so no limit makes them gentle"
         return
     for place, (output, section) in enumerate(reference_sections(config, signals)):

@@ -34,7 +34,9 @@ FIRST_SOFT_TURN = 0.5 / math.tau
 FIRST_COMMAND_SHARE = 0.2
 """of an input's limit"""
 DECLARATION_S = 0.5
-"""A device has this long after its first sample to say that it is emulated."""
+"""Every sample of this time must say that the device is emulated."""
+LINE_DECLARATION_S = 2.0
+"""A device that says it in a line between samples has this long."""
 
 
 def drives_motors(config: FlightConfig) -> bool:
@@ -79,7 +81,12 @@ def is_emulated(config: FlightConfig, signals: Signals) -> bool:
     section = config.transmitter
     if section.rig == "hil" or (section.rig == "quarc" and "flags" not in (section.quarc.fields or ())):
         return False
+    if section.rig == "serial" and section.serial.motor_port:
+        return False  # the encoders' port says nothing of the motors behind another
     with build_device(config, output=False, signals=signals) as device:
+        if section.rig == "serial" and section.serial.format == "ascii":
+            # Its declaration is a line of its own between samples.
+            return device.declares_emulation(LINE_DECLARATION_S, late=True)
         return device.declares_emulation(DECLARATION_S)
 
 

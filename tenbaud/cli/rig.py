@@ -156,7 +156,7 @@ def rig_check(
     """
     from tenbaud.build.recorded import flight_config
     from tenbaud.checks.rigcheck import check_rig, show_check
-    from tenbaud.config.load import nested, toml_text
+    from tenbaud.config.load import given_values, merged, nested, toml_text
     from tenbaud.files.whole import write_whole
 
     if write is not None and write.exists():
@@ -164,9 +164,12 @@ def rig_check(
     changed = options.overrides(rig=rig, settings=settings)
     result = check_rig(flight_config(preset, config, changed), seconds, live=not json)
     if write is not None:
-        write_whole(write, toml_text(nested(result.proposal)))
+        values = merged(given_values(config, changed), nested(result.proposal))
+        write_whole(write, toml_text(values))
+        whole = f"{config} and " if config else ""
         typer.echo(
-            f"the proposed settings are in {write}: check them, then add --config {write}", err=True
+            f"{whole}the proposed settings are in {write}: check them, then fly with --config {write}",
+            err=True,
         )
     if json:
         options.print_json(asdict(result))

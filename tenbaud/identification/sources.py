@@ -47,9 +47,9 @@ class Source:
 def from_rig(config: FlightConfig, excitation: str, duration_s: float) -> Record:
     """Excite the configured rig and return its encoder's readings."""
     if drives_motors(config):
-        rig = real_rig_name(config.transmitter)
+        named = real_rig_name(config.transmitter)
         raise IdentificationError(
-            f"the motors of {rig} stay off: this command excites simulated rigs only. Fly it and "
+            f"the motors of {named} stay off: this command excites simulated rigs only. Fly it and "
             "give the run: `tenbaud demo --clock real --config FILE --out run`, then "
             "`tenbaud identify run`"
         )

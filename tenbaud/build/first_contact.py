@@ -106,7 +106,7 @@ def _missing(config: FlightConfig, signals: Signals, parts: Parts) -> Iterator[s
     controller = config.receiver.controller
     outside = controller == "recorded" or controller not in CONTROLLERS.built_in
     if outside or parts.controller is not None:
-        yield "receiver.controller: it follows set-points of its own, so no limit makes them gentle"
+        yield "receiver.controller: it may follow set-points of its own, which no limit makes gentle"
         return
     for place, (output, section) in enumerate(reference_sections(config, signals)):
         gentle = gentle_limit(output, soft[place])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import shlex
 import subprocess
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -12,9 +13,12 @@ from typing import Any
 import pytest
 
 from channel.codec.signals import Signals
+from channel.protocol.frames import Hello, Welcome, Why
+from channel.protocol.wire import DATAGRAM
 from receiver.controllers.references import Constant, LimitedReference, Square, SteeredReference
 from tenbaud import fly
 from tenbaud.build.codec import build_model
+from tenbaud.build.ends import build_receiver
 from tenbaud.build.first_contact import drives_motors, require_safe
 from tenbaud.build.flight import agree
 from tenbaud.build.recorded import flight_config
@@ -142,9 +146,7 @@ def test_a_firmware_with_bits_of_its_own_is_no_emulator() -> None:
     declared = [byte for byte in range(256) if DeviceFlag.EMULATED in flags_of(byte)]
     assert declared == list(range(0xA0, 0xB0))
     layout = DoublesLayout(("flags", "c0"))
-    status = {
-        value: layout.decode(layout.struct.pack(value, 0.0)).flags for value in (163.0, 163.4, 419.0)
-    }
+    status = [layout.decode(layout.struct.pack(one, 0.0)).flags for one in (163.0, 163.4, 419.0)]
     assert [DeviceFlag.EMULATED in one for one in status] == [True, False, False]
     assert all(one & 0x0F == 3 for one in status)
 
@@ -180,7 +182,7 @@ def _undeclared(sample: Any) -> Any:
 
 def test_a_controller_from_outside_is_refused_by_its_name_too() -> None:
     text = refusal(configured("hil", *SETTINGS, "receiver.controller='tests.nowhere:Law'"))
-    assert "receiver.controller: it follows set-points of its own" in text
+    assert "receiver.controller: it may follow set-points of its own" in text
 
 
 @pytest.mark.parametrize("command", ["demo", "transmit"])
@@ -261,6 +263,46 @@ def test_a_set_point_by_hand_keeps_to_the_limits() -> None:
     free = SteeredReference(Constant(2.0, 0.01))
     free.steer(7.0)
     assert free.value(0) == 7.0
+
+
+def test_a_receiver_that_starts_late_moves_the_set_point_from_its_estimate() -> None:
+    limits = ("limits.set_point_max=0.16", "limits.set_point_slew_per_s=0.1")
+    agreement = agree(configured("simulated", *limits, "model.start=[0.1,0,0,0]"), "virtual")
+    session = build_receiver(agreement, None, DATAGRAM).session
+    identity, sample = agreement.identity, 36_000
+    greeting = Hello(5, identity.version, identity.config_digest, identity.numerics_probe)
+    late = replace(greeting, session=99, epoch=3, request=1, why=Why.UNKNOWN, sample=sample)
+    (welcome,) = session.on_frame(late, 0)
+    assert isinstance(welcome, Welcome)
+    first = welcome.first_sample * agreement.terms.ticks_per_sample
+    controller = session._commander._controller
+    values = [controller.references(tick)[0] for tick in range(first, first + 100)]
+    steps = [abs(after - before) for before, after in pairwise([0.1, *values])]
+    assert first >= sample * 10
+    assert max(steps) < 0.00101
+
+
+def test_what_came_before_a_late_start_is_not_gone_through() -> None:
+    asked: list[int] = []
+
+    class Asked(Constant):
+        def value(self, tick: int) -> float:
+            asked.append(tick)
+            return self.level
+
+    steered = SteeredReference(LimitedReference(Asked(1.0, 0.01), 0.0, 0.5, 0.01))
+    steered.begin(10**9, 0.3)
+    assert steered.value(10**9 + 4) == pytest.approx(0.35)
+    assert len(asked) == 5
+
+
+def test_the_set_points_of_all_samples_that_are_not_recorded_yet_are_known() -> None:
+    words = ("timing.tick_s=0.001", "timing.symbol_period_s=1.0", "limits.set_point_slew_per_s=0.001")
+    config = configured("simulated", *words, "timing.lead_ticks=0")
+    (reference,) = build_references(config, configured_signals(config), build_model(config))
+    assert reference is not None
+    values = [reference.value(tick) for tick in range(34_000)]
+    assert reference.value(2_000) == values[2_000] != values[2_001]
 
 
 def test_a_receiver_with_other_set_point_limits_is_refused_in_the_handshake() -> None:

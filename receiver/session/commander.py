@@ -8,7 +8,7 @@ consumed and decided becomes an echo. It knows no slot, no frame and no peer.
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Sized
+from collections.abc import Callable, Sized
 from typing import NamedTuple
 
 from channel.codec.codec import Codec, CodecState, Vector, Word
@@ -25,6 +25,8 @@ from receiver.controllers.base import Controller
 from receiver.session.records import write_commands, write_sample
 from receiver.session.rejoin import carried_to
 
+Begins = Callable[[int, Vector], None]
+"""Is called where the flight begins afresh, with the tick and the outputs estimated there."""
 UNWRITTEN_MAX = 32
 """Samples that may be flown before they are recorded even if nobody finds the time."""
 
@@ -59,7 +61,9 @@ class Commander:
         recorder: Recorder,
         counts: Counter[str],
         emit: Tell,
+        begins: Begins | None = None,
     ) -> None:
+        self._begins = begins
         self.codec = codec
         self.terms = terms
         self.state = codec.initial()
@@ -94,8 +98,12 @@ class Commander:
 
     def restart(self, sample: int) -> None:
         """Begin afresh at a sample, from the codec's initial state and command."""
+        self.write_down()
         self.state = self.codec.initial()._replace(sample=sample)
         self._hold(self.terms.initial_command)
+        if self._begins is not None:
+            outputs = self.codec.model.measured(self.state.model)
+            self._begins(sample * self.terms.ticks_per_sample, outputs)
 
     def carry_on(self, sample: int, silent_samples: int) -> None:
         """Begin an epoch at a later sample, the state carried there under the last command.

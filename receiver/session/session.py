@@ -41,7 +41,7 @@ from channel.protocol.recording import NullRecorder, Recorder, write_epoch
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
 from receiver.controllers.base import Controller
-from receiver.session.commander import Commander
+from receiver.session.commander import Begins, Commander
 from receiver.session.records import write_symbol
 from receiver.session.rejoin import Greeter, Takeover, Verdict, desync_answer, difference, first_sample
 from receiver.session.schedule import Proven, Schedule, SlotClock, Timing
@@ -74,6 +74,7 @@ class ReceiverSession:
         recorder: Recorder | None = None,
         *,
         take_over: bool = False,
+        begins: Begins | None = None,
     ) -> None:
         self.codec = codec
         self.terms = terms
@@ -93,7 +94,9 @@ class ReceiverSession:
         self._greeter = Greeter(terms)
         self._takeover = Takeover(session_number, take_over)
         self._recorder = recorder or NullRecorder()
-        self._commander = Commander(codec, terms, controller, self._recorder, self.counts, self._emit)
+        self._commander = Commander(
+            codec, terms, controller, self._recorder, self.counts, self._emit, begins
+        )
         self._clock = SlotClock(terms)
         self._word: list[int | None] = []
         self._advanced = False

@@ -34,18 +34,22 @@ class LatenessMeter:
 
 
 class BaudMeter:
-    """Measures symbols per second on the receiver's clock, over its last 5 s."""
+    """Measures symbols per second on the receiver's clock, over its last 5 s and over the whole flight."""
 
     SPAN_NS = 5_000_000_000
 
     def __init__(self) -> None:
         self._times_ns: deque[int] = deque()
-        self._last_ns = 0
+        self._first_ns = self._last_ns = 0
+        self._came = 0
 
     def on_slot(self, now_ns: int, *, came: bool) -> None:
         """Count a slot that is decided now; `came`: its symbol is there."""
         self._last_ns = now_ns
         if came:
+            if not self._came:
+                self._first_ns = now_ns
+            self._came += 1
             self._times_ns.append(now_ns)
         # The last symbol before the span bounds its first interval.
         while len(self._times_ns) > 1 and self._times_ns[1] <= now_ns - self.SPAN_NS:
@@ -53,8 +57,14 @@ class BaudMeter:
 
     @property
     def baud(self) -> float | None:
-        """Return the measured rate; None before two symbols came at different times."""
-        if not self._times_ns:
-            return None
-        span_ns = self._last_ns - self._times_ns[0]
-        return (len(self._times_ns) - 1) * 1e9 / span_ns if span_ns > 0 else None
+        """Return the rate of the last 5 s; None before two symbols came at different times."""
+        return self._rate(len(self._times_ns), self._times_ns[0]) if self._times_ns else None
+
+    @property
+    def whole_baud(self) -> float | None:
+        """Return the rate from the first symbol to the last slot; None as with `baud`."""
+        return self._rate(self._came, self._first_ns)
+
+    def _rate(self, came: int, first_ns: int) -> float | None:
+        span_ns = self._last_ns - first_ns
+        return (came - 1) * 1e9 / span_ns if came and span_ns > 0 else None

@@ -88,6 +88,22 @@ def test_when_more_frames_in_a_row_are_lost_then_a_rejoin_follows() -> None:
     assert flight.transmitter.copies.confirmed == flight.receiver.state
 
 
+def test_when_a_samples_own_frame_was_lost_then_its_state_is_not_compared() -> None:
+    flight = compact(lead_ticks=3, downlink_line=LosingDownlink((), {20: 210_000_000}))
+    compared: list[bool] = []
+    session = flight.transmitter
+    confirm = session.copies.confirm
+
+    def confirming(*given: Any) -> Any:
+        compared.append(session.is_proven)
+        return confirm(*given)
+
+    session.copies.confirm = confirming  # type: ignore[method-assign]
+    flight.fly(4.0)
+    # Asked before each sample is confirmed: 0 has nothing before it, and the frame of 20 came last.
+    assert [sample for sample, known in enumerate(compared) if not known] == [0, 21]
+
+
 def test_when_a_frame_is_overtaken_then_its_echo_is_taken_from_the_next_one() -> None:
     flight = compact(downlink_line=LosingDownlink((), {30: 250_000_000}))
     flight.fly(10.0)

@@ -9,7 +9,9 @@ the power of the sample's bits; the sample is the one nearest to where the trans
 Before the first sample of an epoch echoes are zeros.
 
 A command is a number of *held steps* of its input: the steps of a full frame, or as many of them
-together as make the input's limit fit `COMMAND_BITS`. So both codecs use exactly what came.
+together as make the input's limit fit `HELD_BITS`. So both codecs use exactly what came. From sample to
+sample it changes by one tick's slew at most: it changes at one tick, and the guard beside the motors
+allows no more.
 
 Of the newest sample's digest the low 16 bits are here and three of the others: those of sample `k`
 begin at bit `16 + 3 (k mod 16)`. So two states that differ stay unseen for `n` samples with a
@@ -22,11 +24,10 @@ from collections.abc import Sequence
 
 from channel.codec.codec import WIRE_ERASED, Codec, Vector
 from channel.protocol.frames import Commands, Echo, ShortCommands
-from channel.protocol.limits import to_steps
+from channel.protocol.limits import steps_held, to_steps
 from channel.protocol.terms import Terms
 from channel.protocol.wire import SHORT_MARK
 
-COMMAND_BITS = 11
 DIGEST_BITS = 16
 PART_BITS = 3
 PART_SAMPLES = 16
@@ -44,9 +45,8 @@ class CompactForm:
         self._word_bits = self._words.bit_length()
         # Echoes are taken from one history behind the clock to two before it.
         self._sample_bits = max(SAMPLE_BITS_MIN, (4 * terms.history_samples - 1).bit_length())
-        most = (1 << COMMAND_BITS - 1) - 1
         largest = to_steps(terms.limits.command_max, terms.signals)
-        self._per_held = tuple([max(1, -(-one // most)) for one in largest])
+        self._per_held = steps_held(terms.limits, terms.signals)
         """steps of a full frame in one held step, for each input"""
         self._largest = tuple([a // b for a, b in zip(largest, self._per_held, strict=True)])
         self._command_bits = tuple([(2 * one).bit_length() for one in self._largest])

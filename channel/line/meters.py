@@ -34,7 +34,7 @@ class LatenessMeter:
 
 
 class BaudMeter:
-    """Measures symbols per second on the receiver's clock, over its last 5 s and over the whole flight."""
+    """Measures symbols per second on the receiver's clock: of its last 5 s and of the whole flight."""
 
     SPAN_NS = 5_000_000_000
 

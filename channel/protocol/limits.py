@@ -119,7 +119,7 @@ def steps_held(limits: CommandLimits, signals: Signals) -> tuple[int, ...]:
 
 
 def require_movable(limits: CommandLimits, signals: Signals, per_step: Sequence[int]) -> None:
-    """Raise ValueError, with the numbers, where the slew limit is below a step: a command stays as it is.
+    """Raise ValueError, with the numbers, where the slew limit is below a step: nothing would move.
 
     `per_step`: steps of a full frame that the downlink counts as one, for each input.
     """
@@ -128,7 +128,7 @@ def require_movable(limits: CommandLimits, signals: Signals, per_step: Sequence[
         if slew < step * (1.0 - 1e-9):
             raise ValueError(
                 f"the slew limit of input {one.name} is {slew:g} {one.unit} per tick, and the downlink "
-                f"carries its command in steps of {step:g} {one.unit}, so that it could not move: raise "
+                f"carries its command in steps of {step:g} {one.unit}; it could not move: raise "
                 f"limits.command_slew_per_s to {step / slew:.3g} times its value or more"
                 + ("" if per == 1 else ', lower limits.command_max, or set channel.downlink = "full"')
             )

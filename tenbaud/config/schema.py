@@ -115,8 +115,8 @@ class Limits(Section):
     command_max: Positive | tuple[Positive, ...] | None = None
     """largest value of an input, either way; none: the input's own range, or 5 where it has none"""
     command_slew_per_s: Positive | tuple[Positive, ...] = 1000.0
-    """fastest change of an input; on the compact downlink a command changes once a sample, by the share of
-    one tick: N times slower"""
+    """fastest change of an input; on the compact downlink a command changes once a sample, and by one
+    tick's share: N times slower"""
     initial_command: Command = 0.0
     """command until the first one from the receiver"""
     set_point_max: PerOutput = None

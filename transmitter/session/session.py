@@ -333,10 +333,8 @@ class TransmitterSession:
             return self._on_diverged(error)
         self.confirmed.append(done)
         self.history.add(self.epoch, word, done.flown.state)
-        checked, erased = echo.digest_mask > 0, word is ERASED
-        self.counts.update(
-            confirmed=1, digest_checks=checked, erasures=erased, words_missed=not done.lag_samples
-        )
+        checked, erased, unsent = echo.digest_mask > 0, word is ERASED, done.lag_samples == 0
+        self.counts.update(confirmed=1, digest_checks=checked, erasures=erased, words_missed=unsent)
         if done.digest != done.peer_digest:
             return self._on_desync(done)
         # Only now: a receiver with a different state must move no motor.

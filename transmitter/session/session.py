@@ -116,7 +116,7 @@ class TransmitterSession:
         self._recorder = recorder or NullRecorder()
         self._due = DueCommands(terms.initial_command, terms.lead_ticks)
         self._tick = -1
-        self._compact = CompactForm(codec, terms) if terms.downlink == "compact" else None
+        self.compact = CompactForm(codec, terms) if terms.downlink == "compact" else None
 
     # What happens at a tick
 
@@ -298,9 +298,9 @@ class TransmitterSession:
         return [Bye(0, refusal.ending, refusal.text)]
 
     def _unpacked(self, frame: ShortCommands) -> Commands | None:
-        if self._compact is None or self.phase is not Phase.FLYING:
+        if self.compact is None or self.phase is not Phase.FLYING:
             return None
-        return self._compact.unpacked(frame, self.session_number, self.epoch, self._sample)
+        return self.compact.unpacked(frame, self.session_number, self.epoch, self._sample)
 
     def _on_commands(self, frame: Commands) -> list[Frame]:
         if frame.echoes[-1].sample < self.copies.confirmed.sample:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import ipaddress
 import socket
+import sys
 from collections import deque
 
 from channel.errors import LinkError
@@ -91,14 +92,19 @@ def default_endpoint() -> str:
 def free_endpoint() -> str:
     """Return a loopback TCP endpoint whose port the system gives to nobody else for now.
 
-    This process holds the port without listening. A server sets SO_REUSEADDR and may listen there.
+    On Linux this process holds the port without listening: a server that sets SO_REUSEADDR may listen
+    there. Other systems refuse the server a port that is held, so there it was free a moment ago.
     """
     host = loopback_host()
     holder = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
     holder.bind((host, 0))
     holder.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    _held.append(holder)
-    return _on_loopback(holder.getsockname()[1])
+    port = holder.getsockname()[1]
+    if sys.platform == "linux":
+        _held.append(holder)
+    else:
+        holder.close()
+    return _on_loopback(port)
 
 
 def _on_loopback(port: int) -> str:

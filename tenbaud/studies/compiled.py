@@ -15,6 +15,7 @@ import shutil
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from hashlib import blake2b
 from importlib import import_module
@@ -250,7 +251,7 @@ def _cache_folder() -> Path | None:
         base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
         folder = Path(base) / "tenbaud" / sources_digest()
         if not folder.is_dir():
-            folder.mkdir(parents=True)
+            folder.mkdir(parents=True, exist_ok=True)
             prune(folder.parent)
         os.utime(folder)
     except (OSError, RuntimeError):  # the latter for a user without a home, as in containers
@@ -259,8 +260,9 @@ def _cache_folder() -> Path | None:
 
 
 def prune(base: Path) -> None:
-    """Remove the machine code of sources that are in use no more."""
-    folders = sorted(base.iterdir(), key=lambda one: one.stat().st_mtime, reverse=True)
-    for folder in folders[KEPT_FOLDERS:]:
-        if time.time() - folder.stat().st_mtime > KEPT_S:
-            shutil.rmtree(folder, ignore_errors=True)
+    """Remove the machine code of sources that are in use no more; other processes may do so too."""
+    with suppress(OSError):
+        folders = sorted(base.iterdir(), key=lambda one: one.stat().st_mtime, reverse=True)
+        for folder in folders[KEPT_FOLDERS:]:
+            if time.time() - folder.stat().st_mtime > KEPT_S:
+                shutil.rmtree(folder, ignore_errors=True)

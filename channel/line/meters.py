@@ -40,7 +40,7 @@ class BaudMeter:
 
     def __init__(self) -> None:
         self._times_ns: deque[int] = deque()
-        self._first_ns = self._last_ns = 0
+        self._last_ns = self._first_came_ns = self._last_came_ns = 0
         self._came = 0
 
     def on_slot(self, now_ns: int, *, came: bool) -> None:
@@ -48,7 +48,8 @@ class BaudMeter:
         self._last_ns = now_ns
         if came:
             if not self._came:
-                self._first_ns = now_ns
+                self._first_came_ns = now_ns
+            self._last_came_ns = now_ns
             self._came += 1
             self._times_ns.append(now_ns)
         # The last symbol before the span bounds its first interval.
@@ -58,13 +59,15 @@ class BaudMeter:
     @property
     def baud(self) -> float | None:
         """Return the rate of the last 5 s; None before two symbols came at different times."""
-        return self._rate(len(self._times_ns), self._times_ns[0]) if self._times_ns else None
+        if not self._times_ns:
+            return None
+        return _rate(len(self._times_ns), self._last_ns - self._times_ns[0])
 
     @property
     def whole_baud(self) -> float | None:
-        """Return the rate from the first symbol to the last slot; None as with `baud`."""
-        return self._rate(self._came, self._first_ns)
+        """Return the rate from the first symbol to the last one; None as with `baud`."""
+        return _rate(self._came, self._last_came_ns - self._first_came_ns)
 
-    def _rate(self, came: int, first_ns: int) -> float | None:
-        span_ns = self._last_ns - first_ns
-        return (came - 1) * 1e9 / span_ns if came and span_ns > 0 else None
+
+def _rate(came: int, span_ns: int) -> float | None:
+    return (came - 1) * 1e9 / span_ns if span_ns > 0 else None

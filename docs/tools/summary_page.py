@@ -30,7 +30,7 @@ FIELDS: dict[str, tuple[str, str]] = {
     "baud_configured": ("baud", "largest number of symbols per second up the link"),
     "baud_measured": (
         "baud",
-        "symbols that arrived per second of the whole flight, on the receiver's clock",
+        "symbols per second from the first that arrived to the last, on the receiver's clock",
     ),
     "config_digest": ("", "of the shared configuration; equal at both ends"),
     "numerics_probe": ("", "digest of the codec run over fixed vectors; equal on all machines"),

@@ -28,7 +28,10 @@ FIELDS: dict[str, tuple[str, str]] = {
     "lead_ticks": ("ticks", "command lead D"),
     "delivery": ("", "whether a symbol arrives at the start or at the end of its slot"),
     "baud_configured": ("baud", "largest number of symbols per second up the link"),
-    "baud_measured": ("baud", "symbols per second that arrived, on the receiver's clock"),
+    "baud_measured": (
+        "baud",
+        "symbols per second from the first that arrived to the last, on the receiver's clock",
+    ),
     "config_digest": ("", "of the shared configuration; equal at both ends"),
     "numerics_probe": ("", "digest of the codec run over fixed vectors; equal on all machines"),
     "version": ("", "of the software"),

@@ -107,7 +107,7 @@ def receiver_part(agreement: Agreement, endpoint: ReceiverEndpoint, outcome: Out
     return {
         **_common(agreement, outcome, session.end),
         "samples": session.state.sample,
-        "baud_measured": session.meter.baud,
+        "baud_measured": session.meter.whole_baud,
         "wire_bytes_up": endpoint.inlet.wire_bytes,
         "coder_bits_down": 8 * endpoint.downlink.command_bytes,
         "wire_bytes_down": endpoint.downlink.wire_bytes,

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from channel.codec.signals import Signals
+from plant_sim.identification.errors import IdentificationError
 from receiver.controllers.references import Constant, LimitedReference, Square, SteeredReference
 from tenbaud import fly
 from tenbaud.build.codec import build_model
@@ -23,6 +24,7 @@ from tenbaud.cli import options
 from tenbaud.cli.app import run
 from tenbaud.config.load import ConfigError, dump_config, load_config
 from tenbaud.flight.outcome import ExitCode
+from tenbaud.identification.sources import from_rig
 from tenbaud.studies.arrays import targets_of
 from tests.transmitter.rigs.emulated import emulated
 from transmitter.rigs.formats.samples import DeviceFlag, flags_of
@@ -119,6 +121,21 @@ def test_the_emulator_says_that_it_is_one_and_nothing_is_sent_to_it(form: Any) -
     with emulated(form) as emulator:
         assert not require_safe(configured(f"{form}:{emulator.line.address}"))
         assert emulator.device.counts["commands"] == 0
+
+
+def test_an_identification_excites_no_rig_that_drives_motors(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "rig.toml"
+    with emulated("cobs") as emulator:
+        file.write_text(dump_config(configured(f"cobs:{emulator.line.address}", *SETTINGS)))
+        words = ["--config", str(file), "--duration", "1", "--out", str(tmp_path / "found")]
+        assert run(["identify", *words]) == ExitCode.USAGE
+        assert emulator.device.counts["commands"] == 0
+    told = " ".join(capsys.readouterr().err.split())
+    assert "Fly it and give the run: `tenbaud demo --config FILE --out RUN`" in told
+    with pytest.raises(IdentificationError, match="drives motors"):
+        from_rig(configured("quarc:127.0.0.1:1", *SETTINGS), "square:0.1,0,2", 1.0)
 
 
 @pytest.mark.parametrize("flags", [False, True])

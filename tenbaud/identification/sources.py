@@ -51,8 +51,8 @@ def from_rig(config: FlightConfig, excitation: str, duration_s: float) -> Record
     """
     if drives_motors(config):
         raise IdentificationError(
-            f"{real_rig_name(config.transmitter)} drives motors, and only a simulated rig is excited by "
-            "this command. Fly it and give the run: `tenbaud demo --config FILE --out RUN`, then "
+            f"{real_rig_name(config.transmitter)} drives motors, and only a simulated rig is excited "
+            "here. Fly it and give the run: `tenbaud demo --config FILE --out RUN`, then "
             "`tenbaud identify RUN`"
         )
     tick_s = config.timing.tick_s

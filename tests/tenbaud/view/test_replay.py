@@ -205,6 +205,22 @@ def test_two_flights_are_laid_over_each_other_with_their_names_bits_and_digests(
     assert box["y"] + box["height"] < 900.0
 
 
+def test_flights_of_unlike_inputs_have_bars_and_pictures_of_their_own(
+    open_page: Any, tmp_path: Path
+) -> None:
+    presets = ("integrator-10baud", "servo-10baud")
+    runs = [str(flown(tmp_path / name, name, duration_s=1.0).path) for name in presets]
+    with served(tmp_path, "view", *runs, "--port", "0") as one:
+        page = open_page(one)
+        page.keyboard.press("End")
+        cursor_is(page, 1.0)
+        for suffix, name, unit in (("", "acceleration", "rad/s^2"), ("@1", "voltage", "V")):
+            bars = page.locator(f'[id="inputs{suffix}"]').inner_text().split("\n")
+            assert (bars[0], bars[1].split()[1]) == (name, unit)
+        assert page.locator('[id="dial"]').is_hidden()
+        assert page.locator('[id="dial@1"]').is_visible()
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_phone_shows_two_flights_without_scrolling_sideways(
     open_page: Any, two_runs: Served, scheme: str

@@ -94,7 +94,7 @@ class RecordedFlight:
         """Why digests cannot be compared; empty where they can."""
         if not self._has["transmitter"]:
             return "the transmitter's recording is not here"
-        return "" if self.samples.compared_by(len(self.base.ticks)) else "no digests were recorded"
+        return "" if self.samples.compared else "no digests were recorded"
 
     @property
     def notes(self) -> list[str]:

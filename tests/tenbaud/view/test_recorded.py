@@ -10,6 +10,7 @@ import numpy as np
 import orjson
 import pytest
 
+from channel.protocol.recording import Field, RecordChannel
 from tenbaud import Run
 from tenbaud.cli.app import run as command
 from tenbaud.recording.writer import McapRecorder
@@ -17,7 +18,7 @@ from tenbaud.view.recorded import POINTS, RecordedFlight, RunsDiffer, recorded_f
 from tenbaud.view.replay import described, moments
 from tests.tenbaud.flown import SECONDS, flown
 from tests.tenbaud.processes import REPOSITORY
-from tests.tenbaud.recording.rows import TICK, tick_row
+from tests.tenbaud.recording.rows import SAMPLE, TICK, sample_row, tick_row
 
 OLD = REPOSITORY / "tests/golden/recordings/two-epochs-0.1.0"
 AT_S = 7.05
@@ -148,6 +149,18 @@ def test_ticks_without_estimates_are_shown_as_such(tmp_path: Path) -> None:
     assert orjson.loads(orjson.dumps(moment))["point"][2:] == [[None], [None]]
     assert flight.missing == "no digests were recorded"
     assert "run is without estimates" in flight.notes
+
+
+def test_digests_of_a_recording_that_begins_late_are_compared(tmp_path: Path) -> None:
+    path = tmp_path / "run" / "transmitter.mcap"
+    path.parent.mkdir()
+    sample = RecordChannel("sample", (*SAMPLE.fields, Field("peer_digest", "string")))
+    with McapRecorder(path, {"role": "transmitter"}) as recorder:
+        for tick in range(5000, 5100):
+            recorder.write(TICK, tick * 10_000_000, tick_row(tick, 0.0))
+        row = sample_row(500, word=[1], state=0.0)
+        recorder.write(sample, 5000 * 10_000_000, (*row, row[-1]))
+    assert RecordedFlight(Run(path.parent)).missing == ""
 
 
 def test_runs_of_unlike_outputs_and_too_many_runs_are_refused(lossy: Run, tmp_path: Path) -> None:

@@ -79,6 +79,19 @@ def test_a_long_window_keeps_the_extremes_and_a_short_one_every_tick(
     assert len(decisions) < 10
 
 
+def test_a_set_point_that_always_changes_keeps_its_extremes_too(
+    lossy: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flight = RecordedFlight(lossy)
+    wave = np.sin(np.arange(len(lossy.time_s)) / 100.0)
+    wave[[701, 905]] = 3.0, -3.0
+    monkeypatch.setattr(flight, "_references", wave[:, np.newaxis])
+    decisions = flight.moment(0.0, (0.0, SECONDS))["decisions"]
+    assert len(decisions) < len(wave)
+    shown = [row[1][0] for row in decisions]
+    assert (min(shown), max(shown)) == (-3.0, 3.0)
+
+
 def test_a_question_without_a_window_gets_no_curves_and_nonsense_is_refused(
     flight: RecordedFlight,
 ) -> None:

@@ -99,7 +99,9 @@ def test_a_question_without_a_window_gets_no_curves_and_nonsense_is_refused(
     assert "points" not in one
     (one,) = orjson.loads(moments([flight], '{"at_s": 1e9, "from_s": -5, "to_s": 1e9}'))["runs"]
     assert one["at_s"] == SECONDS
-    for question in ("", "[]", "{}", '{"at_s": "x"}', '{"at_s": 1, "from_s": 1}', '{"at_s": NaN}', "3"):
+    endless = ('{"at_s":1,"from_s":"-inf","to_s":"inf"}', '{"at_s":"inf"}', '{"at_s":"nan"}')
+    junk = ("", "[]", "{}", '{"at_s": "x"}', '{"at_s": 1, "from_s": 1}', '{"at_s": NaN}', "3")
+    for question in (*junk, *endless):
         with pytest.raises((ValueError, TypeError)):
             moments([flight], question)
 

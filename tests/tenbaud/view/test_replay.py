@@ -131,7 +131,16 @@ def test_it_plays_at_any_speed_and_stops_at_the_end(open_page: Any, one_run: Ser
     play.click()
     cursor_is(page, SECONDS)
     assert play.inner_text() == "Play"
-    page.get_by_label("Speed, times real time").fill("1000")
+    speed = page.get_by_label("Speed, times real time")
+    speed.fill("-1000")
+    page.locator("#cursor").focus()
+    page.keyboard.press("PageDown")
+    cursor_is(page, SECONDS - 5.0)
+    play.click()
+    page.wait_for_timeout(300.0)
+    play.click()
+    assert float(page.locator("#cursor-text").inner_text().split()[0]) >= SECONDS - 5.0
+    speed.fill("1000")
     play.click()
     wait(page, "() => document.getElementById('play').textContent === 'Play'")
     cursor_is(page, SECONDS)
@@ -234,6 +243,20 @@ def test_a_phone_shows_two_flights_without_scrolling_sideways(
         box = page.locator(element).bounding_box()
         assert box["x"] >= 0
         assert box["x"] + box["width"] <= 360
+
+
+CLOSED_AFTER = """([frame, isBinary]) => new Promise((go) => {
+  const socket = new WebSocket(new URL("stream", location.href.replace("http", "ws")));
+  socket.onopen = () => socket.send(isBinary ? new TextEncoder().encode(frame) : frame);
+  socket.onclose = ({ code }) => go(code);
+})"""
+
+
+def test_the_stream_closes_on_what_is_no_question(open_page: Any, one_run: Served) -> None:
+    page = open_page(one_run)
+    frames = (('{"at_s":1}', True), ('{"at_s":1,"from_s":"-inf","to_s":"inf"}', False), ("[]", False))
+    for frame in frames:
+        assert page.evaluate(CLOSED_AFTER, list(frame)) == 1003, frame
 
 
 def test_one_address_is_printed_and_nothing_is_served_without_its_secret(

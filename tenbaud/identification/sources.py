@@ -13,7 +13,8 @@ from channel.codec.signals import Signals
 from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.excitation import excite, parse_excitation
 from plant_sim.identification.record import Record
-from tenbaud.build.rig import build_rig
+from tenbaud.build.first_contact import drives_motors
+from tenbaud.build.rig import build_rig, real_rig_name
 from tenbaud.build.signals import build_encoders, configured_signals, encoder_steps
 from tenbaud.config.schema import FlightConfig, FlightLogSection
 from tenbaud.identification.bits import Bits, read_bits
@@ -44,7 +45,13 @@ class Source:
 
 
 def from_rig(config: FlightConfig, excitation: str, duration_s: float) -> Record:
-    """Excite the configured rig and return its encoder's readings."""
+    """Excite the configured rig and return its encoder's readings; a rig with motors is refused."""
+    if drives_motors(config):
+        raise IdentificationError(
+            f"{real_rig_name(config.transmitter)}: identify does not move a real rig, only a simulated "
+            "one. Fly it and give the run: tenbaud demo --clock real --config FILE --out RUN, then "
+            "tenbaud identify RUN"
+        )
     tick_s = config.timing.tick_s
     signals = configured_signals(config)
     if len(signals.outputs) != 1 or len(signals.inputs) != 2:

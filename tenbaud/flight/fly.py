@@ -41,8 +41,8 @@ from tenbaud.flight.drawing import NotebookDrawing
 from tenbaud.flight.report import removed_unless_begun
 from tenbaud.flight.status import Status
 from tenbaud.flight.viewing import ViewOptions
-from tenbaud.recording.folder import RunFolder, create_run_folder
 from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.folder import RunFolder, create_run_folder
 from tenbaud.recording.notebook import in_notebook
 from tenbaud.recording.run import Run
 

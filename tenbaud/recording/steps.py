@@ -59,7 +59,9 @@ def steps_of(
     lengths = np.diff(edges)
     found = []
     for place, (start, length) in enumerate(zip(edges, lengths, strict=False)):
-        jumps = begins and bool(reference[start]) if place == 0 else lengths[place - 1] >= HELD_TICKS_MIN
+        jumps = (
+            begins and bool(reference[start]) if place == 0 else lengths[place - 1] >= HELD_TICKS_MIN
+        )
         apart = not np.isnan(values[start]) and values[start] != reference[start]
         if jumps and length >= HELD_TICKS_MIN and apart:
             held = slice(start, start + length)

@@ -57,6 +57,7 @@ their machine code; nothing makes it wait for them."""
 
 COLD = (
     "tests/tenbaud/endings/",
+    "tests/tenbaud/test_fire.py",
     "tests/tenbaud/test_restarts.py",
     "tests/tenbaud/test_not_flown.py",
     "tests/tenbaud/view/test_gate.py",

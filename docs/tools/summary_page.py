@@ -47,7 +47,7 @@ FIELDS: dict[str, tuple[str, str]] = {
     "wire_bytes_down": ("bytes", "of all frames to the transmitter, framing included"),
     "line_bytes_out": ("bytes", "that this end put on a serial line"),
     "line_bytes_in": ("bytes", "that this end took from a serial line"),
-    "erasures": ("symbols", "that did not arrive within their deadline"),
+    "erasures": ("words", "that did not arrive whole within their deadline"),
     "symbols_late": ("symbols", "that arrived after their deadline"),
     "symbols_misplaced": ("symbols", "that arrived for a slot of another time"),
     "symbols_refused": ("symbols", "that the rate limiter refused"),

@@ -84,9 +84,9 @@ class ReceiverSession:
         self.epoch = 0
         self.meter = BaudMeter()
         self.counts: Counter[str] = Counter()
-        """samples (flown), samples_skipped (between epochs), erasures, symbols_late, symbols_misplaced,
-        stale_frames, malformed, refused_hellos, bad_commands, bad_references, desyncs, rejoins,
-        out_of_bounds"""
+        """samples (flown), samples_skipped (between epochs), erasures (words), symbols_late,
+        symbols_misplaced, stale_frames, malformed, refused_hellos, bad_commands, bad_references,
+        desyncs, rejoins, out_of_bounds"""
         self.end: End | None = None
         self.refusal: End | None = None
         self.desync: Desync | None = None
@@ -346,7 +346,6 @@ class ReceiverSession:
         """Decide what this slot's symbol was; at the end of a word, fly its sample."""
         self.meter.on_slot(now_ns, came=symbol is not None)
         if symbol is None:
-            self.counts["erasures"] += 1
             self._emit(Event(EventKind.ERASED, slot=slot))
         self._word.append(symbol)
         if len(self._word) < self.terms.symbols_per_word:
@@ -355,7 +354,7 @@ class ReceiverSession:
         whole = len(symbols) == len(self._word)
         self._word = []
         word = tuple(symbols) if whole else ERASED
-        self.counts["samples"] += 1
+        self.counts.update(samples=1, erasures=int(not whole))
         echoes = self._commander.fly(word, self.epoch, now_ns)
         if self._compact is not None:
             return [self._compact.packed(self.session_number, self.epoch, echoes)]

@@ -57,7 +57,7 @@ def _not_flown(agreement: Agreement, session: ReceiverSession) -> Outcome | None
     counts = FlightCounts(
         samples=flown + session.counts["samples_skipped"],
         confirmed=flown,
-        erased=min(flown, session.counts["erasures"] // agreement.terms.symbols_per_word),
+        erased=session.counts["erasures"],
         rejoins=session.counts["rejoins"],
         bad_commands=session.counts["bad_commands"],
         commands=flown * agreement.terms.ticks_per_sample,

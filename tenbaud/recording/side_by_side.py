@@ -102,7 +102,7 @@ class SideBySide:
         """Return the table without its head: the name of each figure, and it for every run."""
         rows = [
             ("rate, bit/s", self._each(lambda one: _number(one["rate_bit_per_s"], ".4g"))),
-            ("bits sent", self._each(lambda one: _number(one["bits"], "g"))),
+            ("bits sent", self._each(lambda one: _number(one["bits"], ".12g"))),
             ("words lost", self._each(lambda one: _number(one["erasures"], "d"))),
             ("error over floor", self._each(lambda one: _number(one["rms_over_floor"], ".2f"))),
         ]
@@ -210,6 +210,7 @@ def _other_references(
             if signal is None:
                 break
             held.append(signal.values[np.searchsorted(run.time_s, at_s, side="right") - 1])
+        held = [one for one in held if not np.isnan(one).all()]
         size = max((float(np.nanmax(np.abs(one))) for one in held), default=0.0)
         for one, other in pairwise(held):
             if np.mean(np.abs(one - other) > 0.01 * size) > REFERENCE_SHARE:

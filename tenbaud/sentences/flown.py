@@ -173,7 +173,7 @@ def _bytes(count: int) -> str:
 
 def _link(summary: Summary) -> str:
     get = summary.get
-    parts = [_number(get("erasures"), "symbol") + " lost", f"{get('symbols_late') or 0} late"]
+    parts = [_number(get("erasures"), "word") + " lost", f"{get('symbols_late') or 0} late"]
     if get("rejoins") is not None:
         cost = f" ({get('rejoin_bytes')} bytes)" if get("rejoins") and get("rejoin_bytes") else ""
         parts.append(_number(get("rejoins"), "resync") + cost)

@@ -32,7 +32,7 @@ export function become(flights) {
   curves.classList.toggle("several", several);
   curves.replaceChildren(...plant.outputs.flatMap((one, place) => {
     const unit = shown(one.unit).words;
-    return [["value", title(one)], ["error", several ? `${title(one)}, estimation error` : "Estimation error"]]
+    return [["value", title(one)], ["error", several ? `${title(one)}, error of the codec` : "Error of the codec"]]
       .map(([kind, name]) => {
         const chart = make("div"), heading = make("h2", "", `${name} `), canvas = make("canvas");
         if (several) heading.prepend(key(place));
@@ -56,7 +56,7 @@ function showLegend(flights) {
   const legend = document.getElementById("curves-legend");
   const [first] = plant.outputs, value = plant.outputs.length === 1 ? words(first) : "value";
   if (flights.length === 1) {
-    legend.replaceChildren(...entry("body", value), ...entry("estimate", "estimate"), ...entry("reference", "set-point"), ...entry("tube", "range ± M"), ...entry("error", "estimation error"));
+    legend.replaceChildren(...entry("body", value), ...entry("estimate", "estimate"), ...entry("reference", "set-point"), ...entry("tube", "range ± M"), ...entry("error", "error of the codec"));
     return;
   }
   const runs = flights.flatMap((flight) => [square(`run-${flight.place}`), make("b", "", flight.name)]);

@@ -56,7 +56,7 @@ def test_a_real_rig_is_refused_before_it_is_opened(rig: tuple[str, ...], tmp_pat
     options = [word for setting in rig for word in ("--set", setting)]
     result = run(*options, "--duration", "1", "--out", str(tmp_path / "out"))
     assert result.exit_code != 0
-    assert "does not move a real rig" in str(result.exception)
+    assert "simulated rigs only" in str(result.exception)
     assert "tenbaud demo --clock real" in str(result.exception)
     assert not (tmp_path / "out").exists()
 

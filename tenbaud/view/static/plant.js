@@ -65,9 +65,11 @@ function showLegend(flights) {
 
 // Flights in the same curves have the same outputs; inputs and picture are each flight's own.
 const plantOf = (flight) => flight.plant || plant;
+// One without a picture takes that of the first flight, which turns by the same outputs.
+const pictureOf = (flight) => plantOf(flight).picture || plant.picture;
 
 function build(flight, several, flights) {
-  const own = plantOf(flight), id = own.picture.replaceAll(" ", "-");
+  const own = plantOf(flight), id = pictureOf(flight).replaceAll(" ", "-");
   const picture = (id && (flight.at(`${id}-${plant.outputs.length}`) || flight.at(id))) || null;
   flight.picture = picture;
   for (const one of flight.at("outputs").parentNode.querySelectorAll(".plant")) one.toggleAttribute("hidden", one !== picture);
@@ -141,7 +143,7 @@ export function drawPicture(flight) {
   }
   if (!applied) return;
   drawGauges(flight, "inputs", plantOf(flight).inputs, (place) => ({ bar: applied[place] }));
-  if (picture && plantOf(flight).picture === "helicopter" && plant.outputs.length === 1 && applied.length === 2) {
+  if (picture && pictureOf(flight) === "helicopter" && plant.outputs.length === 1 && applied.length === 2) {
     // The front rotor lifts the front: it is drawn at the right, where the nose is.
     const arrow = (x, volt) => (Math.abs(volt) > 0.05 ? `M${x} 98v${(-volt * 6).toFixed(1)}` : "");
     flight.at("thrust-front").setAttribute("d", arrow(254, applied[0]));

@@ -190,6 +190,8 @@ def test_two_flights_are_laid_over_each_other_with_their_names_bits_and_digests(
     assert "usual (usual-1000baud)" in legend
     page.keyboard.press("PageUp")
     cursor_is(page, 5.0)
+    # The usual loop names no picture of its own.
+    assert page.locator('[id="helicopter@1"]').is_visible()
     for suffix, run, sample_s in (("", runs[0], 0.1), ("@1", runs[1], 0.01)):
         for end in ("up", "down"):
             shown = page.locator(f'[id="digest-{end}{suffix}"]').inner_text()

@@ -38,6 +38,10 @@ class StopFlag(_Handlers):
         super().__init__(self._on_signal)
         self.raised = False
 
+    def __enter__(self) -> Self:
+        Interruptions.require_none()
+        return super().__enter__()
+
     def __call__(self) -> bool:
         return self.raised
 
@@ -50,9 +54,29 @@ class StopFlag(_Handlers):
 class Interruptions(_Handlers):
     """Within a `with`, signals raise KeyboardInterrupt: open files and links are closed."""
 
+    _present: Interruptions | None = None
+
     def __init__(self) -> None:
         super().__init__(self._on_signal)
         self.received: signal.Signals | None = None
+
+    def __enter__(self) -> Self:
+        Interruptions._present = self
+        return super().__enter__()
+
+    def __exit__(self, *details: object) -> None:
+        super().__exit__(*details)
+        Interruptions._present = None
+
+    @classmethod
+    def require_none(cls) -> None:
+        """Raise KeyboardInterrupt again where one was lost.
+
+        An import may lose one: raised in `__set_name__` it becomes a RuntimeError, and libraries go on
+        without a module that fails.
+        """
+        if cls._present is not None and cls._present.received is not None:
+            raise KeyboardInterrupt
 
     def _on_signal(self, number: int, frame: FrameType | None) -> None:
         self.received = signal.Signals(number)

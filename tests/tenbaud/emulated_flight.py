@@ -63,6 +63,8 @@ def fly_emulated(
             "real",
             "--rig",
             f"{form}:{'socket://' if serial_over_tcp else ''}{rig.address}",
+            "--preset",
+            "paper-10baud",
             *PATIENT,
             *arguments,
             seconds=seconds,

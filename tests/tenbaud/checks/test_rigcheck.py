@@ -15,6 +15,9 @@ from tests.transmitter.rigs.emulated import emulated, rig_config
 from transmitter.rigs.emulator.device import RigEmulator
 from transmitter.rigs.formats.samples import RawSample
 
+# Samples per second and the gaps between them are times.
+pytestmark = pytest.mark.real_time
+
 
 def checked_config(address: str, stale_s: float = 0.5):  # type: ignore[no-untyped-def]
     return rig_config(

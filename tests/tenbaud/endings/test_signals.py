@@ -120,7 +120,8 @@ def test_a_lasting_command_ends(name: str, after_s: float, number: int, tmp_path
     # dataclass is made, Python 3.11 dies of SIGINT after all, which a shell calls 130 too.
     codes = (ExitCode.INTERRUPTED, -number, -signal.SIGINT, 0)
     assert ended.code in codes, (ended.code, ended.err)
-    assert "Traceback" not in ended.err, ended.err
+    # Python's own start cannot be covered: until `main` it prints where it was interrupted.
+    assert "Traceback" not in ended.err or ", in main" not in ended.err, ended.err
     nothing_half_is_left(tmp_path)
     assert not (tmp_path / "port").is_symlink(), "its port is left"
 

@@ -88,8 +88,10 @@ def view(
         _replay(runs, address, open_browser)
         return
     feed = _feed(tuple(connect or ()), session, keys)
+    from tenbaud.flight.stop import Interruptions
     from tenbaud.view.server import serve
 
+    Interruptions.require_none()
     serve(feed, address, open_browser=open_browser, view_only=view_only)
 
 
@@ -113,10 +115,13 @@ def _feed(connect: tuple[str, ...], session: str, keys: Path | None) -> Feed:
 
 
 def _replay(runs: list[Path], address: Address, open_browser: bool) -> None:
+    from tenbaud.flight.stop import Interruptions
     from tenbaud.recording.run import Run
     from tenbaud.view.recorded import recorded_flights
     from tenbaud.view.replay import serve_recorded
 
     # What is wrong with the port is said before minutes of recordings are read.
     address.check()
-    serve_recorded(recorded_flights([Run(one) for one in runs]), address, open_browser=open_browser)
+    flights = recorded_flights([Run(one) for one in runs])
+    Interruptions.require_none()
+    serve_recorded(flights, address, open_browser=open_browser)

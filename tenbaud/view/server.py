@@ -140,9 +140,6 @@ def run_page(
     on_startup: Callable[[Callable[[], Any]], None],
 ) -> None:
     """Serve an application behind the gate until the process is asked to stop."""
-    from tenbaud.flight.stop import Interruptions
-
-    Interruptions.require_none()
     import uvicorn
 
     from tenbaud.view.gate import Gate

@@ -88,16 +88,15 @@ def view(
         _replay(runs, address, open_browser)
         return
     feed = _feed(tuple(connect or ()), session, keys)
-    from tenbaud.flight.stop import Interruptions
     from tenbaud.view.server import serve
 
-    Interruptions.require_none()
     serve(feed, address, open_browser=open_browser, view_only=view_only)
 
 
 def _feed(connect: tuple[str, ...], session: str, keys: Path | None) -> Feed:
     from channel.links.endpoints import check_endpoints
     from channel.links.zenoh.hub import is_session_pattern
+    from tenbaud.flight.stop import Interruptions
     from tenbaud.view.feed import Feed
 
     if not is_session_pattern(session):
@@ -111,6 +110,7 @@ def _feed(connect: tuple[str, ...], session: str, keys: Path | None) -> Feed:
         credentials = credentials_of(keys, "viewer")
     protected = tuple(one for one in connect if not one.startswith("unixsock"))
     check_endpoints(protected, insecure=True, secured=credentials is not None)
+    Interruptions.require_none()
     return Feed(connect, session, credentials)
 
 

@@ -90,7 +90,7 @@ def default_endpoint() -> str:
 
 
 def free_endpoint() -> str:
-    """Return a loopback TCP endpoint whose port the system gives to nobody else for now.
+    """Return a loopback TCP endpoint whose port the system gives to no other process now.
 
     On Linux this process holds the port without listening: a server that sets SO_REUSEADDR may listen
     there. Other systems refuse the server a port that is held, so there it was free a moment ago.

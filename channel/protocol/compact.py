@@ -163,6 +163,11 @@ class _Bits:
         return taken
 
 
+def compact_form(codec: Codec, terms: Terms) -> CompactForm | None:
+    """Return the form of a flight's command frames; None for the full downlink."""
+    return CompactForm(codec, terms) if terms.downlink == "compact" else None
+
+
 def _checksum(session: int, data: bytes) -> int:
     return crc_hqx(data, crc_hqx(session.to_bytes(4, "little"), CRC_START))
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 from channel.codec.codec import Codec, CodecState, Vector, Word
 from channel.codec.lead import FlownSample, fly_sample
 from channel.errors import CodecDiverged
-from channel.protocol.compact import CompactForm
+from channel.protocol.compact import compact_form
 from channel.protocol.events import Event, EventKind, Failing, Tell
 from channel.protocol.frames import Echo
 from channel.protocol.limits import are_plausible, from_steps, to_steps
@@ -80,7 +80,7 @@ class Commander:
         self._echoes: deque[Echo] = deque(maxlen=terms.repeats + 1)
         self._steps: list[int] = []
         """decided for the sample that is being flown"""
-        self._compact = CompactForm(codec, terms) if terms.downlink == "compact" else None
+        self.compact = compact_form(codec, terms)
         self._unwritten: list[_Flown] = []
         self.first_problem = ""
         """of the controller's commands"""
@@ -146,11 +146,11 @@ class Commander:
         """Fly a sample with the commands that the controller decides, or with their mean held."""
         known, held = tuple(self._commands), self.hold
         flown = fly_sample(self.codec, self.state, word, known, self._decide)
-        if self._compact is None:
+        if self.compact is None:
             return flown
         # The law's first command, held, would steer half a sample late. The mean moves the plant as the
         # law's own course would, and the law is asked at every tick as ever.
-        steps = self._compact.held(flown.commands, held)
+        steps = self.compact.held(flown.commands, held)
         self.hold = from_steps(steps, self.terms.signals)
         self._steps = [*steps] * self.terms.ticks_per_sample
         return fly_sample(self.codec, self.state, word, known, lambda _tick, _state: self.hold)
@@ -188,16 +188,16 @@ class Commander:
 
     def _ask(self, tick: int, state: Vector) -> Vector:
         """Return the controller's command; its last one if it fails or is not finite."""
+        command: Vector = ()
         try:
             command = self._controller.command(tick, state)
-            if isinstance(command, Sized):
-                if len(command) == len(self.hold) and are_plausible(command):
-                    return command
-                problem = f"wants {command}"
-            else:
-                problem = f"wants {command!r}, and not a tuple of {len(self.hold)} number(s)"
+            if len(command) == len(self.hold) and are_plausible(command):
+                return command
+            problem = f"wants {command}"
         except Exception as error:  # a controller is the user's code; the flight goes on without it
             problem = f"failed: {type(error).__name__}: {error}"
+            if not isinstance(command, Sized):
+                problem = f"wants {command!r}, and not a tuple of {len(self.hold)} number(s)"
         self._counts["bad_commands"] += 1
         if self._counts["bad_commands"] == 1:
             self.first_problem = problem

@@ -18,7 +18,6 @@ from enum import Enum
 from channel.codec.codec import ERASED, Codec, CodecState
 from channel.line.meters import BaudMeter
 from channel.protocol.bounds import Bounds, within_text_bounds
-from channel.protocol.compact import CompactForm
 from channel.protocol.endings import End, Ending
 from channel.protocol.events import Dropped, Event, EventKind, Presence, ended_event, write_event
 from channel.protocol.frames import (
@@ -104,7 +103,6 @@ class ReceiverSession:
         self._bounds = Bounds(codec, terms, self.counts, self._emit)
         self._schedule = Schedule(terms)
         self._proven = Proven(self._commander.standing, self._schedule, 0, None)
-        self._compact = CompactForm(codec, terms) if terms.downlink == "compact" else None
 
     @property
     def state(self) -> CodecState:
@@ -356,8 +354,8 @@ class ReceiverSession:
         word = tuple(symbols) if whole else ERASED
         self.counts.update(samples=1, erasures=int(not whole))
         echoes = self._commander.fly(word, self.epoch, now_ns)
-        if self._compact is not None:
-            return [self._compact.packed(self.session_number, self.epoch, echoes)]
+        if self._commander.compact is not None:
+            return [self._commander.compact.packed(self.session_number, self.epoch, echoes)]
         return [Commands(self.session_number, self.epoch, echoes)]
 
     # Ends and reports

@@ -164,7 +164,7 @@ def as_options(settings: Mapping[str, Any]) -> str:
     )
 
 
-def motors_told(config: FlightConfig) -> list[str]:
+def motor_lines(config: FlightConfig) -> list[str]:
     """Return the limits of a flight with motors, a line each, for the person who stands beside them."""
     signals = configured_signals(config)
     free = (math.inf,) * len(signals.outputs)

@@ -12,29 +12,26 @@ TABLE_WIDTH = 72
 """The table of options folds words on a terminal that is narrower."""
 
 
-class Command(TyperCommand):
+class _Plain:
+    """The help of both; it stands before one of Typer's classes."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        return _plain(super().get_params(ctx))  # type: ignore[misc]  # of Typer's class
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        _without_table(self, formatter)
+        super().format_help(ctx, formatter)  # type: ignore[misc]  # likewise
+
+
+class Command(_Plain, TyperCommand):
     """A command."""
 
-    def get_params(self, ctx: Any) -> list[Any]:
-        return _plain(super().get_params(ctx))
 
-    def format_help(self, ctx: Any, formatter: Any) -> None:
-        _without_table(self, formatter)
-        super().format_help(ctx, formatter)
-
-
-class Group(TyperGroup):
+class Group(_Plain, TyperGroup):
     """A command with commands below it."""
 
-    def get_params(self, ctx: Any) -> list[Any]:
-        return _plain(super().get_params(ctx))
 
-    def format_help(self, ctx: Any, formatter: Any) -> None:
-        _without_table(self, formatter)
-        super().format_help(ctx, formatter)
-
-
-def _without_table(command: Command | Group, formatter: Any) -> None:
+def _without_table(command: Any, formatter: Any) -> None:
     """Have a narrow terminal get the help as plain lines."""
     columns = shutil.get_terminal_size().columns
     if columns >= TABLE_WIDTH:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from channel.protocol.terms import Clock
     from tenbaud.build.flight import Agreement
     from tenbaud.flight.many import ManyHost
-    from tenbaud.flight.summary import Summary
+    from tenbaud.sentences.flown import Summary
 
 
 def serve(

@@ -31,13 +31,13 @@ class MotorOptions:
 
 def confirm_motors(config: FlightConfig, yes: bool) -> None:
     """Ask the person at the terminal, if there is one; anything but y or yes ends the command."""
-    from tenbaud.build.first_contact import motors_told
+    from tenbaud.build.first_contact import motor_lines
     from tenbaud.build.rig import real_rig_name
     from tenbaud.flight.outcome import ExitCode
 
     if yes or not (os.isatty(0) and os.isatty(2)):
         return
-    lines = "\n  ".join(motors_told(config))
+    lines = "\n  ".join(motor_lines(config))
     sys.stderr.write(
         f"The motors will turn: {real_rig_name(config.transmitter)}\n  {lines}\n"
         "Is everybody clear of it, and a hand on the emergency stop? Fly? [y/N] "

@@ -130,7 +130,7 @@ def _hint(form: str, address: str, flight: list[str]) -> str:
         where = f"{form}:socket://{address}" if ":" in address else where
     if form == "qsb":
         return f"look at it with: tenbaud rig-check --rig {where}"
-    # Nobody stands beside an emulator, so its flight asks no question.
+    # An emulator can hurt no person, so its flight asks no question.
     command = f"fly it with: tenbaud demo --clock real --yes --rig {shlex.quote(where)}"
     return " ".join([command, *flight])
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from tenbaud.flight.summary import Summary
 from tenbaud.recording.folder import RunFolder
-from tenbaud.sentences.flown import figures_of, verdict_of, warnings_of
+from tenbaud.sentences.flown import Summary, figures_of, verdict_of, warnings_of
 
 LABEL_WIDTH = 16
 

@@ -26,9 +26,10 @@ from tenbaud.flight.outcome import ExitCode, Outcome, first_code, outcome_of_sta
 from tenbaud.flight.report import write_up
 from tenbaud.flight.status import Status, StatusMode
 from tenbaud.flight.stop import StopFlag
-from tenbaud.flight.summary import Summary, joined
+from tenbaud.flight.summary import joined
 from tenbaud.flight.viewing import Viewing, ViewOptions, page_beside
 from tenbaud.recording.folder import RunFolder
+from tenbaud.sentences.flown import Summary
 
 OnStatus = Callable[[Status], None]
 ENDING_TIMEOUT_S = 15.0

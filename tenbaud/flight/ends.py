@@ -27,7 +27,7 @@ from tenbaud.flight.drawing import NotebookDrawing
 from tenbaud.flight.outcome import SAFE, ExitCode, Outcome, outcome_of
 from tenbaud.flight.status import Status, StatusMode, outputs_status
 from tenbaud.flight.stop import StopFlag
-from tenbaud.flight.summary import Summary, gap_part, link_part, receiver_part, transmitter_part
+from tenbaud.flight.summary import gap_part, link_part, receiver_part, transmitter_part
 from tenbaud.flight.trouble import Trouble
 from tenbaud.flight.viewing import ALONE, ENDS, Viewing
 from tenbaud.recording.encoding import SIGNALS_KEY, signals_text
@@ -35,6 +35,7 @@ from tenbaud.recording.folder import RunFolder
 from tenbaud.recording.overview import OverviewRecorder
 from tenbaud.recording.shared import SharedWriter
 from tenbaud.recording.writer import McapRecorder
+from tenbaud.sentences.flown import Summary
 from tenbaud.telemetry.compose import ReceiverComposer, TransmitterComposer
 from tenbaud.telemetry.end import DEFAULT_OPTIONS, TelemetryEnd, TelemetryOptions
 from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter

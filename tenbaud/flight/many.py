@@ -29,11 +29,12 @@ from tenbaud.flight.outcome import ExitCode, Outcome, outcome_of
 from tenbaud.flight.rate_limited_log import RateLimitedLog
 from tenbaud.flight.receive import ended_outcome
 from tenbaud.flight.report import write_summary
-from tenbaud.flight.summary import Summary, receiver_part
+from tenbaud.flight.summary import receiver_part
 from tenbaud.recording.folder import RunFolder, make_numbered
 from tenbaud.recording.shared import SharedWriter
 from tenbaud.recording.writer import McapRecorder
 from tenbaud.sentences import endings
+from tenbaud.sentences.flown import Summary
 
 Log = Callable[[str], None]
 AgreementOf = Callable[[str], Agreement]

@@ -13,9 +13,9 @@ from tenbaud.config.load import flattened
 from tenbaud.config.schema import FlightConfig
 from tenbaud.files.whole import WriteError, remove, write_whole
 from tenbaud.flight.outcome import ExitCode, Outcome, outcome_of
-from tenbaud.flight.summary import Summary
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RunFolder
+from tenbaud.sentences.flown import Summary
 
 if TYPE_CHECKING:
     from rich.table import Table

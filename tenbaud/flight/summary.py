@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
-from typing import Any
 
 from channel.codec.coders.learning import learned_of
 from channel.links.base import Link
@@ -17,10 +16,9 @@ from tenbaud.build.rig import real_rig_name
 from tenbaud.build.transmitter_run import TransmitterRun
 from tenbaud.flight.outcome import Outcome
 from tenbaud.sentences import events
+from tenbaud.sentences.flown import Summary
 from transmitter.metrics.gap import Gap
 from transmitter.metrics.scores import ErrorMeter
-
-Summary = dict[str, Any]
 
 
 def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:

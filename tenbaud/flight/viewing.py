@@ -58,7 +58,7 @@ class Viewing:
 
 
 ALONE = Viewing()
-"""Nobody looks."""
+"""There is no viewer."""
 
 
 @contextmanager

@@ -40,6 +40,7 @@ class _Summary(_Part):
     wire_bytes_up: int | None = None
     wire_bytes_down: int | None = None
     ticks_commanded: int | None = None
+    ticks_at_limit: int | None = None
     commands_late: int | None = None
     symbols_missing_share: float | None = None
     erasures: int | None = None

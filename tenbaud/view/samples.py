@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from channel.line.meters import BaudMeter
 from tenbaud.recording.reader import Recording
 from tenbaud.recording.table import Series, Table
 
-RATE_SPAN_S = 5.0
+RATE_SPAN_S = BaudMeter.SPAN_NS / 1e9
 SAMPLE_FIELDS = ("sample", "word_sent", "word", "range", "digest", "peer_digest", "about", "arrival_s")
 
 

@@ -15,7 +15,7 @@ from enum import Enum
 
 from channel.codec.codec import ERASED, Codec, CodecState, Vector
 from channel.protocol.bounds import Bounds, shown, within_text_bounds
-from channel.protocol.compact import CompactForm
+from channel.protocol.compact import compact_form
 from channel.protocol.endings import End, Ending
 from channel.protocol.events import ASKED, Event, EventKind, ended_event, write_event
 from channel.protocol.frames import (
@@ -116,7 +116,7 @@ class TransmitterSession:
         self._recorder = recorder or NullRecorder()
         self._due = DueCommands(terms.initial_command, terms.lead_ticks)
         self._tick = -1
-        self.compact = CompactForm(codec, terms) if terms.downlink == "compact" else None
+        self.compact = compact_form(codec, terms)
 
     # What happens at a tick
 

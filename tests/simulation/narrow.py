@@ -57,7 +57,8 @@ def paper_law() -> MirroredPid:
 
 def mirrored(layout: Layout, queue: int, lead_ticks: int = 0, bits: int = 9) -> TwoWay:
     """Return the state machine with the law in it."""
-    scheme = MirroredLaw(paper_law(), (SetPointRange(0, -2.0, 2.0),), 1, bits, queue)
+    ranges = (SetPointRange(0, -2.0, 2.0),)
+    scheme = MirroredLaw(paper_law(), ranges, 1, bits, queue, layout.command_period)
     return TwoWay(tuned_codec(), scheme, layout, lead_ticks, START, LIMITS, NO_SLEW)
 
 

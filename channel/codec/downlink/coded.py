@@ -13,7 +13,7 @@ State: the turn, then for each direction v, M and the last two signs.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from channel.codec.codec import STATE_MAX, Vector
@@ -40,16 +40,17 @@ class CodedDirection(NamedTuple):
     """v is held within this, either way"""
 
 
-def held_inputs(command_max: Vector, **more: float) -> tuple[CodedDirection, ...]:
+def held_inputs(
+    command_max: Vector, initial_range: float = 1.0, minimum_range: float = 0.3, decay: float = 0.7
+) -> tuple[CodedDirection, ...]:
     """Return a direction for each input on its own, held between symbols."""
     count = len(command_max)
-    return tuple(
-        [
-            CodedDirection(row, row, largest=command_max[at], **more)
-            for at in range(count)
-            for row in [tuple([1.0 if place == at else 0.0 for place in range(count)])]
-        ]
-    )
+    found = []
+    for at in range(count):
+        row = tuple([1.0 if place == at else 0.0 for place in range(count)])
+        one = CodedDirection(row, row, (), initial_range, minimum_range, decay, command_max[at])
+        found.append(one)
+    return tuple(found)
 
 
 class CodedCommands:
@@ -102,13 +103,14 @@ class CodedCommands:
         place = self.turns[int(down[0])]
         return place, 1 + SIZE * place
 
-    def encode(self, down: Vector, wanted: Vector, live: Vector) -> int:
-        """Return the bit for the command `wanted`."""
+    def encode(self, down: Vector, wanted: Callable[[int], Vector], live: Vector) -> int:
+        """Return the bit for the command that is wanted now."""
         place, at = self._next(down)
         one = self.directions[place]
         value = _fed_back(one, live)
+        command = wanted(0)
         for index in range(len(self.base)):
-            value += one.read[index] * (wanted[index] - self.base[index])
+            value += one.read[index] * (command[index] - self.base[index])
         return 1 if value >= down[at + VALUE] else 0
 
     def take(self, down: Vector, symbol: int) -> Vector:

@@ -1,9 +1,9 @@
 """Which symbols of a sample carry commands or set-points, and which carry hash bits.
 
-Down symbols are bits. Both ends must know what each one means, so its kind follows from the shared state
-alone. With two or more symbols a sample the first few are command symbols and the others hash symbols.
-With one symbol a sample the two take turns: while no word is being sent, every `command_period`-th sample
-has a command symbol; within a word, samples of a command symbol and of a hash symbol alternate.
+Down symbols are bits. Both ends must know what each one means, so its kind follows from shared state
+alone. While no word is being sent, every `command_period`-th sample begins with command symbols, and all
+others are hash symbols. Within a word every sample begins with command symbols, or, with one symbol a
+sample, every second one: the others have the hash symbol.
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ class Layout:
 
     symbols_per_sample: int
     command_symbols: int = 1
-    """of two symbols a sample or more: how many are command symbols"""
+    """of a sample that has any"""
     command_period: int = 1
-    """of one symbol a sample: every such sample has a command symbol while no word is being sent"""
+    """samples from one with command symbols to the next, while no word is being sent"""
 
     def __post_init__(self) -> None:
         count, commands = self.symbols_per_sample, self.command_symbols
-        if not 1 <= count <= SYMBOLS_MAX:
-            raise ValueError(f"a sample has 1 to {SYMBOLS_MAX} down symbols, got {count}")
-        if count == 1 and not (commands == 1 and self.command_period >= 2):
+        if not 1 <= count <= SYMBOLS_MAX or self.command_period < 1:
             raise ValueError(
-                f"with one down symbol a sample, command_period is {self.command_period}; it must be at "
-                "least 2, so that hash symbols are sent too"
+                f"a sample has 1 to {SYMBOLS_MAX} down symbols and command_period is at least 1, got "
+                f"{count} and {self.command_period}"
             )
-        if count > 1 and not (1 <= commands < count and self.command_period == 1):
+        if not 1 <= commands <= count:
+            raise ValueError(f"of {count} down symbols a sample {commands} cannot be command symbols")
+        if commands == count and (count > 1 or self.command_period < 2):
             raise ValueError(
-                f"of {count} down symbols a sample {commands} are command symbols, and command_period is "
-                f"{self.command_period}; there must be 1 to {count - 1} of them in every sample"
+                f"all {count} down symbol(s) of a sample are command symbols, with command_period = "
+                f"{self.command_period}; leave one to hash bits, or, of one symbol, every second sample"
             )
 
     def commands_in(self, sample: int, word_age: int) -> int:
@@ -44,11 +44,11 @@ class Layout:
 
         `word_age`: samples since the word that is being sent began; 0: none is.
         """
-        if self.symbols_per_sample > 1:
-            return self.command_symbols
-        if word_age:
-            return 0 if word_age & 1 else 1
-        return 0 if sample % self.command_period else 1  # integers
+        if word_age == 0:
+            free = sample % self.command_period  # integers
+        else:
+            free = word_age & 1 if self.symbols_per_sample == 1 else 0
+        return 0 if free else self.command_symbols
 
     def word_samples(self, symbols: int) -> int:
         """Return in how many samples a word of this many symbols is sent, its first one included."""

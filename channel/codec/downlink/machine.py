@@ -123,9 +123,14 @@ class TwoWay:
         scheme = self.scheme
 
         def chosen(tick: int, live: Vector, down: Vector) -> Vector:
-            target = wanted(tick, live) if count or scheme.asks_every_tick else ()
+            now = wanted(tick, live) if count or scheme.asks_every_tick else ()
+
+            def ago(samples: int) -> Vector:
+                before = tick - samples * self.codec.ticks_per_sample
+                return now if samples == 0 else wanted(before if before > 0 else 0, live)
+
             for _ in range(count):
-                symbol = scheme.encode(down, target, live)
+                symbol = scheme.encode(down, ago, live)
                 sent.append(symbol)
                 down = scheme.take(down, symbol)
             return down

@@ -1,25 +1,27 @@
 """Mirrored law: the law is part of the shared state, and only set-points go down, as words.
 
-While nothing changes, command symbols are 0. A 1 announces a word: the number of the output that is
-steered, if there are several, then the set-point, most significant bit first. The bits halve the range
-low ... high of that output; after each of them the set-point is the middle of what is left.
+While nothing changes, command symbols are 0. A 1 announces a word. Its bits, most significant first, say
+how many samples ago the set-point changed (nothing, where every sample has a command symbol), which of
+the steered outputs it is for (nothing, of one), and the set-point. Each bit of it halves the range low ...
+high of that output, and the set-point is then the middle of what is left.
 
-A set-point takes effect `queue` samples after the first symbol of its word. A word that is complete by
-then acts at its exact time; one that is not acts with the bits that have come. Set-points known ahead
-(`announce`) are sent that much earlier, and so lose no time at all.
+A set-point takes effect `queue` samples after it changed. A word that is complete by then acts at its
+exact time; one that is not acts with the bits that have come. Set-points that are known `queue` samples
+ahead are sent that much earlier, and so lose no time at all.
 
-State: set-points in force, set-points as decoded, the word (age, bits left, output, middle, half width),
-the queue (oldest first, all outputs of a sample together), the law's memory.
+State: set-points in force, set-points as decoded, the word (age, bits left, samples ago, output, middle,
+half width), the queue (oldest first, all outputs of a sample together), the law's memory.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
 
 from channel.codec.codec import STATE_MAX, Vector
 
-AGE, LEFT, OUTPUT, MIDDLE, HALF = range(5)
+AGE, LEFT, BACK, OUTPUT, MIDDLE, HALF = range(6)
+WORD = 6
 BITS_MAX = 24
 
 
@@ -54,7 +56,13 @@ class MirroredLaw:
     asks_every_tick = False
 
     def __init__(
-        self, law: Law, ranges: Sequence[SetPointRange], outputs: int, bits: int, queue: int
+        self,
+        law: Law,
+        ranges: Sequence[SetPointRange],
+        outputs: int,
+        bits: int,
+        queue: int,
+        command_period: int = 1,
     ) -> None:
         if not 1 <= bits <= BITS_MAX or queue < 0 or not ranges:
             raise ValueError(
@@ -80,16 +88,18 @@ class MirroredLaw:
         self.queue = queue
         self.outputs = outputs
         self.address_bits = (len(self.ranges) - 1).bit_length()
+        self.back_max = command_period - 1
+        self.back_bits = self.back_max.bit_length()
         count = len(self.ranges)
         self._word = 2 * count
-        self._queue = self._word + 5
+        self._queue = self._word + WORD
         self._memory = self._queue + queue * count
         self._memory_size = len(law.initial())
 
     @property
     def word_symbols(self) -> int:
         """Return the symbols of a whole word."""
-        return 1 + self.address_bits + self.bits
+        return 1 + self.back_bits + self.address_bits + self.bits
 
     def quantum(self, place: int) -> float:
         """Return how far two neighbouring set-points of one range lie apart."""
@@ -107,7 +117,7 @@ class MirroredLaw:
 
     def initial(self) -> Vector:
         start = tuple([one.start for one in self.ranges])
-        return start + start + (0.0,) * 5 + start * self.queue + self.law.initial()
+        return start + start + (0.0,) * WORD + start * self.queue + self.law.initial()
 
     def word_age(self, down: Vector) -> int:
         return int(down[self._word + AGE])
@@ -115,19 +125,39 @@ class MirroredLaw:
     def is_idle(self, down: Vector) -> bool:
         return down[self._word + LEFT] == 0.0
 
-    def encode(self, down: Vector, wanted: Vector, live: Vector) -> int:
-        """Return the next bit towards the set-points `wanted`, one for each output of the model."""
-        word, count = self._word, len(self.ranges)
-        left = down[word + LEFT]
-        if left == 0.0:
-            return 0 if self._worst(down, wanted) < 0 else 1
+    def encode(self, down: Vector, wanted: Callable[[int], Vector], live: Vector) -> int:
+        """Return the next bit of the set-points that were wanted when the word began.
+
+        `wanted` gives one for each output of the model.
+        """
+        word = down[self._word : self._word + WORD]
+        left = int(word[LEFT])
+        age = int(word[AGE])
+        targets = wanted(age)
+        if left == 0:
+            return 0 if self._worst(down, targets) < 0 else 1
+        worst = self._worst(down, targets)
+        worst = worst if worst > 0 else 0
+        if left > self.address_bits + self.bits:
+            shift = left - self.address_bits - self.bits - 1
+            return self._changed_ago(wanted, age, worst) >> shift & 1
         if left > self.bits:
-            place = self._worst(down, wanted)
-            shift = int(left) - self.bits - 1
-            return (place if place > 0 else 0) >> shift & 1
-        place = int(down[word + OUTPUT])
-        place = place if place < count else count - 1
-        return 1 if wanted[self.ranges[place].output] >= down[word + MIDDLE] else 0
+            return worst >> (left - self.bits - 1) & 1
+        place = int(word[OUTPUT])
+        place = place if place < len(self.ranges) else len(self.ranges) - 1
+        return 1 if targets[self.ranges[place].output] >= word[MIDDLE] else 0
+
+    def _changed_ago(self, wanted: Callable[[int], Vector], age: int, place: int) -> int:
+        """Return for how many samples before the word began its set-point was wanted already."""
+        output = self.ranges[place].output
+        target = wanted(age)[output]
+        back = 0
+        while back < self.back_max:
+            off = wanted(age + back + 1)[output] - target
+            if not -0.5 * self.quantum(place) <= off <= 0.5 * self.quantum(place):
+                break
+            back += 1
+        return back
 
     def _worst(self, down: Vector, wanted: Vector) -> int:
         """Return which set-point is furthest off, in quanta; -1: none is by more than rounding is."""
@@ -150,28 +180,28 @@ class MirroredLaw:
         left = int(down[word + LEFT])
         if left == 0:
             if symbol:
-                after[word + LEFT] = float(self.address_bits + self.bits)
-                after[word + OUTPUT] = 0.0
+                after[word + LEFT] = float(self.word_symbols - 1)
                 self._open_word(after)
             return tuple(after)
         after[word + LEFT] = left - 1.0
         if left > self.bits:
-            after[word + OUTPUT] = 2.0 * down[word + OUTPUT] + symbol
+            at = word + (BACK if left > self.address_bits + self.bits else OUTPUT)
+            after[at] = 2.0 * down[at] + symbol
             self._open_word(after)
             return tuple(after)
         half = 0.5 * down[word + HALF]
         middle = down[word + MIDDLE] + (half if symbol else -half)
         place = int(down[word + OUTPUT])
         if place < count:
-            # Every sample since the word began was given the set-point before it; now it is known better.
+            # The samples since it changed were given the set-point before it; now it is known better.
             after[count + place] = middle
-            age = int(down[word + AGE])
-            for back in range(1, (age if age < self.queue else self.queue) + 1):
+            samples = int(down[word + AGE] + down[word + BACK])
+            for back in range(1, (samples if samples < self.queue else self.queue) + 1):
                 after[self._queue + (self.queue - back) * count + place] = middle
         after[word + MIDDLE] = middle
         after[word + HALF] = half
         if left == 1:
-            after[word : word + 5] = [0.0] * 5
+            after[word : word + WORD] = [0.0] * WORD
         return tuple(after)
 
     def _open_word(self, after: list[float]) -> None:
@@ -213,7 +243,8 @@ class MirroredLaw:
         for value in down:
             if not -STATE_MAX < value < STATE_MAX:
                 return False
-        age, left, output = down[self._word : self._word + 3]
-        whole = age == int(age) and left == int(left) and output == int(output)
-        fits = 0.0 <= left <= self.address_bits + self.bits and 0.0 <= output < 1 << self.address_bits
-        return whole and fits and age >= 0.0
+        age, left, back, output = down[self._word : self._word + MIDDLE]
+        for value in (age, left, back, output):
+            if value < 0.0 or value != int(value):
+                return False
+        return left < self.word_symbols and output < 1 << self.address_bits and back <= self.back_max

@@ -6,6 +6,7 @@ Per sample, in this order: `take` for each command symbol, `settle` once, `comma
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 from channel.codec.codec import Vector
@@ -26,8 +27,11 @@ class Scheme(Protocol):
     def is_idle(self, down: Vector) -> bool:
         """Return whether the next command symbol says if there is news; if not, both are as likely."""
 
-    def encode(self, down: Vector, wanted: Vector, live: Vector) -> int:
-        """Return the command symbol, 0 or 1, that leads to what is wanted (receiver only)."""
+    def encode(self, down: Vector, wanted: Callable[[int], Vector], live: Vector) -> int:
+        """Return the command symbol, 0 or 1, that leads to what is wanted (receiver only).
+
+        `wanted(n)` is what was wanted n samples ago, `wanted(0)` what is now.
+        """
 
     def take(self, down: Vector, symbol: int) -> Vector:
         """Return the state after a command symbol."""

@@ -1,12 +1,13 @@
 """Coded commands: what any controller wants goes down as measurements go up, one bit on the deviation.
 
 A command is `base + sum_j direction_j w_j`, and `w_j = v_j - K_j x` with the shared, predicted state x;
-with K zero the command is held between symbols. A symbol says on which side of v_j the wanted value lies:
+with K zero the command is held between symbols. A symbol says on which side of v_j what is wanted lies:
 
-    v_j <- v_j + s M_j,    M_j <- (1 - rho) M_min + (M_j / rho  if the last three signs agree, else rho M_j)
+    v_j <- v_j + s M_j,    M_j <- g M_j  within  M_min ... M_max,
 
-Several v_j take their turns in the order of `turns`. Clamp and slew limits come after all of this, at
-both ends alike.
+g being `again` where the last three signs of v_j agree, `grow` where two do, `shrink` where they do not.
+The v_j take their turns in the order of `turns`. v_j may exceed what the limits let through: a controller
+that saturates keeps its input saturated. Clamp and slew limits come after all of this, at both ends alike.
 
 State: the turn, then for each direction v, M and the last two signs.
 """
@@ -31,25 +32,26 @@ class CodedDirection(NamedTuple):
     """what of each input, beyond `base`, it is: the row that gives w back from a command"""
     feedback: Vector = ()
     """K, for each state of the model; empty: zero"""
-    initial_range: float = 1.0
-    minimum_range: float = 0.3
+    initial_range: float = 1.5
+    minimum_range: float = 1.5
     """M_min"""
-    decay: float = 0.7
-    """rho"""
-    largest: float = 100.0
-    """v is held within this, either way"""
+    maximum_range: float = 8.0
+    """M_max"""
+    largest: float = 20.0
+    """v_max: v is held within this, either way"""
+    again: float = 2.5
+    grow: float = 1.5
+    shrink: float = 0.4
 
 
-def held_inputs(
-    command_max: Vector, initial_range: float = 1.0, minimum_range: float = 0.3, decay: float = 0.7
-) -> tuple[CodedDirection, ...]:
+def held_inputs(command_max: Vector) -> tuple[CodedDirection, ...]:
     """Return a direction for each input on its own, held between symbols."""
     count = len(command_max)
     found = []
     for at in range(count):
         row = tuple([1.0 if place == at else 0.0 for place in range(count)])
-        one = CodedDirection(row, row, (), initial_range, minimum_range, decay, command_max[at])
-        found.append(one)
+        reach, largest = 0.15 * command_max[at], 2.0 * command_max[at]
+        found.append(CodedDirection(row, row, (), reach, reach, 0.8 * command_max[at], largest))
     return tuple(found)
 
 
@@ -78,12 +80,17 @@ class CodedCommands:
                     f"direction {place} is for {len(one.direction)} input(s) and reads {len(one.read)}; "
                     f"the plant has {len(base)}"
                 )
-            ranges = 0.0 < one.minimum_range <= one.initial_range < STATE_MAX and one.largest > 0.0
-            if not ranges or not 0.0 < one.decay < 1.0:
+            rises = 0.0 < one.minimum_range <= one.initial_range <= one.maximum_range <= one.largest
+            if not rises or one.largest >= STATE_MAX:
                 raise ValueError(
-                    f"direction {place} has the ranges {one.minimum_range:g} to start with "
-                    f"{one.initial_range:g}, decay {one.decay:g} and limit {one.largest:g}; ranges and the "
-                    "limit must be positive, decay between 0 and 1"
+                    f"direction {place} has the smallest range {one.minimum_range:g}, begins with "
+                    f"{one.initial_range:g}, and has the largest {one.maximum_range:g} and the limit "
+                    f"{one.largest:g}; they must be above 0 and rise"
+                )
+            if not 0.0 < one.shrink < 1.0 <= one.grow <= one.again < STATE_MAX:
+                raise ValueError(
+                    f"direction {place} multiplies its range by {one.shrink:g}, {one.grow:g} and "
+                    f"{one.again:g}; the first must be below 1, the others at least 1 and rising"
                 )
 
     def initial(self) -> Vector:
@@ -122,11 +129,12 @@ class CodedCommands:
         value = down[at + VALUE] + sign * reach
         value = one.largest if value > one.largest else value
         after[at + VALUE] = -one.largest if value < -one.largest else value
-        total = sign + down[at + SIGN] + down[at + SIGN_BEFORE]
-        grows = total > 2.0 or total < -2.0  # signs are small whole numbers
-        scaled = reach / one.decay if grows else one.decay * reach
-        reach = (1.0 - one.decay) * one.minimum_range + scaled
-        after[at + RANGE] = one.largest if reach > one.largest else reach
+        factor = one.shrink
+        if sign == down[at + SIGN]:  # signs are whole numbers
+            factor = one.again if sign == down[at + SIGN_BEFORE] else one.grow
+        reach = factor * reach
+        reach = one.minimum_range if reach < one.minimum_range else reach
+        after[at + RANGE] = one.maximum_range if reach > one.maximum_range else reach
         after[at + SIGN] = sign
         after[at + SIGN_BEFORE] = down[at + SIGN]
         return self._turned(after)

@@ -17,10 +17,10 @@ def followed(scheme: CodedCommands, wanted: Vector, symbols: int, live: Vector =
 
 
 def test_held_commands_follow_what_any_controller_wants() -> None:
-    scheme = CodedCommands((0.0, 0.0), held_inputs((5.0, 5.0), minimum_range=0.1))
+    scheme = CodedCommands((0.0, 0.0), held_inputs((5.0, 5.0)))
     assert followed(scheme, (4.0, -2.0), 60) == (
-        pytest.approx(4.0, abs=0.2),
-        pytest.approx(-2.0, abs=0.2),
+        pytest.approx(4.0, abs=1.5),
+        pytest.approx(-2.0, abs=1.5),
     )
 
 
@@ -59,8 +59,8 @@ def test_a_bit_that_is_not_known_yet_changes_the_turn_alone() -> None:
         (held_inputs((5.0, 5.0)), (0,)),
         (held_inputs((5.0, 5.0)), (0, 1, 2)),
         ((CodedDirection((1.0,), (1.0,)),), ()),
-        ((CodedDirection((1.0, 0.0), (1.0, 0.0), decay=1.0),), ()),
-        ((CodedDirection((1.0, 0.0), (1.0, 0.0), minimum_range=2.0),), ()),
+        ((CodedDirection((1.0, 0.0), (1.0, 0.0), shrink=1.0),), ()),
+        ((CodedDirection((1.0, 0.0), (1.0, 0.0), minimum_range=2.0, initial_range=1.0),), ()),
     ],
 )
 def test_directions_that_do_not_fit_are_refused(

@@ -46,7 +46,10 @@ def test_the_mirrored_pid_commands_what_the_receivers_does(rate: int) -> None:
 
 def test_the_mirrored_feedback_commands_what_the_receivers_does() -> None:
     law = FeedbackLaw(
-        (0.2, -0.2), ((3.0, 1.0, 0.1, 0.0), (-3.0, -1.0, 0.0, 0.1)), ((3.0,), (-3.0,)), ((1.0,), (-1.0,))
+        (0.2, -0.2),
+        ((3.0, 1.0, 0.1, 0.0), (-3.0, -1.0, 0.0, 0.1)),
+        ((3.0,), (-3.0,)),
+        ((1.0,), (-1.0,)),
     )
     own = StateFeedback(law, (Constant(0.4, TICK_S),), MODEL.measured, LIMITS, TICK_S)
     mirror = MirroredFeedback(law, LIMITS, TICK_S)

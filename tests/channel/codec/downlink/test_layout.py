@@ -27,7 +27,9 @@ def test_with_one_symbol_a_sample_word_and_hash_symbols_alternate() -> None:
     assert layout.word_samples(10) == 19
 
 
-@pytest.mark.parametrize("numbers", [(0,), (33,), (1,), (1, 1, 1), (2, 2), (2, 2, 4), (2, 0), (2, 1, 0)])
+@pytest.mark.parametrize(
+    "numbers", [(0,), (33,), (1,), (1, 1, 1), (2, 2), (2, 2, 4), (2, 0), (2, 1, 0)]
+)
 def test_a_layout_without_hash_or_command_symbols_is_refused(numbers: tuple[int, ...]) -> None:
     with pytest.raises(ValueError, match="symbol"):
         Layout(*numbers)

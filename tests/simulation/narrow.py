@@ -58,7 +58,7 @@ def paper_law() -> MirroredPid:
 def mirrored(layout: Layout, queue: int, lead_ticks: int = 0, bits: int = 9) -> TwoWay:
     """Return the state machine with the law in it."""
     ranges = (SetPointRange(0, -2.0, 2.0),)
-    scheme = MirroredLaw(paper_law(), ranges, 1, bits, queue, layout.command_period)
+    scheme = MirroredLaw(paper_law(), ranges, 1, bits, queue, layout)
     return TwoWay(tuned_codec(), scheme, layout, lead_ticks, START, LIMITS, NO_SLEW)
 
 
@@ -158,6 +158,8 @@ class Result:
     tracking: float = 0.0
     largest: float = 0.0
     wrong: int = 0
+    doubted: int = 0
+    """confirmed samples of which another history leads to the same state"""
     confirmed: int = 0
     delays: list[int] = field(default_factory=list)
     sizes: list[int] = field(default_factory=list)
@@ -260,7 +262,8 @@ class NarrowFlight:
             self.result.confirmed += 1
             self.result.delays.append(done.lag_samples)
             same = (done.word, done.symbols, done.before) == (word, symbols, before)
-            self.result.wrong += not same
+            self.result.wrong += not same and done.doubt == 0.0
+            self.result.doubted += done.doubt > 0.0
             if self._keep:
                 self.confirmed.append(done)
         self.result.sizes.append(self.hypotheses.size)

@@ -109,5 +109,5 @@ def fast_mirrored(layout: Layout, queue: int, lead_ticks: int = 0, bits: int = 9
     """Return what `tests.simulation.narrow.mirrored` does, compiled."""
     law = paper_law()
     ranges: Sequence[SetPointRange] = (SetPointRange(0, -2.0, 2.0),)
-    scheme = MirroredLaw(law, ranges, 1, bits, queue, layout.command_period)
+    scheme = MirroredLaw(law, ranges, 1, bits, queue, layout)
     return FastTwoWay(scheme, law, layout, lead_ticks)

@@ -1,9 +1,9 @@
 """Mirrored law: the law is part of the shared state, and only set-points go down, as words.
 
 While nothing changes, command symbols are 0. A 1 announces a word. Its bits, most significant first, say
-how many samples ago the set-point changed (nothing, where every sample has a command symbol), which of
-the steered outputs it is for (nothing, of one), and the set-point. Each bit of it halves the range low ...
-high of that output, and the set-point is then the middle of what is left.
+how many samples ago the set-point changed (where not every sample has a command symbol, and the queue is
+long enough for it to matter), which of the steered outputs it is for (where there are several), and the
+set-point: each bit halves the range low ... high of its output, and leaves the middle as the set-point.
 
 A set-point takes effect `queue` samples after it changed. A word that is complete by then acts at its
 exact time; one that is not acts with the bits that have come. Set-points that are known `queue` samples
@@ -19,6 +19,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
 
 from channel.codec.codec import STATE_MAX, Vector
+from channel.codec.downlink.layout import Layout
 
 AGE, LEFT, BACK, OUTPUT, MIDDLE, HALF = range(6)
 WORD = 6
@@ -62,7 +63,7 @@ class MirroredLaw:
         outputs: int,
         bits: int,
         queue: int,
-        command_period: int = 1,
+        layout: Layout,
     ) -> None:
         if not 1 <= bits <= BITS_MAX or queue < 0 or not ranges:
             raise ValueError(
@@ -88,8 +89,13 @@ class MirroredLaw:
         self.queue = queue
         self.outputs = outputs
         self.address_bits = (len(self.ranges) - 1).bit_length()
-        self.back_max = command_period - 1
+        self.back_max = layout.command_period - 1
         self.back_bits = self.back_max.bit_length()
+        self.queue_needed = layout.word_samples(self.word_symbols) + self.back_max
+        """samples ahead of which a set-point must be known to act at its exact time"""
+        if queue < self.queue_needed:
+            # Bits that change nothing in the end could never be confirmed.
+            self.back_max = self.back_bits = 0
         count = len(self.ranges)
         self._word = 2 * count
         self._queue = self._word + WORD

@@ -8,7 +8,8 @@ the chance of the down symbols that came: a hash bit that agrees, a command symb
 What is not followed any further is not forgotten. Its weight is booked as *rest*, at the first sample
 where it leaves the likeliest path, and so is a little of every sample for what no branch explains. To
 the rest a hash bit is a coin, so one that agrees with the list halves it, relative to the list; a command
-symbol is to the rest what it is to the list. A sample is confirmed when all that differs from the
+symbol is to the rest what it is to the list. Hypotheses that have come to the same state are one from
+there on, with the likelier history. A sample is confirmed when all that differs from the
 likeliest path in it or before it, list and rest, weighs less than `confirmed_below` of the list.
 """
 
@@ -83,6 +84,9 @@ class Confirmed(NamedTuple):
     flown: TwoWaySample
     lag_samples: int
     """samples heard of beyond this one"""
+    doubt: float
+    """share of other inputs of this sample which led to the same state later, so that nothing that comes
+    can tell them apart; 0 with a codec that forgets nothing"""
 
 
 class Hypotheses:
@@ -223,6 +227,8 @@ class Hypotheses:
         Return the samples that are certain now. ValueError for another sample, or another number of
         symbols.
         """
+        if self.rejoin is not None:
+            return []
         count = self.machine.layout.symbols_per_sample
         heard = (None,) * count if symbols is None else tuple(symbols)
         if sample != self.next_heard or len(heard) != count:
@@ -230,8 +236,6 @@ class Hypotheses:
                 f"{len(heard)} down symbols of sample {sample} came; those of sample {self.next_heard} "
                 f"are next, {count} of them"
             )
-        if self.rejoin is not None:
-            return []
         sent = self._unheard.popleft() if self._unheard else ERASED
         self._unconfirmed.append((sent, heard))
         self._ahead = None
@@ -307,7 +311,7 @@ class Hypotheses:
             return 0.0, 1.0, 0.0, 0.0
         alphabet = self.machine.codec.coder.alphabet
         erased, flip = self.priors.erased(before), self.priors.flipped
-        more = flip * flip if len(sent) > 1 else 0.0
+        more = 0.5 * flip * flip * (len(sent) - 1) / len(sent)
         others = len(sent) * (len(alphabet.symbols) - 1)
         arrived = 1.0 - erased
         return arrived * (1.0 - flip), erased, arrived * (flip - more) / others, arrived * more
@@ -361,22 +365,27 @@ class Hypotheses:
         """Follow the branches that weigh enough, book the others; return whether there is one."""
         branches.sort(key=lambda one: -one[0])
         least = branches[0][0] * self.settings.dropped_below
-        members: list[tuple[float, Node]] = []
+        members: dict[TwoWayState, tuple[float, Node]] = {}
         dropped = list(spilled)
         for weight, node, word, symbols in branches:
             followed = weight >= least and weight > 0.0 and len(members) < self.settings.list_max
             child = node.child(self.machine, word, symbols) if followed else None
             if child is None:
                 dropped.append((weight, node))
+            elif child.state in members:
+                other, kept = members[child.state]
+                members[child.state] = (other + weight, kept)
+                kept.doubt(child, weight / (other + weight))
             else:
-                members.append((weight, child))
+                members[child.state] = (weight, child)
         for _, node in self._members:
             node.children = {}
         if not members:
             return False
         paths = self._paths
         paths.scale_rest(rest_factor)
-        paths.follow(members[0][1])
+        followed_on = sorted(members.values(), key=lambda one: -one[0])
+        paths.follow(followed_on[0][1])
         paths.book(self.settings.unexplained * rest_factor, None)
         leaves: dict[Node, int | None] = {}
         for weight, node in dropped:
@@ -385,9 +394,9 @@ class Hypotheses:
                     leaves[node] = paths.leaves_at(node)
                 paths.book(weight, leaves[node])
         total = 0.0
-        for weight, _ in members:
+        for weight, _ in followed_on:
             total += weight
-        self._members = [(weight / total, node) for weight, node in members]
+        self._members = [(weight / total, node) for weight, node in followed_on]
         paths.scale_rest(1.0 / total)
         return True
 
@@ -435,5 +444,15 @@ class Hypotheses:
         if commands and machine.scheme.is_idle(before.down):
             self.priors.learn_news(commands[0] == 1)
         assert node.flown is not None  # only the root has none
-        lag = self._paths.tip.sample - node.sample
-        return Confirmed(node.sample, before, digest, sent, node.word, symbols, heard, node.flown, lag)
+        return Confirmed(
+            sample=node.sample,
+            before=before,
+            digest=digest,
+            word_sent=sent,
+            word=node.word,
+            symbols=symbols,
+            heard=heard,
+            flown=node.flown,
+            lag_samples=self._paths.tip.sample - node.sample,
+            doubt=node.doubted,
+        )

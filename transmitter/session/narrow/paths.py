@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from channel.codec.codec import CodecState, Vector, Word
+from channel.codec.codec import Vector, Word
 from channel.codec.downlink.machine import TwoWay, TwoWaySample, TwoWayState
 from channel.errors import CodecDiverged
 
@@ -18,6 +18,7 @@ class Node:
     __slots__ = (
         "children",
         "commands",
+        "doubted",
         "flown",
         "on_path",
         "parent",
@@ -46,6 +47,8 @@ class Node:
         self.flown = flown
         self.commands: list[Vector] = [] if flown is None else flown.commands
         self.on_path = False
+        self.doubted = 0.0
+        """largest share of a history that ended in the same state, and has other inputs here"""
         self.children: dict[tuple[Word, Symbols], Node | None] = {}
         """samples flown on top of it; None: cannot be flown"""
 
@@ -60,6 +63,15 @@ class Node:
             else:
                 self.children[key] = Node(self, self.sample + 1, word, symbols, flown.state, flown)
         return self.children[key]
+
+    def doubt(self, other: Node, share: float) -> None:
+        """Note a history of this share that differs from this node's own, and has come to its state."""
+        one: Node | None = self
+        two: Node | None = other
+        while one is not None and two is not None and one is not two:
+            if (one.word, one.symbols) != (two.word, two.symbols) or one.state != two.state:
+                one.doubted = max(one.doubted, share)
+            one, two = one.parent, two.parent
 
 
 class Paths:
@@ -144,8 +156,3 @@ class Paths:
             self.old_rest += weight
         self.rest = self.rest[count:]
         return done
-
-
-def codec_state(node: Node) -> CodecState:
-    """Return the codec's state after a node's sample."""
-    return node.state.codec

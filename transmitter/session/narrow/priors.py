@@ -40,7 +40,7 @@ class Priors:
         self._erased_again = Share(0.4, 2.5)
         self._flipped = Share(0.005)
         self._down_flipped = Share(0.005)
-        self._news = Share(0.02)
+        self._news = Share(0.1)
 
     def erased(self, before: Word) -> float:
         """Return how likely a word is erased, after this one."""

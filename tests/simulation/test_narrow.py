@@ -1,0 +1,161 @@
+"""Flights with a narrow downlink: nothing is confirmed that the receiver did not fly, whatever the line does."""
+
+from __future__ import annotations
+
+import math
+import os
+import random
+import statistics
+
+import pytest
+
+from channel.codec.codec import Word
+from channel.codec.downlink.coded import CodedDirection
+from channel.codec.downlink.layout import Layout
+from channel.codec.downlink.machine import TwoWay
+from receiver.controllers.pid import PAPER_GAINS, Pid
+from receiver.controllers.references import Square
+from tests.channel.codec.downlink.test_machine import SCHEMES, machine, wanted
+from tests.simulation.narrow import (
+    TICK_S,
+    TICKS,
+    Faults,
+    NarrowFlight,
+    Wants,
+    coded,
+    full,
+    mirrored,
+    paper_law,
+    square,
+    tuned_codec,
+)
+from transmitter.session.narrow.hypotheses import Hypotheses
+
+LAYOUT, QUEUE = Layout(2, 1, 4), 15
+DIRECTION = CodedDirection((0.5, -0.5), (1.0, -1.0))
+BURSTS = Faults(burst_up=(0.02, 0.25), burst_down=(0.02, 0.25))
+
+
+def announced(queue: int) -> Wants:
+    return lambda tick, live: (square(tick + queue * TICKS),)
+
+
+def pid() -> Wants:
+    return Pid(PAPER_GAINS, Square(math.pi / 2, 25.0, TICK_S), TICK_S).command
+
+
+def test_on_a_clean_line_every_sample_is_confirmed_as_it_was_flown() -> None:
+    flight = NarrowFlight(mirrored(LAYOUT, QUEUE), announced(QUEUE), 1, keep=True)
+    result = flight.fly(600)
+    assert result.wrong == 0
+    assert result.confirmed > 570
+    assert result.rejoins == []
+    assert [one.sample for one in flight.confirmed] == list(range(result.confirmed))
+    assert flight.hypotheses.confirmed_state == flight.confirmed[-1].flown.state
+    assert statistics.median(result.delays) <= 10
+    own = full(tuned_codec(), paper_law(), 1, 600)
+    assert result.error < 1.1**2 * own.error
+    assert result.tracking < 1.02**2 * own.tracking
+
+
+@pytest.mark.parametrize(
+    "faults",
+    [
+        Faults.both(loss=0.01),
+        Faults.both(loss=0.05),
+        Faults.both(flip=0.01),
+        Faults.both(loss=0.02, flip=0.01),
+        Faults(loss_down=0.2),
+        Faults(loss_up=0.1),
+        BURSTS,
+        Faults(burst_up=(0.01, 0.1), burst_down=(0.01, 0.1)),
+    ],
+)
+def test_nothing_is_confirmed_that_the_receiver_did_not_fly(faults: Faults) -> None:
+    result = NarrowFlight(mirrored(LAYOUT, QUEUE), announced(QUEUE), 1, faults).fly(1250)
+    assert result.wrong == 0
+    assert result.confirmed > 900
+
+
+@pytest.mark.parametrize(("layout", "period"), [(Layout(2), 1), (Layout(1, 1, 2), 2), (Layout(4), 1)])
+def test_coded_commands_of_any_controller_are_confirmed_as_sent(layout: Layout, period: int) -> None:
+    faults = Faults.both(loss=0.01)
+    result = NarrowFlight(coded(layout, DIRECTION), pid(), 1, faults).fly(400)
+    assert result.wrong == 0
+    assert result.confirmed > 300
+
+
+@pytest.mark.parametrize(("round_trip", "lead_ticks"), [(1, 0), (1, 10), (1, 14), (4, 0), (4, 40)])
+def test_symbols_may_come_samples_later(round_trip: int, lead_ticks: int) -> None:
+    flight = NarrowFlight(
+        mirrored(LAYOUT, QUEUE, lead_ticks),
+        announced(QUEUE),
+        1,
+        Faults.both(loss=0.01),
+        round_trip=round_trip,
+    )
+    result = flight.fly(300)
+    assert result.wrong == 0
+    assert result.confirmed > 240
+
+
+@pytest.mark.parametrize("at", range(len(SCHEMES)))
+def test_any_model_with_any_scheme_is_followed_through_erasures_and_flips(at: int) -> None:
+    scheme, layout = SCHEMES[at]
+    two_way: TwoWay = machine(scheme, layout, 5)
+    hypotheses, state, chance = Hypotheses(two_way), two_way.initial(), random.Random(at)
+    taken: list[Word] = []
+    wrong = confirmed = 0
+    for sample in range(150):
+        sent = (chance.choice((-1, 1)), chance.choice((-1, 1)))
+        hypotheses.sent(sent)
+        dice = chance.random()
+        word: Word = None if dice < 0.03 else (-sent[0], sent[1]) if dice < 0.04 else sent
+        taken.append(word)
+
+        flown, symbols = two_way.fly(state, word, wanted)
+        state = flown.state
+        heard = [None if chance.random() < 0.03 else symbol for symbol in symbols]
+        for done in hypotheses.heard(sample, heard):
+            confirmed += 1
+            wrong += done.word != taken[done.sample]
+    assert wrong == 0
+    assert hypotheses.rejoin is None
+    assert confirmed > 60
+
+
+@pytest.mark.parametrize("at_receiver", [True, False])
+def test_a_corrupt_state_is_found_within_twelve_samples_and_replaced(at_receiver: bool) -> None:
+    flight = NarrowFlight(mirrored(Layout(2), 12), announced(12), 2)
+    flight.fly(30)
+    found = []
+    for _ in range(15):
+        flight.fly(12)
+        flight.corrupt(at_receiver)
+        begin, asked = flight.sample, len(flight.result.rejoins)
+        while len(flight.result.rejoins) == asked:
+            flight.fly(1)
+            assert flight.sample < begin + 60
+        found.append(flight.sample - begin)
+        flight.fly(12)
+    assert flight.result.wrong == 0
+    assert statistics.median(found) <= 12
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("faults", [Faults.both(0.01), Faults.both(0.05), BURSTS, Faults.both(0, 0.01)])
+def test_nothing_wrong_is_confirmed_in_long_flights(faults: Faults) -> None:
+    from tests.simulation.narrow_fast import fast_mirrored
+
+    fast, plain = fast_mirrored(LAYOUT, QUEUE, 14), mirrored(LAYOUT, QUEUE, 14)
+    one = other = plain.initial()
+    for word in [(1,), (-1,), (1,), None] * 50:
+        flown, symbols = plain.fly(one, word, announced(QUEUE))
+        again, same = fast.fly(other, word, announced(QUEUE))
+        assert (plain.pack(flown.state), symbols) == (fast.pack(again.state), same)
+        one, other = flown.state, again.state
+    samples = int(10_000 * float(os.environ.get("MINUTES", "10")))
+    flight = NarrowFlight(fast_mirrored(LAYOUT, QUEUE), announced(QUEUE), 1, faults)
+    result = flight.fly(samples)
+    assert result.wrong == 0
+    assert result.confirmed > 0.9 * samples

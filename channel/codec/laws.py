@@ -1,8 +1,8 @@
 """Laws from estimate to command, as functions of numbers: the PID loops (24), feedback of all states.
 
-Both keep to the codec's arithmetic, so that either end can run them: the receiver's controllers as they
-stand, studies compiled, and with a *mirrored* law (`channel.codec.downlink`) both ends, for it is part of
-the state machine that they share.
+Both keep to the codec's arithmetic, so that either end can run them: the receiver's controllers as
+they stand, studies compiled, and with a *mirrored* law (`channel.codec.downlink`) both ends, for it is
+part of the state machine that they share.
 """
 
 from __future__ import annotations

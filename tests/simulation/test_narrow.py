@@ -1,4 +1,4 @@
-"""Flights with a narrow downlink: nothing is confirmed that the receiver did not fly, whatever the line does."""
+"""Flights with a narrow downlink: nothing is confirmed that the receiver did not fly."""
 
 from __future__ import annotations
 

@@ -5,9 +5,9 @@ with K zero the command is held between symbols. A symbol says on which side of 
 
     v_j <- v_j + s M_j,    M_j <- g M_j  within  M_min ... M_max,
 
-g being `again` where the last three signs of v_j agree, `grow` where two do, `shrink` where they do not.
-The v_j take their turns in the order of `turns`. v_j may exceed what the limits let through: a controller
-that saturates keeps its input saturated. Clamp and slew limits come after all of this, at both ends alike.
+g being `again` where the last three signs of v_j agree, `grow` where two do, else `shrink`. The v_j
+take their turns in the order of `turns`. v_j may exceed what the limits let through, so that a controller
+which saturates keeps its input saturated. Clamp and slew limits come after this, at both ends alike.
 
 State: the turn, then for each direction v, M and the last two signs.
 """
@@ -72,13 +72,13 @@ class CodedCommands:
         missing = set(range(len(self.directions))) ^ set(self.turns)
         if not self.directions or missing:
             raise ValueError(
-                f"turns {self.turns} must name each of the {len(self.directions)} directions, and no other"
+                f"turns {self.turns} must name each of the {len(self.directions)} directions, no other"
             )
         for place, one in enumerate(self.directions):
             if not len(one.direction) == len(one.read) == len(base):
                 raise ValueError(
-                    f"direction {place} is for {len(one.direction)} input(s) and reads {len(one.read)}; "
-                    f"the plant has {len(base)}"
+                    f"direction {place} is for {len(one.direction)} input(s) and reads "
+                    f"{len(one.read)}; the plant has {len(base)}"
                 )
             rises = 0.0 < one.minimum_range <= one.initial_range <= one.maximum_range <= one.largest
             if not rises or one.largest >= STATE_MAX:

@@ -57,7 +57,7 @@ class MirroredLoop(NamedTuple):
 
 
 class MirroredPid:
-    """A `Law`: PID loops. Memory: each loop's integral, each loop's last output, whether there is one."""
+    """A `Law`: PID loops. Memory: each loop's integral, its last output, and whether there is one."""
 
     def __init__(
         self, loops: tuple[MirroredLoop, ...], command_max: Vector, bias: Vector, tick_s: float

@@ -1,8 +1,8 @@
 """Which symbols of a sample carry commands or set-points, and which carry hash bits.
 
-Down symbols are bits. Both ends must know what each one means, so its kind follows from shared state
-alone. While no word is being sent, every `command_period`-th sample begins with command symbols, and all
-others are hash symbols. Within a word every sample begins with command symbols, or, with one symbol a
+Down symbols are bits. Both ends must know what each one means, so its kind follows from shared
+state alone. While no word is being sent, every `command_period`-th sample begins with command
+symbols, and all others are hash symbols. Within a word every sample begins with command symbols, or, with one symbol a
 sample, every second one: the others have the hash symbol.
 """
 
@@ -62,7 +62,7 @@ class Layout:
         if needed > downlink_baud * (1.0 + 1e-9):
             raise ValueError(
                 f"{self.symbols_per_sample} down symbol(s) every {sample_ns / 1e9:g} s ask for "
-                f"{needed:g} symbols/s, but the line carries downlink_baud = {downlink_baud:g}; choose a "
-                f"layout of at most {int(downlink_baud * sample_ns / 1e9 + 1e-9)} symbol(s) a sample, "
+                f"{needed:g} symbols/s, but the line carries downlink_baud = {downlink_baud:g}; choose "
+                f"a layout of at most {int(1e-9 * downlink_baud * sample_ns + 1e-9)} a sample, "
                 "lengthen symbol_period_s or raise downlink_baud"
             )

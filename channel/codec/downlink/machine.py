@@ -5,12 +5,12 @@ the state of the command scheme. Its inputs are, for each sample, the up word th
 and the command symbols that it sent. The receiver's X is the truth; the transmitter finds out what X is
 (`transmitter.session.narrow`). One sample `k`:
 
-    1. hash symbols are read from the digest of X as it stands: its lowest bits, each of them inverted if
-       the word of sample `k` is erased
+    1. hash symbols are read from the digest of X as it stands: its lowest bits, each of them inverted
+       if the word of sample `k` is erased
     2. the codec consumes the word
     3. command symbols are consumed, and settle what is commanded
-    4. the codec flies its N ticks, and the commands of ticks kN + D ... (k+1)N + D - 1 are decided on the
-       model's prediction, as with every other downlink (`channel.codec.lead`)
+    4. the codec flies its N ticks, and the commands of ticks kN + D ... (k+1)N + D - 1 are decided on
+       the model's prediction, as with every other downlink (`channel.codec.lead`)
 
 The command symbols come first within a sample, and hash symbols after them.
 """
@@ -157,9 +157,9 @@ class TwoWay:
         consume: Callable[[int, Vector, Vector], Vector],
         ask: Wanted | None,
     ) -> TwoWaySample:
-        """Fly a sample; `consume` gives the scheme's state after its symbols, at the first tick decided.
+        """Fly a sample; `consume`, called at the first tick decided, takes the command symbols.
 
-        `ask` is a controller that wants to see every tick.
+        It returns the scheme's state after them. `ask` is a controller that wants to see every tick.
         """
         scheme, measured = self.scheme, self.codec.model.measured
         largest, slew = self._command_max, self._slew
@@ -193,8 +193,8 @@ class TwoWay:
         """Return the state with these canonical bytes; ValueError if they are not of this machine."""
         if len(data) != self._layout.size:
             raise ValueError(
-                f"a state of this flight has {self._layout.size} bytes, got {len(data)}; both ends need "
-                "the same downlink"
+                f"a state of this flight has {self._layout.size} bytes, got {len(data)}; both ends "
+                "need the same downlink"
             )
         sample, *values = self._layout.unpack(data)
         if sample < 0 or not all(math.isfinite(value) for value in values):

@@ -1,16 +1,16 @@
 """Mirrored law: the law is part of the shared state, and only set-points go down, as words.
 
-While nothing changes, command symbols are 0. A 1 announces a word. Its bits, most significant first, say
-how many samples ago the set-point changed (where not every sample has a command symbol, and the queue is
-long enough for it to matter), which of the steered outputs it is for (where there are several), and the
-set-point: each bit halves the range low ... high of its output, and leaves the middle as the set-point.
+While nothing changes, command symbols are 0. A 1 announces a word. Its bits, most significant first,
+say how many samples ago the set-point changed (where not every sample has a command symbol, and the
+queue is long enough for it to matter), which of the steered outputs it is for (where there are
+several), and the set-point: each bit halves the range low ... high of its output, and leaves the middle as the set-point.
 
 A set-point takes effect `queue` samples after it changed. A word that is complete by then acts at its
 exact time; one that is not acts with the bits that have come. Set-points that are known `queue` samples
 ahead are sent that much earlier, and so lose no time at all.
 
-State: set-points in force, set-points as decoded, the word (age, bits left, samples ago, output, middle,
-half width), the queue (oldest first, all outputs of a sample together), the law's memory.
+State: set-points in force, set-points as decoded, the word (age, bits left, samples ago, output,
+middle, half width), the queue (oldest first, all outputs of a sample together), the law's memory.
 """
 
 from __future__ import annotations
@@ -67,8 +67,8 @@ class MirroredLaw:
     ) -> None:
         if not 1 <= bits <= BITS_MAX or queue < 0 or not ranges:
             raise ValueError(
-                f"a set-point word has 1 to {BITS_MAX} bits, a queue of at least 0 samples and an output "
-                f"to steer; got {bits} bits, a queue of {queue} and {len(ranges)} output(s)"
+                f"a set-point word has 1 to {BITS_MAX} bits, a queue of at least 0 samples and an "
+                f"output to steer; got {bits} bits, a queue of {queue} and {len(ranges)} output(s)"
             )
         for one in ranges:
             if not -STATE_MAX < one.low <= one.start <= one.high < STATE_MAX or one.low == one.high:
@@ -117,8 +117,8 @@ class MirroredLaw:
         for one in self.ranges:
             if not one.low <= targets[one.output] <= one.high:
                 raise ValueError(
-                    f"the set-point {targets[one.output]:g} of output {one.output} is outside the range "
-                    f"of its words, {one.low:g} to {one.high:g}; widen the range or change the set-point"
+                    f"the set-point {targets[one.output]:g} of output {one.output} is outside the "
+                    f"range of its words, {one.low:g} to {one.high:g}; widen it or change the set-point"
                 )
 
     def initial(self) -> Vector:

@@ -1,14 +1,13 @@
-"""What the receiver consumed, found out from what comes down: weighted hypotheses, confirmed in the end.
+"""What the receiver consumed, found out from what comes down: weighted hypotheses, confirmed in time.
 
 The receiver's state X is the truth. Each hypothesis is a copy of X after the last sample heard of, with
-all its inputs since the last confirmed sample, and a weight. `heard` lets each of them branch: the word
-as sent, erased, or with one symbol changed; every command symbol as 0 or 1. Each branch is weighed with
-the chance of the down symbols that came: a hash bit that agrees, a command symbol that is the one taken.
+all its inputs since the last confirmed sample, and a weight. `heard` lets each of them branch, and
+weighs the branches by the down symbols that came (`branches`).
 
 What is not followed any further is not forgotten. Its weight is booked as *rest*, at the first sample
 where it leaves the likeliest path, and so is a little of every sample for what no branch explains. To
-the rest a hash bit is a coin, so one that agrees with the list halves it, relative to the list; a command
-symbol is to the rest what it is to the list. Hypotheses that have come to the same state are one from
+the rest a hash bit is a coin, so one that agrees with the list halves it, relative to the list; command
+symbols are as likely to it as to the list. Hypotheses that have come to the same state are one from
 there on, with the likelier history. A sample is confirmed when all that differs from the
 likeliest path in it or before it, list and rest, weighs less than `confirmed_below` of the list.
 """
@@ -22,6 +21,7 @@ from typing import NamedTuple
 
 from channel.codec.codec import ERASED, CodecState, Vector, Word
 from channel.codec.downlink.machine import TwoWay, TwoWaySample, TwoWayState
+from transmitter.session.narrow.branches import Branched, Branching
 from transmitter.session.narrow.paths import Node, Paths, Symbols
 from transmitter.session.narrow.priors import Priors
 
@@ -29,7 +29,6 @@ APPLIED_SHARE = 1.0 / 256.0
 """Of the list: what weighs less, all together, has no say in what is applied."""
 AHEAD_MAX = 4
 """Hypotheses that are carried ahead of what has been heard of."""
-Branch = tuple[float, Node, Word, Symbols]
 
 
 class RejoinReason(Enum):
@@ -85,8 +84,8 @@ class Confirmed(NamedTuple):
     lag_samples: int
     """samples heard of beyond this one"""
     doubt: float
-    """share of other inputs of this sample which led to the same state later, so that nothing that comes
-    can tell them apart; 0 with a codec that forgets nothing"""
+    """share of other inputs of this sample which led to the same state later, so that nothing can tell
+    them apart; 0 with a codec that forgets nothing"""
 
 
 class Hypotheses:
@@ -96,6 +95,7 @@ class Hypotheses:
         self.machine = machine
         self.settings = settings or Settings()
         self.priors = Priors()
+        self._branching = Branching(machine, self.priors, self.settings.dropped_below)
         self.rejoin: Rejoin | None = None
         """set when the list cannot go on; until `restart` it then stands still"""
         self.restart(machine.initial())
@@ -239,8 +239,7 @@ class Hypotheses:
         sent = self._unheard.popleft() if self._unheard else ERASED
         self._unconfirmed.append((sent, heard))
         self._ahead = None
-        branches, rest_factor, spilled = self._branches(sent, heard)
-        if not self._select(branches, rest_factor, spilled):
+        if not self._select(self._branching.of(self._members, sent, heard)):
             self.rejoin = Rejoin(RejoinReason.EMPTY, sample, self.rest, self._lag)
             return []
         done = self._confirm()
@@ -257,112 +256,9 @@ class Hypotheses:
     def _lag(self) -> int:
         return len(self._paths.path)
 
-    def _branches(
-        self, sent: Word, heard: Symbols
-    ) -> tuple[list[Branch], float, list[tuple[float, Node]]]:
-        """Return all branches worth following, what the rest is multiplied by, and what is left out."""
-        machine, flip = self.machine, self.priors.down_flipped
-        branches: list[Branch] = []
-        flips: list[tuple[float, Node, tuple[tuple[Symbols, float], ...]]] = []
-        spilled: list[tuple[float, Node]] = []
-        best = 0.0
-        predicted = 0.0
-        own = machine.commands_in(self._best[1].state)
-        for weight, node in self._members:
-            count = machine.commands_in(node.state)
-            options, chance = self._options(node.state, heard[:count])
-            asked = len([one for one in heard[:own] if one is not None])
-            predicted += weight * (chance if count == own else 0.5**asked)
-            came = [(place, one) for place, one in enumerate(heard[count:]) if one is not None]
-            likely = [1.0, 1.0]
-            if came:
-                digest = machine.digest(node.state)
-                for place, one in came:
-                    same = digest >> place & 1 == one
-                    likely[0] *= 1.0 - flip if same else flip
-                    likely[1] *= flip if same else 1.0 - flip
-            as_sent, erased, changed, other = self._chances(sent, node.word)
-            for symbols, share in options:
-                if as_sent > 0.0:
-                    branches.append((weight * as_sent * likely[0] * share, node, sent, symbols))
-                    best = max(best, branches[-1][0])
-                branches.append((weight * erased * likely[1] * share, node, ERASED, symbols))
-                best = max(best, branches[-1][0])
-            if changed > 0.0:
-                flips.append((weight * changed * likely[0], node, options))
-            if other > 0.0:
-                spilled.append((weight * other * likely[0] * chance, node))
-        self._add_flips(sent, flips, best * self.settings.dropped_below, branches, spilled)
-        hashes = len([one for one in heard[own:] if one is not None])
-        asked = len([one for one in heard[:own] if one is not None])
-        return branches, 0.5**hashes * max(0.5**asked, predicted), spilled
-
-    @property
-    def _best(self) -> tuple[float, Node]:
-        return max(self._members, key=lambda one: one[0])
-
-    def _chances(self, sent: Word, before: Word) -> tuple[float, float, float, float]:
-        """Return how likely a word comes as sent, erased, with one symbol changed, or otherwise.
-
-        One changed symbol: the chance of each word that differs in one. Otherwise, with several symbols:
-        more than one is changed, which no hypothesis follows.
-        """
-        if sent is ERASED:
-            return 0.0, 1.0, 0.0, 0.0
-        alphabet = self.machine.codec.coder.alphabet
-        erased, flip = self.priors.erased(before), self.priors.flipped
-        more = 0.5 * flip * flip * (len(sent) - 1) / len(sent)
-        others = len(sent) * (len(alphabet.symbols) - 1)
-        arrived = 1.0 - erased
-        return arrived * (1.0 - flip), erased, arrived * (flip - more) / others, arrived * more
-
-    def _options(
-        self, state: TwoWayState, heard: Symbols
-    ) -> tuple[tuple[tuple[Symbols, float], ...], float]:
-        """Return all command symbols of a sample with their chances, given what came, and their sum."""
-        scheme, flip, news = self.machine.scheme, self.priors.down_flipped, self.priors.news
-        found: list[tuple[Symbols, float, Vector]] = [((), 1.0, state.down)]
-        for place, came in enumerate(heard):
-            longer = []
-            for symbols, chance, down in found:
-                one = news if scheme.is_idle(down) else 0.5
-                for symbol in (0, 1):
-                    share = chance * (one if symbol else 1.0 - one)
-                    if came is not None:
-                        share *= 1.0 - flip if symbol == came else flip
-                    after = scheme.take(down, symbol) if place + 1 < len(heard) else down
-                    longer.append(((*symbols, symbol), share, after))
-            found = longer
-        return tuple([(symbols, share) for symbols, share, _ in found]), sum(one[1] for one in found)
-
-    def _add_flips(
-        self,
-        sent: Word,
-        flips: Sequence[tuple[float, Node, tuple[tuple[Symbols, float], ...]]],
-        least: float,
-        branches: list[Branch],
-        spilled: list[tuple[float, Node]],
-    ) -> None:
-        """Add the words that differ from the one sent in one symbol, where they weigh enough."""
-        if sent is ERASED:
-            return
-        alphabet = self.machine.codec.coder.alphabet.symbols
-        count = len(sent) * (len(alphabet) - 1)
-        for weight, node, options in flips:
-            for symbols, share in options:
-                if weight * share < least:
-                    spilled.append((count * weight * share, node))
-                    continue
-                for place in range(len(sent)):
-                    for symbol in alphabet:
-                        if symbol != sent[place]:
-                            word = (*sent[:place], symbol, *sent[place + 1 :])
-                            branches.append((weight * share, node, word, symbols))
-
-    def _select(
-        self, branches: list[Branch], rest_factor: float, spilled: Sequence[tuple[float, Node]]
-    ) -> bool:
+    def _select(self, branched: Branched) -> bool:
         """Follow the branches that weigh enough, book the others; return whether there is one."""
+        branches, rest_factor, spilled = branched
         branches.sort(key=lambda one: -one[0])
         least = branches[0][0] * self.settings.dropped_below
         members: dict[TwoWayState, tuple[float, Node]] = {}

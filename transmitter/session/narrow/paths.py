@@ -64,6 +64,10 @@ class Node:
                 self.children[key] = Node(self, self.sample + 1, word, symbols, flown.state, flown)
         return self.children[key]
 
+    def forget(self) -> None:
+        """Let go of the samples before it."""
+        self.parent = None
+
     def doubt(self, other: Node, share: float) -> None:
         """Note a history of this share that differs from this node's own, and has come to its state."""
         one: Node | None = self
@@ -77,8 +81,8 @@ class Node:
 class Paths:
     """The likeliest path from the last confirmed sample on, and the rest beside it.
 
-    `rest[i]`: weight of what is no longer followed and leaves the path at sample `first + i`; `old_rest`:
-    of what left it before. Weights are in units of the list's.
+    `rest[i]`: weight of what is no longer followed and leaves the path at sample `first + i`;
+    `old_rest`: of what left it before. Weights are in units of the list's.
     """
 
     def __init__(self, root: Node) -> None:
@@ -150,7 +154,7 @@ class Paths:
         """Make the first `count` samples of the path certain; return them."""
         done = self.path[:count]
         self.root = done[-1]
-        self.root.parent = None
+        self.root.forget()
         self.path = self.path[count:]
         for weight in self.rest[:count]:
             self.old_rest += weight

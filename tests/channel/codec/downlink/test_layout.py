@@ -37,5 +37,7 @@ def test_a_layout_without_hash_or_command_symbols_is_refused(numbers: tuple[int,
 
 def test_a_line_too_slow_for_a_layout_is_refused_with_the_numbers() -> None:
     Layout(2).check_rate(20.0, 100_000_000)
-    with pytest.raises(ValueError, match=r"ask for 20 symbols/s.*downlink_baud = 19.*at most 1 symbol"):
+    with pytest.raises(
+        ValueError, match=r"ask for 20 symbols/s.*downlink_baud = 19.*at most 1 a sample"
+    ):
         Layout(2).check_rate(19.0, 100_000_000)

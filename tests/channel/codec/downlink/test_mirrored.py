@@ -87,7 +87,7 @@ def test_a_set_point_is_frozen_while_its_word_is_sent() -> None:
 def test_a_set_point_outside_the_range_of_its_words_is_refused_with_the_numbers() -> None:
     scheme = MirroredLaw(LAW, ONE, 2, 9, 12, Layout(2))
     scheme.check_set_points((-2.0, 99.0))
-    with pytest.raises(ValueError, match="2.1 of output 0 is outside .* -2 to 2"):
+    with pytest.raises(ValueError, match=r"2\.1 of output 0 is outside .* -2 to 2"):
         scheme.check_set_points((2.1, 0.0))
 
 

@@ -1,8 +1,9 @@
 """Both ends of a flight with a narrow downlink, without sessions: the state machine and its hypotheses.
 
 The plant is the pitch axis, `mismatch` off from the model, pushed by white torque. Each kind of
-chance has a separate stream, so that flights of one seed, whatever their downlink, have the same pushes
-and uplink faults. `full` is the same flight with today's downlink, whose commands and echoes are exact.
+chance has a separate stream, so that flights of one seed, whatever their downlink, have the same
+pushes and uplink faults. `full` is the same flight with today's downlink, whose commands and echoes
+are exact.
 """
 
 from __future__ import annotations

@@ -1,13 +1,15 @@
 """Coded commands: what any controller wants goes down as measurements go up, one bit on the deviation.
 
-A command is `base + sum_j direction_j w_j`, and `w_j = v_j - K_j x` with the shared, predicted state x;
-with K zero the command is held between symbols. A symbol says on which side of v_j what is wanted lies:
+A command is `base + sum_j direction_j w_j`, and `w_j = v_j - K_j x` with the shared, predicted state
+x; with K zero the command is held between symbols. A symbol says on which side of v_j what is wanted
+lies:
 
     v_j <- v_j + s M_j,    M_j <- g M_j  within  M_min ... M_max,
 
 g being `again` where the last three signs of v_j agree, `grow` where two do, else `shrink`. The v_j
-take their turns in the order of `turns`. v_j may exceed what the limits let through, so that a controller
-which saturates keeps its input saturated. Clamp and slew limits come after this, at both ends alike.
+take their turns in the order of `turns`. v_j may exceed what the limits let through, so that a
+controller which saturates keeps its input saturated. Clamp and slew limits come after this, at both
+ends alike.
 
 State: the turn, then for each direction v, M and the last two signs.
 """

@@ -1,9 +1,9 @@
 """Which symbols of a sample carry commands or set-points, and which carry hash bits.
 
-Down symbols are bits. Both ends must know what each one means, so its kind follows from shared
-state alone. While no word is being sent, every `command_period`-th sample begins with command
-symbols, and all others are hash symbols. Within a word every sample begins with command symbols, or, with one symbol a
-sample, every second one: the others have the hash symbol.
+Down symbols are bits. Both ends must know what each one means, so its kind follows from shared state
+alone. While no word is being sent, every `command_period`-th sample begins with command symbols, and
+all others are hash symbols. Within a word every sample begins with command symbols, or, with one
+symbol a sample, every second one: the others have the hash symbol.
 """
 
 from __future__ import annotations

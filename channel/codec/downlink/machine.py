@@ -1,9 +1,9 @@
 """The two-way state machine: the codec, and with it all that follows from what went down.
 
-Its state X is the codec's state, the commands that are decided and not yet flown, the last command, and
-the state of the command scheme. Its inputs are, for each sample, the up word that the receiver consumed
-and the command symbols that it sent. The receiver's X is the truth; the transmitter finds out what X is
-(`transmitter.session.narrow`). One sample `k`:
+Its state X is the codec's state, the commands that are decided and not yet flown, the last command,
+and the state of the command scheme. Its inputs are, for each sample, the up word that the receiver
+consumed and the command symbols that it sent. The receiver's X is the truth; the transmitter finds
+out what X is (`transmitter.session.narrow`). One sample `k`:
 
     1. hash symbols are read from the digest of X as it stands: its lowest bits, each of them inverted
        if the word of sample `k` is erased

@@ -3,11 +3,12 @@
 While nothing changes, command symbols are 0. A 1 announces a word. Its bits, most significant first,
 say how many samples ago the set-point changed (where not every sample has a command symbol, and the
 queue is long enough for it to matter), which of the steered outputs it is for (where there are
-several), and the set-point: each bit halves the range low ... high of its output, and leaves the middle as the set-point.
+several), and the set-point: each bit halves the range low ... high of its output, and leaves the
+middle as the set-point.
 
 A set-point takes effect `queue` samples after it changed. A word that is complete by then acts at its
-exact time; one that is not acts with the bits that have come. Set-points that are known `queue` samples
-ahead are sent that much earlier, and so lose no time at all.
+exact time; one that is not acts with the bits that have come. Set-points that are known `queue`
+samples ahead are sent that much earlier, and so lose no time at all.
 
 State: set-points in force, set-points as decoded, the word (age, bits left, samples ago, output,
 middle, half width), the queue (oldest first, all outputs of a sample together), the law's memory.

@@ -1,9 +1,9 @@
 """How hypotheses branch in a sample, and what the down symbols that came say of each branch.
 
-A word comes as it was sent, erased, or with one of its symbols changed into another: one branch for each.
-Words with more than one changed symbol are not followed; their weight goes to the rest. Command
-symbols branch into 0 and 1, weighed by what came; hash symbols need no branch, for they follow from the
-state before the word, and from whether the word is erased.
+A word comes as it was sent, erased, or with one of its symbols changed into another: one branch for
+each. Words with more than one changed symbol are not followed; their weight goes to the rest. Command
+symbols branch into 0 and 1, weighed by what came; hash symbols need no branch, for they follow from
+the state before the word, and from whether the word is erased.
 """
 
 from __future__ import annotations

@@ -1,14 +1,14 @@
 """What the receiver consumed, found out from what comes down: weighted hypotheses, confirmed in time.
 
-The receiver's state X is the truth. Each hypothesis is a copy of X after the last sample heard of, with
-all its inputs since the last confirmed sample, and a weight. `heard` lets each of them branch, and
-weighs the branches by the down symbols that came (`branches`).
+The receiver's state X is the truth. Each hypothesis is a copy of X after the last sample heard of,
+with all its inputs since the last confirmed sample, and a weight. `heard` lets each of them branch,
+and weighs the branches by the down symbols that came (`branches`).
 
 What is not followed any further is not forgotten. Its weight is booked as *rest*, at the first sample
 where it leaves the likeliest path, and so is a little of every sample for what no branch explains. To
-the rest a hash bit is a coin, so one that agrees with the list halves it, relative to the list; command
-symbols are as likely to it as to the list. Hypotheses that have come to the same state are one from
-there on, with the likelier history. A sample is confirmed when all that differs from the
+the rest a hash bit is a coin, so one that agrees with the list halves it, relative to the list;
+command symbols are as likely to it as to the list. Hypotheses that have come to the same state are
+one from there on, with the likelier history. A sample is confirmed when all that differs from the
 likeliest path in it or before it, list and rest, weighs less than `confirmed_below` of the list.
 """
 

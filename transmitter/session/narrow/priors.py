@@ -1,7 +1,7 @@
 """How likely each fault of the line is: assumed at first, then learned from confirmed samples.
 
-Each is a share of recent cases, the last 500 or so, and never so small that one surprise says nothing.
-Erasures come in bursts on many lines, so an erasure after an erasure has a share of its own.
+Each is a share of recent cases, the last 500 or so, and never so small that one surprise says
+nothing. Erasures come in bursts on many lines, so an erasure after an erasure has a share of its own.
 """
 
 from __future__ import annotations

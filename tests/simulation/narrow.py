@@ -236,7 +236,7 @@ class NarrowFlight:
         waiting = hypotheses.rejoin is not None
         word: Word = ERASED
         if not waiting:
-            word = machine.codec.encode(hypotheses.state_before_next(), self.plant.state[:1])
+            word = hypotheses.encode(self.plant.state[:1])
             hypotheses.sent(word)
         alphabet = machine.codec.coder.alphabet
         came = self._up.carry_word(word or alphabet.symbols[:1] * alphabet.symbols_per_word, alphabet)

@@ -102,7 +102,9 @@ class FastTwoWay(TwoWay):
         after = self.codec.close(state.codec, opened, closed)
         law = (*memory.tolist(), 0.0, 1.0)
         down = down[: -self._law_size] + law
-        return TwoWaySample(TwoWayState(after, following, decided[-1], down), decided, [], [])
+        return TwoWaySample(
+            TwoWayState(after, following, decided[-1], down, self._owed(state, word)), decided, [], []
+        )
 
 
 def fast_mirrored(layout: Layout, queue: int, lead_ticks: int = 0, bits: int = 9) -> FastTwoWay:

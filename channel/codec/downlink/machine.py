@@ -12,7 +12,9 @@ out what X is (`transmitter.session.narrow`). One sample `k`:
     4. the codec flies its N ticks, and the commands of ticks kN + D ... (k+1)N + D - 1 are decided on
        the model's prediction, as with every other downlink (`channel.codec.lead`)
 
-The command symbols come first within a sample, and hash symbols after them.
+The command symbols come first within a sample, and hash symbols after them. A sample without a hash
+symbol owes one: the next one that is sent is then the bit of the first state that owes it, inverted
+once for each word that was erased since, so that no erasure stays unseen by the next hash symbol.
 """
 
 from __future__ import annotations
@@ -32,6 +34,9 @@ Wanted = Callable[[int, Vector], Vector]
 """(tick, predicted model state) -> what is wanted there: a command, or set-points."""
 
 
+NONE_OWED = -1.0
+
+
 class TwoWayState(NamedTuple):
     """X between two samples."""
 
@@ -42,6 +47,8 @@ class TwoWayState(NamedTuple):
     """the last command decided"""
     down: Vector
     """of the command scheme"""
+    owed: float = NONE_OWED
+    """the hash bit of samples without a hash symbol, 0 or 1, which the next one carries"""
 
     @property
     def sample(self) -> int:
@@ -97,7 +104,7 @@ class TwoWay:
         first = self.initial()
         self._sizes = (len(first.codec.model), len(first.codec.coder), inputs, len(first.down))
         floats = len(first.codec.model) + len(first.codec.coder) + len(first.down)
-        self._layout = struct.Struct(f"<q{floats + inputs * (lead_ticks + 1)}d")
+        self._layout = struct.Struct(f"<q{floats + inputs * (lead_ticks + 1) + 1}d")
 
     def initial(self) -> TwoWayState:
         """Return the common state before sample 0."""
@@ -109,10 +116,17 @@ class TwoWay:
         """Return how many of the next sample's symbols are command symbols."""
         return self.layout.commands_in(state.codec.sample, self.scheme.word_age(state.down))
 
-    def hash_bits(self, digest: int, count: int, word: Word) -> tuple[int, ...]:
-        """Return a sample's hash symbols, of the digest of the state before it and of its word."""
+    def hashed(self, state: TwoWayState, digest: int) -> int:
+        """Return the bits that the next sample's hash symbols say, the first one lowest."""
+        if state.owed == NONE_OWED:
+            return digest
+        return digest >> 1 << 1 | int(state.owed)
+
+    def hash_symbols(self, state: TwoWayState, digest: int, count: int, word: Word) -> tuple[int, ...]:
+        """Return a sample's hash symbols, of the state before it, with its digest, and of its word."""
         erased = 1 if word is ERASED else 0
-        return tuple([digest >> place & 1 ^ erased for place in range(count)])
+        bits = self.hashed(state, digest)
+        return tuple([bits >> place & 1 ^ erased for place in range(count)])
 
     def fly(
         self, state: TwoWayState, word: Word, wanted: Wanted
@@ -137,7 +151,8 @@ class TwoWay:
 
         flown = self._flown(state, word, chosen, wanted if scheme.asks_every_tick else None)
         hashes = self.layout.symbols_per_sample - count
-        return flown, (*sent, *self.hash_bits(self.digest(state), hashes, word))
+        digest = self.digest(state) if hashes else 0
+        return flown, (*sent, *self.hash_symbols(state, digest, hashes, word))
 
     def step(self, state: TwoWayState, word: Word, symbols: Sequence[int | None]) -> TwoWaySample:
         """Fly a sample with these command symbols; None: not known, so predict without it."""
@@ -179,12 +194,18 @@ class TwoWay:
 
         flown = fly_sample(self.codec, state.codec, word, state.commands, decide)
         known = (*state.commands, *flown.commands)[self.codec.ticks_per_sample :]
-        after = TwoWayState(flown.state, known, hold, down)
+        after = TwoWayState(flown.state, known, hold, down, self._owed(state, word))
         return TwoWaySample(after, flown.commands, flown.live, flown.coded)
+
+    def _owed(self, state: TwoWayState, word: Word) -> float:
+        """Return the hash bit that is owed after a sample."""
+        if self.commands_in(state) < self.layout.symbols_per_sample:
+            return NONE_OWED
+        return float(self.hash_symbols(state, self.digest(state), 1, word)[0])
 
     def pack(self, state: TwoWayState) -> bytes:
         """Return the canonical bytes of a state, little-endian, no minus zero."""
-        values = [*state.codec.model, *state.codec.coder, *state.down, *state.hold]
+        values = [*state.codec.model, *state.codec.coder, *state.down, state.owed, *state.hold]
         for command in state.commands:
             values += command
         return self._layout.pack(state.codec.sample, *[value + 0.0 for value in values])
@@ -201,13 +222,14 @@ class TwoWay:
             raise ValueError("the state has a negative index or a value that is not finite")
         model, coder, inputs, down = self._sizes
         parts, at = [], 0
-        for size in (model, coder, down, *[inputs] * (self.lead_ticks + 1)):
+        for size in (model, coder, down, 1, *[inputs] * (self.lead_ticks + 1)):
             parts.append(tuple(values[at : at + size]))
             at += size
         codec = CodecState(sample, parts[0], parts[1])
-        if not is_coder_state(self.codec.coder, codec.coder) or not self.scheme.is_state(parts[2]):
+        possible = is_coder_state(self.codec.coder, codec.coder) and self.scheme.is_state(parts[2])
+        if not possible or parts[3] not in ((NONE_OWED,), (0.0,), (1.0,)):
             raise ValueError("the state is none that this coder and command scheme can be in")
-        return TwoWayState(codec, tuple(parts[4:]), parts[3], parts[2])
+        return TwoWayState(codec, tuple(parts[5:]), parts[4], parts[2], parts[3][0])
 
     def digest(self, state: TwoWayState) -> int:
         """Return the 64-bit digest of a state."""

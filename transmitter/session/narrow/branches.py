@@ -96,10 +96,11 @@ class Branching:
         """Return how likely these hash symbols come down with a word that is whole, and with none."""
         whole = erased = 1.0
         if any(one is not None for one in heard):
-            flip, digest = self._priors.down_flipped, self._machine.digest(state)
+            flip = self._priors.down_flipped
+            bits = self._machine.hashed(state, self._machine.digest(state))
             for place, one in enumerate(heard):
                 if one is not None:
-                    same = digest >> place & 1 == one
+                    same = bits >> place & 1 == one
                     whole *= 1.0 - flip if same else flip
                     erased *= flip if same else 1.0 - flip
         return whole, erased

@@ -153,8 +153,28 @@ class Hypotheses:
         self._ahead = None
 
     def state_before_next(self) -> CodecState:
-        """Return the likeliest codec state before `next_sample`: what its word is formed on."""
+        """Return the likeliest codec state before `next_sample`."""
         return self._carried()[0][1].state.codec
+
+    def encode(self, measurement: Vector) -> tuple[int, ...]:
+        """Return the word of `next_sample` for a measurement at its first tick.
+
+        Where the hypotheses ask for different words, it is the one that leaves the smallest mean square
+        between measurement and prediction, over all of them.
+        """
+        codec = self.machine.codec
+        states = [(weight, node.state.codec) for weight, node in self._carried()]
+        words = [codec.encode(state, measurement) for _, state in states]
+        best, least = words[0], None
+        for word in dict.fromkeys(words) if len(set(words)) > 1 else ():
+            square = 0.0
+            for weight, state in states:
+                corrected = state._replace(model=codec.open(state, word).model)
+                for one, other in zip(measurement, codec.predicted(corrected), strict=True):
+                    square += weight * (one - other) * (one - other)
+            if least is None or square < least:
+                best, least = word, square
+        return best
 
     def command(self, tick: int) -> Vector:
         """Return the command to apply at a tick: the weighted mean of what the hypotheses command.
@@ -333,7 +353,7 @@ class Hypotheses:
         sent, heard = self._unconfirmed.popleft()
         digest = machine.digest(before)
         commands = tuple([1 if one else 0 for one in node.symbols])
-        hashes = machine.hash_bits(digest, len(heard) - len(commands), node.word)
+        hashes = machine.hash_symbols(before, digest, len(heard) - len(commands), node.word)
         symbols = commands + hashes
         self.priors.learn(sent, node.word, word_before)
         self.priors.learn_symbols(symbols, heard)

@@ -93,6 +93,24 @@ def test_hash_symbols_are_bits_of_the_digest_before_the_word_inverted_by_an_eras
         state = flown.state
 
 
+def test_a_hash_symbol_shows_every_erasure_since_the_one_before_it() -> None:
+    two_way = machine(CodedCommands((0.0, 0.0), held_inputs(LIMITS)), Layout(1, 1, 3), 5)
+    state, sent, due = two_way.initial(), 0, 0
+    for sample, word in enumerate(words(90)):
+        digest = two_way.digest(state)
+        flown, symbols = two_way.fly(state, word, wanted)
+        erased = 1 if word is ERASED else 0
+        if sample % 3 == 0:
+            due = digest & 1 ^ erased
+        elif sample % 3 == 1:
+            assert symbols == (due ^ erased,)
+        else:
+            assert symbols == (digest & 1 ^ erased,)
+            sent += erased
+        state = flown.state
+    assert sent > 3
+
+
 def test_the_codec_flies_as_it_does_with_the_same_commands_on_any_downlink() -> None:
     two_way = machine(mirrored_law(Layout(2)), Layout(2), 7)
     state = two_way.initial()

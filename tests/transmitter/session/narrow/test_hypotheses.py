@@ -118,6 +118,23 @@ class ThreeByTwo:
         return coder
 
 
+def test_where_hypotheses_ask_for_different_words_the_likely_and_large_error_decides() -> None:
+    machine = mirrored(Layout(2), 12)
+    hypotheses = Hypotheses(machine)
+    hypotheses.sent((1,))
+    hypotheses.heard(0, (0, None))
+    angles = sorted(state.codec.model[0] for weight, state in hypotheses.members() if weight > 0.004)
+    assert len(angles) == 3
+    likeliest = hypotheses.state_before_next().model[0]
+    assert likeliest == angles[-1]
+    assert hypotheses.encode((angles[-1] + 1e-3,)) == (1,)
+    assert hypotheses.encode((angles[-1] - 5e-3,)) == (-1,)
+    assert hypotheses.encode((angles[0] - 1e-3,)) == (-1,)
+    near = angles[-1] - 1e-6
+    assert machine.codec.encode(hypotheses.state_before_next(), (near,)) == (-1,)
+    assert hypotheses.encode((near,)) == (1,)
+
+
 def test_a_word_of_several_symbols_branches_into_one_changed_symbol_and_the_rest() -> None:
     base = mirrored(Layout(3), 12)
     codec = Codec(base.codec.model, ThreeByTwo(), 10)

@@ -68,6 +68,8 @@ class Served:
     look_url: str = ""
     """with the secret of who may only look"""
     folder: Path = Path()
+    alone: bool = False
+    """whether one address is printed: of a replay, or with --view-only"""
     said: list[str] = field(default_factory=list)
     _up: threading.Event = field(default_factory=threading.Event)
 
@@ -80,7 +82,7 @@ class Served:
                 self.url = line.split()[-1]
             if line.startswith(LOOK_ONLY):
                 self.look_url = line.split()[-1]
-            if self.url and (self.look_url or "--view-only" in self.process.args):
+            if self.url and (self.look_url or self.alone):
                 self._up.set()
 
     @property
@@ -110,15 +112,21 @@ class Served:
 
 @contextmanager
 def served(
-    folder: Path, *arguments: str, environment: dict[str, str] | None = None
+    folder: Path,
+    *arguments: str,
+    environment: dict[str, str] | None = None,
+    program: tuple[str, ...] = ("-m", "tenbaud"),
 ) -> Iterator[Served]:
-    """Within the `with`, `tenbaud` with these arguments serves a page; they name a port of 0."""
+    """Within the `with`, `tenbaud` with these arguments serves a page; they name a port of 0.
+
+    `program`: other words for the interpreter.
+    """
     top = Path(__file__).parents[1]
     path = os.pathsep.join([str(top), os.environ.get("PYTHONPATH", "")])
     # NiceGUI behaves differently in a process that it takes for a test.
     own = {name: value for name, value in os.environ.items() if name != "PYTEST_CURRENT_TEST"}
     process = subprocess.Popen(
-        [sys.executable, "-m", "tenbaud", *arguments],
+        [sys.executable, *program, *arguments],
         cwd=folder,
         env={**own, "PYTHONPATH": path, **(environment or {})},
         stdin=subprocess.DEVNULL,
@@ -126,7 +134,8 @@ def served(
         stderr=subprocess.PIPE,
         text=True,
     )
-    one = Served(process, folder=folder)
+    alone = "--view-only" in arguments or (arguments[0] == "view" and not arguments[1].startswith("-"))
+    one = Served(process, folder=folder, alone=alone)
     threading.Thread(target=one.read, daemon=True).start()
     try:
         one.wait_until_up()

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 
 class TenbaudError(Exception):
-    """Root of the errors that a user can meet; the text says what happened and what to do next."""
+    """Root of the errors shown to a user; the text gives the cause and the next step."""
 
 
 class ConfigMismatch(TenbaudError):

@@ -26,7 +26,7 @@ class FlightLog:
     start_s: float = 0.0
     """the file's clock at row 0"""
     notes: tuple[str, ...] = ()
-    """what was done to the file, for people"""
+    """changes made to the file, for people"""
     steps: tuple[float, ...] = ()
     """of each output, how far its values lie apart; 0: as fine as numbers are"""
 

@@ -1,4 +1,4 @@
-"""Names to objects: what this project has built in, and what installed packages offer by entry points.
+"""Names to objects: the built-in ones, and those that installed packages offer by entry points.
 
 A registry is a table of `name: "module:object"`; nothing is imported before it is asked for. A package
 adds to it without a change here, in its own `pyproject.toml`:
@@ -53,7 +53,7 @@ class Registry:
         return name
 
     def hint(self, name: str) -> str:
-        """Return what else a name that nobody offers might be."""
+        """Return similar names for an unknown one."""
         names = self.names()
         near = difflib.get_close_matches(name, names, 1)
         known = f"known are {', '.join(names)}" + (" and module:Class" if self.classes else "")
@@ -81,7 +81,7 @@ class Registry:
             ) from error
 
     def offered_by(self, name: str) -> str:
-        """Return who offers a name, as what. Imports nothing."""
+        """Return the packages that offer a name, and as what. Imports nothing."""
         offers = self._offered().get(name, [])
         return " and ".join(f"{_owner(offer)} offers as {offer.value}" for offer in offers)
 

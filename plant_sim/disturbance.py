@@ -1,4 +1,4 @@
-"""Torque disturbances: what pushes the plant beside its motors.
+"""Torque disturbances: torques on the plant beside its motors.
 
 A torque here is already divided by the inertia: an angular acceleration in rad/s^2, held for one
 plant step. Every disturbance is a pure function of the step index, so steps may be asked for again.
@@ -49,7 +49,7 @@ class PlannedDisturbance(Disturbance, Protocol):
 
 
 def pushes_of(disturbances: Sequence[Disturbance | None], steps: int) -> Pushes:
-    """Return what pushes a plant in the first steps, a column per place; one row for nothing."""
+    """Return the disturbance of the first steps, a column per place; one row without any."""
     planned = [one.torques(steps) for one in disturbances if isinstance(one, PlannedDisturbance)]
     return np.column_stack(planned) if planned else np.zeros((1, len(disturbances)))
 

@@ -1,4 +1,4 @@
-"""How an output is read: by an incremental encoder, in whole counts, or exactly."""
+"""The reading of an output: by an incremental encoder, in whole counts, or exactly."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ EXACT_PER_UNIT: Final = 2.0**40
 
 
 class OutputReader(Protocol):
-    """What reads one output of a plant."""
+    """The reader of one output of a plant."""
 
     def counts(self, angle_rad: float, /) -> int:
         """Return the count of a value; ValueError when it is not finite."""

@@ -125,7 +125,7 @@ class SimulatedLinear:
 
 
 def _stepped(model: Mapping[str, Any], context: PlantContext) -> tuple[Matrix, ...]:
-    """Return F, E and what a held disturbance adds in a step."""
+    """Return F, E and the effect of a held disturbance in a step."""
     step_s, off = context.step_s, context.mismatch
     names = "AB" if model.get("A") else "FE"
     a = _matrix(names[0], model[names[0]], None, len(model[names[0]]))

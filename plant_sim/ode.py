@@ -1,4 +1,4 @@
-"""Plants of ordinary differential equations, and what they have in common.
+"""Plants of ordinary differential equations, and their common parts.
 
 Commands are clamped, motors lag, every place that is disturbed has its own torque, and the state takes
 classical Runge-Kutta steps of order 4. A plant adds its equations: a pure function over numbers by

@@ -72,7 +72,7 @@ class PitchParameters:
 
 
 def pitch_constants(parameters: PitchParameters, step_s: float) -> PitchConstants:
-    """Precompute what `pitch_step` needs for steps of `step_s` seconds (finite, above 0).
+    """Precompute the constants of `pitch_step` for steps of `step_s` seconds (finite, above 0).
 
     In order: a_w, a_th, k_v, theta_0, largest voltage, step, and the share of a motor's lag that
     is left after half a step and after a whole one.

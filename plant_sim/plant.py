@@ -13,28 +13,28 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class PlantContext:
-    """The context that a plant from outside gets when it is built."""
+    """The context that an external plant gets when it is built."""
 
     step_s: float
-    """what one call of `advance` simulates"""
+    """time that one call of `advance` simulates"""
     seed: int
-    """of everything random"""
+    """of all random numbers"""
     command_max: tuple[float, ...]
     """where each input is clamped"""
     mismatch: float | tuple[float, ...]
-    """fraction by which the plant is to be off the codec's model"""
+    """fraction by which the plant differs from the codec's model"""
     disturbance: Disturbance | None
     """configured torque: `disturbance.torque(step)`, rad/s^2"""
     initial: tuple[float, ...] = ()
     """value of each output at the start, as far as it is configured"""
     model: Mapping[str, Any] = field(default_factory=dict)
-    """the settings of the codec's model, which the plant is to be near"""
+    """the settings of the codec's model, which the plant resembles"""
     sine: Callable[[float], float] = math.sin
     """how a sine is taken: with the codec's own a simulated flight is the same on every machine"""
     inputs: tuple[str, ...] = ()
     """names of the model's inputs, in the order of a command"""
     outputs: tuple[str, ...] = ()
-    """names of the model's outputs, which are what the plant has"""
+    """names of the model's outputs, which are the plant's"""
     disturbance_text: str = ""
     """configured disturbance, for a plant that is disturbed in several places"""
 
@@ -59,7 +59,7 @@ class PlantContext:
 class Plant(Protocol):
     """A plant advanced in fixed steps of a held command.
 
-    A plant knows nothing of encoders, symbols or the network: it takes commands and has true outputs.
+    A plant is independent of encoders, symbols and network: it takes commands and has true outputs.
     The length of one step is fixed when the plant is built, because lags and integration constants
     are computed once for it.
     """

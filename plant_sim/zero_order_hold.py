@@ -1,4 +1,4 @@
-"""A linear plant between two ticks: what it does under a held command, and the way back.
+"""A linear plant between two ticks: its discretisation under a held command, and the inverse.
 
 dx/dt = A x + B u   and   x[n+1] = F x[n] + E u[n]
 """

@@ -23,7 +23,7 @@ REFUSAL_LINGER_S = 1.0
 class ReceiverEndpoint:
     """A session with its way in and its way out. Times are of one monotonic clock.
 
-    `clock` is what this end takes for the time, where it is a bad one on purpose.
+    `clock` is this end's clock, if it is a bad one on purpose.
     """
 
     def __init__(

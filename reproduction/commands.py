@@ -46,10 +46,10 @@ def figures(
     ] = False,
     out: Out = None,
 ) -> None:
-    """Fly and draw the paper's Figs. 3 to 8; with all of them, write the page that compares.
+    """Fly and draw the paper's Figs. 3 to 8; with all of them, write the page that compares them.
 
-    cliff: flights near the smallest rate of a pendulum and a rotary pendulum. What it has flown into a
-    folder is not flown there again.
+    cliff: flights near the smallest rate of a pendulum and a rotary pendulum. It flies only
+    flights that are missing in the folder.
 
     [dim]tenbaud figures 7[/dim]
 

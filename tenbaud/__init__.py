@@ -33,7 +33,8 @@ Flights
 Configured flights and their recordings
     identify            a model, and a configuration that flies it, from a log or arrays
     fly                 flies a preset, a configuration or objects; leaves a run folder
-    Run                 reads a run: its signals as numpy arrays on one time base
+    Run                 reads a run: its signals as numpy arrays on one time base, its figures
+    compare             the figures of several runs side by side, and their curves
     Preset              the parts of a preset, from load_preset
     load_preset         a preset as objects
     preset_names        the presets that there are
@@ -61,6 +62,7 @@ if TYPE_CHECKING:
     from tenbaud.identification.api import identify
     from tenbaud.recording.memory import MemoryRecorder
     from tenbaud.recording.run import Run
+    from tenbaud.recording.side_by_side import compare
     from transmitter.session.session import TransmitterSession
 
 __all__ = [
@@ -74,6 +76,7 @@ __all__ = [
     "Terms",
     "TransmitterSession",
     "coders",
+    "compare",
     "controllers",
     "errors",
     "fly",
@@ -94,6 +97,7 @@ _HOMES = {
     "Run": "tenbaud.recording.run",
     "Terms": "channel.protocol.terms",
     "TransmitterSession": "transmitter.session.session",
+    "compare": "tenbaud.recording.side_by_side",
     "fly": "tenbaud.flight.fly",
     "identify": "tenbaud.identification.api",
     "load_preset": "tenbaud.build.preset",

@@ -1,4 +1,4 @@
-"""Lets `python -m tenbaud` do what `tenbaud` does."""
+"""Makes `python -m tenbaud` equal to `tenbaud`."""
 
 from __future__ import annotations
 

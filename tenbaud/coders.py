@@ -1,4 +1,4 @@
-"""Coders: which word a measurement asks for, and what a word means at both ends.
+"""Coders: the word for a measurement, and the meaning of a word at both ends.
 
 Each is built from its parameters, `coders.ZoomCoder(coders.ZoomParameters(window=3))`, and plugs into a
 `Codec`. A coder of your own is a class that fulfils the protocol `Coder`: it declares its symbols with

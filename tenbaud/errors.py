@@ -1,4 +1,4 @@
-"""The errors of tenbaud. Each is a `TenbaudError`; its text says what happened and what to do next.
+"""The errors of tenbaud. Each is a `TenbaudError`; its text gives the cause and the next step.
 
 A bad argument is a plain ValueError that names the value and the allowed range.
 """

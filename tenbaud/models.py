@@ -1,4 +1,4 @@
-"""Prediction models: what both ends compute the plant's next state with, tick by tick.
+"""Prediction models: both ends compute the plant's next state with them, tick by tick.
 
 A model of your own is a class that fulfils the protocol `Model`. It runs at both ends and must give
 both the same bits: `+ - * /`, comparisons, `math.sqrt`, `math.floor`, and `sin`, `cos`, `exp`.

@@ -1,4 +1,4 @@
-"""Simulated plants: what is flown. A plant takes volts and has true angles.
+"""Simulated plants. A plant takes volts and has true angles.
 
 A plant of your own is a class that fulfils the protocol `Plant`. It is free to use any arithmetic.
 """

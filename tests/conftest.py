@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import fcntl
+import gc
 import os
 import signal
+import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -13,6 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+
+from tests import warm
 
 # Some hundred processes are started here. Without bytecode on disk each compiles all that it imports,
 # which takes longer than most flights.
@@ -27,7 +31,15 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
+COMPILED_ONCE = (
+    "tests/tenbaud/studies/test_equal_bits.py",
+    "tests/tenbaud/identify/test_identify_command.py",
+    "tests/tenbaud/studies/test_quick.py",
+)
+"""Their tests stay together: the first compiles a flight, the others read its machine code."""
+
 LONGEST_FIRST = (
+    *COMPILED_ONCE,
     "tests/docs/",
     "tests/tenbaud/view/test_page.py",
     "tests/network/",
@@ -39,8 +51,18 @@ LONGEST_FIRST = (
 )
 """What takes or waits longest: started last, it would keep one worker busy and the others idle."""
 
-COMPILED_ONCE = ("tests/tenbaud/studies/test_equal_bits.py",)
-"""Their tests stay together too: the first compiles, the others read its machine code from disk."""
+COMPILED_BEFORE = "[docs/howto/your-log.md]"
+"""A page that flies what those above compile: it comes when they are through."""
+
+COLD = (
+    "tests/tenbaud/endings/",
+    "tests/tenbaud/view/test_gate.py",
+    "tests/tenbaud/view/test_beside.py",
+    "tests/network/",
+    "tests/docs/",
+)
+"""Tests of processes as the system shows them: theirs are ordinary ones. Elsewhere a process begins
+with everything imported (`tests/warm.py`): it disturbs less what flies on the real clock beside it."""
 
 _MACHINE = Path(tempfile.gettempdir()) / f"tenbaud-tests-{os.getuid()}.lock"
 
@@ -48,6 +70,11 @@ _MACHINE = Path(tempfile.gettempdir()) / f"tenbaud-tests-{os.getuid()}.lock"
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Bring the longest to the front."""
     items.sort(key=_rank)
+
+
+def pytest_collection_finish() -> None:
+    """Let the garbage collector pass over what all tests together have imported."""
+    gc.freeze()
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -58,8 +85,9 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     class ByFixture(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
             file = nodeid.partition("::")[0]
-            together = file in COMPILED_ONCE or _has_shared_fixture(config.rootpath / file)
-            return file if together else nodeid
+            if file in COMPILED_ONCE:
+                return COMPILED_ONCE[0]
+            return file if _has_shared_fixture(config.rootpath / file) else nodeid
 
     return ByFixture(config, log)
 
@@ -72,8 +100,26 @@ def _has_shared_fixture(path: Path) -> bool:
 def _rank(item: pytest.Item) -> int:
     if item.get_closest_marker("both_cores") is not None:
         return len(LONGEST_FIRST) + 1  # at the end, when no module-wide fixture is at work any more
+    if item.nodeid.endswith(COMPILED_BEFORE):
+        return len(LONGEST_FIRST)
     ranks = [rank for rank, start in enumerate(LONGEST_FIRST) if item.nodeid.startswith(start)]
     return ranks[0] if ranks else len(LONGEST_FIRST)
+
+
+@pytest.fixture(scope="session")
+def _server() -> Iterator[warm.Server | None]:
+    server = warm.Server() if warm.CLONE is not None else None
+    subprocess.Popen = warm.Popen  # type: ignore[misc]
+    yield server
+    warm.Popen.server = None
+    if server is not None:
+        server.close()
+
+
+@pytest.fixture(autouse=True)
+def _warm(request: pytest.FixtureRequest, _server: warm.Server | None) -> None:
+    """Let the processes of most tests begin with everything imported."""
+    warm.Popen.server = None if request.node.nodeid.startswith(COLD) else _server
 
 
 @pytest.fixture(autouse=True)

@@ -1,4 +1,4 @@
-"""Notices an encoder that is stuck: counts that stand still while the body must be moving.
+"""Detects a stuck encoder: counts that stay constant while the model predicts a motion.
 
 Standing still proves nothing by itself, a body at its set-point does too. So the codec's model is
 carried on from its estimate, without corrections, under the voltages that were applied; only when it
@@ -74,7 +74,7 @@ class EncoderWatch:
                 volts = self._applied.popleft()
                 try:
                     self._state = self._model.tick(self._state, volts, self._nothing_held)
-                except (ArithmeticError, ValueError):  # beyond what the model can say
+                except (ArithmeticError, ValueError):  # beyond the model's validity
                     self._age_ticks = 0
                     return None
         if self._age_ticks < self._window_ticks:
@@ -83,7 +83,7 @@ class EncoderWatch:
         return self._judge(counts)
 
     def _judge(self, counts: tuple[int, ...]) -> str | None:
-        """Compare, at the end of a window, what the model says with axes that never changed."""
+        """Compare, at the end of a window, the model's prediction with axes that never changed."""
         start, end = self._model.measured(self._start), self._model.measured(self._state)
         for axis, ticks in enumerate(self._still_ticks):
             moved, motion = end[axis] - start[axis], self._motions[axis]

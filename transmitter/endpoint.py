@@ -110,7 +110,7 @@ class TransmitterNode:
         return answers
 
     def flush_records(self) -> None:
-        """Score and record what was confirmed: work for when the next symbol is on its way."""
+        """Score and record confirmed samples: work for the time after the next symbol is sent."""
         if not self.session.confirmed:
             return
         per_sample = self.session.terms.ticks_per_sample
@@ -285,14 +285,14 @@ class TransmitterEndpoint:
         self.tick += 1
 
     def take(self, data: bytes, now_ns: int) -> list[Delivery]:
-        """Take a message that arrived; return what answers it."""
+        """Take a message that arrived; return the answers."""
         frame = self.inlet.take(data)
         return [] if frame is None else self._offer(self.node.deliver(frame), now_ns)
 
     def farewell(self, end: End) -> list[bytes]:
         """End the session; return the messages that tell the receiver.
 
-        They are spared the line's delay and what goes wrong on it: this process is about to end.
+        They bypass the line's delay and impairments: this process is about to end.
         """
         return [self.uplink.counted(frame)[0] for frame in self.node.session.bye(end)]
 

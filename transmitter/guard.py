@@ -1,12 +1,12 @@
 """The guard beside the motors: limiter and watchdog.
 
-Every tick it is asked what to put on the motors. A command passes, in this order, a finite check, the
+At every tick it decides the command of the motors. A command passes, in this order, a finite check, the
 clamp and the slew limit; with the soft limit of an output exceeded, or a sensor that cannot be trusted,
-nothing passes. When commands stay away the last one is held; after the time-out the command is taken to
-the safe one along a ramp, and there it stays, latched: while it is latched no symbol leaves. It is
-re-armed on purpose only.
+nothing passes. Without commands the last one is held; after the time-out the command ramps to the safe
+one and stays there, latched: while it is latched no symbol is sent. It is re-armed only on
+request.
 
-The age of a command counts the ticks that were owed one (`transmitter.session.owing`) and had none.
+The age of a command counts the ticks for which one was due (`transmitter.session.owing`) but missing.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ class GuardState(StrEnum):
 
 
 class GuardCause(StrEnum):
-    """Why the guard takes the command down."""
+    """Why the guard ramps the command down."""
 
     TIMED_OUT = "timed_out"
-    """commands stayed away: the one cause that commands can make good again"""
+    """commands were missing: the only cause that later commands can clear"""
     STOPPED = "stopped"
     """a person or a signal stopped the flight"""
     SESSION_ENDED = "session_ended"
@@ -44,9 +44,9 @@ class GuardCause(StrEnum):
     SENSOR = "sensor"
     ANGLE_LIMIT = "angle_limit"
     NO_ANGLE = "no_angle"
-    """an angle that is no finite number"""
+    """an angle that is not a finite number"""
     BAD_COMMAND = "bad_command"
-    """a command that is no finite number"""
+    """a command that is not a finite number"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,24 +59,24 @@ class GuardReason:
     value: float | None = None
     limit: float | None = None
     number: int | None = None
-    """ticks that were owed a command and had none"""
+    """ticks for which a command was due but missing"""
     detail: str | None = None
-    """for people: what the sensor's device says, or the name of the output"""
+    """for people: the text of the sensor's device, or the name of the output"""
 
 
 @dataclass(frozen=True, slots=True)
 class GuardSettings:
-    """When the guard steps in, and how. Times are in ticks."""
+    """Limits and times of the guard. Times are in ticks."""
 
     timeout_ticks: int
-    """age of the last command after which it is taken down"""
+    """age of the last command after which the guard ramps it down"""
     ramp_ticks: int
-    """how long the way to the safe command takes"""
+    """duration of the ramp to the safe command"""
     safe_command: Vector
     soft_limits: Vector = ()
     """largest value of each output, either way; empty: none"""
     outputs: tuple[Signal, ...] = ()
-    """the outputs by name, for what is said of them"""
+    """names of the outputs, for messages"""
 
     def __post_init__(self) -> None:
         if self.timeout_ticks < 1 or self.ramp_ticks < 1:
@@ -87,7 +87,7 @@ class GuardSettings:
 
 
 class Guard:
-    """Decides what is applied at every tick."""
+    """Decides the applied command at every tick."""
 
     def __init__(self, limits: CommandLimits, settings: GuardSettings) -> None:
         self._limits = limits
@@ -109,7 +109,7 @@ class Guard:
 
     @property
     def timed_out(self) -> bool:
-        """Return whether it stopped for nothing but commands that stayed away."""
+        """Return whether missing commands are the only cause of its stop."""
         return self.reason is not None and self.reason.cause is GuardCause.TIMED_OUT
 
     def check_outputs(self, tick: int, measured: Vector) -> None:
@@ -129,7 +129,7 @@ class Guard:
         self.trip(GuardReason(cause, tick, axis, value, limit, detail=label))
 
     def trip(self, reason: GuardReason) -> None:
-        """Take the command down from now on."""
+        """Ramp the command down from now on."""
         if not self.stopped:
             self.state = GuardState.RAMPING
             self.reason = reason
@@ -140,7 +140,7 @@ class Guard:
             self.reason = reason
 
     def rearm(self) -> None:
-        """Pass commands again, from what is applied now."""
+        """Pass commands again, starting from the applied one."""
         if not self.timed_out:
             raise RuntimeError(f"the guard cannot be re-armed: {self.reason or 'it is not stopped'}")
         self.state = GuardState.READY
@@ -148,9 +148,9 @@ class Guard:
         self._age_ticks = 0
 
     def apply(self, tick: int, command: Vector | None, owed_ticks: int = sys.maxsize) -> Vector:
-        """Return what is applied at this tick; `command` is None when none has come.
+        """Return the applied command of this tick; `command` is None if none has come.
 
-        `owed_ticks`: for how many ticks, up to this one, one should have come. No other is missed.
+        `owed_ticks`: number of ticks, up to this one, for which one was due.
         """
         if command is not None:
             for value in command:

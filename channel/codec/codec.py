@@ -8,21 +8,21 @@ proves it sample by sample.
 
 Three rules keep it so:
 
-* **Role-free.** Whatever differs between the ends lives in their sessions, never here.
+* **Role-free.** All differences between the ends are in their sessions, never here.
 * **Restricted arithmetic.** Python floats with `+ - * /`, comparisons, `math.sqrt`, `math.floor`,
   integers, and the `sin`, `cos`, `exp` of `channel.codec.numerics`. The C library's functions differ
   between two processors in the last bit, and on a marginal plant one bit is enough in the end:
   nothing on the link pulls the copies together again. A test walks the syntax tree of this file.
-* **Decisions from symbols.** What a word means follows from symbols, which are integers, and from no
-  comparison of two floats that each end made for itself; limits that a range is held within are the
-  exception, and the same on either side of the edge.
+* **Decisions from symbols.** The meaning of a word follows from symbols, which are integers, and not
+  from comparisons of two floats that each end computed; the limits of a range are the exception, and
+  give the same result on either side of the limit.
 
 One sample `k`, its ticks `kN ... (k+1)N - 1`:
 
-    encode   transmitter only: which word does the measurement ask for, given the prediction?
+    encode   transmitter only: the word for the measurement, given the prediction
     open     both: the word (or ERASED) becomes a correction, and the coder adapts its range
     tick     both, N times: the model advances by one tick under a command and the held correction
-    close    both: the state after the sample, which is what the digest is of
+    close    both: the state after the sample, of which the digest is computed
 
 A coder declares an alphabet (for the paper: -1 and +1) and how many symbols make the word of one
 sample. An erasure (the receiver saw no whole word in time) is distinct from every symbol, a paid
@@ -47,7 +47,7 @@ from channel.errors import CodecDiverged
 Vector = tuple[float, ...]
 
 STATE_MAX = 5e4
-"""A state beyond this is no estimate any more; angles stay within what `numerics.sin` takes."""
+"""A state beyond this has diverged; angles stay within what `numerics.sin` takes."""
 
 Word: TypeAlias = tuple[int, ...] | None
 """One sample's symbols in the order in which they were sent, or `ERASED`."""
@@ -85,7 +85,8 @@ class Alphabet:
         self.symbols = symbols
         self.symbols_per_word = symbols_per_word
         self._digit = {symbol: digit for digit, symbol in enumerate(symbols)}
-        self._words = words
+        self.words = words
+        """how many kinds of words there are"""
 
     def symbol_number(self, symbol: int) -> int:
         """Return the digit that stands for one symbol; ValueError for a foreign one."""
@@ -108,14 +109,14 @@ class Alphabet:
         return number
 
     def has_word(self, number: int) -> bool:
-        return 0 <= number < self._words or number == WIRE_ERASED
+        return 0 <= number < self.words or number == WIRE_ERASED
 
     def word(self, number: int) -> Word:
         """Return the word with this wire number; ValueError when there is none."""
         if number == WIRE_ERASED:
             return ERASED
-        if not 0 <= number < self._words:
-            raise ValueError(f"word number {number} is outside 0 ... {self._words - 1}")
+        if not 0 <= number < self.words:
+            raise ValueError(f"word number {number} is outside 0 ... {self.words - 1}")
         digits = []
         for _ in range(self.symbols_per_word):
             number, digit = divmod(number, len(self.symbols))  # integers
@@ -145,7 +146,7 @@ class Model(Protocol):
 
 
 class Coder(Protocol):
-    """Says which word a measurement asks for and what a word means. Every method is pure."""
+    """Gives the word for a measurement and the meaning of a word. Every method is pure."""
 
     alphabet: Alphabet
     impulse: bool
@@ -171,7 +172,7 @@ class Coder(Protocol):
 
 
 class CodecState(NamedTuple):
-    """Everything that a copy of the codec is, between two samples."""
+    """The whole state of a copy of the codec, between two samples."""
 
     sample: int
     """Index of the next sample: that many words have been consumed."""
@@ -207,7 +208,7 @@ def is_estimate(model: Sequence[float]) -> bool:
 
 
 def is_coder_state(coder: Coder, state: Vector) -> bool:
-    """Return whether a coder can be in this state, finite as it is; one that does not say can."""
+    """Return whether this finite state is valid for a coder; True if the coder has no check."""
     check = getattr(coder, "is_state", None)
     return check is None or bool(check(state))
 
@@ -234,14 +235,14 @@ class Codec:
         return CodecState(0, self.model.initial(), self.coder.initial())
 
     def encode(self, state: CodecState, measurement: Vector) -> tuple[int, ...]:
-        """Return the word that a measurement at the sample's first tick asks for (20).
+        """Return the word for a measurement at the sample's first tick (20).
 
         For a coder that uses rates, the measurement holds one value per corrected state.
         """
         return self.coder.encode(state.coder, self.predicted(state), measurement)
 
     def predicted(self, state: CodecState) -> Vector:
-        """Return what a measurement is compared with: angles, or all corrected states."""
+        """Return the prediction of a measurement: angles, or all corrected states."""
         if self.uses_rates:
             return state.model[: self.model.correction_size]
         return self.model.measured(state.model)
@@ -268,10 +269,10 @@ class Codec:
         return CodecState(state.sample + 1, model, opened.coder)
 
     def about(self, state: CodecState, word: Word, opened: Vector) -> tuple[int, ...] | None:
-        """Return the place of the output that each symbol of a word was about; None for ERASED.
+        """Return the index of the output that each symbol of a word codes; None for ERASED.
 
-        `opened` is the model state after the word's correction. The answer follows from shared state,
-        and none follows from it: it is for people. None also where the coder fails to give one.
+        `opened` is the model state after the word's correction. It follows from shared state, and no
+        state depends on it: it is for display. None also if the coder fails to give one.
         """
         if word is ERASED:
             return None
@@ -342,7 +343,7 @@ class ModelContext:
     """For a prediction model."""
 
     tick_s: float
-    """h: what one call of `tick` advances by"""
+    """h: the step of one call of `tick`"""
     symbol_period_s: float
     """T_s"""
 

@@ -1,7 +1,7 @@
-"""One sample with command lead: what the receiver does with a word, and the transmitter repeats.
+"""One sample with command lead: computed by the receiver, and repeated by the transmitter.
 
-The command of tick `n + D` is decided when the codec stands at tick `n`. Its basis is the codec's own
-state carried `D` ticks ahead by the model under the commands already given, with no correction
+The command of tick `n + D` is computed when the codec is at tick `n`, from the codec's own state
+advanced `D` ticks by the model under the commands already given, with no correction
 beyond the last known word. This *live* estimate is outside the codec state; at `D = 0` it is the
 codec state. Both ends compute it here: the receiver to decide commands, the transmitter to know
 afterwards what the receiver predicted.
@@ -46,7 +46,7 @@ def fly_ticks(
 ) -> Any:
     """Carry a model state over the `count` ticks of a sample and `lead` more; return what is carried.
 
-    This is the one text of the order of a sample's ticks: sessions run it as it stands, and studies
+    The order of a sample's ticks is written only here: sessions run it as it is, and studies
     compile it with functions of their own. `flight` is handed to each of these:
 
     `step(flight, carried, at, within, ahead, model)` returns (carried, command of tick `at`). `within`:
@@ -112,7 +112,7 @@ def _tick(
 def fly_sample(
     codec: Codec, state: CodecState, word: Word, known: Sequence[Vector], decide: Decide
 ) -> FlownSample:
-    """Consume one word, decide `N` commands and return what they rest on.
+    """Consume one word, compute `N` commands and return them with their states.
 
     `known` holds the `D` commands of ticks `kN ... kN + D - 1`, decided with earlier words.
     """

@@ -1,8 +1,7 @@
 """The signals of a plant: names, units, ranges and groups of its states, inputs and outputs.
 
-A model says them once, and everything that shows, limits, records or steers a plant reads them here:
-how many there are, what they are called and in which unit they are given. Nothing else of the project
-knows what a plant is made of.
+A model defines them once, and all code that shows, limits, records or controls a plant reads them here:
+their number, names and units. No other part of the project depends on the kind of plant.
 """
 
 from __future__ import annotations
@@ -76,7 +75,7 @@ class Signal:
 
 @dataclass(frozen=True, slots=True)
 class InputSignal(Signal):
-    """One input of the plant: what a command has a value for."""
+    """One input of the plant: a command has one value for it."""
 
     steps_per_unit: float = 1000.0
     """A command travels as a whole number of steps, at most `STEPS_MAX` either way: 1000 are mV."""
@@ -112,11 +111,11 @@ class Signals:
     states: tuple[Signal, ...]
     inputs: tuple[InputSignal, ...]
     outputs: tuple[Signal, ...]
-    """what is measured, and steered to a set-point"""
+    """measured, and controlled to a set-point"""
     output_states: tuple[int | None, ...] = field(default=())
     """for each output the state that it is, None for another function of the states"""
     picture: str = ""
-    """what the plant looks like, one of `PICTURES`; empty: each output is shown as a bar"""
+    """picture of the plant, one of `PICTURES`; empty: each output is shown as a bar"""
     output_rows: tuple[tuple[float, ...], ...] = ()
     """for each output that is a sum of states their coefficients, for another one nothing; without
     any such output empty"""

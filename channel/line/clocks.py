@@ -1,4 +1,4 @@
-"""A clock that runs fast, slow or in jumps, to try out what the ends make of it."""
+"""A clock that runs fast, slow or in jumps, to test how the ends react."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from channel.line.virtual import Peer, Reply
 
 
 class SkewedClock:
-    """Maps true time to what a bad clock shows, and back. Times are in ns from `start_ns` on."""
+    """Maps true time to the time of a bad clock, and back. Times are in ns from `start_ns` on."""
 
     def __init__(self, faults: LineFaults, start_ns: int = 0) -> None:
         self._rate = 1.0 + faults.skew_ppm / 1e6
@@ -15,7 +15,7 @@ class SkewedClock:
         self._start_ns = start_ns
 
     def shown(self, true_ns: int) -> int:
-        """Return what the clock shows at a true time."""
+        """Return the clock's time at a true time."""
         since_ns = true_ns - self._start_ns
         jumps = sum(jump for at, jump in self._steps if since_ns >= at)
         return self._start_ns + round(since_ns * self._rate) + jumps

@@ -95,7 +95,7 @@ class LineFaults:
 
 
 def parse_impairments(text: str) -> LineFaults:
-    """Return what a text asks for; ValueError, naming the item, for one that makes no sense."""
+    """Return the impairments of a text; ValueError, naming the item, for an invalid one."""
     faults = LineFaults()
     for item in filter(None, (part.strip() for part in text.split(","))):
         try:
@@ -190,7 +190,7 @@ def _time_ns(text: str) -> int:
 
 @dataclass(slots=True)
 class ImpairedLine:
-    """A line with impairments before it; `counts` says what they did to how many messages."""
+    """A line with impairments before it; `counts` has the number of messages of each kind."""
 
     impairments: Impairments
     alphabet: Alphabet
@@ -211,7 +211,7 @@ class ImpairedLine:
         return self.line.longest_delay_ns + one.delay_ns + one.jitter_ns + held_ns
 
     def suffer(self, impairments: Impairments) -> None:
-        """Change what goes wrong from now on."""
+        """Change the impairments from now on."""
         self.impairments = impairments
 
     def carry(self, data: bytes, now_ns: int) -> list[Delivery]:
@@ -262,7 +262,7 @@ class ImpairedLine:
 
 
 def impair(line: Line, impairments: Impairments) -> bool:
-    """Change what goes wrong on a line from now on; return whether it is one that can be impaired."""
+    """Change the impairments of a line from now on; return whether it can be impaired."""
     if not isinstance(line, ImpairedLine):
         return False
     line.suffer(impairments)

@@ -1,4 +1,4 @@
-"""One direction of a line as the flight experiences it: when, and whether, a message arrives.
+"""One direction of a line: when, and whether, a message arrives.
 
 On the virtual clock the transmitter's process asks the line of each direction; on a real clock each
 sender asks its own and holds the message back until it is due (`Outbox`). A line carries bytes: what a
@@ -20,7 +20,7 @@ from typing import NamedTuple, Protocol
 
 from channel.codec.codec import Alphabet, Codec
 from channel.errors import FrameError
-from channel.protocol.frames import Commands, Frame, ShortSymbol, Symbol
+from channel.protocol.frames import Commands, Frame, ShortCommands, ShortSymbol, Symbol
 from channel.protocol.recording import SENT_CHANNEL, NullRecorder, Recorder
 from channel.protocol.terms import Terms
 from channel.protocol.wire import DATAGRAM, Wire
@@ -42,7 +42,7 @@ class Line(Protocol):
 
     @property
     def counts(self) -> Counter[str]:
-        """Return how many messages it did what to, on purpose."""
+        """Return the number of messages that it impaired on purpose, by kind."""
 
     def carry(self, data: bytes, now_ns: int) -> list[Delivery]:
         """Return the arrivals of a message put on the line at flight time `now_ns`."""
@@ -77,7 +77,7 @@ class Outbox:
         return self._waiting[0][0] if self._waiting else None
 
     def put(self, deliveries: Iterable[Delivery]) -> None:
-        """Hold what a line makes of a message; a lost one leaves nothing."""
+        """Hold the deliveries of a message; a lost one has none."""
         for arrival_ns, data in deliveries:
             if data is not None:
                 self._order += 1
@@ -100,6 +100,8 @@ class Inlet:
         self.wire_bytes = 0
         self.control_bytes = 0
         """of `wire_bytes`, those of frames that carried neither a symbol nor commands"""
+        self.command_bytes = 0
+        """of command frames, without a line's framing"""
         self.malformed = 0
         self._on_malformed = on_malformed
 
@@ -113,7 +115,9 @@ class Inlet:
             if self._on_malformed is not None:
                 self._on_malformed(str(error))
             return None
-        if not isinstance(frame, (Commands, Symbol, ShortSymbol)):
+        if isinstance(frame, (Commands, ShortCommands)):
+            self.command_bytes += len(data)
+        elif not isinstance(frame, (Symbol, ShortSymbol)):
             self.control_bytes += size
         return frame
 
@@ -129,6 +133,8 @@ class Downlink:
         self.wire = wire
         self.line: Line = line or CleanLine()
         self.wire_bytes = 0
+        self.command_bytes = 0
+        """of command frames, without a line's framing"""
         self._outbox = Outbox()
         self._start_ns: int | None = None
 
@@ -139,9 +145,13 @@ class Downlink:
 
     def encoded(self, frames: Iterable[Frame]) -> list[bytes]:
         """Count frames; return their messages."""
-        messages = [self.wire.encode(frame) for frame in frames]
-        for message in messages:
+        messages = []
+        for frame in frames:
+            message = self.wire.encode(frame)
             self.wire_bytes += self.wire.size(message)
+            if isinstance(frame, (Commands, ShortCommands)):
+                self.command_bytes += len(message)
+            messages.append(message)
         return messages
 
     def offer(self, frames: Iterable[Frame], now_ns: int) -> list[bytes]:
@@ -183,7 +193,7 @@ def bits_per_symbol(alphabet: Alphabet) -> float:
 
 
 class UplinkMeter:
-    """Counts what the transmitter put on the line."""
+    """Counts the transmitter's messages on the line."""
 
     def __init__(self, alphabet: Alphabet) -> None:
         self._bits_per_symbol = bits_per_symbol(alphabet)

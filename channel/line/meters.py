@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import deque
+
 
 class LatenessMeter:
     """Percentiles of lateness, in bins of 10 microseconds up to 50 ms."""
@@ -32,21 +34,27 @@ class LatenessMeter:
 
 
 class BaudMeter:
-    """Measures symbols per second on the receiver's clock, between the first symbol and the last."""
+    """Measures symbols per second on the receiver's clock, over its last 5 s."""
+
+    SPAN_NS = 5_000_000_000
 
     def __init__(self) -> None:
-        self.symbols = 0
-        self._first_ns = 0
+        self._times_ns: deque[int] = deque()
         self._last_ns = 0
 
-    def on_symbol(self, now_ns: int) -> None:
-        if self.symbols == 0:
-            self._first_ns = now_ns
+    def on_slot(self, now_ns: int, *, came: bool) -> None:
+        """Count a slot that is decided now; `came`: its symbol is there."""
         self._last_ns = now_ns
-        self.symbols += 1
+        if came:
+            self._times_ns.append(now_ns)
+        # The last symbol before the span bounds its first interval.
+        while len(self._times_ns) > 1 and self._times_ns[1] <= now_ns - self.SPAN_NS:
+            self._times_ns.popleft()
 
     @property
     def baud(self) -> float | None:
         """Return the measured rate; None before two symbols came at different times."""
-        span_ns = self._last_ns - self._first_ns
-        return (self.symbols - 1) * 1e9 / span_ns if span_ns > 0 else None
+        if not self._times_ns:
+            return None
+        span_ns = self._last_ns - self._times_ns[0]
+        return (len(self._times_ns) - 1) * 1e9 / span_ns if span_ns > 0 else None

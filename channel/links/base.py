@@ -36,7 +36,7 @@ class LinkCounts:
 
 
 class Link(ABC):
-    """One end of a link; what is not abstract here is what an ordinary one does."""
+    """One end of a link; the methods that are not abstract are the usual behaviour."""
 
     name = ""
     """of the kind of link, for summaries"""
@@ -63,7 +63,7 @@ class Link(ABC):
         """Return whether the other end is known to be there now."""
 
     def trouble(self) -> str:
-        """Return what is wrong with this end's line itself, such as a port that went; else nothing."""
+        """Return the fault of this end's line itself, such as a lost port; else nothing."""
         return ""
 
     @abstractmethod

@@ -5,11 +5,15 @@ from __future__ import annotations
 import contextlib
 import ipaddress
 import socket
+import sys
+from collections import deque
 
 from channel.errors import LinkError
 
 DEFAULT_PORT = 7447
 DEFAULT_ENDPOINT = f"tcp/127.0.0.1:{DEFAULT_PORT}"
+
+_held: deque[socket.socket] = deque(maxlen=256)
 
 
 def is_loopback(endpoint: str) -> bool:
@@ -38,7 +42,7 @@ def check_endpoints(
         protocol, slash, address = endpoint.partition("/")
         if not slash or ":" not in address:
             raise LinkError(
-                f"{endpoint!r} is no endpoint; write PROTOCOL/HOST:PORT, such as {DEFAULT_ENDPOINT}"
+                f"{endpoint!r} is not an endpoint; write PROTOCOL/HOST:PORT, such as {DEFAULT_ENDPOINT}"
             )
         if secured and protocol != "tls":
             raise LinkError(
@@ -86,11 +90,21 @@ def default_endpoint() -> str:
 
 
 def free_endpoint() -> str:
-    """Return a loopback TCP endpoint with a port that was free a moment ago."""
+    """Return a loopback TCP endpoint whose port the system gives to nobody else for now.
+
+    On Linux this process holds the port without listening: a server that sets SO_REUSEADDR may listen
+    there. Other systems refuse the server a port that is held, so there it was free a moment ago.
+    """
     host = loopback_host()
-    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
-        probe.bind((host, 0))
-        return _on_loopback(probe.getsockname()[1])
+    holder = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET)
+    holder.bind((host, 0))
+    holder.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    port = holder.getsockname()[1]
+    if sys.platform == "linux":
+        _held.append(holder)
+    else:
+        holder.close()
+    return _on_loopback(port)
 
 
 def _on_loopback(port: int) -> str:

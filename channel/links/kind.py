@@ -32,7 +32,7 @@ class NodePlace(TypedDict, total=False):
 
 
 class LinkSettings(Protocol):
-    """The configuration's section `link`; `options` are whatever a kind from outside asks for."""
+    """The configuration's section `link`; `options` are those of an external kind."""
 
     @property
     def session(self) -> str: ...
@@ -77,14 +77,14 @@ class Meeting:
 
 
 class LinkKind(ABC):
-    """A kind of link; what stands here is what an ordinary one has."""
+    """A kind of link; the defaults here are those of an ordinary one."""
 
     in_process = False
     """both ends are in one process, on the virtual clock: no link is opened, nothing looks on"""
     serves_many = False
     """one receiver may serve many sessions over it"""
     changes_terms = False
-    """bytes take time on the line, so `terms` changes what a flight is"""
+    """bytes take time on the line, so `terms` changes the flight"""
     carries_slots = True
     """a symbol arrives with the number of its slot, whole and checked; without it, a symbol that comes
     after its deadline cannot be distinguished from a later one's"""
@@ -101,7 +101,7 @@ class LinkKind(ABC):
         """Raise LinkError for settings that cannot be opened or are not safe."""
 
     def terms(self, settings: LinkSettings, codec: Codec, terms: Terms) -> Terms:
-        """Return the terms with what the line does to them; ValueError for what it cannot carry."""
+        """Return the terms with the line's effect; ValueError if the line cannot carry the flight."""
         return terms
 
     @abstractmethod

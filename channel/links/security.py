@@ -92,7 +92,7 @@ def tls_settings(credentials: Credentials) -> dict[str, object]:
 
 
 def access_rules(invited: Sequence[Invited]) -> dict[str, object]:
-    """Return Zenoh's `access_control` section: deny all, allow the invited what their part needs."""
+    """Return Zenoh's `access_control` section: deny all, allow invited nodes what their role needs."""
     rules: list[Rule] = []
     subjects: list[Rule] = []
     policies: list[Rule] = []

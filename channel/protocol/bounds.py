@@ -28,7 +28,7 @@ from channel.protocol.limits import to_steps
 from channel.protocol.terms import Terms
 
 COUNTER = "out_of_bounds"
-"""Name under which sessions count, and summaries show, the frames dropped for what they hold."""
+"""Name of the count of frames that sessions drop for their contents; summaries show it."""
 
 COUNTER_MAX = 3 * 2**30
 """Three quarters of what 32 bits count: slots beyond are left to the flight that goes on."""
@@ -64,7 +64,7 @@ class Bounds:
         self.sample_max = min(COUNTER_MAX // terms.symbols_per_word, TIME_NS_MAX // terms.sample_ns)
 
     def drops(self, problem: str | None) -> bool:
-        """Count and tell a frame that is dropped for what it holds; return whether it is."""
+        """Count and report a frame that is dropped for its contents; return whether it is."""
         if problem is None:
             return False
         self._counts[COUNTER] += 1
@@ -178,6 +178,6 @@ def within_text_bounds(frame: Frame) -> Frame:
 
 
 def shown(text: str, characters_max: int = TEXT_CHARACTERS_MAX) -> str:
-    """Return a peer's text, cut, and with a question mark for what would steer a terminal."""
+    """Return a peer's text, truncated, with question marks for terminal control characters."""
     cut = text if len(text) <= characters_max else text[: characters_max - 3] + "..."
     return "".join([one if one.isprintable() or one == "\n" else "?" for one in cut])

@@ -1,4 +1,4 @@
-"""How a session ends or is refused. The number is what travels and what programs read.
+"""How a session ends or is refused. The number is sent, and programs read it.
 
 Beside it goes a text for people, which nothing reads: what the end that speaks knows beyond the number.
 """
@@ -63,4 +63,4 @@ class End:
     by_peer: bool = False
     """whether the other end said so"""
     answer: str = ""
-    """what the other end says about a refusal, for people"""
+    """the other end's text about a refusal, for people"""

@@ -15,7 +15,7 @@ from channel.protocol.recording import Field, RecordChannel, Recorder
 
 
 class EventKind(StrEnum):
-    """Every kind of thing that a flight reports."""
+    """The kinds of events of a flight."""
 
     STARTED = "started"
     ENDED = "ended"
@@ -38,26 +38,26 @@ class EventKind(StrEnum):
 class Dropped(Enum):
     """Why a symbol or another frame was dropped: the causes of LATE_SYMBOL and STALE."""
 
-    SETTLED = "its slot was settled already"
-    PAST_DEADLINE = "it came after its deadline"
+    SETTLED = "its slot was already decided"
+    PAST_DEADLINE = "it arrived after its deadline"
     FAR_AHEAD = "its slot is too far ahead"
-    NOT_DUE = "no slot that is due has this symbol"
-    OUT_OF_BOUNDS = "it holds what no frame of this flight may hold"
+    NOT_DUE = "no due slot has this symbol"
+    OUT_OF_BOUNDS = "its contents are out of bounds"
 
 
 class Presence(Enum):
     """The state of the other end: the causes of PEER."""
 
-    GONE = "it is not there any more"
-    BACK = "it is there again"
-    SILENT = "no symbol came for a whole history"
+    GONE = "it is absent"
+    BACK = "it is present again"
+    SILENT = "no symbol came within the history"
 
 
 class Rate(Enum):
     """Changes of the symbol rate: the causes of RATE."""
 
     MISSED = "too few symbols arrive in time"
-    KEPT = "they arrive again"
+    KEPT = "enough symbols arrive again"
 
 
 class Failing(Enum):
@@ -70,19 +70,19 @@ class Failing(Enum):
 class ByHand(Enum):
     """Changes by a person in flight: the causes of CONTROL."""
 
-    SET_POINT = "steer to an angle"
+    SET_POINT = "a new set-point"
     FOLLOW = "follow the reference"
     PAUSE = "pause before a tick"
-    GO_ON = "go on after a pause"
+    GO_ON = "continue after a pause"
     PACE = "a multiple of real time"
-    IMPAIR = "what goes wrong on the line"
+    IMPAIR = "impairments of the line"
     CORRUPT = "one bit of a codec"
-    IGNORED = "something that cannot be done"
+    IGNORED = "an impossible change"
 
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """One thing that happened. A field that has no meaning for its kind is None."""
+    """One event. A field without a meaning for its kind is None."""
 
     kind: EventKind
     sample: int | None = None

@@ -20,13 +20,13 @@ class Why(IntEnum):
     DESYNC = 1
     """the digests of a sample differed"""
     GAP = 2
-    """echoes were lost, more in a row than command frames repeat"""
+    """more consecutive echoes were lost than command frames repeat"""
     LAG = 3
-    """no echo came for as long as the history lasts"""
+    """no echo came within the history"""
     UNKNOWN = 4
-    """the receiver does not know the session: it was restarted, or lost track"""
+    """the receiver does not know the session: it was restarted, for example"""
     GUARD = 5
-    """commands stayed away until the watchdog took the voltage down"""
+    """without commands the watchdog ramped the voltage down"""
     TAKEN_OVER = 6
     """another receiver takes the flight over, on purpose"""
 
@@ -88,7 +88,7 @@ class Refuse:
 
 @dataclass(frozen=True, slots=True)
 class Symbol:
-    """One paid symbol in its slot."""
+    """One coded symbol in its slot."""
 
     session: int
     epoch: int
@@ -119,7 +119,7 @@ class LocatedSymbol:
     slot: int | None
     """None: no slot that may come now has it"""
     slot_low: int
-    """what its byte said of the slot"""
+    """the slot's digits in its byte"""
     in_time: bool
     anchor: tuple[int, int] | None
     """(slot, time in ns): where deadlines count from now on, if that has changed"""
@@ -136,6 +136,8 @@ class Echo:
     """of the codec state after the sample, 64 bits"""
     steps: tuple[int, ...]
     """commands of ticks `kN + D ... (k+1)N + D - 1`, all inputs of a tick together"""
+    digest_mask: int = 2**64 - 1
+    """which bits of the digest came with the echo; the others are zeros"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,10 +150,20 @@ class Commands:
 
 
 @dataclass(frozen=True, slots=True)
+class ShortCommands:
+    """Commands as the compact downlink carries them, packed; `channel.protocol.compact` has the bits.
+
+    Only a session knows the sample, the session and the epoch that they belong to.
+    """
+
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
 class Desync:
     """The transmitter's copy differs from the receiver's after this sample.
 
-    The receiver answers with the same frame and its own state, so that both can write both down.
+    The receiver answers with the same frame and its own state, so that both can record both.
     """
 
     session: int
@@ -195,7 +207,7 @@ class Bye:
 
 @dataclass(frozen=True, slots=True)
 class ForeignVersion:
-    """A whole frame of another wire version: not read further, but worth telling about."""
+    """A whole frame of another wire version: not decoded further, but reported."""
 
     version: int
 
@@ -208,6 +220,7 @@ Frame: TypeAlias = (
     | ShortSymbol
     | LocatedSymbol
     | Commands
+    | ShortCommands
     | Desync
     | Unknown
     | Claim

@@ -18,6 +18,9 @@ from channel.codec import numerics
 from channel.codec.codec import ERASED, Codec, Word
 from channel.errors import CodecDiverged
 
+LEFT_OUT = {"channel.downlink": "full"}
+"""Fields of the shared configuration that it leaves out at this value: its digest is that of before."""
+
 PROBE_SAMPLES = 40
 PROBE_POINTS = 200
 
@@ -73,12 +76,11 @@ def differing_fields(ours: str, theirs: str) -> list[str]:
         left, right = _flatten(json.loads(ours)), _flatten(json.loads(theirs))
     except (ValueError, RecursionError):
         return ["the peer's configuration cannot be read"]
-    missing = "(absent)"
-    return [
-        f"{name}: here {left.get(name, missing)}, there {right.get(name, missing)}"
+    pairs = [
+        (name, *(side.get(name, LEFT_OUT.get(name, "(absent)")) for side in (left, right)))
         for name in sorted(left.keys() | right.keys())
-        if left.get(name, missing) != right.get(name, missing)
     ]
+    return [f"{name}: here {here}, there {there}" for name, here, there in pairs if here != there]
 
 
 def _flatten(value: Any, prefix: str = "") -> dict[str, Any]:

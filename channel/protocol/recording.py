@@ -1,4 +1,4 @@
-"""Descriptions of a node's records, so that a recording carries names and units.
+"""Descriptions of a node's records: a recording stores their names and units.
 
 A node declares its channels as `RecordChannel`s and hands rows to a `Recorder`. It never learns
 where they go: the tool puts them into a file from another thread, a test into a list.
@@ -95,6 +95,6 @@ EPOCH_CHANNEL = RecordChannel(
 def write_epoch(
     recorder: Recorder, sample_ns: int, epoch: int, start: CodecState, hold: Vector
 ) -> None:
-    """Write down from what state an epoch starts."""
+    """Record the start state of an epoch."""
     row = (start.sample, epoch, start.model, start.coder, hold)
     recorder.write(EPOCH_CHANNEL, start.sample * sample_ns, row)

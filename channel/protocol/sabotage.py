@@ -1,4 +1,4 @@
-"""Corrupting one copy of the codec on purpose, in its last bit, to see that nobody stays silent."""
+"""Corruption of one copy of the codec in its last bit, to test that the difference is reported."""
 
 from __future__ import annotations
 

@@ -17,6 +17,8 @@ from channel.protocol.lockstep import HISTORY_NS, HISTORY_SAMPLES
 
 Delivery = Literal["start", "end"]
 Clock = Literal["real", "virtual"]
+Rung = Literal["full", "compact"]
+"""What a downlink spends on the echo of a sample."""
 
 # What a command frame can hold (channel/protocol/wire.py): 16 KiB, its echoes counted in one byte.
 ECHO_BYTES = 10
@@ -50,6 +52,8 @@ class Terms:
     limits: CommandLimits
     signals: Signals
     """of the codec's model"""
+    downlink: Rung = "full"
+    """"compact": one command a sample, in frames of few bits (`channel.protocol.compact`)"""
     uplink_line_ns: int = 0
     """on a line of finite rate: how long a symbol is on its way"""
     downlink_line_ns: int = 0
@@ -69,6 +73,7 @@ class Terms:
         repeats: int = 2,
         initial_command: Vector | None = None,
         limits: CommandLimits | None = None,
+        downlink: Rung = "full",
     ) -> Terms:
         """Return the terms on which a codec flies with ticks of `tick_s` on the virtual clock.
 
@@ -91,6 +96,7 @@ class Terms:
             initial_command=initial_command or (0.0,) * codec.model.input_size,
             limits=limits or CommandLimits.of(signals),
             signals=signals,
+            downlink=downlink,
         )
         if lead_ticks is None:
             terms = terms.with_shortest_lead("virtual")

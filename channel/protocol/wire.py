@@ -18,6 +18,9 @@ there. Bodies, by kind:
     9 claim     session that takes over u32
 
 A text is a u16 length and that many bytes of UTF-8.
+
+A message whose first two bits are 10 is a command frame of the compact downlink
+(`channel.protocol.compact`), without this head and with the same CRC.
 """
 
 from __future__ import annotations
@@ -40,6 +43,7 @@ from channel.protocol.frames import (
     Frame,
     Hello,
     Refuse,
+    ShortCommands,
     Symbol,
     Unknown,
     Welcome,
@@ -50,6 +54,8 @@ WIRE_VERSION = 2
 FRAME_BYTES_MAX = 16_384
 """No frame of ours comes near it; longer ones are dropped unread."""
 CRC_START = 0xFFFF
+SHORT_MARK = 0x80
+"""The first two bits of a compact command frame; versions stay below it."""
 
 _HEAD = struct.Struct("<BBIH")
 _CRC = struct.Struct("<H")
@@ -111,7 +117,7 @@ class Wire(SymbolWire, Protocol):
 
 
 def foreign_version_text(peer: str, version: int) -> str:
-    """Return what to do about a peer whose frames are of another wire version."""
+    """Return the advice for a peer whose frames are of another wire version."""
     return (
         f"the {peer} speaks wire version {version}, this end {WIRE_VERSION}: install the same tenbaud "
         "on both"
@@ -120,6 +126,10 @@ def foreign_version_text(peer: str, version: int) -> str:
 
 def encode(frame: Frame) -> bytes:
     """Return the bytes of a frame; ValueError for values that no frame can carry."""
+    if isinstance(frame, ShortCommands):
+        if frame.data[:1] < b"\x80" or frame.data[:1] >= b"\xc0":
+            raise ValueError("compact commands begin with the bits 10")
+        return frame.data + _CRC.pack(crc_hqx(frame.data, CRC_START))
     try:
         kind, body = _encode_body(frame)
         session, epoch = getattr(frame, "session", 0), getattr(frame, "epoch", 0)
@@ -131,15 +141,23 @@ def encode(frame: Frame) -> bytes:
     return message + _CRC.pack(crc_hqx(message, CRC_START))
 
 
+def is_short(data: bytes) -> bool:
+    """Return whether a message that is no symbol byte begins as a compact command frame."""
+    return len(data) > _CRC.size and data[0] & 0xC0 == SHORT_MARK
+
+
 def decode(data: bytes) -> Frame:
     """Return the frame in these bytes; FrameError, with the reason, for anything else."""
     if len(data) > FRAME_BYTES_MAX:
         raise FrameError(f"oversized: {len(data)} bytes, at most {FRAME_BYTES_MAX}")
-    if len(data) < _HEAD.size + _CRC.size:
+    short = is_short(data)
+    if len(data) < _HEAD.size + _CRC.size and not short:
         raise FrameError(f"truncated: {len(data)} bytes")
     message = data[: -_CRC.size]
     if _CRC.unpack(data[-_CRC.size :])[0] != crc_hqx(message, CRC_START):
         raise FrameError("checksum")
+    if short:
+        return ShortCommands(message)
     version, kind, session, epoch = _HEAD.unpack_from(message)
     if version != WIRE_VERSION:
         return ForeignVersion(version)

@@ -33,16 +33,16 @@ SKIPPED = (
 )
 
 EXIT_MEANINGS = {
-    ExitCode.OK: "all went well",
+    ExitCode.OK: "success",
     ExitCode.FAILED: "something failed, or a check found a difference",
     ExitCode.USAGE: "the command line or the configuration cannot be used",
     ExitCode.MISMATCH: "the two ends differ in version, configuration or arithmetic",
-    ExitCode.LINK_LOST: "the other end is not there, or was lost",
+    ExitCode.LINK_LOST: "the other end did not answer, or was lost",
     ExitCode.DESYNC: "the codecs differed without a requested corruption; or `--on-desync stop`",
     ExitCode.SAFETY_STOP: "the rig or the guard beside the motors ended the flight",
-    ExitCode.NOT_FLOWN: "the flight went to its end and [did not fly](../RELIABILITY.md#did-it-fly)",
+    ExitCode.NOT_FLOWN: "the flight reached its end but [did not fly](../RELIABILITY.md#did-it-fly)",
     ExitCode.NOT_WRITTEN: "a file, the recording or standard output could not be written",
-    ExitCode.INTERRUPTED: "Ctrl-C, or another signal that asks to end",
+    ExitCode.INTERRUPTED: "Ctrl-C, or another signal to end",
 }
 
 

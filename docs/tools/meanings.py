@@ -1,4 +1,4 @@
-"""What fields of the configuration mean whose schema has no text below them.
+"""Meanings of the configuration's fields that have no text in the schema.
 
 Those are parameters of constructors, and names that several sections share.
 """
@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 MEANINGS: Mapping[str, str] = {
     "description": "one line about the configuration, for people; `tenbaud presets` shows it",
-    "seed": "of everything random: disturbance, impairments; the same seed gives the same flight",
+    "seed": "of all random numbers: disturbance, impairments; the same seed gives the same flight",
     "duration_s": "flight time",
     "rate_damping_per_s": "damping of the pitch rate by the air and the bearing",
     "stiffness_per_s2": "restoring torque of the body's weight, per radian and moment of inertia",
@@ -18,7 +18,7 @@ MEANINGS: Mapping[str, str] = {
     "motor_lag_s": "time constant of the motors: first-order lag from voltage to thrust",
     "damping_per_s": "damping of the rate",
     "A": "of dx/dt = A x + B u + G w: a row for each state; empty where F and E are given",
-    "B": "of the same: what the commands change, a row for each state",
+    "B": "of the same: effect of the commands, a row for each state",
     "states": "names, in the order of A's rows; empty: state_1, state_2 ...",
     "state_units": "unit of each state; empty: none",
     "inputs": "names, in the order of B's columns; empty: input_1, input_2 ...",
@@ -39,16 +39,16 @@ MEANINGS: Mapping[str, str] = {
     "minimum_range_rad": "smallest range M",
     "maximum_range_rad": "largest range M",
     "decay": "factor of the range M per sample: shrinks by it, and grows by its inverse at saturation",
-    "open-loop-zoom.decay": "factor by which the range M shrinks per sample, whatever the signs are",
+    "open-loop-zoom.decay": "factor by which the range M shrinks per sample, for any signs",
     "range_rad": "range M of the coder, which never changes",
     "pcm.range_rad": "half the width that a word covers",
     "bits": "symbols per word, one bit each",
     "minimum_strength": "smallest sigma that the coder assumes",
     "maximum_strength": "largest sigma that the coder assumes",
-    "rig": "what is flown: a simulated plant, a recorded flight, or a real rig",
-    "sign": "-1 turns the direction round",
-    "transmitter.plant.pitch.kind": "the pitch axis; there is no other",
-    "first_sample_timeout_s": "how long the rig may take to its first sample",
+    "rig": "a simulated plant, a recorded flight, or a real rig",
+    "sign": "-1 reverses the direction",
+    "transmitter.plant.pitch.kind": "the pitch axis, the only one",
+    "first_sample_timeout_s": "longest time until the rig's first sample",
     "transmitter.bridge.travel.channel": "place of the encoder among those that the device sends",
     "transmitter.bridge.pitch.channel": "place of the encoder among those that the device sends",
     "transmitter.bridge.elevation.channel": "place of the encoder among those that the device sends",
@@ -70,13 +70,13 @@ MEANINGS: Mapping[str, str] = {
     "proportional": "gain of the error, in `unit`",
     "integral": "gain of the integral of the error over time in s, in `unit` per s",
     "derivative": "gain of the rate of the output, in `unit` times s",
-    "anti_windup": "conditional: the integral rests while the command is at its limit",
+    "anti_windup": "conditional: the integral is held while the command is at its limit",
     "period_s": "period of the square wave or the sine",
     "flight_log.file": "the recorded flight",
-    "signs": "-1 turns a signal round",
+    "signs": "-1 reverses a signal",
     "scales": "factor of a signal",
-    "end_s": "on the file's own clock; later rows are not looked at",
-    "link.kind": "what joins the two ends; memory: both in one process",
+    "end_s": "on the file's own clock; later rows are ignored",
+    "link.kind": "how the two ends are connected; memory: both in one process",
     "session": "name of the flight on the link; the same at both ends",
 }
 """Field, or section and field where it has another meaning there."""

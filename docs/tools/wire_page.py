@@ -11,8 +11,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from channel.codec.codec import Codec
+from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
+from channel.codec.models.pitch import PitchModel, PitchParameters
 from channel.line.virtual import Reply, Step, encode_reply, encode_step
 from channel.links.serial.wire import SerialWire, stuff
+from channel.protocol.compact import CompactForm
 from channel.protocol.endings import Ending
 from channel.protocol.frames import (
     Bye,
@@ -28,6 +32,7 @@ from channel.protocol.frames import (
     Welcome,
     Why,
 )
+from channel.protocol.terms import Terms
 from channel.protocol.wire import WIRE_VERSION, encode
 from tenbaud.sentences.endings import ending_text
 
@@ -149,6 +154,9 @@ def wire_page() -> str:
     for name, (frame, fields) in FRAMES.items():
         table = "\n".join(_table(encode(frame), (*HEAD, *fields, *TAIL)))
         text = text.replace(f"{{{{{name}}}}}", table)
+    message, table = _compact()
+    text = text.replace("{{compact_frame}}", _hex(message))
+    text = text.replace("{{compact}}", "\n".join(table))
     text = text.replace("{{version}}", str(WIRE_VERSION))
     text = text.replace("{{endings}}", "\n".join(_endings()))
     text = text.replace("{{symbols}}", "\n".join(_symbols()))
@@ -172,6 +180,39 @@ def _table(message: bytes, fields: tuple[Field, ...]) -> Iterator[str]:
         raise ValueError(
             f"the fields cover {offset} of {len(message)} bytes: {[f.name for f in fields]}"
         )
+
+
+def _compact() -> tuple[bytes, list[str]]:
+    """Return a frame of the compact downlink of the paper's flight, and its table of bits."""
+    codec = Codec(PitchModel(PitchParameters(), 0.01), ZoomCoder(ZoomParameters()), 10)
+    form = CompactForm(codec, Terms.for_codec(codec, 0.01, downlink="compact"))
+    steps = ((0, 0), (1500, -1500), (1480, -1480))
+    words = (0, 0xFFFF, 1)
+    echoes = [
+        Echo(698 + place, word, DIGEST, two * 10)
+        for place, (word, two) in enumerate(zip(words, steps, strict=True))
+    ]
+    message = encode(form.packed(SESSION, EPOCH, echoes))
+    fields = [
+        ("mark", 2, "always 10"),
+        ("epoch", 2, f"{EPOCH} modulo 4"),
+        ("session", 4, f"0x{SESSION:08X} modulo 16"),
+        ("sample", 8, "700 modulo 256"),
+        ("digest", 16, f"the low bits of 0x{DIGEST:016X}"),
+        ("more of it", 3, "bits 52 to 54: 16 + 3 x (700 modulo 16) and on"),
+    ]
+    for word, two in zip(reversed(words), reversed(steps), strict=True):
+        fields.append(("word", 2, "2: erased" if word == 0xFFFF else f"word number {word}"))
+        fields += [("command", 11, f"{one} mV: ({one} + 5000) / 5") for one in two]
+    fields.append(("zeros", 5, "up to a whole byte"))
+    bits = f"{int.from_bytes(message[:-2], 'big'):0{8 * len(message) - 16}b}"
+    table = ["| bits | field | value | |", "|---|---|---|---|"]
+    for name, count, meaning in fields:
+        part, bits = bits[:count], bits[count:]
+        table.append(f"| `{part}` | {name} | {int(part, 2)} | {meaning} |")
+    if bits:
+        raise ValueError(f"the fields leave {len(bits)} bits")
+    return message, table
 
 
 def _endings() -> Iterator[str]:

@@ -4,4 +4,4 @@ from __future__ import annotations
 
 
 class IdentificationError(ValueError):
-    """Data or settings that no estimate can come from; the text names the cause and what to do."""
+    """Data or settings that allow no estimate; the text gives the cause and the remedy."""

@@ -1,4 +1,4 @@
-"""The least-squares estimator (9), (10), with what a person needs to trust its answer.
+"""The least-squares estimator (9), (10), with the figures to judge its answer.
 
     Omega' = -Gamma phi phi' Omega + Gamma phi xi                                    (9)
     Gamma' = -Gamma phi phi' Gamma + alpha Gamma                                     (10)

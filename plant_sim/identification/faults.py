@@ -1,4 +1,4 @@
-"""Faults that records have before anything is identified: units, wraps, signals that never move."""
+"""Faults of records, found before identification: units, wraps, constant signals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How likely the symbols of a flight are for a plant: a Gaussian filter that is given them alone.
+"""The likelihood of a flight's symbols for a plant: a Gaussian filter that uses only them.
 
 Every symbol says of one combination of the states, c' x plus a reading error, that it lies between two
 numbers that both ends know; of a sign one of them is infinite. The state is taken as Gaussian. For a

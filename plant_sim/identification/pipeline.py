@@ -50,7 +50,7 @@ COARSE = 100
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """What is asked of an identification; None: found from the data."""
+    """The options of an identification; None: found from the data."""
 
     lag_s: float | None = None
     bandwidth_rad_s: float | None = None
@@ -63,7 +63,7 @@ class Options:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Identification:
-    """The result: two opinions, the parameters that count, and what is to be said about them."""
+    """The result: two estimates, the chosen parameters, and notes about them."""
 
     structure: Structure
     regression: Regression
@@ -79,7 +79,7 @@ class Identification:
     refused: tuple[str, ...]
     """why the data support no model; empty when they do"""
     densities: tuple[float, ...] = ()
-    """of each equation's white disturbance; empty: what the regression leaves unexplained"""
+    """of each equation's white disturbance; empty: the regression's residual"""
     parameters: tuple[Parameter, ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -268,7 +268,7 @@ def disagreements(regression: Regression, check: SimulationFit) -> dict[str, str
 
 
 def doubts(found: Identification) -> Iterable[str]:
-    """Yield what is strange about the parameters themselves."""
+    """Yield warnings about the parameters themselves."""
     structure = found.structure
     if isinstance(structure, PitchStructure) and found.values.get("k_v", 0.0) < 0.0:
         yield "k_v is negative: front and rear voltage are exchanged, or the encoder's sign"

@@ -32,7 +32,7 @@ class PitchStructure:
 
     equilibrium_rad: float | None = None
     volts_max: float = math.inf
-    """where each motor saturates: what is commanded beyond it does not act"""
+    """where each motor saturates: commands beyond it have no further effect"""
     without: frozenset[str] = frozenset()
     kind: str = "pitch"
     order: int = 2

@@ -1,4 +1,4 @@
-"""A recorded stretch of motion: outputs and inputs, evenly sampled, checked."""
+"""A recorded motion: outputs and inputs, evenly sampled, checked."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Record:
     """of each output, how far its values lie apart; 0: as fine as numbers are"""
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be a record; name the signals that have no names."""
+        """Refuse an invalid record; name the signals that have no names."""
         if not (math.isfinite(self.step_s) and self.step_s > 0.0):
             raise IdentificationError(f"the sampling time is {self.step_s} s; it must be above 0")
         if len(self.outputs) != len(self.inputs):

@@ -1,4 +1,4 @@
-"""A second opinion: the parameters whose simulation fits the record best.
+"""A second estimate: the parameters whose simulation fits the record best.
 
 The record is cut into segments. Each is simulated under the recorded inputs, from the initial state
 that fits its outputs best, and the difference to the recorded outputs is minimised by
@@ -60,7 +60,7 @@ class Segments:
     outputs: Array
     inputs: Array
     before: Array
-    """(inputs before each segment, segments, inputs): what the lag remembers"""
+    """(inputs before each segment, segments, inputs): memory of the lag"""
 
     @property
     def scale(self) -> Array:
@@ -140,7 +140,7 @@ def _from_best_states(
 
 
 class _Given(NamedTuple):
-    """What a simulation of all segments begins with."""
+    """The start of a simulation of all segments."""
 
     lag_s: float
     segments: Segments

@@ -1,4 +1,4 @@
-"""Structures: what a model's equations may be, each linear in its parameters.
+"""Structures: the possible equations of a model, each linear in its parameters.
 
 An equation says that a derivative of an output is a sum of terms: a parameter times a derivative of a
 signal. The signals are functions of the outputs, then the inputs, then the constant 1.
@@ -58,7 +58,7 @@ class StateSpace(NamedTuple):
 
 
 class Structure(Protocol):
-    """The equations of a model, and what its parameters mean."""
+    """The equations of a model, and the meaning of its parameters."""
 
     @property
     def kind(self) -> str:
@@ -89,7 +89,7 @@ class Structure(Protocol):
         ...
 
     def parameters(self, values: Mapping[str, float], covariance: Array) -> list[Parameter]:
-        """Return what is reported of the values, those held at 0 included."""
+        """Return the reported values, those held at 0 included."""
         ...
 
 

@@ -1,4 +1,4 @@
-"""What a flight's symbols say, and how likely they are as a function of a structure's parameters."""
+"""The statements of a flight's symbols, and their likelihood for a structure's parameters."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LOG_WRONG_MIN, LOG_WRONG_MAX = -15.0, -0.1
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Symbols:
-    """Symbols as statements about outputs and their rates, and what was commanded meanwhile.
+    """Symbols as statements about outputs and their rates, and the commands meanwhile.
 
     The states are each output and its derivatives below the structure's order, output by output.
     """

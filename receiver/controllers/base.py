@@ -12,7 +12,7 @@ from receiver.controllers.references import Constant, Reference
 
 @dataclass(frozen=True, slots=True)
 class ControllerContext:
-    """The context that a controller from outside gets when it is built."""
+    """The context that an external controller gets when it is built."""
 
     tick_s: float
     """time between two commands"""
@@ -35,8 +35,8 @@ class ControllerContext:
 class Controller(Protocol):
     """A law that turns the estimated state into a command, once per control tick.
 
-    It runs at the receiver only: what it commands travels to the other end on the wire, so it is
-    free to use any arithmetic and to keep any memory.
+    It runs at the receiver only: its commands are sent to the other end, so it may use any
+    arithmetic and keep any memory.
     """
 
     def command(self, tick: int, state: tuple[float, ...]) -> tuple[float, ...]:
@@ -48,8 +48,8 @@ class Controller(Protocol):
         ...
 
     def references(self, tick: int) -> tuple[float | None, ...]:
-        """Return what the controller steers each output to at `tick`; None where it follows nothing.
+        """Return the set-point of each output at `tick`; None if it has none.
 
-        Outputs behind the last one given follow nothing either.
+        Outputs after the last one given have none either.
         """
         ...

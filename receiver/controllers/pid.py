@@ -74,7 +74,7 @@ class PidLoops:
     """
 
     def __init__(self, loops: Sequence[Loop], command_max: Vector, bias: Vector) -> None:
-        """Steer by `loops`; `bias` is what the inputs have without them.
+        """Control by `loops`; `bias` is the input without them.
 
         Each input saturates at its `command_max`.
         """

@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
+
+from channel.protocol.limits import limited
 
 # A time within this share of a tick after the tick counts as the tick itself.
 _TICK_TOLERANCE: Final = 1e-6
@@ -125,6 +128,34 @@ class Listed:
         return self.values[max(bisect_right(self._first_ticks, tick) - 1, 0)]
 
 
+class LimitedReference:
+    """A set-point that keeps within +-`largest` and moves by at most `step` a tick, from `start` on.
+
+    Ticks are asked for in order; of earlier ones the last `KEPT` values are known.
+    """
+
+    KEPT = 4096
+
+    def __init__(self, programme: Reference, start: float, largest: float, step: float) -> None:
+        self._by_hand: float | None = None
+        self.largest = largest
+        self._programme, self._step = programme, step
+        self._tick = -1
+        self._kept = deque([start], self.KEPT)
+
+    def value(self, tick: int) -> float:
+        while self._tick < tick:
+            self._tick += 1
+            by_hand = self._by_hand
+            wanted = self._programme.value(self._tick) if by_hand is None else by_hand
+            self._kept.append(limited(wanted, self._kept[-1], self.largest, self._step))
+        return self._kept[max(tick - self._tick - 1, -len(self._kept))]
+
+    def steer(self, value: float | None) -> None:
+        """Take this in place of the programme, within the same limits; None: the programme again."""
+        self._by_hand = value
+
+
 class SteeredReference:
     """A set-point that is the configured one until a person takes it over in flight.
 
@@ -135,7 +166,8 @@ class SteeredReference:
         self, programme: Reference, stops: tuple[float, float] = (-math.inf, math.inf)
     ) -> None:
         self._programme = programme
-        self.stops = stops
+        largest = programme.largest if isinstance(programme, LimitedReference) else math.inf
+        self.stops = max(stops[0], -largest), min(stops[1], largest)
         """least and largest set-point that the plant can reach"""
         self.by_hand: float | None = None
         """the set-point given by hand; None: the configured reference is followed"""
@@ -143,9 +175,13 @@ class SteeredReference:
     def steer(self, value: float | None) -> None:
         """Take the set-point by hand; None gives it back to the configured reference."""
         self.by_hand = value
+        if isinstance(self._programme, LimitedReference):
+            self._programme.steer(value)
 
     def value(self, tick: int) -> float:
-        return self._programme.value(tick) if self.by_hand is None else self.by_hand
+        if self.by_hand is None or isinstance(self._programme, LimitedReference):
+            return self._programme.value(tick)
+        return self.by_hand
 
 
 def _first_tick(time_s: float, tick_s: float) -> int:

@@ -1,4 +1,4 @@
-"""The controller node of many rigs: one loop that serves each of them as if it were alone.
+"""The controller node of many rigs: one loop serves them all independently.
 
 Every session has its own endpoint; this loop takes in what comes for all of them and keeps their
 deadlines. What goes wrong in one ends that one: an exception closes it, and a transmitter that sends
@@ -48,7 +48,7 @@ class Host(Protocol):
     """Opens and closes services. Its methods return at once."""
 
     def on_unserved(self, name: str, data: bytes) -> list[bytes]:
-        """Take a message of a session that has no service; return what to answer."""
+        """Take a message of a session that has no service; return the answers."""
 
     def ready(self) -> Iterable[tuple[str, Served]]:
         """Return the services that have become ready since the last call."""
@@ -69,7 +69,7 @@ class Served:
     first: bytes
     """message that it was opened for"""
     dropped: int = 0
-    """messages beyond what it may send"""
+    """messages above its limit"""
     queued_ns: int | None = None
     """when the loop will look at it next, as the heap has it"""
     allowance: float = field(default=BURST_MESSAGES)
@@ -207,7 +207,7 @@ class ManyService:
             self._close(served, None)
 
     def _guarded(self, served: Served, action: Callable[..., None], *arguments: object) -> None:
-        """Do something for one session; whatever it raises ends that session and no other."""
+        """Do something for one session; an exception ends only that session."""
         try:
             action(served, *arguments)
         except Exception as error:  # of any kind: the others' motors depend on this loop

@@ -1,4 +1,4 @@
-"""The controller node of one rig: messages drive it, and one timer per slot. It has no tick."""
+"""The controller node of one rig, driven by messages and one timer per slot. It has no tick."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """From words to commands: the receiver's copy of the codec, its controller, and the echoes.
 
-The session decides what was received; this is what follows from it. Each word advances the codec by
+The session decides which word was received; this module applies it. Each word advances the codec by
 one sample, the controller is asked for the commands of the sample's ticks `D` ahead, and what was
 consumed and decided becomes an echo. It knows no slot, no frame and no peer.
 """
@@ -13,6 +13,7 @@ from typing import NamedTuple
 from channel.codec.codec import Codec, CodecState, Vector, Word
 from channel.codec.lead import FlownSample, fly_sample
 from channel.errors import CodecDiverged
+from channel.protocol.compact import CompactForm
 from channel.protocol.events import Event, EventKind, Failing, Tell
 from channel.protocol.frames import Echo
 from channel.protocol.limits import are_plausible, from_steps, to_steps
@@ -74,6 +75,7 @@ class Commander:
         self._echoes: deque[Echo] = deque(maxlen=terms.repeats + 1)
         self._steps: list[int] = []
         """decided for the sample that is being flown"""
+        self._compact = CompactForm(codec, terms) if terms.downlink == "compact" else None
         self._unwritten: list[_Flown] = []
 
     @property
@@ -113,7 +115,7 @@ class Commander:
         before = self.state
         self._steps = []
         try:
-            flown = fly_sample(self.codec, before, word, tuple(self._commands), self._decide)
+            flown = self._flown(word)
         except (ArithmeticError, ValueError) as error:
             raise CodecDiverged(f"the estimate diverged in sample {before.sample}: {error}") from error
         self._commands.extend(flown.commands)
@@ -129,8 +131,21 @@ class Commander:
             self.write_down()
         return tuple(self._echoes)
 
+    def _flown(self, word: Word) -> FlownSample:
+        """Fly a sample with the commands that the controller decides, or with their mean held."""
+        known, held = tuple(self._commands), self.hold
+        flown = fly_sample(self.codec, self.state, word, known, self._decide)
+        if self._compact is None:
+            return flown
+        # The law's first command, held, would steer half a sample late. The mean moves the plant as the
+        # law's own course would, and the law is asked at every tick as ever.
+        steps = self._compact.held(flown.commands, held)
+        self.hold = from_steps(steps, self.terms.signals)
+        self._steps = [*steps] * self.terms.ticks_per_sample
+        return fly_sample(self.codec, self.state, word, known, lambda _tick, _state: self.hold)
+
     def write_down(self) -> None:
-        """Record what was flown since the last call. It can wait until the commands have left."""
+        """Record the samples since the last call. It can wait until the commands were sent."""
         unwritten, self._unwritten = self._unwritten, []
         for before, word, flown, digest, now_ns in unwritten:
             ranges = self.codec.coder.ranges(before.coder)
@@ -138,7 +153,7 @@ class Commander:
             write_commands(self._recorder, self.terms, before.sample, flown, self._references)
 
     def _decide(self, tick: int, state: Vector) -> Vector:
-        """Ask the controller, limit what it wants, and return it as the wire will carry it."""
+        """Ask the controller, limit its command, and return it as sent on the wire."""
         limited = self.terms.limits.apply(self._ask(tick, state), self.hold)
         steps = to_steps(limited, self.terms.signals)
         self._steps += steps
@@ -161,7 +176,7 @@ class Commander:
         return self._no_references
 
     def _ask(self, tick: int, state: Vector) -> Vector:
-        """Return what the controller wants; its last command where it fails or wants nonsense."""
+        """Return the controller's command; its last one if it fails or is not finite."""
         try:
             command = self._controller.command(tick, state)
             if len(command) == len(self.hold) and are_plausible(command):

@@ -11,7 +11,7 @@ from channel.protocol.recording import ARRIVED_CHANNEL, Field, RecordChannel, Re
 from channel.protocol.terms import Terms
 
 ReferencesOf = Callable[[int], tuple[float | None, ...]]
-"""Tick -> what the controller steers each output to."""
+"""Tick -> the set-point of each output."""
 
 TICK_CHANNEL = RecordChannel(
     "tick",
@@ -55,7 +55,7 @@ def write_sample(
 def write_commands(
     recorder: Recorder, terms: Terms, sample: int, flown: FlownSample, references: ReferencesOf
 ) -> None:
-    """Write down the commands that were decided with one sample, and what they steered to."""
+    """Record the commands computed with one sample, and their set-points."""
     tick = sample * terms.ticks_per_sample + terms.lead_ticks
     for predicted, command in zip(flown.live, flown.commands, strict=True):
         row = (tick, references(tick), predicted, command)

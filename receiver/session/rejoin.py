@@ -2,8 +2,8 @@
 
 * An unanswered request is repeated by the transmitter, so equal requests get equal answers for as
   long as nothing was flown on them, unless the answer has grown too old to begin with.
-* A second transmitter is refused while the first one is heard. When the first has fallen silent, the
-  second is taken for the same rig started again.
+* A second transmitter is refused while the first one sends. When the first is silent, the second is
+  treated as the same rig, restarted.
 * A request that contradicts what is known, older than one that was answered or for a sample that the
   clock cannot have reached, is accepted when it persists: one forged or delayed request does nothing.
 * An answer on which no symbol has come is no more than an offer: the next request is answered from
@@ -53,7 +53,7 @@ SILENT_SLOTS = 2
 """Slots missed in a row after which a transmitter may be taken for gone, if another one asks."""
 
 ALIVE_SYMBOLS = 3
-"""Symbols of the present transmitter, after another one asked, that prove it alive."""
+"""Symbols of the present transmitter, after another one's request, that prove it alive."""
 
 KEEP_CODER_SAMPLES = 10
 """After a pause longer than this the coder starts from its initial range: the plant has moved on."""
@@ -73,7 +73,7 @@ class Verdict(Enum):
 
 
 class Greeter:
-    """Judges requests; remembers who is flown with and what was answered."""
+    """Decides on requests; remembers the transmitter and the answers."""
 
     def __init__(self, terms: Terms) -> None:
         self._answer_age_max = terms.samples_in(ANSWER_AGE_NS, ANSWER_AGE_SAMPLES_MAX)
@@ -101,7 +101,7 @@ class Greeter:
         """
         last = self.welcome
         if difference(hello, identity) is not None and hello.incarnation in self._known:
-            # A process does not change what it is: somebody else asks in its name.
+            # A process does not change its identity: somebody else asks in its name.
             return Verdict.IGNORE
         if last is None:
             return self._admit(hello, identity)
@@ -146,7 +146,7 @@ class Greeter:
         self, hello: Hello, identity: Identity, advanced: bool, silent_slots: int
     ) -> Verdict:
         if hello.incarnation != self._unknown_incarnation or silent_slots >= SILENT_SLOTS:
-            # What was on the line when the present one stopped proves nothing for long.
+            # Old symbols on the line do not prove for long that the present one is alive.
             self._unknown_incarnation, self._symbols_since = hello.incarnation, 0
         if self._symbols_since >= ALIVE_SYMBOLS:
             return Verdict.BUSY
@@ -156,7 +156,7 @@ class Greeter:
 
 
 def difference(hello: Hello, ours: Identity) -> str | None:
-    """Return in what a transmitter differs so that it cannot be flown with; None: in nothing."""
+    """Return the difference for which a transmitter is refused; None: no difference."""
     if hello.config_digest != ours.config_digest:
         return (
             "the shared configuration differs: transmitter "

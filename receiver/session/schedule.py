@@ -1,4 +1,4 @@
-"""Which slot is settled next, and when slots are due by this end's clock.
+"""The next slot to decide, and when slots are due by this end's clock.
 
 `SlotClock` settles a slot on its symbol, on a later one, or at its deadline; the schedule of studies
 counts with it too. `Schedule` knows how far ahead of the clock a slot may be, and which symbols count.
@@ -132,7 +132,7 @@ class Proven(NamedTuple):
 
 
 class SlotClock:
-    """Counts the slots of an epoch. What it yields is settled: nothing that comes later changes it."""
+    """Counts the slots of an epoch. Yielded slots are final: later messages do not change them."""
 
     def __init__(self, terms: Terms, slot: int = 0) -> None:
         self.slot = slot
@@ -158,7 +158,7 @@ class SlotClock:
         return self.silent_slots >= self._gap_slots_max
 
     def bridges(self, slot: int) -> bool:
-        """Return whether a slot is so near that what lies between is a gap and no other flight."""
+        """Return whether a slot is so near that the slots between are a gap and not another flight."""
         return abs(slot - self.slot) <= self._gap_slots_max
 
     def anchor(self, at: tuple[int, int] | None) -> None:

@@ -18,6 +18,7 @@ from enum import Enum
 from channel.codec.codec import ERASED, Codec, CodecState
 from channel.line.meters import BaudMeter
 from channel.protocol.bounds import Bounds, within_text_bounds
+from channel.protocol.compact import CompactForm
 from channel.protocol.endings import End, Ending
 from channel.protocol.events import Dropped, Event, EventKind, Presence, ended_event, write_event
 from channel.protocol.frames import (
@@ -57,7 +58,7 @@ class Phase(Enum):
 
 
 class ReceiverSession:
-    """Turns symbols into commands; see the module's text.
+    """Converts symbols to commands; see the module's text.
 
     `session_number` is drawn by the caller (32 bits, not zero), so that the session itself stays
     deterministic. `take_over`: claim a flight that another receiver has.
@@ -100,6 +101,7 @@ class ReceiverSession:
         self._bounds = Bounds(codec, terms, self.counts, self._emit)
         self._schedule = Schedule(terms)
         self._proven = Proven(self._commander.standing, self._schedule, 0, None)
+        self._compact = CompactForm(codec, terms) if terms.downlink == "compact" else None
 
     @property
     def state(self) -> CodecState:
@@ -171,7 +173,7 @@ class ReceiverSession:
         self._emit(Event(EventKind.MALFORMED, detail=why))
 
     def flush_records(self) -> None:
-        """Do what can wait until the frames are on their way: the recording."""
+        """Do the work that can wait until the frames are sent: the recording."""
         self._commander.write_down()
 
     # The handshake
@@ -226,7 +228,7 @@ class ReceiverSession:
                 self._commander.carry_on(first, self._proven.silent_slots // count)
                 state = self.codec.pack(self.state)
             else:
-                # A rig that was started again is at rest, and so is what is known of it.
+                # A restarted rig is at rest, and so is its estimate.
                 self._commander.restart(first)
         self._clock, self._word, self._advanced = SlotClock(self.terms, first * count), [], False
         self._schedule = Schedule(self.terms)
@@ -243,7 +245,7 @@ class ReceiverSession:
         return [welcome]
 
     def _stand_where_proven(self, last: Welcome | None) -> int:
-        """Take back what was offered and never flown; return this end's next sample."""
+        """Undo an offer that was never flown; return this end's next sample."""
         if self._advanced and last is not None:
             standing, silent = self._commander.standing, self._clock.silent_slots
             self._proven = Proven(standing, self._schedule, silent, last.incarnation)
@@ -286,7 +288,6 @@ class ReceiverSession:
         for slot in self._clock.take(symbol.slot):
             frames += self._settle(slot, None, now_ns)
         self._clock.anchor(self._schedule.take(symbol.slot, now_ns, anew=anew))
-        self.meter.on_symbol(now_ns)
         write_symbol(self._recorder, self.terms, symbol, now_ns, taken=True)
         value = self.codec.coder.alphabet.symbols[symbol.number]
         return frames + self._settle(symbol.slot, value, now_ns)
@@ -317,7 +318,7 @@ class ReceiverSession:
         return []
 
     def _on_located_symbol(self, place: LocatedSymbol, now_ns: int) -> list[Frame]:
-        """Take a symbol that says no session, as one of this session, which it can only be."""
+        """Take a symbol without a session number as one of this session."""
         frames: list[Frame] = []
         if place.slot is None:
             self.counts["symbols_misplaced"] += 1
@@ -335,6 +336,7 @@ class ReceiverSession:
 
     def _settle(self, slot: int, symbol: int | None, now_ns: int) -> list[Frame]:
         """Decide what this slot's symbol was; at the end of a word, fly its sample."""
+        self.meter.on_slot(now_ns, came=symbol is not None)
         if symbol is None:
             self.counts["erasures"] += 1
             self._emit(Event(EventKind.ERASED, slot=slot))
@@ -347,12 +349,14 @@ class ReceiverSession:
         word = tuple(symbols) if whole else ERASED
         self.counts["samples"] += 1
         echoes = self._commander.fly(word, self.epoch, now_ns)
+        if self._compact is not None:
+            return [self._compact.packed(self.session_number, self.epoch, echoes)]
         return [Commands(self.session_number, self.epoch, echoes)]
 
     # Ends and reports
 
     def _on_desync(self, theirs: Desync) -> list[Frame]:
-        """Write a failure down and answer with this end's state; the request that follows rejoins."""
+        """Record a failure and answer with this end's state; the request that follows rejoins."""
         if self._bounds.drops(self._bounds.of_report(theirs, self.epoch, self.state.sample)):
             return []
         answer = desync_answer(theirs, self.history, self.codec)

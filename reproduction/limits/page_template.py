@@ -33,8 +33,8 @@ square, q = {nominal:g}:
 {floors}
 
 The rounding of {counts} counts a turn is {rounding:.4f} deg rms. An ideal code reaches that error at
-{at_encoder}; any more bits describe the encoder's steps. The last column treats the rounding as white
-noise: it is a yardstick and no bound. The modes of the helicopter decay, so an estimate stays bounded
+{at_encoder}; further bits describe the encoder's steps. The last column treats the rounding as white
+noise: it is a yardstick, not a bound. The modes of the helicopter decay, so an estimate stays bounded
 without any bit. A pendulum of 7.32 1/s needs more than {pendulum:.2f} bit/s, and `floor` refuses lower
 rates with this number.
 
@@ -49,7 +49,7 @@ made for q; the others do not know it.
 
 ![Error against disturbance]({disturbance_picture})
 
-A seed is easy or hard for all coders alike, so a comparison seed by seed is sharper. Rms error over
+A seed is as hard for one coder as for another, so a comparison seed by seed is sharper. Rms error over
 that of the paper's coder, tuned, on the same seed (geometric mean), q = {nominal:g}:
 
 {pairs}
@@ -142,12 +142,12 @@ strength and {found:.2f} times without. At 20 bit/s the four ratios are {paper_2
 RECORDED: Final = """\
 Rms / largest error as fractions of the largest pitch. For the UIUC recording both coders were tuned on
 its first half, at each rate, and are flown on the second. **The second half is not an unseen flight.**
-Results on it were looked at often while the history coder's search was set up, and they shaped the fit:
-the first half was played at one, two and three times its size because the pushes of the second half are
+Its results were checked often during the set-up of the history coder's search, and influenced the fit:
+the first half was flown at one, two and three times its size because the pushes of the second half are
 harder. There are two fits per rate. The one kept at 10 bit/s is better on the first half (4.57 % on the
 second; the other has 4.89 %). The one kept at 25 bit/s was chosen after its result on the second half
 was known: it is better there (the other has 1.38 %) and slightly worse on the first half. Both rows,
-above all the one at 25 bit/s, flatter the history coder: they show what such a coder can be fitted to,
+above all the one at 25 bit/s, favour the history coder: they show how well such a coder can be fitted,
 and not its error on the next flight. Nothing was tuned on the NTNU recordings. A few pushes cause most
 of these errors, and each error depends on where the samples fall within the push: differences of a
 tenth mean little.

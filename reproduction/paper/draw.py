@@ -61,7 +61,7 @@ def draw_ideal(paths: Sequence[Path]) -> tuple[Series, Series, Series]:
 
 
 def draw_transmission(off: Flown, exact: Flown, paths: Sequence[Path]) -> None:
-    """Figs. 6 and 7: (a) pitch, estimate and error, (b) range M_k; plant 10 % off, exact below."""
+    """Figs. 6 and 7: (a1), (a2) pitch, estimate and error, (b1), (b2) range M_k of both plants."""
     figure, panels = new_figure(4, height=1.75)
     curves, model = _curves(off), _curves(exact)
     upper, error, lower, lower_exact = panels
@@ -77,18 +77,18 @@ def draw_transmission(off: Flown, exact: Flown, paths: Sequence[Path]) -> None:
         label=r"$\theta_*$",
     )
     upper.set_ylabel("rad")
-    upper.set_title("(a) pitch and estimate, plant 10 % off the model", loc="left", fontsize=9)
+    upper.set_title("(a1) pitch and estimate, plant 10 % off the model", loc="left", fontsize=9)
     legend_above(upper)
     for one, colour, label in ((model, FAINT, "exact plant"), (curves, LINE_B, "plant 10 % off")):
         error.plot(
             *decimated(one.times_s, one.pitch_rad - one.coded_rad), color=colour, lw=0.8, label=label
         )
     error.set_ylabel("rad")
-    error.set_title(r"(a) error $e=\theta-\hat\theta$", loc="left", fontsize=9)
+    error.set_title(r"(a2) error $e=\theta-\hat\theta$", loc="left", fontsize=9)
     legend_above(error)
     for panel, one, label in (
-        (lower, curves, "(b) range $M_k$, plant 10 % off"),
-        (lower_exact, model, "(b) range $M_k$, exact plant"),
+        (lower, curves, "(b1) range $M_k$, plant 10 % off"),
+        (lower_exact, model, "(b2) range $M_k$, exact plant"),
     ):
         panel.plot(
             *decimated(one.range_times_s, one.range_rad), color=LINE_B, lw=0.8, drawstyle="steps-post"

@@ -138,8 +138,8 @@ Not flown for this page: the recordings were not at hand (`--data FOLDER`)."""
 
 A Quanser 3-DOF helicopter under its own controller, pushed by hand (120 s, 50 Hz, 4096 counts a turn;
 the first {real.HALF_S:g} s for fitting, the rest for validation). Every constant was fitted on the
-first half alone. The second half was not unseen, though: its pushes are harder, and because plain fits
-did badly on them, simulated pushes were added to the first half for the fit.
+first half alone. The second half is not unseen, though: its pushes are harder, and because plain fits
+were poor there, simulated pushes were added to the first half for the fit.
 
 ![Recorded flight](figures/recorded-flight.png)
 
@@ -147,7 +147,7 @@ did badly on them, simulated pushes were added to the first half for the fit.
 
 Errors are fractions of the largest pitch of the second half,
 {results.flown["uiuc-tuned-10"].pitch_rad:.2f} rad, relative to the encoder, at every 0.02 s. The column
-of ten-bit words is flattered: it assumes that a word of ten bits arrives at the instant of its sample.
+of ten-bit words is optimistic: it assumes that a word of ten bits arrives at the instant of its sample.
 
 {_first_half(first)}
 

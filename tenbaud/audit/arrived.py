@@ -1,4 +1,4 @@
-"""Symbols as they came: one a slot at most, not before they could be there, and those of the words."""
+"""Received symbols: at most one a slot, not before their possible arrival, and those of the words."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def check_words(evidence: Evidence) -> None:
     for sample in sorted({slot // count for slot in found} - known - begun):
         if evidence.is_whole("receiver") or sample < last:
             place = evidence.at("receiver", "sample", f"sample {sample}")
-            place.gap("sample", "it is missing, and a symbol was taken for it")
+            place.gap("sample", "it is missing, but a symbol was accepted for it")
 
 
 @claim(

@@ -29,7 +29,7 @@ from tenbaud.replay.replay import compare
 
 @dataclass(frozen=True, slots=True)
 class Counted:
-    """What was counted in the recordings, not what the ends said of themselves."""
+    """Counts from the recordings, not from the ends' own summaries."""
 
     symbols_sent: int | None
     symbols_refused: int | None
@@ -46,7 +46,7 @@ class Counted:
 
 
 def count(evidence: Evidence) -> Counted:
-    """Count what went over the line."""
+    """Count the traffic on the line."""
     sent = evidence.topic("transmitter", "symbol")
     arrived = evidence.topic("receiver", "symbol")
     paid = [row for row in sent if row.left_ns is not None] if sent.recorded else None
@@ -83,7 +83,7 @@ class Audit:
     counted: Counted
     leaks: list[str] = field(default_factory=list)
     gaps: list[str] = field(default_factory=list)
-    """what the recordings do not show"""
+    """unverified claims"""
     notes: list[str] = field(default_factory=list)
     digests_compared: int = 0
     jittered_states: int = 0
@@ -106,7 +106,7 @@ def audit(path: Path, other: Path | None = None, *, allow_code: bool = False) ->
 
 
 def audit_record(record: FlightRecord) -> Audit:
-    """Audit what was recorded of a flight."""
+    """Audit the recordings of a flight."""
     evidence = Evidence(record)
     _fly(evidence)
     for claim in CLAIMS:
@@ -181,9 +181,9 @@ def _notes(record: FlightRecord) -> list[str]:
     if "transmitter" not in record.tables:
         notes.append("only the receiver's recording is here: when each symbol left is not shown")
     if "receiver" not in record.tables:
-        notes.append("only the transmitter's recording is here: what arrived, and when, is not shown")
+        notes.append("only the transmitter's recording is here: arrivals and their times are unknown")
     if "transmitter" in record.rows and not record.summaries.get("transmitter"):
-        notes.append("there is no summary: how many symbols left in all is not shown")
+        notes.append("there is no summary: the total number of sent symbols is unknown")
     for end, tables in record.tables.items():
         notes += version_notes(tables.path, tables.metadata)
         if not tables.end:

@@ -72,7 +72,7 @@ class Place(NamedTuple):
 
 @dataclass
 class Evidence:
-    """All that an audit has of a flight, and what it finds."""
+    """The data of an audited flight, and the findings."""
 
     record: FlightRecord
     findings: Findings = field(default_factory=Findings)
@@ -84,7 +84,7 @@ class Evidence:
     jittered_states: int = 0
     """states that were computed again with other arrival times"""
     expected: Expected | None = None
-    """what the recordings must hold; None where it cannot be known"""
+    """the expected content of the recordings; None if unknown"""
 
     @property
     def rows(self) -> dict[str, EndRows]:

@@ -1,4 +1,4 @@
-"""Events against what they tell of: epochs, erased slots, late symbols, differences."""
+"""Events against the rows that they report: epochs, erased slots, late symbols, differences."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def check_events(evidence: Evidence) -> None:
     ("receiver", "event", "kind"),
 )
 def check_counts(evidence: Evidence) -> None:
-    """As many events of a kind as there are rows of what they tell of."""
+    """As many events of a kind as rows that they report."""
     for end in filter(evidence.is_whole, evidence.rows):
         for kinds, wanted in _wanted(evidence, end).items():
             found = sum(row.kind in kinds for row in evidence.topic(end, "event"))

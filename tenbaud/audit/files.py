@@ -1,4 +1,4 @@
-"""The files: whose they are, that they hold all rows that were written, and that none was lost."""
+"""The files: the flight that they belong to, and that no written row is missing."""
 
 from __future__ import annotations
 
@@ -81,10 +81,11 @@ def _figures(evidence: Evidence) -> list[tuple[str, str, str, int]]:
     # Without the coder's bits the summary in the transmitter's folder is the receiver's.
     if "coder_bits_up" in evidence.summary("transmitter"):
         samples = evidence.topic("transmitter", "sample").rows
+        checked = sum(bool(row.peer_digest) for row in samples)
         erased = sum(row.word is None for row in samples)
         rejoins = len(evidence.topic("transmitter", "epoch")) - 1
         found += [
-            ("transmitter", "sample", "digest_checks", len(samples)),
+            ("transmitter", "sample", "digest_checks", checked),
             ("transmitter", "sample", "erasures", erased),
             ("transmitter", "epoch", "rejoins", max(0, rejoins)),
         ]

@@ -33,7 +33,7 @@ def check_shape(evidence: Evidence) -> None:
     for end, rows in evidence.rows.items():
         for misfit in rows.misfits:
             place = evidence.at(end, misfit.topic, misfit.row)
-            place.gap(misfit.field, "this is not what a node writes", misfit.text)
+            place.gap(misfit.field, "a node does not write this", misfit.text)
         for topic in rows.foreign:
             evidence.at(end, topic, "every row").gap("", "no node writes this topic")
 

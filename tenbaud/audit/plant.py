@@ -1,4 +1,4 @@
-"""The ticks beside the plant: commands as the receiver gave them, volts as the guard let them pass."""
+"""The ticks at the plant: the receiver's commands, and the guard's voltages."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def check_guard(evidence: Evidence) -> None:
             return
         if by_guard and not is_same(passed.volts, row.applied):
             detail = f"recorded {row.applied}, computed {passed.volts}"
-            place.leak("applied", "it is not what the guard lets pass", detail)
+            place.leak("applied", "it is not the guard's output", detail)
         if passed.changed and row.guard != "running":
             changes.append(now_ns)
         if passed.armed_again and not {now_ns, now_ns - tick_ns} & told:

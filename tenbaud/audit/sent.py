@@ -1,4 +1,4 @@
-"""Symbols as they left: one a slot at most, each while its slot lasts, and those of the words sent."""
+"""Sent symbols: at most one a slot, each within its slot, and those of the words sent."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tenbaud.audit.base import Evidence, claim
 
 @claim("each end recorded its symbols")
 def check_recorded(evidence: Evidence) -> None:
-    """Each end recorded which symbol was in which slot, and what its samples start from."""
+    """Each end recorded the symbol of each slot, and the start of its samples."""
     for end in evidence.rows:
         if not evidence.topic(end, "symbol").recorded:
             evidence.at(end, "symbol", "every slot").gap("", "no symbols were recorded")

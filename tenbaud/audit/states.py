@@ -1,4 +1,4 @@
-"""Both recordings against the flight flown again: each row there, each field as the words give it."""
+"""Both recordings against the replayed flight: every row present, every field as computed."""
 
 from __future__ import annotations
 
@@ -27,7 +27,8 @@ def check_samples(evidence: Evidence) -> None:
     outputs = len(evidence.agreement.signals.outputs)
     corrected = evidence.agreement.codec.model.correction_size
     for end in evidence.rows:
-        fields = SAMPLE_FIELDS if end == "receiver" else (*SAMPLE_FIELDS, "peer_digest")
+        whole = end == "transmitter" and evidence.terms.downlink == "full"
+        fields = (*SAMPLE_FIELDS, "peer_digest") if whole else SAMPLE_FIELDS
         without = tuple(name for name in fields if name != "range")
         for place, row in evidence.each(end, "sample"):
             # None: flown with another receiver, or after the receiver's recording was cut.
@@ -84,7 +85,7 @@ def check_steering(evidence: Evidence) -> None:
     if evidence.steps and not evidence.is_steered:
         tick, angle = evidence.steps[0]
         place = evidence.at("receiver", "tick", f"tick {tick}")
-        place.leak("reference", "nobody was recorded to have moved the set-point", f"{angle!r} rad")
+        place.leak("reference", "no manual change of the set-point is recorded", f"{angle!r} rad")
 
 
 def _check_keys(evidence: Evidence, where: tuple[str, str, str], keys: Iterable[int]) -> None:

@@ -1,1 +1,1 @@
-"""What no code of R bit/s can do better than: `floor` first, then `linear`."""
+"""The theoretical minimum of the error at R bit/s: `floor` first, then `linear`."""

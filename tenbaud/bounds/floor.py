@@ -65,7 +65,7 @@ def _floor_covariance(matrices: tuple[bytes, ...], rate_bit_s: float) -> Matrix:
 
 
 def ideal_worth(model: LinearModel, rate_bit_s: float) -> tuple[Matrix, Matrix]:
-    """Return (P, N): the floor's covariance, and what an error costs an ideal code, now and later.
+    """Return (P, N): the floor's covariance, and the cost of an error for an ideal code, now and later.
 
     With the multipliers lambda of the rate and Z of `K = A P + P A' + Q >= 0`, which fulfil
     `W = lambda/2 P^-1 Q P^-1 + A' Z + Z A`, it is `N = lambda/2 P^-1 - Z`: bits go where the eigenvalue

@@ -1,4 +1,4 @@
-"""Linear models driven by white noise, and the rate without which they cannot be followed at all."""
+"""Linear models driven by white noise, and the smallest rate at which they can be followed."""
 
 from __future__ import annotations
 

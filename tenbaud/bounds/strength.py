@@ -1,4 +1,4 @@
-"""How hard a linear plant is pushed about, from its outputs and the codec's states: for the gap gauge.
+"""The strength of a linear plant's disturbance, from outputs and codec states: for the gap gauge.
 
 Between two samples the error of the codec's estimate moves by known matrices, by the corrections, which
 are known as well, and by the disturbance. So over a window of some samples the measured errors, less

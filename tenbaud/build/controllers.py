@@ -42,11 +42,11 @@ def build_controller(
 def controller_context(
     config: FlightConfig, model: Model, references: References | None = None
 ) -> ControllerContext:
-    """Return what a controller is built with."""
+    """Return the context of a controller."""
     signals = signals_of(model)
     return ControllerContext(
         config.timing.tick_s,
-        build_references(config, signals) if references is None else references,
+        build_references(config, signals, model) if references is None else references,
         build_limits(config, signals).command_max,
         initial_command(config, signals),
         signals,
@@ -55,7 +55,7 @@ def controller_context(
 
 
 def recorded(config: FlightConfig, context: ControllerContext) -> RecordedController:
-    """Return what gives the commands of a recorded flight again."""
+    """Return the controller that repeats the commands of a recorded flight."""
     return RecordedController(read_flight_log(config, context.signals), len(context.signals.inputs))
 
 
@@ -165,7 +165,7 @@ def _value_of(context: ControllerContext, place: int) -> Reading:
 def _rate_of(
     section: PidLoopSection, context: ControllerContext, place: int, value: Reading
 ) -> Reading:
-    """Return what reads the rate of an output: a state, or its difference from tick to tick."""
+    """Return the reader of an output's rate: a state, or its difference from tick to tick."""
     signals = context.signals
     names = [one.name for one in signals.states]
     name = section.rate or f"{signals.outputs[place].name}_rate"

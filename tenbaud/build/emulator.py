@@ -1,4 +1,4 @@
-"""An emulated rig of a configuration: the same plant, talking like a real device."""
+"""The emulated rig of a configuration: the same plant with the interface of a real device."""
 
 from __future__ import annotations
 

@@ -22,6 +22,7 @@ from receiver.endpoint import ReceiverEndpoint, SteppedEndpoint
 from receiver.session.session import ReceiverSession
 from tenbaud.build.codec import build_codec
 from tenbaud.build.controllers import build_controller
+from tenbaud.build.first_contact import require_safe
 from tenbaud.build.flight import Agreement, ticks_of, watchdog_wanted_s
 from tenbaud.build.flight_log import output_steps
 from tenbaud.build.gauge import build_gauge
@@ -81,11 +82,11 @@ def _followed(agreement: Agreement) -> Callable[[int], tuple[float | None, ...]]
         return agreement.parts.controller.references
     if agreement.config.receiver.controller == "recorded":
         return values_of((None,) * len(agreement.signals.outputs))
-    return values_of(build_references(agreement.config, agreement.signals))
+    return values_of(build_references(agreement.config, agreement.signals, agreement.codec.model))
 
 
 def build_observer(agreement: Agreement) -> StateObserver | None:
-    """Return what gives a coder its rates, None for one that does without."""
+    """Return the observer of a coder that uses rates, None for others."""
     codec = agreement.codec
     if not codec.uses_rates:
         return None
@@ -115,7 +116,7 @@ def build_uplink(agreement: Agreement, wire: Wire, recorder: Recorder | None = N
 
 
 def build_line(agreement: Agreement, direction: Direction, wire: SymbolWire) -> Line:
-    """Return one direction of the line, with what goes wrong on it."""
+    """Return one direction of the line, with its impairments."""
     one = agreement.faults.up if direction == "up" else agreement.faults.down
     if not one.any and not agreement.live:
         return CleanLine()
@@ -163,7 +164,7 @@ def build_receiver(
 
 
 def check_parts(config: FlightConfig, parts: Parts | None = None) -> None:
-    """Build what can be wrong in files and texts, so that it is reported before anything starts.
+    """Build the parts from files and texts, so that errors are reported before anything starts.
 
     `parts` are objects in place of what is configured; they are checked already.
     """
@@ -175,14 +176,19 @@ def check_parts(config: FlightConfig, parts: Parts | None = None) -> None:
             _check_command(config, controller, parts)
 
 
-def check_rig_port(config: FlightConfig) -> None:
-    """Raise LinkError where a serial port of the rig is not there; for a process that opens the rig."""
+def check_rig(config: FlightConfig, accept_risk: bool = False, parts: Parts | None = None) -> bool:
+    """Return whether motors of a real rig will turn; for a process that opens the rig.
+
+    LinkError where a serial port of the rig is not there, ConfigError where its motors would turn
+    without what `require_safe` asks for.
+    """
     if config.transmitter.rig == "serial":
         from channel.links.serial.port import check_port
 
         section = config.transmitter.serial
         for port in filter(None, (section.port, section.motor_port)):
             check_port(port, insecure=True)
+    return require_safe(config, accept_risk, parts)
 
 
 def check_sabotage(agreement: Agreement) -> None:

@@ -141,6 +141,7 @@ def build_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:
         initial_command=initial_command(config, signals),
         limits=build_limits(config, signals),
         signals=signals,
+        downlink=config.channel.downlink,
     )
     terms = kind_of_link(config).terms(config.link, codec, terms)
     if lead != "auto":

@@ -1,4 +1,4 @@
-"""The recorded flight of a configuration, read once as long as its files stay the same."""
+"""The recorded flight of a configuration, read again only if its files change."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def _recording_of(config: FlightConfig, signals: Signals | None) -> _Recording:
 
 
 def _changed(name: str) -> tuple[tuple[str, int, int], ...]:
-    """Return what changes with a file, or with one in a folder."""
+    """Return a stamp that changes with a file, or with one in a folder."""
     path = Path(name)
     files = sorted(path.iterdir()) if path.is_dir() else [path]
     stats = [(one.name, one.stat()) for one in files if one.is_file()]

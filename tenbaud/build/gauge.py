@@ -1,4 +1,4 @@
-"""The gap gauge of a flight: its floor, and what finds the strength of the disturbance."""
+"""The gap gauge of a flight: its floor, and the estimator of the disturbance's strength."""
 
 from __future__ import annotations
 

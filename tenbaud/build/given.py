@@ -1,4 +1,4 @@
-"""What a program gives to `fly` as values: gains, set-points, classes; as settings and as parts."""
+"""Values that a program passes to `fly`: gains, set-points, classes; as settings and as parts."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ FORMS = (
 
 
 def feedback_gains(given: Any) -> list[list[float]]:
-    """Return the gains of u = -K x, a row for each input; ConfigError for what is no matrix."""
+    """Return the gains of u = -K x, a row for each input; ConfigError if it is not a matrix."""
     try:
         gains = np.atleast_2d(np.asarray(given, dtype=float))
     except (TypeError, ValueError) as error:

@@ -1,7 +1,7 @@
 """Checks that lead, delays and watchdog allow a flight to recover from every loss of lockstep.
 
-`agree` checks this for every configuration, so that what cannot fly is refused, with numbers, instead
-of asking for a new epoch for ever. `docs/RELIABILITY.md` has the reasoning.
+`agree` checks this for every configuration, so that one that cannot fly is refused, with numbers,
+instead of requesting new epochs for ever. `docs/RELIABILITY.md` has the reasoning.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Checks of parts from outside, given as objects or as classes named in the configuration.
+"""Checks of external parts, given as objects or as classes named in the configuration.
 
 What a part must have is read from its protocol (`Model`, `Coder`, `Plant`, `Controller`), so that the
 protocol is the one place that says it. A part that lacks something is refused before anything moves,
@@ -29,7 +29,7 @@ class PartError(ConfigError):
 
 @dataclass(frozen=True, slots=True)
 class Parts:
-    """Objects that take the place of what a configuration describes; None: as configured."""
+    """Objects that replace configured parts; None: as configured."""
 
     model: Model | None = None
     coder: Coder | None = None
@@ -37,7 +37,7 @@ class Parts:
     controller: Controller | None = None
 
     def check(self) -> None:
-        """Raise PartError for an object that lacks what its part must have."""
+        """Raise PartError for an object that lacks a required attribute of its part."""
         protocols = {"model": Model, "coder": Coder, "plant": Plant, "controller": Controller}
         for name, protocol in protocols.items():
             if (part := getattr(self, name)) is not None:
@@ -100,13 +100,13 @@ def _method_faults(part: object, protocol: type) -> list[str]:
 
 
 def _method_fault(part: object, name: str, takes: Sequence[str]) -> str:
-    """Return what is wrong with one method; empty: nothing."""
+    """Return the fault of one method; empty: none."""
     call = f"({', '.join(takes)})"
     if not hasattr(part, name):
         return f"it has no method {name}{call}"
     method = getattr(part, name)
     if not callable(method):
-        return f"its {name} is no method; it must be one that takes {call}"
+        return f"its {name} is not a method; it must be one that takes {call}"
     try:
         signature = inspect.signature(method)
     except ValueError:  # a builtin whose signature is not known

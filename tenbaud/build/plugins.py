@@ -1,4 +1,4 @@
-"""Parts from outside: a class named `module:Class` in the configuration, loaded and checked.
+"""External parts: a class named `module:Class` in the configuration, loaded and checked.
 
 A module is looked for in the folder that the command was started in, then where Python always looks.
 A class is called with one context object and the options of its section; what it builds must have
@@ -30,7 +30,7 @@ def build_part(
     options: Mapping[str, Any],
     protocol: type,
 ) -> Any:
-    """Return what the function or class of this name builds; PartError if it is not what is needed.
+    """Return the object built by the function or class of this name; PartError if it is unsuitable.
 
     `name` is built in, `module:Class` or what an installed package offers. CodeNotAllowed unless
     the user allowed the configuration's code to run.
@@ -77,7 +77,7 @@ def build_class(
 
 
 def _load_class(field: str, name: str) -> Any:
-    """Return what `module:Class` names; PartError, with a hint, if there is no such thing."""
+    """Return the object that `module:Class` names; PartError, with a hint, if there is none."""
     module_name, _, class_name = name.partition(":")
     here = os.getcwd()
     if here not in sys.path:
@@ -91,8 +91,8 @@ def _load_class(field: str, name: str) -> Any:
                 "installed."
             ) from error
         raise PartError(
-            f"{field} = {name!r}: there is no module {module_name}. It is looked for in the folder "
-            f"that this command was started in ({here}), in PYTHONPATH and among what is installed."
+            f"{field} = {name!r}: there is no module {module_name}. It is searched in the folder in "
+            f"which this command was started ({here}), in PYTHONPATH and among the installed packages."
         ) from error
     except Exception as error:  # the module is the user's code
         raise PartError(

@@ -1,4 +1,4 @@
-"""A preset as objects: the parts of what `tenbaud demo --preset NAME` flies."""
+"""A preset as objects: the parts of the flight of `tenbaud demo --preset NAME`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The configuration of a flight; one that replays a recording takes from it what is not set.
+"""The configuration of a flight; a replay takes unset fields from the recording.
 
 Both ends call this with the same file and the same settings, and come to the same shared configuration.
 Only `tenbaud.log` knows what files look like; here it is known what a flight needs of them.
@@ -22,7 +22,16 @@ from channel.protocol.limits import per_input
 from tenbaud.build.codec import build_model
 from tenbaud.build.flight_log import read_flight_log, recorded_tick_s
 from tenbaud.build.signals import build_limits, configured_signals, initial_command
-from tenbaud.config.load import ConfigError, checked, given_names, merged, merged_values, nested
+from tenbaud.config.load import (
+    ConfigError,
+    checked,
+    given_names,
+    load_config,
+    merged,
+    merged_values,
+    nested,
+    read_toml,
+)
 from tenbaud.config.models import LinearModelSection
 from tenbaud.config.models import ModelSection as BuiltInModel
 from tenbaud.config.schema import FlightConfig, Timing
@@ -59,8 +68,16 @@ def flight_config(
         _fit_tick(values.setdefault("timing", {}))
     config = checked(values, path, allow_code=allow_code)
     if config.transmitter.rig != "replay":
-        return config
+        return config.giving(_decided(given, path, config))
     return _Adoption(values, path, given, config).config()
+
+
+def _decided(given: set[str], path: Path | None, config: FlightConfig) -> set[str]:
+    """Return the names that a person gave: a file that a flight wrote has every field of its preset."""
+    written = path is not None and FlightConfig.model_fields.keys() <= read_toml(path).keys()
+    if written and config.limits.command_max == load_config(config.preset).limits.command_max:
+        return given - {"limits.command_max"}
+    return given
 
 
 def _replays(overrides: dict[str, Any]) -> bool:
@@ -89,7 +106,7 @@ class _Adoption:
         self._config = config
 
     def config(self) -> FlightConfig:
-        """Return the configuration with what the recording decides."""
+        """Return the configuration with the recording's settings."""
         self._take_tick(recorded_tick_s(self._config))
         # From here on in its own ticks.
         log = read_flight_log(self._config)
@@ -257,7 +274,7 @@ def largest_commands(log: FlightLog, signals: Signals) -> Vector:
 
 
 def replay_notes(config: FlightConfig) -> tuple[str, ...]:
-    """Return what a replay does with its recording, a line each, for people; () for other flights."""
+    """Return notes on a replay's use of its recording, a line each; () for other flights."""
     return tuple(_notes(config)) if config.transmitter.rig == "replay" else ()
 
 

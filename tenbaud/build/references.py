@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
+from channel.codec.codec import Model
 from channel.codec.signals import Signal, Signals
-from receiver.controllers.references import Constant, Listed, Reference, Shifted, Sine, Square, Step
+from receiver.controllers.references import (
+    Constant,
+    LimitedReference,
+    Listed,
+    Reference,
+    Shifted,
+    Sine,
+    Square,
+    Step,
+)
+from tenbaud.build.signals import per_output
 from tenbaud.config.controllers import ReferenceSection
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
@@ -33,8 +45,11 @@ def reference_sections(
     return tuple([(one, None if own is None or own.kind == "none" else own) for one, own in found])
 
 
-def build_references(config: FlightConfig, signals: Signals) -> References:
-    """Return the set-point of each output over the ticks; None for one that follows nothing."""
+def build_references(config: FlightConfig, signals: Signals, model: Model | None = None) -> References:
+    """Return the set-point of each output over the ticks; None for one that follows nothing.
+
+    Limited ones move from the outputs at the start of `model`, without it from 0.
+    """
     tick_s = config.timing.tick_s
     found: list[Reference | None] = []
     stops: dict[str, tuple[float, float]] = getattr(config.model, "stops", {})
@@ -42,7 +57,32 @@ def build_references(config: FlightConfig, signals: Signals) -> References:
         found.append(None if section is None else reference_of(section, tick_s, output))
         if section is not None and output.name in stops:
             _require_within(stops[output.name], section, found[-1], output)
-    return tuple(found)
+    limits = set_point_limits(config, signals, model)
+    return tuple([one and limits_kept(one, of) for one, of in zip(found, limits, strict=True)])
+
+
+SetPointLimits = tuple[float, float, float] | None
+"""Start, largest value and step per tick; None: no limit."""
+
+
+def set_point_limits(
+    config: FlightConfig, signals: Signals, model: Model | None
+) -> tuple[SetPointLimits, ...]:
+    """Return the limits of the set-point of each output."""
+    section, tick_s = config.limits, config.timing.tick_s
+    largest = per_output("limits.set_point_max", section.set_point_max, signals)
+    slew = per_output("limits.set_point_slew_per_s", section.set_point_slew_per_s, signals)
+    free = (math.inf,) * len(signals.outputs)
+    if not largest and not slew:
+        return (None,) * len(free)
+    start = (0.0,) * len(free) if model is None else model.measured(model.initial())
+    steps = [one * tick_s for one in slew or free]
+    return tuple(zip(start, largest or free, steps, strict=True))
+
+
+def limits_kept(reference: Reference, limits: SetPointLimits) -> Reference:
+    """Return a set-point that keeps to its limits."""
+    return reference if limits is None else LimitedReference(reference, *limits)
 
 
 def _require_within(
@@ -65,7 +105,7 @@ def _require_within(
 
 
 def values_of(references: References) -> Callable[[int], tuple[float | None, ...]]:
-    """Return what gives the values of all set-points at a tick."""
+    """Return the function from a tick to all set-points."""
     if len(references) == 1 and references[0] is not None:
         value = references[0].value
         return lambda tick: (value(tick),)

@@ -23,7 +23,7 @@ from tenbaud.config.kinds import PLANTS
 from tenbaud.config.load import ConfigError
 from tenbaud.config.models import PitchModelSection
 from tenbaud.config.rig_schema import AxisSection
-from tenbaud.config.schema import FlightConfig
+from tenbaud.config.schema import FlightConfig, TransmitterSection
 from tenbaud.log.units import turn_in
 from transmitter.rigs.axes import Axis, Motors
 from transmitter.rigs.base import Rig
@@ -73,9 +73,20 @@ def build_device(config: FlightConfig, output: bool, signals: Signals | None = N
     except ValueError as error:
         raise ConfigError(f"transmitter.{section.rig}: {error}") from error
     raise ConfigError(
-        f"rig = {section.rig!r} is no device; name one: --rig cobs:PORT, ascii:PORT, qsb:PORT, "
+        f"rig = {section.rig!r} is not a device; name one: --rig cobs:PORT, ascii:PORT, qsb:PORT, "
         "quarc:HOST:PORT, quarc-server:PORT or hil"
     )
+
+
+def real_rig_name(section: TransmitterSection) -> str:
+    """Return where a real rig is, in a few words."""
+    match section.rig:
+        case "serial":
+            return f"rig at {section.serial.port}, {section.serial.format}"
+        case "quarc":
+            return f"QUARC model at {section.quarc.host}:{section.quarc.port}"
+        case _:
+            return f"Quanser {section.hil.card_type} {section.hil.card_identifier}"
 
 
 def build_plant(config: FlightConfig, step_s: float, signals: Signals | None = None) -> Plant:

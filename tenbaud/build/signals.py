@@ -1,4 +1,4 @@
-"""What a configuration gives for the inputs and outputs of its model, in their order."""
+"""The settings of a configuration for the inputs and outputs of its model, in their order."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from plant_sim.encoder import OutputReader
 from tenbaud.build.codec import build_model
 from tenbaud.build.parts import Parts
 from tenbaud.config.load import ConfigError
-from tenbaud.config.schema import FlightConfig
+from tenbaud.config.schema import FlightConfig, PerOutput
 from tenbaud.design.encoders import check_outputs, encoders_of, output_names, steps_of
 
 
@@ -51,7 +51,14 @@ def _command(field: str, given: float | tuple[float, ...], signals: Signals) -> 
 
 def soft_limits(config: FlightConfig, signals: Signals) -> Vector:
     """Return the largest value of each output before the guard steps in; () without any."""
-    field, given = "transmitter.soft_limits", config.transmitter.soft_limits
+    return per_output("transmitter.soft_limits", config.transmitter.soft_limits, signals)
+
+
+def per_output(field: str, given: PerOutput, signals: Signals) -> Vector:
+    """Return one value for each output, infinity for one that a table leaves out.
+
+    () where none is given; ConfigError where they do not fit the outputs.
+    """
     if given is None:
         return ()
     if isinstance(given, dict):

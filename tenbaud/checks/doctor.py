@@ -8,15 +8,19 @@ import platform
 import socket
 import sys
 import time
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
 
 from channel.errors import LinkError
 from channel.links.base import Link
 from channel.links.endpoints import free_endpoint
+from channel.links.serial.budget import least_rate_baud
+from channel.links.serial.wire import SerialWire
 from channel.protocol.frames import Symbol
+from channel.protocol.terms import Rung
 from channel.protocol.wire import encode
-from tenbaud.build.flight import agree
+from tenbaud.build.codec import build_codec
+from tenbaud.build.flight import agree, build_terms
 from tenbaud.config.schema import FlightConfig
 from tenbaud.config.version import software_version
 from transmitter.rigs.serial_ports import list_ports
@@ -47,6 +51,7 @@ def examine(config: FlightConfig, connect: tuple[str, ...] = ()) -> list[Finding
         *_numerics(config),
         *_clock(config),
         *_ports(),
+        serial_line(config),
         *_vendor(),
         *_zenoh(),
         *(_reach(endpoint) for endpoint in connect),
@@ -126,6 +131,26 @@ def _ports() -> list[Finding]:
         else Finding("problem", "serial port", f"{port.device}: not permitted; {port.remedy}")
         for port in ports
     ]
+
+
+def serial_line(config: FlightConfig) -> Finding:
+    """Say which serial line carries the flight, with either downlink."""
+    try:
+        needs = ", ".join(f"{least} baud {rung}" for rung, least in line_rates(config).items())
+    except ValueError as error:
+        return Finding("note", "serial line", f"none carries preset {config.preset}: {error}")
+    return Finding(
+        "ok", "serial line", f"preset {config.preset} needs at least {needs} (channel.downlink)"
+    )
+
+
+def line_rates(config: FlightConfig) -> dict[Rung, int]:
+    """Return the least rate of a serial line for each downlink; ValueError where no line carries it."""
+    codec = build_codec(config)
+    on_memory = config.model_copy(update={"link": config.link.model_copy(update={"kind": "memory"})})
+    terms = build_terms(on_memory, codec, "real")
+    SerialWire(len(codec.coder.alphabet.symbols))
+    return {rung: least_rate_baud(replace(terms, downlink=rung), codec) for rung in get_args(Rung)}
 
 
 def _vendor() -> list[Finding]:

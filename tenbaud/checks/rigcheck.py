@@ -14,9 +14,10 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from tenbaud.build.rig import build_device
+from tenbaud.build.rig import build_device, real_rig_name
+from tenbaud.checks.proposal import proposed
+from tenbaud.config.load import nested, toml_text
 from tenbaud.config.schema import FlightConfig
-from tenbaud.flight.summary import real_rig_name
 from transmitter.rigs.axes import Axis
 from transmitter.rigs.formats.samples import DeviceFlag, DeviceSample
 
@@ -38,6 +39,8 @@ class AxisCheck:
     angle_max_rad: float
     rate_max_rad_per_s: float = 0.0
     moved: bool = False
+    noise_counts: int | None = None
+    """smallest span of the counts over `RATE_SPAN_S`: what is left of it at rest is noise"""
 
 
 @dataclass(slots=True)
@@ -55,6 +58,10 @@ class RigCheck:
     axes: list[AxisCheck] = field(default_factory=list)
     counts: dict[str, Any] = field(default_factory=dict)
     problems: list[str] = field(default_factory=list)
+    proposal: dict[str, Any] = field(default_factory=dict)
+    """settings of a first flight, by their full names"""
+    not_seen: list[str] = field(default_factory=list)
+    """what these settings do not rest on"""
 
 
 class _Watcher:
@@ -68,6 +75,7 @@ class _Watcher:
         self.longest_gap_ns = 0
         self._before = first
         self._rate_from = (first, angles)
+        self._spans = [(axis.counts_first, axis.counts_first) for axis in self.axes]
 
     def take(self, sample: DeviceSample, angles: tuple[float, ...]) -> None:
         self.longest_gap_ns = max(self.longest_gap_ns, sample.host_ns - self._before.host_ns)
@@ -80,9 +88,16 @@ class _Watcher:
             axis.angle_min_rad = min(axis.angle_min_rad, angle)
             axis.angle_max_rad = max(axis.angle_max_rad, angle)
             axis.moved |= axis.counts_last != axis.counts_first
+            least, most = self._spans[index]
+            span = self._spans[index] = min(least, axis.counts_last), max(most, axis.counts_last)
             if span_s >= RATE_SPAN_S:
                 rate = abs(angle - start_angles[index]) / span_s
                 axis.rate_max_rad_per_s = max(axis.rate_max_rad_per_s, rate)
+                width = span[1] - span[0]
+                axis.noise_counts = min(
+                    width, width if axis.noise_counts is None else axis.noise_counts
+                )
+                self._spans[index] = (axis.counts_last, axis.counts_last)
         if span_s >= RATE_SPAN_S:
             self._rate_from = (sample, angles)
 
@@ -118,11 +133,14 @@ def check_rig(config: FlightConfig, seconds: float, live: bool) -> RigCheck:
         samples_per_s=samples / seconds,
         longest_gap_ms=watcher.longest_gap_ns / 1e6,
         device_clock_ppm=_clock_ppm(first, last),
-        flags=[str(flag.name).lower() for flag in DeviceFlag if flag & last.flags],
+        flags=[
+            str(flag.name).lower() for flag in (*DeviceFlag, DeviceFlag.EMULATED) if flag in last.flags
+        ],
         axes=watcher.axes,
         counts=figures,
     )
-    return replace(result, problems=_problems(result, config))
+    settings, not_seen = proposed(config, result.axes)
+    return replace(result, problems=_problems(result, config), proposal=settings, not_seen=not_seen)
 
 
 def _clock_ppm(first: DeviceSample, last: DeviceSample) -> float | None:
@@ -184,7 +202,7 @@ def show_check(result: RigCheck) -> None:
         title=f"{result.rig}: {result.seconds:g} s, its output never opened", title_justify="left"
     )
     table.add_column("axis (channel)")
-    for heading in ("counts", "rad now", "least", "most", "rad/s", "moved"):
+    for heading in ("counts", "rad now", "least", "most", "rad/s", "noise", "moved"):
         table.add_column(heading, justify="right")
     for axis in result.axes:
         table.add_row(
@@ -194,6 +212,7 @@ def show_check(result: RigCheck) -> None:
             f"{axis.angle_min_rad:+.3f}",
             f"{axis.angle_max_rad:+.3f}",
             f"{axis.rate_max_rad_per_s:.2f}",
+            "" if axis.noise_counts is None else str(axis.noise_counts),
             "yes" if axis.moved else "no",
         )
     console.print(table)
@@ -216,5 +235,11 @@ def show_check(result: RigCheck) -> None:
         f"position to be 0: {field}.zero_counts = {axis.counts_last}",
         highlight=False,
     )
+    console.print(
+        "\nFor a first flight, in a file for --config (or with --write FILE):\n", highlight=False
+    )
+    console.print(toml_text(nested(result.proposal)), highlight=False, markup=False, soft_wrap=True)
+    for line in result.not_seen:
+        console.print(f"not seen: {line}", highlight=False)
     for problem in result.problems:
         console.print(f"problem: {problem}", highlight=False, style="bold")

@@ -1,4 +1,4 @@
-"""From the address options of a command to endpoints: what is missing is filled in, or refused."""
+"""From the address options of a command to endpoints: missing ones get defaults, or are refused."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def endpoints_of(
     take_over: bool = False,
     sessions: str | None = None,
 ) -> Endpoints:
-    """Return where an end listens and connects; LinkError or KeysError where that is refused.
+    """Return where an end listens and connects; LinkError or KeysError if that is refused.
 
     `sessions` is the pattern of session names of an end that serves many.
     """
@@ -69,7 +69,7 @@ def endpoints_of(
 
 
 def security_of(role: Role, addresses: options.Addresses, session: str) -> Security | None:
-    """Return the credentials of `--keys` with all who are invited, or None without keys."""
+    """Return the credentials of `--keys` with all invited nodes, or None without keys."""
     from channel.links.security import Invited, Security
 
     if addresses.keys is None:

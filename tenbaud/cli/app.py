@@ -31,13 +31,13 @@ def main() -> None:
     if error is not None:
         from tenbaud.flight.outcome import ExitCode
 
-        _say(f"standard output cannot be written: {_reason(error)}; what belongs there is lost")
+        _say(f"standard output cannot be written: {_reason(error)}; that output is lost")
         code = code or int(ExitCode.NOT_WRITTEN)
     leave(code)
 
 
 def run(arguments: list[str]) -> int:
-    """Run one command in this process, say what went wrong, and return its exit code."""
+    """Run one command in this process, print its error, and return its exit code."""
     from channel.errors import TenbaudError
     from tenbaud.cli.commands import app_for
     from tenbaud.flight.outcome import ExitCode, outcome_of

@@ -7,20 +7,24 @@ from importlib.util import find_spec
 
 import typer
 
+from tenbaud.cli.flags import Command, Group
+
 PANEL = "Models, coders, studies"
 
 
 def add_commands(app: typer.Typer) -> None:
-    """Add `figures` and `bench coders`; where there is no checkout, what says that they need one."""
-    bench = typer.Typer(no_args_is_help=True, help="Compare coders with the theoretical minimum.")
-    # Keeps `coders` a command of its own, however few there are.
+    """Add `figures` and `bench coders`; without a checkout, commands that report the need for one."""
+    bench = typer.Typer(
+        cls=Group, no_args_is_help=True, help="Compare coders with the theoretical minimum."
+    )
+    # Keeps `coders` a subcommand although it is the only one.
     bench.callback()(lambda: None)
     app.add_typer(bench, name="bench", rich_help_panel=PANEL)
     if find_spec("reproduction") is not None:
         from reproduction.commands import coders, figures
 
-        app.command(rich_help_panel=PANEL)(figures)
-        bench.command()(coders)
+        app.command(cls=Command, rich_help_panel=PANEL)(figures)
+        bench.command(cls=Command)(coders)
         return
     anything = {"allow_extra_args": True, "ignore_unknown_options": True}
     app.command("figures", rich_help_panel=PANEL, context_settings=anything)(_needs_checkout("figures"))

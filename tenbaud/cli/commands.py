@@ -1,4 +1,4 @@
-"""The commands, gathered. Each lives in a separate module beside this one."""
+"""All commands. Each is in a separate module beside this one."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ import typer
 
 from tenbaud.cli import demo, design, identify, keys, log, nodes, rig, router, runs, sweep, tune, view
 from tenbaud.cli.checkout import add_commands
+from tenbaud.cli.flags import Command, Group
 
 app = typer.Typer(
+    cls=Group,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
@@ -42,7 +44,18 @@ def _root(
 
 for panel, commands in (
     ("Fly", (demo.demo, nodes.transmit, nodes.receive, view.view, runs.presets)),
-    ("What was flown", (runs.inspect, runs.diff, runs.replay, runs.audit, runs.convert, runs.recover)),
+    (
+        "What was flown",
+        (
+            runs.inspect,
+            runs.compare,
+            runs.diff,
+            runs.replay,
+            runs.audit,
+            runs.convert,
+            runs.recover,
+        ),
+    ),
     ("Rigs and machines", (rig.doctor, rig.rig, rig.rig_check, router.router)),
     (
         "Models, coders, studies",
@@ -50,15 +63,16 @@ for panel, commands in (
     ),
 ):
     for command in commands:
-        app.command(command.__name__.replace("_", "-"), rich_help_panel=panel)(command)
+        name = command.__name__.replace("_", "-")
+        app.command(name, cls=Command, rich_help_panel=panel)(command)
 app.add_typer(keys.app, name="keys", rich_help_panel="Rigs and machines")
 add_commands(app)
 
 
 def app_for(arguments: list[str]) -> typer.Typer:
-    """Return the app with the one command that is asked for: the others take time to build.
+    """Return the app with only the requested command: the others take time to build.
 
-    Where the first argument is no command of its own, it is the whole app.
+    If the first argument is not a command, return the whole app.
     """
     commands = [one for one in app.registered_commands if [one.name] == arguments[:1]]
     if not commands:

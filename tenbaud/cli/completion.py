@@ -1,4 +1,4 @@
-"""What a shell completes beside commands and options: names of presets and of fields."""
+"""Shell completion of preset and field names."""
 
 from __future__ import annotations
 

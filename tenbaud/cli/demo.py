@@ -1,4 +1,4 @@
-"""`tenbaud demo`: both ends on this machine, from nothing to a figure."""
+"""`tenbaud demo`: both ends on this machine, and a figure."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import typer
 
 from tenbaud.cli import options
 from tenbaud.cli.log_options import LogOptions
+from tenbaud.cli.motors import MotorOptions, confirm_motors
 from tenbaud.cli.spread import spread
 
 if TYPE_CHECKING:
@@ -23,13 +24,14 @@ DEFAULT_PRESET = "tuned-10baud"
 DEFAULT_MISMATCH = 0.1
 """No model is exact."""
 VIEW_DURATION_S = 3600.0
-"""A flight that is looked at lasts until somebody stops it, or this long."""
+"""A viewed flight lasts until it is stopped, or this long."""
 
 
 @spread
 def demo(
     flight: options.FlightOptions,
     log: LogOptions,
+    risk: MotorOptions,
     mismatch: options.Mismatches = None,
     view: options.View = False,
     view_port: options.ViewPort = 8710,
@@ -60,7 +62,7 @@ def demo(
         own = any(one.startswith(("model.", "transmitter.plant.")) for one in flight.settings or ())
         flights = list(mismatch or (None if own else DEFAULT_MISMATCH,))
     changes = [options.overrides(**options.fields_of(flight), mismatch=off, log=log) for off in flights]
-    agreements = _agree_all(flight, changes)
+    agreements = _agree_all(flight, changes, risk)
     pace = _checked_pace(agreements[0], pace, view)
     view_options = _view_options(agreements, view, view_port, open_browser)
     from tenbaud.flight.demo import fly_demo
@@ -70,7 +72,7 @@ def demo(
 
 
 def _checked_pace(agreement: Agreement, pace: float | None, view: bool) -> float | None:
-    """Return how many times real time to fly at most; a flight that is looked at keeps to 1."""
+    """Return the highest multiple of real time; for a viewed flight it is 1."""
     virtual = agreement.clock == "virtual" and not agreement.link.in_process
     if pace is not None and not virtual:
         raise typer.BadParameter("--pace slows the virtual clock of two processes down, and no other")
@@ -80,7 +82,7 @@ def _checked_pace(agreement: Agreement, pace: float | None, view: bool) -> float
 def _view_options(
     agreements: list[Agreement], view: bool, port: int, open_browser: bool
 ) -> ViewOptions | None:
-    """Return how the flight is to be looked at, if it is, checked before anything starts."""
+    """Return the options of the view, if any, checked before anything starts."""
     if not view:
         if open_browser:
             raise typer.BadParameter("--open opens the live page; it goes with --view")
@@ -98,9 +100,11 @@ def _view_options(
     return ViewOptions(address.port, open_browser)
 
 
-def _agree_all(flight: options.FlightOptions, changes: list[dict[str, Any]]) -> list[Agreement]:
+def _agree_all(
+    flight: options.FlightOptions, changes: list[dict[str, Any]], risk: MotorOptions
+) -> list[Agreement]:
     """Return the flights, each checked as far as it can be before anything starts."""
-    from tenbaud.build.ends import check_parts, check_rig_port, check_sabotage
+    from tenbaud.build.ends import check_parts, check_rig, check_sabotage
     from tenbaud.build.flight import agree
     from tenbaud.build.recorded import flight_config, replay_notes
 
@@ -110,10 +114,12 @@ def _agree_all(flight: options.FlightOptions, changes: list[dict[str, Any]]) -> 
     agreements = [agree(one, flight.clock.value) for one in configs]
     for agreement in agreements:
         check_parts(agreement.config)
-        check_rig_port(agreement.config)
+        motors = check_rig(agreement.config, risk.accept_risk)
         check_sabotage(agreement)
     for note in replay_notes(configs[0]):
         typer.echo(f"  {note}", err=True)
+    if motors:
+        confirm_motors(configs[0], risk.yes)
     return agreements
 
 

@@ -1,4 +1,4 @@
-"""`tenbaud floor` and `tenbaud design`: what a rate allows, and the constants that come near to it."""
+"""`tenbaud floor` and `tenbaud design`: the least error at a rate, and a coder that approaches it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def floor(
         str | None, typer.Option(help="A linear plant by name instead of a configuration's.")
     ] = None,
     rate: Annotated[
-        float | None, typer.Option(help="In bit/s; the flight's if not given.", min=1e-6, max=1e9)
+        float | None, typer.Option(help="Rate in bit/s; the flight's if not given.", min=1e-6, max=1e9)
     ] = None,
     json: options.AsJson = False,
 ) -> None:
@@ -47,7 +47,7 @@ def floor(
         section: Any = _known(plant_section, plant)
         tick_s = 0.01
     else:
-        # Its codec is not built: that refuses a rate that is too low, which is what may be asked about.
+        # Its codec is not built: that would refuse a rate that is too low.
         flown = load_config(preset, config)
         section, tick_s = flown.model, flown.timing.tick_s
         if rate is None:
@@ -76,7 +76,7 @@ def design(
 ) -> None:
     """Complete a configuration: discretise its linear model, design its `direction` coder.
 
-    Once, for both ends: give the same completed file to the transmitter and the receiver.
+    Run it once: give the same completed file to the transmitter and the receiver.
 
     [dim]tenbaud design --config plant.toml --out flight.toml[/dim]
     """
@@ -95,7 +95,7 @@ def design(
 
 
 def _known(function: Any, *arguments: Any) -> Any:
-    """Call a function whose ValueError is about what was asked for."""
+    """Call a function whose ValueError is about the command's arguments."""
     try:
         return function(*arguments)
     except ValueError as error:

@@ -39,14 +39,14 @@ Forgetting = Annotated[
 Structure = Annotated[
     str,
     typer.Option(
-        help="pitch, first-order, integrator, integrator:ORDER, siso:N,M or linear; one that suits "
+        help="pitch, first-order, integrator, integrator:ORDER, siso:N,M or linear; chosen by "
         "model and signals if not given.",
         show_default=False,
     ),
 ]
 Lag = Annotated[
     str,
-    typer.Option(help="Motor lag: auto (model.motor_lag_s where it is set, else found), or s."),
+    typer.Option(help="Motor lag: auto (model.motor_lag_s if set, else estimated), or s."),
 ]
 
 
@@ -56,7 +56,7 @@ def identify(
     log: LogOptions,
     source: Annotated[
         Path | None,
-        typer.Argument(help="A log or the folder of a run; not given: the simulated rig is excited."),
+        typer.Argument(help="A log or the folder of a run; not given: excite the simulated rig."),
     ] = None,
     structure: Structure = "",
     lag: Lag = "auto",
@@ -69,7 +69,7 @@ def identify(
         ),
     ] = None,
     equilibrium: Annotated[
-        str, typer.Option(help="theta_0: auto, quiet (a stretch at rest), estimate, or rad.")
+        str, typer.Option(help="theta_0: auto, quiet (an interval at rest), estimate, or rad.")
     ] = "auto",
     bandwidth: Bandwidth = None,
     damping: Damping = 0.7,
@@ -78,18 +78,18 @@ def identify(
         bool,
         typer.Option(
             "--from-bits",
-            help="Use only what crossed the wire of a run: symbols and commands.",
+            help="Use only the transmitted data of a run: symbols and commands.",
         ),
     ] = False,
     fly: Annotated[
-        bool, typer.Option("--fly/--no-fly", help="Fly the record with what was identified.")
+        bool, typer.Option("--fly/--no-fly", help="Fly the record with the identified model.")
     ] = True,
     out: options.Out = None,
     json: options.AsJson = False,
 ) -> None:
     """Identify a plant, write a configuration that flies it, and Figs. 3 and 4.
 
-    Exit code 1, and no configuration, where the data support no model, or none that flies.
+    Exit code 1, and no configuration, if the data support no model, or none that flies.
 
     [dim]tenbaud identify[/dim]
 

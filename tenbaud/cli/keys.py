@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from channel.links.endpoints import DEFAULT_PORT
+from tenbaud.cli.flags import Command, Group
 
 if TYPE_CHECKING:
     from tenbaud.keys.authority import Certified
     from tenbaud.keys.store import NodeKeys
 
 app = typer.Typer(
+    cls=Group,
     no_args_is_help=True,
     rich_markup_mode="rich",
     help="""Keys for a flight between two machines.
@@ -28,17 +30,17 @@ app = typer.Typer(
     """,
 )
 
-Folder = Annotated[Path, typer.Option("--folder", help="Where the authority and the nodes are.")]
+Folder = Annotated[Path, typer.Option("--folder", help="Folder of the authority and the nodes.")]
 Hosts = Annotated[
     list[str] | None,
     typer.Option("--host", help="Address or name at which others connect to it; repeatable."),
 ]
-Days = Annotated[float, typer.Option(help="How long the certificate is valid.", min=0.01, max=3650.0)]
+Days = Annotated[float, typer.Option(help="Validity of the certificate in days.", min=0.01, max=3650.0)]
 Name = Annotated[str, typer.Argument(help="Name of the node, such as rig.")]
 DEFAULT_FOLDER = Path("keys")
 
 
-@app.command()
+@app.command(cls=Command)
 def init(folder: Folder = DEFAULT_FOLDER) -> None:
     """Make the authority that signs the nodes' certificates; once, on one machine."""
     from tenbaud.keys.store import create_authority
@@ -48,7 +50,7 @@ def init(folder: Folder = DEFAULT_FOLDER) -> None:
     typer.echo(next_steps(()))
 
 
-@app.command()
+@app.command(cls=Command)
 def add(
     name: Name,
     role: Annotated[str | None, typer.Option(help="transmitter, receiver, router or viewer.")] = None,
@@ -68,9 +70,9 @@ def add(
     typer.echo(next_steps(read_nodes(folder)))
 
 
-@app.command()
+@app.command(cls=Command)
 def renew(name: Name, host: Hosts = None, days: Days = 365.0, folder: Folder = DEFAULT_FOLDER) -> None:
-    """Make a node's key and certificate anew, before or after it expires; copy its folder again."""
+    """Renew a node's key and certificate, expired or not; then copy its folder again."""
     from tenbaud.keys.store import renew_node
 
     node = renew_node(folder, name, tuple(host or ()), days)
@@ -78,13 +80,13 @@ def renew(name: Name, host: Hosts = None, days: Days = 365.0, folder: Folder = D
     typer.echo(f"Copy {node.folder} to its machine again, and start its end again there.")
 
 
-@app.command()
+@app.command(cls=Command)
 def show(
     folder: Annotated[
         Path, typer.Argument(help="Folder of all keys, or of one node.")
     ] = DEFAULT_FOLDER,
 ) -> None:
-    """List the nodes, until when they are valid, and the commands for the two machines."""
+    """List the nodes, their expiry dates, and the commands for the two machines."""
     from tenbaud.keys.store import KeysError, expiry_warning, read_node, read_nodes
 
     nodes = [read_node(folder)] if (folder / "node.pem").exists() else read_nodes(folder)
@@ -114,7 +116,7 @@ def endpoint_of(host: str) -> str:
 
 
 def next_steps(nodes: Sequence[NodeKeys]) -> str:
-    """Return what is still to be added, or the commands for the machines of a whole set."""
+    """Return the next node to add, or the commands for the machines of a whole set."""
     transmitter = _first(nodes, "transmitter")
     receiver = _first(nodes, "receiver")
     router = _first(nodes, "router")

@@ -1,4 +1,4 @@
-"""`tenbaud log`: what is in a recorded log, and the options with which it is read."""
+"""`tenbaud log`: the content of a recorded log, and the options to read it."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ def log(
         Path | None, typer.Option(help="Draw the columns into this file (.png, .svg, .pdf).")
     ] = None,
     write: Annotated[
-        bool, typer.Option("--write", help="Keep the options in FILE.toml, where commands find them.")
+        bool, typer.Option("--write", help="Store the options in FILE.toml, which other commands read.")
     ] = False,
     json: options.AsJson = False,
 ) -> None:
-    """Show what a log holds: columns, units, sampling, faults, and the commands that use it.
+    """Show a log's columns, units, sampling and faults, and the commands that use it.
 
-    Exit code 0: the log can be used with the options shown. 1: the text says what is wrong with it.
+    Exit code 0: the log can be used with the options shown. 1: it has errors, which are listed.
 
     [dim]tenbaud log flight.csv --plot flight.png[/dim]
 

@@ -1,4 +1,4 @@
-"""The options that say what a recorded log is, of every command that reads one."""
+"""The options that describe a recorded log, of every command that reads one."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def _text(help: str, *names: str) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class LogOptions:
-    """Columns, units and the stretch of a log."""
+    """Columns, units and the interval of a log."""
 
     columns: Annotated[
         str,
@@ -31,14 +31,14 @@ class LogOptions:
         _text("Units in the log: pitch=deg,time=ms; one word: of all angles.", "--units", "--unit"),
     ] = ""
     sign: Annotated[str, _text("Signs of columns: pitch=-1.")] = ""
-    scale: Annotated[str, _text("What columns are multiplied by: front=0.01.")] = ""
-    offset: Annotated[str, _text("What is added to columns then: pitch=-0.2.")] = ""
+    scale: Annotated[str, _text("Factors of columns: front=0.01.")] = ""
+    offset: Annotated[str, _text("Offsets added to columns then: pitch=-0.2.")] = ""
     start: Annotated[
         float | None,
-        typer.Option("--from", help="Use the log from here on its own clock, s.", **CLOCK),
+        typer.Option("--from", help="Start within the log, on its own clock, s.", **CLOCK),
     ] = None
     end: Annotated[
-        float | None, typer.Option("--to", help="Use the log up to here, on its own clock, s.", **CLOCK)
+        float | None, typer.Option("--to", help="End within the log, on its own clock, s.", **CLOCK)
     ] = None
     period: Annotated[
         float | None,
@@ -47,7 +47,7 @@ class LogOptions:
     remove_spikes: Annotated[
         bool,
         typer.Option(
-            "--remove-spikes", help="Put a single row that is far off between its neighbours."
+            "--remove-spikes", help="Replace single outlier rows by the mean of their neighbours."
         ),
     ] = False
 

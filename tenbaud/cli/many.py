@@ -68,7 +68,7 @@ def serve(
             f"{common.identity.numerics_probe.hex()}\n"
             f"  at {places}, recording below {root}"
         )
-        # What was built so far stays; the collector need not look at it in flight.
+        # Objects built so far stay; the collector need not scan them in flight.
         gc.collect()
         gc.freeze()
         try:
@@ -96,9 +96,9 @@ def serve(
 def agreements(
     preset: str | None, path: Path | None, configs: Path | None, changed: dict[str, Any], clock: Clock
 ) -> Callable[[str], Agreement]:
-    """Return what gives the agreement for a session name; "" for that without a separate file.
+    """Return a function from a session name to its agreement; "" for the one without a separate file.
 
-    A file is read anew when it has changed.
+    A changed file is read again.
     """
     from tenbaud.build.ends import check_parts
     from tenbaud.build.flight import agree

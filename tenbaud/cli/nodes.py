@@ -8,6 +8,7 @@ import typer
 
 from tenbaud.cli import options
 from tenbaud.cli.log_options import LogOptions
+from tenbaud.cli.motors import MotorOptions, confirm_motors
 from tenbaud.cli.spread import spread
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ def transmit(
     node: options.NodeOptions,
     addresses: options.Addresses,
     log: LogOptions,
+    risk: MotorOptions,
     duration: options.Duration = None,
     seed: options.Seed = None,
     rig: options.Rig = None,
@@ -54,7 +56,7 @@ def transmit(
     )
     if pace is not None and node.clock is not options.ClockOption.VIRTUAL:
         raise typer.BadParameter("--pace slows the virtual clock down; the real one cannot be paced")
-    _run("transmitter", node, addresses, changed, pace=pace, figure=figure)
+    _run("transmitter", node, addresses, changed, pace=pace, figure=figure, risk=risk)
 
 
 @spread
@@ -65,7 +67,7 @@ def receive(
     log: LogOptions,
     rig: Annotated[
         str | None,
-        typer.Option(help="replay:FILE when the transmitter replays: its voltages are used."),
+        typer.Option(help="replay:FILE when the transmitter replays: use the recorded voltages."),
     ] = None,
     take_over: options.TakeOver = False,
 ) -> None:
@@ -110,11 +112,12 @@ def _run(
     take_over: bool = False,
     pace: float | None = None,
     figure: bool = False,
+    risk: MotorOptions | None = None,
 ) -> None:
     from contextlib import nullcontext
     from dataclasses import replace
 
-    from tenbaud.build.ends import check_parts, check_rig_port
+    from tenbaud.build.ends import check_parts, check_rig, check_sabotage
     from tenbaud.build.flight import agree
     from tenbaud.build.recorded import flight_config
     from tenbaud.cli.addresses import endpoints_of
@@ -132,8 +135,11 @@ def _run(
     agreement = replace(agree(config, node.clock.value), live=telemetry.control)
     endpoints = replace(endpoints_of(role, addresses, config, take_over), telemetry=telemetry)
     check_parts(config)
-    if role == "transmitter":
-        check_rig_port(config)
+    if role == "transmitter":  # it alone knows how long the flight is
+        check_sabotage(agreement)
+    # Whoever started this end with a folder has checked the rig.
+    if risk is not None and node.run_folder is None and check_rig(config, risk.accept_risk):
+        confirm_motors(config, risk.yes)
     telemetry.check(role, endpoints.insecure, endpoints.security is not None)
     whole = node.run_folder is None
     folder = RunFolder(node.run_folder or create_run_folder(None, f"{role}-{config.preset}", node.out))

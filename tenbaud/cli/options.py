@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class ClockOption(StrEnum):
-    """On which clock to fly."""
+    """The clock of a flight."""
 
     REAL = "real"
     VIRTUAL = "virtual"
@@ -46,7 +46,7 @@ Duration = Annotated[
 ]
 Seed = Annotated[
     int | None,
-    typer.Option(help="Seed of everything random.", min=0, max=2**63 - 1),
+    typer.Option(help="Seed of all random numbers.", min=0, max=2**63 - 1),
 ]
 Lead = Annotated[
     int | None,
@@ -63,7 +63,7 @@ Out = Annotated[
     Path | None, typer.Option(help="New folder for the run; runs/<time>_<name> if not given.")
 ]
 AsJson = Annotated[
-    bool, typer.Option("--json", help="Summary on standard output as JSON, nothing else there.")
+    bool, typer.Option("--json", help="Print only the summary, as JSON, on standard output.")
 ]
 Verbose = Annotated[bool, typer.Option("--verbose", help="Also print every figure of the summary.")]
 Draw = Annotated[
@@ -168,7 +168,7 @@ class Addresses:
         typer.Option(help="Zenoh router between the ends, instead of --listen and --connect."),
     ] = None
     scout: Annotated[
-        bool, typer.Option("--scout", help="Look for the other end by multicast in this network.")
+        bool, typer.Option("--scout", help="Find the other end by multicast in this network.")
     ] = False
     keys: Annotated[
         Path | None,
@@ -218,7 +218,7 @@ class ManyOptions:
 
 @dataclass(frozen=True, slots=True)
 class PlantOptions:
-    """A configuration, and the plant in it, of commands that fly without a link."""
+    """Configuration and plant of the commands without a link."""
 
     preset: Preset = None
     config: ConfigFile = None
@@ -238,7 +238,7 @@ class PlantOptions:
 
 @dataclass(frozen=True, slots=True)
 class _Configured:
-    """What `demo`, `transmit` and `receive` have in common."""
+    """Common options of `demo`, `transmit` and `receive`."""
 
     preset: Preset = None
     config: ConfigFile = None
@@ -253,7 +253,7 @@ class _Configured:
 
 @dataclass(frozen=True, slots=True)
 class FlightOptions(_Configured):
-    """What `demo` flies."""
+    """The flight of `demo`."""
 
     clock: Clock = ClockOption.VIRTUAL
     duration: Duration = None

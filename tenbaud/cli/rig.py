@@ -1,10 +1,12 @@
-"""`tenbaud rig`: an emulated device. `rig-check` and `doctor`: look at the rig, and at the machine."""
+"""`tenbaud rig`: an emulated device. `rig-check` and `doctor`: check the rig, and the machine."""
 
 from __future__ import annotations
 
 import json as json_module
+import shlex
 import sys
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -14,6 +16,7 @@ from tenbaud.cli.spread import spread
 from tenbaud.flight.outcome import ExitCode
 
 if TYPE_CHECKING:
+    from tenbaud.config.schema import FlightConfig
     from transmitter.rigs.emulator.device import RigEmulator
 
 FormatOption = Annotated[str, typer.Option("--format", help="ascii, cobs, quarc or qsb.")]
@@ -66,8 +69,9 @@ def rig(
     """
     from tenbaud.build.emulator import build_emulator
 
+    config = body.load(rig=None if replay is None else f"replay:{replay}", log=log)
     emulator = build_emulator(
-        body.load(rig=None if replay is None else f"replay:{replay}", log=log),
+        config,
         form,  # type: ignore[arg-type]
         port,
         line_form=lines,
@@ -76,10 +80,12 @@ def rig(
         watchdog_s=watchdog,
         faults=tuple(fault or ()),
     )
-    _emulate(emulator, form, duration, json)
+    _emulate(emulator, form, duration, json, _flight_words(body, config))
 
 
-def _emulate(emulator: RigEmulator, form: str, duration_s: float | None, as_json: bool) -> None:
+def _emulate(
+    emulator: RigEmulator, form: str, duration_s: float | None, as_json: bool, flight: list[str]
+) -> None:
     import time
 
     from tenbaud.flight.stop import StopFlag
@@ -90,9 +96,8 @@ def _emulate(emulator: RigEmulator, form: str, duration_s: float | None, as_json
         # The first line, so that a script can read where the device is.
         sys.stdout.write(json_module.dumps({"port": address}) + "\n" if as_json else f"{address}\n")
         sys.stdout.flush()
-        typer.echo(
-            f"tenbaud rig: {form} at {address}; Ctrl-C ends it\n  {_hint(form, address)}", err=True
-        )
+        typer.echo(f"tenbaud rig: {form} at {address}; Ctrl-C ends it", err=True)
+        typer.echo(f"  {_hint(form, address, flight)}", err=True)
         until = None if duration_s is None else time.monotonic() + duration_s
         try:
             emulator.run(lambda: stop() or (until is not None and time.monotonic() > until))
@@ -105,13 +110,26 @@ def _emulate(emulator: RigEmulator, form: str, duration_s: float | None, as_json
         typer.echo(", ".join(f"{name} {value}" for name, value in figures.items()))
 
 
-def _hint(form: str, address: str) -> str:
+def _flight_words(body: options.PlantOptions, config: FlightConfig) -> list[str]:
+    """Return the options of a flight of this rig, safe ones as for a real rig."""
+    from tenbaud.build.first_contact import as_options, first_settings
+    from tenbaud.build.signals import configured_signals
+
+    words = ["--preset", body.preset] if body.preset else []
+    words += ["--config", str(body.config)] if body.config else []
+    for one in body.settings or ():
+        words += ["--set", one]
+    given = [shlex.join(words)] if words else []
+    return [*given, as_options(first_settings(config, configured_signals(config)))]
+
+
+def _hint(form: str, address: str, flight: list[str]) -> str:
     where = f"{form}:{address}"
     if form != "quarc" and not address.startswith("/"):
         where = f"{form}:socket://{address}" if ":" in address else where
     if form == "qsb":
         return f"look at it with: tenbaud rig-check --rig {where}"
-    return f"fly it with: tenbaud demo --clock real --rig {where}"
+    return " ".join([f"fly it with: tenbaud demo --clock real --rig {shlex.quote(where)}", *flight])
 
 
 def rig_check(
@@ -120,19 +138,34 @@ def rig_check(
     config: options.ConfigFile = None,
     seconds: Annotated[float, typer.Option(help="Seconds to read.", min=0.1, max=86_400.0)] = 10.0,
     settings: options.Settings = None,
+    write: Annotated[
+        Path | None, typer.Option(help="New file for the proposed settings of a first flight.")
+    ] = None,
     json: options.AsJson = False,
 ) -> None:
     """Read encoders and check the samples; motors stay disabled.
 
-    Turn each axis by hand while it runs: counts, angles, signs, rates and gaps are shown.
+    Turn each axis by hand to both of its ends while it runs: counts, angles, rates and gaps are shown,
+    and the limits of a first flight that follow from them.
 
     [dim]tenbaud rig-check --rig cobs:/dev/ttyACM0[/dim]
-    """
-    from tenbaud.checks.rigcheck import check_rig, show_check
-    from tenbaud.config.load import load_config
 
+    [dim]tenbaud rig-check --rig cobs:/dev/ttyACM0 --write rig.toml[/dim]
+    """
+    from tenbaud.build.recorded import flight_config
+    from tenbaud.checks.rigcheck import check_rig, show_check
+    from tenbaud.config.load import nested, toml_text
+    from tenbaud.files.whole import write_whole
+
+    if write is not None and write.exists():
+        raise typer.BadParameter(f"--write {write}: it exists already; name a new file")
     changed = options.overrides(rig=rig, settings=settings)
-    result = check_rig(load_config(preset, config, changed), seconds, live=not json)
+    result = check_rig(flight_config(preset, config, changed), seconds, live=not json)
+    if write is not None:
+        write_whole(write, toml_text(nested(result.proposal)))
+        typer.echo(
+            f"the proposed settings are in {write}: check them, then add --config {write}", err=True
+        )
     if json:
         options.print_json(asdict(result))
     else:
@@ -148,9 +181,9 @@ def doctor(
     allow_code: options.AllowCode = False,
     json: options.AsJson = False,
 ) -> None:
-    """Look at ports, permissions, clock, arithmetic and Zenoh; print a report to paste.
+    """Check ports, permissions, clock, arithmetic and Zenoh; print a report to paste.
 
-    Exit code 1 if something is a problem.
+    Exit code 1 if there is a problem.
 
     [dim]tenbaud doctor[/dim]
 

@@ -1,7 +1,9 @@
-"""Commands about runs: look at them, compare, fly them again, judge, convert; and about presets."""
+"""Commands about runs: inspect, compare, replay, audit, convert; and about presets."""
 
 from __future__ import annotations
 
+import shutil
+import sys
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -17,28 +19,29 @@ RunArgument = Annotated[Path, typer.Argument(help="Folder of a run, or one recor
 def inspect(
     run: RunArgument, json: Annotated[bool, typer.Option("--json", help="The same as JSON.")] = False
 ) -> None:
-    """Show what a run's recordings hold: channels, units, spans, events.
+    """Show the content of a run's recordings: channels, units, spans, events.
 
     [dim]tenbaud inspect runs/2026-11-23T10-00-00_paper-10baud[/dim]
     """
+    from tenbaud.flight.narrow import for_terminal
     from tenbaud.recording.inspect import describe_json, describe_text
 
     if json:
         options.print_json(describe_json(run))
         return
-    typer.echo(describe_text(run))
+    typer.echo(for_terminal(describe_text(run)))
 
 
 def diff(
     run_a: RunArgument,
     run_b: Annotated[
-        Path | None, typer.Argument(help="Another; not given: the two ends of the first are compared.")
+        Path | None, typer.Argument(help="Another; not given: compare the two ends of the first.")
     ] = None,
 ) -> None:
-    """Name the first sample at which two recordings differ, and the field.
+    """Find the first sample and field in which two recordings differ.
 
-    Exit code 0: equal. 1: a value differs. 2: not comparable, because rows are missing that both should
-    hold, or because there is nothing to compare; what is missing is named.
+    Exit code 0: equal. 1: a value differs. 2: not comparable, because rows that both should hold
+    are missing (they are listed), or there is nothing to compare.
 
     [dim]tenbaud diff runs/monday runs/tuesday[/dim]
     """
@@ -57,14 +60,48 @@ def diff(
         raise typer.Exit(int(ExitCode.USAGE))
 
 
+def compare(
+    runs: Annotated[list[Path], typer.Argument(help="Folders of two or more runs, or recordings.")],
+    figure: Annotated[
+        Path | None,
+        typer.Option(help="Draw outputs and errors over each other into this .png, .svg or .pdf file."),
+    ] = None,
+    json: Annotated[
+        bool, typer.Option("--json", help="The figures as JSON, in the units of the recordings.")
+    ] = False,
+) -> None:
+    """Put the figures of runs side by side: errors, tracking, rise, overshoot, settling, bits.
+
+    Compared are the outputs and the flight time that all runs have; what differs is noted. Exit code 2
+    if they have none in common. No file is written without --figure.
+
+    [dim]tenbaud compare runs/slow runs/fast --figure slow-and-fast.png[/dim]
+    """
+    from tenbaud.recording.side_by_side import compare as compare_runs
+    from tenbaud.recording.style import FIGURE_FORMATS
+
+    if figure is not None and figure.suffix not in FIGURE_FORMATS:
+        raise typer.BadParameter(f"--figure {figure}: end the name in {', '.join(FIGURE_FORMATS)}")
+    compared = compare_runs(*runs)
+    if json:
+        options.print_json(compared.as_json())
+    else:
+        unicode = (sys.stdout.encoding or "").lower().startswith("utf")
+        typer.echo(compared.text(shutil.get_terminal_size((10_000, 24)).columns, unicode=unicode))
+    if figure is not None:
+        compared.plot(figure)
+        typer.echo(str(figure), err=json)
+
+
 def presets() -> None:
     """List the presets that come with tenbaud by plant, with their rates."""
     from tenbaud.config.load import load_config, preset_names
+    from tenbaud.flight.narrow import for_terminal
 
     configs = {name: load_config(name) for name in preset_names()}
     plants: dict[str, list[str]] = {}
     for name, config in configs.items():
-        # A plant that is nothing but matrices has its name from its preset.
+        # A linear plant is named after its preset.
         own = config.plant_kind == "linear"
         plants.setdefault(name.rpartition("-")[0] if own else config.plant_kind, []).append(name)
     width = max(map(len, configs))
@@ -72,11 +109,12 @@ def presets() -> None:
         typer.echo(plant)
         for name in sorted(plants[plant], key=lambda one: configs[one].channel.rate_baud):
             config = configs[name]
-            typer.echo(f"  {name:{width}} {config.channel.rate_baud:7.4g} baud  {config.description}")
+            line = f"  {name:{width}} {config.channel.rate_baud:7.4g} baud  {config.description}"
+            typer.echo(for_terminal(line))
 
 
 class Form(StrEnum):
-    """What a run can become."""
+    """The formats of `convert`."""
 
     CSV = "csv"
     MAT = "mat"
@@ -138,13 +176,13 @@ def replay(
     run: Annotated[Path, typer.Argument(help="Folder of a run, or a file of symbols.")],
     other: OtherRun = None,
     save: Annotated[
-        Path | None, typer.Option(help="Write the symbols into this new file: the whole flight.")
+        Path | None, typer.Option(help="Write the symbols, the whole flight, into this new file.")
     ] = None,
     allow_code: options.AllowCode = False,
 ) -> None:
-    """Fly a recorded flight again from its symbols alone, and compare every state to the last bit.
+    """Replay a recorded flight from its symbols alone, and compare every state to the last bit.
 
-    Exit code 1 if one differs.
+    Exit code 1 if a state differs.
 
     [dim]tenbaud replay runs/2026-11-23T10-00-00_paper-10baud --save flight.symbols[/dim]
 

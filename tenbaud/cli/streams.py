@@ -1,9 +1,9 @@
-"""The standard streams: those that are closed, full or gone end no flight, and do not pass in silence.
+"""The standard streams: closed, full or lost ones do not end a flight, and are reported.
 
-A stream that was closed before the start leads nowhere from then on: with its number free, the next
-file opened would get it, and with it whatever a library prints. Output that cannot be written is kept
-in mind and reported when the command ends; what fails on standard error cannot be reported anywhere.
-Bytes of file names that are no text are written as they are; what the terminal's encoding lacks is
+A stream that was closed before the start is opened on the null device: otherwise the next file opened
+would get its number, and the output of libraries. Output that cannot be written is remembered and
+reported when the command ends; failures of standard error cannot be reported anywhere. Bytes of file
+names that are not text are written as they are; characters outside the terminal's encoding are
 written with a backslash.
 """
 
@@ -63,12 +63,12 @@ def lost_output() -> OSError | None:
 
 
 def leave(code: int) -> None:
-    """End the process with this code, whatever its streams still hold and cannot write."""
+    """End the process with this code, even if its streams cannot be written."""
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError):
             stream.flush()
         if getattr(stream, "error", None) is not None:
-            # The interpreter would try again on its way out, and end with a code of its own.
+            # The interpreter would try again at exit, and end with its own code.
             with suppress(OSError, ValueError):
                 os.dup2(os.open(os.devnull, os.O_RDWR), stream.fileno())
     sys.exit(code)

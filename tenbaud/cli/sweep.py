@@ -1,4 +1,4 @@
-"""`tenbaud sweep`: fly a study and draw it."""
+"""`tenbaud sweep`: fly a study and plot it."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tenbaud.cli import options
+from tenbaud.cli.waiting import Waiting
 from tenbaud.studies.progress import progress_bar
 
 if TYPE_CHECKING:
@@ -21,7 +22,9 @@ def sweep(
     study: Annotated[Path, typer.Argument(help="Study file (TOML); see docs/studies.md.")],
     out: Annotated[
         Path | None,
-        typer.Option(help="Folder of the results; studies/<name> if not given. Resumes what is there."),
+        typer.Option(
+            help="Folder of the results; studies/<name> if not given. Resumes an existing study."
+        ),
     ] = None,
     workers: Annotated[
         int | None, typer.Option(min=1, max=1024, help="Processes on this machine; default: all cores.")
@@ -63,11 +66,7 @@ def sweep(
             remove(folder)
         typer.echo(said, err=True)
         raise
-    drawn = []
-    if plots:
-        from tenbaud.studies.plots import draw_study
-
-        drawn = draw_study(table, what.names, what.file.description or name, folder, what.outputs)
+    drawn = _draw(table, what, folder) if plots else []
     why = Counter(one for one in table["outcome"].to_pylist() if one != "ok")
     slow = Counter(one for one in table["not_compiled"].to_pylist() if one)
     summary = {
@@ -94,6 +93,14 @@ def _fly(what: Study, results: Results, workers: int, scheduler: str | None) -> 
         return run_study(
             what, results, lambda done, total: update(done, total, name), workers, scheduler
         )
+
+
+def _draw(table: Any, what: Study, folder: Path) -> list[Path]:
+    with Waiting("tenbaud sweep", doing="drawing"):
+        from tenbaud.studies.plots import draw_study
+
+        title = what.file.description or what.file.name
+        return draw_study(table, what.names, title, folder, what.outputs)
 
 
 def _tell(summary: dict[str, Any], why: Counter[str], slow: Counter[str]) -> None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class MethodOption(StrEnum):
-    """How to search."""
+    """Search method."""
 
     EVOLUTION = "cma-es"
     SIMPLEX = "nelder-mead"
@@ -48,9 +48,7 @@ Model = Annotated[
 Seeds = Annotated[int, typer.Option(min=1, max=100_000, help="Simulated flights for the fit.")]
 TestSeeds = Annotated[
     int,
-    typer.Option(
-        min=1, max=100_000, help="Simulated flights for validation, with the seeds after those."
-    ),
+    typer.Option(min=1, max=100_000, help="Simulated flights for validation, with the next seeds."),
 ]
 TrainShare = Annotated[
     float,
@@ -77,7 +75,7 @@ Shoves = Annotated[
     typer.Option(
         min=0.0,
         max=100.0,
-        help="Recorded flights: rms of the random shoves added for the fit, as a share of the record's "
+        help="Recorded flights: rms of the random pushes added for the fit, as a share of the record's "
         "motion; 0: none.",
     ),
 ]
@@ -86,7 +84,7 @@ Phases = Annotated[
     typer.Option(
         min=1,
         max=10_000,
-        help="Recorded flights: sample phases flown for the fit, at most. The validation flies all.",
+        help="Recorded flights: maximum number of sample phases for the fit; the validation flies all.",
     ),
 ]
 Seed = Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Seed of the search.")]
@@ -122,7 +120,7 @@ def tune(
 
     Minimises the receiver's rms estimation error. Simulated flights: --seeds seeds for the fit, and
     --test-seeds others for validation. Recorded flights: the first --train-share for the fit, at
-    several sizes, with shoves added and from several sample phases; the rest for validation, as it was
+    several sizes, with random pushes added and from several sample phases; the rest for validation, as
     recorded, mean over all phases. Both errors are reported, before and after.
 
     The preset written to --out has the sections timing, channel, model and coder over the preset that
@@ -187,7 +185,7 @@ def _need_chance(config: FlightConfig) -> None:
 
 
 def _make_room(out: Path) -> None:
-    """Make the folder of the preset; an error where none can be written, before anything is flown."""
+    """Make the folder of the preset; an error if it cannot be written, before any flight."""
     from tenbaud.files.whole import check_room, make_folder
     from tenbaud.studies.settings import StudyError
 
@@ -198,12 +196,12 @@ def _make_room(out: Path) -> None:
 
 
 def _leave(tuned: Tuned, preset: str, out: Path, as_json: bool) -> None:
-    """Print what was found, and write it."""
+    """Print the result, and write it."""
     from tenbaud.files.whole import write_whole
 
     if not as_json:
         _tell(tuned)
-    # After the figures, which a full disk must not take along.
+    # After the figures, so that a full disk does not lose them.
     write_whole(out, preset)
     if as_json:
         options.print_json({**tuned._asdict(), "preset_file": str(out)})

@@ -1,24 +1,36 @@
-"""`tenbaud view`: a live page of a flight in the browser."""
+"""`tenbaud view`: a page of a flight in the browser, live or from its recordings."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tenbaud.cli import options
 
+if TYPE_CHECKING:
+    from tenbaud.view.feed import Feed
+    from tenbaud.view.server import Address
+
 Host = Annotated[
     str | None,
     typer.Option(
-        help="Address of the page; one beyond this machine needs --insecure. Not given: 127.0.0.1, or "
+        help="Address of the page; others than loopback need --insecure. Not given: 127.0.0.1, or "
         "::1 where there is no IPv4."
     ),
 ]
 
 
 def view(
+    runs: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="RUN",
+            help="Folders of finished runs, up to four of the same outputs, or recordings: the page "
+            "replays them, laid over each other. Not given: a live flight.",
+        ),
+    ] = None,
     connect: Annotated[
         list[str] | None,
         typer.Option(
@@ -43,12 +55,15 @@ def view(
         bool, typer.Option("--schema", help="Print the JSON schema of the telemetry and end.")
     ] = False,
 ) -> None:
-    """Serve a live page of a flight, for the browser: picture, curves, bits, lockstep, controls.
+    """Serve a page of a flight, for the browser: picture, curves, bits, lockstep, controls.
 
-    Two addresses are printed: one that can control the flight, if the flight allows it, and one that
-    is view-only. Each contains a secret; without a secret nothing of the page is served.
+    With RUN the same page replays finished flights: scrub, play at any speed, compare. Of a live
+    flight two addresses are printed: one that can control the flight, if the flight allows it, and one
+    that is view-only. Each contains a secret; requests without it are refused.
 
     [dim]tenbaud demo --view[/dim]
+
+    [dim]tenbaud view runs/at-10 runs/at-1000 --open[/dim]
 
     [dim]tenbaud view --connect tcp/127.0.0.1:7448 --connect tcp/127.0.0.1:7449[/dim]
 
@@ -59,24 +74,49 @@ def view(
 
         options.print_json(schema_json())
         return
-    from channel.links.endpoints import check_endpoints, loopback_host
+    from channel.links.endpoints import loopback_host
+    from tenbaud.view.server import Address, free_port
+
+    # As in a URL, or bare.
+    host = loopback_host() if host is None else host.removeprefix("[").removesuffix("]")
+    address = Address(host, port or free_port(host), insecure)
+    if runs:
+        if connect or keys or session != "**":
+            raise typer.BadParameter(
+                "--connect, --keys and --session are for live flights; give no RUN"
+            )
+        _replay(runs, address, open_browser)
+        return
+    feed = _feed(tuple(connect or ()), session, keys)
+    from tenbaud.view.server import serve
+
+    serve(feed, address, open_browser=open_browser, view_only=view_only)
+
+
+def _feed(connect: tuple[str, ...], session: str, keys: Path | None) -> Feed:
+    from channel.links.endpoints import check_endpoints
     from channel.links.zenoh.hub import is_session_pattern
     from tenbaud.view.feed import Feed
-    from tenbaud.view.server import Address, free_port, serve
 
     if not is_session_pattern(session):
         raise typer.BadParameter(
             f"--session {session!r}: a session's name as in rig/7, with * for any one part"
         )
-    # As in a URL, or bare.
-    host = loopback_host() if host is None else host.removeprefix("[").removesuffix("]")
-    address = Address(host, port or free_port(host), insecure)
     credentials = None
     if keys is not None:
         from tenbaud.cli.addresses import credentials_of
 
         credentials = credentials_of(keys, "viewer")
-    protected = tuple(one for one in connect or () if not one.startswith("unixsock"))
+    protected = tuple(one for one in connect if not one.startswith("unixsock"))
     check_endpoints(protected, insecure=True, secured=credentials is not None)
-    feed = Feed(tuple(connect or ()), session, credentials)
-    serve(feed, address, open_browser=open_browser, view_only=view_only)
+    return Feed(connect, session, credentials)
+
+
+def _replay(runs: list[Path], address: Address, open_browser: bool) -> None:
+    from tenbaud.recording.run import Run
+    from tenbaud.view.recorded import recorded_flights
+    from tenbaud.view.replay import serve_recorded
+
+    # What is wrong with the port is said before minutes of recordings are read.
+    address.check()
+    serve_recorded(recorded_flights([Run(one) for one in runs]), address, open_browser=open_browser)

@@ -1,4 +1,4 @@
-"""A line on the terminal for as long as a command says nothing: `tenbaud audit: working, 3 s`."""
+"""A line on the terminal while a command prints nothing: `tenbaud audit: working, 3 s`."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 from contextlib import suppress
+from typing import Self
 
 AFTER_S = 0.3
 PERIOD_S = 0.5
@@ -15,16 +16,22 @@ COMPLETES = "_TENBAUD_COMPLETE"
 
 
 class Waiting:
-    """Begins after `AFTER_S`, and is gone with the first output of the command or with `end`."""
+    """Begins after `AFTER_S`, and disappears with the command's first output or with `end`."""
 
-    def __init__(self, what: str, number: int = 2) -> None:
-        self._what = what
+    def __init__(self, what: str, number: int = 2, doing: str = "working") -> None:
+        self._what = f"{what}: {doing}"
         self._number = number
         self._shown = False
         self._lock = threading.Lock()
         self._over = threading.Event()
         if number >= 0 and os.isatty(number) and os.environ.get("TERM") != "dumb":
             threading.Thread(target=self._run, name="waiting", daemon=True).start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
 
     def end(self) -> None:
         """Clear the line, for good."""
@@ -40,7 +47,7 @@ class Waiting:
         wait_s = AFTER_S
         while not self._over.wait(wait_s):
             wait_s = PERIOD_S
-            text = f"\r{self._what}: working, {time.monotonic() - started:.0f} s"
+            text = f"\r{self._what}, {time.monotonic() - started:.0f} s"
             with self._lock:
                 if not self._over.is_set():
                     self._shown = True

@@ -1,4 +1,4 @@
-"""The kinds of coders: what each one's section may hold, and what is built from it."""
+"""The kinds of coders: the section of each, and the object built from it."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class ZoomCoderSection(_GainsSection):
 
     kind: Literal["zoom"] = "zoom"
     window_signs: Annotated[int, Field(ge=1, le=16)] = 2
-    """how many signs the saturation test of (19) looks at; the paper's has two"""
+    """number of signs in the saturation test of (19); the paper's has two"""
     initial_range_rad: AngleRange = 0.5
     minimum_range_rad: AngleRange = 0.05
     decay: Annotated[float, Field(ge=1e-6, le=1.0)] = 0.95
@@ -72,28 +72,28 @@ class PcmCoderSection(KindSection):
     bits: Annotated[int, Field(ge=1, le=15)] = 10
     range_rad: AngleRange = 3.141592653589793
     rate_filter_s: NotNegative = 0.0
-    """tau of a low-pass behind the differentiator; 0: none"""
+    """tau of a low-pass after the differentiator; 0: none"""
 
 
 class HistoryCoderSection(KindSection):
-    """One sign that looks ahead when it is formed and back when it is read; ranges in rad."""
+    """One sign per sample, formed with a look-ahead, decoded with the last signs; ranges in rad."""
 
     kind: Literal["history"] = "history"
     rows: Annotated[tuple[tuple[Factor, Factor, Factor], ...], Field(min_length=1, max_length=512)] = (
         (1.0, 0.75, 1.0),
     )
     """(angle, rate, range) of each pattern of the last signs: corrections in units of the range, the
-    rate's per symbol period, and what the range is multiplied by. Bit j of a row's number says that the
+    rate's per symbol period, and the factor of the range. Bit j of a row's number says that the
     sign j + 1 samples ago was the present one"""
     initial_range_rad: AngleRange = 0.01
     minimum_range_rad: AngleRange = 0.001
     maximum_range_rad: AngleRange = 3.0
     weights: tuple[Factor, Factor, Factor] = (0.7, 0.45, 0.75)
-    """of the error that is left after the look-ahead: angle, angle times T rate, T rate"""
+    """of the error after the look-ahead: angle, angle times T rate, T rate"""
     lookahead: Annotated[int, Field(ge=0, le=6)] = 1
     """samples that the transmitter looks ahead"""
     floor_gain: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
-    """g, share per sample by which a slow mean of the range follows it; 0: the smallest range stays"""
+    """g, share per sample by which a slow mean of the range follows it; 0: fixed smallest range"""
     floor_exponent: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
     """c; the smallest range is minimum_range_rad times (slow mean / minimum_range_rad)^c"""
 
@@ -102,7 +102,7 @@ Square = Annotated[tuple[tuple[Factor, ...], ...], Field(min_length=1, max_lengt
 
 
 class _DesignedSection(KindSection):
-    """What the coders that `tenbaud design` makes for a linear plant have in common."""
+    """Common fields of the coders that `tenbaud design` makes for a linear plant."""
 
     bits: Annotated[int, Field(ge=1, le=15)] = 1
     """signs per sample"""
@@ -111,9 +111,9 @@ class _DesignedSection(KindSection):
     transition: Square = ()
     """F of a sample, of the corrected states"""
     worth: Square = ()
-    """N, what an error costs, now and later"""
+    """N, cost of an error, now and later"""
     removed: Annotated[float, Field(ge=0.001, le=0.999)] = 0.67
-    """alpha, of the variance along the direction, by a sign"""
+    """alpha, share of the variance along the direction that a sign removes"""
     step: Annotated[float, Field(ge=0.001, le=10.0)] = 1.0
     """kappa, correction in standard deviations"""
     minimum_strength: Positive = 0.001
@@ -121,11 +121,11 @@ class _DesignedSection(KindSection):
 
 
 class DirectionCoderSection(_DesignedSection):
-    """Signs asked of the direction that is worth most, for any linear plant; from `tenbaud design`."""
+    """Signs in the most costly direction of the state, for any linear plant; from `tenbaud design`."""
 
     kind: Literal["direction"] = "direction"
     noise: Square = ()
-    """Q, covariance of what the disturbance adds in a sample"""
+    """Q, covariance of the disturbance's effect in a sample"""
     start: Square = ()
     """P, covariance before the first word"""
     initial_strength: Positive = 1.0
@@ -133,7 +133,7 @@ class DirectionCoderSection(_DesignedSection):
 
 
 class LearningCoderSection(_DesignedSection):
-    """The coder `direction` that learns the model's terms too (`learns`); from `tenbaud design`."""
+    """The coder `direction` that also learns the model's terms (`learns`); from `tenbaud design`."""
 
     kind: Literal["learning"] = "learning"
     noises: Annotated[tuple[Square, ...], Field(max_length=16)] = ()
@@ -141,11 +141,11 @@ class LearningCoderSection(_DesignedSection):
     starts: Annotated[tuple[Square, ...], Field(max_length=16)] = ()
     """P before the first word, of each column"""
     reach: Square = ()
-    """what a constant rate of each state, a column, adds in a sample"""
+    """effect of a constant rate of each state, a column, in a sample"""
     spreads: Annotated[tuple[Positive, ...], Field(max_length=64)] = ()
     """standard deviation of each term's error before the first word; empty: 0.1, of a force 0.03"""
     drift: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0003
-    """by which an error may change in a sample, as a share of its spread"""
+    """largest change of an error in a sample, as a share of its spread"""
     learned_max: Annotated[float, Field(ge=0.01, le=0.9)] = 0.3
     """of the size of each error"""
     minimum_strength: Positive = 0.01

@@ -1,4 +1,4 @@
-"""The sections of the controllers that are built in, and of the set-points that they follow."""
+"""The sections of the built-in controllers, and of their set-points."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ class PidLoopSection(Section):
     rate: str = ""
     """name of the state that is its rate; empty: OUTPUT_rate, or else the output's change"""
     inputs: dict[str, Factor] = Field(default_factory=dict)
-    """share of the loop's sum that each input gets; empty: a single input has it all, and of two the
-    first has half of it and the second has minus half"""
+    """share of the loop's sum that each input gets; empty: a single input gets all of it; of two, the
+    first gets half and the second minus half"""
     steers: str = ""
     """in place of inputs: output whose loop, later in the list, takes the sum as its set-point"""
     reversed: bool = False
-    """the sum changes its sign on the way to that loop"""
+    """the sum's sign is reversed for that loop"""
     set_point_max: Positive = 1e9
     """largest set-point given to that loop, either way"""
     proportional: Gain = 0.0
@@ -44,7 +44,7 @@ class PidSection(PidLoopSection):
     normal_force_volts: Factor = 0.0
     """w of (1): a sum that all inputs share equally"""
     loops: tuple[PidLoopSection, ...] = ()
-    """[[receiver.pid.loops]]: in place of the one loop that is described here"""
+    """[[receiver.pid.loops]]: instead of the one loop described here"""
 
 
 class StateFeedbackSection(Section):
@@ -53,11 +53,11 @@ class StateFeedbackSection(Section):
     gains: tuple[tuple[Factor, ...], ...] = ()
     """a row for each input, a column for each state; empty: designed"""
     integral_gains: tuple[tuple[Factor, ...], ...] = ()
-    """beside given gains: a row for each input, a column for each output"""
+    """with given gains: a row for each input, a column for each output"""
     state_weights: dict[str, NotNegative] = Field(default_factory=dict)
-    """cost of each state by name, 0 for those left out; empty: 1 for every output"""
+    """cost of each state by name, 0 for the others; empty: 1 for every output"""
     input_weights: dict[str, Positive] = Field(default_factory=dict)
-    """cost of each input by name, 1 for those left out"""
+    """cost of each input by name, 1 for the others"""
     integral_weights: dict[str, Positive] = Field(default_factory=dict)
     """outputs with integral action, and the cost of the integral of their error"""
     anti_windup: Literal["conditional", "none"] = "conditional"
@@ -67,11 +67,11 @@ class ReferenceSection(Section):
     """The set-point of an output."""
 
     kind: Literal["square", "step", "sine", "constant", "points", "csv", "none"] = "square"
-    """none: the output follows nothing"""
+    """none: the output has no set-point"""
     amplitude: Factor = 1.5707963267948966
     """in the unit of the output"""
     offset: Factor = 0.0
-    """what is added to a set-point of any kind"""
+    """added to a set-point of any kind"""
     period_s: Positive = 25.0
     start_s: NotNegative = 1.0
     """time of the step"""

@@ -21,7 +21,7 @@ from tenbaud.config.section import OutsideSection, Section
 
 DEFAULT_PRESET = "paper-10baud"
 OWN = "own"
-"""In place of a preset: a plant of one's own, over nothing but the defaults of the fields."""
+"""In place of a preset: the user's own plant, over the defaults of the fields."""
 FOLDERS = {
     "preset": files("tenbaud") / "presets",
     "mission": files("tenbaud") / "presets" / "missions",
@@ -50,7 +50,7 @@ def load_config(
     """Return the checked configuration.
 
     A file may name the preset that it builds on (`preset = "..."`); an explicit `preset` wins.
-    `allow_code`: classes from outside that it names may be imported, as for a flight of one's own.
+    `allow_code`: external classes that it names may be imported, as for the user's own flight.
     `recorded`: the file was written by a flight; old names in it cause no warning. Raises ConfigError.
     """
     values = merged_values(preset, path, overrides, recorded=recorded)
@@ -173,7 +173,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def merged(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
-    """Return nested settings with others laid over them; a section of another kind replaces one."""
+    """Return nested settings overridden by others; a section of another kind replaces one."""
     both = dict(base)
     for key, value in over.items():
         below = both.get(key)
@@ -223,7 +223,7 @@ def _describe(detail: ErrorDetails) -> tuple[str, str]:
 
 
 def _kinds(section: str) -> dict[str, type[Section]]:
-    """Return what a section may be, by the tag that its errors carry."""
+    """Return the kinds of a section, by the tag in its errors."""
     kinds: dict[str, type[Section]] = dict(KINDS.get(section, {}))
     return kinds | {"plugin": OutsideSection} if kinds else kinds
 

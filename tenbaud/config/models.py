@@ -1,4 +1,4 @@
-"""The kinds of models: what each one's section may hold, and what is built from it."""
+"""The kinds of models: the section of each, and the object built from it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tenbaud.config.section import Factor, KindSection, NotNegative, Positive
 
 
 class ModelSection(KindSection):
-    """What every kind of model that is built in may be given."""
+    """Common fields of the built-in models."""
 
     start: tuple[Factor, ...] = ()
     """state that both ends begin with; empty: at rest, a linear model's operating state"""
@@ -30,7 +30,7 @@ class ModelSection(KindSection):
 
 
 class PitchModelSection(ModelSection):
-    """The pitch model (11),(12) that both codecs predict with."""
+    """The pitch model (11),(12) of both codecs."""
 
     kind: Literal["pitch"] = "pitch"
     rate_damping_per_s: Annotated[float, Field(ge=0.0, le=100.0)] = 0.1
@@ -45,7 +45,7 @@ ANGLE_DENSITY = 2e-3
 
 
 class HoldModelSection(ModelSection):
-    """No model: angle and rate stay as the last word set them. For the coder `pcm`."""
+    """No model: angle and rate stay as set by the last word. For the coder `pcm`."""
 
     kind: Literal["hold"] = "hold"
     outputs: Annotated[tuple[str, ...], Field(min_length=1, max_length=16)] = ("pitch",)
@@ -72,9 +72,9 @@ class LinearModelSection(ModelSection):
     C: Annotated[Matrix, Field(min_length=1)]
     """rows of the outputs"""
     F: Matrix = ()
-    """what both ends predict with: states after a tick; `tenbaud design` finds it from A"""
+    """for the prediction at both ends: states after a tick; `tenbaud design` finds it from A"""
     E: Matrix = ()
-    """what a command that is held over a tick adds; from A and B"""
+    """effect of a command held over a tick; from A and B"""
     G: Matrix = ()
     """where the disturbance enters; empty: where the commands do"""
     densities: tuple[NotNegative, ...] = (1.0,)
@@ -82,7 +82,7 @@ class LinearModelSection(ModelSection):
     weights: tuple[NotNegative, ...] = (1.0,)
     """of the squared error of each output, or one for all"""
     corrected: Annotated[int, Field(ge=0, le=64)] = 0
-    """how many of the states, from the first, take corrections; 0: all"""
+    """number of states, from the first, that take corrections; 0: all"""
     operating_state: tuple[Factor, ...] = ()
     """x0, at rest under u0: where a nonlinear plant was linearised; empty: zero"""
     operating_command: tuple[Factor, ...] = ()
@@ -94,11 +94,11 @@ class LinearModelSection(ModelSection):
     outputs: Names = ()
     output_units: Names = ()
     input_steps_per_unit: tuple[Positive, ...] = ()
-    """a command travels in whole steps: 1000 per volt are mV; empty: 1000"""
+    """a command is sent in whole steps: 1000 per volt are mV; empty: 1000"""
     learns: bool = False
     """whether errors of A and B, and a constant force, are states that the coder `learning` corrects"""
     picture: Picture = ""
-    """what displays draw, its parts turned by the outputs in order; empty: a bar for each output"""
+    """picture in displays, its parts turned by the outputs in order; empty: a bar for each output"""
 
     def signals(self, inputs: int) -> Signals:
         """Return names and units; an output that is a state is called like it, others are numbered."""

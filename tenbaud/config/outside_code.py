@@ -1,4 +1,4 @@
-"""Decides whether the classes from outside that a configuration names may be imported.
+"""Decides whether the external classes that a configuration names may be imported.
 
 A configuration is data, and often somebody else's: there is one in every run folder and in every file
 of symbols. Opening a recording must not run what it names. So a configuration may name what it likes,
@@ -71,7 +71,7 @@ def require_allowed(config: FlightConfig) -> None:
         return
     named = [f"{part.registry.field} = {part.name!r}: {_what_would_run(part)}" for part in parts]
     raise CodeNotAllowed(
-        "\n  ".join(["the configuration names code that is no part of tenbaud:", *named])
+        "\n  ".join(["the configuration names external code:", *named])
         + "\nNone of it was imported. Imported code can do whatever you can do on this machine. "
         f"If you trust it, add {ALLOW_OPTION} (in Python: config.allowing_code())."
     )

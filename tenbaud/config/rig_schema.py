@@ -1,4 +1,4 @@
-"""The configuration of a real rig: its encoders and motors, and the way to it."""
+"""The configuration of a real rig: its encoders, motors and connection."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class TravelSection(AxisSection):
 
 
 class PitchSection(AxisSection):
-    """The body's tilt: the axis that is flown."""
+    """The body's tilt: the controlled axis."""
 
     channel: Channel = 1
 
@@ -84,7 +84,7 @@ class BridgeSection(NamedSections):
     """age of the newest sample beyond which the sensor counts as lost"""
     first_sample_timeout_s: Annotated[float, Field(ge=0.01, le=120.0)] = 5.0
     rate_max_rad_per_s: Positive = 20.0
-    """faster than any axis moves; a step of the counts beyond it is a jump"""
+    """limit of an axis; a faster step of the counts is a jump"""
 
     __pydantic_extra__: dict[str, AxisSection]
 
@@ -97,9 +97,9 @@ class SerialSection(Section):
     line_baud: Annotated[int, Field(ge=300, le=12_000_000)] = 115_200
     format: Literal["ascii", "cobs", "qsb"] = "cobs"
     columns: tuple[str, ...] = ("t_us", "travel", "pitch", "elevation")
-    """ascii: what the columns of a plain line are"""
+    """ascii: columns of a plain line"""
     poll: str = ""
-    """ascii: what asks for a sample; empty where the device streams"""
+    """ascii: the request for a sample; empty if the device streams"""
     command_style: Literal["checked", "pulse"] = "checked"
     """ascii: `U,seq,v0,v1*HH`, or `o p0 p1` with pulse widths up to 255"""
     pulse_full_volts: Positive = 12.0
@@ -114,7 +114,7 @@ class QuarcSection(Section):
     host: str = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65_535)] = 18_000
     role: Literal["client", "server"] = "client"
-    """what this end is; the model's Stream block is the other"""
+    """of this end; the model's Stream block has the other role"""
     byte_order: Literal["little", "big"] = "little"
     fields: tuple[str, ...] | None = None
     """of the vector that the model sends: names of axes, c0 ... c9, seq, time_s, flags, -; none: the
@@ -122,7 +122,7 @@ class QuarcSection(Section):
     unit: Literal["counts", "rad", "deg"] = "counts"
     """of its angles"""
     command_fields: tuple[str, ...] | None = None
-    """of the vector that it takes: names of inputs, seq, enable; none: the inputs"""
+    """of the vector that it receives: names of inputs, seq, enable; none: the inputs"""
 
 
 class HilSection(Section):

@@ -7,12 +7,14 @@ alike, and the handshake compares their digest. The others concern one end, or h
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field, PrivateAttr, field_validator, model_validator
 
 from channel.line.impairments import parse_impairments
 from channel.links.registry import LINKS
+from channel.protocol.identity import LEFT_OUT
 from tenbaud.config.coders import ZoomCoderSection
 from tenbaud.config.controllers import PidSection, ReferencesSection, StateFeedbackSection
 from tenbaud.config.deprecated import DIGEST_KINDS
@@ -43,6 +45,8 @@ from tenbaud.config.section import (
     Section,
 )
 
+PerOutput: TypeAlias = Positive | tuple[Positive, ...] | dict[str, Positive] | None
+"""A number for all outputs, a list with one for each, or a table by name."""
 SHARED_SECTIONS = ("timing", "channel", "model", "coder", "limits")
 ADDED_FIELDS = {"start", "travel_stop_rad", "outputs", "floor_gain", "floor_exponent", "learns"}
 """Of models and coders that were flown before they had them."""
@@ -82,6 +86,8 @@ class ChannelSection(Section):
     """time reserved for a command frame to reach the plant"""
     repeats: Annotated[int, Field(ge=0, le=32)] = 2
     """W: earlier samples that each command frame repeats"""
+    downlink: Literal["full", "compact"] = "full"
+    """a command for every tick, or one for each sample in frames of at most 16 bytes for two motors"""
 
 
 if TYPE_CHECKING:
@@ -99,9 +105,10 @@ KINDS: dict[str, dict[str, type[KindSection]]] = {
 
 
 class Limits(Section):
-    """Limits of a command; the receiver keeps them and the guard beside the motors checks them.
+    """Limits of commands and set-points; the receiver applies them.
 
-    Each field is a number for all inputs or a list with one for each, in the unit of the input.
+    The guard beside the motors checks those of commands: a number for all inputs or a list with one for
+    each, in the unit of the input.
     """
 
     command_max: Positive | tuple[Positive, ...] | None = None
@@ -109,14 +116,19 @@ class Limits(Section):
     command_slew_per_s: Positive | tuple[Positive, ...] = 1000.0
     """fastest change of an input"""
     initial_command: Command = 0.0
-    """command of the ticks before the first one decided"""
+    """command until the first one from the receiver"""
+    set_point_max: PerOutput = None
+    """largest set-point of an output, either way: a number for all outputs, a list with one for each,
+    or a table by name; none: no limit"""
+    set_point_slew_per_s: PerOutput = None
+    """fastest change of a set-point, from the output at the model's start on; none: no limit"""
 
 
 class PlantSection(Section):
     """The simulated plant, relative to the codec's model."""
 
     kind: Annotated[str, AfterValidator(PartName(PLANTS, also="auto"))] = "auto"
-    """built in, an FMU (machine code in a file) or from outside; "auto": that of the codec's model"""
+    """built-in, an FMU (machine code in a file) or external; "auto": that of the codec's model"""
     options: Options = Field(default_factory=dict)
     """what the plant's class is built with"""
     relative_to: Literal["model", "pitch"] = "model"
@@ -124,11 +136,11 @@ class PlantSection(Section):
     pitch: PitchModelSection = PitchModelSection()
     """what the plant is relative to where the codec's model is none, or `relative_to` says so"""
     mismatch: Mismatch | tuple[Mismatch, Mismatch, Mismatch] = 0.0
-    """fraction by which damping, stiffness and gain are off the model: 0.1 is 10 % more of each"""
+    """fraction by which damping, stiffness and gain differ from the model: 0.1 is 10 % more of each"""
     disturbance: str = ""
     """such as "q=2e-3,step=0.5@30": white torque density in rad^2/s^3, torque steps in rad/s^2"""
     initial: Command = ()
-    """outputs at the start: a number for the first, or a list; empty: as the plant starts by itself"""
+    """outputs at the start: a number for the first, or a list; empty: the plant's own start"""
 
     @property
     def initial_outputs(self) -> tuple[float, ...]:
@@ -137,7 +149,7 @@ class PlantSection(Section):
 
 
 class EncoderSection(Section):
-    """How an output is read."""
+    """The encoder of an output."""
 
     counts_per_turn: Annotated[int, Field(ge=2, le=10_000_000)] | None = None
     """of an angle; none: 4096"""
@@ -161,7 +173,7 @@ class TransmitterSection(Section):
 
     rig: Literal["simulated", "replay", "serial", "quarc", "hil"] = "simulated"
     dry_run: bool = False
-    """read the rig and never move it"""
+    """read the rig, send no commands"""
     rate_observer_bandwidth_rad_s: Annotated[float, Field(ge=0.001, le=10_000.0)] = 30.0
     """bandwidth of the rate observer, for the coder `history`; `direction` has a Kalman filter"""
     encoders: EncodersSection = EncodersSection()
@@ -173,7 +185,7 @@ class TransmitterSection(Section):
     """time from the held command to the safe one"""
     safe_command: Command = 0.0
     """a number for all inputs, or a list with one for each"""
-    soft_limits: Positive | tuple[Positive, ...] | dict[str, Positive] | None = None
+    soft_limits: PerOutput = None
     """largest measured value before the guard ramps down: a number for all outputs, a list with one for
     each, or a table by name; none: no limit"""
     bridge: BridgeSection = BridgeSection()
@@ -190,7 +202,7 @@ class ReceiverSection(Section):
     """The controller node."""
 
     controller: Annotated[str, AfterValidator(PartName(CONTROLLERS))] = "pid"
-    """the PID law, feedback of all states, the commands of a recorded flight, or a law from outside"""
+    """the PID law, feedback of all states, the commands of a recorded flight, or an external law"""
     controller_options: Options = Field(default_factory=dict)
     """options of an external class"""
     pid: PidSection = PidSection()
@@ -201,14 +213,14 @@ class ReceiverSection(Section):
 
 
 class FlightLogSection(Section):
-    """A recorded flight: its file, and what the columns are. FILE.toml beside it may hold the same."""
+    """A recorded flight: its file and columns. FILE.toml beside it may hold the same."""
 
     file: str = ""
     join: tuple[str, ...] = ()
     """further files, whose columns are joined by time"""
     columns: dict[str, str] = Field(default_factory=dict)
     """column, by name or number, of a signal, `angle`, `output`, `input`, `time` or `index` (it counts
-    rows, `period_s` apart); "0": no such input. What is not given is guessed from the names"""
+    rows, `period_s` apart); "0": no such input. The others are guessed from the names"""
     period_s: Annotated[float, Field(ge=1e-6, le=1e6)] | None = None
     """time between two rows of a file without a clock; none: timing.tick_s"""
     units: dict[str, str] = Field(default_factory=dict)
@@ -219,10 +231,10 @@ class FlightLogSection(Section):
     offsets: dict[str, Factor] = Field(default_factory=dict)
     """value = sign * scale * number + offset, then the unit"""
     start_s: Annotated[float, Field(ge=-2.4e9, le=2.4e9)] | None = None
-    """on the file's own clock; earlier rows are not looked at"""
+    """on the file's own clock; earlier rows are ignored"""
     end_s: Annotated[float, Field(ge=-2.4e9, le=2.4e9)] | None = None
     remove_spikes: bool = False
-    """set single rows that are far off between their neighbours"""
+    """replace single outlier rows by the mean of their neighbours"""
     digest: str = ""
     """of ticks, rows and commands, for the handshake; a replay computes it"""
 
@@ -243,7 +255,7 @@ class LinkSection(Section):
     downlink_rate_baud: Annotated[int, Field(ge=50, le=10_000_000)] = 115_200
     """serial: of that second port"""
     best_effort: bool = False
-    """Zenoh: a congested network may drop symbols instead of letting them wait"""
+    """Zenoh: a congested network may drop symbols instead of delaying them"""
     options: Options = Field(default_factory=dict)
     """for a kind from an installed package"""
     impairments: str = ""
@@ -284,6 +296,7 @@ class FlightConfig(CodePermission):
     link: LinkSection = LinkSection()
     telemetry: TelemetrySection = TelemetrySection()
     _notes: tuple[str, ...] = PrivateAttr(default=())
+    _given: frozenset[str] = PrivateAttr(default=frozenset())
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -295,6 +308,17 @@ class FlightConfig(CodePermission):
         noted = self.model_copy()
         noted._notes = notes
         return noted
+
+    @property
+    def given(self) -> frozenset[str]:
+        """Return the full names of the settings that a person gave; through text they are forgotten."""
+        return self._given
+
+    def giving(self, names: Iterable[str]) -> FlightConfig:
+        """Return the same configuration with the names of the settings that were given."""
+        marked = self.model_copy()
+        marked._given = frozenset(names)
+        return marked
 
     @property
     def plant_kind(self) -> str:
@@ -314,6 +338,13 @@ class FlightConfig(CodePermission):
             for field in added & fields.keys():
                 if getattr(section, field) == fields[field].default:
                     del shared[name][field]  # recordings from before it have the same digest
+        for field in ("set_point_max", "set_point_slew_per_s"):
+            if shared["limits"][field] is None:
+                del shared["limits"][field]  # likewise
+        for place, value in LEFT_OUT.items():
+            name, field = place.split(".")
+            if shared[name][field] == value:
+                del shared[name][field]
         if self.flight_log.digest:
             shared["flight_log"] = {"digest": self.flight_log.digest}
         shared["coder"]["kind"] = DIGEST_KINDS.get(self.coder.kind, self.coder.kind)

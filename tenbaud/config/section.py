@@ -58,7 +58,7 @@ class KindSection(Section):
 
 
 class OutsideSection(KindSection):
-    """A class from outside: named here, or offered by an installed package under its name."""
+    """An external class: named here, or offered by an installed package under its name."""
 
     kind: OfferedName
     """module:Class, or the name that a package offers"""

@@ -1,4 +1,4 @@
-"""Completing a configuration: what both ends must share to the last bit is worked out once, here.
+"""Completing a configuration: the numbers that both ends must share to the last bit are computed once.
 
 Neither end discretises or designs by itself: two machines' libraries differ in the last bit. The result
 goes into the shared configuration by value.

@@ -1,4 +1,4 @@
-"""Linear plants by name and by configuration: what `tenbaud floor` and `tenbaud design` are about."""
+"""Linear plants by name and by configuration, for `tenbaud floor` and `tenbaud design`."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def require_rate(plant: LinearPlant, rate_bit_s: float, section: KindSection) ->
 
 
 def state_names(section: KindSection, plant: LinearPlant) -> list[str]:
-    """Return what the states of a described plant are called."""
+    """Return the names of the states of a described plant."""
     linear = linear_of(section)
     return [] if linear is None else [one.name for one in linear.signals(plant.B.shape[1]).states]
 

@@ -1,6 +1,6 @@
 """The constants of the coders `direction` and `learning`, found once from a plant and a rate.
 
-What an error costs is not what it costs now: an error of the rate is an error of the angle later. N is
+The cost of an error is not only its present cost: an error of the rate becomes one of the angle. N is
 that cost-to-go under the coder itself, which asks for the direction that N calls the most expensive. So
 it is found by turns, from an ideal code's (the floor's multipliers) or from that of a few samples
 without bits: fly the covariance forward under N, bring the cost of its errors back, take N between the
@@ -44,7 +44,7 @@ class Turn(NamedTuple):
 def design_direction(
     plant: LinearPlant, rate_bit_s: float, symbol_period_s: float, *, adapts: bool = True
 ) -> DirectionParameters:
-    """Return what the coder needs for a plant at a rate; ValueError where there is no such coder.
+    """Return the coder's constants for a plant at a rate; ValueError if there is no such coder.
 
     A word of `rate_bit_s symbol_period_s` bits leaves every symbol period.
     """

@@ -1,4 +1,4 @@
-"""What reads each output, by the configuration's encoders."""
+"""The readers of the outputs, by the configuration's encoders."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def output_names(signals: Signals) -> str:
 
 
 def encoders_of(section: EncodersSection, signals: Signals) -> tuple[OutputReader, ...]:
-    """Return what reads each output."""
+    """Return the reader of each output."""
     field = "transmitter.encoders"
     check_outputs(field, section.by_name, signals)
     for one in signals.outputs:
@@ -37,7 +37,7 @@ def encoders_of(section: EncodersSection, signals: Signals) -> tuple[OutputReade
 
 
 def steps_of(section: EncodersSection, signals: Signals) -> list[float]:
-    """Return the step of what reads each output, in the output's unit; 0 where it is read exactly."""
+    """Return the step of each output's reader, in the output's unit; 0 if it is read exactly."""
     readers = encoders_of(section, signals)
     return [one.turn / one.counts_per_turn if isinstance(one, Encoder) else 0.0 for one in readers]
 

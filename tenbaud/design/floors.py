@@ -1,4 +1,4 @@
-"""What a rate allows at best for a plant: the figures of `tenbaud floor`."""
+"""The least errors of a plant at a rate: the figures of `tenbaud floor`."""
 
 from __future__ import annotations
 

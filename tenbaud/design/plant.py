@@ -1,4 +1,4 @@
-"""A linear plant as designs and floors take it.
+"""A linear plant for designs and floors.
 
 dx/dt = A x + B u + G w,     y = C x,     E w(t) w(t')' = diag(q) delta(t - t')
 """
@@ -33,7 +33,7 @@ class LinearPlant:
         return self.G * self.densities @ self.G.T
 
     def model(self) -> LinearModel:
-        """Return what the floors are of; ValueError where there is none."""
+        """Return the model of the floors; ValueError if there is none."""
         return linear_model(self.A, self.noise, self.C, self.weights)
 
 

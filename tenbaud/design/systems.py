@@ -26,7 +26,7 @@ LEAST = 1e-9
 REST_MAX = 1e-6
 """fastest change of a state at rest, and largest error of an output, per unit of size"""
 LATER_S = (0.37, 11.3)
-"""times at which an autonomous system does what it does at time 0"""
+"""times at which an autonomous system behaves as at time 0"""
 LABEL = re.compile(r"(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\)|,\s*(.*))?")
 NUMBERED = re.compile(r"[A-Za-z]+\[\d+\]")
 """A name that python-control gives to a signal without one."""
@@ -65,14 +65,14 @@ Point: TypeAlias = tuple[ArrayLike, ArrayLike]
 
 
 class Names(NamedTuple):
-    """What a system calls its signals; none where it does not name them."""
+    """The names of a system's signals; none if it has no names."""
 
     state: tuple[str, ...]
     input: tuple[str, ...]
     output: tuple[str, ...]
 
     def of(self, what: str, place: int) -> str:
-        """Return what a signal is called in an error."""
+        """Return the name of a signal in an error."""
         names: tuple[str, ...] = getattr(self, what)
         return f"{what} {names[place] if names else place + 1}"
 
@@ -209,8 +209,9 @@ def _linearised(
     rest = here[:size] - x if discrete else here[:size]
     for place in np.flatnonzero(~(abs(rest) <= REST_MAX * (1.0 + abs(x))))[:1]:
         raise ConfigError(
-            f"the operating point is no rest: {names.of('state', place)} moves by {rest[place]:.6g} "
-            f"{'a step' if discrete else 'a second'} there; control.find_operating_point finds one"
+            f"the operating point is not an equilibrium: {names.of('state', place)} moves by "
+            f"{rest[place]:.6g} {'a step' if discrete else 'a second'} there; "
+            "control.find_operating_point finds one"
         )
     slopes = _slopes(both, x, u)
     A, B, C, D = slopes[:size, :size], slopes[:size, size:], slopes[size:, :size], slopes[size:, size:]

@@ -1,4 +1,4 @@
-"""Writes every file of a command whole or not at all.
+"""Writes every file of a command completely or not at all.
 
 A file is written beside its place under a temporary name, flushed to the disk and renamed. A process
 that is stopped, killed or out of space leaves the old file or none, and never half of the new one.
@@ -27,14 +27,14 @@ _ADVICE = {
     errno.EROFS: "The file system is read-only: choose another place",
     errno.EACCES: "Choose a place that this user may write to",
     errno.EPERM: "Choose a place that this user may write to",
-    errno.ENOTDIR: "A file stands where a folder should be: choose another place",
+    errno.ENOTDIR: "A file is in the place of the folder: choose another place",
     errno.ENAMETOOLONG: "Choose a shorter name",
     errno.ELOOP: "It is a symbolic link, and links are not followed: remove it or choose another place",
 }
 
 
 class WriteError(TenbaudError):
-    """A file or folder could not be written; the text names it, the reason, and what to do."""
+    """A file or folder could not be written; the text names it, the reason and the remedy."""
 
 
 def write_error(path: Path | str, error: OSError) -> WriteError:

@@ -1,165 +1,27 @@
-"""The end of a flight at a glance: verdict, warnings, a few figures, what to open and do next."""
+"""The closing lines of a flight: verdict, warnings, a few figures, files to open, next command."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tenbaud.flight.status import in_degrees
 from tenbaud.flight.summary import Summary
 from tenbaud.recording.folder import RunFolder
+from tenbaud.sentences.flown import figures_of, verdict_of, warnings_of
 
-LATE_SHARE_WORTH_A_WARNING = 0.01
 LABEL_WIDTH = 16
 
 
 def closing_lines(summary: Summary, folder: RunFolder, *, unicode: bool = True) -> list[str]:
     """Return the lines that end a flight on a terminal; angles are in degrees."""
-    lines = [_verdict(summary, unicode)]
+    lines = [verdict_of(summary, unicode)]
     lines += [f"  {'! ' if not unicode else '⚠ '}{text}" for text in warnings_of(summary)]
-    shown = [*_figures(summary, unicode), _what_next(summary, folder)]
+    shown = [*figures_of(summary, unicode), _what_next(summary, folder)]
     return lines + [f"  {label:{LABEL_WIDTH}}{text}" for label, text in shown]
 
 
-def _verdict(summary: Summary, unicode: bool) -> str:
-    code = int(summary["exit_code"])
-    if code:
-        mark = "✗" if unicode else "x"
-        cause = ", ".join(summary.get("not_flown") or ()) or summary["outcome"]
-        return f"{mark} Flight failed (exit code {code}): {cause}"
-    mark = "✓" if unicode else "+"
-    text = f"{mark} Flight finished: "
-    duration_s = summary.get("duration_s")  # a receiver knows samples, and not the flight's time
-    text += f"{summary['samples']} samples" if duration_s is None else f"{float(duration_s):g} s"
-    checks, desyncs = summary.get("digest_checks"), summary.get("desyncs") or 0
-    if checks is None:
-        return text
-    if desyncs:
-        return f"{text}, {checks} checks of the two codecs, {desyncs} found a difference"
-    return f"{text}, both codecs equal in {checks} of {checks} checks"
-
-
-def warnings_of(summary: Summary) -> list[str]:
-    """Return what a person should know before the figures, most serious first."""
-    get = summary.get
-    counted = (
-        (
-            "bad_commands",
-            "the controller failed at {} ticks (wrong length, not finite, or an exception)",
-        ),
-        ("bad_references", "the reference failed at {} ticks"),
-        (
-            "desyncs",
-            "differences of the two codecs, resynchronised: {} (`tenbaud diff` names the field)",
-        ),
-        ("out_of_bounds", "{} frames held values out of bounds and were dropped"),
-        ("malformed", "{} messages were no frames and were dropped"),
-        ("recording_rows_lost", "the recording lost {} rows: the disk was too slow"),
-    )
-    found = str(get("outcome")).splitlines() if get("not_flown") else []
-    found += [text.format(get(name)) for name, text in counted if get(name)]
-    if get("sensor_fault"):
-        found.append(f"sensor: {get('sensor_fault')}")
-    ticks = get("ticks_commanded")
-    if get("ticks_guard_down"):
-        found.append(f"the guard held the safe voltage for {get('ticks_guard_down')} ticks")
-    late = get("commands_late") or 0
-    if ticks and late > LATE_SHARE_WORTH_A_WARNING * ticks:
-        found.append(f"{late} commands came too late: the last one was held")
-    missing = get("symbols_missing_share") or 0.0
-    if missing > LATE_SHARE_WORTH_A_WARNING:
-        found.append(f"{missing:.1%} of the slots had no symbol in time")
-    return found
-
-
-def _figures(summary: Summary, unicode: bool) -> Iterator[tuple[str, str]]:
-    get = summary.get
-    flown = f"{get('preset')} over {get('link')}, {get('clock')} clock"
-    yield "Flown", f"{get('plant')}; {flown}" if get("plant") else flown
-    if get("coder_bits_up") is not None:
-        yield "Uplink", _uplink(summary)
-    yield from _errors(summary, unicode)
-    if learned := summary.get("learned"):
-        seen = [learned_text(name, **one) for name, one in learned.items() if is_seen(**one)]
-        yield "Model is off by", ", ".join(seen) or "nothing that was learned"
-    yield "Link", _link(summary)
-    if get("impairments"):
-        yield "Impaired", f"{get('impairments')}"
-    if get("loop_late_ms_p99") is not None:
-        yield (
-            "Loop lateness",
-            f"{get('loop_late_ms_p50'):.2f} ms median, {get('loop_late_ms_p99'):.2f} ms p99",
-        )
-
-
-def is_seen(error: float, deviation: float) -> bool:
-    """Return whether an error that was learned is more than twice its standard deviation."""
-    return abs(error) > 2.0 * deviation
-
-
-def learned_text(name: str, error: float, deviation: float) -> str:
-    """Return what was learned of a term: an error in per cent, a force as it is."""
-    words = name.replace("_", " ")
-    if name.endswith("_force"):
-        return f"{words} {error:+.3f} (sd {deviation:.3f})"
-    return f"{words} {error:+.1%} (sd {deviation:.1%})"
-
-
-def _errors(summary: Summary, unicode: bool) -> Iterator[tuple[str, str]]:
-    """Yield the errors of every output in its unit, angles in degrees."""
-    window = summary.get("window_start_s") or 0.0
-    after = f", after the first {window:g} s" if window else ""
-    outputs: dict[str, Summary] = summary.get("outputs") or {}
-
-    def shown(value: float, unit: str, digits: int) -> str:
-        value, unit = in_degrees(value, unit)
-        if unit != "deg":
-            return f"{value:.3g} {unit}".rstrip()
-        return f"{value:.{digits}f}{'°' if unicode else ' deg'}"
-
-    for name, one in outputs.items():
-        of = f"{name.replace('_', ' ')}: " if len(outputs) > 1 else ""
-        rms, most, largest = one["error_live_rms"], one["error_live_max"], one["largest"]
-        if rms is not None and most is not None:
-            share = f" ({rms / largest:.2%} and {most / largest:.2%} of the largest)" if largest else ""
-            error = f"{shown(rms, one['unit'], 2)} rms, {shown(most, one['unit'], 2)} max"
-            yield "Estimate error", of + error + share + after
-        if one["tracking_rms"] is not None:
-            tracking = shown(one["tracking_rms"], one["unit"], 1)
-            usual = summary.get("usual_loop")
-            beside = f" ({shown(usual['tracking_rms_rad'], 'rad', 1)} over 1000 bit/s)" if usual else ""
-            yield "Tracking error", f"{of}{tracking} rms{beside}, steps of the reference included"
-
-
-def _uplink(summary: Summary) -> str:
-    bits = summary["coder_bits_up"]
-    text = f"{bits:g} bits"
-    if summary.get("duration_s"):
-        text += f", {bits / float(summary['duration_s']):.3g} bit/s"
-    up, down = summary.get("wire_bytes_up"), summary.get("wire_bytes_down")
-    if up is not None and down is not None:
-        text += f"; with framing {_bytes(up)} up, {_bytes(down)} down"
-    return text
-
-
-def _bytes(count: int) -> str:
-    return f"{count / 1000:.1f} kB" if count < 1_000_000 else f"{count / 1e6:.1f} MB"
-
-
-def _link(summary: Summary) -> str:
-    get = summary.get
-    parts = [f"{get('erasures') or 0} symbols lost", f"{get('symbols_late') or 0} late"]
-    if get("rejoins") is not None:
-        cost = f" ({get('rejoin_bytes')} bytes)" if get("rejoins") and get("rejoin_bytes") else ""
-        parts.append(f"{get('rejoins')} resyncs{cost}")
-    if get("reconnects"):
-        parts.append(f"{get('reconnects')} reconnects")
-    return ", ".join(parts)
-
-
 def _what_next(summary: Summary, folder: RunFolder) -> tuple[str, str]:
-    """Return what to open and the next command, as a label and its text."""
+    """Return the file to open and the next command, as a label and its text."""
     path = _shown(folder.path)
     drawn = folder.figure.is_file()
     label, place = ("Open", f"{path}/{folder.figure.name}") if drawn else ("Recorded in", path)

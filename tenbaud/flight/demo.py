@@ -1,6 +1,6 @@
 """Both ends on this machine: two processes of the same command.
 
-Zenoh on loopback joins them, or whatever the configured kind of link has for two processes.
+Zenoh on loopback joins them, or another configured kind of link.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from channel.links.kind import Meeting
 from tenbaud.build.flight import Agreement
 from tenbaud.config.load import dump_config, flattened
 from tenbaud.files.whole import write_whole
+from tenbaud.flight.drawing import NotebookDrawing
 from tenbaud.flight.ends import run_in_memory
 from tenbaud.flight.lifeline import end_child, start_child
 from tenbaud.flight.outcome import ExitCode, Outcome, first_code, outcome_of_status
@@ -40,7 +41,7 @@ class DemoResult:
     summary: Summary
     code: ExitCode
     messages: list[str]
-    """what the two ends said on their way out, if it was not a plain success"""
+    """the last lines of the two ends, if they were not a plain success"""
 
 
 def fly_demo(
@@ -53,23 +54,23 @@ def fly_demo(
     pace: float | None = None,
     status: StatusMode = "auto",
     compare: bool = False,
+    drawing: NotebookDrawing | None = None,
 ) -> DemoResult:
     """Fly once into an existing, empty run folder; write summary and, if wished, figure there.
 
     `view`: serve the live page beside the flight, which may then be steered from it. `pace`: on the
-    virtual clock, at most this factor of real time; not for a link within one process. `status`: what a
+    virtual clock, at most this factor of real time. `status`: what a
     flight within this process writes on the standard error. `compare`: fly the usual loop beside it,
-    where there is one.
+    where there is one. `drawing` shows a flight within this process.
     """
     write_whole(folder.config, dump_config(agreement.config))
-    if agreement.link.in_process:
-        outcome, upper, lower = run_in_memory(agreement, folder, status)
-        messages = [] if outcome.code is ExitCode.OK else [outcome.text]
-        result = DemoResult(joined(upper, lower), outcome.code, messages)
-    else:
-        with StopFlag() as stop, page_beside(view, stop) as viewing:
-            if pace is not None:
-                viewing = replace(viewing, transmitter=[*viewing.transmitter, "--pace", str(pace)])
+    with StopFlag() as stop, page_beside(view, stop, pace) as viewing:
+        if agreement.link.in_process:
+            flown = replace(agreement, live=view is not None)
+            outcome, upper, lower = run_in_memory(flown, folder, status, viewing, drawing)
+            messages = [] if outcome.code is ExitCode.OK else [outcome.text]
+            result = DemoResult(joined(upper, lower), outcome.code, messages)
+        else:
             result = _fly_processes(agreement, folder, on_status, viewing, stop)
     on_status({"role": "run", "phase": "writing its results"})
     usual = None
@@ -80,7 +81,7 @@ def fly_demo(
         result.summary |= {"usual_loop": usual.figures} if usual else {}
     draw = draw and result.summary.get("samples", 0) > 0
     problems = write_up(folder, agreement.config, result.summary, draw, usual and usual.curve)
-    # What ended the flight is said last.
+    # The cause of the end comes last.
     result.messages[:0] = [problem.text for problem in problems]
     result.code = first_code(result.code, *(problem.code for problem in problems))
     return result
@@ -90,7 +91,8 @@ def _fly_processes(
     agreement: Agreement, folder: RunFolder, on_status: OnStatus, viewing: Viewing, stop: StopFlag
 ) -> DemoResult:
     with agreement.link.meeting(agreement.config.link) as meetings:
-        up, down = _words(meetings[0]) + viewing.transmitter, _words(meetings[1]) + viewing.receiver
+        up = _words(meetings[0]) + viewing.words("transmitter")
+        down = _words(meetings[1]) + viewing.words("receiver")
         receiver = _Child("receiver", agreement, folder, down, on_status)
         transmitter = _Child("transmitter", agreement, folder, up, on_status)
         ends = (transmitter, receiver)
@@ -106,7 +108,7 @@ def _fly_processes(
 
 
 def _result(agreement: Agreement, transmitter: _Child, receiver: _Child) -> DemoResult:
-    """Return what both said, the first cause of the end last."""
+    """Return the lines of both, the first cause of the end last."""
     ends = [transmitter, receiver]
     # Whoever was killed comes first: the other one only noticed.
     ends.sort(key=lambda end: end.process.returncode >= 0)
@@ -238,7 +240,7 @@ class _Child:
         return self._interrupted and self.process.poll() == -signal.SIGINT
 
     def end(self) -> None:
-        """Make sure that the process has ended, and read what it left."""
+        """Make sure that the process has ended, and read its output."""
         end_child(self.process, 5.0)
         self._read_out()
 

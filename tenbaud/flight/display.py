@@ -53,7 +53,7 @@ class StatusDisplay:
             self._live.stop()
 
     def show(self, status: Status) -> None:
-        """Take a status in; what is shown changes at its own pace."""
+        """Take a status; the display is updated at its own rate."""
         now_s = time.monotonic()
         if self._live is not None:
             self._screen.update(status)

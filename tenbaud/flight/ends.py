@@ -1,4 +1,4 @@
-"""One end, run whole: recording opened, link opened, flown, everything closed, figures returned."""
+"""The complete run of one end: open recording and link, fly, close everything, return figures."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from channel.codec.codec import Word
 from channel.links.base import Link, Role
 from channel.links.kind import LinkEnd, NodePlace
 from channel.links.security import Security
+from channel.protocol.recording import Recorder
 from channel.protocol.wire import DATAGRAM
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build.ends import build_receiver
@@ -22,11 +23,13 @@ from tenbaud.build.recorded import replay_notes
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
 from tenbaud.flight import receive, transmit
 from tenbaud.flight.display import StatusReporter
+from tenbaud.flight.drawing import NotebookDrawing
 from tenbaud.flight.outcome import SAFE, ExitCode, Outcome, outcome_of
 from tenbaud.flight.status import Status, StatusMode, outputs_status
 from tenbaud.flight.stop import StopFlag
 from tenbaud.flight.summary import Summary, gap_part, link_part, receiver_part, transmitter_part
 from tenbaud.flight.trouble import Trouble
+from tenbaud.flight.viewing import ALONE, ENDS, Viewing
 from tenbaud.recording.encoding import SIGNALS_KEY, signals_text
 from tenbaud.recording.folder import RunFolder
 from tenbaud.recording.overview import OverviewRecorder
@@ -34,6 +37,7 @@ from tenbaud.recording.shared import SharedWriter
 from tenbaud.recording.writer import McapRecorder
 from tenbaud.telemetry.compose import ReceiverComposer, TransmitterComposer
 from tenbaud.telemetry.end import DEFAULT_OPTIONS, TelemetryEnd, TelemetryOptions
+from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
 from transmitter.loops.virtual import LinkPeer
 
 SWITCH_INTERVAL_S = 0.0002
@@ -59,7 +63,7 @@ class Endpoints:
     telemetry: TelemetryOptions = DEFAULT_OPTIONS
 
     def node(self) -> NodePlace:
-        """Return what opens this end's Zenoh session."""
+        """Return the function that opens this end's Zenoh session."""
         return {
             "listen": self.listen,
             "connect": self.connect,
@@ -148,31 +152,70 @@ def refusals(endpoints: Endpoints) -> Iterator[Counter[str]]:
 
 
 def run_in_memory(
-    agreement: Agreement, folder: RunFolder, status: StatusMode
+    agreement: Agreement,
+    folder: RunFolder,
+    status: StatusMode,
+    viewing: Viewing = ALONE,
+    drawing: NotebookDrawing | None = None,
 ) -> tuple[Outcome, Summary, Summary]:
     """Fly both ends in this process, on the virtual clock, without a link."""
     with (
         _end(agreement, "transmitter", folder) as (recorder, stop),
         open_recorder(agreement, "receiver", folder.receiver) as receiver_recorder,
     ):
-        run = transmit.prepare(agreement, recorder, DATAGRAM)
-        endpoint = build_receiver(agreement, receiver_recorder, DATAGRAM)
-        with StatusReporter(lambda: transmitter_status(run), status):
+        rows: tuple[Recorder, Recorder] = recorder, receiver_recorder
+        if drawing is not None:
+            rows = drawing.recorders(*rows)
+        looked_at = [Endpoints(telemetry=viewing.options(role)) for role in ENDS]
+        up = _telemetry(agreement, "transmitter", rows[0], looked_at[0])
+        down = _telemetry(agreement, "receiver", rows[1], looked_at[1])
+        run = transmit.prepare(agreement, up.recorder, DATAGRAM)
+        endpoint = build_receiver(agreement, down.recorder, DATAGRAM, references=down.steering)
+        obeyed = down.fly_receiver(endpoint, stop)
+        live = up.fly_transmitter(run, stop, lambda: _obey(obeyed))
+        if viewing.endpoints or drawing is not None:
+            run.node.before_every_tick(_each_tick(live, obeyed, drawing))
+        with (
+            up.publishing(lambda tap: TransmitterComposer(run, tap, live)),
+            down.publishing(lambda tap: ReceiverComposer(agreement, endpoint, tap, obeyed)),
+            StatusReporter(lambda: transmitter_status(run), status),
+        ):
             outcome = _guarded(lambda: transmit.fly_virtual(run, endpoint, stop))
         seen = receive.ended_outcome(agreement, endpoint.session)
         if outcome.code is ExitCode.OK and seen.code is ExitCode.NOT_FLOWN:
             outcome = seen
         run.node.flush_records()
         endpoint.session.flush_records()
+        if drawing is not None:
+            drawing.end()
         upper = transmitter_part(run, outcome)
         lower = receiver_part(agreement, endpoint, outcome)
         return outcome, _with_recording(upper, recorder), lower
 
 
+def _obey(receiver: LiveReceiver) -> None:
+    """Have the receiver's commands take hold, also while the flight is paused."""
+    receiver()
+
+
+def _each_tick(
+    live: LiveTransmitter, obeyed: LiveReceiver, drawing: NotebookDrawing | None
+) -> Callable[[int], None]:
+    """Return what both ends have done before every tick of a flight that is looked at."""
+
+    def act(tick: int) -> None:
+        _obey(obeyed)
+        live.at_tick(tick)
+        if drawing is not None:
+            drawing.at_tick(tick)
+
+    return act
+
+
 def open_recorder(
     agreement: Agreement, role: Role, path: Path, writer: SharedWriter | None = None
 ) -> McapRecorder:
-    """Return a recorder for one end, its file headed by what was flown.
+    """Return a recorder for one end, its file headed by the flight's description.
 
     `writer`: a thread that it shares with others, instead of one of its own.
     """
@@ -200,7 +243,7 @@ def open_recorder(
 
 
 def transmitter_status(run: TransmitterRun) -> Status:
-    """Return what a person wants to know of a running transmitter."""
+    """Return the status of a running transmitter, for people."""
     node = run.node
     coder = run.agreement.codec.coder
     tick_s = run.agreement.terms.tick_ns / 1e9
@@ -233,7 +276,7 @@ def _tape(words: Sequence[tuple[Word, tuple[int, ...] | None]]) -> Status:
 
 
 def receiver_status(agreement: Agreement, endpoint: ReceiverEndpoint) -> Status:
-    """Return what a person wants to know of a running receiver."""
+    """Return the status of a running receiver, for people."""
     session, model = endpoint.session, agreement.codec.model
     return {
         "role": "receiver",
@@ -257,14 +300,14 @@ def _end(
     path = folder.transmitter if role == "transmitter" else folder.receiver
     sys.setswitchinterval(SWITCH_INTERVAL_S)
     with StopFlag() as stop, open_recorder(agreement, role, path) as recorder:
-        # What was built so far stays; the collector need not look at it in flight.
+        # Objects built so far stay; the collector need not scan them in flight.
         gc.collect()
         gc.freeze()
         yield recorder, stop
 
 
 def _telemetry(
-    agreement: Agreement, role: Role, recorder: McapRecorder, endpoints: Endpoints
+    agreement: Agreement, role: Role, recorder: Recorder, endpoints: Endpoints
 ) -> TelemetryEnd:
     return TelemetryEnd(
         agreement,
@@ -298,7 +341,7 @@ def _guarded(fly: Callable[[], Outcome]) -> Outcome:
 
 
 def _with_recording(summary: Summary, recorder: McapRecorder) -> Summary:
-    """Close the recording and add what became of it."""
+    """Close the recording and add its outcome."""
     recorder.close()
     return {
         **summary,

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import inspect
+import sys
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,11 +14,12 @@ from numpy.typing import ArrayLike
 
 from channel.codec.codec import Coder, Model
 from channel.errors import TenbaudError
+from channel.links.endpoints import loopback_host
 from channel.protocol.terms import Clock
 from plant_sim.plant import Plant
 from receiver.controllers.base import Controller
 from tenbaud.build.controllers import controller_context
-from tenbaud.build.ends import check_parts, check_rig_port
+from tenbaud.build.ends import check_parts, check_rig, check_sabotage
 from tenbaud.build.flight import Agreement, agree
 from tenbaud.build.given import Given, feedback_gains, reference_settings, whole_sections
 from tenbaud.build.parts import PartError, Parts
@@ -33,8 +36,13 @@ from tenbaud.design.settings import exact_outputs, settings_of
 from tenbaud.design.simulated import system_plant
 from tenbaud.design.systems import Point, System, is_system, matrices
 from tenbaud.flight.demo import fly_demo
+from tenbaud.flight.display import StatusDisplay
+from tenbaud.flight.drawing import NotebookDrawing
 from tenbaud.flight.report import removed_unless_begun
+from tenbaud.flight.status import Status
+from tenbaud.flight.viewing import ViewOptions
 from tenbaud.recording.folder import RunFolder, create_run_folder
+from tenbaud.recording.notebook import in_notebook
 from tenbaud.recording.run import Run
 
 FIELDS = {
@@ -48,7 +56,11 @@ REFERENCE_NAME = "reference.csv"
 
 
 class FlightFailed(TenbaudError):
-    """A flight that did not end well; the text says how, and where its recordings are."""
+    """A flight that did not end well; the text says how, and `run` is what was recorded of it."""
+
+    def __init__(self, text: str, run: Run) -> None:
+        super().__init__(f"{text}\n  the recordings are in {run.path}")
+        self.run = run
 
 
 def fly(
@@ -67,6 +79,9 @@ def fly(
     model: Model | str | None = None,
     coder: Coder | str | None = None,
     plant: Plant | Callable[..., Plant] | str | None = None,
+    show: bool = False,
+    pace: float | None = None,
+    accept_risk: bool = False,
 ) -> Run:
     """Fly once, a preset or a plant of your own, and return the recorded run.
 
@@ -84,7 +99,12 @@ def fly(
     configuration, or an object that you build for the tick that is flown; a class of a plant is called
     with its context. With the link "memory" both ends are in this process and the flight is as fast as
     it computes; the others start two processes and take names only. `out` is a new folder; without it
-    one is made in `runs/`.
+    one is made in `runs/`. `accept_risk`: turn the motors of a real rig without the limits of a first
+    flight (docs/rigs).
+
+    `show`: in a notebook, draw the flight below its cell while it flies, with a progress bar; elsewhere
+    and for a flight of two processes, open the live page in the browser, from which it may be steered.
+    `pace`: on the virtual clock, at most this many times real time; the page has 1 if it is not given.
 
     Raises ConfigError for plants, settings and parts that make no flight, and FlightFailed for a flight
     that did not end well.
@@ -102,12 +122,36 @@ def fly(
     with removed_unless_begun(folder):
         if reference is not None:
             loaded = _following(loaded, reference, parts, folder)
-        agreement = _agreement(loaded, clock, parts)
-    result = fly_demo(agreement, folder, lambda _status: None, draw=draw, status="none")
+        agreement = _agreement(loaded, clock, parts, accept_risk)
+        looks = _looks(agreement, show, pace)
+    with StatusDisplay() if show and sys.stderr.isatty() else nullcontext() as display:
+        on_status = display.show if display is not None else _unseen
+        result = fly_demo(agreement, folder, on_status, draw=draw, status="none", **looks)
     if result.code:
-        said = "\n  ".join([str(result.summary["outcome"]), *result.messages])
-        raise FlightFailed(f"{said}\n  the recordings are in {folder.path}")
+        texts = dict.fromkeys([str(result.summary["outcome"]), *result.messages])
+        raise FlightFailed("\n  ".join(texts), Run(folder.path))
     return Run(folder.path)
+
+
+def _unseen(status: Status) -> None:
+    """Show nothing."""
+
+
+def _looks(agreement: Agreement, show: bool, pace: float | None) -> dict[str, Any]:
+    """Return how a flight is to be looked at, checked before anything starts."""
+    if pace is not None and (agreement.clock == "real" or not pace > 0.0):
+        raise ConfigError(
+            "pace slows the virtual clock down: a factor above 0, and not for clock='real'"
+        )
+    if show and agreement.link.in_process and in_notebook():
+        return {"drawing": NotebookDrawing(agreement), "pace": pace}
+    if not show:
+        return {"pace": pace}
+    from tenbaud.view.server import free_port, require_nicegui
+
+    require_nicegui()
+    view = ViewOptions(free_port(loopback_host()), open_browser=True)
+    return {"view": view, "pace": pace or (1.0 if agreement.clock == "virtual" else None)}
 
 
 def _are_gains(controller: object) -> bool:
@@ -178,7 +222,8 @@ def _following(
     )
     values = loaded.model_dump(mode="json", exclude_none=True)
     over = {"receiver": {"reference": whole_sections(section, outputs[0].name)}}
-    return load_config(loaded.preset, None, merged(values, over), allow_code=True)
+    followed = load_config(loaded.preset, None, merged(values, over), allow_code=True)
+    return followed.giving(loaded.given)
 
 
 def _objects(parts: Mapping[str, Any]) -> Parts:
@@ -198,7 +243,9 @@ def _is_built(name: str, part: object) -> bool:
     return name in ("plant", "controller") and inspect.isclass(part)
 
 
-def _agreement(loaded: FlightConfig, clock: Clock, parts: Mapping[str, Any]) -> Agreement:
+def _agreement(
+    loaded: FlightConfig, clock: Clock, parts: Mapping[str, Any], accept_risk: bool
+) -> Agreement:
     """Return what both ends share, with every part built and checked."""
     agreement = agree(loaded, clock, _objects(parts))
     plant, controller = parts.get("plant"), parts.get("controller")
@@ -215,5 +262,6 @@ def _agreement(loaded: FlightConfig, clock: Clock, parts: Mapping[str, Any]) -> 
         )
     agreement = replace(agreement, parts=made)
     check_parts(loaded, made)
-    check_rig_port(loaded)
+    check_sabotage(agreement)
+    check_rig(loaded, accept_risk, made)
     return agreement

@@ -1,4 +1,4 @@
-"""Child processes that end when their parent has gone, however that came about.
+"""Child processes that end with their parent, for any cause.
 
 The parent holds a pipe to the child's standard input and never writes to it. The operating system
 closes it with the parent, also when that was killed and could tell nobody.
@@ -33,7 +33,7 @@ def start_child(*arguments: str, **more: Any) -> subprocess.Popen[str]:
 
 
 def end_child(child: subprocess.Popen[str], timeout_s: float) -> None:
-    """End a child and wait for it: what it held, such as a port, is free then."""
+    """End a child and wait for it: its resources, such as a port, are free then."""
     if child.poll() is None:
         child.terminate()
         if hasattr(signal, "SIGCONT"):

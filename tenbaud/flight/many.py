@@ -37,7 +37,7 @@ from tenbaud.sentences import endings
 
 Log = Callable[[str], None]
 AgreementOf = Callable[[str], Agreement]
-"""Session name -> what its flights are agreed on; raises TenbaudError where there is no such."""
+"""Session name -> agreement of its flights; raises TenbaudError if there is none."""
 
 LOGGED_MAX = 1000
 """Refusals remembered, so that repeated requests of a transmitter are logged once."""
@@ -85,7 +85,7 @@ class ManyHost:
     # In the loop's thread
 
     def on_unserved(self, name: str, data: bytes) -> list[bytes]:
-        """Take a message of a session that has no service; return what to answer.
+        """Take a message of a session that has no service; return the answers.
 
         A request for a session opens one. A symbol is answered as a restarted receiver does, so that
         its transmitter asks.

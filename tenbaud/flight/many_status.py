@@ -17,6 +17,7 @@ from rich.table import Table
 from receiver.loops.many import ManyService, Served
 from receiver.session.session import Phase
 from tenbaud.sentences import endings
+from tenbaud.sentences.quantities import amount
 
 PERIOD_S = 1.0
 LINES_AROUND = 6
@@ -96,14 +97,15 @@ def _row(served: Served) -> tuple[str, ...]:
     session = served.endpoint.session
     baud = session.meter.baud
     state, model = session.state, session.codec.model
-    values = zip(model.measured(state.model), session.terms.signals.outputs, strict=True)
+    outputs = session.terms.signals.outputs
+    values = zip(model.measured(state.model), outputs, strict=True)
     ranges = session.codec.coder.ranges(state.coder)
     return (
         served.name,
         endings.phase_text(session.phase.value),
         f"{state.sample * session.terms.sample_ns / 1e9:.1f} s",
-        ", ".join(f"{value:+.3f} {output.unit}".rstrip() for value, output in values),
-        ", ".join(f"{one:.3f}" for one in ranges),
+        ", ".join(amount(value, output.unit) for value, output in values),
+        ", ".join(amount(one, output.unit, 2) for one, output in zip(ranges, outputs, strict=True)),
         "" if baud is None else f"{baud:.2f}",
         str(session.counts["erasures"]),
         str(session.counts["rejoins"]),

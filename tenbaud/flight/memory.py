@@ -174,13 +174,13 @@ class MemoryFlight:
         )
 
     def _ended_by(self) -> str:
-        """Return what ended a flight before its time, for people."""
+        """Return why a flight ended early, for people."""
         end = self.transmitter.end
         return guard_text(self.node.guard.reason) if end is None else end_text(end, "receiver")
 
 
 def _observer(codec: Codec, counts_per_turn: int) -> StateObserver | None:
-    """Return what shows a coder all states of a linear model; None: as the session has it."""
+    """Return the observer of all states of a linear model; None: the session's own."""
     if not (codec.uses_rates and isinstance(plant_model(codec.model), LinearModel)):
         return None
     from tenbaud.design.observer import observer_of_coder

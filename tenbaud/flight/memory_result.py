@@ -44,19 +44,19 @@ class FlightResult:
     samples: tuple[int, ...]
     """the samples that were confirmed: both ends hold equal states after them"""
     words: tuple[Word, ...]
-    """what both ends consumed in each of `samples`; None: erased"""
+    """words that both ends consumed in each of `samples`; None: erased"""
     words_sent: tuple[Word, ...]
-    """what the transmitter had sent; None: nothing"""
+    """words that the transmitter sent; None: none"""
     digests: tuple[str, ...]
     """64-bit digest of the state after each of `samples`"""
     counts: Mapping[str, Mapping[str, int]]
-    """what each end counted, by "transmitter" and "receiver"; 0 for what never happened"""
+    """counts of each end, by `transmitter` and `receiver`"""
     events: tuple[Event, ...]
-    """what the sessions reported, in order of flight time"""
+    """events of the sessions, in order of flight time"""
     desync: Desync | None
     """the last lost lockstep, with both digests; None: there was none"""
     ended_by: str
-    """what ended the flight before its time; empty: it was flown to its end"""
+    """why the flight ended early; empty: it reached its end"""
 
     @property
     def reference_rad(self) -> Series:

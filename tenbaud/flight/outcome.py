@@ -36,7 +36,7 @@ class Outcome:
     text: str
     """for people; nothing reads it"""
     not_flown: tuple[NotFlown, ...] = ()
-    """in what the flight fell short, for NOT_FLOWN"""
+    """the faults of the flight, for NOT_FLOWN"""
 
 
 SAFE = "the motors are at their safe voltage"
@@ -50,7 +50,7 @@ _ENDINGS = {
     ExitCode.DESYNC: Ending.DESYNC,
     ExitCode.SAFETY_STOP: Ending.SAFETY_STOP,
 }
-"""What the other end is sent; whether the flight has flown it judges for itself."""
+"""The ending sent to the other end, which decides itself whether the flight has flown."""
 
 
 def farewell_of(outcome: Outcome) -> End:
@@ -62,7 +62,7 @@ def farewell_of(outcome: Outcome) -> End:
 def first_cause(outcome: Outcome, trouble: str, consequence: str = "") -> Outcome:
     """Return the outcome, with the fault of this end's own line as its cause if that was lost.
 
-    Seen from a lost line the other end is silent, which is what the outcome would blame.
+    On a lost line the other end seems silent, and the outcome would blame it.
     """
     if outcome.code is not ExitCode.LINK_LOST or not trouble:
         return outcome

@@ -57,6 +57,6 @@ def _left_out(count: int) -> str:
 
 
 def _plain(text: str) -> str:
-    """Return what a terminal shows as text, without control characters."""
+    """Return a text without control characters, for the terminal."""
     shown = text[:CHARACTERS_MAX] + (" ..." if len(text) > CHARACTERS_MAX else "")
     return "".join(one if one.isprintable() or one == "\n" else "?" for one in shown)

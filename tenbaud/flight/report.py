@@ -98,7 +98,7 @@ def draw_figure(folder: RunFolder, title: str, usual: Curve | None = None) -> No
 
 
 def figure_title(config: FlightConfig, summary: Summary) -> str:
-    """Return what stands over a flight's figure."""
+    """Return the title of a flight's figure."""
     return f"{config.preset}: {summary.get('plant', '')}, {config.channel.rate_baud:g} bit/s"
 
 
@@ -109,6 +109,7 @@ def show_summaries(
     from rich.console import Console
 
     from tenbaud.flight.closing import closing_lines
+    from tenbaud.flight.narrow import for_terminal
     from tenbaud.flight.screen import unicode_fits
 
     console = Console()
@@ -116,7 +117,8 @@ def show_summaries(
         console.print(_table(summaries))
     for summary, folder in zip(summaries, folders, strict=True):
         lines = closing_lines(summary, folder, unicode=unicode_fits(console))
-        console.print("\n".join(lines), soft_wrap=True, highlight=False, markup=False)
+        text = for_terminal("\n".join(lines))
+        console.print(text, soft_wrap=True, highlight=False, markup=False)
 
 
 def _table(summaries: Sequence[Summary]) -> Table:

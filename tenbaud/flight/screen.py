@@ -9,17 +9,23 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 
-from rich.console import Console, Group, RenderableType
+from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
 from rich.table import Table
 from rich.text import Text
 
-from tenbaud.flight.status import Status, in_degrees
+from tenbaud.flight.status import Status
 from tenbaud.sentences import endings
+from tenbaud.sentences.quantities import in_degrees
 
 GAUGE_DEGREES = 180
 GAUGE_CELLS = 41
 TAPE_CELLS = 48
 SPARK_CELLS = 48
+CELLS_MIN = 5
+LABEL_CELLS = 13
+"""What stands before a value, or most labels."""
+VALUE_CELLS = 15
+RANGE_CELLS = 12
 TAPE_STYLES = ("blue", "green", "magenta", "yellow", "cyan", "white")
 """Of bits about the first output, the second, ...: red is what is erased."""
 SPARKS = "▁▂▃▄▅▆▇█"
@@ -34,6 +40,7 @@ class Screen:
         self._errors: dict[str, deque[float]] = {}
         self._largest: dict[str, float] = {}
         self._unicode = unicode
+        self._room = TAPE_CELLS
 
     def update(self, status: Status) -> None:
         self._newest[status["role"]] = status
@@ -42,15 +49,20 @@ class Screen:
                 errors = self._errors.setdefault(one["name"], deque(maxlen=SPARK_CELLS))
                 errors.append(abs(one["error"]))
 
-    def __rich__(self) -> RenderableType:
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        self._room = options.max_width - LABEL_CELLS
         if not self._newest:
-            return Text("starting", style="dim")
-        return Group(*(self._end(status) for status in self._newest.values()))
+            yield Text("starting", style="dim")
+        yield Group(*(self._end(status) for status in self._newest.values()))
+
+    def _cells(self, most: int, beside: int = 0) -> int:
+        """Return how many cells of a picture have room beside a text."""
+        return max(CELLS_MIN, min(most, self._room - beside))
 
     def _end(self, status: Status) -> RenderableType:
         table = Table.grid(padding=(0, 1))
         table.add_column(justify="right", style="dim", min_width=9)
-        table.add_column()
+        table.add_column(no_wrap=True, overflow="crop")
         style = "bold" if status["phase"] == "flying" else "yellow"
         head = Text(endings.phase_text(status["phase"]), style=style)
         head.append(_time_text(status))
@@ -84,10 +96,11 @@ class Screen:
 
     def _gauge(self, share: float) -> str:
         share = min(1.0, max(-1.0, share))
-        place = round((share + 1.0) / 2.0 * (GAUGE_CELLS - 1))
+        count = (self._cells(GAUGE_CELLS, VALUE_CELLS) - 1) // 2 * 2 + 1
+        place = round((share + 1.0) / 2.0 * (count - 1))
         rail, middle, mark = "─┼●" if self._unicode else "-+o"
-        cells = [rail] * GAUGE_CELLS
-        cells[GAUGE_CELLS // 2] = middle
+        cells = [rail] * count
+        cells[count // 2] = middle
         cells[place] = mark
         return "".join(cells)
 
@@ -95,7 +108,8 @@ class Screen:
         marks = SPARKS if self._unicode else ASCII_SPARKS
         largest = max(errors) or 1.0
         last = len(marks) - 1
-        return "".join(marks[round(error / largest * last)] for error in errors)
+        shown = list(errors)[-self._cells(SPARK_CELLS, VALUE_CELLS + RANGE_CELLS) :]
+        return "".join(marks[round(error / largest * last)] for error in shown)
 
     def _tape(
         self,
@@ -107,7 +121,7 @@ class Screen:
         high, low, none = "▀▄×" if self._unicode else "'.x"  # noqa: RUF001
         is_coloured = len(outputs) > 1 and len(about) == len(words)
         text = Text()
-        for at in range(max(0, len(words) - TAPE_CELLS), len(words)):
+        for at in range(max(0, len(words) - self._cells(TAPE_CELLS)), len(words)):
             word = words[at]
             if word is None:
                 text.append(none, style="red")

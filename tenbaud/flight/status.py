@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any, Literal
 
 from channel.codec.signals import Signals
 from tenbaud.sentences import endings
+from tenbaud.sentences.quantities import in_degrees
 
 StatusMode = Literal["auto", "lines", "none"]
 Status = dict[str, Any]
@@ -19,7 +19,7 @@ def outputs_status(
     ranges: Sequence[float],
     errors: Sequence[float | None] = (),
 ) -> list[Status]:
-    """Return what a status says of each output; None for what is not known."""
+    """Return the values of each output in a status; None if unknown."""
     names = ("value", "range", "error")
     told = []
     for place, one in enumerate(plant.outputs):
@@ -28,24 +28,21 @@ def outputs_status(
     return told
 
 
-def in_degrees(value: float, unit: str) -> tuple[float, str]:
-    """Return a value as a person reads it, and its unit: angles in degrees."""
-    return (math.degrees(value), "deg") if unit == "rad" else (value, unit)
-
-
 def status_line(status: Status) -> str:
     """Return a status as one line for a terminal."""
     words = [f"{status['role']}: {endings.phase_text(status['phase'])}"]
     if status.get("time_s") is not None:
         words.append(f"{status['time_s']:7.1f} s")
     for output in status.get("outputs", ()):
-        for name, label, form in (
-            ("value", output["name"], "{:+.3f} {}"),
-            ("error", "error", "{:+.4f} {}"),
-            ("range", "M", "{:.3f}"),
+        for name, label, form, of_angle in (
+            ("value", output["name"], "{:+.3f} {}", "{:+.1f} {}"),
+            ("error", "error", "{:+.4f} {}", "{:+.2f} {}"),
+            ("range", "M", "{:.3f}", "{:.2f}"),
         ):
             if output[name] is not None:
-                words.append(f"{label} {form.format(output[name], output['unit'])}".rstrip())
+                value, unit = in_degrees(output[name], output["unit"])
+                shown = (of_angle if unit == "deg" else form).format(value, unit)
+                words.append(f"{label} {shown}".rstrip())
     for name, label, form in (
         ("rms_over_floor", "floor x", "{:.1f}"),
         ("erasures", "erased", "{}"),

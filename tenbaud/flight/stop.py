@@ -48,7 +48,7 @@ class StopFlag(_Handlers):
 
 
 class Interruptions(_Handlers):
-    """Within a `with`, signals raise KeyboardInterrupt: what is open is closed on the way out."""
+    """Within a `with`, signals raise KeyboardInterrupt: open files and links are closed."""
 
     def __init__(self) -> None:
         super().__init__(self._on_signal)

@@ -1,4 +1,4 @@
-"""The figures of a flight: what each end can say, joined into one `summary.json`."""
+"""The figures of a flight: those of each end, joined into one `summary.json`."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from channel.protocol.endings import End
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build.flight import Agreement
 from tenbaud.build.recorded import replay_notes
+from tenbaud.build.rig import real_rig_name
 from tenbaud.build.transmitter_run import TransmitterRun
-from tenbaud.config.schema import TransmitterSection
 from tenbaud.flight.outcome import Outcome
 from tenbaud.sentences import events
 from transmitter.metrics.gap import Gap
@@ -24,7 +24,7 @@ Summary = dict[str, Any]
 
 
 def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
-    """Return what the transmitter knows: plant, errors, bits sent, its loop."""
+    """Return the transmitter's figures: plant, errors, bits sent, its loop."""
     node, terms, config = run.node, run.agreement.terms, run.agreement.config
     session, scores, meter = node.session, node.scores.first, run.uplink.meter
     flown_s = run.ticks * terms.tick_ns / 1e9
@@ -36,6 +36,7 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         "samples": session.copies.next_sample,
         "coder_bits_up": meter.coder_bits,
         "wire_bytes_up": meter.wire_bytes,
+        "coder_bits_down": 8 * run.endpoint.inlet.command_bytes,
         "wire_bytes_down": run.wire_bytes_down,
         "erasures": session.counts["erasures"],
         "digest_checks": session.counts["digest_checks"],
@@ -82,7 +83,7 @@ def _rate(run: TransmitterRun) -> Summary:
     if not run.ticks:
         return {"symbols_per_s_asked": asked, "symbols_per_s_kept": None, "symbols_missing_share": None}
     samples = run.ticks / terms.ticks_per_sample
-    share = min(1.0, (counts["digest_checks"] - counts["erasures"]) / samples)
+    share = min(1.0, (counts["confirmed"] - counts["erasures"]) / samples)
     return {
         "symbols_per_s_asked": asked,
         "symbols_per_s_kept": share * asked,
@@ -100,13 +101,14 @@ def gap_part(gap: Gap | None) -> Summary:
 
 
 def receiver_part(agreement: Agreement, endpoint: ReceiverEndpoint, outcome: Outcome) -> Summary:
-    """Return what the receiver knows: symbols as they arrived, on its own clock."""
+    """Return the receiver's figures: symbols as they arrived, on its own clock."""
     session = endpoint.session
     return {
         **_common(agreement, outcome, session.end),
         "samples": session.state.sample,
         "baud_measured": session.meter.baud,
         "wire_bytes_up": endpoint.inlet.wire_bytes,
+        "coder_bits_down": 8 * endpoint.downlink.command_bytes,
         "wire_bytes_down": endpoint.downlink.wire_bytes,
         "erasures": session.counts["erasures"],
         "symbols_late": session.counts["symbols_late"],
@@ -122,7 +124,7 @@ def receiver_part(agreement: Agreement, endpoint: ReceiverEndpoint, outcome: Out
 
 
 def link_part(link: Link, refused: Counter[str] | None = None) -> Summary:
-    """Return what an end's link saw of its line: what it dropped and why, and its own bytes if any.
+    """Return the figures of an end's link: dropped messages by reason, and its own bytes if any.
 
     `refused` are connections that were turned away before the link knew of them.
     """
@@ -151,6 +153,8 @@ def joined(transmitter: Summary, receiver: Summary) -> Summary:
     for name in ("reconnects", "malformed", "recording_rows_lost", COUNTER):
         both[name] = transmitter.get(name, 0) + receiver.get(name, 0)
     both["recording_error"] = transmitter.get("recording_error") or receiver.get("recording_error")
+    if receiver.get("coder_bits_down"):
+        both["coder_bits_down"] = receiver["coder_bits_down"]
     if receiver.get("impaired_down"):
         both["impaired_down"] = receiver["impaired_down"]
     return {**transmitter, **both, **{name: receiver.get(name) for name in own}}
@@ -170,6 +174,7 @@ def _common(agreement: Agreement, outcome: Outcome, end: End | None) -> Summary:
         "lead_ticks": agreement.terms.lead_ticks,
         "delivery": config.channel.delivery,
         "baud_configured": config.channel.rate_baud,
+        "downlink": config.channel.downlink,
         "config_digest": agreement.identity.config_digest.hex(),
         "numerics_probe": agreement.identity.numerics_probe.hex(),
         "version": agreement.identity.version,
@@ -193,17 +198,6 @@ def _plant_name(agreement: Agreement) -> str:
     return name
 
 
-def real_rig_name(section: TransmitterSection) -> str:
-    """Return where a real rig is, in a few words."""
-    match section.rig:
-        case "serial":
-            return f"rig at {section.serial.port}, {section.serial.format}"
-        case "quarc":
-            return f"QUARC model at {section.quarc.host}:{section.quarc.port}"
-        case _:
-            return f"Quanser {section.hil.card_type} {section.hil.card_identifier}"
-
-
 def _outputs(run: TransmitterRun) -> Summary:
     """Return the figures of every output, by its name, in its own unit."""
     figures = {}
@@ -223,7 +217,7 @@ def _outputs(run: TransmitterRun) -> Summary:
 
 
 def _learned(run: TransmitterRun) -> Summary:
-    """Return what both ends have learned of the plant's terms, where they do."""
+    """Return the plant's terms as learned by both ends, if they do."""
     found = learned_of(run.agreement.codec, run.node.session.copies.confirmed)
     return {"learned": {name: one._asdict() for name, one in found.items()}} if found else {}
 

@@ -130,7 +130,7 @@ class _Ending:
 
     @property
     def _went_to_its_end(self) -> bool:
-        """Return whether nothing but the end of its time ended the flight, in whatever state it was."""
+        """Return whether the flight ended only because its time was over, in any state."""
         run, session, guard = self._run, self._run.node.session, self._run.node.guard
         harmless = not guard.stopped or guard.timed_out
         flown = run.ticks >= run.agreement.flight_ticks
@@ -141,7 +141,7 @@ def _outcome(run: TransmitterRun, peer_present: bool) -> Outcome:
     node, session = run.node, run.node.session
     if session.refusal is not None:
         text = endings.refusal_text(session.refusal)
-        raise ConfigMismatch(f"the receiver refused to go on: {text}")
+        raise ConfigMismatch(f"the receiver refused to continue: {text}")
     if session.desync is not None and session.phase is Phase.ENDED:
         return Outcome(ExitCode.DESYNC, endings.desync_text(session.desync))
     if node.guard.reason is not None and node.guard.reason.cause is GuardCause.STOPPED:
@@ -174,11 +174,11 @@ def _not_flown(run: TransmitterRun) -> Outcome | None:
 
 
 def flight_counts(run: TransmitterRun) -> FlightCounts:
-    """Return what the verdict on a flight rests on."""
+    """Return the counts for the verdict on a flight."""
     node, session = run.node, run.node.session
     return FlightCounts(
         samples=-(-run.ticks // run.agreement.terms.ticks_per_sample),
-        confirmed=session.counts["digest_checks"],
+        confirmed=session.counts["confirmed"],
         erased=session.counts["erasures"],
         rejoins=session.counts["rejoins"],
         ticks=run.ticks,

@@ -31,7 +31,7 @@ EPOCH_SAMPLES_MIN = 20
 
 
 class NotFlown(StrEnum):
-    """In what a flight fell short."""
+    """The faults of a flight."""
 
     NEVER_LOCKED = "never locked"
     REJOINING = "rejoins without end"
@@ -65,7 +65,7 @@ class FlightCounts:
 
 
 def faults_of(counts: FlightCounts) -> tuple[NotFlown, ...]:
-    """Return in what a flight fell short; nothing where it has flown."""
+    """Return the faults of a flight; none if it has flown."""
     confirmed, ticks = counts.confirmed, counts.ticks
     holds = {
         NotFlown.NEVER_LOCKED: counts.samples > 0 and confirmed == 0,
@@ -95,7 +95,7 @@ class Settings:
 
 
 def settings_of(agreement: Agreement) -> Settings:
-    """Return what can be changed about a flight."""
+    """Return the possible changes to a flight."""
     # Imported here: every command imports this module for its exit codes.
     from tenbaud.build.flight import watchdog_wanted_s
     from tenbaud.build.liveness import watchdog_ticks
@@ -116,7 +116,7 @@ def settings_of(agreement: Agreement) -> Settings:
 def verdict_text(
     faults: tuple[NotFlown, ...], counts: FlightCounts, settings: Settings, asked: Mapping[str, int]
 ) -> str:
-    """Return the verdict with its numbers and what to change, for people.
+    """Return the verdict with its numbers and a remedy, for people.
 
     `asked`: how often a new epoch was asked for, by reason.
     """
@@ -132,7 +132,7 @@ def verdict_text(
         numbers.append(f"no command from the controller at {counts.bad_commands} ticks")
     numbers.append(f"{counts.rejoins} rejoins" + (f" (asked for: {reasons})" if reasons else ""))
     lines = [f"the flight did not fly ({', '.join(faults)}): " + ", ".join(numbers)]
-    # One fault brings others with it: what to change follows from the first one that has an answer.
+    # One fault causes others: the remedy is that of the first fault that has one.
     lines += [ADVICE[fault](settings) for fault in faults if fault in ADVICE][:1]
     return "\n  ".join(lines)
 

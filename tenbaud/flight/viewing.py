@@ -1,4 +1,4 @@
-"""The live page beside a demonstration: a separate process, and where the two ends meet it."""
+"""The live page beside a demonstration: a separate process, and the addresses to reach it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,9 +14,12 @@ from tempfile import TemporaryDirectory
 from typing import IO
 
 from channel.errors import LinkLost
+from channel.links.base import Role
 from tenbaud.flight.lifeline import end_child, start_child
+from tenbaud.telemetry.end import TelemetryOptions
 from tenbaud.telemetry.place import SOCKET
 
+ENDS: tuple[Role, Role] = ("transmitter", "receiver")
 START_TIMEOUT_S = 30.0
 LAST_WORD_S = 0.5
 """Time for the page to hear that the flight is over."""
@@ -32,32 +35,49 @@ class ViewOptions:
     open_browser: bool = False
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class Viewing:
-    """Options of the two ends for the page to receive their telemetry."""
+    """Where the page receives the telemetry of both ends, and how fast they fly."""
 
-    transmitter: list[str] = field(default_factory=list)
-    receiver: list[str] = field(default_factory=list)
+    endpoints: Mapping[Role, str] = field(default_factory=dict)
+    """nothing: there is no page"""
+    pace: float | None = None
+    """virtual seconds per second at most"""
+
+    def words(self, role: Role) -> list[str]:
+        """Return the options of a process that flies one end."""
+        words = ["--telemetry", self.endpoints[role], "--allow-control"] if self.endpoints else []
+        if self.pace is not None and role == "transmitter":
+            words += ["--pace", str(self.pace)]
+        return words
+
+    def options(self, role: Role) -> TelemetryOptions:
+        """Return the same for an end in this process."""
+        endpoint = self.endpoints.get(role, "off")
+        return TelemetryOptions(endpoint, control=bool(self.endpoints), pace=self.pace)
+
+
+ALONE = Viewing()
+"""Nobody looks."""
 
 
 @contextmanager
-def page_beside(options: ViewOptions | None, should_stop: Callable[[], bool]) -> Iterator[Viewing]:
-    """Within the `with`, the page is served; yields options for both ends.
+def page_beside(
+    options: ViewOptions | None, should_stop: Callable[[], bool], pace: float | None = None
+) -> Iterator[Viewing]:
+    """Within the `with`, the page is served; yields what both ends have to know.
 
     Raises LinkLost when it cannot be served, and KeyboardInterrupt when it is asked to stop meanwhile.
     """
     if options is None:
-        yield Viewing()
+        yield Viewing(pace=pace)
         return
     with TemporaryDirectory(prefix="tenbaud-view-") as folder:
-        places = [f"{SOCKET}{Path(folder) / name}.sock" for name in ("transmitter", "receiver")]
-        process = _start(places, options)
+        places = {role: f"{SOCKET}{Path(folder) / role}.sock" for role in ENDS}
+        process = _start(places.values(), options)
         try:
             _wait_until_served(process, should_stop)
-            yield Viewing(
-                ["--telemetry", places[0], "--allow-control"],
-                ["--telemetry", places[1], "--allow-control"],
-            )
+            yield Viewing(places, pace)
             if process.poll() is None:
                 time.sleep(LAST_WORD_S)
             else:
@@ -67,7 +87,7 @@ def page_beside(options: ViewOptions | None, should_stop: Callable[[], bool]) ->
             end_child(process, ENDING_TIMEOUT_S)
 
 
-def _start(places: list[str], options: ViewOptions) -> subprocess.Popen[str]:
+def _start(places: Iterable[str], options: ViewOptions) -> subprocess.Popen[str]:
     words = ["view", "--port", str(options.port)]
     words += [part for place in places for part in ("--connect", place)]
     words += ["--open"] if options.open_browser else []

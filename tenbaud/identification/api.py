@@ -38,7 +38,7 @@ SHARED = ("limits.command_max", "limits.command_slew_per_s", "transmitter.encode
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What is asked for, as on the command line."""
+    """The options, as on the command line."""
 
     structure: str = ""
     lag: str = "auto"
@@ -50,7 +50,7 @@ class Request:
     given: frozenset[str] = frozenset()
     """full names of the settings that a person gives; "preset" where one is named"""
     from_bits: bool = False
-    """only what crossed the wire of a run may be used"""
+    """use only the transmitted data of a run"""
 
 
 @dataclass(slots=True, eq=False)
@@ -68,7 +68,7 @@ class Each:
 
     @property
     def config(self) -> FlightConfig:
-        """Return the configuration that flies what was identified; IdentificationError without one."""
+        """Return the configuration that flies the identified model; IdentificationError without one."""
         if not self.settings:
             raise IdentificationError("; ".join(self.refused or self.warnings))
         return load_config(self.settings["preset"], None, self.settings)
@@ -90,7 +90,7 @@ class Each:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Return what is doubtful."""
+        """Return the warnings."""
         return self.identified.warnings
 
     @property
@@ -99,7 +99,7 @@ class Each:
         return self.identified.found.refused
 
     def lines(self) -> list[str]:
-        """Return what was found and done, for people."""
+        """Return the results and steps, for people."""
         one = self.identified
         found = one.found
         lag = "none" if not found.lag_s else f"{found.lag_s:.4g} s"
@@ -188,7 +188,7 @@ def _finish(one: Each, folder: Path, number: str, fly: bool) -> None:
         one.settings["flight_log"] = log
     if fly:
         one.flown = fly_record(one.settings)
-        # An experiment that this command made shows the plant, and not what flights are like.
+        # An experiment of this command shows the plant, not typical flights.
         if not one.source.excited and one.source.bits is None:
             fitted, note = with_coder(one.settings)
             flown = one.flown if note else fly_record(fitted)
@@ -294,7 +294,7 @@ def _wanted(config: FlightConfig, source: Source, request: Request) -> Wanted:
     if request.lag != "auto":
         lag_s = _lag(request.lag)
     elif "model.motor_lag_s" in request.given or (excited and config.transmitter.rig == "simulated"):
-        # What a preset says is of the preset's plant.
+        # The settings of a preset are for the preset's plant.
         lag_s = getattr(config.model, "motor_lag_s", None)
     forgetting = request.forgetting_per_s
     paper = Filters()

@@ -1,4 +1,4 @@
-"""What a model out of a run's bits is compared with: the simulated plant, the run's measurements."""
+"""References for a model from a run's bits: the simulated plant, the run's measurements."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What crossed the wire of a recorded flight: words, commands, and what both ends know beforehand."""
+"""The transmitted data of a recorded flight: words, commands, and the shared configuration."""
 
 from __future__ import annotations
 
@@ -170,7 +170,7 @@ def symbols_of(bits: Bits, order: int) -> tuple[Symbols, Linearised]:
 
 
 def run_bits(name: str, bits: Bits, wanted: str, equilibrium: str, lag_s: float | None) -> Identified:
-    """Identify the plant of a flight from what crossed the wire."""
+    """Identify the plant of a flight from its transmitted data."""
     from tenbaud.studies.compiled import compiled, require
 
     require("numba")

@@ -1,4 +1,4 @@
-"""What a record can say without what moved the plant: its motion, and a closed loop's bandwidth."""
+"""Results of a record without the plant's inputs: its motion, and a closed loop's bandwidth."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from plant_sim.identification.structures import LinearStructure
 
 SET_POINTS = {"setpoint", "reference", "ref", "desired", "target", "soll"}
 COMMANDS = {"u", "v", "i", "voltage", "current", "torque", "pwm"}
-"""Words of a name that say that it is what a controller commands: `i_ref` moves the plant."""
+"""Words of a name that mark a controller's command: `i_ref` moves the plant."""
 
 
 def _set_points(record: Record) -> list[int]:
@@ -48,9 +48,7 @@ def with_commands(record: Record) -> tuple[Record, tuple[str, ...]]:
     lines = [_motion(record, index) for index in range(record.outputs.shape[1])]
     lines += [_loop(record, index) for index in wanted]
     missing = (
-        "a set-point was logged, and not what the controller commanded"
-        if wanted
-        else "no input was logged"
+        "a set-point was logged, not the controller's command" if wanted else "no input was logged"
     )
     raise IdentificationError(
         "\n  ".join(

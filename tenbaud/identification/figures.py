@@ -1,4 +1,4 @@
-"""Figs. 3 and 4 of the paper: what excited the plant, and how the estimates came about."""
+"""Figs. 3 and 4 of the paper: the excitation of the plant, and the convergence of the estimates."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The record, flown with what was identified from it."""
+"""The record, flown with the model identified from it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PLAIN_TICKS = 10_000
 
 
 class Flown(NamedTuple):
-    """What came of the flight."""
+    """The result of the flight."""
 
     outcome: str
     """ok, or why there are no figures"""

@@ -17,7 +17,7 @@ ORDER_MAX = 2
 NUDGE = 1e-4
 CONDITION_MAX = 1e8
 SETTLING = 400
-"""ticks in which what lags, as motors do, comes to rest"""
+"""ticks in which lags, such as those of motors, settle"""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,7 +34,7 @@ class Linearised:
     """of the highest derivative of each output, by z"""
     by_input: Array
     force: Array
-    """what is left of the highest derivatives without z and inputs"""
+    """the highest derivatives without z and inputs"""
 
 
 def linearised(model: Model, order: int, tick_s: float, command: Vector) -> Linearised:
@@ -82,7 +82,7 @@ def _differences(function: Callable[[Array], tuple[Array, Array]], at: Array) ->
 
 
 def _derivatives(model: Model, corrected: Array, inputs: Array, tick_s: float) -> list[Array]:
-    """Return outputs, rates and accelerations; inputs are held, and what lags is at rest."""
+    """Return outputs, rates and accelerations; inputs are held, and lags have settled."""
     nothing, command = (0.0,) * model.correction_size, tuple(inputs.tolist())
     first = tuple(corrected.tolist())
     state = (*first, *model.initial()[len(first) :])

@@ -1,4 +1,4 @@
-"""One identification, from a record to what a person and a configuration file need."""
+"""One identification, from a record to a report and a configuration file."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ UNIT_SCALES = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wanted:
-    """What is asked of an identification."""
+    """The options of an identification."""
 
     structure: str = ""
     equilibrium: str = "auto"
@@ -97,7 +97,7 @@ def run(name: str, record: Record, wanted: Wanted) -> Identified:
 
 
 def _unwrapped(record: Record) -> tuple[Record, list[str]]:
-    """Return a record whose angles do not jump by a turn, and what was done."""
+    """Return a record whose angles do not jump by a turn, and the changes."""
     outputs, notes = record.outputs.copy(), []
     for index, (name, unit) in enumerate(zip(record.output_names, record.output_units, strict=True)):
         turn = turn_of(unit, None)

@@ -29,7 +29,7 @@ ALIASES = ("angle", "output", "input", "time", "index", "front", "rear")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Source:
-    """A record, its name, and what was done to the file that it is from."""
+    """A record, its name, and the changes to its file."""
 
     name: str
     record: Record
@@ -40,11 +40,11 @@ class Source:
     excited: bool = False
     """the configured rig moved as this command made it"""
     bits: Bits | None = None
-    """what crossed the wire of the run, where nothing else may be used"""
+    """the transmitted data of the run, where nothing else may be used"""
 
 
 def from_rig(config: FlightConfig, excitation: str, duration_s: float) -> Record:
-    """Excite the configured rig and return what its encoder saw."""
+    """Excite the configured rig and return its encoder's readings."""
     tick_s = config.timing.tick_s
     signals = configured_signals(config)
     if len(signals.outputs) != 1 or len(signals.inputs) != 2:
@@ -68,7 +68,7 @@ def from_rig(config: FlightConfig, excitation: str, duration_s: float) -> Record
 def from_log(
     config: FlightConfig, structure: str = "", tick_s: float | None = None
 ) -> tuple[Record, tuple[str, ...]]:
-    """Return the record in the log that a configuration names, and what was done to the file.
+    """Return the record in the log that a configuration names, and the changes to the file.
 
     The signals are those of the model, or the file's own where the structure is none of the model.
     `tick_s` is the time between rows of a file without a clock. LogError where it cannot be used.
@@ -94,7 +94,7 @@ def from_log(
 
 
 def from_bits(path: Path) -> Source:
-    """Return what crossed the wire of a run; its file is named where it holds measurements too."""
+    """Return the transmitted data of a run; the file is named if it also holds measurements."""
     bits = read_bits(path)
     measured = "transmitter" in bits.ends
     note = () if measured else ("the run holds no measurements, so nothing can be flown over them",)

@@ -1,4 +1,4 @@
-"""What the symbols of a word say about the plant, by coder: an interval of a combination of its states.
+"""The meaning of a word's symbols for the plant, by coder: an interval of a combination of its states.
 
 The thresholds are the coder's own, at the recorded state of the codec. They hold as the transmitter
 formed the word from that state: on a line without faults always, and after a fault as soon as its echo

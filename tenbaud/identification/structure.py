@@ -1,4 +1,4 @@
-"""Which structure is identified: the one asked for, or one that suits model and signals, and why."""
+"""The structure to identify: the requested one, or one that suits model and signals, and why."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ from tenbaud.log.units import turn_in
 
 WHOLE = 1e-6
 DENSITY_LEAST = 1e-3
-"""disturbance that is assumed at least, as a share of what the inputs do"""
+"""smallest assumed disturbance, as a share of the inputs' effect"""
 SLEW_USUAL = 1000.0
 TICK_S_MAX = 1.0
 PIECE = 100_000
@@ -145,7 +145,7 @@ def _linear(one: Identified, values: dict[str, Any]) -> dict[str, Any]:
 
 
 def _densities(one: Identified, space: StateSpace, period_s: float) -> list[float]:
-    """Return q of each equation's disturbance: as found, or what the regression leaves unexplained."""
+    """Return q of each equation's disturbance: as found, or the residual of the regression."""
     filters = one.found.regression.filters
     polynomial = low_pass(one.found.structure.order, filters.bandwidth_rad_s, filters.damping)
     # The filter's noise bandwidth: integral of |H|^2 over all frequencies in Hz.

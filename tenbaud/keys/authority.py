@@ -1,4 +1,4 @@
-"""A small private certificate authority: one certificate per node, signed by a key that stays home.
+"""A small private certificate authority: one certificate per node; its key stays on its machine.
 
 A certificate says who a node is (its common name), what it is for (its role, as organisational unit)
 and at which addresses it may be listened for (subject alternative names). Keys are ECDSA P-256.
@@ -95,7 +95,7 @@ def issue(
 
 
 def read_certificate(pem: bytes) -> Certified:
-    """Return what a node's certificate says; ValueError for anything that is not one of ours."""
+    """Return the fields of a node's certificate; ValueError for a foreign one."""
     certificate = x509.load_pem_x509_certificate(pem)
     names = certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
     roles = certificate.subject.get_attributes_for_oid(NameOID.ORGANIZATIONAL_UNIT_NAME)
@@ -114,12 +114,12 @@ def read_certificate(pem: bytes) -> Certified:
 
 
 def end_of(certificate_pem: bytes) -> datetime:
-    """Return when any certificate expires, an authority's too; ValueError for what is none."""
+    """Return when any certificate expires, an authority's too; ValueError if it is not one."""
     return x509.load_pem_x509_certificate(certificate_pem).not_valid_after_utc
 
 
 def is_key_of(key_pem: bytes, certificate_pem: bytes) -> bool:
-    """Return whether a private key belongs to a certificate; ValueError for what is no key."""
+    """Return whether a private key belongs to a certificate; ValueError if it is not a key."""
     key = load_pem_private_key(key_pem, None)
     return key.public_key() == x509.load_pem_x509_certificate(certificate_pem).public_key()
 

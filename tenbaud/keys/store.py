@@ -45,7 +45,7 @@ _OTHERS = stat.S_IRWXG | stat.S_IRWXO
 
 
 class KeysError(TenbaudError):
-    """Keys that are missing, unreadable, expired or open to others; the text says what to do."""
+    """Keys that are missing, unreadable, expired or open to others; the text gives the remedy."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +175,7 @@ def usable(folder: Path, role: NodeRole | None) -> NodeKeys:
 
 
 def expiry_warning(node: NodeKeys) -> str | None:
-    """Return what to say about a certificate that expires soon."""
+    """Return the warning about a certificate that expires soon."""
     left = node.certified.days_left()
     if left > WARN_DAYS:
         return None

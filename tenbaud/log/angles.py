@@ -31,7 +31,7 @@ STEP_ERROR = 0.05
 
 @dataclass(frozen=True)
 class Straightened:
-    """Values without what the recording did to them, and the rows where it did."""
+    """Values without the recording's distortions, and the rows of these."""
 
     values: Array
     rows: tuple[int, ...]
@@ -77,7 +77,7 @@ def without_spikes(values: Array, turn: float | None) -> Straightened:
 
 
 def counts_of(values: Array, encoder: OutputReader | None) -> npt.NDArray[np.int64]:
-    """Return what an encoder reads of values in the output's unit."""
+    """Return an encoder's readings of values in the output's unit."""
     if isinstance(encoder, Encoder):
         steps = np.floor(values / encoder.turn * encoder.counts_per_turn + 0.5)
         return encoder.sign * steps.astype(np.int64) + encoder.zero_counts

@@ -12,7 +12,7 @@ from tenbaud.log.table import LogError
 
 
 def with_file_beside(section: FlightLogSection) -> FlightLogSection:
-    """Return a section with what the file beside its log says and it does not say itself."""
+    """Return a section, completed from the file beside its log."""
     path = Path(f"{section.file}.toml")
     if not path.is_file():
         return section
@@ -28,6 +28,6 @@ def with_file_beside(section: FlightLogSection) -> FlightLogSection:
 
 
 def write_beside(section: FlightLogSection) -> None:
-    """Write what a section says into the file beside its log."""
+    """Write a section into the file beside its log."""
     values = section.model_dump(mode="json", exclude_defaults=True, exclude={"file"})
     write_whole(Path(f"{section.file}.toml"), toml_text(values))

@@ -1,4 +1,4 @@
-"""The clock of a log: times in seconds, what is cut, and rows one tick apart."""
+"""The clock of a log: times in seconds, cut intervals, and rows one tick apart."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is in a log, for the person who has to say which column is what."""
+"""The content of a log, for the person who assigns its columns."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ class Description:
 
 
 def describe(section: FlightLogSection) -> tuple[Description, Table]:
-    """Return what is said about the log of a section, and its columns. LogError: it holds no table."""
+    """Return the description of a section's log, and its columns. LogError: it holds no table."""
     section = with_file_beside(section)
     kept = cache(read_table)
     table, _ = table_of(section, lambda path, _: kept(path))

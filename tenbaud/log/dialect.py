@@ -34,13 +34,13 @@ _OTHERS = {
 
 @dataclass(frozen=True)
 class Dialect:
-    """What `pandas.read_csv` needs to know of a file."""
+    """The arguments of `pandas.read_csv` for a file."""
 
     encoding: str
     separator: str
     decimal: str
     comment: str
-    """what starts a comment line; "" without any"""
+    """start of a comment line; "" without any"""
     skipped: int
     """lines above the first row"""
     names: tuple[str, ...]

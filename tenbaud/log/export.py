@@ -1,4 +1,4 @@
-"""What the columns of an exported flight are; `tenbaud.recording.signals` names them."""
+"""The columns of an exported flight; `tenbaud.recording.signals` names them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a column of a log looks like: a clock, an index, counts, an angle, a command, a signal."""
+"""The likely kind of a log's column: a clock, an index, counts, an angle, a command, a signal."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Look:
 
 
 def looks_of(table: Table) -> list[Look]:
-    """Return what every column of a table looks like."""
+    """Return the likely kind of every column of a table."""
     return list(_with_rates(table, [_look(table, place) for place in range(len(table.names))]))
 
 

@@ -1,4 +1,4 @@
-"""The tool's own recordings and JSON exports as tables: nothing has to be said about their columns."""
+"""The tool's own recordings and JSON exports as tables: their columns need no options."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from tenbaud.recording.reader import Recording
 
 
 def read_run(path: Path, wanted: Wanted | None = None) -> Table:
-    """Return what a run's transmitter measured and applied, tick by tick.
+    """Return a run's measured and applied signals, tick by tick.
 
     `path` is the folder of a run or an MCAP file; that of another program is read as messages.
     """

@@ -190,7 +190,7 @@ class _Reading:
         return unit or given
 
     def _linear(self, role: str, kind: str) -> tuple[float, float]:
-        """Return what a column's numbers are multiplied by, and what is added then."""
+        """Return the factor of a column's numbers, and the offset added then."""
         section, setting = self.section, self.roles.setting
         sign = cast(float | None, setting(section.signs, role, kind))
         scale = cast(float | None, setting(section.scales, role, kind))
@@ -293,7 +293,7 @@ class _Reading:
                 clock.rows.start + row,
                 column,
                 f"'{values[row]:g}' is not a whole number within +-2^53, and the column is in counts; "
-                "--units says in what it is: rad or deg",
+                "give its unit with --units: rad or deg",
             )
 
     def _input(self, signal: Signal, column: int, clock: Clock) -> Array:

@@ -1,4 +1,4 @@
-"""The format of a log, by its first bytes, and what reads it."""
+"""The format of a log, by its first bytes, and its reader."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tenbaud.log.table import LogError, Table, Wanted
 Reader = Callable[[str | Path, Wanted | None], Table]
 MCAP_MAGIC = b"\x89MCAP0\r\n"
 EXPORTED = ("flight.csv", "flight.parquet")
-"""What a folder that `tenbaud convert` wrote holds."""
+"""The contents of a folder that `tenbaud convert` wrote."""
 
 
 def read_table(path: str | Path, wanted: Wanted | None = None) -> Table:
@@ -25,7 +25,7 @@ def read_table(path: str | Path, wanted: Wanted | None = None) -> Table:
 
 
 def _reader(path: Path) -> Callable[[Path, Wanted | None], Table]:
-    """Return what reads a file; the libraries of other formats are imported with their readers."""
+    """Return the reader of a file; the libraries of other formats are imported with their readers."""
     try:
         with path.open("rb") as file:
             head = file.read(8)

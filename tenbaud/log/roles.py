@@ -51,7 +51,7 @@ class Chosen:
 
 @dataclass
 class Roles:
-    """What the configuration says about the columns of one file, and what is guessed beside it."""
+    """The configured columns of one file, and the guessed ones."""
 
     path: str
     section: FlightLogSection
@@ -118,7 +118,7 @@ class Roles:
         )
 
     def setting(self, values: Mapping[str, object], role: str, kind: str) -> object | None:
-        """Return what a table such as `units` says about a signal; None where it says nothing."""
+        """Return the entry of a signal in a table such as `units`; None if there is none."""
         every = EVERY.get(kind, ())
         own = [
             value for name, value in values.items() if name not in ALL and self.role(name, "") == role
@@ -164,7 +164,7 @@ class Roles:
                 key = "angle" if not at else signal.name
                 raise LogError(
                     f"{self.path}: which column is the {signal.name}? Give --columns {key}=NAME; "
-                    f"present: {listed(names)}; `tenbaud log` shows what each looks like"
+                    f"present: {listed(names)}; `tenbaud log` describes each"
                 )
             taken.add(place)
             outputs.append((signal, place))

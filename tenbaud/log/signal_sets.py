@@ -150,7 +150,7 @@ def _listed(group: _Group) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Columns:
-    """A set of signals column by column, and what they were made from."""
+    """A set of signals column by column, and their source."""
 
     names: Sequence[str]
     units: Sequence[str]

@@ -1,4 +1,4 @@
-"""The options with which a log is read: what is given, and guessed from names or looks for the rest."""
+"""The options to read a log: the given ones, the rest guessed from names or values."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Suggestion:
         return " ".join(words + ["--remove-spikes"] * section.remove_spikes)
 
     def commands(self, beside: bool) -> list[str]:
-        """Return what identifies and flies the log; `beside`: the options are in a file beside it."""
+        """Return the commands that use the log; `beside`: the options are in a file beside it."""
         file = shlex.quote(self.section.file)
         options = f" {self.options}" if self.options and not beside else ""
         options += " --period SECONDS" * self.lacks_period
@@ -100,7 +100,7 @@ def _by_names(section: FlightLogSection, table: Table) -> tuple[dict[str, str], 
 
 
 def _by_looks(table: Table, looks: Sequence[Look]) -> tuple[dict[str, str], tuple[str, ...]]:
-    """Return a clock, the first column that moves, and what switches or is constant as inputs."""
+    """Return a clock, the first column that moves, and switching or constant columns as inputs."""
     clock: dict[str, str] = {}
     for role in ("time", "index"):
         kind = "clock" if role == "time" else role

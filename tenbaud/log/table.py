@@ -1,4 +1,4 @@
-"""What every format of a log is read into."""
+"""The table into which every format of a log is read."""
 
 from __future__ import annotations
 

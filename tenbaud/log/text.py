@@ -150,7 +150,7 @@ def _chunks(path: Path, dialect: Dialect) -> Any:
 
 
 def _places(path: Path, dialect: Dialect) -> Callable[[int], str]:
-    """Return what finds the line of a row: it counts the lines of the file, when an error asks."""
+    """Return the function from a row to its line: it counts the file's lines when an error needs it."""
 
     def place(row: int) -> str:
         rows = -1

@@ -1,4 +1,4 @@
-"""Units of a log's columns: where a name holds one, and what converts one into another."""
+"""Units of a log's columns: those in names, and conversions."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def turn_in(unit: str) -> float | None:
 
 
 def factor(unit: str, into: str) -> float | None:
-    """Return what a value in `unit` is multiplied by to be in `into`; None: it cannot be."""
+    """Return the factor from `unit` to `into`; None if there is none."""
     unit, into = unit_named(unit) or unit, unit_named(into) or into
     if not unit or not into or unit == into:
         return 1.0

@@ -20,7 +20,7 @@ Tree = Mapping[str, Any]
 """Names to arrays, texts, trees, and lists of these."""
 
 DATA_NAMES = frozenset({"data", "value", "values"})
-"""What the array of a signal is called that is a structure by itself."""
+"""Names of the array of a signal that is a structure."""
 UNNAMED = frozenset({"", "unnamed"})
 COLUMNS_MAX = 256
 """Of one matrix; more are an image or a simulation, not a log."""
@@ -86,7 +86,7 @@ def seconds(values: NDArray[Any]) -> Array:
 
 
 def rows_first(values: NDArray[Any], rows: int | None) -> Array | None:
-    """Return an array with a row per instant; None for what is no table of signals.
+    """Return an array with a row per instant; None if it is not a table of signals.
 
     `rows` is the length of its clock. Without one the longer axis is time.
     """

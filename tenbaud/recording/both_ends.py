@@ -30,7 +30,7 @@ class _Sample(NamedTuple):
 
 
 def compare_ends(first: Recording, second: Recording, compared: Compared) -> None:
-    """Compare the samples that both recorded, and note what one of them lacks."""
+    """Compare the samples that both recorded, and note those missing in one."""
     ends = [first, second]
     if not _is_transmitter(first) and _is_transmitter(second):
         ends.reverse()

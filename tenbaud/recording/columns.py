@@ -1,4 +1,4 @@
-"""A run as three tables of plain columns, which is what the files of other tools can hold.
+"""A run as three tables of plain columns, for the files of other tools.
 
 `flight` has a row per tick and a column per signal, `samples` a row per sample, `events` a row per
 thing that was reported.

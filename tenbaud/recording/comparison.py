@@ -125,7 +125,7 @@ def paired(
     key: Callable[[Keyed], Any],
     is_before: Callable[[Any, Any], bool],
 ) -> Iterator[tuple[Keyed | None, Keyed | None]]:
-    """Walk two streams side by side; what one of them lacks comes alone, beside None."""
+    """Walk two streams side by side; an item missing in one is paired with None."""
     here, there = next(left, None), next(right, None)
     while here is not None or there is not None:
         if here is not None and there is not None and key(here) == key(there):

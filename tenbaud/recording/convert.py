@@ -218,4 +218,4 @@ FORMS: dict[str, tuple[str, Callable[[Run, Path], None]]] = {
     "json": ("flight.json", _write_json),
     "mcap": ("flight.mcap", _write_mcap),
 }
-"""Each form: where it goes in the folder of a run, and what writes it."""
+"""Each form: its place in the folder of a run, and its writer."""

@@ -84,7 +84,7 @@ def files_to_compare(first: Path, second: Path | None = None) -> list[Comparison
 
 
 def _check_whole(recording: Recording, compared: Compared) -> None:
-    """Note what a file says itself that it lacks."""
+    """Note the missing data that a file reports itself."""
     end = recording.metadata_record(END_METADATA)
     if not recording.complete:
         compared.faults.append(f"{recording.path} was cut or damaged: rows after that are missing")

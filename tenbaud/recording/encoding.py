@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from pydantic import TypeAdapter
 
 RUN_METADATA = "run"
-"""Metadata of a recording: what the run said about itself when it began."""
+"""Metadata of a recording: the run's description at its start."""
 END_METADATA = "recorder"
 """Written when a recording is finished only: how many rows were written and dropped, and why."""
 OVERVIEW_METADATA = "overview"
-"""What the figure of a long flight shows (`overview.py`)."""
+"""The data of a long flight's figure (`overview.py`)."""
 SIGNALS_KEY = "signals"
-"""In the metadata of a run: what the model calls its states, inputs and outputs."""
+"""In the metadata of a run: the model's names of states, inputs and outputs."""
 SIGNALS_MAX = 128
 UNIT_LENGTH_MAX = 64
 KEY_PROPERTY = "key"
@@ -110,20 +110,20 @@ def signals_text(plant: Signals) -> str:
 
 
 def recorded_signals(metadata: Mapping[str, str]) -> Signals:
-    """Return the signals that a recording describes; RecordingError for what no node writes."""
+    """Return the signals that a recording describes; RecordingError for an invalid description."""
     text = metadata.get(SIGNALS_KEY)
     if text is None:
         return SIGNALS_WITHOUT
     try:
         plant = _signals_adapter().validate_json(text)
     except ValueError as error:
-        raise RecordingError(f"The recording's description of the signals is none: {error}") from error
+        raise RecordingError(f"The recording's description of the signals is wrong: {error}") from error
     signals = (*plant.states, *plant.inputs, *plant.outputs)
     texts = [one.unit + one.group for one in signals]
     if len(signals) > SIGNALS_MAX or any(len(text) > UNIT_LENGTH_MAX for text in texts):
         raise RecordingError("The recording describes more signals, or longer units, than a plant has.")
     if not all(text.isprintable() for text in texts):
-        raise RecordingError("A unit or group in the recording's description is no plain text.")
+        raise RecordingError("A unit or group in the recording's description is not plain text.")
     return plant
 
 

@@ -1,4 +1,4 @@
-"""Curves of any length in bounded memory, thinned while they come to what a picture can show.
+"""Curves of any length in bounded memory, thinned to the resolution of a picture.
 
 Time is divided into stretches of one width, which doubles as the curve grows. Of every stretch the
 lowest and the highest point are kept, and one gap if there is one. The extremes of extremes are
@@ -100,7 +100,7 @@ class Means:
             return self._times, self._sums / self._counts
 
     def restore(self, times: Series, means: Series, thinned: bool) -> None:
-        """Take over what `curve` of another one gave."""
+        """Load the result of another one's `curve`."""
         self.add(times, means)
         self.thinned = thinned
 
@@ -128,13 +128,19 @@ def stretches(times: Series, count: int) -> NDArray[np.intp]:
 
 
 def thin(times: Series, values: Series, points: int) -> tuple[Series, Series]:
-    """Thin a curve to some `points` points, keeping the lowest and highest of every stretch of time.
+    """Thin a curve to its `extremes`."""
+    if len(values) <= points:
+        return times, values
+    chosen = extremes(times, values, points)
+    return times[chosen], values[chosen]
+
+
+def extremes(times: Series, values: Series, points: int) -> NDArray[np.intp]:
+    """Return the places of some `points` points: the lowest and highest of every stretch of time.
 
     A stretch with a NaN keeps one, so that the curve stays interrupted there; such a stretch may have
     three points.
     """
-    if len(values) <= points:
-        return times, values
     starts = stretches(times, points // 2)
     lengths = np.diff(np.append(starts, len(values)))
     kept = [
@@ -142,8 +148,7 @@ def thin(times: Series, values: Series, points: int) -> tuple[Series, Series]:
         for extreme in (np.fmin.reduceat(values, starts), np.fmax.reduceat(values, starts))
     ]
     kept.append(_first_of(np.isnan(values), starts, lengths))
-    chosen = np.unique(np.concatenate(kept))
-    return times[chosen], values[chosen]
+    return np.unique(np.concatenate(kept))
 
 
 def _first_of(

@@ -6,4 +6,4 @@ from channel.errors import TenbaudError
 
 
 class RecordingError(TenbaudError):
-    """A recording or a run folder cannot be made, read or compared; the text says what to do."""
+    """A recording or a run folder cannot be made, read or compared; the text gives the remedy."""

@@ -109,7 +109,19 @@ def draw_run(
             "There is no transmitter's recording here, and what was measured is recorded there. Give "
             "the folder of the transmitter's run."
         )
-    flight = _read_flight(transmitter, receiver, own, usual)
+    overview, metadata = _read_overview(transmitter, own)
+    theirs = _read_overview(receiver, own)[0] if receiver is not None else None
+    return draw_overviews(overview, theirs, metadata.get("impairments", ""), title, usual)
+
+
+def draw_overviews(
+    overview: Overview, theirs: Overview | None, impairments: str, title: str, usual: Curve | None
+) -> Figure:
+    """Return the figure of what a transmitter and, if there is one, a receiver recorded.
+
+    Raises RecordingError where the transmitter recorded no tick.
+    """
+    flight = _flight(overview, theirs, impairments, usual)
     drawn = _panels(flight)
     ratios = [ratio for ratio, _, _ in drawn]
     height = (0.9 + sum(ratios)) / len(drawn)
@@ -127,7 +139,7 @@ def draw_run(
 
 
 def _panels(flight: _Flight) -> list[tuple[float, str, _Draw]]:
-    """Return what is drawn below each other: height, label, and what draws it."""
+    """Return the panels, top to bottom: height, label, and drawing function."""
     plant = flight.plant
     outputs = plant.groups("outputs")[:DRAWN_MAX]
     inputs = plant.groups("inputs")[:DRAWN_MAX]
@@ -174,19 +186,17 @@ def _plain(label: str) -> str:
     return label.replace("$", r"\$")
 
 
-def _read_flight(transmitter: Path, receiver: Path | None, own: bool, usual: Curve | None) -> _Flight:
-    overview, metadata = _read_overview(transmitter, own)
+def _flight(
+    overview: Overview, theirs: Overview | None, impairments: str, usual: Curve | None
+) -> _Flight:
     plant = overview.plant
     times_s = overview.curves["value"][0].curve()[0] if plant.outputs else np.zeros(0)
     if not len(times_s):
         raise RecordingError(
-            f"The recording {transmitter} holds no ticks, so there is no flight to draw. "
-            "Give a transmitter's recording."
+            "The recording holds no ticks: give a transmitter's recording of a flight."
         )
-    if receiver is not None:
-        theirs, _ = _read_overview(receiver, own)
-        if theirs.plant == plant:
-            overview.curves["reference"] = theirs.curves["reference"]
+    if theirs is not None and theirs.plant == plant:
+        overview.curves["reference"] = theirs.curves["reference"]
     return _Flight(
         plant,
         {name: [one.curve() for one in held] for name, held in overview.curves.items()},
@@ -194,7 +204,7 @@ def _read_flight(transmitter: Path, receiver: Path | None, own: bool, usual: Cur
         overview.symbols.curve(),
         overview.symbols.thinned,
         _about(overview),
-        _cuts(metadata.get("impairments", ""), times_s[-1]),
+        _cuts(impairments, times_s[-1]),
         usual,
     )
 

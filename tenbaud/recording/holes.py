@@ -67,7 +67,7 @@ def unpacked_holes(metadata: dict[str, str]) -> list[Hole]:
         try:
             holes.append(_unpacked(orjson.loads(text)))
         except (ValueError, KeyError, TypeError, AttributeError):
-            holes.append(Hole(0.0, None, "what the recovered file says of this hole is damaged"))
+            holes.append(Hole(0.0, None, "the recovered file's entry of this gap is damaged"))
     return holes
 
 

@@ -48,7 +48,7 @@ def describe_text(path: Path) -> str:
     described = describe(path)
     parts = [_headline(path), *(_text(description) for description in described)]
     if not all(description.recording.complete for description in described):
-        parts.append(f"`tenbaud recover {path}` makes whole files of what was cut or damaged")
+        parts.append(f"`tenbaud recover {path}` repairs truncated or damaged files")
     return printable("\n\n".join(part for part in parts if part))
 
 
@@ -58,7 +58,7 @@ def describe_json(path: Path) -> list[dict[str, Any]]:
 
 
 def _headline(path: Path) -> str:
-    """Return what `summary.json` says in one line; empty without it."""
+    """Return `summary.json` in one line; empty without it."""
     summary = read_summary(RunFolder(path).summary)
     if not summary:
         return ""

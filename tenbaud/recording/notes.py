@@ -48,7 +48,7 @@ def _printable(text: str) -> str:
 
 
 def printable(text: str) -> str:
-    """Return a text of somebody else's without what would steer a terminal."""
+    """Return a foreign text without terminal control characters."""
     return "".join(
         one if one.isprintable() or one == "\n" else "\N{REPLACEMENT CHARACTER}" for one in text
     )

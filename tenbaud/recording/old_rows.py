@@ -1,4 +1,4 @@
-"""Rows as earlier versions wrote them, read as those of today: the one place that knows old names.
+"""Rows of earlier versions, read as those of today: old names occur only here.
 
 Up to wire version 1 an event was kind, sample and a sentence. The fields of today are filled from it,
 and the sentence stays, as `text`, for people. Fields of ticks and epochs had units in their

@@ -273,13 +273,18 @@ class OverviewRecorder:
         if len(rows) >= BLOCK_ROWS:
             self._take(topic)
 
-    def metadata(self) -> dict[str, str] | None:
-        """Return the overview as metadata of the file; None for a flight that is quickly read again."""
+    def overview(self) -> Overview:
+        """Return what was gathered so far."""
         for topic in self._rows:
             self._take(topic)
+        return self._overview
+
+    def metadata(self) -> dict[str, str] | None:
+        """Return the overview as metadata of the file; None for a flight that is quickly read again."""
+        overview = self.overview()
         if self._count < ROWS_OF_LONG_FLIGHT:
             return None
-        return packed(self._overview)
+        return packed(overview)
 
     def _take(self, topic: str) -> None:
         times, rows = self._rows[topic]

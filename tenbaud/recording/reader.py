@@ -1,8 +1,8 @@
-"""Reads recordings: whole ones, those cut by a crash, and those that somebody else gave you.
+"""Reads recordings: complete, truncated and untrusted ones.
 
-Every file is read from its beginning: of one without an end, a reader that starts from the index at
-the end gets nothing. Damaged parts are left out and listed in `MessageStream.holes`; what was never
-written by tenbaud is a RecordingError. Every command that reads a recording does it through here.
+Every file is read from its beginning: in a truncated file there is no index at the end to start from.
+Damaged parts are skipped and listed in `MessageStream.holes`; content that tenbaud cannot have written
+is a RecordingError. Every command reads recordings with this module.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from tenbaud.recording.notes import recording_notes
 from tenbaud.recording.old_rows import of_today
 from tenbaud.recording.resync import blocks_of_file
 from tenbaud.recording.rows import Row, RowDecoder, channel_of_names, check_channel
-from tenbaud.recording.table import Table
+from tenbaud.recording.table import Filling, Table
 
 METADATA_RECORDS_MAX = 100
 
@@ -35,9 +35,9 @@ METADATA_RECORDS_MAX = 100
 class MessageStream:
     """Iterates over (topic, time in ns, row) in the order of the file, in bounded memory.
 
-    What it has met so far is in `channels` and `metadata`. After the last message, `complete` tells
-    whether the file was finished properly and all of it could be read, and `holes` what is missing
-    between rows that are there.
+    `channels` and `metadata` are those found so far. After the last message, `complete` tells whether
+    the file was finished properly and read completely, and `holes` lists the missing rows between
+    present ones.
     """
 
     def __init__(self, path: Path, topic: str | None = None, size: int | None = None) -> None:
@@ -135,7 +135,7 @@ class MessageStream:
             self.metadata[record.name] = dict(record.metadata)
 
     def _know(self, messages: list[RawMessage]) -> None:
-        """Find out what the rows of a channel are whose description is lost."""
+        """Determine the rows of a channel whose description is lost."""
         there = {message[0] for message in messages}
         if there - self._topics.keys():
             with open_recording(self.path) as stream:
@@ -202,7 +202,7 @@ class Recording:
 
     @property
     def metadata(self) -> dict[str, str]:
-        """The metadata that the run wrote when it began."""
+        """The metadata that the run wrote at its start."""
         return self.metadata_record(RUN_METADATA)
 
     def metadata_record(self, name: str) -> dict[str, str]:
@@ -210,7 +210,7 @@ class Recording:
 
     @cached_property
     def end(self) -> dict[str, str]:
-        """What the recorder said when it finished: rows written and dropped; empty if it was cut."""
+        """The recorder's counts at its end: rows written and dropped; empty if it was truncated."""
         end = self.metadata_record(END_METADATA)
         for name in ("rows_written", "rows_dropped", "rows_recovered"):
             count = end.get(name, "0")
@@ -239,6 +239,20 @@ class Recording:
                 + ("" if self.complete else " It was cut or damaged before one.")
             )
         return self.topics[name]
+
+    def read(self, wanted: Mapping[str, Sequence[str]]) -> None:
+        """Read columns of several topics in one pass over the file: those that are there."""
+        names = {
+            topic: [name for name in columns if name in self.topics[topic].names]
+            for topic, columns in wanted.items()
+            if topic in self.topics
+        }
+        found = {topic: Filling(self.topics[topic], columns) for topic, columns in names.items()}
+        for block in rows_in_blocks(MessageStream(self.path, size=self._survey.size), names):
+            for topic, (times_ns, rows) in block.items():
+                found[topic].add(times_ns, rows)
+        for filling in found.values():
+            filling.finish()
 
     def rows(self, topic: str) -> Iterator[tuple[int, Row]]:
         """Stream (flight time in ns, row) of one topic; nothing if the topic is absent."""
@@ -310,7 +324,7 @@ def open_recording(path: Path) -> BinaryIO:
         if not stat.S_ISREG(os.fstat(handle).st_mode):
             os.close(handle)
             raise RecordingError(
-                f"The recording {path} cannot be read: it is no file. "
+                f"The recording {path} cannot be read: it is not a file. "
                 "Check the path; `runs/` holds one folder per run."
             )
         return open(handle, "rb")

@@ -1,4 +1,4 @@
-"""A whole file from a recording that was cut by a crash, or damaged.
+"""A complete file from a recording that was truncated or damaged.
 
 Our own commands read a damaged recording as it is; other tools start from the index at its end, which a
 killed process never wrote.

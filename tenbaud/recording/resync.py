@@ -1,4 +1,4 @@
-"""Reads a recording from its beginning to its end, and finds where to go on after what is damaged."""
+"""Reads a recording from beginning to end, and resynchronises after damaged parts."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def blocks_of_file(stream: BinaryIO, size: int) -> Iterator[Block | Damage]:
             block, confirmed = read_record(stream, *head, kinds)
         except BROKEN as error:
             found = resync.after(at, certain)
-            yield Damage(at, found, str(error) or "a record is not what was written")
+            yield Damage(at, found, str(error) or "a record is corrupt")
             at = certain = found
             continue
         if block is not None:

@@ -1,4 +1,4 @@
-"""Rows of a recording checked against what their channel declares, many at a time.
+"""Rows of a recording checked against their channel's declaration, many at a time.
 
 Every row has all declared fields, each with a value of its type or null, and a whole number, not null,
 in the field that counts the rows; `NEVER_NULL` names further fields.
@@ -119,7 +119,7 @@ class RowDecoder:
         self._count = 0
 
     def decode(self, texts: Sequence[bytes]) -> list[Row]:
-        """Return the next rows; RecordingError for one that is not what the channel declares."""
+        """Return the next rows; RecordingError for one that contradicts the channel's declaration."""
         rows: list[Row] = []
         for start in range(0, len(texts), ROWS_AT_ONCE):
             some = texts[start : start + ROWS_AT_ONCE]

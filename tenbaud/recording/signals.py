@@ -122,7 +122,7 @@ class Source:
         return summed(row, partial(self.ticks, "transmitter", "estimate", "coded_state"))
 
     def live(self, row: Row) -> Series | None:
-        """Return what the receiver predicted of a sum of states."""
+        """Return the receiver's prediction of a sum of states."""
         live = summed(row, partial(self.ticks, "transmitter", "estimate", "live_state"))
         return (
             summed(row, partial(self.ticks, "receiver", "tick", "live_state")) if live is None else live
@@ -134,14 +134,14 @@ class Source:
         return None if value is None or estimate is None else value - estimate
 
     def loop(self, name: str) -> Series | None:
-        """Return what the transmitter's loop recorded once a tick."""
+        """Return a field that the transmitter's loop recorded once a tick."""
         return self.ticks("transmitter", "tick", name, None)
 
     def applied(self, place: int) -> Series | None:
         return self.ticks("transmitter", "tick", "applied", place)
 
     def command(self, place: int) -> Series | None:
-        """Return what was commanded of an input, as the receiver sent it if that was recorded."""
+        """Return the commands of an input, as the receiver sent them if that was recorded."""
         sent = self.ticks("receiver", "tick", "command", place)
         return self.ticks("transmitter", "tick", "commanded", place) if sent is None else sent
 
@@ -198,7 +198,7 @@ class Source:
 
 
 class Definition(NamedTuple):
-    """A signal that a run may have: its unit, its meaning, and what it is made from."""
+    """A signal that a run may have: its unit, its meaning, and its source."""
 
     unit: str
     meaning: str
@@ -222,7 +222,7 @@ _OF_OUTPUT: tuple[tuple[str, str, _OfOutput], ...] = (
     ("error_live", "{} less its live estimate", lambda one, at, row: one.error(at, one.live(row))),
     ("range", "range M for {} before the word", lambda one, at, _: one.samples("range", at)),
 )
-"""What belongs to an output, its meaning, and what makes it of the output's place and row."""
+"""A signal of an output, its meaning, and its function of the output's index and row."""
 
 _OF_ALL = {
     "symbol": Definition(
@@ -252,7 +252,9 @@ def definitions(plant: Signals) -> dict[str, Definition]:
 
     for what, meaning, make in _OF_OUTPUT:
         for place, one in enumerate(plant.outputs):
-            name = output_name(plant, what, place)
+            name = one.name
+            if what:
+                name = what if len(plant.outputs) == 1 else f"{what}_{one.name}"
             add(name, one.unit, meaning.format(one.words), _made(make, place, plant.row(place)))
     only = f"{plant.outputs[0].name}_" if len(plant.outputs) == 1 else ""
     for state, one in enumerate(plant.states):
@@ -282,8 +284,6 @@ def _made(make: _OfOutput, place: int, row: Row) -> Maker:
 
 
 def output_name(plant: Signals, what: str, place: int) -> str:
-    """Return the name of what belongs to an output; `what` empty: of the output itself."""
-    name = plant.outputs[place].name
-    if not what or len(plant.outputs) == 1:
-        return what or name
-    return f"{what}_{name}"
+    """Return the signal that is `what` of an output; `what` empty: the output itself."""
+    row = [one for one, _, _ in _OF_OUTPUT].index(what)
+    return list(definitions(plant))[row * len(plant.outputs) + place]

@@ -21,6 +21,7 @@ LINE_B = "#0b6fb8"
 LINE_C = "#d9730d"
 FAINT = "#8a8a8a"
 POINTS = 3000
+FIGURE_FORMATS = (".png", ".svg", ".pdf")
 
 
 def new_figure(
@@ -63,6 +64,6 @@ def save(figure: Figure, paths: Sequence[Path]) -> None:
     """Write the figure to each path; the ending says in which format."""
     for path in paths:
         # A fixed salt and no date: the same data give the same file.
-        metadata = {"Date": None} if path.suffix == ".svg" else {"Software": None}
+        unwritten = {".svg": "Date", ".pdf": "CreationDate"}.get(path.suffix, "Software")
         with whole_file(path) as stream:
-            figure.savefig(stream, dpi=100, metadata=metadata, format=path.suffix[1:])
+            figure.savefig(stream, dpi=100, metadata={unwritten: None}, format=path.suffix[1:])

@@ -114,15 +114,15 @@ class Table:
         )
 
     def _read(self, fields: Sequence[Field]) -> None:
-        parts: dict[str, list[NDArray[Any]]] = {one.name: [] for one in fields}
-        times: list[NDArray[np.uint64]] = []
-        for times_ns, rows in self._blocks(list(parts)):
-            times.append(np.array(times_ns, dtype=np.uint64))
-            for one in fields:
-                parts[one.name].append(self._part(rows, one))
+        filling = Filling(self, [one.name for one in fields])
+        for times_ns, rows in self._blocks([one.name for one in fields]):
+            filling.add(times_ns, rows)
+        filling.finish()
+
+    def _keep(self, times: list[NDArray[np.uint64]], parts: dict[str, list[NDArray[Any]]]) -> None:
         self._times_ns = np.concatenate(times) if times else np.zeros(0, dtype=np.uint64)
-        for one in fields:
-            self._columns[one.name] = self._joined(parts.pop(one.name), one)
+        for name in list(parts):
+            self._columns[name] = self._joined(parts.pop(name), self._field(name))
 
     def _part(self, rows: list[Row], one: Field) -> NDArray[Any]:
         values = [row[one.name] for row in rows]
@@ -165,6 +165,25 @@ class Table:
                 f"{self.channel.topic!r} have up to {width} values, and most far fewer. tenbaud writes "
                 "no such field: the file was changed, or another program wrote it."
             )
+
+
+class Filling:
+    """Some columns of a table, from its rows as a pass over the file brings them."""
+
+    def __init__(self, table: Table, names: Sequence[str]) -> None:
+        self._table = table
+        self._fields = [table._field(name) for name in names]
+        self._parts: dict[str, list[NDArray[Any]]] = {name: [] for name in names}
+        self._times: list[NDArray[np.uint64]] = []
+
+    def add(self, times_ns: list[int], rows: list[Row]) -> None:
+        self._times.append(np.array(times_ns, dtype=np.uint64))
+        for one in self._fields:
+            self._parts[one.name].append(self._table._part(rows, one))
+
+    def finish(self) -> None:
+        """Hand the columns to the table."""
+        self._table._keep(self._times, self._parts)
 
 
 @contextmanager

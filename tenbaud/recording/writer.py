@@ -90,7 +90,7 @@ class McapRecorder:
         self.error: str | None = None
         """the first trouble met, for a person"""
         self.cause: Exception | None = None
-        """what ended the recording early"""
+        """why the recording ended early"""
         self._failed = False
         self._writers: dict[int, _ChannelWriter] = {}
         self._stream = open_new_recording(path)
@@ -141,7 +141,7 @@ class McapRecorder:
         self._closing.set()
 
     def close(self) -> None:
-        """Write what is queued, finish the file and stop the thread. May be called again."""
+        """Write the queued rows, finish the file and stop the thread. May be called again."""
         self.finish_soon()
         if not self._finished.wait(CLOSE_TIMEOUT_S):
             self._note(
@@ -171,7 +171,7 @@ class McapRecorder:
             self._closing.wait(POLL_PERIOD_S)
 
     def attend(self) -> bool:
-        """Write what is queued, from the thread that writes; return False once it has finished."""
+        """Write the queued rows, from the writing thread; return False once it has finished."""
         if not self._open:
             self._guard(self._write_head)
             self._open = True

@@ -1,1 +1,1 @@
-"""Flying a recorded flight again from its symbols, and auditing what it rested on."""
+"""Replay of a recorded flight from its symbols."""

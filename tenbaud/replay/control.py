@@ -1,15 +1,16 @@
-"""The controller of a flight that is flown again: built as then, or repeating what it commanded."""
+"""The controller of a replayed flight: built as in the flight, or repeating its commands."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from channel.codec.signals import signals_of
 from receiver.controllers.base import Controller
 from receiver.controllers.references import Reference
+from tenbaud.build.codec import build_model
 from tenbaud.build.controllers import build_controller
-from tenbaud.build.references import build_references
-from tenbaud.build.signals import configured_signals
+from tenbaud.build.references import References, build_references
 from tenbaud.config.schema import FlightConfig
 from tenbaud.replay.record import FlightRecord
 
@@ -37,7 +38,7 @@ class RecordedCommands:
 
 @dataclass(frozen=True, slots=True)
 class SteppedReference:
-    """The set-point of the configuration, with what was set by hand over it: (tick, angle) steps."""
+    """The configured set-point, with manual changes over it: (tick, angle) steps."""
 
     configured: Reference
     steps: tuple[tuple[int, float], ...]
@@ -58,7 +59,7 @@ def steps_by_hand(record: FlightRecord) -> tuple[tuple[int, float], ...]:
     """
     if "receiver" not in record.rows:
         return ()
-    reference = build_references(record.agreement.config, record.agreement.signals)[0]
+    reference = _references(record.agreement.config)[0]
     if reference is None:
         return ()
     rows = record.rows["receiver"].topics["tick"]
@@ -75,11 +76,16 @@ def steps_by_hand(record: FlightRecord) -> tuple[tuple[int, float], ...]:
     return tuple(steps)
 
 
+def _references(config: FlightConfig) -> References:
+    model = build_model(config)
+    return build_references(config, signals_of(model), model)
+
+
 def controller_of(config: FlightConfig, steps: tuple[tuple[int, float], ...] = ()) -> Controller:
     """Return the controller that was flown, with the set-points that it was given by hand."""
     if not steps:
         return build_controller(config)
-    first, *others = build_references(config, configured_signals(config))
+    first, *others = _references(config)
     return build_controller(config, (first and SteppedReference(first, steps), *others))
 
 

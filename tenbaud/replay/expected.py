@@ -25,7 +25,7 @@ class Expected:
     """The rows by their keys, as `tenbaud.replay.rows` reads them."""
 
     samples: dict[int, Any] = field(default_factory=dict)
-    """the transmitter's; what it sent, and when echoes came, does not follow from the words"""
+    """the transmitter's; its sent words and the echoes' times do not follow from the words"""
     estimates: dict[int, Any] = field(default_factory=dict)
     """of the transmitter"""
     commands: dict[int, Any] = field(default_factory=dict)
@@ -37,7 +37,7 @@ class Expected:
 
 
 def expect(agreement: Agreement, epochs: Sequence[Epoch], flown: Sequence[Reflown]) -> Expected:
-    """Return what the recordings must hold of a flight that was flown again."""
+    """Return the rows that the recordings of a replayed flight must hold."""
     expected = Expected()
     copies: list[Copies] = []
     for epoch in epochs:

@@ -14,7 +14,8 @@ from tenbaud.config.outside_code import require_allowed, require_regular_files
 from tenbaud.config.schema import FlightConfig
 from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.reader import Recording
-from tenbaud.recording.run import ENDS, Run
+from tenbaud.recording.recorded import ENDS
+from tenbaud.recording.run import Run
 from tenbaud.replay.rows import EndRows, read_rows
 
 NUMBER_MAX = 1e9
@@ -166,7 +167,7 @@ def epochs_of(record: FlightRecord) -> list[Epoch]:
         if row.sample > expected:
             raise RecordingError(
                 f"{tables.path} lacks sample {expected}: the next one recorded is {row.sample}. "
-                "Rows were lost, so what follows cannot be computed from the symbols."
+                "Rows were lost, so later states cannot be computed from the symbols."
             )
         if row.sample < expected:
             raise RecordingError(

@@ -1,4 +1,4 @@
-"""The receiver's own session flown again: symbols in, states and commands out.
+"""Replay of the receiver's own session: symbols in, states and commands out.
 
 Nothing here knows what was recorded but the words, the state that each epoch starts from and the
 controller. Symbols arrive when they are due, or later by what the caller says; as long as that is

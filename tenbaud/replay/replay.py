@@ -1,4 +1,4 @@
-"""A recorded flight flown again from its symbols alone, and compared with what was recorded."""
+"""A recorded flight replayed from its symbols alone, and compared with the recording."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Replayed:
     digests_compared: int
     """samples of either end whose digest was compared"""
     differences: list[str]
-    """what differs, the first of each end and topic; empty: nothing"""
+    """differences, the first of each end and topic; empty: none"""
     packed: Packed
     erased: int
     epochs: int
@@ -40,7 +40,7 @@ class Replayed:
 
 
 def replay(record: FlightRecord) -> Replayed:
-    """Fly a recorded flight again from its symbols and compare."""
+    """Replay a recorded flight from its symbols and compare."""
     agreement = record.agreement
     _check_shape(record)
     epochs = epochs_of(record)
@@ -77,7 +77,7 @@ def replay_symbols(unpacked: Unpacked) -> tuple[int, str]:
 
 
 def compare(record: FlightRecord, flown: Sequence[Reflown]) -> tuple[list[str], int]:
-    """Return what differs from the recordings, and how many digests were compared."""
+    """Return the differences from the recordings, and the number of compared digests."""
     differences: list[str] = []
     compared = 0
     for end, rows in record.rows.items():
@@ -95,8 +95,8 @@ def _check_shape(record: FlightRecord) -> None:
         if rows.misfits:
             first = rows.misfits[0]
             raise RecordingError(
-                f"The {end}'s recording holds what no node writes: topic {first.topic}, {first.row}, "
-                f"field {first.field}: {first.text}."
+                f"The {end}'s recording holds data that no node writes: topic {first.topic}, "
+                f"{first.row}, field {first.field}: {first.text}."
             )
 
 
@@ -147,7 +147,7 @@ def _compare_commands(rows: EndRows, flown: Sequence[Reflown]) -> list[str]:
                 first = first or f"tick {tick}: recorded {row.command}, computed {command}"
     if not unlike:
         return []
-    return [f"receiver: {unlike} commands differ from what the states give, first at {first}"]
+    return [f"receiver: {unlike} commands differ from those of the states, first at {first}"]
 
 
 def save_symbols(replayed: Replayed, path: Path) -> None:
@@ -168,14 +168,14 @@ def replay_text(replayed: Replayed) -> str:
         size += f" and {len(packed.erasures)} that mark {replayed.erased} erasures"
     lines = [
         f"{replayed.samples} samples, {replayed.bits_sent:g} bits: the whole flight is {size}",
-        f"beside it, known beforehand: {len(packed.head)} bytes of configuration, packed",
+        f"known in advance: {len(packed.head)} bytes of configuration, packed",
     ]
     if replayed.epochs > 1:
         lines.append(
             f"{replayed.epochs} epochs; rejoins sent {packed.start_bytes} bytes of states down the link"
         )
     if replayed.steps:
-        lines.append(f"the set-point was moved by hand; {len(replayed.steps)} steps were recorded")
+        lines.append(f"the set-point was changed manually; {len(replayed.steps)} steps were recorded")
     if replayed.equal:
         lines.append(
             f"flown again: all {replayed.digests_compared} digests of both recordings are equal, and "

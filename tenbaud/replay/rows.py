@@ -31,7 +31,7 @@ KEY_MAX = 2**48
 """No flight has a tick, sample or slot beyond this."""
 
 WITH_HOLES = ("measured", "true", "reference")
-"""A rig may read what is no number, and an output may have no set-point: a recording holds null."""
+"""A rig's reading may be invalid, and an output may have no set-point: a recording holds null."""
 
 
 class Kind(NamedTuple):

@@ -1,6 +1,6 @@
 """A whole flight in as many bits as were sent: its words, packed.
 
-What both ends know beforehand stands in the head of the file: the configuration. What a rejoin sent
+The configuration, known to both ends in advance, is in the head of the file. What a rejoin sent
 down the link, the start states of later epochs, stands there too, and set-points given by hand.
 
     "tenbaud symbols 1" and a line feed | head length u32 | head, JSON in zlib | symbols | erasures
@@ -33,7 +33,7 @@ _LENGTH = struct.Struct("<I")
 
 @dataclass(frozen=True, slots=True)
 class Packed:
-    """A flight as bytes, and how many of them are what."""
+    """A flight as bytes, and the sizes of its parts."""
 
     head: bytes
     symbols: bytes

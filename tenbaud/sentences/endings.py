@@ -1,4 +1,4 @@
-"""Sentences for how a flight ended, and for where a session stands."""
+"""Sentences for how a flight ended, and for the phase of a session."""
 
 from __future__ import annotations
 
@@ -12,34 +12,34 @@ _ENDINGS: Mapping[Ending, str] = {
     Ending.OVER: "the flight is over",
     Ending.STOPPED: "stopped by the user",
     Ending.FAILED: "its process failed",
-    Ending.LINK_LOST: "nothing came from the other end any more",
+    Ending.LINK_LOST: "no messages came from the other end",
     Ending.DESYNC: "the two copies of the codec differ",
-    Ending.SAFETY_STOP: "the guard took the motors to their safe voltage",
+    Ending.SAFETY_STOP: "the guard set the motors to their safe voltage",
     Ending.WIRE_VERSION: "the two ends have different wire versions",
-    Ending.MISMATCH: "the two ends are not set up alike",
+    Ending.MISMATCH: "the two ends have different set-ups",
     Ending.BUSY: "this receiver flies with another transmitter",
-    Ending.FULL: "this receiver serves as many rigs as it may",
+    Ending.FULL: "this receiver serves its largest number of rigs",
     Ending.CANNOT_SERVE: "this receiver cannot serve this session",
     Ending.ALREADY_ENDED: "the session of this receiver has ended",
     Ending.SECOND_RECEIVER: (
-        "the transmitter flies with another receiver and stays with it; to take the flight over on "
-        "purpose: tenbaud receive --take-over"
+        "the transmitter flies with another receiver; to take the flight over: "
+        "tenbaud receive --take-over"
     ),
     Ending.TAKEN_OVER: "another receiver has taken the flight over",
-    Ending.REJOINS: "a session has no more epochs than 65535: look at this line",
+    Ending.REJOINS: "the session has used all 65535 epochs: check the line",
 }
 
 _PHASES = {
     "greeting": "waiting for a receiver",
     "waiting": "waiting for a transmitter",
-    "rejoining": "asking for a common state",
+    "rejoining": "requesting a common state",
 }
 
 
 def ending_text(ending: Ending) -> str:
     """Return what an ending means."""
     known = _ENDINGS.get(ending)
-    return known or f"for a reason that this version does not know (number {int(ending)})"
+    return known or f"for a reason unknown to this version (number {int(ending)})"
 
 
 def end_text(end: End | None, peer: Role) -> str:
@@ -53,13 +53,13 @@ def end_text(end: End | None, peer: Role) -> str:
 
 
 def refusal_text(refusal: End) -> str:
-    """Return why two ends do not fly together, as both see it."""
+    """Return why a flight is refused, as reported by both ends."""
     said = refusal.text or ending_text(refusal.ending)
-    return f"{said}\n  as the transmitter sees it: {refusal.answer}" if refusal.answer else said
+    return f"{said}\n  reported by the transmitter: {refusal.answer}" if refusal.answer else said
 
 
 def desync_text(desync: Desync) -> str:
-    """Return where the two copies differ."""
+    """Return a sentence about the difference of the two copies."""
     return difference_text(
         desync.sample, f"{desync.transmitter_digest:016x}", f"{desync.receiver_digest:016x}"
     )
@@ -74,5 +74,5 @@ def difference_text(sample: object, transmitter_digest: object, receiver_digest:
 
 
 def phase_text(phase: str) -> str:
-    """Return where a session stands."""
+    """Return the phase of a session."""
     return _PHASES.get(phase, phase)

@@ -1,6 +1,6 @@
 """One sentence for each event, from its fields as recordings and telemetry hold them.
 
-Only what shows something to a person calls this module and `endings`; nothing reads what they return.
+Only displays call this module and `endings`; no program parses the sentences.
 Call them through the module (`events.event_text`), so that a test can replace every sentence.
 """
 
@@ -11,6 +11,7 @@ from typing import Any
 
 from channel.protocol.endings import Ending
 from tenbaud.sentences import endings
+from tenbaud.sentences.quantities import amount
 from transmitter.guard import GuardReason
 
 Fields = Mapping[str, Any]
@@ -31,7 +32,7 @@ def event_text(fields: Fields) -> str:
 
 
 def guard_text(reason: GuardReason | None) -> str:
-    """Return why the guard took the voltage down."""
+    """Return why the guard ramped the voltage down."""
     if reason is None:
         return ""
     return _guard_cause(_Known({name: getattr(reason, name) for name in GuardReason.__slots__}))
@@ -71,7 +72,7 @@ def _ended(one: Fields) -> str:
 
 def _refused(one: Fields) -> str:
     if one["cause"] == "second_receiver":
-        return "a second receiver asked for this flight: refused"
+        return "a second receiver requested this flight: refused"
     said = str(one["detail"] or _ending(one["cause"]))
     return f"the receiver that takes over refused: {said}" if one["session"] is not None else said
 
@@ -79,25 +80,25 @@ def _refused(one: Fields) -> str:
 def _rejoin_asked(one: Fields) -> str:
     why: dict[str, Callable[[], str]] = {
         "desync": lambda: f"the two copies of the codec differ after sample {one['sample']}",
-        "gap": lambda: f"the echo of sample {one['sample']} never came, nor a repetition of it",
+        "gap": lambda: f"the echo of sample {one['sample']} and its repetitions were lost",
         "lag": lambda: _lag(one),
-        "unknown": lambda: "the receiver does not know this session (any more)",
+        "unknown": lambda: "the receiver does not know this session",
         "guard": lambda: "the guard stopped",
-        "taken_over": lambda: f"receiver session {one['session']:08x} takes over on purpose",
+        "taken_over": lambda: f"receiver session {one['session']:08x} takes over on request",
     }
-    return f"{why[one['cause']]()}: asking for a new epoch after {one['epoch']}"
+    return f"{why[one['cause']]()}: requesting a new epoch after {one['epoch']}"
 
 
 def _lag(one: Fields) -> str:
     if one["detail"]:
-        return f"this end's copy of the codec cannot go on ({one['detail']})"
+        return f"this end's copy of the codec cannot continue ({one['detail']})"
     return f"no echo for {one['number']} samples"
 
 
 def _dropped(one: Fields) -> str:
     texts = {
-        "settled": f"slot {one['slot']} was settled already: dropped",
-        "past_deadline": f"slot {one['slot']} came after its deadline: dropped",
+        "settled": f"slot {one['slot']} was already decided: dropped",
+        "past_deadline": f"slot {one['slot']} arrived after its deadline: dropped",
         "far_ahead": f"slot {one['slot']} is {one['number']} ahead: dropped",
         "not_due": f"a symbol of slot ...{one['slot']} is not due: dropped",
         "out_of_bounds": f"dropped a frame that is out of bounds: {one['detail']}",
@@ -123,12 +124,13 @@ def _guard_cause(one: Fields) -> str:
         case "sensor":
             return f"tick {tick}: {one['detail']}"
         case "angle_limit":
+            name, _, unit = str(one["detail"] or f"axis {axis}, rad").partition(", ")
             return (
-                f"{one['detail'] or f'axis {axis}, rad'}: {value:.3f} at tick {tick} is beyond the "
-                f"soft limit of {limit:g}"
+                f"{name}: {amount(value, unit)} at tick {tick} is beyond the soft limit of "
+                f"{amount(limit, unit)}"
             )
         case "no_angle":
-            return f"{one['detail'] or f'axis {axis}'} reads no number at tick {tick}"
+            return f"{one['detail'] or f'axis {axis}'} has no valid reading at tick {tick}"
         case "bad_command":
             return f"the command of tick {tick} is not a number"
     return str(one["cause"])
@@ -137,13 +139,13 @@ def _guard_cause(one: Fields) -> str:
 def _controller(one: Fields) -> str:
     if one["cause"] == "reference":
         return f"the reference of tick {one['tick']} failed: {one['detail']}"
-    return f"at tick {one['tick']} the controller {one['detail']}; its last command is kept"
+    return f"at tick {one['tick']} the controller {one['detail']}; its last command is held"
 
 
 def _peer(one: Fields) -> str:
     texts = {
         "gone": "the receiver is gone",
-        "back": "the receiver is there again",
+        "back": "the receiver is back",
         "silent": f"no symbol for {one['number']} samples: waiting for one",
     }
     return texts[one["cause"]]
@@ -151,27 +153,26 @@ def _peer(one: Fields) -> str:
 
 def _rate(one: Fields) -> str:
     if one["cause"] == "kept":
-        return "the symbol rate is kept again"
+        return "the symbol rate has recovered"
     return (
-        f"the symbol rate is not kept: {one['limit']:g} symbols/s are asked for, "
+        f"the symbol rate is too low: {one['limit']:g} symbols/s are configured, "
         f"{one['value']:.0f} arrive in time, {1.0 - one['value'] / one['limit']:.1%} of the symbols "
         f"are late or were never sent. This process missed {one['missed_share']:.1%} of its ticks; in "
         f"{one['overdue_share']:.1%} of the others echoes were overdue. Lower channel.rate_baud, or "
-        "leave both processes more of a processor"
+        "give both processes more processor time"
     )
 
 
 def _control(one: Fields) -> str:
     tick = one["tick"]
     before = f"tick {tick}" if tick is not None else f"sample {one['sample']}"
+    # In a recording without the unit it is an angle.
+    unit = "rad" if one["detail"] is None else str(one["detail"])
     texts: dict[str, Callable[[], str]] = {
-        # Of a recording without the unit it was an angle.
-        "set_point": lambda: " ".join(
-            ("set-point", repr(one["value"]), "rad" if one["detail"] is None else one["detail"])
-        ).rstrip(),
+        "set_point": lambda: f"set-point {amount(one['value'], unit)}",
         "follow": lambda: "follow the reference",
         "pause": lambda: f"pause before tick {one['number']}",
-        "go_on": lambda: "go on",
+        "go_on": lambda: "continue",
         "pace": lambda: f"{one['value']!r} times real time",
         "impair": lambda: line_text(one["detail"] or ""),
         "corrupt": lambda: (
@@ -179,12 +180,12 @@ def _control(one: Fields) -> str:
         ),
         "ignored": lambda: f"{one['detail']}: ignored",
     }
-    return f"by hand, before {before}: {texts[one['cause']]()}"
+    return f"manual, before {before}: {texts[one['cause']]()}"
 
 
 def line_text(impairments: str) -> str:
-    """Return what the line suffers from now on."""
-    return f"the line suffers {impairments}" if impairments else "the line is clean"
+    """Return a sentence about the impairments of the line from now on."""
+    return f"the line now has {impairments}" if impairments else "the line is clean"
 
 
 _EVENTS: Mapping[str, Callable[[Fields], str]] = {

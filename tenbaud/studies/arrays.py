@@ -14,7 +14,13 @@ from channel.flight_log import FlightLog
 from plant_sim.encoder import Encoder
 from tenbaud.build.ends import guard_settings
 from tenbaud.build.flight import Agreement
-from tenbaud.build.references import reference_of, reference_sections
+from tenbaud.build.references import (
+    SetPointLimits,
+    limits_kept,
+    reference_of,
+    reference_sections,
+    set_point_limits,
+)
 from tenbaud.build.signals import build_encoders
 from tenbaud.config.controllers import ReferenceSection
 from tenbaud.studies.flight_data import Work
@@ -110,16 +116,18 @@ def targets_of(agreement: Agreement, ticks: int, replay: bool) -> Any:
     """Return the set-point of each output at every tick."""
     targets = np.zeros((ticks, len(agreement.signals.outputs)))
     tick_s, fields = agreement.config.timing.tick_s, set(ReferenceSection.model_fields)
+    limits = set_point_limits(agreement.config, agreement.signals, agreement.codec.model)
     for place, (output, section) in enumerate(reference_sections(agreement.config, agreement.signals)):
         if section is not None and not replay:
-            targets[:, place] = _values(section.as_text(include=fields), tick_s, output, ticks)
+            text = section.as_text(include=fields)
+            targets[:, place] = _values(text, tick_s, output, ticks, limits[place])
     return targets
 
 
 @lru_cache(maxsize=64)
-def _values(section: str, tick_s: float, output: Signal, ticks: int) -> Any:
+def _values(section: str, tick_s: float, output: Signal, ticks: int, limits: SetPointLimits) -> Any:
     """Return the set-point of every tick; the section as JSON, so that it can be remembered."""
-    reference = reference_of(ReferenceSection.of_text(section), tick_s, output)
+    reference = limits_kept(reference_of(ReferenceSection.of_text(section), tick_s, output), limits)
     return np.array([reference.value(tick) for tick in range(ticks)])
 
 

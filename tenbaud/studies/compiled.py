@@ -1,7 +1,7 @@
 """The nodes' own functions, compiled: one text for each formula.
 
-`compiled` takes a plain function of this project and returns what numba makes of it. The functions that
-it calls, wherever in the project they are defined, are compiled with it; nothing is rewritten. Neither
+`compiled` takes a plain function of the project and returns it compiled by numba. The functions that it
+calls, wherever in the project they are defined, are compiled with it; nothing is rewritten. Neither
 `fastmath` nor fused multiply-adds are allowed, so the bits stay those of plain Python.
 
 Machine code is kept in the user's cache folder under a digest of all sources that could matter, so that
@@ -11,8 +11,11 @@ a second study, or a second worker, does not compile again and no stale code is 
 from __future__ import annotations
 
 import os
+import shutil
 import sys
+import time
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from hashlib import blake2b
 from importlib import import_module
@@ -50,6 +53,10 @@ BESIDE = (
     ),
 )
 """Modules that no figure of a flight depends on."""
+
+KEPT_FOLDERS = 8
+KEPT_S = 86_400.0
+"""How long machine code is kept unused, and of how many versions of the sources in any case."""
 
 Parts = tuple[tuple[str, Any], ...]
 """Replacements for the placeholders of the flight: (name, compiled function, or a number)."""
@@ -213,13 +220,13 @@ class MachineCode:
         return ""
 
     def get_disambiguator(self) -> str:
-        """Return what tells functions of one name in a file apart."""
+        """Return the line, which distinguishes functions of one name in a file."""
         return str(self._line)
 
 
 @cache
 def sources_digest() -> str:
-    """Return what stands for all sources that the figures of a flight depend on."""
+    """Return a digest of all sources that the figures of a flight depend on."""
     digest = blake2b(digest_size=12)
     for path in figure_sources():
         digest.update(path.read_bytes())
@@ -243,7 +250,19 @@ def _cache_folder() -> Path | None:
     try:
         base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
         folder = Path(base) / "tenbaud" / sources_digest()
-        folder.mkdir(parents=True, exist_ok=True)
+        if not folder.is_dir():
+            folder.mkdir(parents=True, exist_ok=True)
+            prune(folder.parent)
+        os.utime(folder)
     except (OSError, RuntimeError):  # the latter for a user without a home, as in containers
         return None
     return folder if os.access(folder, os.W_OK) else None
+
+
+def prune(base: Path) -> None:
+    """Remove the machine code of sources that are in use no more; other processes may do so too."""
+    with suppress(OSError):
+        folders = sorted(base.iterdir(), key=lambda one: one.stat().st_mtime, reverse=True)
+        for folder in folders[KEPT_FOLDERS:]:
+            if time.time() - folder.stat().st_mtime > KEPT_S:
+                shutil.rmtree(folder, ignore_errors=True)

@@ -162,7 +162,7 @@ def present(config: FlightConfig, name: str) -> float:
         if here is None:
             raise StudyError(f"{name} is not a constant of the coder and model that are configured")
     if isinstance(here, bool) or not isinstance(here, int | float):
-        raise StudyError(f"{name} is no number, so it cannot be fitted")
+        raise StudyError(f"{name} is not a number, so it cannot be fitted")
     if isinstance(here, int):
         raise StudyError(f"{name} is a whole number, which a fit cannot move; sweep it")
     return here

@@ -180,7 +180,7 @@ class CompiledPoint:
         del self._work
 
     def _counts(self, schedule: Schedule) -> FlightCounts:
-        """Return what the verdict on a flight rests on; a compiled one has no rejoin and no stop."""
+        """Return the counts for the verdict on a flight; a compiled one has no rejoin and no stop."""
         ticks = self.numbers.ticks
         return FlightCounts(
             samples=self._samples,
@@ -192,7 +192,7 @@ class CompiledPoint:
         )
 
     def _figures(self, schedule: Schedule) -> FlightFigures:
-        """Return what a study keeps of the flight."""
+        """Return the figures that a study keeps of the flight."""
         numbers, work = self.numbers, self._work
         coded, live = work.counted.tolist()
         followed = numbers.ticks - numbers.window_start
@@ -221,14 +221,14 @@ class CompiledPoint:
         )
 
     def schedule(self, agreement: Agreement) -> Schedule:
-        """Return what the line does; on one without faults the same for all seeds."""
+        """Return the line's effects; without faults the same for all seeds."""
         if self._clean is None or agreement.faults.any:
             self._clean = schedule_of(agreement, self._samples, self.numbers.ticks)
         clean: Schedule = self._clean
         return clean
 
     def given(self, schedule: Schedule, agreement: Agreement) -> Given:
-        """Return what a flight reads."""
+        """Return the inputs of a flight."""
         plant = self._plant
         if self._pushed and agreement is not self.agreement:
             plant = build_plant(agreement.config, agreement.config.timing.tick_s, agreement.signals)
@@ -279,6 +279,8 @@ def _require_ordinary(config: FlightConfig, codec: Codec) -> None:
         raise Uncommon("a plant from outside")
     if config.transmitter.sabotage or config.receiver.sabotage or config.transmitter.dry_run:
         raise Uncommon("sabotage and dry runs")
+    if config.channel.downlink != "full":
+        raise Uncommon(f"the {config.channel.downlink} downlink")
     if kind_of_link(config).changes_terms:
         raise Uncommon("a link on which bytes take time, such as a serial line")
     model, coder = codec.model, codec.coder

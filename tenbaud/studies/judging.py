@@ -45,7 +45,7 @@ FIT_TICKS = 100_000
 PHASES_MAX = 50
 """sample phases of the judgement"""
 NO_CONSTANTS = (TenbaudError, ValueError, ArithmeticError, np.linalg.LinAlgError)
-"""what a corner of the ranges that makes no coder, model or observer may raise"""
+"""exceptions for constants that allow no coder, model or observer"""
 NOTABLE = 0.005
 """share by which an error must rise to be another one"""
 

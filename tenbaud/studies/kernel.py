@@ -152,7 +152,7 @@ def _measure(
 
 
 def _receive(sample: int, given: Given, work: Work) -> bool:
-    """Make `work.word` what comes out of the line; return whether it is erased."""
+    """Set `work.word` to the line's output; return whether it is erased."""
     size = work.word.shape[0]
     kinds = given.alphabet.shape[0]
     for place in range(size):

@@ -28,7 +28,7 @@ class AtRest:
 
 
 class PlantParts(NamedTuple):
-    """What a flight takes of a plant; see `parts.py`."""
+    """The parts of a plant that a flight uses; see `parts.py`."""
 
     step: Any
     output: Any

@@ -39,10 +39,12 @@ MAPS_MAX = 12
 
 
 class Drawn(NamedTuple):
-    """What the plots of one output have in common."""
+    """The common data of one output's plots."""
 
     columns: dict[str, Any]
     """settings, and the quantities in `unit`"""
+    over: list[str]
+    """settings with several values, and seeds, where there are several flights of one setting"""
     unit: str
     title: str
     folder: Path
@@ -68,6 +70,9 @@ def draw_study(
         title = f"{title}\n{missing} of {len(good)} flights have no figures and are left out"
     names = [name for name in names if len(np.unique(columns[name])) > 1] or names
     numeric = [name for name in names if columns[name].dtype.kind in "fiub"]
+    over = [name for name in names if len(np.unique(columns[name])) > 1]
+    if len(set(zip(*columns.values(), strict=True))) < np.count_nonzero(good):
+        over.append("seeds")
     paths = []
     for place, output in enumerate(outputs):
         end = f"_{output.name}" if place else ""
@@ -75,7 +80,7 @@ def draw_study(
         found = {one: scale * np.array(table[one + end].to_pylist())[good] for one in QUANTITIES}
         unit = "degrees" if output.unit == "rad" else output.unit
         whose = f"{title}: {output.words}" if len(outputs) > 1 else title
-        drawn = Drawn(columns | found, unit, whose, folder, end)
+        drawn = Drawn(columns | found, over, unit, whose, folder, end)
         paths += [_curves(drawn, name) for name in names]
         for first, second in itertools.islice(itertools.combinations(numeric, 2), MAPS_MAX):
             paths.append(_map(drawn, first, second))
@@ -117,7 +122,9 @@ def _curves(drawn: Drawn, name: str) -> Path:
             lower.set_xticks(levels, [f"{one:.4g}" for one in levels])
             lower.minorticks_off()
     lower.set_xlabel(LABELS.get(name, name))
-    what = "each dot a flight" if sampled else "medians, and the middle half of all flights"
+    others = " and ".join(one for one in drawn.over if one != name)
+    what = f"medians, and the middle half over {others}" if others else "one flight for each value"
+    what = "each dot a flight" if sampled else what
     upper.set_title(f"{drawn.title}\n{what}", fontsize=10)
     return _save(figure, drawn.folder / f"error_{_file(name)}{drawn.end}.png")
 

@@ -12,7 +12,7 @@ from tenbaud.studies.study_file import Range, SampleSection, StudyFile, Value
 FLIGHTS_MAX = 10_000_000
 
 SAME = (("rate", "timing.symbol_period_s"), *FIELDS.items())
-"""Short names and what they replace."""
+"""Short names and the fields that they replace."""
 
 
 def names_of(file: StudyFile) -> list[str]:
@@ -45,7 +45,7 @@ def _check_fixed(names: list[str], fixed: set[str]) -> None:
 
 
 def points_of(file: StudyFile) -> list[dict[str, Value]]:
-    """Return what is set at each point; StudyError for axes that are none."""
+    """Return the settings of each point; StudyError for invalid axes."""
     axes: list[list[Value]] = []
     for name, values in file.grid.items():
         if isinstance(values, Range):

@@ -1,4 +1,4 @@
-"""Coder constants for a recorded flight within seconds: what `tenbaud identify` writes beside a model.
+"""Coder constants for a recorded flight within seconds, written by `tenbaud identify` beside a model.
 
 The model is given. A few numbers of a coder that suits it (`families`) are fitted to variants of the
 record (`records`), with a bounded number of flights.

@@ -1,8 +1,8 @@
 """Variants of a recorded flight on which constants are fitted.
 
-A record is one draw of what may happen: constants fitted to it alone suit its shoves and fail with the
-next ones. So it is flown at several sizes, and with shoves added: heavy-tailed noise (Student's t, two
-degrees of freedom) that has passed through the plant of the model.
+A record is one sample of the disturbance: constants fitted to it alone overfit and fail on the next. So
+it is flown at several sizes, and with random pushes: heavy-tailed noise (Student's t, two degrees of
+freedom), filtered by the plant of the model.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Augment:
     seed: int = 1
 
     def __post_init__(self) -> None:
-        """Refuse what makes no record."""
+        """Refuse invalid settings."""
         if not self.scales or min(self.scales) <= 0.0:
             raise StudyError(f"scales are sizes above 0, got {self.scales}")
         if self.shoves < 0.0 or self.phases < 1:
@@ -53,7 +53,7 @@ class Augment:
 
 
 class Variant(NamedTuple):
-    """A record, and what is changed with it."""
+    """A record, and its variants."""
 
     log: FlightLog
     size: float
@@ -114,7 +114,7 @@ def _read(encoders: Sequence[OutputReader], values: Matrix) -> Matrix:
 def _added(
     config: FlightConfig, motion: Matrix, augment: Augment, random: np.random.Generator
 ) -> Iterator[Matrix]:
-    """Yield what is added to the outputs: nothing, and then shoves."""
+    """Yield the additions to the outputs: nothing, and then random pushes."""
     yield np.zeros_like(motion)
     plant = plant_of(config.model, config.timing.tick_s)
     if plant is None or not augment.shoves:

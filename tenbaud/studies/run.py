@@ -71,13 +71,13 @@ def flying_in_pool(tasks: list[ChunkTask], workers: int) -> Iterator[ChunkResult
             continue
         return
     raise StudyError(
-        f"worker processes ended {POOLS_MAX} times without a word (killed, or out of memory?); "
-        f"{len(left)} of {len(tasks)} chunks are missing. Run the same command again to go on"
+        f"worker processes ended {POOLS_MAX} times without a message (killed, or out of memory?); "
+        f"{len(left)} of {len(tasks)} chunks are missing. Run the same command again to continue"
     )
 
 
 def _in_one_pool(left: dict[int, ChunkTask], workers: int) -> Iterator[ChunkResult]:
-    """Fly what is left, in the order of completion; BrokenProcessPool when a process vanished."""
+    """Fly the missing chunks, in the order of completion; BrokenProcessPool when a process died."""
     pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_end_with_parent)
     try:
         waiting = iter(list(left.values()))
@@ -144,7 +144,7 @@ def _look_for_workers(client: Any, seen: float, left: int) -> float:
     if time.monotonic() - seen > WORKERS_AWAITED_S:
         raise StudyError(
             f"the cluster has had no worker for {WORKERS_AWAITED_S:g} s; {left} chunks are missing. "
-            "Run the same command again to go on"
+            "Run the same command again to continue"
         )
     return seen
 
@@ -157,6 +157,6 @@ def _result_of(future: Any, left: int) -> ChunkResult:
     except Exception as error:
         raise StudyError(
             f"the cluster gave a chunk up: {type(error).__name__}: {error}; {left} chunks are missing. "
-            "Run the same command again to go on"
+            "Run the same command again to continue"
         ) from error
     return result

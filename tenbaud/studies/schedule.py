@@ -1,6 +1,6 @@
 """The course of every symbol and every echo of a flight, and when, before anything is computed.
 
-Loss, delay and erasure do not depend on what a symbol says. So the line is flown once on its own, in
+Loss, delay and erasure do not depend on a symbol's value. So the line is flown once on its own, in
 the order of events of the virtual clock (`transmitter.loops.virtual`) and with the receiver's own slot
 clock and schedule, over the lines that a flight would use
 and with their seeds. What comes out are arrays that a compiled flight reads.

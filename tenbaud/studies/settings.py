@@ -25,11 +25,11 @@ from tenbaud.config.schema import KINDS, FlightConfig
 
 
 class StudyError(TenbaudError):
-    """A study that cannot be run; the text names what is wrong and where."""
+    """A study that cannot be run; the text names the error and its place."""
 
 
 class Short(NamedTuple):
-    """A short name: what it stands for, its unit, and what it may be."""
+    """A short name: its fields, its unit, and its allowed values."""
 
     what: str
     unit: str
@@ -123,7 +123,7 @@ def configured(
 
 
 def _put_texts(config: FlightConfig, values: dict[str, Any], texts: dict[str, Any]) -> None:
-    """Add what is swept to the texts of a configuration; StudyError where they say it already."""
+    """Add the swept settings to the texts of a configuration; StudyError if they are set already."""
     for name, value in texts.items():
         text = attrgetter(TEXTS[name])(config)
         item = "q" if name == "density" else name

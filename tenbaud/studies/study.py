@@ -86,7 +86,7 @@ class Study:
 
     @property
     def digest(self) -> str:
-        """Return what stands for all that the results depend on, but the software."""
+        """Return a digest of all that the results depend on, except the software."""
         configs = [config.model_dump(mode="json") for config in self.configs]
         content = json.dumps([configs, self.seeds, self.file.engine, self.file.chunk_flights])
         return blake2b(content.encode(), digest_size=16).hexdigest()
@@ -119,7 +119,7 @@ class Study:
 
 @lru_cache(maxsize=1024)
 def _check_parts(parts: str) -> None:
-    """Build what a flight needs beside the codec, given its sections as JSON; ConfigError."""
+    """Build the other parts of a flight, given its sections as JSON; ConfigError."""
     # What the study names was allowed, or refused, where its configurations were made.
     check_parts(FlightConfig.of_text(parts).allowing_code())
 

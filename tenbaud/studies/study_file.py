@@ -1,4 +1,4 @@
-"""The study as it is written in its file; `study` says what a file means."""
+"""The study as written in its file; `study` interprets it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fitting constants of a coder, and if asked of the model, on flights; judged on others."""
+"""Fitting constants of a coder, optionally of the model, on flights; validated on others."""
 
 from __future__ import annotations
 
@@ -222,7 +222,7 @@ def shown(error: float, units: tuple[str, ...]) -> str:
 
 
 def report(tuned: Tuned) -> Iterator[str]:
-    """Yield lines with the errors of both parts, and what they leave out."""
+    """Yield lines with the errors of both parts, and the excluded flights."""
     for what, part in (
         (f"fit on {tuned.train_what}", "train"),
         (f"validated on {tuned.test_what}", "test"),

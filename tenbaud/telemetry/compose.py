@@ -5,12 +5,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
-from math import isfinite
 from typing import Any
 
 from channel.codec.codec import Vector
 from channel.codec.coders.learning import learned_of
-from channel.codec.signals import Signal
 from channel.protocol.events import EVENT_CHANNEL
 from channel.protocol.recording import RecordChannel
 from receiver.endpoint import ReceiverEndpoint
@@ -18,7 +16,7 @@ from receiver.session import records as receiver
 from tenbaud.build.flight import Agreement
 from tenbaud.build.transmitter_run import TransmitterRun
 from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
-from tenbaud.telemetry.schema import SCHEMA_VERSION
+from tenbaud.telemetry.schema import SCHEMA_VERSION, named_signal
 from tenbaud.telemetry.tap import Tap
 from transmitter.session.records import ESTIMATE_CHANNEL, SAMPLE_CHANNEL, TICK_CHANNEL
 
@@ -61,8 +59,8 @@ class Composer(ABC):
         self._plant = {
             "model": agreement.config.model.kind,
             "picture": plant.picture,
-            "outputs": [_named(one) for one in plant.outputs],
-            "inputs": [_named(one) for one in plant.inputs],
+            "outputs": [named_signal(one) for one in plant.outputs],
+            "inputs": [named_signal(one) for one in plant.inputs],
         }
         self._stride = max(1, round(POINT_PERIOD_S / (agreement.terms.tick_ns / 1e9)))
 
@@ -237,11 +235,6 @@ class ReceiverComposer(Composer):
             "set_points": [None if one is None else one.by_hand for one in steering],
             "steerable": [one is not None for one in steering],
         }
-
-
-def _named(one: Signal) -> dict[str, Any]:
-    low, high = (value if isfinite(value) else None for value in (one.low, one.high))
-    return {"name": one.name, "unit": one.unit, "low": low, "high": high}
 
 
 COUNTED_UP = ("erasures", "desyncs", "rejoins", "digest_checks", "words_missed", "stale_frames")

@@ -82,7 +82,7 @@ class TelemetryEnd:
             )
         self.tap = None if self.endpoint is None else Tap(recorder)
         self.recorder: Recorder = self.tap or recorder
-        """what the end records into: the tap, where there is one"""
+        """the recorder of the end: the tap, if there is one"""
         self.queue = CommandQueue() if steerable else None
         self.steering = _steered(agreement)
         self.pace = options.pace if agreement.clock == "virtual" else None
@@ -153,7 +153,7 @@ class TelemetryEnd:
 def _steered(agreement: Agreement) -> tuple[SteeredReference | None, ...] | None:
     if not (agreement.live and agreement.config.receiver.controller in STEERABLE):
         return None
-    references = build_references(agreement.config, agreement.signals)
+    references = build_references(agreement.config, agreement.signals, agreement.codec.model)
     stops: dict[str, tuple[float, float]] = getattr(agreement.config.model, "stops", {})
     found: list[SteeredReference | None] = []
     for output, one in zip(agreement.signals.outputs, references, strict=True):

@@ -1,4 +1,4 @@
-"""Commands from outside, applied by the loop between two ticks or two messages, and written down.
+"""Commands of viewers, applied by the loop between two ticks or two messages, and recorded.
 
 The recording of a steered flight holds every command as an event, with the sample before which it
 took hold. Which of them were obeyed where:
@@ -25,6 +25,7 @@ from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
 from receiver.controllers.references import SteeredReference
 from receiver.endpoint import ReceiverEndpoint
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
+from tenbaud.sentences.quantities import amount
 from tenbaud.telemetry.schema import Command, Corrupt, Impair, Pace, Pause, SetPoint, Step
 from tenbaud.telemetry.tap import CommandQueue
 
@@ -196,7 +197,8 @@ class LiveReceiver:
         output = outputs[place]
         low, high = max(output.low, steering.stops[0]), min(output.high, steering.stops[1])
         if value is not None and not low <= value <= high:
-            return _ignored(f"{output.name} is within {low:g} and {high:g} {output.unit}")
+            ends = " and ".join(amount(end, output.unit) for end in (low, high))
+            return _ignored(f"{output.words} is within {ends}")
         steering.steer(value)
         if value is None:
             return _by_hand(ByHand.FOLLOW)

@@ -1,4 +1,4 @@
-"""The thread that sends telemetry: at a set rate, never the loop's own, and dropping what is late."""
+"""The thread that sends telemetry at a set rate, separate from the loop; late messages are dropped."""
 
 from __future__ import annotations
 

@@ -21,7 +21,18 @@ NEWS_KEPT = 60
 SILENCE_S = 2.0
 """After this silence of the flight that is shown, another one may take its place."""
 
+TAPE_SHOWS = ("erased", "late_symbol")
+OF_TRANSMITTER = ("desync", "rejoin", "ended")
+"""Events that the receiver reports as well."""
 HEAD_WITHOUT = ("points", "samples", "events")
+
+
+def is_shown(event: dict[str, Any]) -> bool:
+    """Return whether the page lists an event: not what passes by itself or is reported twice."""
+    kind = event["kind"]
+    if kind in TAPE_SHOWS or event.get("state") == "holding":
+        return False
+    return event["role"] == "transmitter" or kind not in OF_TRANSMITTER
 
 
 class News(NamedTuple):
@@ -93,6 +104,8 @@ class Board:
             self._on_receiver(message)
         for event in message["events"]:
             row = {"role": role, **event, "text": events.event_text(event)}
+            if not is_shown(row):
+                continue
             self._events.append(row)
             self._fresh["events"].append(row)
 

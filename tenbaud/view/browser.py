@@ -15,6 +15,9 @@ from tempfile import TemporaryDirectory
 
 LEAD_ON = '<!doctype html><meta http-equiv="refresh" content="0; url={}"><title>tenbaud</title>'
 
+STATIC = Path(__file__).parent / "static"
+"""What a browser gets as it is: the page's instruments, its script and its style."""
+
 
 @contextmanager
 def open_privately() -> Iterator[Callable[[str], None]]:

@@ -2,29 +2,35 @@
 
 from __future__ import annotations
 
-import json
 import math
+import time
 from collections.abc import Callable
 from functools import partial
 from html import escape
-from pathlib import Path
 from typing import Any
 
 from nicegui import ui
 
+from channel.line.impairments import parse_impairments
 from tenbaud.view.board import Board
+from tenbaud.view.browser import STATIC
 from tenbaud.view.feed import Feed
 
-STATIC = Path(__file__).parent / "static"
 REFRESH_S = 0.25
 SET_POINT_STEP_DEG = 5
+REPORT_S = 2.0
+"""A command shows in the telemetry by then."""
 SET_POINT_STEPS = 40
+DEGREE = {"rad": math.radians(1.0), "mrad": 1000.0 * math.radians(1.0), "deg": 1.0, "°": 1.0}
+"""One degree in the units of angles; `static/units.js` has the same."""
 PACES = {0.25: "¼", 1.0: "1", 5.0: "5", 25.0: "25"}
 
 LOOK_ONLY = "This address is view-only: it has no controls."
 
 Send = Callable[..., None]
 Moved = Callable[[float], None]
+Spread = tuple[float, float, float]
+"""least, most and step"""
 
 
 def build_page(board: Board, feed: Feed, *, steers: bool) -> None:
@@ -33,6 +39,8 @@ def build_page(board: Board, feed: Feed, *, steers: bool) -> None:
     ui.add_head_html('<link rel="stylesheet" href="view/view.css">')
     ui.add_body_html((STATIC / "instruments.html").read_text(encoding="utf-8"))
     ui.dark_mode(value=None)
+    # The page has a main landmark of its own.
+    ui.query(".q-page").props('role="none"')
     if steers:
         _add_controls(board, feed)
     else:
@@ -103,47 +111,36 @@ class _Panel:
         self.controls.append(button)
         return button
 
-    def slider(
-        self, name: str, least: float, most: float, step: float, unit: str, moved: Moved
-    ) -> _Slider:
-        return _Slider(name, (least, most, step), unit, moved)
-
 
 class _Slider:
     """The browser's own slider, which every keyboard and screen reader knows how to use.
 
-    It is plain HTML whose value only the visitor and `reset` change: one that the server renders again
-    would jump back during a quick movement. `moved` is called on release, or at each key.
+    It is plain HTML whose value the visitor and the page's script change: one that the server renders
+    again would jump back during a quick movement. The script reads the attributes `data`, of which
+    `output` makes it follow the set-point of that output. `moved` is called on release, or at each key.
     """
 
-    def __init__(self, name: str, spread: tuple[float, float, float], unit: str, moved: Moved) -> None:
+    def __init__(self, name: str, spread: Spread, unit: str, moved: Moved, **data: float) -> None:
         self.value = 0.0
         self._moved = moved
-        self._unit = unit
         least, most, step = spread
         name, unit = escape(name), escape(unit)
+        attributes = " ".join(f'data-{key}="{value}"' for key, value in data.items())
         self._element = ui.html(
-            f'<span>{name}</span><output class="slider-value">0{unit}</output>'
+            f'<span>{name}</span><span class="slider-value" aria-hidden="true">0{unit}</span>'
             f'<input type="range" min="{least}" max="{most}" step="{step}" value="0" '
-            f'aria-label="{name}">',
+            f'aria-label="{name}" aria-valuetext="0{unit}" data-unit="{unit}" {attributes}>',
             sanitize=False,
             tag="label",
         ).classes("slider")
-        show = "event.currentTarget.querySelector('output').textContent"
-        self._element.on(
-            "input",
-            js_handler=f"(event) => {{ {show} = event.target.value + {json.dumps(self._unit)} }}",
-        )
         number = "(event) => emit(Number(event.target.value))"
         self._element.on("change", lambda event: self._take(event.args), js_handler=number)
 
-    def reset(self) -> None:
-        """Put the slider to 0, without a command."""
-        self.value = 0.0
+    def show(self, value: float) -> None:
+        """Show what there is at present, without a command."""
+        self.value = value
         ui.run_javascript(
-            f"const slider = document.getElementById('c{self._element.id}');"
-            f"slider.querySelector('input').value = 0;"
-            f"slider.querySelector('output').textContent = {json.dumps('0' + self._unit)};"
+            f"document.querySelector('#c{self._element.id} input').dataset.present = {value:g};"
         )
 
     def _take(self, value: float) -> None:
@@ -172,10 +169,12 @@ class _SetPoint(_Panel):
             for place, (output, can) in enumerate(zip(outputs, steerable, strict=False)):
                 if not can:
                     continue
-                spread, unit, factor = _spread(output)
+                spread, unit, factor = slider_spread(output)
                 words = str(output["name"]).replace("_", " ")
                 name = "Set-point" if len(outputs) == 1 else f"Set-point of {words}"
-                self.slider(name, *spread, unit, partial(self._moved, place, factor))
+                _Slider(
+                    name, spread, unit, partial(self._moved, place, factor), output=place, factor=factor
+                )
 
     def _moved(self, place: int, factor: float, value: float) -> None:
         self._send(kind="set_point", value=value * factor, output=place)
@@ -187,16 +186,17 @@ class _SetPoint(_Panel):
         self.enable(allowed and any(lower.get("steerable", ())))
 
 
-def _spread(output: dict[str, Any]) -> tuple[tuple[float, float, float], str, float]:
+def slider_spread(output: dict[str, Any]) -> tuple[Spread, str, float]:
     """Return least, most and step of a slider, its unit, and what its value is multiplied by.
 
     Angles are in degrees. Without a range in the plant's description: 90 degrees, or 1.
     """
     low, high, unit = output["low"], output["high"], str(output["unit"])
     known = low is not None and high is not None
-    if unit == "rad":
-        ends = (math.ceil(math.degrees(low)), math.floor(math.degrees(high))) if known else (-90, 90)
-        return (*ends, SET_POINT_STEP_DEG), "°", math.radians(1.0)
+    if unit in DEGREE:
+        degree = DEGREE[unit]
+        ends = (math.ceil(low / degree), math.floor(high / degree)) if known else (-90, 90)
+        return (*ends, SET_POINT_STEP_DEG), "°", degree
     low, high = (low, high) if known else (-1.0, 1.0)
     return (low, high, (high - low) / SET_POINT_STEPS), f" {unit}" if unit else "", 1.0
 
@@ -240,10 +240,11 @@ class _Line(_Panel):
     def __init__(self, send: Send) -> None:
         super().__init__("The line", "Simulated impairments between the two ends.")
         self._send = send
+        self._reported, self._sent, self._sent_s = "", "", -REPORT_S
         with self.box:
-            self.loss = self.slider("Bits lost", 0, 90, 5, " %", self._changed)
-            self.flips = self.slider("Bits flipped", 0, 50, 1, " %", self._changed)
-            self.delay = self.slider("Delay each way", 0, 300, 10, " ms", self._changed)
+            self.loss = _Slider("Bits lost", (0, 90, 5), " %", self._changed)
+            self.flips = _Slider("Bits flipped", (0, 50, 1), " %", self._changed)
+            self.delay = _Slider("Delay each way", (0, 300, 10), " ms", self._changed)
             self.button("Repair the line", self._repair)
 
     def _changed(self, _value: float = 0.0) -> None:
@@ -254,21 +255,35 @@ class _Line(_Panel):
             parts.append(f"up:flip={self.flips.value / 100:g}")
         if self.delay.value:
             parts.append(f"delay={self.delay.value:g}ms")
-        self._send(kind="impair", text=",".join(parts))
+        self._sent, self._sent_s = ",".join(parts), time.monotonic()
+        self._send(kind="impair", text=self._sent)
 
     def _repair(self) -> None:
         for slider in (self.loss, self.flips, self.delay):
-            slider.reset()
+            slider.show(0.0)
         self._changed()
+
+    def refresh(self, allowed: bool, upper: dict[str, Any], lower: dict[str, Any]) -> None:
+        """Show the line as the flight reports it: as it started, or as another visitor made it."""
+        self.enable(allowed)
+        text = upper.get("impairments", "")
+        under_way = text != self._sent and time.monotonic() - self._sent_s < REPORT_S
+        if under_way or text == self._reported:
+            return
+        self._reported = text
+        up = parse_impairments(text).up
+        self.loss.show(round(100.0 * up.loss))
+        self.flips.show(round(100.0 * up.flip))
+        self.delay.show(round(up.delay_ns / 1e6))
 
 
 class _Break(_Panel):
     def __init__(self, send: Send) -> None:
         super().__init__("Break it", "Flip one bit in one end's codec; the next digest detects it.")
         with self.box, ui.element("div").classes("row-of-buttons"):
-            for end, name in (("transmitter", "sensor"), ("receiver", "controller")):
+            for end in ("transmitter", "receiver"):
                 self.button(
-                    f"Corrupt the {name}'s codec",
+                    f"Corrupt the {end}'s codec",
                     lambda end=end: send(kind="corrupt", end=end, field="range"),  # type: ignore[misc]
                 ).classes("danger")
 

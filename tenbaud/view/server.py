@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import Any
 from urllib.request import Request, urlopen
 
@@ -21,7 +22,7 @@ from channel.errors import TenbaudError
 from channel.links.endpoints import is_loopback
 from tenbaud.view.access import COOKIE, Access, draw_access
 from tenbaud.view.board import Board
-from tenbaud.view.browser import open_privately
+from tenbaud.view.browser import STATIC, open_privately
 from tenbaud.view.feed import Feed
 
 STREAM_PERIOD_S = 0.05
@@ -82,28 +83,32 @@ class Address:
 
 
 def require_nicegui() -> None:
-    """Raise PageUnavailable, with what to install, when the page's extra is missing."""
+    """Raise PageUnavailable, with what to install, when the page's extra is missing.
+
+    It only looks: NiceGUI itself takes a second to import, and a replay does without.
+    """
     try:
-        import nicegui  # noqa: F401
-    except ImportError as error:
+        found = find_spec("nicegui") is not None
+    except ValueError:
+        found = False
+    if not found:
         raise PageUnavailable(
-            f"the live page needs the extra `page` ({error}): pip install 'tenbaud[page]'"
-        ) from error
+            "the page needs the extra `page`, which is not installed: pip install 'tenbaud[page]'"
+        )
 
 
 def serve(feed: Feed, address: Address, *, open_browser: bool = False, view_only: bool = False) -> None:
-    """Serve the page until the process is asked to stop. Raises PageUnavailable.
+    """Serve the page of a live flight until the process is asked to stop. Raises PageUnavailable.
 
     `view_only`: no address is printed that lets anybody steer.
     """
     require_nicegui()
     address.check()
-    import uvicorn
     from fastapi import FastAPI
     from nicegui import app, ui
 
-    from tenbaud.view.gate import GRANT, Gate
-    from tenbaud.view.page import STATIC, build_page
+    from tenbaud.view.gate import GRANT
+    from tenbaud.view.page import build_page
 
     board = Board()
     access = draw_access(address.host, address.is_local, view_only=view_only)
@@ -122,9 +127,26 @@ def serve(feed: Feed, address: Address, *, open_browser: bool = False, view_only
         gzip_middleware_factory=None,  # packing half a megabyte takes longer than loopback does
         reconnect_timeout=5.0,
     )
-    # The gate is the outermost: NiceGUI answers nobody whom it has not let in.
+    with feed:
+        run_page(outer, access, address, open_browser=open_browser, on_startup=app.on_startup)
+
+
+def run_page(
+    inner: Any,
+    access: Access,
+    address: Address,
+    *,
+    open_browser: bool,
+    on_startup: Callable[[Callable[[], Any]], None],
+) -> None:
+    """Serve an application behind the gate until the process is asked to stop."""
+    import uvicorn
+
+    from tenbaud.view.gate import Gate
+
+    # The gate is the outermost: nothing answers anybody whom it has not let in.
     config = uvicorn.Config(
-        Gate(outer, access),
+        Gate(inner, access),
         host=address.host,
         port=address.port,
         ws="wsproto",
@@ -135,9 +157,8 @@ def serve(feed: Feed, address: Address, *, open_browser: bool = False, view_only
         timeout_graceful_shutdown=1,  # an open page would otherwise hold the server up
     )
     with ExitStack() as stack:
-        stack.enter_context(feed)
         shown = stack.enter_context(open_privately()) if open_browser else None
-        app.on_startup(lambda: _first_look(address.url, access, shown))
+        on_startup(lambda: _first_look(address.url, access, shown))
         uvicorn.Server(config).run()
 
 

@@ -28,6 +28,7 @@ LEFT_OUT_AT_TOP = {"runs", "site", "dist", "build"}
 """Left out of the top folder only: `tenbaud/build` is a package."""
 COMMANDS = {"tenbaud": "-m tenbaud", "python": "", "python3": "", "pytest": "-m pytest"}
 COMMANDS |= {name: f"-m {name}" for name in ("ruff", "mypy", "mkdocs")}
+COPIES = {"tenbaud": "-m tests.warm"}
 LOOPBACK_PORT = re.compile(r"(?<=127\.0\.0\.1:)(\d+)\b|(?<=localhost:)(\d+)\b")
 VIEW_PORT = 8710
 BLOCK_TIMEOUT_S = 150.0
@@ -48,6 +49,8 @@ class Sandbox:
 
     folder: Path
     timeout_s: float = BLOCK_TIMEOUT_S
+    copies: bool = False
+    """whether what `tenbaud demo` starts may begin with everything imported (`tests/warm.py`)"""
     ports: dict[str, str] = field(default_factory=dict)
     _settled: bool = True
     _background: list[tuple[Block, subprocess.Popen[str], Path]] = field(default_factory=list)
@@ -64,7 +67,7 @@ class Sandbox:
             path.write_text(text.replace(f" = {VIEW_PORT}", " = 0"))
         programs = self.top / ".venv" / "bin"
         programs.mkdir(parents=True)
-        for name, how in COMMANDS.items():
+        for name, how in (COMMANDS | (COPIES if self.copies else {})).items():
             program = programs / name
             program.write_text(f'#!/bin/sh\nexec "{sys.executable}" {how} "$@"\n')
             program.chmod(0o755)

@@ -33,7 +33,7 @@ NOT_RUN = [block for blocks in RUN.values() for block in blocks if block.skip]
 
 
 def type_in(blocks: list[Block], folder: Path, timeout_s: float) -> None:
-    with Sandbox(folder, timeout_s) as sandbox:
+    with Sandbox(folder, timeout_s, copies=True) as sandbox:
         for block in blocks:
             sandbox.run(block)
         sandbox.end()

@@ -20,7 +20,7 @@ from channel.line.virtual import decode_reply, decode_step
 from channel.links.serial.cobs import cobs_decode
 from channel.links.serial.wire import SerialWire, unstuff
 from channel.protocol import wire
-from channel.protocol.frames import Why
+from channel.protocol.frames import ShortCommands, Why
 from tests.rules.sources import TOP
 
 PAGE = (TOP / "docs/reference/wire-format.md").read_text(encoding="utf-8")
@@ -224,3 +224,16 @@ def test_when_the_envelopes_are_decoded_then_they_say_what_the_text_says() -> No
     step, reply = decode_step(bytes.fromhex(match[1])), decode_reply(bytes.fromhex(match[2]))
     assert (step.number, step.time_ns, step.data) == (5, 700_000_000, b"\x01")
     assert (reply.number, reply.deadline_ns, reply.frames) == (5, 820_000_000, (b"\x01\x02",))
+
+
+def test_when_the_compact_frames_bits_are_put_together_then_they_are_its_bytes() -> None:
+    page = PAGE.split("### Compact commands", 1)[1].split("\n## ", 1)[0]
+    shown_bytes = re.search(r"^`([0-9a-f ]+)`$", page, re.MULTILINE)
+    assert shown_bytes is not None
+    message = bytes.fromhex(shown_bytes[1])
+    table = re.findall(r"^\| `([01]+)` \| ([\w ]+) \| (\d+) \|", page, re.MULTILINE)
+    assert (
+        int("".join(bits for bits, _, _ in table), 2).to_bytes(len(message) - 2, "big") == message[:-2]
+    )
+    assert [int(bits, 2) for bits, _, _ in table] == [int(value) for _, _, value in table]
+    assert wire.decode(message) == ShortCommands(message[:-2])

@@ -6,12 +6,12 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from tests.rules.test_tidy import MACHINE_PATH
 from tests.tenbaud.processes import REPOSITORY
 
 EXAMPLES = REPOSITORY / "examples"
@@ -76,51 +76,67 @@ def test_a_mujoco_model_is_held_upright(tmp_path: Path) -> None:
     assert told.endswith("desyncs: 0\n")
 
 
-@pytest.fixture
-def run_notebook(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[Any], list[Any]]:
-    """Run a notebook in a folder of its own and return its outputs."""
-    nbclient = pytest.importorskip("nbclient")
-    pytest.importorskip("ipykernel")
-    path = os.pathsep.join([str(REPOSITORY), os.environ.get("PYTHONPATH", "")])
-    monkeypatch.setenv("PYTHONPATH", path)
-    resources = {"metadata": {"path": str(tmp_path)}}
-
-    def run(notebook: Any) -> list[Any]:
-        settings = {"timeout": 90, "kernel_name": "python3", "resources": resources}
-        nbclient.NotebookClient(notebook, **settings).execute()
-        return [output for cell in notebook.cells for output in cell.get("outputs", [])]
-
-    return run
+def test_a_pendulum_stays_up_over_fewer_and_fewer_bits_until_it_falls(tmp_path: Path) -> None:
+    text = run_script(EXAMPLES / "pendulum.py", tmp_path)
+    assert text.startswith("No code of 10.49 bit/s or less can hold this pendulum.")
+    outcomes = re.findall(r"^ *(\d+\.\d) bit/s +(stays up|falls|refused)", text, re.MULTILINE)
+    assert outcomes == [
+        *((rate, "stays up") for rate in ("20.0", "15.8", "12.7")),
+        ("11.0", "falls"),
+        ("10.0", "refused"),
+    ]
+    errors = numbers_in(text, r"estimate error (\d+\.\d+) deg")
+    assert errors == sorted(errors)
+    assert (tmp_path / "pendulum.png").stat().st_size > 10_000
 
 
-def texts_of(outputs: list[Any]) -> str:
-    return "".join(output["text"] for output in outputs if output.get("name") == "stdout")
+SAID = {
+    "any_plant": ("600 equal digests of 600 samples",),
+    "first_flight": ("Flight finished: 60 s", "rise time, 10-90 %", "codecs differ after sample 200"),
+    "read_a_run": ("of the largest pitch, rms, on 600 bits", "True"),
+}
+PICTURES = {"any_plant": 3, "first_flight": 3, "read_a_run": 2}
+FIGURE = r"(?:error|floor|end) (\d\.\d+)"
 
 
-def test_the_notebook_runs_from_top_to_bottom(run_notebook: Callable[[Any], list[Any]]) -> None:
-    nbformat = pytest.importorskip("nbformat")
-    notebook = nbformat.read(EXAMPLES / "read_a_run.ipynb", as_version=4)
-    assert not any(cell.get("outputs") for cell in notebook.cells), "clear the outputs first"
-    outputs = run_notebook(notebook)
-    text = texts_of(outputs)
-    assert "of the largest pitch, rms, on 600 bits" in text
-    assert "True" in text
-    assert any("image/png" in output.get("data", {}) for output in outputs)
+def test_every_notebook_is_run() -> None:
+    assert {path.stem for path in EXAMPLES.glob("*.ipynb")} == set(SAID)
 
 
-def test_any_plant_flies_in_the_notebook_with_the_figures_that_it_shows(
-    run_notebook: Callable[[Any], list[Any]],
+@pytest.mark.parametrize("name", sorted(SAID))
+def test_a_notebook_runs_and_its_stored_outputs_are_those_of_a_run(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     nbformat = pytest.importorskip("nbformat")
-    notebook = nbformat.read(EXAMPLES / "any_plant.ipynb", as_version=4)
-    kept = [output for cell in notebook.cells for output in cell.get("outputs", [])]
-    outputs = run_notebook(notebook)
-    for shown in (kept, outputs):
-        assert "600 equal digests of 600 samples" in texts_of(shown)
-        assert sum("image/png" in output.get("data", {}) for output in shown) == 3
-        assert not any(output.get("name") == "stderr" for output in shown)
-    pattern = r"(?:error|floor|end) (\d\.\d+)"
-    figures, before = (numbers_in(texts_of(one), pattern) for one in (outputs, kept))
-    assert len(figures) == 5
-    assert figures == pytest.approx(before, rel=0.05), "run the notebook again, and keep its outputs"
-    assert figures[0] < 2.0 * figures[1]
+    pytest.importorskip("ipykernel")
+    from docs.tools.notebooks import executed, outputs_of
+
+    monkeypatch.setenv("PYTHONPATH", os.environ.get("PYTHONPATH", ""))
+    path = EXAMPLES / f"{name}.ipynb"
+    stored = nbformat.read(path, as_version=4)
+    again = executed(path, tmp_path)
+    for notebook in (stored, again):
+        outputs = outputs_of(notebook)
+        assert not any(one.get("name") == "stderr" for one in outputs)
+        text, pictures = texts_of(outputs)
+        for said in SAID[name]:
+            assert said in text
+        assert pictures == PICTURES[name]
+    text, _ = texts_of(outputs_of(stored))
+    assert not MACHINE_PATH.search(text)
+    assert "/tmp/" not in text
+    assert not re.search(r"0x[0-9a-f]{8}", text)
+    figures = [numbers_in(texts_of(outputs_of(one))[0], FIGURE) for one in (stored, again)]
+    assert figures[1] == pytest.approx(figures[0], rel=0.05), "run docs/tools/notebooks.py again"
+
+
+def texts_of(outputs: list[Any]) -> tuple[str, int]:
+    """Return what outputs say, and how many pictures are among them."""
+    texts, pictures = [], 0
+    for output in outputs:
+        data = output.get("data", {})
+        html = data.get("text/html", "")
+        pictures += html.count("data:image/png") + ("image/png" in data)
+        plain = re.sub(r'base64,[^"]+', "", html) or data.get("text/plain", "")
+        texts.append(output.get("text", plain))
+    return "\n".join(texts), pictures

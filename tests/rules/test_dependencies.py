@@ -19,6 +19,7 @@ NOT_FOR_USERS = ("dev", "docs")
 """Extras of the developers; nothing in the wheel may need them."""
 
 UNDECLARED = {
+    "IPython": "a notebook has it, and it is imported there alone",
     "quanser": "the maker's own package comes with its driver and is in no index",
 }
 """Imported where a person has them, never installed by us."""

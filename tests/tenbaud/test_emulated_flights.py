@@ -18,6 +18,7 @@ from tenbaud.flight.summary import transmitter_part
 from tenbaud.recording.reader import MessageStream
 from tests.tenbaud.confirmed import check_flown, need_idle
 from tests.tenbaud.emulated_flight import PATIENT, RigProcess, demo, fly_emulated
+from tests.tenbaud.ends import wait_for
 
 SECONDS = 5.0
 SOAK_SECONDS = 60.0
@@ -97,6 +98,7 @@ def test_an_unplugged_rig_ends_the_flight_and_flies_again_when_it_is_back(tmp_pa
         stale = ("--set", "transmitter.bridge.stale_s=0.5")
         arguments = ("--clock", "real", "--rig", f"cobs:{link}", *PATIENT, *stale)
         first = demo(*arguments, seconds=6.0, out=tmp_path / "first")
+        wait_for(link.exists, lambda: "it was not plugged in again")
         second = demo(*arguments, seconds=1.0, out=tmp_path / "second")
     finally:
         device = rig.end()

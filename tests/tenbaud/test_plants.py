@@ -56,7 +56,7 @@ MORE = {
         10.0, 3.0, {"travel": 0.02, "elevation": 0.02, "pitch": 0.03}, HELICOPTER, 3
     ),
     "helicopter-usual": Flown(
-        4.0, 3.0, {"travel": 0.005, "elevation": 0.01, "pitch": 0.02}, HELICOPTER, 12
+        4.0, 1.0, {"travel": 0.005, "elevation": 0.01, "pitch": 0.02}, HELICOPTER, 12
     ),
     "pendulum-16baud": Flown(10.0, 3.0, {"angle": 0.01}, {"angle": 0.3}),
     "pendulum-20baud": Flown(10.0, 3.0, {"angle": 0.006}, {"angle": 0.2}),

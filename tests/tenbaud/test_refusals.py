@@ -18,6 +18,7 @@ from tests.tenbaud.processes import run
         ("demo --pace 2 --clock real", "--pace slows the virtual clock"),
         ("demo --pace 2 --link memory", "--pace slows the virtual clock"),
         ("demo --duration 3 --sabotage sample=30,field=range", "the flight has only 30 samples"),
+        ("transmit --duration 3 --sabotage sample=30,field=range", "the flight has only 30 samples"),
         ("tune --mismatch 0.1 --out found.toml", "nothing is random in these flights"),
         ("tune --impair delay=30ms,cut=40s+3s --out found.toml", "nothing is random in these flights"),
         ("tune --disturbance q=0,step=0.5@3 --out found.toml", "nothing is random in these flights"),

@@ -138,6 +138,23 @@ def test_when_it_flies_at_ten_baud_then_ten_bytes_a_second_go_up_and_ten_baud_ar
     assert flown.receiver.session.meter.baud == pytest.approx(10.0, abs=0.1)
 
 
+def test_when_the_line_has_2400_baud_then_the_compact_downlink_flies_over_it(tmp_path: Path) -> None:
+    with EmulatedLine(tmp_path, 2400) as line:
+        flown = fly(line, {**settings(line_rate_baud=2400), "channel": {"downlink": "compact"}})
+        carried = line.carried("down")
+    assert flown.outcome.code is ExitCode.OK, flown.outcome.text
+    flown.assert_nothing_silent()
+    downlink = flown.receiver.downlink
+    samples = flown.receiver.session.counts["samples"]
+    assert downlink.command_bytes == 16 * samples >= 16 * 50
+    # 19 bytes of each frame on the line; beside them the welcome.
+    assert downlink.wire_bytes - 19 * samples < 200
+    assert carried >= 19 * 50
+    assert "line busy" not in flown.dropped
+    if not flown.transmitter.node.session.counts["words_missed"]:
+        assert flown.transmitter.node.commands_late == 0
+
+
 def test_when_the_line_damages_bytes_then_no_divergence_is_silent(tmp_path: Path) -> None:
     # Up, one byte in five; down, as much as frames of this size stand for some seconds.
     with NoisyLine(tmp_path, 460_800, seed=6) as line:

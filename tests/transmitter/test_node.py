@@ -124,7 +124,7 @@ def test_when_the_session_ends_then_the_voltage_is_taken_down_with_its_reason() 
     ("rig", "text"),
     [
         (ScriptedRig(faulty_tick=25), "tick 25: the cable is off"),
-        (ScriptedRig(angle_rad=1.5), "axis 0, rad: 1.500 at tick 0"),
+        (ScriptedRig(angle_rad=1.5), "axis 0: 85.9 deg at tick 0"),
     ],
     ids=["fault", "soft limit"],
 )

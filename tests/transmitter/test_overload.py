@@ -103,7 +103,7 @@ def test_when_an_end_is_too_slow_then_it_is_reported_and_the_flight_goes_on(
     session = flight.endpoint.node.session
     told = [event_text(event_fields(event)) for event in session.events if event.kind is EventKind.RATE]
     assert told
-    assert "1000 symbols/s are asked for" in told[0]
+    assert "1000 symbols/s are configured" in told[0]
     assert flight.endpoint.rate.kept_symbols_per_s is not None
     assert flight.endpoint.rate.kept_symbols_per_s < 950.0
     assert session.counts["desyncs"] == 0

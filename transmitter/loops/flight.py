@@ -1,6 +1,6 @@
 """The course of a flight, the same on either clock: greet, fly tick by tick, finish.
 
-What differs is how time passes (`transmitter.loops.real`, `transmitter.loops.virtual`).
+Only the passing of time differs (`transmitter.loops.real`, `transmitter.loops.virtual`).
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class Flight(ABC):
 
     @abstractmethod
     def _rest(self) -> None:
-        """Do what can wait until a tick is over."""
+        """Do the work that can wait until a tick is over."""
 
     @abstractmethod
     def _land(self) -> None:
@@ -81,15 +81,15 @@ class Flight(ABC):
 
     @abstractmethod
     def _await_answer(self) -> None:
-        """Take in what comes until it is time to ask again."""
+        """Take in messages until it is time to ask again."""
 
     @abstractmethod
     def _wait_until(self, due_ns: int) -> None:
-        """Take in what comes until a tick is due."""
+        """Take in messages until a tick is due."""
 
     @abstractmethod
     def _linger(self) -> None:
-        """Take in what comes until no echo can come any more."""
+        """Take in messages until no echo can come any more."""
 
     @abstractmethod
     def _send(self, messages: list[Delivery]) -> None:

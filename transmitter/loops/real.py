@@ -128,7 +128,7 @@ class RealFlight(Flight):
                 break
             ramp_down.step(now_ns)
             self._take_in((min(until_ns, ramp_down.next_ns) - self._now_ns()) / 1e9)
-        # What the last echo was answered with: the report of a difference.
+        # The answer to the last echo: the report of a difference.
         self._send_due()
 
     def _land(self) -> None:
@@ -154,7 +154,7 @@ class RealFlight(Flight):
                 time.sleep(max(0.0, wake_ns - self._now_ns()) / 1e9)
 
     def _catch_up(self) -> None:
-        """Take in what has come, within bounds: a flood of messages must not stop the ticks."""
+        """Take in arrived messages, within bounds: a flood of messages must not stop the ticks."""
         for _ in range(CATCH_UP_MESSAGES_MAX):
             if not self._take_in(0.0):
                 return

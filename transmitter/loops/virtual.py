@@ -1,4 +1,4 @@
-"""The sensor node on the virtual clock: as fast as the messages go, and the same every time.
+"""The sensor node on the virtual clock: as fast as the messages, and reproducible.
 
 Every message has an arrival in virtual time; they wait in one queue, uplink and downlink together,
 and are taken out in order of time. At its arrival an uplink message is given to the peer as one step,

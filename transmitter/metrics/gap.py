@@ -1,4 +1,4 @@
-"""How near the flight is to the best that any code could do with its bits: the gap gauge.
+"""The ratio of a flight's error to the theoretical minimum at its rate: the gap gauge.
 
 The floor under the error depends on how hard the plant is pushed about. Nobody measures that torque,
 so it is estimated while flying, from what the transmitter has anyway: the encoder, and the codec's
@@ -142,7 +142,7 @@ class StrengthMeter:
         return (mean - self._encoder) * self._per_square
 
     def _carry_on(self, done: Confirmed, angle_rad: float) -> None:
-        """Sum up, as motion, what was added to the codec's state and not to the plant's."""
+        """Sum up, as motion, the corrections of the codec's state."""
         codec, before, period = self._codec, done.before, self._sample_s
         (jump, kick, *_), _ = codec.coder.decode(before.coder, before.model, done.word)
         self._position += self._rate * period
@@ -174,7 +174,7 @@ class GapGauge:
         self._measured: deque[tuple[int, Vector]] = deque(maxlen=MEASURED_MAX)
 
     def on_outputs(self, tick: int, measured: Vector) -> None:
-        """Take what the encoders show at a tick."""
+        """Take the encoders' readings of a tick."""
         sample, within = divmod(tick, self._ticks_per_sample)
         if within == 0:
             self._measured.append((sample, measured))

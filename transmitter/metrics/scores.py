@@ -1,4 +1,4 @@
-"""How well the far end knew the plant: errors kept as running figures, never as lists.
+"""Errors of the receiver's estimate, kept as running figures, never as lists.
 
 Two errors are kept for every tick of the window. *Coded* is the codec's own error at that tick, as in
 the paper; *live* is the error of the receiver's predicted estimate when it had to decide the
@@ -117,7 +117,7 @@ class Scores:
         self._join()
 
     def on_estimate(self, tick: int, coded: Vector, live: Vector | None) -> None:
-        """Note what was estimated of a tick; ticks come in order."""
+        """Take the estimate of a tick; ticks come in order."""
         measured = self._model.measured
         self._estimates.append((tick, measured(coded), None if live is None else measured(live)))
         self._join()

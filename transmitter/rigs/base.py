@@ -29,7 +29,7 @@ class DeviceNote:
 
 
 class Reading(NamedTuple):
-    """One look at the rig. There is one for every tick, so it is a plain tuple."""
+    """One reading of the rig. There is one for every tick, so it is a plain tuple."""
 
     counts: tuple[int, ...]
     """of the encoders, unwrapped"""
@@ -48,14 +48,14 @@ class Reading(NamedTuple):
 class Rig(ABC):
     """A plant with encoders and motors. `read` and `write` alternate, one pair per tick.
 
-    What is not abstract here is what a rig without a device does.
+    The methods that are not abstract are those of a rig without a device.
     """
 
     name = ""
     is_real = False
     """a body that moves in real time: it cannot be flown on the virtual clock"""
     is_recorded = False
-    """a flight that is over: nothing on it is to be protected"""
+    """a recorded flight: it needs no protection"""
     ramps_down = False
     """after a flight the voltages are taken down along the guard's ramp, not dropped"""
 
@@ -74,11 +74,11 @@ class Rig(ABC):
         """Put the safe voltage on the motors at once."""
 
     def close(self) -> None:
-        """Leave the rig at its safe voltage and give it back."""
+        """Leave the rig at its safe voltage and close it."""
         self.safe_stop()
 
     def figures(self) -> dict[str, object]:
-        """Return what the rig counted, for the summary; empty where there is nothing to count."""
+        """Return the rig's counts, for the summary; empty if there are none."""
         return {}
 
     def __enter__(self) -> Self:

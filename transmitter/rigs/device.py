@@ -48,7 +48,7 @@ class DeviceSettings:
 
 @dataclass(frozen=True, slots=True)
 class Wiring:
-    """What hangs on a device, and within which limits it is used."""
+    """The axes and motors of a device, and the limits of their use."""
 
     axes: tuple[Axis, ...]
     """all encoders"""
@@ -85,7 +85,7 @@ class DeviceRig(Rig):
         self._problem = ""
         """why the reader has no device at present"""
 
-    # What a kind of device has to do
+    # The methods of a kind of device
 
     @abstractmethod
     def _connect(self) -> None:
@@ -119,7 +119,7 @@ class DeviceRig(Rig):
             raise
 
     def read(self, tick: int) -> Reading:
-        """Return the newest sample, with what is wrong with it."""
+        """Return the newest sample, with its faults."""
         with self._arrived:
             sample, unread, self._unread = self.latest, self._unread, 0
         if sample is None:
@@ -148,7 +148,7 @@ class DeviceRig(Rig):
         if not self.settings.output:
             return
         if not all(math.isfinite(value) for value in volts):
-            self._fail(f"the voltages of tick {tick} are no numbers: {volts}")
+            self._fail(f"the voltages of tick {tick} are not numbers: {volts}")
         if self.hard_fault is not None:
             self._send(self.motors.off(), False)
             return
@@ -198,6 +198,15 @@ class DeviceRig(Rig):
                 return None
             self._unread = 0
             return self.latest
+
+    def declares_emulation(self, timeout_s: float) -> bool:
+        """Return whether the device says within this time that it is the rig emulator."""
+        until = time.monotonic() + timeout_s
+        while self.latest is None or DeviceFlag.EMULATED not in self.latest.flags:
+            if (left_s := until - time.monotonic()) <= 0.0:
+                return False
+            self.wait_for_sample(left_s)
+        return True
 
     # The reader's side
 
@@ -295,7 +304,7 @@ class DeviceRig(Rig):
 
 
 def _flag_fault(flags: DeviceFlag) -> str | None:
-    """Return what a device's flags complain about, None for nothing."""
+    """Return the fault that a device's flags report, None without."""
     if flags & DeviceFlag.ESTOP_OPEN:
         return "the emergency stop is open"
     if flags & DeviceFlag.ENCODER_ERROR:

@@ -143,7 +143,7 @@ class HilRig(DeviceRig):
             self._problem = f"(the board has no watchdog: {error})"
 
     def _output(self) -> None:
-        """Write what the flight wants, while that is fresh; called once per timed sample."""
+        """Write the flight's command while it is fresh; called once per timed sample."""
         outputs, enable = self._wanted, self._wanted_enable
         age_s = (time.monotonic_ns() - self._wanted_ns) / 1e9
         if enable and age_s > self._hil.watchdog_s:

@@ -1,4 +1,4 @@
-"""A QUARC model as the rig, over plain TCP: what its Stream blocks send is raw doubles.
+"""A QUARC model as the rig, over plain TCP: its Stream blocks send raw doubles.
 
 The model may be the server or the client. A unit is `N` doubles and nothing else, so the bytes are
 put together to exactly that; of several units that came at once the newest counts and the others are
@@ -175,5 +175,5 @@ class QuarcBridge(DeviceRig):
 
 
 def scale_of(unit: str, counts_per_turn: int) -> float:
-    """Return what one count is in "counts", "rad" or "deg"."""
+    """Return the size of one count in "counts", "rad" or "deg"."""
     return {"counts": 1.0, "rad": math.tau / counts_per_turn, "deg": 360.0 / counts_per_turn}[unit]

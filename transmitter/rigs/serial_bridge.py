@@ -1,6 +1,6 @@
 """A rig behind a serial port: a microcontroller, or a US Digital adapter.
 
-Whatever `serial_for_url` opens will do: `/dev/ttyACM0`, `COM3`, `socket://host:port`, `rfc2217://...`.
+Any port of `serial_for_url`: `/dev/ttyACM0`, `COM3`, `socket://host:port`, `rfc2217://...`.
 A port that disappears is opened again as soon as it is back.
 """
 

@@ -24,7 +24,7 @@ class SimulatedRig(Rig):
         safe_command: Vector,
         outputs: Sequence[str] = (),
     ) -> None:
-        """`outputs` are their names, for what is said of them."""
+        """`outputs` are their names, for messages."""
         self._plant = plant
         self._names = outputs
         self._encoders = encoders
@@ -78,7 +78,7 @@ class DryRig(Rig):
         self._rig.open()
 
     def read(self, tick: int) -> Reading | None:
-        """Return its reading; what turned the body was not us."""
+        """Return its reading; the recorded commands moved the body."""
         reading = self._rig.read(tick)
         if reading is None or reading.applied_volts is not None:
             return reading
@@ -95,7 +95,7 @@ class DryRig(Rig):
 
 
 class ReplayRig(Rig):
-    """Reads one row per tick; what is written to it changes nothing."""
+    """Reads one row per tick; commands have no effect."""
 
     name = "replay"
     is_recorded = True

@@ -1,13 +1,14 @@
 """The transmitter's two copies of the codec, and the order in which echoes reach them.
 
-The *confirmed* copy advances on echoes only: what the receiver consumed, not what was sent. It alone
-is digested. While echoes are on their way the next symbol is formed on the *provisional* copy: the
-confirmed one carried on with the words sent and the commands known, a missing one taken to be like
-the last. A wrong guess there costs one poor bit and never lockstep, because the next echo replaces it.
+The *confirmed* copy advances on echoes only: the words that the receiver consumed, not those sent.
+Only its state is digested. While echoes are on their way the next symbol is formed on the
+*provisional* copy: the confirmed one advanced with the words sent and the commands known, a missing
+one assumed equal to the last. A wrong assumption costs one poor bit and never lockstep, because the
+next echo replaces it.
 
-Every command frame repeats the echoes of earlier samples, so a lost frame is made good by the next
-ones. On a line that delays frames unevenly a later frame may overtake an earlier one by more than it
-repeats: its echoes wait in `EchoOrder` until the earlier frame has come, or can no longer come.
+Every command frame repeats the echoes of earlier samples, so the next frames replace a lost one. On a
+line with variable delay a later frame may overtake an earlier one by more than it repeats: its echoes
+wait in `EchoOrder` until the earlier frame has come, or can no longer come.
 """
 
 from __future__ import annotations
@@ -43,10 +44,12 @@ class Confirmed(NamedTuple):
     """of our copy after the sample"""
     peer_digest: int
     """of the receiver's"""
+    peer_mask: int
+    """which of its bits the receiver sent; the others are taken from ours"""
     lag_samples: int
     """samples that had been sent beyond this one when its echo came"""
     about: tuple[int, ...] | None = None
-    """the output that each symbol was about, once `Copies.explained` has said so"""
+    """the output that each symbol codes, set by `Copies.explained`"""
 
 
 def commands_of(echo: Echo, terms: Terms) -> list[Vector]:
@@ -94,7 +97,7 @@ class Copies:
         return len(self._sent)
 
     def state_before_next(self) -> CodecState:
-        """Return the best guess at the codec state before `next_sample`."""
+        """Return the provisional codec state before `next_sample`."""
         while self._provisional.sample < self.next_sample:
             sample = self._provisional.sample
             word = self._sent[sample - self.confirmed.sample]
@@ -112,10 +115,13 @@ class Copies:
         self._sent.extend([ERASED] * missed)
         return missed
 
-    def confirm(self, word: Word, commands: list[Vector], peer_digest: int) -> Confirmed:
+    def confirm(
+        self, word: Word, commands: list[Vector], peer_digest: int, peer_mask: int = 2**64 - 1
+    ) -> Confirmed:
         """Advance the confirmed copy by the echo of its next sample.
 
-        `commands` are those of ticks `kN + D ... (k+1)N + D - 1`.
+        `commands` are those of ticks `kN + D ... (k+1)N + D - 1`; of the receiver's digest the bits of
+        `peer_mask` are known.
         """
         before = self.confirmed
         arriving = iter(commands)
@@ -133,14 +139,15 @@ class Copies:
         self.confirmed = flown.state
         self._keep_provisional(word, taken)
         digest = self.codec.digest(flown.state)
-        return Confirmed(before.sample, before, sent, word, flown, live, digest, peer_digest, lag)
+        peer = digest & ~peer_mask | peer_digest
+        return Confirmed(before.sample, before, sent, word, flown, live, digest, peer, peer_mask, lag)
 
     def explained(self, done: Confirmed) -> Confirmed:
-        """Return a confirmed sample with what its symbols were about, on which no state depends."""
+        """Return a confirmed sample with the outputs of its symbols; no state depends on them."""
         return done._replace(about=self.codec.about(done.before, done.word, done.flown.coded[0]))
 
     def _keep_provisional(self, word: Word, taken: list[Vector]) -> None:
-        """Start the provisional copy anew unless all that it assumed still stands."""
+        """Restart the provisional copy unless all its assumptions were correct."""
         if self._assumed and self._assumed.popleft() == (word, taken):
             first = self.confirmed.sample
             if all(
@@ -181,14 +188,15 @@ class EchoOrder:
     def add(self, echoes: Sequence[Echo], expected: int, tick: int, sample: int) -> None:
         """Take the echoes of a frame; `expected` is the sample whose echo is next.
 
-        `sample` is the one that the clock stands in: no later one waits here for its turn, or a forged
-        echo would lie in wait for long.
+        `sample` is the one that the clock stands in: no later one is kept, or a forged
+        echo would wait here for long.
         """
         latest = expected + self._ahead_samples
         if echoes[0].sample > expected:
             latest = min(latest, sample)
         for echo in echoes:
-            if expected <= echo.sample <= latest:
+            repeated = not echo.digest_mask and echo.sample in self._early
+            if expected <= echo.sample <= latest and not repeated:
                 self._early[echo.sample] = echo
         if echoes[0].sample > expected and self._missing != expected:
             self._missing, self._until_tick = expected, tick + self._overtaking_ticks

@@ -1,4 +1,4 @@
-"""From which tick on a command is owed: where the watchdog begins to count in an epoch.
+"""The tick from which commands are due: where the watchdog begins to count in an epoch.
 
 A new epoch begins a command lead ahead, and its first command is decided for a lead after that. Until
 then none can come, however healthy the line is: a watchdog that counted these ticks would trip in every

@@ -40,7 +40,7 @@ class RateWatch:
         self._slow = 0
 
     def look(self, tick: int, session: TransmitterSession) -> Event | None:
-        """Take one tick that was flown; return what is to be reported, if something is."""
+        """Take one flown tick; return the event to report, if any."""
         if self._from_tick is None:
             self._begin(tick, session)
         self._looks += 1
@@ -78,4 +78,4 @@ class RateWatch:
 
 def _received(session: TransmitterSession) -> int:
     """Return how many samples the receiver says it has received whole."""
-    return session.counts["digest_checks"] - session.counts["erasures"]
+    return session.counts["confirmed"] - session.counts["erasures"]

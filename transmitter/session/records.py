@@ -53,7 +53,12 @@ SAMPLE_CHANNEL = RecordChannel(
         Field("state", "numbers", "", "codec's model state after the sample"),
         Field("coder", "numbers", "", "coder state after the sample"),
         Field("digest", "string", "", "64-bit digest of the codec state after the sample"),
-        Field("peer_digest", "string", "", "the receiver's digest of the same sample"),
+        Field(
+            "peer_digest",
+            "string",
+            "",
+            "the receiver's digest of it: the last digits that were sent",
+        ),
         Field("lag_samples", "integer", "", "samples sent beyond it when its echo came", timing=True),
         Field("about", "integers", "", "output that each symbol was about, from 0; null: erased"),
     ),
@@ -61,9 +66,11 @@ SAMPLE_CHANNEL = RecordChannel(
 
 
 def write_sample(recorder: Recorder, terms: Terms, codec: Codec, done: Confirmed) -> None:
-    """Write down a confirmed sample, and what was estimated at each of its ticks."""
+    """Record a confirmed sample, and the estimates of its ticks."""
     first_tick = done.sample * terms.ticks_per_sample
     state = done.flown.state
+    # The low ones, up to the first that did not come.
+    known_bits = (done.peer_mask ^ (done.peer_mask + 1)).bit_length() - 1
     row = (
         done.sample,
         done.word_sent,
@@ -72,7 +79,7 @@ def write_sample(recorder: Recorder, terms: Terms, codec: Codec, done: Confirmed
         state.model,
         state.coder,
         f"{done.digest:016x}",
-        f"{done.peer_digest:016x}",
+        f"{done.peer_digest:016x}"[16 - known_bits // 4 :],
         done.lag_samples,
         done.about,
     )

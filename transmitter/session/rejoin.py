@@ -1,4 +1,4 @@
-"""How the transmitter asks for a session: at the start, and again whenever lockstep is gone.
+"""The transmitter's requests for a session: at the start, and after each loss of lockstep.
 
 A request has a number and is repeated every sample period, or every 10 ms if that is longer, until an
 answer with this number comes: both the request and its answer may be lost, late or doubled. Nothing of

@@ -15,6 +15,7 @@ from enum import Enum
 
 from channel.codec.codec import ERASED, Codec, Vector
 from channel.protocol.bounds import Bounds, shown, within_text_bounds
+from channel.protocol.compact import CompactForm
 from channel.protocol.endings import End, Ending
 from channel.protocol.events import ASKED, Event, EventKind, ended_event, write_event
 from channel.protocol.frames import (
@@ -27,6 +28,7 @@ from channel.protocol.frames import (
     Frame,
     Hello,
     Refuse,
+    ShortCommands,
     Symbol,
     Unknown,
     Welcome,
@@ -38,6 +40,7 @@ from channel.protocol.recording import NullRecorder, Recorder, write_epoch
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
 from transmitter.session.copies import CANNOT_FLY, Confirmed, Copies, EchoOrder, commands_of
+from transmitter.session.due import DueCommands
 from transmitter.session.owing import Owing
 from transmitter.session.records import write_sample
 from transmitter.session.rejoin import Asking, start_of
@@ -55,7 +58,7 @@ class Phase(Enum):
 
 
 class TransmitterSession:
-    """Turns measurements into symbols and echoes into commands; see the module's text.
+    """Converts measurements to symbols and echoes to commands; see the module's text.
 
     `incarnation` is drawn by the caller (32 bits), so that the session itself stays deterministic.
     `stop_on_desync`: end the flight at the first digest that differs, instead of rejoining.
@@ -84,8 +87,8 @@ class TransmitterSession:
         self.epoch = 0
         self.copies = Copies(codec, terms)
         self.counts: Counter[str] = Counter()
-        """digest_checks, desyncs, rejoins, stale_frames, words_missed, erasures, claims_refused,
-        take_overs, out_of_bounds, diverged"""
+        """confirmed, digest_checks, desyncs, rejoins, stale_frames, words_missed, erasures,
+        claims_refused, take_overs, out_of_bounds, diverged"""
         self.rejoins_asked: Counter[Why] = Counter()
         self.end: End | None = None
         self.refusal: End | None = None
@@ -98,7 +101,7 @@ class TransmitterSession:
         """first tick of the present epoch"""
         self.owing = Owing(terms)
         self.confirmed: deque[Confirmed] = deque(maxlen=2 * terms.history_samples)
-        """samples confirmed and not yet written down (`take_confirmed`)"""
+        """samples confirmed and not yet recorded (`take_confirmed`)"""
         self.events: deque[Event] = deque(maxlen=1000)
         self.history = History(codec, 2 * terms.history_samples)
         self._asking = Asking(identity, incarnation, terms)
@@ -110,18 +113,14 @@ class TransmitterSession:
         """Echoes may be this many samples behind before a rejoin is asked for."""
         self._observer = state_observer or default_observer(codec, terms.tick_ns / 1e9)
         self._recorder = recorder or NullRecorder()
-        self._due: deque[tuple[int, Vector]] = deque(
-            enumerate([terms.initial_command] * terms.lead_ticks)
-        )
-        """commands of coming ticks"""
+        self._due = DueCommands(terms.initial_command, terms.lead_ticks)
         self._tick = -1
-        self._command: Vector = terms.initial_command
-        """the last one given out"""
+        self._compact = CompactForm(codec, terms) if terms.downlink == "compact" else None
 
     # What happens at a tick
 
     def hello(self) -> Hello:
-        """Return the frame that asks for a session; to be repeated until there is one."""
+        """Return the frame that requests a session; to be repeated until there is one."""
         return self._asking.hello(self.session_number, self.epoch, self._tick)
 
     def on_measurement(self, tick: int, measurement: Vector) -> list[Frame]:
@@ -134,7 +133,7 @@ class TransmitterSession:
         """
         self._tick = tick
         if self._observer is not None:
-            measurement = self._observer.look(tick, measurement, self._command)
+            measurement = self._observer.look(tick, measurement, self._due.last)
         if self.phase is Phase.REJOINING:
             return self._ask()
         if self.phase is not Phase.FLYING:
@@ -182,15 +181,10 @@ class TransmitterSession:
 
     def command(self, tick: int) -> Vector | None:
         """Return the command of this tick, None when it has not come; earlier ones are forgotten."""
-        while self._due and self._due[0][0] < tick:
-            self._due.popleft()
-        if not self._due or self._due[0][0] != tick:
-            return None
-        self._command = self._due[0][1]
-        return self._command
+        return self._due.take(tick)
 
     def take_confirmed(self) -> list[Confirmed]:
-        """Write down and return what was confirmed since the last call; the next symbol goes first."""
+        """Record and return the samples confirmed since the last call; the next symbol goes first."""
         taken = [self.copies.explained(done) for done in self.confirmed]
         self.confirmed.clear()
         for done in taken:
@@ -205,6 +199,8 @@ class TransmitterSession:
         match frame:
             case Commands() if self._is_current(frame.session) and frame.epoch == self.epoch:
                 return self._on_commands(frame)
+            case ShortCommands() if commands := self._unpacked(frame):
+                return self._on_commands(commands)
             case Welcome() if self._asking.is_answered_by(frame):
                 return self._on_welcome(frame)
             case Welcome() if self._is_current(frame.session) and self._is_left_behind(frame):
@@ -234,7 +230,7 @@ class TransmitterSession:
         return [Bye(self.session_number, end.ending, end.text)] if had_session else []
 
     def _on_unknown(self) -> list[Frame]:
-        """Believe it of a receiver that has stopped commanding; refuse it of a second one."""
+        """Accept it from a receiver that has stopped commanding; refuse it from a second one."""
         if self._takeover.is_lost(self._tick, self.heard_tick):
             return self.rejoin(Why.UNKNOWN)
         if not self._takeover.is_second():
@@ -270,7 +266,7 @@ class TransmitterSession:
         self._echoes.clear()
         self.epoch_tick = state.sample * self.terms.ticks_per_sample
         held = self.owing.begin(self.epoch_tick, self._tick, self._asking.why)
-        self._due = deque(enumerate([hold] * held, self.epoch_tick))
+        self._due.restart(self.epoch_tick, hold, held)
         self.phase = Phase.FLYING
         write_epoch(self._recorder, self.terms.sample_ns, self.epoch, state, hold)
         self.counts["rejoins"] += again
@@ -300,6 +296,11 @@ class TransmitterSession:
             self._end(refusal)
         return [Bye(0, refusal.ending, refusal.text)]
 
+    def _unpacked(self, frame: ShortCommands) -> Commands | None:
+        if self._compact is None or self.phase is not Phase.FLYING:
+            return None
+        return self._compact.unpacked(frame, self.session_number, self.epoch, self._sample)
+
     def _on_commands(self, frame: Commands) -> list[Frame]:
         if frame.echoes[-1].sample < self.copies.confirmed.sample:
             # A copy, or a recording: it brings nothing, and proves nobody alive.
@@ -326,19 +327,21 @@ class TransmitterSession:
         word = self.codec.coder.alphabet.word(echo.word_number)
         commands = commands_of(echo, self.terms)
         try:
-            done = self.copies.confirm(word, commands, echo.digest)
+            done = self.copies.confirm(word, commands, echo.digest, echo.digest_mask)
         except CANNOT_FLY as error:
             return self._on_diverged(error)
         self.confirmed.append(done)
         self.history.add(self.epoch, word, done.flown.state)
         unsent = done.lag_samples == 0
-        self.counts.update(digest_checks=1, erasures=word is ERASED, words_missed=unsent)
-        if done.digest != echo.digest:
+        checked, erased = echo.digest_mask > 0, word is ERASED
+        self.counts.update(confirmed=1, digest_checks=checked, erasures=erased, words_missed=unsent)
+        if done.digest != done.peer_digest:
             return self._on_desync(done)
         # Only now: a receiver with a different state must move no motor.
-        self.owing.on_confirmed()
+        if checked:
+            self.owing.on_confirmed()
         first_tick = echo.sample * self.terms.ticks_per_sample + self.terms.lead_ticks
-        self._due.extend(enumerate(commands, first_tick))
+        self._due.add(first_tick, commands, proven=checked)
         return []
 
     def _on_desync(self, done: Confirmed) -> list[Frame]:
@@ -354,7 +357,7 @@ class TransmitterSession:
         return self.rejoin(Why.DESYNC, replace(ASKED, sample=done.sample))
 
     def _on_diverged(self, error: Exception) -> list[Frame]:
-        """Ask for another state: the receiver flies on from its own, so this one is not the same."""
+        """Request another state: the receiver continues from its own, so this one differs."""
         self.counts["diverged"] += 1
         return self.rejoin(Why.LAG, replace(ASKED, detail=repr(error)))
 
@@ -362,11 +365,11 @@ class TransmitterSession:
 
     @property
     def _sample(self) -> int:
-        """Return the sample that this end's clock stands in."""
+        """Return the sample at this end's clock."""
         return max(0, self._tick) // self.terms.ticks_per_sample
 
     def _is_left_behind(self, welcome: Welcome) -> bool:
-        """Return whether somebody else was answered in our name, and commands stay away."""
+        """Return whether another transmitter was answered in our name, and commands are missing."""
         later = welcome.incarnation == self.incarnation and welcome.epoch > self.epoch
         return later and self._takeover.is_lost(self._tick, self.heard_tick)
 

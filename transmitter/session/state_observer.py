@@ -1,4 +1,4 @@
-"""What the transmitter sees of the plant beside its outputs: the whole state, from full-rate encoders.
+"""The transmitter's observer: the whole state of the plant, from full-rate encoders.
 
 A coder that uses rates forms its words from all corrected states. The encoders give outputs only, so
 the states come from an observer at the transmitter: the codec's own model, the commands that are known

@@ -1,4 +1,4 @@
-"""How a transmitter treats another receiver that asks for its flight.
+"""How a transmitter treats another receiver that requests its flight.
 
 A receiver that hears symbols of an unknown session answers `Unknown`. It is this flight's receiver
 after a restart, or a second one. A restarted receiver has lost the session and sends no commands; while

@@ -1,7 +1,7 @@
-"""One sign at a time, asked of the direction in state space in which an error is worth most.
+"""One sign at a time, in the direction of the state space with the most costly error.
 
-Both ends propagate a covariance P of what they cannot know, from the plant's F and Q and from the
-symbols. N says what an error costs, now and later. For each bit, with shared numbers alone:
+Both ends propagate a covariance P of the receiver's error, from the plant's F and Q and from the
+symbols. N is the cost of an error, now and later. For each bit, with shared numbers alone:
 
 1. `P <- P + gamma max(m, 0)^3 D D'`: long runs of agreeing signs mean that P is too small along D.
 2. The direction c: the eigenvector of `N P` with the largest eigenvalue, scaled to `c' P c = 1`, found
@@ -78,7 +78,7 @@ class DirectionParameters:
 
 
 class DirectionConstants(NamedTuple):
-    """What the functions below need; matrices row by row."""
+    """Constants of the functions below; matrices row by row."""
 
     transition: Vector
     noise: Vector
@@ -333,7 +333,7 @@ class DirectionCoder(FunctionCoder):
         )
 
     def initial(self) -> Vector:
-        """Return what both ends know before the first word."""
+        """Return the state of both ends before the first word."""
         start = self.parameters.start
         lower = [start[row][column] for row in range(len(start)) for column in range(row + 1)]
         nothing = [0.0] * (self.correction_size + 1)

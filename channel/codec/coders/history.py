@@ -1,10 +1,10 @@
-"""One bit per sample that looks ahead when it is formed, and back when it is read.
+"""One bit per sample, formed with a look-ahead and decoded with the bits before it.
 
-The word is a sign again. Two things make more of it than the paper's coder does:
+The word is a sign again. Two things make it better than the paper's coder:
 
-* **Reading.** What a sign means depends on the signs before it. After `+-` the error is small, after
-  `+++` it is large and going on. A table, one row for each pattern of the last signs relative to the
-  present one, holds how far angle and rate are corrected and how the range `M` is multiplied:
+* **Reading.** The meaning of a sign depends on the signs before it. After `+-` the error is small,
+  after `+++` it is large and going on. A table, one row for each pattern of the last signs relative to
+  the present one, holds how far angle and rate are corrected and how the range `M` is multiplied:
 
       correction = sigma M (a[i], b[i] / T),      M <- g[i] M  within  M_min ... M_max
 

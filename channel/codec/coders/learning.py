@@ -62,7 +62,7 @@ class LearningParameters:
 
 
 class LearningCoder(FunctionCoder):
-    """One or more signs per sample for all corrected states of a plant, and for what is learned of it.
+    """One or more signs per sample for all corrected states of a plant, and for the learned terms.
 
     Coder state: the lower halves of the parts of P; then D, m and sigma of each column. `term_rows`
     says of which state's rate each term is, `learned_at` where theta begins in the model's state, of
@@ -120,7 +120,7 @@ class LearningCoder(FunctionCoder):
         return tuple(found)
 
     def initial(self) -> Vector:
-        """Return what both ends know before the first word."""
+        """Return the state of both ends before the first word."""
         size, spreads = len(self.parameters.transition), self.parameters.spreads
         nothing = [0.0] * (self._pairs - pairs_of(size))
         found: list[float] = []
@@ -211,7 +211,7 @@ def check_parameters(parameters: LearningParameters, term_rows: Sequence[int]) -
 
 
 class Learned(NamedTuple):
-    """What both ends know of a term."""
+    """The estimate of a term at both ends."""
 
     error: float
     """relative to the configured one; of a force, the force"""

@@ -1,4 +1,4 @@
-"""Signs as the coder `direction` asks for them, that teach both ends the plant beside its state.
+"""Signs as in the coder `direction`, from which both ends also learn the plant's terms.
 
 The model's states x are followed by theta, the errors of its terms: each adds theta_i y_i to the
 acceleration (or whatever rate) of one state, y_i being the term's value, and the model carries its mean
@@ -35,7 +35,7 @@ SHARED = 0.6
 
 
 class LearningConstants(NamedTuple):
-    """What the functions below need; matrices row by row, those of columns one after another."""
+    """Constants of the functions below; matrices row by row, those of columns one after another."""
 
     transition: Vector
     noises: Vector

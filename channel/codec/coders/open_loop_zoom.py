@@ -1,4 +1,4 @@
-"""One-bit coders whose range does not listen: a fixed range, and time-based zooming.
+"""One-bit coders whose range ignores the signs: a fixed range, and time-based zooming.
 
 The word is that of the paper's coder, a sign per axis (20), and so is the correction (21)-(23). Only
 the range differs. It follows the clock alone:

@@ -1,4 +1,4 @@
-"""The usual way, to compare with: every sample's angle as a word, and the rate by differences.
+"""The usual coder, for comparison: every sample's angle as a word, and the rate by differences.
 
 A word of `b` bits is the encoder's angle rounded to one of `2^b` steps of a turn. The receiver takes
 it as it is, and the difference of two words over the time between them for the rate, if wished
@@ -57,7 +57,7 @@ class PcmConstants(NamedTuple):
 
 
 def turn_of(constants: PcmConstants, coder: Numbers) -> int:
-    """Return the angle that a sample's word is about."""
+    """Return the angle that a sample's word codes."""
     return math.floor(coder[2 * constants.angles]) if constants.angles > 1 else 0
 
 
@@ -82,7 +82,7 @@ def pcm_decode(
     correction: Results,
     after: Results,
 ) -> None:
-    """Write what brings (angle, rate) to the word and its difference; nothing if erased."""
+    """Write the correction of (angle, rate) to the word and its difference; nothing if erased."""
     angles, turn = constants.angles, turn_of(constants, coder)
     for place in range(angles):
         age = coder[angles + place]

@@ -1,4 +1,4 @@
-"""The memoryless coder (16): the measurement itself in a few bits, whatever was sent before.
+"""The memoryless coder (16): the measurement itself in a few bits, independent of earlier words.
 
 A uniform quantiser of `2^b` cells over `-range ... +range` says in which cell the measurement lies;
 both ends take the middle of the cell for the measurement and correct the observer by
@@ -101,7 +101,7 @@ class StaticCoder(FunctionCoder):
 
 
 def write_bits(number: int, symbols: SymbolResults) -> None:
-    """Write a whole number as binary symbols, clamped to what they can say."""
+    """Write a whole number as binary symbols, clamped to their range."""
     bits = len(symbols)
     largest = (1 << bits) - 1
     clamped = 0 if number < 0 else largest if number > largest else number

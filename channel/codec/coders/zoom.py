@@ -1,4 +1,4 @@
-"""The paper's coder (16)-(22): one sign per measured axis, scaled by a range that adjusts itself.
+"""The paper's coder (16)-(22): one sign per measured axis, scaled by an adaptive range.
 
 The word of sample `k` is `sigma_k = sign(y - y_hat)` per axis, `sign(0) = +1`. Both ends take the
 error for `M_k sigma_k` and correct the observer by `gains * M_k sigma_k`. The mean `lambda_k` of
@@ -30,7 +30,7 @@ class ZoomParameters:
     decay: float = 0.95
     """rho, in (0, 1]"""
     window: int = 2
-    """how many signs `lambda_k` is the mean of; the paper's (19) has two"""
+    """number of signs in the mean `lambda_k`; the paper's (19) has two"""
     gains: Gains = ((4.1,), (8.6,))
     """a row per corrected model state, a column per measured axis: l1 and l2 of (23)"""
     impulse: bool = False

@@ -1,4 +1,4 @@
-"""No prediction at all: angles and rates stay as the last words said. The usual loop has no model."""
+"""No prediction: angles and rates stay as the last words set them. The usual loop has no model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A model whose terms may be wrong, and whose states say by how much.
+"""A model whose terms may be wrong, with their errors as states.
 
 The plant's own states are followed by theta, one number for each term of its equations, and by the
 terms' values as they were lately. A term adds theta_i times its value to the rate of one state: theta
@@ -78,7 +78,7 @@ def learned_row(
 
 
 class LearnedModel:
-    """What models that learn have in common; `plant` is the same model with its terms as they are."""
+    """Common parts of models that learn; `plant` is the same model with its terms as they are."""
 
     correction_size: int
 
@@ -109,7 +109,7 @@ class LearnedModel:
 
 
 def plant_model(model: Model) -> Any:
-    """Return a model without what it learns: the plant's own states come first in both."""
+    """Return a model without its learned states: the plant's own states come first in both."""
     return model.plant if isinstance(model, LearnedModel) else model
 
 

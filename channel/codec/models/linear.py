@@ -20,7 +20,7 @@ Rows = Sequence[Sequence[float]]
 
 
 class LinearConstants(NamedTuple):
-    """What the functions below need; matrices row by row."""
+    """Constants of the functions below; matrices row by row."""
 
     transition: Vector
     """F"""

@@ -28,7 +28,7 @@ def cobs_encode(data: bytes) -> bytes:
 
 
 def cobs_decode(data: bytes) -> bytes:
-    """Return what was encoded; ValueError for bytes that no encoder writes."""
+    """Return the decoded bytes; ValueError for an invalid encoding."""
     if not data:
         raise ValueError("an empty COBS frame")
     decoded = bytearray()

@@ -139,7 +139,7 @@ class EmulatedLine:
                 continue
 
     def _pass_on(self) -> float:
-        """Move what can be moved; return how long to wait."""
+        """Move the bytes that are due; return how long to wait."""
         near, far = (end.handle for end in self._ends)
         if near < 0 or far < 0:
             return STEP_S * 10

@@ -1,4 +1,4 @@
-"""A serial line as a kind of link: what it can carry, how long bytes take, and how an end opens it."""
+"""A serial line as a kind of link: its capacity, its transmission times, and how an end opens it."""
 
 from __future__ import annotations
 
@@ -54,9 +54,8 @@ class SerialKind(LinkKind):
             down_ns = 0
         else:
             rate = settings.downlink_rate_baud if settings.downlink else settings.line_rate_baud
-            frame_bytes = command_bytes(terms, codec.model.input_size)
-            check_down(terms, frame_bytes, rate)
-            down_ns = byte_ns(frame_bytes, rate)
+            check_down(terms, codec, rate)
+            down_ns = byte_ns(command_bytes(terms, codec), rate)
         up_ns = byte_ns(1, settings.line_rate_baud)
         return replace(terms, uplink_line_ns=up_ns, downlink_line_ns=down_ns)
 

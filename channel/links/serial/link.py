@@ -134,7 +134,7 @@ class SerialLink(Link):
         return self._lost
 
     def close(self) -> None:
-        """Take leave, let what was sent go out, and give the port back."""
+        """Announce the end, send the remaining bytes, and close the port."""
         if self._stop.is_set():
             return
         with self._writing:

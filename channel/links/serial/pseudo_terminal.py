@@ -1,4 +1,4 @@
-"""A pseudo-terminal with a separate name, for whatever stands in for a serial port."""
+"""A pseudo-terminal with a separate name, in place of a serial port."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class PseudoTerminal:
         self.handle = -1
         """this side of it, non-blocking; -1 while it is unplugged"""
         self.address = "" if link is None else str(link)
-        """what the other side opens"""
+        """the name that the other side opens"""
 
     def plug(self) -> None:
         """Make it; OSError, with the name of the link, where that cannot be made."""

@@ -64,7 +64,7 @@ class SlotFinder:
         """of the transmitter that flies"""
 
     def answered(self, hello: Hello, answers: Iterable[Frame], now_ns: int) -> None:
-        """Note a hello that came at `now_ns`, and what the session answered."""
+        """Note a hello that came at `now_ns`, and the session's answer."""
         for answer in answers:
             if isinstance(answer, Welcome) and answer.incarnation != self._incarnation:
                 self._incarnation = answer.incarnation

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from channel.links.base import Link, LinkCounts, Role
-from channel.protocol.wire import Wire
+from channel.protocol.wire import Wire, is_short
 
 DOWNWARD_KINDS = (2, 3, 5, 8, 9)
 """Frame kinds that only the receiver sends: welcome, refuse, commands, unknown, claim."""
@@ -18,7 +18,7 @@ class SplitWire:
         self._up, self._down = up, down
 
     def size(self, data: bytes) -> int:
-        downward = len(data) > 1 and data[1] in DOWNWARD_KINDS
+        downward = is_short(data) or (len(data) > 1 and data[1] in DOWNWARD_KINDS)
         return (self._down if downward else self._up).size(data)
 
 

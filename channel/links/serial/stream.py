@@ -1,10 +1,10 @@
-"""From a stream of bytes back to messages, whatever was lost, added or changed on the way.
+"""From a stream of bytes back to messages, even if bytes were lost, added or changed.
 
 Outside a frame a byte with bit 7 and right check bits is a symbol, a zero opens a frame, and all else
 is garbage. Inside, everything up to the next zero belongs to the frame. Nothing here waits for
 anything, so the result does not depend on how the stream is cut into reads.
 
-How it finds its feet again:
+How it resynchronises:
 
 * A frame that turns out damaged may have lost its closing zero, so the zero that ended it counts as
   the next one's beginning too.

@@ -1,4 +1,4 @@
-"""Zenoh's settings, every one that matters given: its defaults bind all interfaces and look around."""
+"""Zenoh's settings, all relevant ones explicit: its defaults bind all interfaces and scout."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def open_session(
     patience_s: float = 0.0,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> zenoh.Session:
-    """Return an open session. With patience, whatever is not there yet is tried again so long."""
+    """Return an open session. With patience, missing endpoints are tried again for that time."""
     until_s = time.monotonic() + patience_s
     while True:
         try:
@@ -88,7 +88,7 @@ def open_session(
         except zenoh.ZError as error:
             if time.monotonic() >= until_s or should_stop():
                 kind = LinkLost if patience_s > 0.0 else LinkError
-                # What went wrong, without the place in Zenoh's own source.
+                # The error, without the place in Zenoh's own source.
                 why = str(error).split(" at /")[0].strip().rstrip("!.")
                 raise kind(f"Zenoh cannot use {where}: {why}") from error
         time.sleep(OPEN_AGAIN_S)
@@ -141,7 +141,7 @@ def open_node(
     if router and (listen or connect or scouting):
         raise LinkError("behind a router an end neither listens nor connects elsewhere")
     check_endpoints(where, insecure, security is not None, scouting)
-    # Only clients hear each other through a router: what peers send it stays there.
+    # Only clients receive each other through a router: it does not forward messages of peers.
     settings = zenoh_settings(
         "client" if router else "peer",
         listen,

@@ -1,4 +1,4 @@
-"""One end of many sessions over one Zenoh session: the receiver of a whole room of rigs.
+"""One end of many sessions over one Zenoh session: the receiver of many rigs.
 
 Sessions differ by their names, which are part of the keys (`channel.links.zenoh.link`). One
 channel takes in what comes for all of them, in order of arrival; it is short, so that a sender that
@@ -106,7 +106,7 @@ class ZenohHub:
         self._names |= dict.fromkeys(_inbound_keys(name), name)
 
     def leave(self, name: str) -> None:
-        """Take back what `join` did."""
+        """Undo `join`."""
         joined = self._joined.pop(name, None)
         if joined is not None:
             for key in _inbound_keys(name):

@@ -1,4 +1,4 @@
-"""The link over Zenoh: reliable, blocking, express, and nothing found by itself.
+"""The link over Zenoh: reliable, blocking, express, without discovery.
 
 Zenoh's defaults bind every interface and look around by multicast; here both are off and the
 endpoints are given. A reliable `put` to an absent peer is lost in silence, so a liveliness token

@@ -1,4 +1,4 @@
-"""Telemetry over Zenoh: a separate session beside the link, so that no viewer can touch the flight.
+"""Telemetry over Zenoh: a separate session beside the link, so that no viewer can affect the flight.
 
 Keys, `NAME` being the session's name and `ROLE` the end's:
 
@@ -116,7 +116,7 @@ class TelemetryFeed:
 
 @contextmanager
 def _closed_on_error(session: zenoh.Session, session_name: str) -> Iterator[None]:
-    """Within a `with`, what Zenoh refuses closes the session and becomes a LinkError."""
+    """Within a `with`, an error of Zenoh closes the session and becomes a LinkError."""
     try:
         yield
     except zenoh.ZError as error:

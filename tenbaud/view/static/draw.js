@@ -1,14 +1,6 @@
 // Drawing on canvas: two charts for every output, and the tape. Plain lines, redrawn whole; colours come from the page.
 
-const SPAN_S = 30;
-const DEGREES = 180 / Math.PI;
 const ROUND_DEGREES = [0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 45, 90, 180, 360];
-
-// How values of a unit are shown: angles in degrees, everything else as it is.
-export function shown(unit) {
-  return unit === "rad" ? { factor: DEGREES, unit: "°", words: "degrees" }
-    : { factor: 1, unit: unit ? ` ${unit}` : "", words: unit };
-}
 
 // A round step that gives about three lines on either side of zero.
 function roundStep(most, look) {
@@ -19,14 +11,14 @@ function roundStep(most, look) {
   return [1, 2, 5, 10].map((one) => one * power).find((step) => step >= least);
 }
 
-export const OUTPUT_COLOURS = 6;
+export const OUTPUT_COLOURS = 6, RUN_COLOURS = 4;
 
 export function colours() {
   const style = getComputedStyle(document.body);
   const of = (name) => style.getPropertyValue(`--${name}`).trim();
   const names = ["ink", "dim", "line", "card", "estimate", "tube", "error", "reference", "bad", "minus"];
-  const outputs = Array.from({ length: OUTPUT_COLOURS }, (_, place) => of(`output-${place}`));
-  return { outputs, ...Object.fromEntries(names.map((n) => [n, of(n)])) };
+  const several = (name, length) => Array.from({ length }, (_, place) => of(`${name}-${place}`));
+  return { outputs: several("output", OUTPUT_COLOURS), runs: several("run", RUN_COLOURS), ...Object.fromEntries(names.map((n) => [n, of(n)])) };
 }
 
 // Return a context whose unit is one CSS pixel; the bitmap follows the element's size.
@@ -46,37 +38,64 @@ function fitted(canvas, height) {
   return [context, width];
 }
 
-// A chart's frame: horizontal lines at round values, and functions from values to pixels.
-function frame(canvas, height, now, largest, look, ink) {
+// A chart's frame: horizontal lines at round values, and functions from values to pixels. `span` is from, to and, of a
+// recording, the cursor, in s; its times then stand below.
+function frame(canvas, height, span, largest, look, ink) {
   const [context, width] = fitted(canvas, height);
   const left = 46, step = roundStep(largest, look), high = Math.ceil(largest / step) * step, low = -high;
-  const digits = Math.max(0, Math.ceil(-Math.log10(step) - 1e-9));
-  const x = (time) => left + (width - left - 4) * (1 - (now - time) / SPAN_S);
-  const y = (value) => 8 + (height - 16) * (high - value) / (high - low);
+  const digits = Math.max(0, Math.ceil(-Math.log10(step) - 1e-9)), foot = span.cursor === null ? 8 : 20;
+  const x = (time) => left + (width - left - 4) * (time - span.from) / (span.to - span.from || 1);
+  const y = (value) => 8 + (height - 8 - foot) * (high - value) / (high - low);
   context.textAlign = "right";
   context.textBaseline = "middle";
   context.lineWidth = 1;
+  context.fillStyle = ink.dim;
+  context.strokeStyle = ink.line;
   for (let line = Math.round(low / step); line * step <= high * 1.0001; line++) {
     const value = line * step;
-    context.strokeStyle = ink.line;
-    context.beginPath();
-    context.moveTo(left, y(value));
-    context.lineTo(width, y(value));
-    context.stroke();
-    context.fillStyle = ink.dim;
+    stroke(context, left, y(value), width, y(value));
     context.fillText(`${value.toFixed(digits).replace("-", "\u2212")}${look.unit === "°" ? "°" : ""}`, left - 6, y(value));
   }
+  if (span.cursor !== null) times(context, span, x, height, width);
+  context.save();
   context.beginPath();
   context.rect(left, 0, width - left, height);
-  context.save();
   context.clip();
+  if (span.cursor !== null) {
+    context.strokeStyle = ink.ink;
+    stroke(context, x(span.cursor), 0, x(span.cursor), height - foot + 4);
+  }
   return { context, x, y };
 }
 
-function line(chart, rows, value, colour, width, stepped = false) {
+function stroke(context, fromX, fromY, toX, toY) {
+  context.beginPath();
+  context.moveTo(fromX, fromY);
+  context.lineTo(toX, toY);
+  context.stroke();
+}
+
+function times(context, span, x, height, width) {
+  const least = (span.to - span.from) / 6, power = 10 ** Math.floor(Math.log10(least));
+  const step = [1, 2, 5, 10].map((one) => one * power).find((one) => one >= least);
+  const digits = Math.max(0, Math.ceil(-Math.log10(step) - 1e-9));
+  for (let mark = Math.ceil(span.from / step - 1e-9); mark * step <= span.to; mark++) {
+    const place = x(mark * step);
+    if (place < width - 22) context.fillText(`${(mark * step).toFixed(digits)} s`, place + 14, height - 7);
+  }
+}
+
+// The time at a place of a chart, counted in pixels from its left side; null beside the curves.
+export function timeAt(canvas, place, span) {
+  const share = (place - 46) / (canvas.clientWidth - 50);
+  return share < 0 || share > 1 ? null : span.from + share * (span.to - span.from);
+}
+
+function line(chart, rows, value, colour, width, { stepped = false, dash = [] } = {}) {
   const { context, x, y } = chart;
   context.strokeStyle = colour;
   context.lineWidth = width;
+  context.setLineDash(dash);
   context.beginPath();
   let last = null;
   for (const row of rows) {
@@ -90,42 +109,59 @@ function line(chart, rows, value, colour, width, stepped = false) {
     last = now;
   }
   context.stroke();
+  context.setLineDash([]);
 }
 
 function band(chart, rows, upper, lower, colour) {
-  if (rows.length < 2) return;
-  const { context, x, y } = chart;
+  const { context, x, y } = chart, known = rows.filter((row) => upper(row) !== null);
+  if (known.length < 2) return;
   context.fillStyle = colour;
   context.beginPath();
-  for (const row of rows) context.lineTo(x(row[0]), y(upper(row)));
-  for (let index = rows.length - 1; index >= 0; index--) context.lineTo(x(rows[index][0]), y(lower(rows[index])));
+  for (const row of known) context.lineTo(x(row[0]), y(upper(row)));
+  for (let index = known.length - 1; index >= 0; index--) context.lineTo(x(known[index][0]), y(lower(known[index])));
   context.fill();
 }
 
-// rows: [time, values, estimates, ranges], decisions: [time, set-points], each with one entry per output
-export function drawOutput(canvas, height, now, rows, decisions, place, look, ink) {
+// What a row [time, values, estimates, ranges] says of one output, as it is shown; null where that is not known.
+function readers(place, look) {
   const at = (index) => (row) => (row[index][place] === null || row[index][place] === undefined ? null : row[index][place] * look.factor);
-  const value = at(1), estimate = at(2), range = at(3), reference = at(1);
+  const [value, estimate, range] = [at(1), at(2), at(3)];
+  const sum = (one, other, sign) => (row) => (one(row) === null || other(row) === null ? null : one(row) + sign * other(row));
+  return { value, estimate, range, reference: at(1), error: sum(value, estimate, -1), upper: sum(estimate, range, 1), lower: sum(estimate, range, -1) };
+}
+
+// flights: `points` as above, `decisions` as [time, set-points], each with one entry per output
+export function drawOutput(canvas, height, span, flights, place, look, ink) {
+  const { value, estimate, reference, upper, lower } = readers(place, look), overlaid = flights.length > 1;
   let most = look.unit === "°" ? 2 : 1e-6;
-  for (const row of rows) most = Math.max(most, Math.abs(value(row)) * 1.05);
-  for (const row of decisions) most = Math.max(most, Math.abs(reference(row) || 0) * 1.05);
-  const chart = frame(canvas, height, now, most, look, ink);
-  band(chart, rows, (row) => estimate(row) + range(row), (row) => estimate(row) - range(row), ink.tube);
-  line(chart, decisions, reference, ink.reference, 1.5, true);
-  line(chart, rows, estimate, ink.estimate, 3);
-  line(chart, rows, value, ink.ink, 1.2);
+  for (const { points, decisions } of flights) {
+    for (const row of points) most = Math.max(most, Math.abs(value(row)) * 1.05, Math.abs(estimate(row)));
+    for (const row of decisions) most = Math.max(most, Math.abs(reference(row)) * 1.05);
+  }
+  const chart = frame(canvas, height, span, most, look, ink);
+  flights.forEach(({ points, decisions }, run) => {
+    const [own, other] = overlaid ? [ink.runs[run], ink.runs[run]] : [ink.ink, ink.estimate];
+    if (!overlaid) band(chart, points, upper, lower, ink.tube);
+    line(chart, decisions, reference, ink.reference, 1.5, { stepped: true });
+    line(chart, points, estimate, other, overlaid ? 1.2 : 3, { dash: overlaid ? [5, 4] : [] });
+    line(chart, points, value, own, overlaid ? 1.6 : 1.2);
+  });
   chart.context.restore();
 }
 
-export function drawError(canvas, height, now, rows, place, look, ink) {
-  const error = (row) => (row[1][place] - row[2][place]) * look.factor, range = (row) => (row[3][place] ?? 0) * look.factor;
+export function drawError(canvas, height, span, flights, place, look, ink) {
+  const { error, range } = readers(place, look), overlaid = flights.length > 1, below = (row) => (range(row) === null ? null : -range(row));
   let most = look.unit === "°" ? 0.5 : 1e-9;
-  for (const row of rows) most = Math.max(most, range(row), Math.abs(error(row)));
-  const chart = frame(canvas, height, now, most, look, ink);
-  band(chart, rows, range, (row) => -range(row), ink.tube);
-  line(chart, rows, range, ink.estimate, 1);
-  line(chart, rows, (row) => -range(row), ink.estimate, 1);
-  line(chart, rows, error, ink.error, 1.8);
+  for (const { points } of flights) for (const row of points) most = Math.max(most, overlaid ? 0 : range(row), Math.abs(error(row)));
+  const chart = frame(canvas, height, span, most, look, ink);
+  flights.forEach(({ points }, run) => {
+    if (!overlaid) {
+      band(chart, points, range, below, ink.tube);
+      line(chart, points, range, ink.estimate, 1);
+      line(chart, points, below, ink.estimate, 1);
+    }
+    line(chart, points, error, overlaid ? ink.runs[run] : ink.error, overlaid ? 1.4 : 1.8);
+  });
   chart.context.restore();
 }
 

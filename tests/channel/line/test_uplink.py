@@ -79,18 +79,32 @@ def test_when_frames_are_metered_then_only_symbols_are_coder_bits() -> None:
 def test_when_symbols_come_every_tenth_of_a_second_then_ten_baud_are_measured() -> None:
     meter = BaudMeter()
     assert meter.baud is None
-    meter.on_symbol(5_000_000_000)
+    meter.on_slot(5_000_000_000, came=True)
     assert meter.baud is None
-    for count in range(1, 51):
-        meter.on_symbol(5_000_000_000 + count * 100 * MS)
+    for count in range(1, 71):
+        meter.on_slot(5_000_000_000 + count * 100 * MS, came=True)
     assert meter.baud == pytest.approx(10.0)
-    assert meter.symbols == 51
+
+
+def test_when_symbols_stay_away_then_the_rate_of_the_last_seconds_falls_and_recovers() -> None:
+    meter = BaudMeter()
+    for count in range(1000):
+        meter.on_slot(count * 100 * MS, came=True)
+    for count in range(1000, 1025):
+        meter.on_slot(count * 100 * MS, came=False)
+    assert meter.baud == pytest.approx(5.0, abs=0.2)
+    for count in range(1025, 1100):
+        meter.on_slot(count * 100 * MS, came=False)
+    assert meter.baud == 0.0
+    for count in range(1100, 1151):
+        meter.on_slot(count * 100 * MS, came=True)
+    assert meter.baud == pytest.approx(10.0)
 
 
 def test_when_two_symbols_come_at_once_then_no_rate_is_made_up() -> None:
     meter = BaudMeter()
-    meter.on_symbol(7)
-    meter.on_symbol(7)
+    meter.on_slot(7, came=True)
+    meter.on_slot(7, came=True)
     assert meter.baud is None
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import socket
+
 import pytest
 
 from channel.errors import LinkError
@@ -76,3 +78,13 @@ def test_when_an_endpoint_on_this_machine_is_asked_for_then_it_can_be_used() -> 
     endpoint = free_endpoint()
     check_endpoints((endpoint,), insecure=False)
     assert 1024 <= int(endpoint.rpartition(":")[2]) <= 65535
+
+
+def test_when_a_port_was_given_away_then_a_server_may_listen_there_and_nothing_else_gets_it() -> None:
+    ports = [int(free_endpoint().rpartition(":")[2]) for _ in range(20)]
+    assert len(set(ports)) == len(ports)
+    with socket.socket() as other, pytest.raises(OSError, match="in use"):
+        other.bind(("127.0.0.1", ports[0]))
+    address = ("127.0.0.1", ports[0])
+    with socket.create_server(address), socket.create_connection(address) as client:
+        assert client.getsockname()[1] not in ports

@@ -3,7 +3,7 @@ from __future__ import annotations
 import socket
 
 from tenbaud.build.flight import agree
-from tenbaud.checks.doctor import examine, report
+from tenbaud.checks.doctor import examine, report, serial_line
 from tenbaud.config.load import load_config
 
 
@@ -18,6 +18,12 @@ def test_a_report_has_everything_and_the_same_probe_as_a_flight() -> None:
     (zenoh,) = [finding for finding in findings if finding.subject == "Zenoh"]
     assert zenoh.state == "ok"
     assert "round trip" in zenoh.text
+
+
+def test_the_least_rate_of_a_serial_line_is_said_for_each_downlink() -> None:
+    found = serial_line(load_config("paper-10baud"))
+    assert found.state == "ok"
+    assert "at least 16800 baud full, 1900 baud compact (channel.downlink)" in found.text
 
 
 def test_an_endpoint_is_reached_or_not() -> None:

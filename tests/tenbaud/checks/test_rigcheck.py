@@ -1,11 +1,19 @@
 from __future__ import annotations
 
+import math
 import threading
+from pathlib import Path
 
 import pytest
 
+from tenbaud.build.first_contact import require_safe
+from tenbaud.build.recorded import flight_config
 from tenbaud.checks.rigcheck import check_rig, show_check
+from tenbaud.cli.app import run
+from tenbaud.config.load import load_config
 from tests.transmitter.rigs.emulated import emulated, rig_config
+from transmitter.rigs.emulator.device import RigEmulator
+from transmitter.rigs.formats.samples import RawSample
 
 
 def checked_config(address: str, stale_s: float = 0.5):  # type: ignore[no-untyped-def]
@@ -59,3 +67,40 @@ def _now() -> int:
     import time
 
     return time.monotonic_ns()
+
+
+def turned_by_hand(emulator: RigEmulator, ends: tuple[int, int]) -> None:
+    """Have somebody turn the pitch from one end to the other, and back."""
+    sample = emulator.device.sample
+
+    def turned(now_ns: int) -> RawSample:
+        share = 0.5 - 0.5 * math.cos(now_ns / 1e9 * math.tau / 0.8)
+        return sample(now_ns)._replace(counts=(0, round(ends[0] + (ends[1] - ends[0]) * share), 0))
+
+    emulator.device.sample = turned  # type: ignore[method-assign]
+
+
+@pytest.mark.parametrize("ends", [(-400, 500), (-5, 500)])
+def test_soft_limits_follow_from_the_range_that_was_turned(
+    ends: tuple[int, int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    written = tmp_path / "rig.toml"
+    with emulated("cobs") as emulator:
+        turned_by_hand(emulator, ends)
+        rig = ("rig-check", "--rig", f"cobs:{emulator.line.address}", "--seconds", "1.5")
+        patient = ("--set", "transmitter.bridge.stale_s=1.0", "--set", "limits.command_max=2.5")
+        assert run([*rig, *patient, "--write", str(written)]) == 0
+        assert emulator.device.counts["commands"] == 0
+        # A first flight by the file needs nothing else.
+        assert require_safe(flight_config(None, written))
+    config = load_config(None, written)
+    turned = ends[0] == -400
+    assert config.transmitter.soft_limits == (0.55 if turned else 0.5)
+    assert config.limits.command_max == 2.5
+    assert config.limits.set_point_max == pytest.approx(0.17 if turned else 0.16)
+    assert (config.transmitter.rig, config.transmitter.serial.port) == ("serial", emulator.line.address)
+    assert config.transmitter.bridge.stale_s == 1.0
+    said = " ".join(capsys.readouterr().out.split())
+    assert ("its soft limit is a guess" in said) != turned
+    assert "not seen: the motors (front, rear)" in said
+    assert run([*rig, "--write", str(written)]) == 2, "a file that is there is kept"

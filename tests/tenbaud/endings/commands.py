@@ -75,6 +75,9 @@ WRITERS: dict[str, Arguments] = {
     "identify": lambda _, out: [
         *("identify", "--excitation", "square:0.2,0,2.5", "--duration", "30", "--out", out),
     ],
+    "compare figure": lambda inputs, out: [
+        *("compare", inputs.run, inputs.run, "--figure", f"{out}.png"),
+    ],
     "sweep": lambda inputs, out: ["sweep", inputs.study, "--workers", "1", "--no-plots", "--out", out],
     "keys init": lambda _, out: ["keys", "init", "--folder", out],
     "design": lambda inputs, out: ["design", "--config", inputs.plant, "--out", out],
@@ -105,6 +108,7 @@ READERS: dict[str, Arguments] = {
     "presets": lambda *_: ["presets"],
     "inspect": lambda inputs, _: ["inspect", inputs.run],
     "log": lambda inputs, _: ["log", inputs.run],
+    "compare": lambda inputs, _: ["compare", inputs.run, inputs.run],
     "diff": lambda inputs, _: ["diff", inputs.run],
     "audit": lambda inputs, _: ["audit", inputs.run],
     "recover": lambda inputs, _: ["recover", inputs.run],
@@ -112,6 +116,8 @@ READERS: dict[str, Arguments] = {
     "rig": lambda *_: ["rig", "--duration", "0.1"],
     "router": lambda *_: ["router", "--print-config"],
     "view": lambda *_: ["view", "--schema"],
+    # Five are refused; what is served lasts: `LASTING` in test_signals.py.
+    "view RUN": lambda inputs, _: ["view", "--port", "0", *[inputs.run] * 5],
     "keys show": lambda inputs, _: ["keys", "show", inputs.keys],
     "keys renew": lambda inputs, _: ["keys", "renew", "rig", "--folder", inputs.keys],
     "keys add": lambda inputs, out: [
@@ -126,7 +132,7 @@ READERS: dict[str, Arguments] = {
 LONG = ("bench coders",)
 """Minutes long; it writes by the same functions as `figures`."""
 
-ENDS_OF_THEIR_OWN = {"rig-check": 2}
+ENDS_OF_THEIR_OWN = {"rig-check": 2, "view RUN": 2}
 """Exit codes of commands that cannot do well in the form above."""
 
 

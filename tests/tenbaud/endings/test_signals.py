@@ -20,7 +20,7 @@ from tenbaud.flight import demo
 from tenbaud.flight.outcome import ExitCode, outcome_of_status
 from tenbaud.recording.folder import RunFolder
 from tests.tenbaud.endings.commands import nothing_half_is_left, processes_with
-from tests.tenbaud.processes import Ended, finish, start
+from tests.tenbaud.processes import REPOSITORY, Ended, finish, start
 
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 PATIENCE_S = 240.0
@@ -86,14 +86,20 @@ LASTING: dict[str, tuple[str, ...]] = {
     "receive": ("receive", "--listen", "tcp/127.0.0.1:0", "--out", "run"),
     "receive --sessions": ("receive", "--sessions", "*", "--listen", "tcp/127.0.0.1:0", "--out", "run"),
     "rig": ("rig", "--port", "pty:port"),
+    "rig-check": (
+        *("rig-check", "--rig", "quarc-server:0", "--seconds", "60"),
+        *("--set", "transmitter.bridge.first_sample_timeout_s=60"),
+    ),
+    "view": ("view", "--port", "0"),
     "router": ("router", "--listen", "tcp/127.0.0.1:0"),
+    "view RUN": ("view", str(REPOSITORY / "tests/golden/recordings/two-epochs-0.1.0"), "--port", "0"),
     "identify": ("identify", "--duration", "20000", "--out", "run"),
     "figures": ("figures", "all", "--out", "run"),
     "tune": ("tune", "--disturbance", "q=2e-3", "--out", "found.toml", "--evaluations", "100000"),
     "sweep": ("sweep", "study.toml", "--workers", "2", "--out", "run"),
 }
 STUDY = 'name = "long"\nseeds = 2000\nset = { duration_s = 1000.0 }\ngrid = { loss = [0.0, 0.1] }\n'
-WHEN_IT_WAITS = ("transmit", "receive", "rig")
+WHEN_IT_WAITS = ("transmit", "receive", "rig", "rig-check", "view", "view RUN")
 
 
 @pytest.mark.parametrize("number", SIGNALS, ids=lambda one: one.name)
@@ -103,7 +109,7 @@ WHEN_IT_WAITS = ("transmit", "receive", "rig")
     [pytest.param(one, marks=() if one in WHEN_IT_WAITS else pytest.mark.soak) for one in LASTING],
 )
 def test_a_lasting_command_ends(name: str, after_s: float, number: int, tmp_path: Path) -> None:
-    if name in WHEN_IT_WAITS and number is not signal.SIGTERM and after_s < 1.0:
+    if name in ("transmit", "receive", "rig") and number is not signal.SIGTERM and after_s < 1.0:
         pytest.skip("covered by the demo, which starts them")
     (tmp_path / "study.toml").write_text(STUDY)
     process = start(*LASTING[name], cwd=tmp_path)
@@ -139,6 +145,8 @@ NO_PORT: dict[str, tuple[str, ...]] = {
     "transmit with a rig's second port": (
         *("transmit", "--rig", "cobs:/dev/null", "--set", f"transmitter.serial.motor_port={WRONG}"),
     ),
+    "rig-check": ("rig-check", "--rig", f"cobs:{WRONG}"),
+    "rig": ("rig", "--port", WRONG),
     "transmit": ("transmit", "--link", "serial", "--port", WRONG),
     "receive": ("receive", "--link", "serial", "--port", WRONG),
     "receive, second port": (
@@ -152,7 +160,8 @@ def test_a_port_that_is_not_there_is_refused_before_anything_starts(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(subprocess, "Popen", None)
-    assert run([*NO_PORT[name], "--out", str(tmp_path / "run")]) == ExitCode.USAGE
+    out = () if name.startswith("rig") else ("--out", str(tmp_path / "run"))
+    assert run([*NO_PORT[name], *out]) == ExitCode.USAGE
     said = capsys.readouterr().err
     assert said.startswith(f"tenbaud: {WRONG} cannot be opened: No such file or directory; ")
     assert not (tmp_path / "run").exists()

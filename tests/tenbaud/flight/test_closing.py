@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
-from tenbaud.flight.closing import closing_lines, warnings_of
+from tenbaud.flight.closing import closing_lines
 from tenbaud.recording.folder import RunFolder
+from tenbaud.sentences.flown import warnings_of
 
 FLOWN: dict[str, Any] = {
     "preset": "tuned-10baud",
@@ -56,6 +57,12 @@ def test_a_good_flight_is_its_verdict_and_six_lines(tmp_path: Path) -> None:
     assert "0 symbols lost, 0 late, 0 resyncs" in text
     assert "rad" not in text
     assert lines[-1].endswith("Next: tenbaud demo --view")
+
+
+def test_a_downlink_that_is_not_full_says_its_bits(tmp_path: Path) -> None:
+    changed = {"downlink": "compact", "coder_bits_down": 128_000, "duration_s": 100.0}
+    lines = closing_lines(FLOWN | changed, RunFolder(tmp_path))
+    assert "  Downlink        compact: 128000 bits, 1280 bit/s" in lines
 
 
 def test_the_usual_loop_stands_beside_the_tracking_error(tmp_path: Path) -> None:

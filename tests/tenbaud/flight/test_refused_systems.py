@@ -61,7 +61,7 @@ from tests.tenbaud.flight.systems import NAMED, A, B, C, flown, pendulum
         (
             pendulum(),
             {"operating_point": ([0.5, 0.0], [0.0])},
-            r"no rest: state rate moves by -4\.70316 a second",
+            r"not an equilibrium: state rate moves by -4\.70316 a second",
         ),
         (pendulum(), {"operating_point": ([0.5], [0.0])}, r"states \[0\.5\]; 2 finite numbers"),
         (pendulum(), {"operating_point": 3.0}, "must be a pair"),

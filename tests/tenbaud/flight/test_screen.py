@@ -78,7 +78,7 @@ def test_without_unicode_it_is_plain_ascii() -> None:
 
 def test_a_line_has_every_output_with_its_unit() -> None:
     assert status_line(RECEIVER) == (
-        "receiver: flying  arm +0.400 rad  M 0.100  pump [speed] +12.500  error +0.2500  M 0.100"
+        "receiver: flying  arm +22.9 deg  M 5.73  pump [speed] +12.500  error +0.2500  M 0.100"
     )
 
 

@@ -19,11 +19,18 @@ from tenbaud.config.load import load_config
 from tenbaud.identification.api import Each
 from tenbaud.identification.api import Result as Found
 from tenbaud.log.table import LogError
+from tenbaud.studies import quick
 from tests.plant_sim.identification.experiments import EXCITATION_A, experiment
 from tests.plant_sim.identification.test_linear import CASES, COUPLED, record_of
 from tests.plant_sim.identification.test_pitch import random_volts, swing
 
 TRUE = {"rate_damping_per_s": 0.1, "stiffness_per_s2": 0.5, "torque_gain_rad_per_v_s2": 0.35}
+
+
+@pytest.fixture(autouse=True)
+def _few_flights(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fit coder constants with few flights: `studies/test_quick.py` says how good they become."""
+    monkeypatch.setattr(quick, "EVALUATIONS_MAX", 30)
 
 
 def run(*arguments: str) -> Result:

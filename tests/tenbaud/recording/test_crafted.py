@@ -155,7 +155,7 @@ def test_a_pipe_in_the_place_of_a_file_is_not_waited_for(tmp_path: Path) -> None
     again = Run(run.path)
     assert again.summary == {}
     assert again.ends == ["transmitter"]
-    with pytest.raises(RecordingError, match="it is no file"):
+    with pytest.raises(RecordingError, match="it is not a file"):
         Recording(run.folder.receiver)
 
 

@@ -161,9 +161,9 @@ def test_a_recording_that_describes_nothing_is_of_the_pitch() -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("[]", "description of the signals is none"),
+        ("[]", "description of the signals is wrong"),
         ('{"states":[],"inputs":[],"outputs":[{"name":"No"}]}', "'No' is no name of a signal"),
-        ('{"states":[],"inputs":[],"outputs":[{"name":"a","unit":"\\u0007"}]}', "no plain text"),
+        ('{"states":[],"inputs":[],"outputs":[{"name":"a","unit":"\\u0007"}]}', "not plain text"),
         ('{"states":[],"inputs":[],"outputs":[{"name":"a"}],"output_states":[3]}', "no state 3"),
         (signals_text(Signals(tuple(Signal(f"s{n}") for n in range(200)), (), ())), "more signals"),
     ],

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import time
 from pathlib import Path
 from types import FunctionType
 from typing import Any
@@ -9,7 +11,15 @@ from typing import Any
 import pytest
 
 from tenbaud.studies import compiled as compiling
-from tenbaud.studies.compiled import BESIDE, compiled, figure_sources, named
+from tenbaud.studies.compiled import (
+    BESIDE,
+    KEPT_FOLDERS,
+    KEPT_S,
+    compiled,
+    figure_sources,
+    named,
+    prune,
+)
 from tests.rules.sources import TOP
 
 
@@ -64,3 +74,35 @@ def test_machine_code_is_kept_for_the_sources_that_its_folder_stands_for_alone(
     outer = FunctionType(scope["outer"].__code__, scope | {"inner": None}, "outer")
     assert compiled(outer, (("inner", inner),))(1.5) == 4.5
     assert any(tmp_path.iterdir()) == (module != "a_plug_in")
+
+
+def test_machine_code_of_old_sources_goes_but_for_the_last_few(tmp_path: Path) -> None:
+    for age in range(2 * KEPT_FOLDERS):
+        (tmp_path / f"{age:02}").mkdir()
+        (tmp_path / f"{age:02}" / "code.nbi").touch()
+        # All were used a moment ago, but for the last three.
+        used = time.time() - age - (2.0 * KEPT_S if age >= 2 * KEPT_FOLDERS - 3 else 0.0)
+        os.utime(tmp_path / f"{age:02}", (used, used))
+    prune(tmp_path)
+    assert sorted(one.name for one in tmp_path.iterdir()) == [
+        f"{age:02}" for age in range(2 * KEPT_FOLDERS - 3)
+    ]
+    long_ago = time.time() - 2.0 * KEPT_S
+    for folder in tmp_path.iterdir():
+        os.utime(folder, (long_ago, long_ago))
+    prune(tmp_path)
+    assert len(list(tmp_path.iterdir())) == KEPT_FOLDERS
+
+
+def test_machine_code_that_is_used_counts_as_used(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    compiling._cache_folder.cache_clear()
+    folder = compiling._cache_folder()
+    assert folder is not None
+    os.utime(folder, (0.0, 0.0))
+    compiling._cache_folder.cache_clear()
+    assert compiling._cache_folder() == folder
+    assert folder.stat().st_mtime > time.time() - 60.0
+    compiling._cache_folder.cache_clear()

@@ -33,7 +33,7 @@ def test_when_a_constant_does_not_exist_then_the_nearest_is_named() -> None:
         ("transmitter.plant.mismatch", "no constant of coder or model"),
         ("rate", "no constant of coder or model"),
         ("coder.window_signs", "whole number"),
-        ("coder.correction", "no number"),
+        ("coder.correction", "not a number"),
         ("coder.gains.2", "not a constant"),
         ("coder.weights.0", "not a constant"),
     ],

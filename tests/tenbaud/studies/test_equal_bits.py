@@ -29,7 +29,7 @@ from tenbaud.design.complete import completed
 from tenbaud.flight import transmit
 from tenbaud.studies import compiled as compiling
 from tenbaud.studies.chunk import fly_point
-from tenbaud.studies.compiled import arrays_of, compiled
+from tenbaud.studies.compiled import arrays_of, compiled, whole_of
 from tenbaud.studies.flights import CompiledPoint
 from tenbaud.studies.plain import fly_plain
 from tenbaud.studies.schedule import Uncommon
@@ -38,10 +38,10 @@ from tests.tenbaud.sum_of_states import SUM_OF_STATES
 from tests.tenbaud.test_three_axes import CASCADE
 from transmitter.session.records import SAMPLE_CHANNEL
 
-PRESETS = (
-    *("paper-10baud", "tuned-20baud", "open-loop-zoom-10baud", "static-10baud", "usual-1000baud"),
-    *("history-10baud", "linear", "pendulum-30baud"),
-)
+PRESETS = ("paper-10baud", "tuned-20baud", "usual-1000baud", "linear")
+"""Flown whole, compiled, under every line: three flights to compile."""
+BY_PART = ("open-loop-zoom-10baud", "static-10baud", "history-10baud", "pendulum-30baud", "learning")
+"""Their functions are compiled, which takes a fifth of the time; the long tests fly them whole."""
 LINEAR = {
     **SUM_OF_STATES,
     "states": ["pitch", "pitch_rate", "drift"],
@@ -122,21 +122,24 @@ def uncached(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], None]]:
             one.cache_clear()
 
 
-# The first test here, so that it compiles what the next ones fly, unless it is compiled already.
 def test_when_the_machine_code_is_read_then_nothing_is_fused(uncached: Callable[[], None]) -> None:
-    point = CompiledPoint(config_of("paper-10baud", CLEAN))
-    point.fly(1)
-    if point._flight.stats.cache_hits:
-        uncached()  # numba does not show machine code that it has read from a file
-        point = CompiledPoint(config_of("paper-10baud", CLEAN))
-        point.fly(1)
-    code = "\n".join(point._flight.inspect_asm().values())
-    assert re.search(r"\bv?mul[sp]d\b", code), "this is not the machine code of the flight"
+    # Of a tick of the model, which is compiled as the flight is, and is much smaller.
+    uncached()  # numba does not show machine code that it has read from a file
+    codec = build_codec(config_of("paper-10baud", CLEAN))
+    model: Any = codec.model
+    tick = compiling.compiled(model.tick_function)
+    assert tick(model.initial(), (0.1, 0.2), codec.nothing_held, model.constants) == model.tick(
+        model.initial(), (0.1, 0.2), codec.nothing_held
+    )
+    code = "\n".join(tick.inspect_asm().values())
+    assert re.search(r"\bv?mul[sp]d\b", code), "this is not the machine code of a tick"
     assert re.search(r"\bv?f(n)?m(add|sub)", code) is None
 
 
 @pytest.mark.parametrize("changes", [CLEAN, REAL_WIRE, BAD_LINE, BURSTS], ids=str)
-@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize(
+    "preset", [*PRESETS, *(pytest.param(one, marks=pytest.mark.soak) for one in BY_PART[:-1])]
+)
 def test_when_a_flight_is_compiled_then_no_bit_differs(preset: str, changes: dict[str, Any]) -> None:
     config = config_of(preset, changes)
     point = CompiledPoint(config)
@@ -154,23 +157,40 @@ def test_when_a_flight_is_compiled_then_no_bit_differs(preset: str, changes: dic
     compare(point)
 
 
-def test_when_what_a_coder_learns_is_compiled_then_no_bit_differs() -> None:
-    codec = build_codec(load_config("integrator-10baud", None, learning()))
+@pytest.mark.parametrize("preset", BY_PART)
+def test_when_the_functions_of_a_codec_are_compiled_then_no_bit_differs(preset: str) -> None:
+    learns = preset == "learning"
+    config = load_config("integrator-10baud", None, learning()) if learns else load_config(preset)
+    codec = build_codec(config)
     chooser = random.Random(7)
-    decode = compiled(codec.coder.functions.decode, allocates=True)  # type: ignore[attr-defined]
-    constants = arrays_of(codec.coder.constants)  # type: ignore[attr-defined]
-    state, coder = codec.initial(), np.array(codec.initial().coder)
+    model: Any = codec.model
+    coder: Any = codec.coder
+    constants, size = arrays_of(coder.constants), coder.alphabet.symbols_per_word
+    encode, decode, allocates = coder.functions
+    encode, decode = compiled(encode, allocates=allocates), compiled(decode, allocates=allocates)
+    row = getattr(model, "row_function", None)
+    tick = whole_of(row) if row else compiled(model.tick_function)
+    state = codec.initial()
     for sample in range(60):
-        word = None if sample % 7 == 3 else (chooser.choice((-1, 1)),)
-        after, correction = np.empty_like(coder), np.empty(codec.model.correction_size)
-        symbols = np.array(word or (0,))
-        decode(constants, coder, np.array(state.model), symbols, word is None, correction, after)
-        moved, following = codec.coder.decode(state.coder, state.model, word)
-        assert tuple(correction.tolist()) == moved
-        assert tuple(after.tolist()) == following
-        commands = [(chooser.uniform(-1.0, 1.0),)] * codec.ticks_per_sample
-        state, coder = codec.step(state, word, commands), after
-    assert np.abs(state.model[2:4]).max() > 0.0
+        predicted = codec.predicted(state)
+        measured = tuple(value + chooser.uniform(-0.2, 0.2) for value in predicted)
+        symbols = np.zeros(size, dtype=np.int64)
+        encode(constants, np.array(state.coder), np.array(predicted), np.array(measured), symbols)
+        sent = codec.encode(state, measured)
+        assert tuple(symbols.tolist()) == sent
+        word = None if sample % 7 == 3 else sent
+        correction, after = np.empty(model.correction_size), np.empty(len(state.coder))
+        read = np.array(word or (0,) * size)
+        erased = word is None
+        decode(constants, np.array(state.coder), np.array(state.model), read, erased, correction, after)
+        moved, following = coder.decode(state.coder, state.model, word)
+        assert (tuple(correction.tolist()), tuple(after.tolist())) == (moved, following)
+        opened = codec.open(state, word)
+        command = (chooser.uniform(-1.0, 1.0),) * model.input_size
+        ticked = tick(opened.model, command, opened.held, arrays_of(model.constants))
+        assert ticked == model.tick(opened.model, command, opened.held)
+        state = codec.step(state, word, [command] * codec.ticks_per_sample)
+    assert not learns or np.abs(state.model[2:4]).max() > 0.0
 
 
 @pytest.mark.soak
@@ -252,7 +272,8 @@ def compare(point: CompiledPoint) -> None:
 
 
 def test_when_a_kind_of_model_or_coder_exists_then_a_preset_above_flies_it() -> None:
-    configs = [config_of(preset, {}) for preset in (*PRESETS, *COMPILED_LONG, "fixed-10baud")]
+    flown = (*PRESETS, *BY_PART[:-1], *COMPILED_LONG, "fixed-10baud")
+    configs = [config_of(preset, {}) for preset in flown]
     assert {config.coder.kind for config in configs} == set(CODERS.built_in)
     assert {config.model.kind for config in configs} == set(MODELS.built_in)
 
@@ -263,6 +284,9 @@ def test_when_a_flight_cannot_be_compiled_then_the_nodes_fly_it_and_it_says_why(
     assert (figures.engine, figures.not_compiled) == ("plain", "sabotage and dry runs")
     with pytest.raises(StudyError, match="cannot fly sabotage and dry runs"):
         fly_point(config, [1], "compiled")
+    compact = config_of("paper-10baud", {"channel": {"downlink": "compact"}})
+    with pytest.raises(StudyError, match="cannot fly the compact downlink"):
+        fly_point(compact, [1], "compiled")
 
 
 def test_when_a_recorded_flight_is_compiled_then_no_figure_differs(tmp_path: Path) -> None:
@@ -278,7 +302,9 @@ def test_when_a_recorded_flight_is_compiled_then_no_figure_differs(tmp_path: Pat
         "receiver": {"controller": "recorded"},
         "flight_log": {"file": str(log)},
     }
-    config = load_config("uiuc-10baud", None, {**changes, "duration_s": 100.0})
+    # With the coder that `identify` fits to a record: its tests need not compile another flight.
+    coder = load_config("history-10baud").coder.model_dump(mode="json")
+    config = load_config("uiuc-10baud", None, {**changes, "coder": coder, "duration_s": 100.0})
     figures, _ = CompiledPoint(config).fly(1)
     plain = fly_plain(config)
     assert repr(figures._replace(engine="")) == repr(plain._replace(engine=""))

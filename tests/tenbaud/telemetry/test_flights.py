@@ -192,7 +192,7 @@ def test_when_a_flight_is_steered_then_every_command_takes_hold_and_is_written_d
     assert upper.summary["impaired_up"]["lost"] > 100
     told = controls(tmp_path / "upper" / "transmitter.mcap")
     assert [text.split(": ")[1].split()[0] for text in told] == [
-        *("pause", "pause", "go", "one", "the", "1000.0")
+        *("pause", "pause", "continue", "one", "the", "1000.0")
     ]
     down = controls(tmp_path / "lower" / "receiver.mcap")
     assert [text.split(": ")[1].split()[0] for text in down] == ["set-point", "one"]

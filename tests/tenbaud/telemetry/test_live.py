@@ -60,4 +60,4 @@ def test_a_set_point_beyond_a_stop_of_the_plant_is_refused_in_words() -> None:
     assert steering[1] is not None
     assert steering[1].by_hand == 0.3
     told = [event_text(event_fields(event)) for event in endpoint.session.events]
-    assert told[-1].endswith("elevation is within -0.488692 and 0.523599 rad: ignored")
+    assert told[-1].endswith("elevation is within -28.0 deg and 30.0 deg: ignored")

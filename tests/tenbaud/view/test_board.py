@@ -20,7 +20,8 @@ def transmitter(number: int = 1, flight: int = 7, **more: Any) -> bytes:
     message = {
         "version": 3, "role": "transmitter", "session": "lab", "flight": flight, "phase": "flying",
         "takes_commands": False, "points": [point], "samples": [sample],
-        "events": [{"time_s": 1.0, "kind": "erased", "sample": number, "slot": number}],
+        "events": [{"time_s": 1.0, "kind": "peer", "cause": "gone"},
+                   {"time_s": 1.0, "kind": "erased", "sample": number, "slot": number}],
     }  # fmt: skip
     return json.dumps({**message, **more}).encode()
 
@@ -48,8 +49,8 @@ def test_both_ends_are_joined_by_sample() -> None:
     assert whole["points"] == [[0.15, [0.11, 0.2], [0.12, 0.3], [0.05, 0.1]]]
     assert whole["decisions"] == [[0.15, [0.5, None]]]
     (event,) = whole["events"]
-    assert (event["role"], event["kind"], event["slot"]) == ("transmitter", "erased", event["sample"])
-    assert event["text"] == f"slot {event['slot']} is erased"
+    assert (event["role"], event["kind"]) == ("transmitter", "peer"), "the tape shows what is erased"
+    assert event["text"] == "the receiver is gone"
     assert set(whole["heads"]) == {"transmitter", "receiver"}
     assert "points" not in whole["heads"]["transmitter"]
     assert board.heads["receiver"]["takes_commands"]

@@ -192,7 +192,7 @@ def test_who_may_only_look_sees_the_flight_and_has_nothing_to_press(own: Any, fl
     state_is(second, "lockstep")
     own.reload()
     state_is(own, "lockstep")
-    own.get_by_role("button", name="Corrupt the sensor's codec").wait_for()
+    own.get_by_role("button", name="Corrupt the transmitter's codec").wait_for()
     second.close()
     context.close()
 
@@ -215,11 +215,11 @@ def test_when_the_server_was_started_anew_then_the_old_page_shows_nothing_and_sa
     with served(tmp_path, "view", "--port", "0", "--connect", nowhere) as first:
         port = first.port
         page.goto(first.url)
-        page.get_by_text("No flight found").wait_for()
+        page.get_by_text("No flight found. Start one").wait_for()
     with served(tmp_path, "view", "--port", str(port), "--connect", nowhere) as second:
         answer = page.goto(page.url)
         assert answer.status == 403
         assert "Each start prints a new one" in page.inner_text("body")
         page.goto(second.url)
-        page.get_by_text("No flight found").wait_for()
+        page.get_by_text("No flight found. Start one").wait_for()
     page.close()

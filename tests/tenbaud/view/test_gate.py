@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
@@ -14,6 +15,8 @@ from pathlib import Path
 import pytest
 
 from benchmarks.browser import Served, served
+from tenbaud.recording.errors import RecordingError
+from tenbaud.recording.reader import Recording
 from tenbaud.view.access import Access, Grant, draw_access, is_same_origin
 from tests.tenbaud.view import asking
 from tests.tenbaud.view.asking import POLLING, SOCKET_IO, ask, enter, everything, open_socket
@@ -48,7 +51,7 @@ def test_each_printed_address_opens_the_page_and_one_of_them_has_no_controls(pag
     whole = ask(page.port, path, Cookie=cookie).text
     look = ask(page.port, look_path, Cookie=look_cookie).text
     assert "view-only" in look
-    for part in ("Corrupt the sensor's codec", "Bits lost", '"type":"click"', '"type":"change"'):
+    for part in ("Corrupt the transmitter's codec", "Bits lost", '"type":"click"', '"type":"change"'):
         assert part in whole, part
         assert part not in look, part
     # The secret for looking opens nothing at the path of the one that steers.
@@ -201,6 +204,7 @@ def test_another_user_of_the_machine_gets_nothing_and_steers_nothing(tmp_path: P
                 input=json.dumps(given), capture_output=True, text=True, check=True, timeout=60.0,
             ).stdout
         )  # fmt: skip
+        _wait_until_flown(tmp_path / "run" / "transmitter.mcap")
     assert told["uid"] == ANOTHER_USER
     assert told["without"] == dict.fromkeys(told["without"], SHUT)
     assert told["sockets"] == ["PermissionError"] * 2
@@ -209,6 +213,17 @@ def test_another_user_of_the_machine_gets_nothing_and_steers_nothing(tmp_path: P
     assert told["with"] == OPEN
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert summary["desyncs"] == summary["commands_refused"] == 0
+
+
+def _wait_until_flown(path: Path) -> None:
+    """Return when a sample is recorded: a flight that is stopped before leaves no summary."""
+    until_s = time.monotonic() + 60.0
+    while time.monotonic() < until_s:
+        with contextlib.suppress(RecordingError):
+            if any(True for _ in Recording(path).rows("sample")):
+                return
+        time.sleep(0.1)
+    raise AssertionError("no sample was recorded")
 
 
 def _open_sockets(parent: int) -> list[str]:

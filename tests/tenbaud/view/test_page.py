@@ -10,29 +10,14 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-import numpy as np
 import pytest
 
-from benchmarks.browser import Served, browser, served, state_is, why_no_browser
-from tenbaud.recording.pose import helicopter_lines
-from tenbaud.telemetry.schema import TELEMETRY
+from benchmarks.browser import Served, served, state_is, why_no_browser
+from tests.tenbaud.view.viewers import number, wait
 
 pytestmark = pytest.mark.skipif(why_no_browser() is not None, reason=str(why_no_browser()))
 
-PICTURES = {
-    "pendulum": ["160 132"],
-    "dial": ["160 100"],
-    "rotary pendulum": ["84 70", "238 112"],
-}
-"""Pictures, and what their parts turn about."""
-
 FLIGHT = ("--preset", "tuned-10baud", "--mismatch", "0.1")
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    with browser() as one:
-        yield one
 
 
 @pytest.fixture(scope="module")
@@ -54,19 +39,10 @@ def page(chromium: Any, flight: Served) -> Iterator[Any]:
     page.on("websocket", lambda socket: page.asked.append(socket.url))
     page.goto(flight.url)
     state_is(page, "lockstep")
-    page.get_by_role("button", name="Corrupt the sensor's codec").wait_for()
+    page.get_by_role("button", name="Corrupt the transmitter's codec").wait_for()
     yield page
     assert page.told == []
     context.close()
-
-
-def number(page: Any, element: str) -> float:
-    text = page.locator(element).inner_text().replace("\u2212", "-")
-    return float(re.findall(r"[-+]?\d+\.?\d*", text)[0])
-
-
-def wait(page: Any, expression: str, argument: object = None, seconds: float = 240.0) -> None:
-    page.wait_for_function(expression, arg=argument, timeout=seconds * 1000.0)
 
 
 TEXT_IS_NOT = "([id, old]) => document.getElementById(id).textContent !== old"
@@ -108,9 +84,15 @@ def test_the_set_point_steers_the_flight_from_the_keyboard_alone(page: Any) -> N
         page.keyboard.press("Tab")
     else:
         raise AssertionError("the set-point is not reached by Tab")
-    for _ in range(4):
+    slider = page.get_by_role("slider", name="Set-point")
+    # It shows the reference that is followed, a square wave of 90 degrees, until the visitor moves it.
+    wait(page, "() => [90, -90].includes(Number(document.activeElement.value))")
+    assert slider.get_attribute("aria-valuetext") in ("90°", "\u221290°")
+    page.keyboard.press("Home")
+    for _ in range(22):
         page.keyboard.press("ArrowRight")
-    page.get_by_text("set-point 0.349").first.wait_for()
+    assert slider.get_attribute("aria-valuetext") == "20°"
+    page.get_by_text("set-point 20.0 deg").first.wait_for()
     page.get_by_role("button", name="25", exact=True).click()
     wait(page, f"() => Math.abs({NUMBER.format('value')} - 20) < 4")
     page.get_by_role("button", name="1", exact=True).click()
@@ -118,9 +100,51 @@ def test_the_set_point_steers_the_flight_from_the_keyboard_alone(page: Any) -> N
     page.get_by_text("follow the reference").first.wait_for()
 
 
+LIVE_CHANGES = """async () => {
+  const changed = [];
+  const seen = new MutationObserver((all) => all.forEach((one) => changed.push(one.target.id)));
+  for (const one of document.querySelectorAll("[aria-live], [role=status], [role=alert], output"))
+    seen.observe(one, { subtree: true, childList: true, characterData: true });
+  const time = () => parseFloat(document.getElementById("f-time").textContent), from = time();
+  while (time() < from + 2) await new Promise((go) => setTimeout(go, 100));
+  return changed;
+}"""
+
+
+def test_a_screen_reader_hears_changes_of_state_alone_and_finds_one_main_part(page: Any) -> None:
+    assert page.evaluate(LIVE_CHANGES) == []
+    assert page.get_by_role("main").count() == 1
+    assert page.locator("#announcement").inner_text() == "In lockstep"
+    sliders = page.get_by_role("slider").all()
+    assert [one.get_attribute("aria-valuetext") for one in sliders[1:]] == ["0 %", "0 %", "0 ms"]
+
+
+def test_all_controls_are_in_the_first_view_of_a_small_screen(page: Any) -> None:
+    page.set_viewport_size({"width": 1280, "height": 900})
+    page.evaluate("scrollTo(0, 0)")
+    bottoms = page.locator(".controls :is(button, input)").evaluate_all(
+        "(all) => all.map((one) => one.getBoundingClientRect().bottom)"
+    )
+    assert len(bottoms) > 10
+    assert max(bottoms) <= 900.0
+
+
+def test_a_figure_is_explained_on_hover_and_on_focus(page: Any) -> None:
+    term, tip = page.get_by_role("button", name="Range M"), page.get_by_role("tooltip")
+    assert tip.count() == 0
+    term.focus()
+    page.keyboard.press("Shift+Tab")
+    page.keyboard.press("Tab")
+    assert "between \u2212M and +M" in tip.inner_text()
+    page.keyboard.press("Escape")
+    assert tip.count() == 0
+    term.hover()
+    assert "between \u2212M and +M" in tip.inner_text()
+
+
 def test_a_corrupted_end_turns_the_light_and_the_flight_recovers(page: Any) -> None:
     before = page.locator("#f-rejoins").inner_text()
-    for name in ("Corrupt the sensor's codec", "Corrupt the controller's codec"):
+    for name in ("Corrupt the transmitter's codec", "Corrupt the receiver's codec"):
         page.get_by_role("button", name=name).click()
         state_is(page, "broken")
         up, down = (page.locator(f"#digest-{way}").inner_text() for way in ("up", "down"))
@@ -139,6 +163,7 @@ def test_a_corrupted_end_turns_the_light_and_the_flight_recovers(page: Any) -> N
 def test_the_clock_stands_still_steps_and_goes_on(page: Any) -> None:
     page.get_by_role("button", name="Pause").click()
     page.get_by_role("button", name="Resume").wait_for()
+    wait(page, "() => document.getElementById('light-title').textContent === 'In lockstep, paused'")
     stood = None
     while stood != (stood := number(page, "#f-time")):
         page.wait_for_timeout(500.0)  # what was sent before may still be on its way
@@ -152,17 +177,24 @@ def test_the_clock_stands_still_steps_and_goes_on(page: Any) -> None:
     wait(page, f"(old) => {NUMBER.format('f-time')} > old + 0.5", stood)
 
 
-def test_a_bad_wire_is_seen_and_repaired(page: Any) -> None:
+def test_a_bad_wire_is_seen_and_repaired_by_every_visitor(page: Any, flight: Served) -> None:
     erased = number(page, "#f-erasures")
+    other = page.context.new_page()
+    other.goto(flight.url)
+    other.get_by_role("slider", name="Bits lost").wait_for()
     slider = page.get_by_role("slider", name="Bits lost")
     slider.focus()
     for _ in range(10):
         page.keyboard.press("ArrowRight")
     wait(page, "() => document.getElementById('flight').textContent.includes('up:loss=0.5')")
     wait(page, f"(old) => {NUMBER.format('f-erasures')} > old + 2", erased)
+    value_is = "(value) => document.querySelector('[aria-label=\"Bits lost\"]').value === value"
+    wait(other, value_is, "50")
     page.get_by_role("button", name="Repair the line").click()
+    wait(other, value_is, "0")
     wait(page, "() => !document.getElementById('flight').textContent.includes('impaired')")
-    assert slider.input_value() == "0"
+    wait(page, "() => document.querySelector('[aria-label=\"Bits lost\"]').value === '0'")
+    assert slider.get_attribute("aria-valuetext") == "0 %"
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -195,98 +227,10 @@ def test_without_a_flight_it_says_so(chromium: Any, tmp_path: Path) -> None:
     with served(tmp_path, "view", "--port", "0", "--connect", nowhere) as one:
         page = chromium.new_page()
         page.goto(one.url)
-        page.get_by_text("No flight found").wait_for()
-        assert page.get_by_role("button", name="Corrupt the sensor's codec").is_disabled()
+        page.get_by_text("No flight found. Start one").wait_for()
+        assert page.get_by_role("button", name="Corrupt the transmitter's codec").is_disabled()
         state_is(page, "waiting")
         page.close()
-
-
-def test_a_plant_of_any_outputs_is_shown_with_its_names_and_units_and_the_gap_to_the_limit(
-    chromium: Any, tmp_path: Path
-) -> None:
-    from channel.links.zenoh.telemetry import TelemetryPort
-
-    place = f"unixsock-stream/{tmp_path}/t.sock"
-    signals = [
-        {"name": name, "unit": unit, "low": None, "high": None}
-        for name, unit in (("arm", "rad"), ("cart_place", "m"), ("torque", "N m"))
-    ]
-    point = {"time_s": 0.9, "measured": [0.5, 1.5], "true": None, "live": None}
-    message = {
-        "role": "transmitter", "version": 3, "session": "lab",
-        "plant": {"model": "mine:Model", "picture": "", "outputs": signals[:2], "inputs": signals[2:]},
-        "flight": 5, "number": 1,
-        "phase": "flying", "clock": "real", "takes_commands": False, "time_s": 1.0, "epoch": 0,
-        "impairments": "", "counts": {"erasures": 0, "desyncs": 0, "rejoins": 0, "digest_checks": 1},
-        "events": [], "dropped": 0, "preset": "x", "tick_s": 0.01, "symbol_period_s": 0.1,
-        "baud_configured": 10.0, "duration_s": 100.0,
-        "samples": [{"sample": number, "word_sent": [1], "word": [1], "about": [int(number > 2)],
-                     "digest": "aa", "peer_digest": "aa"} for number in range(4)],
-        "points": [{**point, "coded": [0.25, 1.25], "range": [0.1, 0.5]}],
-        "guard": "running", "applied": [-0.25], "paused": False, "pace": None,
-        "lateness": {"p50_ms": 0.1, "p99_ms": 0.25, "max_ms": 1.0}, "gap_to_floor": 1.42,
-    }  # fmt: skip
-    TELEMETRY.validate_python(message)
-    port = TelemetryPort("transmitter", "lab", place)
-    with served(tmp_path, "view", "--port", "0", "--connect", place) as one:
-        page = chromium.new_page()
-        page.goto(one.url)
-        for _ in range(100):
-            port.publish(json.dumps(message).encode())
-            page.wait_for_timeout(100.0)
-            if page.locator("#f-gap").is_visible():
-                break
-        assert (number(page, "#f-gap"), number(page, "#f-late")) == (1.42, 0.25)
-        for canvas in ("#value-0", "#error-0", "#value-1", "#error-1"):
-            assert page.locator(canvas).is_visible()
-        assert "Cart place m, last 30 s of flight" in page.locator("#curves").inner_text()
-        assert page.locator("#outputs").inner_text().split("\n") == [
-            *("arm", "+28.6°", "cart place", "+1.50 m")
-        ]
-        assert page.locator("#inputs").inner_text().split("\n") == ["torque", "\u22120.250 N m"]
-        assert page.locator("#f-error").inner_text() == "+14.32°, +0.250 m"
-        assert page.locator(".plant:visible").count() == 0
-        assert page.locator("#bit-keys").inner_text() == "arm 75 %cart place 25 %"
-        colour = "(name) => getComputedStyle(document.body).getPropertyValue(name).trim()"
-        pixels = "getElementById('tape').getContext('2d').getImageData(x, y, 1, 1).data"
-        tape = f"([x, y]) => [...document.{pixels}]"
-        width = page.locator("#tape").bounding_box()["width"]
-        for place, cell in ((1, 0), (0, 1)):
-            found = page.evaluate(tape, [int(width - 18 * cell - 9), 15])
-            shown = page.evaluate(colour, f"--output-{place}")
-            assert "#{:02x}{:02x}{:02x}".format(*found[:3]) == shown
-        for picture, turned in PICTURES.items():
-            count = len(turned)
-            message["plant"] = {**message["plant"], "picture": picture, "outputs": signals[:count]}
-            message["points"] = [{**point, "time_s": message["time_s"], "measured": [0.5] * count,
-                                  "coded": [0.25] * count, "range": [0.1] * count}]  # fmt: skip
-            port.publish(json.dumps(message).encode())
-            page.locator(f"#{picture.replace(' ', '-')}").wait_for()
-            assert page.locator(".plant:visible").count() == 1
-            bodies = page.locator(".plant:visible .body").all()
-            assert [one.get_attribute("transform") for one in bodies] == [
-                f"rotate(-28.65 {centre})" for centre in turned
-            ]
-        check_pose(page, port, message)
-        page.get_by_text("takes no commands").wait_for()
-        page.close()
-    port.close()
-
-
-def check_pose(page: Any, port: Any, message: dict[str, Any]) -> None:
-    """Check that the helicopter of three axes is drawn by the same lines as in figures."""
-    poses = {"body": (0.3, 0.2, -0.4), "estimate": (0.0, 0.0, 0.0)}
-    point = {"time_s": message["time_s"], "true": None, "live": None, "range": [0.1] * 3}
-    message["points"] = [{**point, "measured": poses["body"], "coded": poses["estimate"]}]
-    axes = [{"name": name, "unit": "rad", "low": None, "high": None} for name in ("a", "b", "c")]
-    message["plant"] = {**message["plant"], "picture": "helicopter", "outputs": axes}
-    port.publish(json.dumps(message).encode())
-    page.locator("#helicopter-3").wait_for()
-    for part, pose in poses.items():
-        drawn = page.locator(f"#helicopter-3 .{part} path").first.get_attribute("d")
-        found = [float(one) for one in re.findall(r"[-.\d]+", drawn)]
-        arm = np.array([138.0, 122.0]) + helicopter_lines(*pose)[0] * [118.0, -118.0]
-        assert found[:4] == pytest.approx(arm.ravel().tolist(), abs=0.06), part
 
 
 def test_when_the_flight_falls_silent_or_ends_then_it_says_so(chromium: Any, tmp_path: Path) -> None:

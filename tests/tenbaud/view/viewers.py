@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import socket
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -35,3 +37,12 @@ def is_free(port: int) -> bool:
         except OSError:
             return False
     return True
+
+
+def number(page: Any, element: str) -> float:
+    text = page.locator(element).inner_text().replace("\u2212", "-")
+    return float(re.findall(r"[-+]?\d+\.?\d*", text)[0])
+
+
+def wait(page: Any, expression: str, argument: object = None, seconds: float = 240.0) -> None:
+    page.wait_for_function(expression, arg=argument, timeout=seconds * 1000.0)

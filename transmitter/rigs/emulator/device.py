@@ -156,7 +156,7 @@ class EmulatedDevice:
         self.advance(now_ns)
         self.counts["samples"] += 1
         self._sequence += 1
-        flags = self.flags
+        flags = self.flags | DeviceFlag.EMULATED
         flags |= DeviceFlag.WATCHDOG_TRIPPED if self.tripped else DeviceFlag(0)
         flags |= DeviceFlag.OUTPUT_ENABLED if self.enabled else DeviceFlag(0)
         time_us = (now_ns - self._boot_ns) // 1000
@@ -165,7 +165,7 @@ class EmulatedDevice:
         return RawSample(tuple(counts), self._sequence, time_us, flags)
 
     def _faulty(self, now_ns: int, counts: int) -> int:
-        """Return what the faulty encoder says in place of its counts."""
+        """Return the counts of the faulty encoder."""
         flight_s = self.flight_s(now_ns)
         jump = self.faults.take_due("jump", flight_s)
         if jump is not None:
@@ -224,7 +224,7 @@ class RigEmulator:
                 self._say(muted)
 
     def figures(self) -> dict[str, object]:
-        """Return what the device saw, for a test or a person."""
+        """Return the counts of the device, for a test or a person."""
         device = self.device
         return {
             **device.counts,

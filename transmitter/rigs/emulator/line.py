@@ -16,10 +16,10 @@ READ_BYTES = 4096
 
 
 class DeviceLine(Protocol):
-    """Bytes in and out, without ever waiting; what nobody takes is lost, as on a real line."""
+    """Bytes in and out, without waiting; bytes that are not read are lost, as on a real line."""
 
     address: str
-    """what the other side opens"""
+    """the name that the other side opens"""
 
     def plug(self) -> None:
         """Put the device on its line."""
@@ -31,7 +31,7 @@ class DeviceLine(Protocol):
         """Wait until something came, or for this long."""
 
     def read(self) -> bytes:
-        """Return what has come."""
+        """Return the received bytes."""
 
     def write(self, data: bytes) -> bool:
         """Send; return whether it went out whole."""
@@ -73,12 +73,9 @@ class SerialLine(_Handled):
         self._line_baud = line_baud
 
     def plug(self) -> None:
-        import serial
+        from channel.links.serial.port import open_port
 
-        try:
-            self._port = serial.Serial(self.address, self._line_baud, timeout=0, exclusive=True)
-        except (serial.SerialException, OSError) as error:
-            raise RigError(f"{self.address} cannot be opened: {error}") from error
+        self._port = open_port(self.address, self._line_baud, 0.0)
         self.handle = self._port.fileno()
         os.set_blocking(self.handle, False)
 

@@ -1,4 +1,4 @@
-"""How an emulated device talks: the other side of every format."""
+"""The formats of an emulated device: the other side of each."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from transmitter.rigs.formats.ascii import checked, unchecked
+from transmitter.rigs.formats.ascii import EMULATOR_LINE, checked, unchecked
 from transmitter.rigs.formats.base import Cutter
 from transmitter.rigs.formats.cobs import (
     COMMAND,
@@ -23,9 +23,11 @@ from transmitter.rigs.formats.cobs import (
 )
 from transmitter.rigs.formats.doubles import doubles
 from transmitter.rigs.formats.qsb import STAMP_US
-from transmitter.rigs.formats.samples import RawSample
+from transmitter.rigs.formats.samples import DeviceFlag, RawSample
 
 COMMAND_BYTES_MAX = 200
+DECLARED_EVERY = 50
+"""In lines of text, one sample in this number follows the line that declares the emulator."""
 
 
 class DeviceCommand(NamedTuple):
@@ -62,7 +64,7 @@ class Speech(ABC):
         return [line.strip() for line in lines if line.strip()]
 
     def _each(self, pieces: list[bytes], read: Callable[[bytes], DeviceCommand]) -> list[DeviceCommand]:
-        """Return the commands in some pieces; what is none is counted."""
+        """Return the commands in some pieces; invalid pieces are counted."""
         commands = []
         for piece in pieces:
             try:
@@ -109,8 +111,14 @@ class AsciiSpeech(Speech):
         super().__init__()
         self.streams = not polled
         self._form = form
+        self._said = 0
 
     def encode(self, sample: RawSample) -> bytes:
+        self._said += 1
+        declares = DeviceFlag.EMULATED in sample.flags and self._said % DECLARED_EVERY == 1
+        return (EMULATOR_LINE + b"\n" if declares else b"") + self._sample_line(sample)
+
+    def _sample_line(self, sample: RawSample) -> bytes:
         cells = list(sample.counts)
         if self._form == "counts":
             return " ".join(map(str, cells)).encode() + b"\r\n"

@@ -1,4 +1,4 @@
-"""Lines of text: what a lab's sketch prints already, or nearly.
+"""Lines of text, as many sketches print them already.
 
 A sample is one line, ended by LF or CR LF, with decimal columns between commas, spaces or tabs; which
 column is what comes from the configuration. A line that begins with `E,` has a separate form, with a
@@ -15,9 +15,11 @@ import re
 from typing import Literal
 
 from transmitter.rigs.formats.base import SerialFormat, xor_checksum
-from transmitter.rigs.formats.samples import RawSample
+from transmitter.rigs.formats.samples import DeviceFlag, RawSample
 
 LINE_BYTES_MAX = 200
+EMULATOR_LINE = b"# tenbaud rig emulator"
+"""By this line of its log the rig emulator declares itself."""
 COLUMN = re.compile(r"c\d|t_us|seq|-")
 AXIS_COLUMNS = {"travel": "c0", "pitch": "c1", "elevation": "c2", "elev": "c2"}
 DEFAULT_COLUMNS = ("t_us", "travel", "pitch", "elevation")
@@ -50,6 +52,11 @@ class AsciiFormat(SerialFormat):
         self._columns = _channels(columns)
         self._command_style = command_style
         self._pulse_full_volts = pulse_full_volts
+        self._flags = DeviceFlag(0)
+
+    def reset(self) -> None:
+        super().reset()
+        self._flags = DeviceFlag(0)
 
     def command(self, sequence: int, volts: tuple[float, ...], enable: bool) -> bytes:
         if self._command_style == "pulse":
@@ -68,6 +75,8 @@ class AsciiFormat(SerialFormat):
             return None
         if text.startswith(b"#"):
             self.counts["log_lines"] += 1
+            if text == EMULATOR_LINE:
+                self._flags = DeviceFlag.EMULATED
             return None
         columns = self._columns
         if text.startswith(b"E,"):
@@ -89,9 +98,8 @@ class AsciiFormat(SerialFormat):
                 time_us = value % self.wraps.device_us
             else:
                 counts[int(name[1:])] = value
-        return RawSample(
-            tuple(counts.get(index, 0) for index in range(max(counts) + 1)), sequence, time_us
-        )
+        channels = tuple(counts.get(index, 0) for index in range(max(counts) + 1))
+        return RawSample(channels, sequence, time_us, self._flags)
 
 
 def checked(text: bytes) -> bytes:

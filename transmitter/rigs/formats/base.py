@@ -24,7 +24,7 @@ def xor_checksum(text: bytes) -> int:
 
 
 class Cutter:
-    """Cuts a stream at a delimiter byte; what comes before the first one is not whole.
+    """Cuts a stream at a delimiter byte; the bytes before the first one are incomplete.
 
     A piece longer than `bytes_max` is dropped, so that a stream without delimiters cannot fill the
     memory; `overlong` counts them.
@@ -38,7 +38,7 @@ class Cutter:
         self.overlong = 0
 
     def reset(self) -> None:
-        """Forget what is half there: the stream begins anew."""
+        """Forget an incomplete piece: the stream restarts."""
         self._rest.clear()
         self._synchronised = False
 
@@ -75,11 +75,11 @@ class SerialFormat(ABC):
         self._cutter = Cutter(delimiter, bytes_max)
 
     def reset(self) -> None:
-        """Forget what is half read: the port has been opened anew."""
+        """Forget an incomplete piece: the port was opened again."""
         self._cutter.reset()
 
     def feed(self, data: bytes) -> list[RawSample]:
-        """Return the samples that these bytes complete; what is damaged is counted and dropped."""
+        """Return the samples that these bytes complete; damaged ones are counted and dropped."""
         samples = []
         for piece in self._cutter.feed(data):
             try:
@@ -97,4 +97,4 @@ class SerialFormat(ABC):
 
     @abstractmethod
     def _sample(self, piece: bytes) -> RawSample | None:
-        """Return the sample in a piece of the stream, if any; ValueError for what is damaged."""
+        """Return the sample in a piece of the stream, if any; ValueError for a damaged piece."""

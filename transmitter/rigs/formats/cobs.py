@@ -12,7 +12,7 @@ import struct
 
 from channel.links.serial.cobs import cobs_decode, cobs_encode
 from transmitter.rigs.formats.base import SerialFormat, crc16
-from transmitter.rigs.formats.samples import DeviceFlag, RawSample
+from transmitter.rigs.formats.samples import RawSample, flags_of
 
 SAMPLE_TYPE = 0x01
 COMMAND_TYPE = 0x81
@@ -59,5 +59,4 @@ class CobsFormat(SerialFormat):
             self.counts["foreign"] += 1
             return None
         _, flags, sequence, time_us, *counts = SAMPLE.unpack(payload)
-        # Bits that a later firmware may use are not ours to judge.
-        return RawSample(tuple(counts), sequence, time_us, DeviceFlag(flags & 0x0F))
+        return RawSample(tuple(counts), sequence, time_us, flags_of(flags))

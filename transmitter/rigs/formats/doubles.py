@@ -1,4 +1,4 @@
-"""Vectors of doubles without any framing: what QUARC's Stream blocks put on a line.
+"""Vectors of doubles without any framing, as QUARC's Stream blocks send them.
 
 `N` doubles are `8 N` bytes and nothing else: no length, no type, no checksum. Alignment that is lost
 is lost for good, so a unit that makes no sense is an error and the caller reconnects.
@@ -10,7 +10,7 @@ import math
 import struct
 from typing import Literal
 
-from transmitter.rigs.formats.samples import DeviceFlag, RawSample, Wraps
+from transmitter.rigs.formats.samples import DeviceFlag, RawSample, Wraps, flags_of
 
 ByteOrder = Literal["little", "big"]
 AngleUnit = Literal["counts", "rad", "deg"]
@@ -27,7 +27,7 @@ def doubles(count: int, byte_order: str) -> struct.Struct:
 
 
 class UnitError(ValueError):
-    """A unit that cannot be what was agreed: alignment or byte order is lost."""
+    """An impossible unit: alignment or byte order is lost."""
 
 
 class DoublesLayout:
@@ -71,7 +71,7 @@ class DoublesLayout:
             elif name == "time_s":
                 time_us = round(value * 1e6)
             elif name == "flags":
-                flags = DeviceFlag(round(value) & 0x0F)
+                flags = flags_of(round(value) & 0xFF)
             else:
                 channel = int(name[1:])
                 counts[channel] = math.floor(value * self._scales.get(channel, 1.0) + 0.5)

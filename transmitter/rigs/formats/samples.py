@@ -1,4 +1,4 @@
-"""One sample of a device: its counts, and what it says about itself."""
+"""One sample of a device: its counts and its status."""
 
 from __future__ import annotations
 
@@ -18,6 +18,14 @@ class DeviceFlag(IntFlag):
     WATCHDOG_TRIPPED = 2
     ENCODER_ERROR = 4
     OUTPUT_ENABLED = 8
+    EMULATED = 0xA0
+    """the rig emulator; the upper half of the byte is the firmware's own otherwise"""
+
+
+def flags_of(byte: int) -> DeviceFlag:
+    """Return the flags in a byte; bits that a firmware uses for itself are left out."""
+    emulated = byte & 0xF0 == DeviceFlag.EMULATED
+    return DeviceFlag(byte & 0x0F) | (DeviceFlag.EMULATED if emulated else DeviceFlag(0))
 
 
 class RawSample(NamedTuple):

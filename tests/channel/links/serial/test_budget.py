@@ -4,9 +4,19 @@ from __future__ import annotations
 
 import pytest
 
-from channel.links.serial.budget import byte_ns, check_down, check_slot_counter, check_up, command_bytes
+from channel.links.serial.budget import (
+    byte_ns,
+    check_down,
+    check_slot_counter,
+    check_up,
+    command_bytes,
+    least_rate_baud,
+    usual_rate_baud,
+)
 from channel.links.serial.wire import SerialWire
-from tests.channel.codec.parts import terms
+from tests.channel.codec.parts import pitch_codec, terms
+
+CODEC = pitch_codec()
 
 
 def test_when_the_papers_flight_is_budgeted_then_it_is_what_a_pencil_says() -> None:
@@ -14,14 +24,14 @@ def test_when_the_papers_flight_is_budgeted_then_it_is_what_a_pencil_says() -> N
     content = 8 + 5 + 3 * (2 + 8 + 20 * 2) + 2
     assert content == 165
     # One code byte, two delimiters.
-    assert command_bytes(terms(repeats=2), inputs=2) == content + 1 + 2 == 168
+    assert command_bytes(terms(repeats=2), CODEC) == content + 1 + 2 == 168
     assert byte_ns(1, 110) == pytest.approx(90.909e6, rel=1e-4)
     assert byte_ns(168, 115_200) == pytest.approx(14.583e6, rel=1e-4)
 
 
 def test_when_a_frame_is_long_then_the_code_bytes_of_every_254_count() -> None:
     content = 15 + 10 * 50
-    assert command_bytes(terms(repeats=9), inputs=2) == content + 3 + 2
+    assert command_bytes(terms(repeats=9), CODEC) == content + 3 + 2
 
 
 def test_when_the_line_is_just_fast_enough_then_it_is_allowed_and_below_it_is_refused() -> None:
@@ -29,13 +39,29 @@ def test_when_the_line_is_just_fast_enough_then_it_is_allowed_and_below_it_is_re
     with pytest.raises(ValueError, match=r"10 symbols/s x 1 byte x 10 line bits = 100 bit/s") as caught:
         check_up(terms(), 99)
     assert "line_rate_baud = 99" in str(caught.value)
-    check_down(terms(), 168, 16_800)
+    check_down(terms(), CODEC, 16_800)
     with pytest.raises(
         ValueError, match=r"168 bytes.* x 10 line bits x 10 samples/s = 16800"
     ) as caught:
-        check_down(terms(), 168, 16_799)
+        check_down(terms(), CODEC, 16_799)
     assert "--downlink" in str(caught.value)
     assert "2 repeats" in str(caught.value)
+    assert 'channel.downlink = "compact" at both ends, which needs 1900 baud' in str(caught.value)
+
+
+def test_when_the_downlink_is_compact_then_2400_baud_carry_the_papers_flight() -> None:
+    compact = terms(repeats=2, downlink="compact")
+    # One byte of mark, epoch and session; sample 8, digest 16, part 3, three echoes of 2 + 2 x 11 bits
+    # and 5 of padding; CRC 2.
+    content = 1 + (8 + 16 + 3 + 3 * (2 + 22) + 5) // 8 + 2
+    assert content == 16
+    assert command_bytes(compact, CODEC) == content + 1 + 2
+    assert least_rate_baud(compact, CODEC) == 1900
+    check_down(compact, CODEC, 1900)
+    with pytest.raises(ValueError, match=r"19 bytes.*= 1900 bit/s") as caught:
+        check_down(compact, CODEC, 1899)
+    assert "channel.downlink" not in str(caught.value)
+    assert [usual_rate_baud(rate) for rate in (1900, 2400, 2401, 10**6)] == [2400, 2400, 4800, 10**6]
 
 
 def test_when_bytes_take_a_fraction_of_a_nanosecond_then_it_is_rounded_up() -> None:

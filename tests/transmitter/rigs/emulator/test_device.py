@@ -47,7 +47,7 @@ def test_the_watchdog_cuts_and_stays_cut_until_disarmed() -> None:
     assert (one.enabled, one.volts, one.tripped) == (False, (0.0, 0.0), True)
     one.command(600 * MS, (2.0, 2.0), True)
     assert not one.enabled
-    assert one.sample(600 * MS).flags == DeviceFlag.WATCHDOG_TRIPPED
+    assert one.sample(600 * MS).flags == DeviceFlag.WATCHDOG_TRIPPED | DeviceFlag.EMULATED
     one.command(610 * MS, (0.0, 0.0), False)
     one.command(620 * MS, (2.0, 2.0), True)
     assert one.enabled

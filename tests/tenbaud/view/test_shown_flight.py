@@ -1,0 +1,59 @@
+"""`fly(show=True)` in a script: the live page of a flight of objects, in a real browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from benchmarks.browser import browser, served, state_is, why_no_browser
+from tenbaud import Run, errors, fly
+
+PROGRAM = """
+from tenbaud import errors, fly
+from tenbaud.plants import PitchParameters, PitchPlant
+
+plant = PitchPlant(PitchParameters().mismatched(0.1), 0.01)
+try:
+    fly("tuned-10baud", plant=plant, settings={"duration_s": 3600.0}, out="run", show=True)
+except errors.FlightFailed as error:
+    print(error)
+"""
+
+
+@pytest.mark.skipif(why_no_browser() is not None, reason=str(why_no_browser()))
+def test_a_flight_of_objects_opens_its_page_and_obeys_it(tmp_path: Path) -> None:
+    opener = tmp_path / "opener"
+    opener.write_text(f'#!/bin/sh\necho "$1" > {tmp_path}/opened\n')
+    opener.chmod(0o755)
+    opened = {"BROWSER": str(opener)}
+    with (
+        served(tmp_path, "-c", PROGRAM, program=(), environment=opened) as flight,
+        browser() as chromium,
+    ):
+        page = chromium.new_page()
+        page.goto(flight.url)
+        state_is(page, "lockstep", 60.0)
+        page.get_by_role("button", name="Corrupt the receiver's codec").click()
+        state_is(page, "broken", 60.0)
+        assert "interrupted" in flight.stop() or flight.process.returncode == 0
+    assert (tmp_path / "opened").read_text().startswith("file://")
+    run = Run(tmp_path / "run")
+    assert run.summary["desyncs"] == 1
+    kinds = {(event["kind"], event["end"]) for event in run.events}
+    assert {("control", "receiver"), ("desync", "transmitter")} <= kinds
+
+
+def test_a_pace_is_for_the_virtual_clock_and_above_zero(tmp_path: Path) -> None:
+    for wrong in ({"pace": 0.0}, {"pace": 1.0, "clock": "real", "link": "zenoh"}):
+        with pytest.raises(errors.ConfigError, match="pace slows the virtual clock down"):
+            fly("tuned-10baud", out=tmp_path / "run", **wrong)  # type: ignore[arg-type]
+        assert not (tmp_path / "run").exists()
+
+
+def test_a_flight_that_failed_gives_its_run(tmp_path: Path) -> None:
+    low = {"duration_s": 5.0, "link.impairments": "up:loss=0.97"}
+    with pytest.raises(errors.FlightFailed) as failed:
+        fly("tuned-10baud", settings=low, out=tmp_path / "run")
+    assert failed.value.run.summary["not_flown"]
+    assert str(failed.value).count(failed.value.run.summary["outcome"]) == 1

@@ -1,0 +1,239 @@
+"""Processes of `tenbaud` that start with everything imported.
+
+Most of a short flight is the start of its processes: each imports the same six hundred modules. Here a
+process is a copy (`fork`) of one that has imported them and has done nothing else: with streams,
+environment, folder and session of its own, and a child of the one that asked for it. What is said about
+starting, ending or finding processes is tested with ordinary ones, and so is whatever a shell starts:
+every command of the documentation.
+
+A process that starts others, as `tenbaud demo` does, keeps an untouched copy of itself for that; an
+ordinary one does so too, when it is started as `python -m tests.warm` in place of `python -m tenbaud`.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import importlib
+import io
+import json
+import os
+import platform
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import traceback
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+TOP = Path(__file__).parents[1]
+IMPORTED = (
+    *("tenbaud.cli.commands", "tenbaud.cli.nodes", "tenbaud.cli.demo", "tenbaud.flight.demo"),
+    *("tenbaud.flight.transmit", "tenbaud.flight.receive", "tenbaud.flight.fly", "tenbaud.build.ends"),
+    *("tenbaud.flight.screen", "channel.links.zenoh.link", "zenoh", "numpy"),
+)
+STARTS_OTHERS = ("demo", "figures")
+CLONE = {"x86_64": 56, "aarch64": 220}.get(platform.machine()) if sys.platform == "linux" else None
+"""The number of the system call that makes a copy."""
+CLONE_PARENT = 0x8000
+REQUEST_BYTES_MAX = 1 << 20
+NAME_BYTES_MAX = 4096
+READ_AT_START = ("PYTHON", "LANG", "LC_", "OMP_", "OPENBLAS_")
+"""Variables of these names count before anything is imported: a copy has those of its original."""
+
+
+class Popen(subprocess.Popen):  # type: ignore[type-arg]
+    """What starts `python -m tenbaud` as a copy where that is possible, and all else as always."""
+
+    server: Server | None = None
+
+    def _execute_child(self, args: Any, executable: Any, preexec_fn: Any, *rest: Any) -> None:
+        close_fds, pass_fds, cwd, env, _, _, shell = rest[:7]
+        pipes, (_, gid, gids, uid, umask, own_session) = rest[7:13], rest[13:19]
+        plain = not (shell or preexec_fn or pass_fds or executable) and close_fds
+        plain = plain and (gid, gids, uid, umask) == (None, None, None, -1)
+        words = [os.fsdecode(one) for one in args] if plain and not isinstance(args, str) else []
+        environment = dict(os.environ if env is None else env)
+        folder = os.fsdecode(cwd or os.getcwd())
+        copied = words[:3] == [sys.executable, "-m", "tenbaud"] and _is_same(folder, environment)
+        if self.server is None or not copied:
+            super()._execute_child(args, executable, preexec_fn, *rest)  # type: ignore[misc]
+            return
+        request = {
+            "arguments": words[3:],
+            "folder": folder,
+            "environment": environment,
+            "own_session": own_session,
+        }
+        places = (pipes[0], pipes[3], pipes[5])
+        streams = [own if own != -1 else number for number, own in enumerate(places)]
+        self.pid = self.server.start(request, streams)
+        self._child_created = True
+        self._close_pipe_fds(*pipes)  # type: ignore[attr-defined]
+
+
+def _is_same(folder: str, environment: Any) -> bool:
+    """Return whether a process there would import what this one does, and in the same way."""
+    for place in [folder, *environment.get("PYTHONPATH", "").split(os.pathsep)]:
+        if (Path(place or folder) / "tenbaud" / "__main__.py").is_file():
+            if Path(place or folder).resolve() != TOP:
+                return False  # a changed copy of the project
+            break
+    return _at_start(environment) == _at_start(os.environ)
+
+
+def _at_start(environment: Any) -> dict[str, str]:
+    names = [name for name in environment if name.startswith(READ_AT_START) and name != "PYTHONPATH"]
+    return {name: environment[name] for name in names}
+
+
+class Server:
+    """The side that asks; what makes the copies is started with the first request."""
+
+    def __init__(self, connection: socket.socket | None = None) -> None:
+        self._connection = connection
+        self._process: subprocess.Popen[bytes] | None = None
+        self._lock = threading.Lock()
+
+    def start(self, request: dict[str, Any], streams: list[int]) -> int:
+        """Return the number of a new process, a child of this one."""
+        with self._lock:
+            if self._connection is None:
+                self._start()
+            assert self._connection is not None
+            socket.send_fds(self._connection, [json.dumps(request).encode()], streams)
+            answer = self._connection.recv(64)
+        assert answer, "the process that is copied has ended"
+        return int(answer)
+
+    def close(self) -> None:
+        """End the process that is copied; its copies go on."""
+        if self._connection is not None:
+            self._connection.close()
+        if self._process is not None:
+            self._process.wait()
+
+    def _start(self) -> None:
+        self._connection, its = _pair()
+        code = f"import sys; sys.path.insert(0, {str(TOP)!r}); from tests import warm; "
+        # The last argument is where a copy writes its own command line.
+        command = [sys.executable, "-c", f"{code}warm.main({its.fileno()})", "-" * NAME_BYTES_MAX]
+        self._process = subprocess.Popen(command, pass_fds=[its.fileno()], stdin=subprocess.DEVNULL)
+        its.close()
+
+
+def _pair() -> tuple[socket.socket, socket.socket]:
+    ours, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, REQUEST_BYTES_MAX)
+    return ours, its
+
+
+def load() -> None:
+    """Import what a process of `tenbaud` needs."""
+    for name in IMPORTED:
+        importlib.import_module(name)
+    gc.freeze()
+
+
+def main(number: int) -> None:
+    """Import, and make copies until the other side has gone."""
+    load()
+    serve(socket.socket(fileno=number))
+    os._exit(0)
+
+
+def serve(connection: socket.socket) -> None:
+    """Make copies until the other side has gone."""
+    while True:
+        data, streams, _, _ = socket.recv_fds(connection, REQUEST_BYTES_MAX, 3)
+        if not data:
+            return
+        assert len(os.listdir("/proc/self/task")) == 1, "a copy has one thread alone"
+        number = _copy()
+        if number == 0:
+            connection.close()
+            _begin(json.loads(data), streams)
+        connection.send(str(number).encode())
+        for stream in streams:
+            os.close(stream)
+
+
+def _copy() -> int:
+    """Fork; the copy is a child of this process' parent."""
+    api = ctypes.pythonapi
+    api.PyOS_BeforeFork()
+    number = ctypes.PyDLL(None).syscall(CLONE, CLONE_PARENT | signal.SIGCHLD, 0, 0, 0, 0)
+    if number == 0:
+        api.PyOS_AfterFork_Child()
+    else:
+        api.PyOS_AfterFork_Parent()
+    return int(number)
+
+
+def _begin(request: dict[str, Any], streams: list[int]) -> None:
+    """Become the process that was asked for; never return."""
+    code = 1
+    try:
+        if request["own_session"]:
+            os.setsid()
+        if request["arguments"][:1] and request["arguments"][0] in STARTS_OTHERS:
+            keep_a_copy()
+        for number, stream in enumerate(streams):
+            os.dup2(stream, number)
+            os.close(stream)
+        os.chdir(request["folder"])
+        os.environ.clear()
+        os.environ.update(request["environment"])
+        path = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+        sys.path[:] = [os.getcwd(), *filter(None, path), *(one for one in sys.path if one != str(TOP))]
+        importlib.invalidate_caches()
+        sys.stdin = open(0, closefd=False)  # noqa: SIM115
+        sys.stdout = io.TextIOWrapper(io.FileIO(1, "w", closefd=False), "utf-8")
+        sys.stderr = io.TextIOWrapper(
+            io.FileIO(2, "w", closefd=False), "utf-8", "backslashreplace", line_buffering=True
+        )
+        sys.argv[:] = [str(TOP / "tenbaud" / "__main__.py"), *request["arguments"]]
+        _show([sys.executable, "-m", "tenbaud", *request["arguments"]])
+        importlib.import_module("tenbaud.cli.app").main()
+    except SystemExit as ended:
+        code = ended.code if isinstance(ended.code, int) else 1
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(OSError, ValueError):
+                stream.flush()
+        os._exit(code)
+
+
+def _show(words: list[str]) -> None:
+    """Write a command line where the system looks for it."""
+    fields = Path("/proc/self/stat").read_text().rpartition(")")[2].split()
+    start, end = int(fields[45]), int(fields[46])
+    line = "\0".join([*words, ""]).encode(errors="surrogateescape")
+    if len(line) < end - start:
+        ctypes.memmove(start, line.ljust(end - start, b"\0"), end - start)
+
+
+def keep_a_copy() -> None:
+    """Let an untouched copy of this process start what it starts."""
+    ours, its = _pair()
+    if os.fork() == 0:
+        ours.close()
+        serve(its)
+        os._exit(0)
+    its.close()
+    Popen.server = Server(ours)
+    subprocess.Popen = Popen  # type: ignore[misc]
+
+
+if __name__ == "__main__":
+    from tests import warm
+
+    if sys.argv[1:2] and sys.argv[1] in STARTS_OTHERS and CLONE is not None:
+        warm.load()
+        warm.keep_a_copy()
+    importlib.import_module("tenbaud.cli.app").main()

@@ -84,8 +84,8 @@ class Confirmed(NamedTuple):
     lag_samples: int
     """samples heard of beyond this one"""
     doubt: float
-    """share of other inputs of this sample which led to the same state later, so that nothing can tell
-    them apart; 0 with a codec that forgets nothing"""
+    """at most the share of other inputs of this sample which led to the same state later, so that nothing
+    can tell them apart; 0 with a codec that forgets nothing"""
 
 
 class Hypotheses:
@@ -179,8 +179,8 @@ class Hypotheses:
     def command(self, tick: int) -> Vector:
         """Return the command to apply at a tick: the weighted mean of what the hypotheses command.
 
-        Hypotheses are carried to the last word sent. The tick must be one whose command follows from
-        these words; ValueError for one that does not.
+        Hypotheses are carried to the last word sent. What does not follow from these words is the last
+        command that does.
         """
         total, mean = 0.0, [0.0] * self.machine.codec.model.input_size
         for weight, node in self._carried():
@@ -212,7 +212,8 @@ class Hypotheses:
             if tip is not None:
                 ahead.append((weight, tip))
         if not ahead:
-            ahead = [(1.0, self._paths.root)]
+            # None can be carried: what comes down next will show it.
+            ahead = kept[:1]
         self._ahead = ahead
         return ahead
 
@@ -227,17 +228,15 @@ class Hypotheses:
         one: Node | None = node
         while one is not None:
             ahead = tick - one.state.sample * count
-            if ahead >= 0:
-                if ahead < len(one.state.commands):
-                    return one.state.commands[ahead]
-                break
+            if 0 <= ahead < len(one.state.commands):
+                return one.state.commands[ahead]
             at = tick - self.machine.lead_ticks - one.sample * count
             if 0 <= at < len(one.commands):
                 return one.commands[at]
+            if ahead >= 0:
+                break
             one = one.parent
-        raise ValueError(
-            f"tick {tick} is not one whose command follows from the words up to sample {node.sample}"
-        )
+        return node.state.hold
 
     # What comes down
 
@@ -283,6 +282,7 @@ class Hypotheses:
         least = branches[0][0] * self.settings.dropped_below
         members: dict[TwoWayState, tuple[float, Node]] = {}
         dropped = list(spilled)
+        whole = sum(one[0] for one in branches) or 1.0
         for weight, node, word, symbols in branches:
             followed = weight >= least and weight > 0.0 and len(members) < self.settings.list_max
             child = node.child(self.machine, word, symbols) if followed else None
@@ -291,7 +291,7 @@ class Hypotheses:
             elif child.state in members:
                 other, kept = members[child.state]
                 members[child.state] = (other + weight, kept)
-                kept.doubt(child, weight / (other + weight))
+                kept.doubt(child, weight / whole)
             else:
                 members[child.state] = (weight, child)
         for _, node in self._members:

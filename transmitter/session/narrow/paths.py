@@ -48,7 +48,7 @@ class Node:
         self.commands: list[Vector] = [] if flown is None else flown.commands
         self.on_path = False
         self.doubted = 0.0
-        """largest share of a history that ended in the same state, and has other inputs here"""
+        """share of the histories that came to the state of one through here, with other inputs"""
         self.children: dict[tuple[Word, Symbols], Node | None] = {}
         """samples flown on top of it; None: cannot be flown"""
 
@@ -74,7 +74,7 @@ class Node:
         two: Node | None = other
         while one is not None and two is not None and one is not two:
             if (one.word, one.symbols) != (two.word, two.symbols) or one.state != two.state:
-                one.doubted = max(one.doubted, share)
+                one.doubted += share
             one, two = one.parent, two.parent
 
 

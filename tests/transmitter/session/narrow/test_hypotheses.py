@@ -7,6 +7,7 @@ import math
 import pytest
 
 from channel.codec.codec import ERASED, Alphabet, Codec, Vector, Word
+from channel.codec.downlink.coded import CodedCommands, held_inputs
 from channel.codec.downlink.layout import Layout
 from channel.codec.downlink.machine import TwoWay
 from tests.simulation.narrow import Faults, NarrowFlight, mirrored, square
@@ -82,8 +83,7 @@ def test_what_is_applied_is_the_weighted_mean_of_what_the_hypotheses_command() -
     assert len(commands) == 3
     assert hypotheses.command(3) == pytest.approx(tuple(mean), abs=0.005)
     assert hypotheses.command(3) not in commands
-    with pytest.raises(ValueError, match="tick 10 is not one"):
-        hypotheses.command(10)
+    assert hypotheses.command(10) == pytest.approx(hypotheses.command(9))
 
 
 def test_commands_of_words_on_their_way_are_predicted_and_replaced_by_what_comes() -> None:
@@ -133,6 +133,36 @@ def test_where_hypotheses_ask_for_different_words_the_likely_and_large_error_dec
     near = angles[-1] - 1e-6
     assert machine.codec.encode(hypotheses.state_before_next(), (near,)) == (-1,)
     assert hypotheses.encode((near,)) == (1,)
+
+
+class Forgetful(ThreeByTwo):
+    """Remembers its last word alone."""
+
+    alphabet = Alphabet((-1, 1), 1)
+
+    def decode(self, coder: Vector, state: Vector, word: Word) -> tuple[Vector, Vector]:
+        return (0.0, 0.0), (0.0 if word is None else float(word[0]),)
+
+
+def test_histories_that_come_to_one_state_are_confirmed_together_and_say_so() -> None:
+    codec = Codec(mirrored(Layout(2), 12).codec.model, Forgetful(), 10)
+    scheme = CodedCommands((0.0, 0.0), held_inputs((5.0, 5.0)))
+    machine = TwoWay(codec, scheme, Layout(2), 0, (0.0, 0.0), (5.0, 5.0), (math.inf, math.inf))
+    hypotheses, state, found = Hypotheses(machine), machine.initial(), {}
+    for sample in range(60):
+        hypotheses.sent((1,))
+        flown, symbols = machine.fly(
+            state, ERASED if sample == 20 else (1,), lambda tick, live: (1.0, 1.0)
+        )
+        state = flown.state
+        # Nothing that depends on the word of sample 20 arrives.
+        heard = (symbols[0], None) if sample in (20, 21) else symbols
+        found.update({one.sample: one for one in hypotheses.heard(sample, heard)})
+    assert len(found) > 40
+    others = [one.doubt for sample, one in found.items() if 10 < sample != 20]
+    assert 5.0 * max(others) < found[20].doubt < 0.1
+    assert found[20].word == (1,)
+    assert found[22].before == found[21].flown.state
 
 
 def test_a_word_of_several_symbols_branches_into_one_changed_symbol_and_the_rest() -> None:

@@ -84,8 +84,8 @@ class Confirmed(NamedTuple):
     lag_samples: int
     """samples heard of beyond this one"""
     doubt: float
-    """at most the share of other inputs of this sample which led to the same state later, so that nothing
-    can tell them apart; 0 with a codec that forgets nothing"""
+    """at most the share of other inputs of this sample which led to the same state later, so that
+    nothing can tell them apart; 0 with a codec that forgets nothing"""
 
 
 class Hypotheses:

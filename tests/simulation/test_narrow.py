@@ -11,10 +11,16 @@ import pytest
 
 from channel.codec.codec import Word
 from channel.codec.downlink.coded import CodedDirection
+from channel.codec.downlink.laws import MirroredFeedback, check_law
 from channel.codec.downlink.layout import Layout
 from channel.codec.downlink.machine import TwoWay
+from channel.codec.downlink.mirrored import MirroredLaw, SetPointRange
 from receiver.controllers.pid import PAPER_GAINS, Pid
 from receiver.controllers.references import Square
+from receiver.controllers.state_feedback import StateFeedback
+from tenbaud.build.codec import build_codec
+from tenbaud.build.controllers import build_controller
+from tenbaud.config.load import load_config
 from tests.channel.codec.downlink.test_machine import SCHEMES, machine, wanted
 from tests.simulation.narrow import (
     TICK_S,
@@ -123,6 +129,36 @@ def test_any_model_with_any_scheme_is_followed_through_erasures_and_flips(at: in
     assert wrong == 0
     assert hypotheses.rejoin is None
     assert confirmed > 60
+
+
+@pytest.mark.parametrize("preset", ["helicopter-20baud", "pendulum-16baud"])
+def test_the_law_and_the_coder_of_a_preset_are_followed(preset: str) -> None:
+    config = load_config(preset)
+    codec, controller = build_codec(config), build_controller(config)
+    assert isinstance(controller, StateFeedback)
+    largest = controller._command_max
+    law = MirroredFeedback(controller.law, largest, controller.tick_s)
+    check_law(law, codec.model)
+    rest = codec.model.measured(codec.model.initial())
+    ranges = [SetPointRange(at, one - 1.0, one + 1.0, one) for at, one in enumerate(rest)]
+    scheme = MirroredLaw(law, ranges, len(rest), 9, 20, LAYOUT)
+    none = (0.0,) * len(largest)
+    two_way = TwoWay(codec, scheme, LAYOUT, 0, none, largest, (math.inf,) * len(largest))
+    hypotheses, state, chance = Hypotheses(two_way), two_way.initial(), random.Random(1)
+    truth = []
+    for sample in range(70):
+        sent = (chance.choice((-1, 1)),)
+        hypotheses.sent(sent)
+        word: Word = None if chance.random() < 0.05 else sent
+        flown, symbols = two_way.fly(
+            state, word, lambda tick, live: (rest[0] + 0.3 * (tick > 40 * TICKS), *rest[1:])
+        )
+        truth.append((word, symbols, state))
+        state = flown.state
+        heard = [None if chance.random() < 0.05 else symbol for symbol in symbols]
+        for done in hypotheses.heard(sample, heard):
+            assert (done.word, done.symbols, done.before) == truth[done.sample]
+    assert hypotheses.next_confirmed > 35
 
 
 @pytest.mark.parametrize("at_receiver", [True, False])

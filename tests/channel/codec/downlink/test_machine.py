@@ -52,7 +52,7 @@ def words(count: int) -> list[Word]:
     return [chance.choice(several) for _ in range(count)]
 
 
-SCHEMES = [
+SCHEMES: list[tuple[Scheme, Layout]] = [
     (mirrored_law(Layout(2)), Layout(2)),
     (mirrored_law(Layout(3, 2, 4), 9), Layout(3, 2, 4)),
     (mirrored_law(Layout(1, 1, 8)), Layout(1, 1, 8)),

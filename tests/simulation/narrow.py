@@ -221,8 +221,7 @@ class NarrowFlight:
         if at_receiver:
             self.state = _corrupted(self.state)
             return
-        for _, node in self.hypotheses._members:
-            node.state = _corrupted(node.state)
+        self.hypotheses.sabotage(_corrupted)
 
     def fly(self, samples: int) -> Result:
         for _ in range(samples):

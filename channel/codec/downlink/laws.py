@@ -140,7 +140,8 @@ def _findings(function: object, seen: set[object]) -> list[str]:
     line = function.__code__.co_firstlineno
     module_is_math = False
     for one in dis.get_instructions(function):
-        line = one.starts_line if type(one.starts_line) is int else line
+        here = getattr(one, "line_number", one.starts_line)  # from Python 3.13 on it is the former
+        line = here if type(here) is int else line
         reason = ""
         name = one.argval
         if one.opname == "BINARY_OP" and one.argrepr.rstrip("=") in ("**", "@", "%", "//"):

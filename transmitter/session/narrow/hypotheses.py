@@ -15,7 +15,7 @@ likeliest path in it or before it, list and rest, weighs less than `confirmed_be
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from enum import Enum
 from typing import NamedTuple
 
@@ -144,6 +144,11 @@ class Hypotheses:
     def members(self) -> list[tuple[float, TwoWayState]]:
         """Return the hypotheses: (weight, state before `next_heard`); the weights sum to one."""
         return [(weight, node.state) for weight, node in self._members]
+
+    def sabotage(self, change: Callable[[TwoWayState], TwoWayState]) -> None:
+        """Change the state of every hypothesis, to see that it is found."""
+        self._members = [(weight, node.changed(change)) for weight, node in self._members]
+        self._ahead = None
 
     # What is used
 

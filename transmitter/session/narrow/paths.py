@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from channel.codec.codec import Vector, Word
 from channel.codec.downlink.machine import TwoWay, TwoWaySample, TwoWayState
 from channel.errors import CodecDiverged
@@ -63,6 +65,12 @@ class Node:
             else:
                 self.children[key] = Node(self, self.sample + 1, word, symbols, flown.state, flown)
         return self.children[key]
+
+    def changed(self, change: Callable[[TwoWayState], TwoWayState]) -> Node:
+        """Change the state after this sample; return the node."""
+        self.state = change(self.state)
+        self.children = {}
+        return self
 
     def forget(self) -> None:
         """Let go of the samples before it."""

@@ -73,10 +73,12 @@ $(FLY): pyproject.toml
 		echo "tenbaud needs Python 3.11 or newer with venv and ensurepip; none was found on PATH." >&2; \
 		echo "Install one (Debian: python3 and python3-venv) or name it: make PYTHON=/path/to/python" >&2; \
 		exit 1; }
+	@echo "installing what flying needs into $(VENV), the first time only: a minute, or several on a slow network"
 	@test -x $(BIN)/python || "$(PYTHON)" -m venv $(VENV)
-	$(INSTALL) .
+	@$(INSTALL) .
 	@touch $@
 
 $(DEVELOP): $(FLY)
-	$(INSTALL) '.[dev]'
+	@echo "installing what the tests need beside it, the first time only: several minutes"
+	@$(INSTALL) '.[dev]'
 	@touch $@

@@ -20,7 +20,6 @@ from tenbaud.recording.style import legend_above, new_figure, save
 
 PRESETS = {20.0: "pendulum-20baud", 15.8: "pendulum-16baud", 12.7: "pendulum-13baud"}
 RATES = (*PRESETS, 11.0, 10.0)  # bit/s
-SECONDS = 12.0
 
 
 def settings_for(rate: float) -> dict[str, object]:
@@ -42,15 +41,16 @@ if __name__ == "__main__":
     for rate, colour in zip(RATES, COLOURS, strict=False):
         try:
             own = {} if rate in PRESETS else settings_for(rate)
-            run = fly(PRESETS.get(rate, "pendulum-13baud"), settings={**own, "duration_s": SECONDS})
+            run = fly(PRESETS.get(rate, "pendulum-13baud"), settings={**own, "duration_s": 12.0})
             outcome = "stays up"
         except errors.FlightFailed as error:
-            run, outcome = error.run, "falls"
+            if (flown := error.run) is None or "the plant fell" not in flown.summary["not_flown"]:
+                raise
+            run, outcome = flown, "falls"
         except errors.ConfigError as error:
             print(f"{rate:4.1f} bit/s  refused: {error}")
             continue
-        angle = np.degrees(run.angle)
-        rms = np.sqrt(np.mean(np.degrees(run.error_live) ** 2))
+        angle, rms = np.degrees(run.angle), np.degrees(np.sqrt(np.mean(run.error_live**2)))
         most = f"at most {abs(angle).max():.2f} deg from upright"
         print(f"{rate:4.1f} bit/s  {outcome:8}  estimate error {rms:.2f} deg rms, {most}")
         panel.plot(run.time_s, angle, color=colour, linewidth=0.9, label=f"{rate:g} bit/s: {outcome}")

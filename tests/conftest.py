@@ -52,10 +52,14 @@ LONGEST_FIRST = (
 """What takes or waits longest: started last, it would keep one worker busy and the others idle."""
 
 COMPILED_BEFORE = "[docs/howto/your-log.md]"
-"""A page that flies what those above compile: it comes when they are through."""
+"""A page that flies what those above compile: it begins after they have begun, and so finds most of
+their machine code; nothing makes it wait for them."""
 
 COLD = (
     "tests/tenbaud/endings/",
+    "tests/tenbaud/test_fire.py",
+    "tests/tenbaud/test_restarts.py",
+    "tests/tenbaud/test_not_flown.py",
     "tests/tenbaud/view/test_gate.py",
     "tests/tenbaud/view/test_beside.py",
     "tests/network/",

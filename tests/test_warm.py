@@ -77,3 +77,56 @@ def test_what_counts_before_the_first_import_starts_an_ordinary_process(tmp_path
     environment = {**os.environ, "PYTHONSAFEPATH": "", "PYTHONPATH": str(tmp_path)}
     done = subprocess.run([*TENBAUD], cwd=tmp_path, env=environment, capture_output=True, check=True)
     assert done.stdout == b"no copy"
+
+
+END = """
+import atexit, sys, threading, time
+from tests import warm
+threading.Thread(target=lambda: (time.sleep(0.2), print("thread"))).start()
+atexit.register(print, "exit")
+try:
+    raise {error}
+except BaseException as error:
+    warm._end(error)
+"""
+
+
+@pytest.mark.parametrize(
+    "error", ["SystemExit", "SystemExit(3)", "SystemExit('why')", "KeyboardInterrupt", "ValueError"]
+)
+def test_a_copy_ends_as_python_does(error: str) -> None:
+    environment = {**os.environ, "PYTHONPATH": str(warm.TOP)}
+    code = END.format(error=error)
+    ended = [
+        subprocess.run([sys.executable, "-c", one], capture_output=True, text=True, env=environment)
+        for one in (code, code.replace("warm._end(error)", "raise"))
+    ]
+    assert ended[0].returncode == ended[1].returncode
+    assert ended[0].stdout == ended[1].stdout == "thread\nexit\n"
+    assert ended[0].stderr.splitlines()[-1:] == ended[1].stderr.splitlines()[-1:]
+
+
+def test_when_what_is_copied_has_ended_then_an_ordinary_process_starts_and_then_a_copy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    server = warm.Server()
+    monkeypatch.setattr(warm.Popen, "server", server)
+    presets = [*TENBAUD, "presets"]
+    made: list[int | None] = []
+    start = server.start
+    monkeypatch.setattr(server, "start", lambda *given: made.append(start(*given)) or made[-1])
+    try:
+        subprocess.run(presets, cwd=tmp_path, capture_output=True, check=True)
+        assert server._process is not None
+        server._process.kill()
+        for _ in range(2):
+            subprocess.run(presets, cwd=tmp_path, capture_output=True, check=True)
+        assert [number is None for number in made] == [False, True, False]
+        with monkeypatch.context() as patch:
+            patch.setenv("OMP_NUM_THREADS", "7")
+            subprocess.run(presets, cwd=tmp_path, capture_output=True, check=True)
+        assert made[3:] == [None], "it was not started with that"
+        subprocess.run(presets, cwd=tmp_path, capture_output=True, check=True, process_group=0)
+        assert len(made) == 4
+    finally:
+        server.close()

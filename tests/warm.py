@@ -12,6 +12,7 @@ ordinary one does so too, when it is started as `python -m tests.warm` in place 
 
 from __future__ import annotations
 
+import atexit
 import ctypes
 import gc
 import importlib
@@ -52,16 +53,13 @@ class Popen(subprocess.Popen):  # type: ignore[type-arg]
 
     def _execute_child(self, args: Any, executable: Any, preexec_fn: Any, *rest: Any) -> None:
         close_fds, pass_fds, cwd, env, _, _, shell = rest[:7]
-        pipes, (_, gid, gids, uid, umask, own_session) = rest[7:13], rest[13:19]
+        pipes, (_, gid, gids, uid, umask, own_session, group) = rest[7:13], rest[13:20]
         plain = not (shell or preexec_fn or pass_fds or executable) and close_fds
-        plain = plain and (gid, gids, uid, umask) == (None, None, None, -1)
+        plain = plain and (gid, gids, uid, umask, group) == (None, None, None, -1, -1)
         words = [os.fsdecode(one) for one in args] if plain and not isinstance(args, str) else []
         environment = dict(os.environ if env is None else env)
         folder = os.fsdecode(cwd or os.getcwd())
         copied = words[:3] == [sys.executable, "-m", "tenbaud"] and _is_same(folder, environment)
-        if self.server is None or not copied:
-            super()._execute_child(args, executable, preexec_fn, *rest)  # type: ignore[misc]
-            return
         request = {
             "arguments": words[3:],
             "folder": folder,
@@ -70,19 +68,23 @@ class Popen(subprocess.Popen):  # type: ignore[type-arg]
         }
         places = (pipes[0], pipes[3], pipes[5])
         streams = [own if own != -1 else number for number, own in enumerate(places)]
-        self.pid = self.server.start(request, streams)
+        started = self.server.start(request, streams) if self.server is not None and copied else None
+        if started is None:
+            super()._execute_child(args, executable, preexec_fn, *rest)  # type: ignore[misc]
+            return
+        self.pid = started
         self._child_created = True
         self._close_pipe_fds(*pipes)  # type: ignore[attr-defined]
 
 
 def _is_same(folder: str, environment: Any) -> bool:
-    """Return whether a process there would import what this one does, and in the same way."""
+    """Return whether a process there would import the project that is here."""
     for place in [folder, *environment.get("PYTHONPATH", "").split(os.pathsep)]:
         if (Path(place or folder) / "tenbaud" / "__main__.py").is_file():
             if Path(place or folder).resolve() != TOP:
                 return False  # a changed copy of the project
             break
-    return _at_start(environment) == _at_start(os.environ)
+    return True
 
 
 def _at_start(environment: Any) -> dict[str, str]:
@@ -95,19 +97,30 @@ class Server:
 
     def __init__(self, connection: socket.socket | None = None) -> None:
         self._connection = connection
+        self._environment = _at_start(os.environ)
         self._process: subprocess.Popen[bytes] | None = None
         self._lock = threading.Lock()
 
-    def start(self, request: dict[str, Any], streams: list[int]) -> int:
-        """Return the number of a new process, a child of this one."""
+    def start(self, request: dict[str, Any], streams: list[int]) -> int | None:
+        """Return the number of a new process, a child of this one; None where it has to be another.
+
+        What is copied may have been started in another environment, or it has ended: a new one is then
+        started for the next request.
+        """
         with self._lock:
+            own = _at_start(os.environ) if self._connection is None else self._environment
+            if _at_start(request["environment"]) != own:
+                return None
             if self._connection is None:
                 self._start()
             assert self._connection is not None
-            socket.send_fds(self._connection, [json.dumps(request).encode()], streams)
-            answer = self._connection.recv(64)
-        assert answer, "the process that is copied has ended"
-        return int(answer)
+            answer = b""
+            with suppress(OSError):
+                socket.send_fds(self._connection, [json.dumps(request).encode()], streams)
+                answer = self._connection.recv(64)
+            if not answer:
+                self.close()
+        return int(answer or 0) or None
 
     def close(self) -> None:
         """End the process that is copied; its copies go on."""
@@ -115,8 +128,10 @@ class Server:
             self._connection.close()
         if self._process is not None:
             self._process.wait()
+        self._connection = self._process = None
 
     def _start(self) -> None:
+        self._environment = _at_start(os.environ)
         self._connection, its = _pair()
         code = f"import sys; sys.path.insert(0, {str(TOP)!r}); from tests import warm; "
         # The last argument is where a copy writes its own command line.
@@ -156,7 +171,7 @@ def serve(connection: socket.socket) -> None:
         if number == 0:
             connection.close()
             _begin(json.loads(data), streams)
-        connection.send(str(number).encode())
+        connection.send(str(max(number, 0)).encode())  # 0: there was no room for another process
         for stream in streams:
             os.close(stream)
 
@@ -175,7 +190,7 @@ def _copy() -> int:
 
 def _begin(request: dict[str, Any], streams: list[int]) -> None:
     """Become the process that was asked for; never return."""
-    code = 1
+    ended: BaseException | None = None
     try:
         if request["own_session"]:
             os.setsid()
@@ -198,14 +213,31 @@ def _begin(request: dict[str, Any], streams: list[int]) -> None:
         sys.argv[:] = [str(TOP / "tenbaud" / "__main__.py"), *request["arguments"]]
         _show([sys.executable, "-m", "tenbaud", *request["arguments"]])
         importlib.import_module("tenbaud.cli.app").main()
-    except SystemExit as ended:
-        code = ended.code if isinstance(ended.code, int) else 1
-    except BaseException:
-        traceback.print_exc()
+    except BaseException as error:
+        ended = error
     finally:
+        _end(ended)
+
+
+def _end(ended: BaseException | None) -> None:
+    """End as Python does: its threads, what is done at exit, the streams, then a code or SIGINT."""
+    code = 0 if ended is None else 1
+    try:
+        if isinstance(ended, SystemExit):
+            code = (ended.code or 0) if isinstance(ended.code, int | None) else 1
+            if code == 1 and not isinstance(ended.code, int):
+                print(ended.code, file=sys.stderr)
+        elif ended is not None:
+            traceback.print_exception(ended)
+        threading._shutdown()  # type: ignore[attr-defined]
+        atexit._run_exitfuncs()
         for stream in (sys.stdout, sys.stderr):
             with suppress(OSError, ValueError):
                 stream.flush()
+        if isinstance(ended, KeyboardInterrupt):
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
+            os.kill(os.getpid(), signal.SIGINT)
+    finally:
         os._exit(code)
 
 

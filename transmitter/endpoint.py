@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterable
 from dataclasses import asdict, astuple, replace
 
 from channel.codec.codec import Vector
-from channel.line.line import Delivery, Inlet, Uplink
+from channel.line.line import Delivery, Inlet, Uplink, no_compact_commands
 from channel.line.meters import LatenessMeter
 from channel.protocol.endings import End
 from channel.protocol.events import Event, EventKind, write_event
-from channel.protocol.frames import Frame, Why
+from channel.protocol.frames import Frame, ShortCommands, Why
 from channel.protocol.recording import NullRecorder, Recorder
 from transmitter.encoder_watch import EncoderWatch
 from transmitter.guard import Guard, GuardCause, GuardReason, GuardState
@@ -57,6 +57,8 @@ class TransmitterNode:
         self.commands_late = 0
         self.ticks_commanded = 0
         """whose own command passed the guard"""
+        self.ticks_at_limit = 0
+        """of these, with an input at its limit"""
         self.ticks_down = 0
         """with the guard at the safe voltage, or on its way there"""
         self.sensor_fault: GuardReason | None = None
@@ -143,7 +145,9 @@ class TransmitterNode:
         self.commands_late += late
         volts = self.guard.apply(tick, command, session.owing.owed_ticks(tick))
         self.ticks_down += self.guard.stopped
-        self.ticks_commanded += command is not None and not self.guard.stopped
+        if command is not None and not self.guard.stopped:
+            self.ticks_commanded += 1
+            self.ticks_at_limit += session.terms.limits.reached(command)
         self.rig.write(tick, volts)
         self._applied = volts if reading.applied_volts is None else reading.applied_volts
         time_ns = tick * self.session.terms.tick_ns
@@ -228,7 +232,7 @@ class TransmitterEndpoint:
     def __init__(self, node: TransmitterNode, uplink: Uplink) -> None:
         self.node = node
         self.uplink = uplink
-        self.inlet = Inlet(uplink.wire, node.on_malformed)
+        self.inlet = Inlet(uplink.wire, node.on_malformed, self._require_whole)
         self.lateness = LatenessMeter()
         """of the ticks; on the virtual clock none is late"""
         self.ticks_missed = 0
@@ -239,6 +243,13 @@ class TransmitterEndpoint:
         self._end_tick = 0
         self._tick_ns = node.session.terms.tick_ns
         self._lateness_ns = 0
+
+    def _require_whole(self, frame: ShortCommands) -> None:
+        session = self.node.session
+        if session.compact is None:
+            no_compact_commands(frame)
+        else:
+            session.compact.require_whole(frame, session.session_number)
 
     @property
     def greeting(self) -> bool:

@@ -90,11 +90,22 @@ class Outbox:
         return due
 
 
+def no_compact_commands(frame: ShortCommands) -> None:
+    """Raise FrameError: where none are expected they are damaged frames of other kinds."""
+    raise FrameError("checksum")
+
+
 class Inlet:
-    """Turns messages into frames. `on_malformed` is called with the reason when one is dropped."""
+    """Turns messages into frames. `on_malformed` is called with the reason when one is dropped.
+
+    `require_whole` raises FrameError for compact commands that are damaged, as only a session can tell.
+    """
 
     def __init__(
-        self, wire: Wire = DATAGRAM, on_malformed: Callable[[str], None] | None = None
+        self,
+        wire: Wire = DATAGRAM,
+        on_malformed: Callable[[str], None] | None = None,
+        require_whole: Callable[[ShortCommands], None] = no_compact_commands,
     ) -> None:
         self.wire = wire
         self.wire_bytes = 0
@@ -104,12 +115,15 @@ class Inlet:
         """of command frames, without a line's framing"""
         self.malformed = 0
         self._on_malformed = on_malformed
+        self._require_whole = require_whole
 
     def take(self, data: bytes) -> Frame | None:
         size = self.wire.size(data)
         self.wire_bytes += size
         try:
             frame = self.wire.decode(data)
+            if isinstance(frame, ShortCommands):
+                self._require_whole(frame)
         except FrameError as error:
             self.malformed += 1
             if self._on_malformed is not None:

@@ -34,18 +34,23 @@ class LatenessMeter:
 
 
 class BaudMeter:
-    """Measures symbols per second on the receiver's clock, over its last 5 s."""
+    """Measures symbols per second on the receiver's clock: of its last 5 s and of the whole flight."""
 
     SPAN_NS = 5_000_000_000
 
     def __init__(self) -> None:
         self._times_ns: deque[int] = deque()
-        self._last_ns = 0
+        self._last_ns = self._first_came_ns = self._last_came_ns = 0
+        self._came = 0
 
     def on_slot(self, now_ns: int, *, came: bool) -> None:
         """Count a slot that is decided now; `came`: its symbol is there."""
         self._last_ns = now_ns
         if came:
+            if not self._came:
+                self._first_came_ns = now_ns
+            self._last_came_ns = now_ns
+            self._came += 1
             self._times_ns.append(now_ns)
         # The last symbol before the span bounds its first interval.
         while len(self._times_ns) > 1 and self._times_ns[1] <= now_ns - self.SPAN_NS:
@@ -53,8 +58,16 @@ class BaudMeter:
 
     @property
     def baud(self) -> float | None:
-        """Return the measured rate; None before two symbols came at different times."""
+        """Return the rate of the last 5 s; None before two symbols came at different times."""
         if not self._times_ns:
             return None
-        span_ns = self._last_ns - self._times_ns[0]
-        return (len(self._times_ns) - 1) * 1e9 / span_ns if span_ns > 0 else None
+        return _rate(len(self._times_ns), self._last_ns - self._times_ns[0])
+
+    @property
+    def whole_baud(self) -> float | None:
+        """Return the rate from the first symbol to the last one; None as with `baud`."""
+        return _rate(self._came, self._last_came_ns - self._first_came_ns)
+
+
+def _rate(came: int, span_ns: int) -> float | None:
+    return (came - 1) * 1e9 / span_ns if span_ns > 0 else None

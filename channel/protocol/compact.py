@@ -6,10 +6,13 @@ Bits in order, the highest first, and zeros up to a whole byte. An echo, the new
 number (an erasure is the one after the last word) and one command for each input, held over all ticks
 of the sample. Session, epoch and sample are what remains of them after division by 16, by 4 and by 2 to
 the power of the sample's bits; the sample is the one nearest to where the transmitter's clock stands.
-Before the first sample of an epoch echoes are zeros.
+Before the first sample of an epoch echoes are zeros. The CRC covers all 32 bits of the session, which
+are not sent, and then the frame.
 
 A command is a number of *held steps* of its input: the steps of a full frame, or as many of them
-together as make the input's limit fit `COMMAND_BITS`. So both codecs use exactly what came.
+together as make the input's limit fit `HELD_BITS`. So both codecs use exactly what came. From sample to
+sample it changes by one tick's slew at most: it changes at one tick, and the guard beside the motors
+allows no more.
 
 Of the newest sample's digest the low 16 bits are here and three of the others: those of sample `k`
 begin at bit `16 + 3 (k mod 16)`. So two states that differ stay unseen for `n` samples with a
@@ -18,15 +21,16 @@ probability of 2^(-19 n), and a difference in any one bit of the digests for 15 
 
 from __future__ import annotations
 
+from binascii import crc_hqx
 from collections.abc import Sequence
 
 from channel.codec.codec import WIRE_ERASED, Codec, Vector
+from channel.errors import FrameError
 from channel.protocol.frames import Commands, Echo, ShortCommands
-from channel.protocol.limits import to_steps
+from channel.protocol.limits import steps_held, to_steps
 from channel.protocol.terms import Terms
-from channel.protocol.wire import SHORT_MARK
+from channel.protocol.wire import CRC_START, SHORT_MARK
 
-COMMAND_BITS = 11
 DIGEST_BITS = 16
 PART_BITS = 3
 PART_SAMPLES = 16
@@ -44,9 +48,8 @@ class CompactForm:
         self._word_bits = self._words.bit_length()
         # Echoes are taken from one history behind the clock to two before it.
         self._sample_bits = max(SAMPLE_BITS_MIN, (4 * terms.history_samples - 1).bit_length())
-        most = (1 << COMMAND_BITS - 1) - 1
         largest = to_steps(terms.limits.command_max, terms.signals)
-        self._per_held = tuple([max(1, -(-one // most)) for one in largest])
+        self._per_held = steps_held(terms.limits, terms.signals)
         """steps of a full frame in one held step, for each input"""
         self._largest = tuple([a // b for a, b in zip(largest, self._per_held, strict=True)])
         self._command_bits = tuple([(2 * one).bit_length() for one in self._largest])
@@ -93,7 +96,16 @@ class CompactForm:
                 bits = bits << width | steps // per + most
         bits <<= missing * (self._word_bits + sum(self._command_bits)) + self._padding
         head = SHORT_MARK | epoch % 4 << SESSION_BITS | session % 16
-        return ShortCommands(bytes((head,)) + bits.to_bytes(self._bytes - 1, "big"))
+        data = bytes((head,)) + bits.to_bytes(self._bytes - 1, "big")
+        return ShortCommands(data, _checksum(session, data))
+
+    def require_whole(self, frame: ShortCommands, session: int) -> None:
+        """Raise FrameError for a damaged frame; one that names another session is taken for whole."""
+        if len(frame.data) != self._bytes:
+            raise FrameError(f"compact commands of {len(frame.data)} bytes and not {self._bytes}")
+        ours = frame.data[0] % (1 << SESSION_BITS) == session % (1 << SESSION_BITS)
+        if ours and frame.checksum != _checksum(session, frame.data):
+            raise FrameError("checksum")
 
     def unpacked(
         self, frame: ShortCommands, session: int, epoch: int, near_sample: int
@@ -104,6 +116,8 @@ class CompactForm:
         """
         head = SHORT_MARK | epoch % 4 << SESSION_BITS | session % 16
         if len(frame.data) != self._bytes or frame.data[0] != head:
+            return None
+        if frame.checksum != _checksum(session, frame.data):
             return None
         bits = _Bits(int.from_bytes(frame.data[1:], "big"))
         if bits.take(self._padding):
@@ -147,6 +161,10 @@ class _Bits:
         taken = self._value % (1 << count)
         self._value >>= count
         return taken
+
+
+def _checksum(session: int, data: bytes) -> int:
+    return crc_hqx(data, crc_hqx(session.to_bytes(4, "little"), CRC_START))
 
 
 def _part_of(sample: int) -> int:

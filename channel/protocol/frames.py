@@ -153,10 +153,12 @@ class Commands:
 class ShortCommands:
     """Commands as the compact downlink carries them, packed; `channel.protocol.compact` has the bits.
 
-    Only a session knows the sample, the session and the epoch that they belong to.
+    Only a session knows the sample, the session and the epoch that they belong to, and whether the
+    checksum is right.
     """
 
     data: bytes
+    checksum: int
 
 
 @dataclass(frozen=True, slots=True)

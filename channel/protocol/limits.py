@@ -15,11 +15,16 @@ from typing import Self
 from channel.codec.codec import Vector
 from channel.codec.signals import STEPS_MAX, Signals
 
+HELD_BITS = 11
+"""of a command on the compact downlink, at most"""
+
 COMMAND_MAX = 5.0
 """Where an input is clamped that has no range and is given no limit."""
 
 PLAUSIBLE_MAX = 1e6
 """A law that wants more has lost its way; anything less is only clamped."""
+
+NEARLY = 0.99
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +76,13 @@ class CommandLimits:
         wanted = zip(command, previous, largest, step, strict=True)
         return tuple([limited(*one) for one in wanted])
 
+    def reached(self, command: Vector) -> bool:
+        """Return whether an input is at its limit, as near as the rounding of the wire lets it come."""
+        for value, largest in zip(command, self.command_max, strict=True):
+            if abs(value) >= NEARLY * largest:
+                return True
+        return False
+
 
 def limited(wanted: float, before: float, largest: float, step: float) -> float:
     """Return one value within +-`largest`, at most `step` away from the one `before`."""
@@ -106,6 +118,28 @@ def require_carried(what: str, command: Vector, signals: Signals) -> None:
             raise ValueError(
                 f"{what} of input {one.name} is {value:g} {one.unit}, and a frame carries at most "
                 f"{one.largest:g}: {STEPS_MAX} steps of {1.0 / one.steps_per_unit:g} {one.unit}"
+            )
+
+
+def steps_held(limits: CommandLimits, signals: Signals) -> tuple[int, ...]:
+    """Return how many steps of a full frame are one of the compact downlink, for each input."""
+    most = (1 << HELD_BITS - 1) - 1
+    return tuple([max(1, -(-one // most)) for one in to_steps(limits.command_max, signals)])
+
+
+def require_movable(limits: CommandLimits, signals: Signals, per_step: Sequence[int]) -> None:
+    """Raise ValueError, with the numbers, where the slew limit is below a step: nothing would move.
+
+    `per_step`: steps of a full frame that the downlink counts as one, for each input.
+    """
+    for one, slew, per in zip(signals.inputs, limits.slew_per_tick, per_step, strict=True):
+        step = per / one.steps_per_unit
+        if slew < step * (1.0 - 1e-9):
+            raise ValueError(
+                f"the slew limit of input {one.name} is {slew:g} {one.unit} per tick, and the downlink "
+                f"carries its command in steps of {step:g} {one.unit}; it could not move: raise "
+                f"limits.command_slew_per_s to {step / slew:.3g} times its value or more"
+                + ("" if per == 1 else ', lower limits.command_max, or set channel.downlink = "full"')
             )
 
 

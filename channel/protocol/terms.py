@@ -12,7 +12,7 @@ from typing import Literal
 
 from channel.codec.codec import Codec, Vector
 from channel.codec.signals import Signals, signals_of
-from channel.protocol.limits import CommandLimits, require_carried
+from channel.protocol.limits import CommandLimits, require_carried, require_movable, steps_held
 from channel.protocol.lockstep import HISTORY_NS, HISTORY_SAMPLES
 
 Delivery = Literal["start", "end"]
@@ -169,6 +169,9 @@ class Terms:
                 f"value(s) and there are {len(self.limits.command_max)} limit(s)"
             )
         require_carried("the initial command", self.initial_command, self.signals)
+        compact = self.downlink == "compact"
+        per_step = steps_held(self.limits, self.signals) if compact else (1,) * inputs
+        require_movable(self.limits, self.signals, per_step)
         echo_bytes = ECHO_BYTES + 2 * len(self.initial_command) * self.ticks_per_sample
         if (self.repeats + 1) * echo_bytes > ECHOES_BYTES_MAX or self.repeats >= ECHOES_MAX:
             raise ValueError(

@@ -20,7 +20,8 @@ there. Bodies, by kind:
 A text is a u16 length and that many bytes of UTF-8.
 
 A message whose first two bits are 10 is a command frame of the compact downlink
-(`channel.protocol.compact`), without this head and with the same CRC.
+(`channel.protocol.compact`), without this head. Its CRC covers the four bytes of the session and then
+the frame, so that only an end which knows the session can check it.
 """
 
 from __future__ import annotations
@@ -129,7 +130,7 @@ def encode(frame: Frame) -> bytes:
     if isinstance(frame, ShortCommands):
         if frame.data[:1] < b"\x80" or frame.data[:1] >= b"\xc0":
             raise ValueError("compact commands begin with the bits 10")
-        return frame.data + _CRC.pack(crc_hqx(frame.data, CRC_START))
+        return frame.data + _CRC.pack(frame.checksum)
     try:
         kind, body = _encode_body(frame)
         session, epoch = getattr(frame, "session", 0), getattr(frame, "epoch", 0)
@@ -153,11 +154,11 @@ def decode(data: bytes) -> Frame:
     short = is_short(data)
     if len(data) < _HEAD.size + _CRC.size and not short:
         raise FrameError(f"truncated: {len(data)} bytes")
-    message = data[: -_CRC.size]
-    if _CRC.unpack(data[-_CRC.size :])[0] != crc_hqx(message, CRC_START):
-        raise FrameError("checksum")
+    message, (checksum,) = data[: -_CRC.size], _CRC.unpack(data[-_CRC.size :])
     if short:
-        return ShortCommands(message)
+        return ShortCommands(message, checksum)
+    if checksum != crc_hqx(message, CRC_START):
+        raise FrameError("checksum")
     version, kind, session, epoch = _HEAD.unpack_from(message)
     if version != WIRE_VERSION:
         return ForeignVersion(version)

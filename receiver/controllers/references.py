@@ -131,17 +131,24 @@ class Listed:
 class LimitedReference:
     """A set-point that keeps within +-`largest` and moves by at most `step` a tick, from `start` on.
 
-    Ticks are asked for in order; of earlier ones the last `KEPT` values are known.
+    Ticks are asked for in order; of earlier ones the last `kept` values are known.
     """
 
     KEPT = 4096
 
-    def __init__(self, programme: Reference, start: float, largest: float, step: float) -> None:
+    def __init__(
+        self, programme: Reference, start: float, largest: float, step: float, kept: int = KEPT
+    ) -> None:
         self._by_hand: float | None = None
         self.largest = largest
         self._programme, self._step = programme, step
         self._tick = -1
-        self._kept = deque([start], self.KEPT)
+        self._kept = deque([start], kept)
+
+    def begin(self, tick: int, start: float) -> None:
+        """Move from `start` at this tick, whatever came before it."""
+        self._tick = tick - 1
+        self._kept = deque([start], self._kept.maxlen)
 
     def value(self, tick: int) -> float:
         while self._tick < tick:
@@ -177,6 +184,11 @@ class SteeredReference:
         self.by_hand = value
         if isinstance(self._programme, LimitedReference):
             self._programme.steer(value)
+
+    def begin(self, tick: int, start: float) -> None:
+        """Move from `start` at this tick, where the set-point has limits."""
+        if isinstance(self._programme, LimitedReference):
+            self._programme.begin(tick, start)
 
     def value(self, tick: int) -> float:
         if self.by_hand is None or isinstance(self._programme, LimitedReference):

@@ -8,6 +8,7 @@ consumed and decided becomes an echo. It knows no slot, no frame and no peer.
 from __future__ import annotations
 
 from collections import Counter, deque
+from collections.abc import Callable, Sized
 from typing import NamedTuple
 
 from channel.codec.codec import Codec, CodecState, Vector, Word
@@ -24,6 +25,8 @@ from receiver.controllers.base import Controller
 from receiver.session.records import write_commands, write_sample
 from receiver.session.rejoin import carried_to
 
+Begins = Callable[[int, Vector], None]
+"""Is called where the flight begins afresh, with the tick and the outputs estimated there."""
 UNWRITTEN_MAX = 32
 """Samples that may be flown before they are recorded even if nobody finds the time."""
 
@@ -58,7 +61,9 @@ class Commander:
         recorder: Recorder,
         counts: Counter[str],
         emit: Tell,
+        begins: Begins | None = None,
     ) -> None:
+        self._begins = begins
         self.codec = codec
         self.terms = terms
         self.state = codec.initial()
@@ -77,6 +82,8 @@ class Commander:
         """decided for the sample that is being flown"""
         self._compact = CompactForm(codec, terms) if terms.downlink == "compact" else None
         self._unwritten: list[_Flown] = []
+        self.first_problem = ""
+        """of the controller's commands"""
 
     @property
     def standing(self) -> Standing:
@@ -91,8 +98,12 @@ class Commander:
 
     def restart(self, sample: int) -> None:
         """Begin afresh at a sample, from the codec's initial state and command."""
+        self.write_down()
         self.state = self.codec.initial()._replace(sample=sample)
         self._hold(self.terms.initial_command)
+        if self._begins is not None:
+            outputs = self.codec.model.measured(self.state.model)
+            self._begins(sample * self.terms.ticks_per_sample, outputs)
 
     def carry_on(self, sample: int, silent_samples: int) -> None:
         """Begin an epoch at a later sample, the state carried there under the last command.
@@ -179,12 +190,16 @@ class Commander:
         """Return the controller's command; its last one if it fails or is not finite."""
         try:
             command = self._controller.command(tick, state)
-            if len(command) == len(self.hold) and are_plausible(command):
-                return command
-            problem = f"wants {command}"
+            if isinstance(command, Sized):
+                if len(command) == len(self.hold) and are_plausible(command):
+                    return command
+                problem = f"wants {command}"
+            else:
+                problem = f"wants {command!r}, and not a tuple of {len(self.hold)} number(s)"
         except Exception as error:  # a controller is the user's code; the flight goes on without it
             problem = f"failed: {type(error).__name__}: {error}"
         self._counts["bad_commands"] += 1
         if self._counts["bad_commands"] == 1:
+            self.first_problem = problem
             self._emit(Event(EventKind.CONTROLLER, tick=tick, cause=Failing.COMMAND, detail=problem))
         return self.hold

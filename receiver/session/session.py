@@ -41,7 +41,7 @@ from channel.protocol.recording import NullRecorder, Recorder, write_epoch
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
 from receiver.controllers.base import Controller
-from receiver.session.commander import Commander
+from receiver.session.commander import Begins, Commander
 from receiver.session.records import write_symbol
 from receiver.session.rejoin import Greeter, Takeover, Verdict, desync_answer, difference, first_sample
 from receiver.session.schedule import Proven, Schedule, SlotClock, Timing
@@ -74,6 +74,7 @@ class ReceiverSession:
         recorder: Recorder | None = None,
         *,
         take_over: bool = False,
+        begins: Begins | None = None,
     ) -> None:
         self.codec = codec
         self.terms = terms
@@ -83,9 +84,9 @@ class ReceiverSession:
         self.epoch = 0
         self.meter = BaudMeter()
         self.counts: Counter[str] = Counter()
-        """samples (flown), samples_skipped (between epochs), erasures, symbols_late, symbols_misplaced,
-        stale_frames, malformed, refused_hellos, bad_commands, bad_references, desyncs, rejoins,
-        out_of_bounds"""
+        """samples (flown), samples_skipped (between epochs), erasures (words), symbols_late,
+        symbols_misplaced, stale_frames, malformed, refused_hellos, bad_commands, bad_references,
+        desyncs, rejoins, out_of_bounds"""
         self.end: End | None = None
         self.refusal: End | None = None
         self.desync: Desync | None = None
@@ -93,7 +94,9 @@ class ReceiverSession:
         self._greeter = Greeter(terms)
         self._takeover = Takeover(session_number, take_over)
         self._recorder = recorder or NullRecorder()
-        self._commander = Commander(codec, terms, controller, self._recorder, self.counts, self._emit)
+        self._commander = Commander(
+            codec, terms, controller, self._recorder, self.counts, self._emit, begins
+        )
         self._clock = SlotClock(terms)
         self._word: list[int | None] = []
         self._advanced = False
@@ -107,6 +110,11 @@ class ReceiverSession:
     def state(self) -> CodecState:
         """Return the codec's state before the next sample."""
         return self._commander.state
+
+    @property
+    def controller_problem(self) -> str:
+        """Return what was wrong with the controller's first bad command; empty without one."""
+        return self._commander.first_problem
 
     @property
     def due_slot(self) -> int | None:
@@ -338,7 +346,6 @@ class ReceiverSession:
         """Decide what this slot's symbol was; at the end of a word, fly its sample."""
         self.meter.on_slot(now_ns, came=symbol is not None)
         if symbol is None:
-            self.counts["erasures"] += 1
             self._emit(Event(EventKind.ERASED, slot=slot))
         self._word.append(symbol)
         if len(self._word) < self.terms.symbols_per_word:
@@ -347,7 +354,7 @@ class ReceiverSession:
         whole = len(symbols) == len(self._word)
         self._word = []
         word = tuple(symbols) if whole else ERASED
-        self.counts["samples"] += 1
+        self.counts.update(samples=1, erasures=int(not whole))
         echoes = self._commander.fly(word, self.epoch, now_ns)
         if self._compact is not None:
             return [self._compact.packed(self.session_number, self.epoch, echoes)]

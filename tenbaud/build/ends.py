@@ -6,6 +6,7 @@ import math
 import secrets
 import time
 from collections.abc import Callable
+from functools import partial
 
 from channel.codec.codec import Codec
 from channel.codec.coders.direction import DirectionCoder
@@ -28,7 +29,7 @@ from tenbaud.build.flight_log import output_steps
 from tenbaud.build.gauge import build_gauge
 from tenbaud.build.liveness import overtaking_ticks, watchdog_ticks
 from tenbaud.build.parts import Parts
-from tenbaud.build.references import References, build_references, values_of
+from tenbaud.build.references import References, begin_from, build_references, values_of
 from tenbaud.build.rig import build_rig
 from tenbaud.build.signals import configured_signals, safe_command, soft_limits
 from tenbaud.config.kinds import CONTROLLERS, model_kind
@@ -145,6 +146,9 @@ def build_receiver(
 
     `take_over` from another one, on purpose; it follows `references` if they are given.
     """
+    if references is None and agreement.parts.controller is None:
+        model = agreement.codec.model
+        references = build_references(agreement.config, agreement.signals, model)
     session = ReceiverSession(
         sabotaged(agreement.codec, agreement.config.receiver.sabotage, agreement.live),
         agreement.terms,
@@ -154,6 +158,7 @@ def build_receiver(
         secrets.randbits(31) + 1,
         recorder,
         take_over=take_over,
+        begins=partial(begin_from, references or ()),
     )
     if agreement.clock == "virtual":
         # There the transmitter's process holds both directions of the line, and the receiver's clock.

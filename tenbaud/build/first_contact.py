@@ -19,6 +19,7 @@ from tenbaud.build.parts import Parts
 from tenbaud.build.references import reference_sections
 from tenbaud.build.rig import build_device, real_rig_name
 from tenbaud.build.signals import build_limits, configured_signals, per_output, soft_limits
+from tenbaud.config.kinds import CONTROLLERS
 from tenbaud.config.load import ConfigError, toml_text
 from tenbaud.config.schema import FlightConfig
 from tenbaud.log.units import turn_in
@@ -33,7 +34,9 @@ FIRST_SOFT_TURN = 0.5 / math.tau
 FIRST_COMMAND_SHARE = 0.2
 """of an input's limit"""
 DECLARATION_S = 0.5
-"""A device has this long after its first sample to say that it is emulated."""
+"""Every sample of this time must say that the device is emulated."""
+LINE_DECLARATION_S = 2.0
+"""A device that says it in a line between samples has this long."""
 
 
 def drives_motors(config: FlightConfig) -> bool:
@@ -78,7 +81,12 @@ def is_emulated(config: FlightConfig, signals: Signals) -> bool:
     section = config.transmitter
     if section.rig == "hil" or (section.rig == "quarc" and "flags" not in (section.quarc.fields or ())):
         return False
+    if section.rig == "serial" and section.serial.motor_port:
+        return False  # the encoders' port says nothing of the motors behind another
     with build_device(config, output=False, signals=signals) as device:
+        if section.rig == "serial" and section.serial.format == "ascii":
+            # Its declaration is a line of its own between samples.
+            return device.declares_emulation(LINE_DECLARATION_S, late=True)
         return device.declares_emulation(DECLARATION_S)
 
 
@@ -95,8 +103,10 @@ def _missing(config: FlightConfig, signals: Signals, parts: Parts) -> Iterator[s
         pairs = zip(signals.inputs, limits, strict=True)
         values = ", ".join(f"{one.name} {most:g} {one.unit}".rstrip() for one, most in pairs)
         yield f"limits.command_max: the preset's own ({values}); state the limit of your motors"
-    if config.receiver.controller == "recorded" or parts.controller is not None:
-        yield "receiver.controller: it follows set-points of its own, so no limit makes them gentle"
+    controller = config.receiver.controller
+    outside = controller == "recorded" or controller not in CONTROLLERS.built_in
+    if outside or parts.controller is not None:
+        yield "receiver.controller: it may follow set-points of its own, which no limit makes gentle"
         return
     for place, (output, section) in enumerate(reference_sections(config, signals)):
         gentle = gentle_limit(output, soft[place])

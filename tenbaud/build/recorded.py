@@ -68,7 +68,7 @@ def flight_config(
         _fit_tick(values.setdefault("timing", {}))
     config = checked(values, path, allow_code=allow_code)
     if config.transmitter.rig != "replay":
-        return config.giving(_decided(given, path, config))
+        return config.giving(_decided(given, path, config) | given_names(None, overrides))
     return _Adoption(values, path, given, config).config()
 
 

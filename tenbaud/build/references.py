@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from channel.codec.codec import Model
+from channel.codec.codec import Model, Vector
 from channel.codec.signals import Signal, Signals
 from receiver.controllers.references import (
     Constant,
@@ -18,8 +18,10 @@ from receiver.controllers.references import (
     Shifted,
     Sine,
     Square,
+    SteeredReference,
     Step,
 )
+from receiver.session.commander import UNWRITTEN_MAX
 from tenbaud.build.signals import per_output
 from tenbaud.config.controllers import ReferenceSection
 from tenbaud.config.load import ConfigError
@@ -58,7 +60,17 @@ def build_references(config: FlightConfig, signals: Signals, model: Model | None
         if section is not None and output.name in stops:
             _require_within(stops[output.name], section, found[-1], output)
     limits = set_point_limits(config, signals, model)
-    return tuple([one and limits_kept(one, of) for one, of in zip(found, limits, strict=True)])
+    # The receiver records the set-points of so many samples after it has flown them.
+    ticks = round(config.timing.symbol_period_s / tick_s)
+    kept = max(LimitedReference.KEPT, 2 * UNWRITTEN_MAX * ticks)
+    return tuple([one and limits_kept(one, of, kept) for one, of in zip(found, limits, strict=True)])
+
+
+def begin_from(references: References, tick: int, outputs: Vector) -> None:
+    """Have limited set-points move from the outputs at this tick."""
+    for one, start in zip(references, outputs, strict=False):
+        if isinstance(one, LimitedReference | SteeredReference):
+            one.begin(tick, start)
 
 
 SetPointLimits = tuple[float, float, float] | None
@@ -80,9 +92,11 @@ def set_point_limits(
     return tuple(zip(start, largest or free, steps, strict=True))
 
 
-def limits_kept(reference: Reference, limits: SetPointLimits) -> Reference:
+def limits_kept(
+    reference: Reference, limits: SetPointLimits, kept: int = LimitedReference.KEPT
+) -> Reference:
     """Return a set-point that keeps to its limits."""
-    return reference if limits is None else LimitedReference(reference, *limits)
+    return reference if limits is None else LimitedReference(reference, *limits, kept)
 
 
 def _require_within(

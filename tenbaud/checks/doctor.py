@@ -11,10 +11,10 @@ import time
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
-from channel.errors import LinkError
+from channel.errors import LinkError, TenbaudError
 from channel.links.base import Link
 from channel.links.endpoints import free_endpoint
-from channel.links.serial.budget import least_rate_baud
+from channel.links.serial.budget import check_slot_counter, least_rate_baud
 from channel.links.serial.wire import SerialWire
 from channel.protocol.frames import Symbol
 from channel.protocol.terms import Rung
@@ -137,7 +137,7 @@ def serial_line(config: FlightConfig) -> Finding:
     """Say which serial line carries the flight, with either downlink."""
     try:
         needs = ", ".join(f"{least} baud {rung}" for rung, least in line_rates(config).items())
-    except ValueError as error:
+    except (ValueError, TenbaudError) as error:
         return Finding("note", "serial line", f"none carries preset {config.preset}: {error}")
     return Finding(
         "ok", "serial line", f"preset {config.preset} needs at least {needs} (channel.downlink)"
@@ -145,11 +145,11 @@ def serial_line(config: FlightConfig) -> Finding:
 
 
 def line_rates(config: FlightConfig) -> dict[Rung, int]:
-    """Return the least rate of a serial line for each downlink; ValueError where no line carries it."""
+    """Return the least rate of a serial line for each downlink; ValueError where none carries it."""
     codec = build_codec(config)
     on_memory = config.model_copy(update={"link": config.link.model_copy(update={"kind": "memory"})})
     terms = build_terms(on_memory, codec, "real")
-    SerialWire(len(codec.coder.alphabet.symbols))
+    check_slot_counter(terms, SerialWire(len(codec.coder.alphabet.symbols)))
     return {rung: least_rate_baud(replace(terms, downlink=rung), codec) for rung in get_args(Rung)}
 
 

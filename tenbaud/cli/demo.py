@@ -57,10 +57,12 @@ def demo(
     if view and flight.duration is None and flight.config is None:
         flight = replace(flight, duration=VIEW_DURATION_S)
     flights: list[float | None] = list(mismatch or (None,))
-    if flight.preset is None and flight.config is None and flight.rig in (None, "simulated"):
+    rig = flight.rig or "simulated"
+    if flight.preset is None and flight.config is None and not rig.startswith("replay"):
         flight = replace(flight, preset=DEFAULT_PRESET)
         own = any(one.startswith(("model.", "transmitter.plant.")) for one in flight.settings or ())
-        flights = list(mismatch or (None if own else DEFAULT_MISMATCH,))
+        exact = own or rig != "simulated"
+        flights = list(mismatch or (None if exact else DEFAULT_MISMATCH,))
     changes = [options.overrides(**options.fields_of(flight), mismatch=off, log=log) for off in flights]
     agreements = _agree_all(flight, changes, risk)
     pace = _checked_pace(agreements[0], pace, view)

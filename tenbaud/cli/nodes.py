@@ -137,8 +137,7 @@ def _run(
     check_parts(config)
     if role == "transmitter":  # it alone knows how long the flight is
         check_sabotage(agreement)
-    # Whoever started this end with a folder has checked the rig.
-    if risk is not None and node.run_folder is None and check_rig(config, risk.accept_risk):
+    if risk is not None and check_rig(config, risk.accept_risk):
         confirm_motors(config, risk.yes)
     telemetry.check(role, endpoints.insecure, endpoints.security is not None)
     whole = node.run_folder is None

@@ -115,7 +115,8 @@ def _flight_words(body: options.PlantOptions, config: FlightConfig) -> list[str]
     from tenbaud.build.first_contact import as_options, first_settings
     from tenbaud.build.signals import configured_signals
 
-    words = ["--preset", body.preset] if body.preset else []
+    # The paper's constants, the default of `transmit`, lose the small angles of a first flight.
+    words = ["--preset", body.preset or "tuned-10baud"] if body.preset or not body.config else []
     words += ["--config", str(body.config)] if body.config else []
     for one in body.settings or ():
         words += ["--set", one]
@@ -129,7 +130,9 @@ def _hint(form: str, address: str, flight: list[str]) -> str:
         where = f"{form}:socket://{address}" if ":" in address else where
     if form == "qsb":
         return f"look at it with: tenbaud rig-check --rig {where}"
-    return " ".join([f"fly it with: tenbaud demo --clock real --rig {shlex.quote(where)}", *flight])
+    # Nobody stands beside an emulator, so its flight asks no question.
+    command = f"fly it with: tenbaud demo --clock real --yes --rig {shlex.quote(where)}"
+    return " ".join([command, *flight])
 
 
 def rig_check(
@@ -154,7 +157,7 @@ def rig_check(
     """
     from tenbaud.build.recorded import flight_config
     from tenbaud.checks.rigcheck import check_rig, show_check
-    from tenbaud.config.load import nested, toml_text
+    from tenbaud.config.load import given_values, merged, nested, toml_text
     from tenbaud.files.whole import write_whole
 
     if write is not None and write.exists():
@@ -162,9 +165,12 @@ def rig_check(
     changed = options.overrides(rig=rig, settings=settings)
     result = check_rig(flight_config(preset, config, changed), seconds, live=not json)
     if write is not None:
-        write_whole(write, toml_text(nested(result.proposal)))
+        values = merged(given_values(config, changed), nested(result.proposal))
+        write_whole(write, toml_text(values))
+        whole = f"{config} and " if config else ""
         typer.echo(
-            f"the proposed settings are in {write}: check them, then add --config {write}", err=True
+            f"{whole}the proposed settings are in {write}: check them, then fly with --config {write}",
+            err=True,
         )
     if json:
         options.print_json(asdict(result))

@@ -71,12 +71,14 @@ def checked(
 
 def given_names(path: Path | None, overrides: Mapping[str, Any] | None) -> set[str]:
     """Return the full names of the settings that are given over a preset, in a file or beside it."""
+    return {name for name, _ in flattened(given_values(path, overrides))}
+
+
+def given_values(path: Path | None, overrides: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return the nested settings that are given over a preset, in a file or beside it."""
     in_file = read_toml(path) if path is not None else {}
-    return {
-        name
-        for values in (in_file, dict(overrides or {}))
-        for name, _ in flattened(with_current_names(values, "", warn=False))
-    }
+    both = [with_current_names(one, "", warn=False) for one in (in_file, dict(overrides or {}))]
+    return merged(*both)
 
 
 def merged_values(

@@ -87,7 +87,8 @@ class ChannelSection(Section):
     repeats: Annotated[int, Field(ge=0, le=32)] = 2
     """W: earlier samples that each command frame repeats"""
     downlink: Literal["full", "compact"] = "full"
-    """a command for every tick, or one for each sample in frames of at most 16 bytes for two motors"""
+    """a command for every tick, or one for each sample in short frames: 16 bytes for two motors, two
+    repeats and words of one symbol"""
 
 
 if TYPE_CHECKING:
@@ -114,7 +115,8 @@ class Limits(Section):
     command_max: Positive | tuple[Positive, ...] | None = None
     """largest value of an input, either way; none: the input's own range, or 5 where it has none"""
     command_slew_per_s: Positive | tuple[Positive, ...] = 1000.0
-    """fastest change of an input"""
+    """fastest change of an input; on the compact downlink a command changes once a sample, and by one
+    tick's share: N times slower"""
     initial_command: Command = 0.0
     """command until the first one from the receiver"""
     set_point_max: PerOutput = None

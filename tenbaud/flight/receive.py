@@ -57,7 +57,7 @@ def _not_flown(agreement: Agreement, session: ReceiverSession) -> Outcome | None
     counts = FlightCounts(
         samples=flown + session.counts["samples_skipped"],
         confirmed=flown,
-        erased=min(flown, session.counts["erasures"] // agreement.terms.symbols_per_word),
+        erased=session.counts["erasures"],
         rejoins=session.counts["rejoins"],
         bad_commands=session.counts["bad_commands"],
         commands=flown * agreement.terms.ticks_per_sample,
@@ -66,4 +66,6 @@ def _not_flown(agreement: Agreement, session: ReceiverSession) -> Outcome | None
     if not faults:
         return None
     text = verdict_text(faults, counts, settings_of(agreement), {})
+    if session.controller_problem:
+        text += f"\n  its first fault: the controller {session.controller_problem}"
     return Outcome(ExitCode.NOT_FLOWN, text, faults)

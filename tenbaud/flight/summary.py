@@ -51,6 +51,7 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         "guard_rearmed": node.rearmed,
         "ticks_guard_down": node.ticks_down,
         "ticks_commanded": node.ticks_commanded,
+        "ticks_at_limit": node.ticks_at_limit,
         "impairments": config.link.impairments,
         "impaired_up": dict(run.uplink.line.counts),
         "impaired_down": dict(run.downlink.counts),
@@ -106,7 +107,7 @@ def receiver_part(agreement: Agreement, endpoint: ReceiverEndpoint, outcome: Out
     return {
         **_common(agreement, outcome, session.end),
         "samples": session.state.sample,
-        "baud_measured": session.meter.baud,
+        "baud_measured": session.meter.whole_baud,
         "wire_bytes_up": endpoint.inlet.wire_bytes,
         "coder_bits_down": 8 * endpoint.downlink.command_bytes,
         "wire_bytes_down": endpoint.downlink.wire_bytes,

@@ -168,8 +168,8 @@ def _on_rejoins(one: Settings) -> str:
 
 def _on_controller(_: Settings) -> str:
     return (
-        "the last command was held at these ticks; `tenbaud inspect RUN` shows the first failure: a "
-        "command needs one finite value for each input, and an exception counts as none"
+        "the last command was held at these ticks: a command is a tuple with one finite number for "
+        "each input, and an exception counts as none"
     )
 
 

@@ -13,7 +13,8 @@ from channel.codec.signals import Signals
 from plant_sim.identification.errors import IdentificationError
 from plant_sim.identification.excitation import excite, parse_excitation
 from plant_sim.identification.record import Record
-from tenbaud.build.rig import build_rig
+from tenbaud.build.first_contact import drives_motors
+from tenbaud.build.rig import build_rig, real_rig_name
 from tenbaud.build.signals import build_encoders, configured_signals, encoder_steps
 from tenbaud.config.schema import FlightConfig, FlightLogSection
 from tenbaud.identification.bits import Bits, read_bits
@@ -45,6 +46,13 @@ class Source:
 
 def from_rig(config: FlightConfig, excitation: str, duration_s: float) -> Record:
     """Excite the configured rig and return its encoder's readings."""
+    if drives_motors(config):
+        named = real_rig_name(config.transmitter)
+        raise IdentificationError(
+            f"the motors of {named} stay off: this command excites simulated rigs only. Fly it and "
+            "give the run: `tenbaud demo --clock real --config FILE --out run`, then "
+            "`tenbaud identify run`"
+        )
     tick_s = config.timing.tick_s
     signals = configured_signals(config)
     if len(signals.outputs) != 1 or len(signals.inputs) != 2:

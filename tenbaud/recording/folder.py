@@ -200,12 +200,14 @@ def read_small(path: Path) -> str:
 
 
 def read_summary(path: Path) -> dict[str, Any]:
-    """Return the figures in a `summary.json`; empty where there is none that can be read."""
+    """Return the figures in a `summary.json`; empty without it, and where it is of another form."""
     try:
         summary = orjson.loads(read_small(path))
     except (OSError, ValueError):
         return {}
-    return summary if isinstance(summary, dict) else {}
+    from tenbaud.recording.summary_form import is_summary
+
+    return summary if is_summary(summary) else {}
 
 
 def open_new_recording(path: Path) -> BinaryIO:

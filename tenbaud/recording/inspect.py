@@ -65,9 +65,9 @@ def _headline(path: Path) -> str:
     parts = [f"{summary.get('preset')}: {summary.get('outcome')}"]
     for name, form in (
         ("duration_s", "{:g} s"),
-        ("coder_bits_up", "{:g} bits up"),
-        ("erasures", "{:g} erasures"),
-        ("desyncs", "{:g} desyncs"),
+        ("coder_bits_up", "{:.12g} bits up"),
+        ("erasures", "{:.12g} words lost"),
+        ("desyncs", "{:.12g} desyncs"),
     ):
         value = summary.get(name)
         if isinstance(value, int | float) and (value or name not in ("erasures", "desyncs")):

@@ -63,7 +63,10 @@ class RecordedRun:
         return role
 
     def __repr__(self) -> str:
-        base = self.base
+        try:
+            base = self.base
+        except RecordingError:
+            return f"<Run {self.path}: no ticks>"
         return (
             f"<Run {self.path}: {len(base.ticks)} ticks of {base.tick_s:g} s, "
             f"{' and '.join(self._files)}{'' if self.complete else ', cut'}>"

@@ -102,8 +102,9 @@ class SideBySide:
         """Return the table without its head: the name of each figure, and it for every run."""
         rows = [
             ("rate, bit/s", self._each(lambda one: _number(one["rate_bit_per_s"], ".4g"))),
-            ("bits sent", self._each(lambda one: _number(one["bits"], "g"))),
+            ("bits sent", self._each(lambda one: _number(one["bits"], ".12g"))),
             ("words lost", self._each(lambda one: _number(one["erasures"], "d"))),
+            ("command lead", tuple([_lead(run) for run in self.runs])),
             ("error over floor", self._each(lambda one: _number(one["rms_over_floor"], ".2f"))),
         ]
         for name in self.outputs:
@@ -140,6 +141,12 @@ def compare(*runs: Run | str | Path) -> SideBySide:
     notes = [*_of_each(opened), *notes, *more, *_other_references(opened, outputs, span)]
     metrics = [run.metrics(from_s=span[0], to_s=span[1]) for run in opened]
     return SideBySide(opened, outputs, tuple(notes), tuple(metrics))
+
+
+def _lead(run: Run) -> str:
+    """Return how far ahead the commands of a run are decided, on the estimate of that time."""
+    ticks = run.summary.get("lead_ticks")
+    return NOTHING if ticks is None else f"{float(ticks) * run.base.tick_s * 1e3:g} ms"
 
 
 def _about(run: Run) -> list[str]:
@@ -182,7 +189,10 @@ def _common_span(runs: Sequence[Run]) -> tuple[tuple[float, float], list[str]]:
             f"time up to {end_s:g} s, rate, bits and lost words of each whole flight."
         )
     start_s = max(settled_s, begin_s)
-    notes.append(f"Errors from {start_s:g} s on. Rise, overshoot, settling: medians over the steps.")
+    notes.append(
+        f"Errors from {start_s:g} s on, those of the estimates as used, a command lead ahead. Rise, "
+        "overshoot, settling: medians over the steps. Floor: the least error of any code at this rate."
+    )
     return (start_s, last_s), notes
 
 
@@ -210,6 +220,7 @@ def _other_references(
             if signal is None:
                 break
             held.append(signal.values[np.searchsorted(run.time_s, at_s, side="right") - 1])
+        held = [one for one in held if not np.isnan(one).all()]
         size = max((float(np.nanmax(np.abs(one))) for one in held), default=0.0)
         for one, other in pairwise(held):
             if np.mean(np.abs(one - other) > 0.01 * size) > REFERENCE_SHARE:

@@ -19,6 +19,9 @@ RISE = (0.1, 0.9)
 HELD_TICKS_MIN = 50
 """A set-point is held this long before and after a jump that counts: a sine or a ramp has no steps."""
 
+BEGINNING_S = 1.0
+"""A set-point that is known by this flight time is the first of its flight."""
+
 
 class Step(TypedDict):
     """One step response; values are in the unit of the output. None: not within the hold."""
@@ -42,19 +45,25 @@ def steps_of(
 ) -> list[Step]:
     """Return the response to every step of a set-point.
 
-    Before its first value the set-point counts as 0. `band`, a fraction of the step, is for settling.
+    At the beginning of a flight the set-point was 0 before; a recording that begins later does not show
+    its first step. An output that is unknown has not settled, and a step from such a one is left out.
+    `band`, a fraction of the step, is for settling.
     """
     known = np.flatnonzero(~np.isnan(reference))
     if not len(known):
         return []
     first = int(known[0])
+    begins = time_s[first] <= BEGINNING_S
     changes = np.flatnonzero(np.diff(reference[first:])) + first + 1
     edges = [first, *changes.tolist(), len(reference)]
     lengths = np.diff(edges)
     found = []
     for place, (start, length) in enumerate(zip(edges, lengths, strict=False)):
-        jumps = bool(reference[start]) if place == 0 else lengths[place - 1] >= HELD_TICKS_MIN
-        if jumps and length >= HELD_TICKS_MIN and values[start] != reference[start]:
+        jumps = (
+            begins and bool(reference[start]) if place == 0 else lengths[place - 1] >= HELD_TICKS_MIN
+        )
+        apart = not np.isnan(values[start]) and values[start] != reference[start]
+        if jumps and length >= HELD_TICKS_MIN and apart:
             held = slice(start, start + length)
             found.append(_response(time_s[held], float(reference[start]), values[held], band))
     return found
@@ -64,7 +73,7 @@ def _response(time_s: Series, target: float, values: Series, band: float) -> Ste
     initial = float(values[0])
     done = (values - initial) / (target - initial)
     low, high = (_first(done >= share) for share in RISE)
-    outside = np.flatnonzero(np.abs(done - 1.0) >= band)
+    outside = np.flatnonzero(~(np.abs(done - 1.0) < band))
     settled = int(outside[-1]) + 1 if len(outside) else 0
 
     def between(first: int, last: int) -> float:

@@ -10,19 +10,25 @@ from tenbaud.sentences.quantities import in_degrees
 Summary = dict[str, Any]
 
 LATE_SHARE_WORTH_A_WARNING = 0.01
+LIMITED_SHARE_WORTH_A_WARNING = 0.5
+LOST_ERROR_SHARE = 0.5
+"""of the largest output: with an rms error beyond it the estimate says little about the plant"""
+INTERRUPTED = 130
+"""The exit code of a flight that a person or a signal ended."""
 
 
 def verdict_of(summary: Summary, unicode: bool = True) -> str:
     """Return how a flight ended, in one line."""
     code = int(summary["exit_code"])
-    if code:
+    if code and code != INTERRUPTED:
         mark = "✗" if unicode else "x"
         cause = ", ".join(summary.get("not_flown") or ()) or summary["outcome"]
         return f"{mark} Flight failed (exit code {code}): {cause}"
-    mark = "✓" if unicode else "+"
-    text = f"{mark} Flight finished: "
     duration_s = summary.get("duration_s")  # a receiver knows samples, and not the flight's time
-    text += f"{summary['samples']} samples" if duration_s is None else f"{float(duration_s):g} s"
+    flown = f"{summary['samples']} samples" if duration_s is None else f"{float(duration_s):g} s"
+    text = f"{'✓' if unicode else '+'} Flight finished: {flown}"
+    if code:
+        text = f"{'■' if unicode else '='} Flight stopped after {flown}: {summary['outcome']}"
     checks, desyncs = summary.get("digest_checks"), summary.get("desyncs") or 0
     if checks is None:
         return text
@@ -57,10 +63,26 @@ def warnings_of(summary: Summary) -> list[str]:
         found.append(f"the guard held the safe voltage for {get('ticks_guard_down')} ticks")
     late = get("commands_late") or 0
     if ticks and late > LATE_SHARE_WORTH_A_WARNING * ticks:
-        found.append(f"{late} commands came too late: the last one was held")
+        found.append(
+            f"{late} commands came too late, so the last one was held (a lost symbol delays the "
+            "command of its sample)"
+        )
+    at_limit = get("ticks_at_limit") or 0
+    if ticks and at_limit > LIMITED_SHARE_WORTH_A_WARNING * ticks:
+        found.append(
+            f"an input was at its limit for {at_limit / ticks:.0%} of the flight (limits.command_max): "
+            "can the plant reach the set-point?"
+        )
     missing = get("symbols_missing_share") or 0.0
     if missing > LATE_SHARE_WORTH_A_WARNING:
         found.append(f"{missing:.1%} of the slots had no symbol in time")
+    for name, one in (get("outputs") or {}).items():
+        rms, largest = one["error_live_rms"], one["largest"]
+        if rms is not None and largest and rms > LOST_ERROR_SHARE * largest:
+            found.append(
+                f"the estimate of {name.replace('_', ' ')} is off by {rms / largest:.0%} of the "
+                "largest value: do preset and model fit this plant?"
+            )
     return found
 
 
@@ -151,7 +173,7 @@ def _bytes(count: int) -> str:
 
 def _link(summary: Summary) -> str:
     get = summary.get
-    parts = [_number(get("erasures"), "symbol") + " lost", f"{get('symbols_late') or 0} late"]
+    parts = [_number(get("erasures"), "word") + " lost", f"{get('symbols_late') or 0} late"]
     if get("rejoins") is not None:
         cost = f" ({get('rejoin_bytes')} bytes)" if get("rejoins") and get("rejoin_bytes") else ""
         parts.append(_number(get("rejoins"), "resync") + cost)

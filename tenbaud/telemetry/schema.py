@@ -75,7 +75,7 @@ class SentSample(_Message):
         description="place of the output that each symbol was about, by the codec; null: erased"
     )
     digest: str = Field(description="64-bit digest of the transmitter's copy after the sample")
-    peer_digest: str = Field(description="the receiver's digest of the same sample")
+    peer_digest: str = Field(description="the last digits that came of the receiver's; empty: none")
 
 
 class TakenSample(_Message):

@@ -144,7 +144,10 @@ class Board:
             self._fresh["decisions"].append(row)
         for sample in message["samples"]:
             kept = self._sample(sample["sample"])
-            kept[2], kept[4] = sample["word"], sample["digest"]
+            kept[2] = sample["word"]
+            # What came over the line is compared, where it is known already.
+            if kept[3] is None:
+                kept[4] = sample["digest"]
 
     def _sample(self, number: int) -> list[Any]:
         """Return the memory of a sample: number, word sent, word taken, both digests, outputs."""

@@ -94,7 +94,7 @@ class RecordedFlight:
         """Why digests cannot be compared; empty where they can."""
         if not self._has["transmitter"]:
             return "the transmitter's recording is not here"
-        return "" if self.samples.compared_by(len(self.base.ticks)) else "no digests were recorded"
+        return "" if self.samples.compared else "no digests were recorded"
 
     @property
     def notes(self) -> list[str]:
@@ -163,9 +163,14 @@ class RecordedFlight:
         if last - first < POINTS:
             return np.arange(first, last + 1)
         span = slice(first, last + 1)
-        times, values, estimates = self._times(span), self._values[span], self._estimates[span]
-        curves = np.column_stack((values, estimates, values - estimates, self._ranges[span]))
-        chosen = [extremes(times, curve, POINTS) for curve in curves.T]
+        values, estimates = self._values[span], self._estimates[span]
+        return self._extremes(first, values, estimates, values - estimates, self._ranges[span])
+
+    def _extremes(self, first: int, *curves: Series) -> NDArray[np.intp]:
+        """Return the places of the ends and of the lowest and highest points of curves from `first`."""
+        last = first + len(curves[0]) - 1
+        times = self._times(slice(first, last + 1))
+        chosen = [extremes(times, curve, POINTS) for curve in np.column_stack(curves).T]
         return first + np.unique(np.concatenate((*chosen, [0, last - first])))
 
     def _steps(self, first: int, last: int) -> NDArray[np.intp]:
@@ -174,7 +179,7 @@ class RecordedFlight:
         is_new = (span[1:] != span[:-1]) & ~(np.isnan(span[1:]) & np.isnan(span[:-1]))
         changed = 1 + np.flatnonzero(is_new.any(axis=1))
         if len(changed) > POINTS:
-            return self._thinned(first, last)
+            return self._extremes(first, span)
         return first + np.unique(np.concatenate(([0], changed, [last - first])))
 
     def _heads(

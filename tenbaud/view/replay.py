@@ -6,6 +6,7 @@ anything, so one address is printed.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import orjson
@@ -51,7 +52,7 @@ def serve_recorded(
                 await browser.send_text(answer.decode())
         except (WebSocketDisconnect, RuntimeError):
             return
-        except (ValueError, TypeError):
+        except (ValueError, TypeError, KeyError):  # KeyError: bytes instead of text
             await browser.close(1003)  # no question of the page's script
 
     ready: list[Any] = []
@@ -102,6 +103,8 @@ def moments(flights: list[RecordedFlight], question: str) -> bytes:
     asked: dict[str, Any] = orjson.loads(question)
     if not isinstance(asked, dict):
         raise ValueError("a question is an object")
-    at_s: Any = asked.get("at_s")
+    at_s = float(asked.get("at_s", ""))
     window = None if "from_s" not in asked else (float(asked["from_s"]), float(asked.get("to_s", "")))
-    return orjson.dumps({"runs": [flight.moment(float(at_s), window) for flight in flights]})
+    if not all(map(math.isfinite, (at_s, *(window or ())))):
+        raise ValueError("a time is a finite number")
+    return orjson.dumps({"runs": [flight.moment(at_s, window) for flight in flights]})

@@ -48,6 +48,11 @@ class RecordedSamples:
         """Return how many samples up to this one have the digests of both ends."""
         return self._count(self._compared, sample)
 
+    @property
+    def compared(self) -> int:
+        """Samples of the whole recording that have the digests of both ends."""
+        return int(self._compared[-1]) if len(self._compared) else 0
+
     def rate_at(self, sample: int) -> float | None:
         """Return the symbols per second of the 5 s before a sample, on the receiver's clock."""
         table = self._down

@@ -236,4 +236,4 @@ def test_when_the_compact_frames_bits_are_put_together_then_they_are_its_bytes()
         int("".join(bits for bits, _, _ in table), 2).to_bytes(len(message) - 2, "big") == message[:-2]
     )
     assert [int(bits, 2) for bits, _, _ in table] == [int(value) for _, _, value in table]
-    assert wire.decode(message) == ShortCommands(message[:-2])
+    assert wire.decode(message) == ShortCommands(message[:-2], int.from_bytes(message[-2:], "little"))

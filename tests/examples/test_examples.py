@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import re
 import subprocess
@@ -111,6 +112,9 @@ def test_a_notebook_runs_and_its_stored_outputs_are_those_of_a_run(
     pytest.importorskip("ipykernel")
     from docs.tools.notebooks import executed, outputs_of
 
+    importlib.import_module(
+        "matplotlib.font_manager"
+    )  # its cache is built here, and not in the notebook
     monkeypatch.setenv("PYTHONPATH", os.environ.get("PYTHONPATH", ""))
     path = EXAMPLES / f"{name}.ipynb"
     stored = nbformat.read(path, as_version=4)

@@ -10,9 +10,9 @@ import pytest
 from channel.codec.codec import Codec, CodecState
 from channel.line.line import CleanLine, Delivery
 from channel.protocol.compact import PART_SAMPLES
-from channel.protocol.frames import Why
+from channel.protocol.frames import Echo, Why
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
-from channel.protocol.wire import is_short
+from channel.protocol.wire import encode, is_short
 from tenbaud import MemoryFlight
 from tests.channel.codec.parts import pitch_codec
 from tests.simulation.flight import assert_lockstep, pitch_flight
@@ -88,6 +88,22 @@ def test_when_more_frames_in_a_row_are_lost_then_a_rejoin_follows() -> None:
     assert flight.transmitter.copies.confirmed == flight.receiver.state
 
 
+def test_when_a_samples_own_frame_was_lost_then_its_state_is_not_compared() -> None:
+    flight = compact(lead_ticks=3, downlink_line=LosingDownlink((), {20: 210_000_000}))
+    compared: list[bool] = []
+    session = flight.transmitter
+    confirm = session.copies.confirm
+
+    def confirming(*given: Any) -> Any:
+        compared.append(session.is_proven)
+        return confirm(*given)
+
+    session.copies.confirm = confirming  # type: ignore[method-assign]
+    flight.fly(4.0)
+    # Asked before each sample is confirmed: 0 has nothing before it, and the frame of 20 came last.
+    assert [sample for sample, known in enumerate(compared) if not known] == [0, 21]
+
+
 def test_when_a_frame_is_overtaken_then_its_echo_is_taken_from_the_next_one() -> None:
     flight = compact(downlink_line=LosingDownlink((), {30: 250_000_000}))
     flight.fly(10.0)
@@ -136,3 +152,23 @@ def test_when_digests_differ_in_any_one_bit_then_it_is_found_within_16_samples(b
     assert report.sample == (33 if bit < 16 else 32 + (place or PART_SAMPLES))
     assert report.sample < 33 + PART_SAMPLES
     assert flight.transmitter.counts["desyncs"] == 1
+
+
+def test_when_frames_are_of_another_session_or_damaged_then_they_count_as_stale_or_malformed() -> None:
+    flight = compact()
+    flight.fly(2.0)
+    session, inlet = flight.transmitter, flight.loop.endpoint.inlet
+    assert session.compact is not None
+    echo = Echo(20, 0, 0, (0, 0) * 10)
+    before = session.counts["stale_frames"]
+    for other in (session.session_number + 1, session.session_number + 3):
+        frame = inlet.take(encode(session.compact.packed(other, session.epoch, (echo,))))
+        assert frame is not None
+        assert session.on_frame(frame) == []
+    assert session.counts["stale_frames"] == before + 2
+    assert inlet.malformed == 0
+    message = encode(session.compact.packed(session.session_number, session.epoch, (echo,)))
+    assert inlet.take(message) is not None
+    assert inlet.take(message[:5] + bytes((message[5] ^ 4,)) + message[6:]) is None
+    assert inlet.take(message[:-1]) is None
+    assert inlet.malformed == 2

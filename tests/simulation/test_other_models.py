@@ -92,4 +92,5 @@ def test_when_one_symbol_of_a_word_of_two_is_lost_then_both_ends_see_the_word_er
     assert_lockstep(flight, 50)
     words = list(result.words)
     assert [sample for sample, word in enumerate(words) if word is None] == [10, 15, 20]
+    assert flight.receiver.counts["erasures"] == flight.transmitter.counts["erasures"] == 3
     assert Alphabet((-1, 1), 2).word(WIRE_ERASED) is None

@@ -8,13 +8,15 @@ from pathlib import Path
 import pytest
 
 from channel.links.serial.budget import usual_rate_baud
-from channel.protocol.frames import Refuse
+from channel.protocol.compact import CompactForm
+from channel.protocol.frames import Echo, Refuse
 from channel.protocol.wire import DATAGRAM
 from tenbaud.audit.audit import audit
+from tenbaud.build.codec import build_codec
 from tenbaud.build.ends import build_receiver, build_transmitter
-from tenbaud.build.flight import agree
-from tenbaud.checks.doctor import line_rates
-from tenbaud.config.load import load_config, preset_names
+from tenbaud.build.flight import agree, build_terms
+from tenbaud.checks.doctor import serial_line
+from tenbaud.config.load import ConfigError, load_config, preset_names
 from tenbaud.replay.record import load_record
 from tenbaud.replay.replay import replay
 from tests.rules.sources import TOP
@@ -71,6 +73,21 @@ def test_an_end_with_the_other_downlink_is_refused_with_both_values(up: str, dow
     assert f"channel.downlink: here {up}, there {down}" in session.refusal.text
 
 
+@pytest.mark.parametrize(("downlink", "slew_per_s"), [("full", 0.09), ("compact", 0.24)])
+def test_a_slew_limit_below_a_step_of_the_downlink_is_refused_with_numbers(
+    downlink: str, slew_per_s: float
+) -> None:
+    given = {"channel": {"downlink": downlink}, "limits": {"command_slew_per_s": slew_per_s}}
+    with pytest.raises(ConfigError, match=r"limits\.command_slew_per_s to [\d.]+ times"):
+        agree(load_config("paper-10baud", None, given), "real")
+    step_v = {"full": 0.001, "compact": 0.005}[downlink]
+    given["limits"]["command_slew_per_s"] = step_v / 0.01
+    agreed = agree(load_config("paper-10baud", None, given), "real")
+    if downlink == "compact":
+        held = CompactForm(agreed.codec, agreed.terms).held([(5.0, -5.0)] * 10, (0.0, 0.0))
+        assert held == (5, -5)
+
+
 def test_the_full_downlink_has_the_shared_configuration_of_before() -> None:
     shared = load_config("paper-10baud").shared_json(0)
     assert '"downlink"' not in shared
@@ -78,11 +95,45 @@ def test_the_full_downlink_has_the_shared_configuration_of_before() -> None:
     assert '"downlink":"compact"' in compact.shared_json(0)
 
 
-def test_the_page_on_serial_lines_has_the_least_rate_of_every_preset() -> None:
+def carries(preset: str, downlink: str, rate_baud: int) -> bool:
+    """Return whether a flight is agreed to on a serial line of this rate."""
+    link = {"kind": "serial", "port": "none", "line_rate_baud": rate_baud}
+    changes = {"channel": {"downlink": downlink}, "link": link, "timing": {"lead_ticks": "auto"}}
+    config = load_config(preset, None, changes)
+    try:
+        build_terms(config, build_codec(config), "real")
+    except ValueError as error:
+        assert "serial line cannot carry" in str(error) or "slots of" in str(error)  # noqa: PT017
+        return False
+    return True
+
+
+def test_the_page_on_serial_lines_has_the_least_rate_of_every_preset_and_its_frame() -> None:
     page = (TOP / "docs" / "serial.md").read_text(encoding="utf-8")
-    found = re.findall(r"^\| `([\w-]+)` \| (\d+) \((\d+)\) \| (\d+) \((\d+)\) \|$", page, re.MULTILINE)
-    wanted = []
-    for name in preset_names():
-        rates = line_rates(load_config(name)).values()
-        wanted.append((name, *[str(one) for rate in rates for one in (rate, usual_rate_baud(rate))]))
-    assert found == wanted
+    rows = re.findall(r"^\| `([\w-]+)` \| (.+) \| (.+) \| (\d+) \|$", page, re.MULTILINE)
+    assert [row[0] for row in rows] == list(preset_names())
+    for preset, *cells, frame_bytes in rows:
+        config = load_config(preset, None, {"channel": {"downlink": "compact"}})
+        codec = build_codec(config)
+        terms = build_terms(config, codec, "virtual")
+        echo = Echo(0, 0, 0, (0,) * (terms.ticks_per_sample * codec.model.input_size))
+        frame = CompactForm(codec, terms).packed(1, 0, (echo,))
+        assert len(DATAGRAM.encode(frame)) == int(frame_bytes)
+        finding = serial_line(load_config(preset))
+        for downlink, cell in zip(("full", "compact"), cells, strict=True):
+            if cell == "none":
+                assert not carries(preset, downlink, 10_000_000)
+                assert finding.state == "note"
+                continue
+            least, usual = (int(one) for one in re.findall(r"\d+", cell))
+            assert usual == usual_rate_baud(least)
+            assert carries(preset, downlink, least)
+            assert not carries(preset, downlink, least - 1)
+            assert f"{least} baud {downlink}" in finding.text
+
+
+def test_a_configuration_that_makes_no_flight_is_a_finding() -> None:
+    config = load_config("paper-10baud", None, {"limits": {"command_max": [1.0, 1.0, 1.0]}})
+    finding = serial_line(config)
+    assert finding.state == "note"
+    assert "3 value" in finding.text

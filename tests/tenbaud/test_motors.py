@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 import os
 import pty
+import select
 import shlex
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -32,6 +34,7 @@ def test_the_printed_command_flies_gently(arguments: tuple[str, ...], tmp_path: 
         printed = [rig.stderr.readline() for _ in range(2)][1]
         words = shlex.split(printed.partition("fly it with: tenbaud ")[2])
         assert words[0] == "demo"
+        assert "--yes" in words
         given = (*PATIENT, "--duration", "3", "--json", "--no-figure", "--out", "run")
         flown = subprocess.run(
             [*TENBAUD, *words, *given],
@@ -65,13 +68,20 @@ def answered(answer: str, folder: Path, *options: str) -> tuple[int, str]:
     said = b""
     os.write(master, f"{answer}\n".encode())
     try:
-        while piece := os.read(master, 4096):
+        until = time.monotonic() + PATIENCE_S
+        while select.select([master], [], [], max(0.0, until - time.monotonic()))[0]:
+            try:
+                piece = os.read(master, 4096)
+            except OSError:  # Linux says so when the last one has closed the other side
+                break
+            if not piece:
+                break
             said += piece
-    except OSError:  # Linux says so when the last one has closed the other side
-        pass
+        return process.wait(max(0.0, until - time.monotonic())), said.decode()
     finally:
+        process.kill()
+        process.wait(PATIENCE_S)
         os.close(master)
-    return process.wait(PATIENCE_S), said.decode()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals")

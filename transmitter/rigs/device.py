@@ -28,6 +28,9 @@ from transmitter.rigs.formats.samples import DeviceFlag, DeviceSample, RawSample
 REARM_TIMEOUT_S = 1.0
 """A device has this long to clear its watchdog's flag after the message that the motors are off."""
 
+DECLARED_LEAST = 10
+"""Fewer samples do not show that a device is the rig emulator."""
+
 HOST_SLACK_S = 0.05
 """Arrival times tell the time between two samples only this well."""
 
@@ -77,6 +80,8 @@ class DeviceRig(Rig):
         self.latest: DeviceSample | None = None
         self._arrived = threading.Condition()
         self._unread = 0
+        self._declared = self._undeclared = 0
+        """samples in a row that declare the rig emulator, and all that do not"""
         self._enabled = False
         self._last_volts: Vector = ()
         self._closing = threading.Event()
@@ -199,14 +204,17 @@ class DeviceRig(Rig):
             self._unread = 0
             return self.latest
 
-    def declares_emulation(self, timeout_s: float) -> bool:
-        """Return whether the device says within this time that it is the rig emulator."""
+    def declares_emulation(self, timeout_s: float, late: bool = False) -> bool:
+        """Return whether every sample of this time says that the device is the rig emulator.
+
+        `late`: samples before the first that says so may be silent about it.
+        """
         until = time.monotonic() + timeout_s
-        while self.latest is None or DeviceFlag.EMULATED not in self.latest.flags:
-            if (left_s := until - time.monotonic()) <= 0.0:
-                return False
+        while (left_s := until - time.monotonic()) > 0.0:
+            if self._undeclared if not late else self._declared >= DECLARED_LEAST:
+                break
             self.wait_for_sample(left_s)
-        return True
+        return self._declared >= DECLARED_LEAST and (late or not self._undeclared)
 
     # The reader's side
 
@@ -223,7 +231,10 @@ class DeviceRig(Rig):
             problem = self._judge(before, sample)
             if problem is not None:
                 self._fail(problem)
+        declared = DeviceFlag.EMULATED in sample.flags
         with self._arrived:
+            self._declared = self._declared + 1 if declared else 0
+            self._undeclared += not declared
             self.latest = sample
             self._unread += 1
             self._arrived.notify_all()

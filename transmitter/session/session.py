@@ -13,7 +13,7 @@ from collections import Counter, deque
 from dataclasses import replace
 from enum import Enum
 
-from channel.codec.codec import ERASED, Codec, Vector
+from channel.codec.codec import ERASED, Codec, CodecState, Vector
 from channel.protocol.bounds import Bounds, shown, within_text_bounds
 from channel.protocol.compact import CompactForm
 from channel.protocol.endings import End, Ending
@@ -99,6 +99,7 @@ class TransmitterSession:
         """when the receiver last sent something new in the present epoch"""
         self.epoch_tick = 0
         """first tick of the present epoch"""
+        self._compared: CodecState | None = None  # last state found equal to the receiver's
         self.owing = Owing(terms)
         self.confirmed: deque[Confirmed] = deque(maxlen=2 * terms.history_samples)
         """samples confirmed and not yet recorded (`take_confirmed`)"""
@@ -115,7 +116,7 @@ class TransmitterSession:
         self._recorder = recorder or NullRecorder()
         self._due = DueCommands(terms.initial_command, terms.lead_ticks)
         self._tick = -1
-        self._compact = CompactForm(codec, terms) if terms.downlink == "compact" else None
+        self.compact = CompactForm(codec, terms) if terms.downlink == "compact" else None
 
     # What happens at a tick
 
@@ -297,9 +298,9 @@ class TransmitterSession:
         return [Bye(0, refusal.ending, refusal.text)]
 
     def _unpacked(self, frame: ShortCommands) -> Commands | None:
-        if self._compact is None or self.phase is not Phase.FLYING:
+        if self.compact is None or self.phase is not Phase.FLYING:
             return None
-        return self._compact.unpacked(frame, self.session_number, self.epoch, self._sample)
+        return self.compact.unpacked(frame, self.session_number, self.epoch, self._sample)
 
     def _on_commands(self, frame: Commands) -> list[Frame]:
         if frame.echoes[-1].sample < self.copies.confirmed.sample:
@@ -332,13 +333,13 @@ class TransmitterSession:
             return self._on_diverged(error)
         self.confirmed.append(done)
         self.history.add(self.epoch, word, done.flown.state)
-        unsent = done.lag_samples == 0
-        checked, erased = echo.digest_mask > 0, word is ERASED
+        checked, erased, unsent = echo.digest_mask > 0, word is ERASED, done.lag_samples == 0
         self.counts.update(confirmed=1, digest_checks=checked, erasures=erased, words_missed=unsent)
         if done.digest != done.peer_digest:
             return self._on_desync(done)
         # Only now: a receiver with a different state must move no motor.
         if checked:
+            self._compared = done.flown.state
             self.owing.on_confirmed()
         first_tick = echo.sample * self.terms.ticks_per_sample + self.terms.lead_ticks
         self._due.add(first_tick, commands, proven=checked)
@@ -379,8 +380,7 @@ class TransmitterSession:
     @property
     def is_proven(self) -> bool:
         """Return whether the confirmed state has been compared with the receiver's, and is equal."""
-        flown = self.copies.confirmed.sample * self.terms.ticks_per_sample > self.epoch_tick
-        return self.phase is Phase.FLYING and flown
+        return self.phase is Phase.FLYING and self._compared is self.copies.confirmed
 
     @property
     def _has_session(self) -> bool:

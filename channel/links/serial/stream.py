@@ -93,7 +93,7 @@ class Deframer:
         if state is not _State.FRAME:
             return None
         try:
-            is_notice, message = unstuff(stuffed)
+            is_notice, message = unstuff(stuffed, commands=self._wire is None)
         except FrameError as error:
             self._drop(str(error))
             return None

@@ -13,8 +13,9 @@ With three check bits any one or two wrong bits of the seven are found, with two
 xor makes 0x80 and 0xFF, what a disturbed idle line likes to show, no symbols.
 
 All other frames are those of `channel.protocol.wire`; their own CRC-16/CCITT-FALSE, low byte first at
-the end, is the CRC of the line. Between two zeros they are COBS-encoded, so that a zero is a delimiter
-wherever it is seen, and a byte is a symbol only outside such a frame:
+the end, is the CRC of the line; that of compact commands is checked by the session. Between two zeros
+they are COBS-encoded, so that a zero is a delimiter wherever it is seen, and a byte is a symbol only
+outside such a frame:
 
     0x00 | COBS of the frame | 0x00
 
@@ -35,7 +36,7 @@ from binascii import crc_hqx
 from channel.errors import FrameError
 from channel.links.serial.cobs import cobs_decode, cobs_encode
 from channel.protocol.frames import Frame, ShortSymbol, Symbol
-from channel.protocol.wire import CRC_START, FRAME_BYTES_MAX, decode, encode
+from channel.protocol.wire import CRC_START, FRAME_BYTES_MAX, decode, encode, is_short
 
 SYMBOL_MARK = 0x80
 NOTICE = 0xF3
@@ -119,7 +120,7 @@ class SerialWire:
 def stuff(message: bytes) -> bytes:
     """Return the bytes on the line for a message that is no symbol, delimiters included."""
     own_crc = len(message) > 2 and message[0] not in _RESERVED
-    if not own_crc or not _is_sealed(message):
+    if not own_crc or not (is_short(message) or _is_sealed(message)):
         message = _seal(bytes((WRAPPED,)) + message)
     return _delimit(message)
 
@@ -129,9 +130,10 @@ def stuff_notice(body: bytes) -> bytes:
     return _delimit(_seal(bytes((NOTICE,)) + body))
 
 
-def unstuff(stuffed: bytes) -> tuple[bool, bytes]:
+def unstuff(stuffed: bytes, *, commands: bool = False) -> tuple[bool, bytes]:
     """Return (is it a notice, message) for the bytes between two delimiters.
 
+    `commands`: the direction carries commands; compact ones are returned with their CRC unchecked.
     Raises FrameError with the kind of damage: "COBS" or "checksum".
     """
     try:
@@ -140,6 +142,8 @@ def unstuff(stuffed: bytes) -> tuple[bool, bytes]:
         raise FrameError("COBS") from error
     if content[:1] == b"\0":
         content = content[1:]
+    if commands and is_short(content):
+        return False, content
     if not _is_sealed(content):
         raise FrameError("checksum")
     if content[0] == WRAPPED:

@@ -3,7 +3,7 @@
 import { Flight } from "./flight.js";
 import { liveBanner } from "./words.js";
 
-const SPAN_S = 30, BUSY_MS = 1500;
+const SPAN_S = 30, BUSY_MS = 1500, ANSWER_MS = 10_000;
 
 export function live(news) {
   const flight = new Flight();
@@ -51,7 +51,10 @@ function followFlight(flight) {
   for (const input of document.querySelectorAll(".slider input")) {
     const { output, factor, movedMs, present } = input.dataset;
     const value = output === undefined ? present : set_points[output] === null ? undefined : set_points[output] / factor;
-    if (value === undefined || Number.isNaN(value) || input.matches(":active") || performance.now() - (movedMs || -1e9) < BUSY_MS) continue;
+    if (value === undefined || Number.isNaN(value) || input.matches(":active")) continue;
+    // One with the focus waits for the flight to reach its value; a limit may keep it from that.
+    const waits = input.matches(":focus") && Math.abs(value - input.value) > input.step / 2;
+    if (performance.now() - (movedMs || -1e9) < (waits ? ANSWER_MS : BUSY_MS)) continue;
     input.value = value;
     showSlider(input);
   }

@@ -32,7 +32,7 @@ export function become(flights) {
   curves.classList.toggle("several", several);
   curves.replaceChildren(...plant.outputs.flatMap((one, place) => {
     const unit = shown(one.unit).words;
-    return [["value", title(one)], ["error", several ? `${title(one)}, estimation error` : "Estimation error"]]
+    return [["value", title(one)], ["error", several ? `${title(one)}, error of the codec` : "Error of the codec"]]
       .map(([kind, name]) => {
         const chart = make("div"), heading = make("h2", "", `${name} `), canvas = make("canvas");
         if (several) heading.prepend(key(place));
@@ -47,7 +47,7 @@ export function become(flights) {
       });
   }));
   showLegend(flights);
-  for (const flight of flights) build(flight, several);
+  for (const flight of flights) build(flight, several, flights);
 }
 
 // What the lines of the curves are; of several runs, each has a colour.
@@ -56,24 +56,32 @@ function showLegend(flights) {
   const legend = document.getElementById("curves-legend");
   const [first] = plant.outputs, value = plant.outputs.length === 1 ? words(first) : "value";
   if (flights.length === 1) {
-    legend.replaceChildren(...entry("body", value), ...entry("estimate", "estimate"), ...entry("reference", "set-point"), ...entry("tube", "range ± M"), ...entry("error", "estimation error"));
+    legend.replaceChildren(...entry("body", value), ...entry("estimate", "estimate"), ...entry("reference", "set-point"), ...entry("tube", "range ± M"), ...entry("error", "error of the codec"));
     return;
   }
   const runs = flights.flatMap((flight) => [square(`run-${flight.place}`), make("b", "", flight.name)]);
   legend.replaceChildren(...runs, ...entry("body", value), ...entry("dashed", "estimate"), ...entry("reference", "set-point"));
 }
 
-function build(flight, several) {
-  const id = plant.picture.replaceAll(" ", "-");
+// Flights in the same curves have the same outputs; inputs and picture are each flight's own.
+const plantOf = (flight) => flight.plant || plant;
+// One without a picture takes that of the first flight, which turns by the same outputs.
+const pictureOf = (flight) => plantOf(flight).picture || plant.picture;
+
+function build(flight, several, flights) {
+  const own = plantOf(flight), id = pictureOf(flight).replaceAll(" ", "-");
   const picture = (id && (flight.at(`${id}-${plant.outputs.length}`) || flight.at(id))) || null;
   flight.picture = picture;
   for (const one of flight.at("outputs").parentNode.querySelectorAll(".plant")) one.toggleAttribute("hidden", one !== picture);
   if (id === "helicopter" && !several) drawScale(picture);
   for (const text of picture ? picture.querySelectorAll("[data-name]") : []) text.textContent = words(plant.outputs[text.dataset.name]);
-  flight.largest = { outputs: plant.outputs.map(spread), inputs: plant.inputs.map(spread) };
+  // Bars of the same signal have the same scale in every flight.
+  const widest = (kind) => own[kind].map((one) => Math.max(...flights.flatMap((other) => plantOf(other)[kind])
+    .filter(({ name, unit }) => name === one.name && unit === one.unit).map(spread)));
+  flight.largest = { outputs: widest("outputs"), inputs: widest("inputs") };
   // A plant without a picture has bars; so have several outputs, for their values.
   flight.at("outputs").replaceChildren(...(picture && !several ? [] : plant.outputs.flatMap((one) => gauge(one, ["reference", "estimate", "body"]))));
-  flight.at("inputs").replaceChildren(...plant.inputs.flatMap((one) => gauge(one, ["bar"])));
+  flight.at("inputs").replaceChildren(...own.inputs.flatMap((one) => gauge(one, ["bar"])));
   flight.at("bit-keys").replaceChildren(...(several ? plant.outputs.flatMap((one, place) => [key(place), make("span")])
     : [make("i", "key plus-key"), "up ", make("i", "key minus-key"), "down"]));
   flight.at("value-name").textContent = several ? "value" : plant.outputs[0] ? words(plant.outputs[0]) : "";
@@ -134,8 +142,8 @@ export function drawPicture(flight) {
     drawGauges(flight, "outputs", plant.outputs, (place) => ({ body: point[1][place], estimate: point[2][place], reference: references[place] }));
   }
   if (!applied) return;
-  drawGauges(flight, "inputs", plant.inputs, (place) => ({ bar: applied[place] }));
-  if (picture && plant.picture === "helicopter" && plant.outputs.length === 1 && applied.length === 2) {
+  drawGauges(flight, "inputs", plantOf(flight).inputs, (place) => ({ bar: applied[place] }));
+  if (picture && pictureOf(flight) === "helicopter" && plant.outputs.length === 1 && applied.length === 2) {
     // The front rotor lifts the front: it is drawn at the right, where the nose is.
     const arrow = (x, volt) => (Math.abs(volt) > 0.05 ? `M${x} 98v${(-volt * 6).toFixed(1)}` : "");
     flight.at("thrust-front").setAttribute("d", arrow(254, applied[0]));

@@ -60,9 +60,9 @@ export function replay(news) {
     if (stale) ask();
   }
 
-  function begin(told) {
+  function begin(recorded) {
     const isNew = !known.duration_s;
-    known = told;
+    known = recorded;
     known.flights.forEach(({ name, missing }, place) => {
       flights[place] ||= new Flight(place, name, true);
       Object.assign(flights[place], { name, missing });
@@ -123,7 +123,7 @@ export function replay(news) {
   }
 
   function tick(now) {
-    const passedS = Math.max(0, now - playedAt) / 1000 * (Number(speed.value) || 1);
+    const passedS = Math.max(0, now - playedAt) / 1000 * Math.max(Number(speed.min), Number(speed.value) || 1);
     playedAt = now;
     playing = requestAnimationFrame(tick);
     go(timeS + passedS);

@@ -28,8 +28,14 @@ function state(flight) {
   if (head.phase === "ended") return ["waiting", "The flight is over", compared];
   const sample = flight.lastCompared();
   if (!sample) return ["waiting", "Waiting", "for the first digests"];
-  if (sample[3] !== sample[4]) return ["broken", "Lockstep broken", broken];
+  if (!sample[3].endsWith(sample[4])) return ["broken", "Lockstep broken", broken];
   return ["lockstep", head.paused ? "In lockstep, paused" : "In lockstep", flight.repaired || compared];
+}
+
+// The receiver's digest: of the compact downlink, the last digits that came.
+function lastDigits(sample) {
+  const [own, other] = sample?.slice(3) || [];
+  return own && other && other.length < own.length ? `…${other}` : other;
 }
 
 function showLight(flight) {
@@ -42,7 +48,7 @@ function showLight(flight) {
   set(flight.at("light-text"), text);
   const sample = flight.lastCompared() || [...flight.samples.values()].at(-1), broken = name === "broken" && flight.broken;
   set(flight.at("digest-up"), (broken ? broken.transmitter_digest : sample?.[3]) || "–");
-  set(flight.at("digest-down"), (broken ? broken.receiver_digest : sample?.[4]) || "–");
+  set(flight.at("digest-down"), (broken ? broken.receiver_digest : lastDigits(sample)) || "–");
   return flight.name ? `${flight.name}: ${title}` : title;
 }
 

@@ -96,16 +96,19 @@ def test_when_symbols_stay_away_then_the_rate_of_the_last_seconds_falls_and_reco
     for count in range(1025, 1100):
         meter.on_slot(count * 100 * MS, came=False)
     assert meter.baud == 0.0
+    assert meter.whole_baud == pytest.approx(10.0)
     for count in range(1100, 1151):
         meter.on_slot(count * 100 * MS, came=True)
     assert meter.baud == pytest.approx(10.0)
+    assert meter.whole_baud == pytest.approx(10.0 * 1050 / 1150)
 
 
 def test_when_two_symbols_come_at_once_then_no_rate_is_made_up() -> None:
     meter = BaudMeter()
+    assert meter.whole_baud is None
     meter.on_slot(7, came=True)
     meter.on_slot(7, came=True)
-    assert meter.baud is None
+    assert meter.baud is meter.whole_baud is None
 
 
 def test_when_a_symbol_is_offered_out_of_its_slot_then_nothing_leaves_and_nothing_is_paid() -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import random
+from binascii import crc_hqx
 from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from channel.codec.codec import WIRE_ERASED, Alphabet, Codec
+from channel.errors import FrameError
 from channel.protocol.compact import PART_SAMPLES, CompactForm
 from channel.protocol.frames import Commands, Echo, ShortCommands
 from channel.protocol.limits import CommandLimits, from_steps
@@ -40,7 +42,7 @@ def through(sender: CompactForm, *echoes: Echo, near: int | None = None) -> Comm
 def test_when_the_papers_echoes_are_packed_then_these_are_the_16_bytes() -> None:
     echoes = (echo(698, 0), echo(699, WIRE_ERASED, (0, 5)), echo(700, 1, (-5000, 5000), 0xABCD))
     message = encode(form().packed(SESSION, EPOCH, echoes))
-    assert message.hex(" ") == "ad bc ab cd 08 00 fa 13 e8 7d 25 14 57 80 fb 63"
+    assert message.hex(" ") == "ad bc ab cd 08 00 fa 13 e8 7d 25 14 57 80 0d f8"
 
 
 @pytest.mark.parametrize("near", [-120, -1, 0, 1, 127])
@@ -93,7 +95,21 @@ def test_when_session_or_epoch_is_another_then_the_frame_is_nobodys(session: int
 def test_when_a_frame_has_another_length_or_bits_in_its_padding_then_it_is_nobodys() -> None:
     frame = form().packed(SESSION, EPOCH, (echo(1),))
     for data in (frame.data[:-1], frame.data + b"\0", frame.data[:-1] + b"\1"):
-        assert form().unpacked(ShortCommands(data), SESSION, EPOCH, 1) is None
+        right = crc_hqx(SESSION.to_bytes(4, "little") + data, 0xFFFF)
+        assert form().unpacked(ShortCommands(data, right), SESSION, EPOCH, 1) is None
+
+
+@pytest.mark.parametrize("session", [SESSION ^ 1 << bit for bit in range(32)])
+def test_when_a_frame_is_left_from_another_session_then_it_is_stale_or_fails_the_checksum(
+    session: int,
+) -> None:
+    frame = form().packed(session, EPOCH, (echo(1),))
+    assert form().unpacked(frame, SESSION, EPOCH, 1) is None
+    if session % 16 != SESSION % 16:
+        form().require_whole(frame, SESSION)
+        return
+    with pytest.raises(FrameError, match="checksum"):
+        form().require_whole(frame, SESSION)
 
 
 @pytest.mark.parametrize("first", [0, 5, 250])

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import shlex
 import subprocess
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -11,9 +13,12 @@ from typing import Any
 import pytest
 
 from channel.codec.signals import Signals
+from channel.protocol.frames import Hello, Welcome, Why
+from channel.protocol.wire import DATAGRAM
 from receiver.controllers.references import Constant, LimitedReference, Square, SteeredReference
 from tenbaud import fly
 from tenbaud.build.codec import build_model
+from tenbaud.build.ends import build_receiver
 from tenbaud.build.first_contact import drives_motors, require_safe
 from tenbaud.build.flight import agree
 from tenbaud.build.recorded import flight_config
@@ -25,6 +30,7 @@ from tenbaud.config.load import ConfigError, dump_config, load_config
 from tenbaud.flight.outcome import ExitCode
 from tenbaud.studies.arrays import targets_of
 from tests.transmitter.rigs.emulated import emulated
+from transmitter.rigs.formats.doubles import DoublesLayout
 from transmitter.rigs.formats.samples import DeviceFlag, flags_of
 
 FIELDS = (
@@ -100,6 +106,7 @@ def test_a_limit_in_a_file_that_a_flight_wrote_is_still_the_presets(tmp_path: Pa
     written.write_text(dump_config(load_config("tuned-10baud")))
     without = [one for one in SETTINGS if "command_max" not in one]
     assert "limits.command_max" in refusal(configured("hil", *without, path=written))
+    assert require_safe(configured("hil", *without, "limits.command_max=5", path=written)), "typed now"
     mine = tmp_path / "mine.toml"
     mine.write_text("[limits]\ncommand_max = 5.0\n")
     assert require_safe(configured("hil", *without, path=mine))
@@ -114,9 +121,11 @@ def test_what_turns_no_motor_needs_nothing() -> None:
     assert not any(drives_motors(one) or require_safe(one) for one in exempt)
 
 
-@pytest.mark.parametrize("form", ["cobs", "ascii"])
-def test_the_emulator_says_that_it_is_one_and_nothing_is_sent_to_it(form: Any) -> None:
-    with emulated(form) as emulator:
+@pytest.mark.parametrize(("form", "samples_per_s"), [("cobs", None), ("ascii", None), ("ascii", 50.0)])
+def test_the_emulator_says_that_it_is_one_and_nothing_is_sent_to_it(
+    form: Any, samples_per_s: float | None
+) -> None:
+    with emulated(form, samples_per_s=samples_per_s) as emulator:
         assert not require_safe(configured(f"{form}:{emulator.line.address}"))
         assert emulator.device.counts["commands"] == 0
 
@@ -136,6 +145,26 @@ def test_raw_doubles_can_say_it_in_their_flags_only(flags: bool) -> None:
 def test_a_firmware_with_bits_of_its_own_is_no_emulator() -> None:
     declared = [byte for byte in range(256) if DeviceFlag.EMULATED in flags_of(byte)]
     assert declared == list(range(0xA0, 0xB0))
+    layout = DoublesLayout(("flags", "c0"))
+    status = [layout.decode(layout.struct.pack(one, 0.0)).flags for one in (163.0, 163.4, 419.0)]
+    assert [DeviceFlag.EMULATED in one for one in status] == [True, False, False]
+    assert all(one & 0x0F == 3 for one in status)
+
+
+def test_one_sample_that_looks_like_the_emulators_is_not_enough() -> None:
+    with emulated("cobs") as emulator:
+        sample = emulator.device.sample
+        count = itertools.count(1)
+        emulator.device.sample = lambda now_ns: (  # type: ignore[method-assign]
+            _undeclared(sample(now_ns)) if next(count) % 20 == 0 else sample(now_ns)
+        )
+        assert "stay off" in refusal(configured(f"cobs:{emulator.line.address}"))
+
+
+def test_an_emulator_at_the_encoders_says_nothing_of_motors_at_another_port() -> None:
+    with emulated("cobs") as emulator:
+        motors = "transmitter.serial.motor_port='/dev/null'"
+        assert "stay off" in refusal(configured(f"cobs:{emulator.line.address}", motors))
 
 
 def test_a_real_device_is_refused_over_its_port_before_anything_is_sent() -> None:
@@ -151,6 +180,11 @@ def _undeclared(sample: Any) -> Any:
     return sample._replace(flags=sample.flags & DeviceFlag(0x0F))
 
 
+def test_a_controller_from_outside_is_refused_by_its_name_too() -> None:
+    text = refusal(configured("hil", *SETTINGS, "receiver.controller='tests.nowhere:Law'"))
+    assert "receiver.controller: it may follow set-points of its own" in text
+
+
 @pytest.mark.parametrize("command", ["demo", "transmit"])
 def test_commands_refuse_before_anything_starts(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -161,6 +195,27 @@ def test_commands_refuse_before_anything_starts(
     said = capsys.readouterr().err
     assert said.startswith("tenbaud: the motors of Quanser q8_usb 0 stay off; before they turn")
     assert not (tmp_path / "run").exists()
+
+
+def test_an_end_with_a_folder_of_its_own_is_checked_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["transmit", "--clock", "real", "--rig", "hil", "--run-folder", str(tmp_path)]
+    assert run(words) == ExitCode.USAGE
+    assert "the motors of Quanser q8_usb 0 stay off" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_identification_excites_no_real_rig(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "rig.toml").write_text('[transmitter]\nrig = "hil"\n')
+    out = tmp_path / "out"
+    assert run(["identify", "--config", str(tmp_path / "rig.toml"), "--out", str(out)]) != ExitCode.OK
+    said = capsys.readouterr().err
+    assert "the motors of Quanser q8_usb 0 stay off" in said
+    assert "`tenbaud identify run`" in said
+    assert not out.exists()
 
 
 def test_a_program_is_refused_alike(tmp_path: Path) -> None:
@@ -208,6 +263,46 @@ def test_a_set_point_by_hand_keeps_to_the_limits() -> None:
     free = SteeredReference(Constant(2.0, 0.01))
     free.steer(7.0)
     assert free.value(0) == 7.0
+
+
+def test_a_receiver_that_starts_late_moves_the_set_point_from_its_estimate() -> None:
+    limits = ("limits.set_point_max=0.16", "limits.set_point_slew_per_s=0.1")
+    agreement = agree(configured("simulated", *limits, "model.start=[0.1,0,0,0]"), "virtual")
+    session = build_receiver(agreement, None, DATAGRAM).session
+    identity, sample = agreement.identity, 36_000
+    greeting = Hello(5, identity.version, identity.config_digest, identity.numerics_probe)
+    late = replace(greeting, session=99, epoch=3, request=1, why=Why.UNKNOWN, sample=sample)
+    (welcome,) = session.on_frame(late, 0)
+    assert isinstance(welcome, Welcome)
+    first = welcome.first_sample * agreement.terms.ticks_per_sample
+    controller = session._commander._controller
+    values = [controller.references(tick)[0] for tick in range(first, first + 100)]
+    steps = [abs(after - before) for before, after in pairwise([0.1, *values])]
+    assert first >= sample * 10
+    assert max(steps) < 0.00101
+
+
+def test_what_came_before_a_late_start_is_not_gone_through() -> None:
+    asked: list[int] = []
+
+    class Asked(Constant):
+        def value(self, tick: int) -> float:
+            asked.append(tick)
+            return self.level
+
+    steered = SteeredReference(LimitedReference(Asked(1.0, 0.01), 0.0, 0.5, 0.01))
+    steered.begin(10**9, 0.3)
+    assert steered.value(10**9 + 4) == pytest.approx(0.35)
+    assert len(asked) == 5
+
+
+def test_the_set_points_of_all_samples_that_are_not_recorded_yet_are_known() -> None:
+    words = ("timing.tick_s=0.001", "timing.symbol_period_s=1.0", "limits.set_point_slew_per_s=0.001")
+    config = configured("simulated", *words, "timing.lead_ticks=0")
+    (reference,) = build_references(config, configured_signals(config), build_model(config))
+    assert reference is not None
+    values = [reference.value(tick) for tick in range(34_000)]
+    assert reference.value(2_000) == values[2_000] != values[2_001]
 
 
 def test_a_receiver_with_other_set_point_limits_is_refused_in_the_handshake() -> None:

@@ -74,7 +74,9 @@ def turned_by_hand(emulator: RigEmulator, ends: tuple[int, int]) -> None:
     sample = emulator.device.sample
 
     def turned(now_ns: int) -> RawSample:
-        share = 0.5 - 0.5 * math.cos(now_ns / 1e9 * math.tau / 0.8)
+        # It is held at both ends, so that a late sample sees them too.
+        swing = 1.5 * math.cos(now_ns / 1e9 * math.tau / 0.8)
+        share = 0.5 - 0.5 * min(max(swing, -1.0), 1.0)
         return sample(now_ns)._replace(counts=(0, round(ends[0] + (ends[1] - ends[0]) * share), 0))
 
     emulator.device.sample = turned  # type: ignore[method-assign]
@@ -104,3 +106,22 @@ def test_soft_limits_follow_from_the_range_that_was_turned(
     assert ("its soft limit is a guess" in said) != turned
     assert "not seen: the motors (front, rear)" in said
     assert run([*rig, "--write", str(written)]) == 2, "a file that is there is kept"
+
+
+def test_what_a_person_had_set_is_written_with_the_proposal(tmp_path: Path) -> None:
+    own, written = tmp_path / "own.toml", tmp_path / "rig.toml"
+    own.write_text(
+        'preset = "helicopter-10baud"\n[receiver.reference]\namplitude = 0.05\n'
+        "[limits]\nvolts_max = 2.0\nset_point_max = 9.0\n"
+    )
+    with emulated("cobs") as emulator:
+        rig = ("rig-check", "--rig", f"cobs:{emulator.line.address}", "--seconds", "0.3")
+        own_words = ("--config", str(own), "--set", "link.peer_timeout_s=7", "--write", str(written))
+        with pytest.warns(FutureWarning, match="limits.volts_max"):
+            run([*rig, *own_words, "--set", "transmitter.bridge.stale_s=1.0"])
+    config = flight_config(None, written)
+    assert (config.preset, config.link.peer_timeout_s) == ("helicopter-10baud", 7.0)
+    assert config.receiver.reference.amplitude == 0.05
+    assert config.limits.command_max == 2.0
+    assert config.limits.set_point_max != 9.0, "what is proposed is the safer"
+    assert require_safe(config)

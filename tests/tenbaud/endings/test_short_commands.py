@@ -25,6 +25,7 @@ OFTEN = ("doctor", "inspect", "rig", "rig-check", "view", "design", "convert par
 COMMANDS = READERS | WRITERS
 AFTER_S = (0.0, 0.6)
 """Within its imports, and within its work."""
+ATTEMPTS = 5
 
 
 def _wait_for_main(process: subprocess.Popen[str]) -> None:
@@ -32,6 +33,23 @@ def _wait_for_main(process: subprocess.Popen[str]) -> None:
     for wanted in (True, False):
         while process.poll() is None and _catches_sigint(process.pid) is not wanted:
             time.sleep(0.005)
+
+
+def _interrupted(
+    name: str, inputs: Inputs, top: Path, after_s: float
+) -> tuple[Path, subprocess.Popen[str]]:
+    """Interrupt a command after this time; start it anew where it was over too early for that."""
+    for attempt in range(ATTEMPTS):
+        folder = top / f"{after_s}-{attempt}"
+        folder.mkdir()
+        process = start(*COMMANDS[name](inputs, str(folder / "out")), cwd=folder)
+        _wait_for_main(process)
+        time.sleep(after_s)
+        if after_s or process.poll() is None:
+            process.send_signal(signal.SIGINT)
+            return folder, process
+        finish(process)
+    raise AssertionError(f"{name} ended {ATTEMPTS} times before it could be interrupted")
 
 
 def _catches_sigint(pid: int) -> bool:
@@ -51,13 +69,8 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Inputs:
 def test_a_command_that_is_interrupted_leaves_nothing_half(
     name: str, inputs: Inputs, tmp_path: Path
 ) -> None:
-    for place, after_s in enumerate(AFTER_S):
-        folder = tmp_path / str(place)
-        folder.mkdir()
-        process = start(*COMMANDS[name](inputs, str(folder / "out")), cwd=folder)
-        _wait_for_main(process)
-        time.sleep(after_s)
-        process.send_signal(signal.SIGINT)
+    for after_s in AFTER_S:
+        folder, process = _interrupted(name, inputs, tmp_path, after_s)
         ended = finish(process)
         codes = (ExitCode.INTERRUPTED, -signal.SIGINT, 0, ENDS_OF_THEIR_OWN.get(name, 0))
         assert ended.code in codes, (ended.code, ended.err)

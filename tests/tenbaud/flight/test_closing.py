@@ -54,7 +54,7 @@ def test_a_good_flight_is_its_verdict_and_six_lines(tmp_path: Path) -> None:
     text = "\n".join(lines)
     assert "1000 bits, 10 bit/s" in text
     assert "0.39° rms, 1.13° max (0.30% and 0.88% of the largest), after the first 25 s" in text
-    assert "0 symbols lost, 0 late, 0 resyncs" in text
+    assert "0 words lost, 0 late, 0 resyncs" in text
     assert "rad" not in text
     assert lines[-1].endswith("Next: tenbaud demo --view")
 
@@ -76,7 +76,21 @@ def test_a_flight_that_did_not_fly_says_in_what_and_then_its_numbers(tmp_path: P
     assert lines[1:3] == ["  ⚠ of 9 samples", "  ⚠ help"]
 
 
-@pytest.mark.parametrize("code", [1, 4, 5, 6, 7, 130])
+def test_a_flight_that_was_stopped_is_neither_finished_nor_failed(tmp_path: Path) -> None:
+    first = lines_of(tmp_path, exit_code=130, outcome="stopped by the user")[0]
+    assert first.startswith("■ Flight stopped after 100 s: stopped by the user")
+
+
+def test_an_input_at_its_limit_and_a_lost_estimate_are_warned_of(tmp_path: Path) -> None:
+    lost = {"pitch": {"unit": "rad", "largest": 0.1, "tracking_rms": None} | dict.fromkeys(
+        ("error_live_rms", "error_live_max"), 0.2
+    )}  # fmt: skip
+    text = "\n".join(lines_of(tmp_path, ticks_at_limit=9000, outputs=lost))
+    assert "an input was at its limit for 90% of the flight" in text
+    assert "the estimate of pitch is off by 200% of the largest value" in text
+
+
+@pytest.mark.parametrize("code", [1, 4, 5, 6, 7])
 def test_a_flight_that_failed_does_not_say_finished(tmp_path: Path, code: int) -> None:
     first = lines_of(tmp_path, exit_code=code, outcome="what happened")[0]
     assert first == f"✗ Flight failed (exit code {code}): what happened"

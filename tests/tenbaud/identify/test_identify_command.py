@@ -43,6 +43,24 @@ def found(result: Result, index: int = 0) -> dict[str, float]:
     return estimates
 
 
+@pytest.mark.parametrize(
+    "rig",
+    [
+        ("transmitter.rig=serial", "transmitter.serial.port=/dev/none"),
+        ("transmitter.rig=quarc",),
+        ("transmitter.rig=hil",),
+    ],
+    ids=lambda rig: rig[0],
+)
+def test_a_real_rig_is_refused_before_it_is_opened(rig: tuple[str, ...], tmp_path: Path) -> None:
+    options = [word for setting in rig for word in ("--set", setting)]
+    result = run(*options, "--duration", "1", "--out", str(tmp_path / "out"))
+    assert result.exit_code != 0
+    assert "simulated rigs only" in str(result.exception)
+    assert "tenbaud demo --clock real" in str(result.exception)
+    assert not (tmp_path / "out").exists()
+
+
 def test_when_the_simulated_rig_is_identified_then_both_ends_can_fly_with_the_result(
     tmp_path: Path,
 ) -> None:

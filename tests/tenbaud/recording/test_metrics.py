@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 import sys
 from pathlib import Path
 
@@ -94,3 +96,25 @@ def test_a_notebook_shows_of_an_end_alone_what_there_is(stepped: Run, tmp_path: 
     assert "no summary" in html
     assert "⚠" in html
     assert "<img" not in html
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"exit_code": None},
+        {"outputs": {"pitch": 0.5}},
+        {"outputs": {"pitch": {"unit": "rad"}}},
+        {"duration_s": "12"},
+        {"coder_bits_up": []},
+    ],
+    ids=str,
+)
+def test_a_summary_of_another_form_counts_as_none(
+    changes: dict[str, object], stepped: Run, tmp_path: Path
+) -> None:
+    copy = Path(shutil.copytree(stepped.path, tmp_path / "copy"))
+    (copy / "summary.json").write_text(json.dumps({**stepped.summary, **changes}))
+    run = Run(copy)
+    assert run.summary == {}
+    assert "no summary" in run._repr_html_()
+    assert run.metrics()["bits"] is None

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import json
 import shutil
+import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from tenbaud import Run, compare
@@ -77,6 +80,17 @@ def test_a_run_without_a_summary_is_compared_as_far_as_its_recordings_go(
     found = compare(slow, copy)
     assert found.metrics[0]["outputs"] == found.metrics[1]["outputs"]
     assert any("B: there is no summary.json" in note for note in found.notes)
+
+
+def test_bits_are_whole_and_an_unknown_set_point_warns_of_nothing(slow: Run, tmp_path: Path) -> None:
+    copy = Run(shutil.copytree(slow.path, tmp_path / "copy"))
+    copy.folder.summary.write_text(json.dumps({**slow.summary, "coder_bits_up": 1234567.0}))
+    signal = copy.signal("reference")
+    assert signal is not None
+    copy._made["reference"] = replace(signal, values=np.full(len(copy.time_s), np.nan))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert rows_of(str(compare(slow, copy)))["bits sent"] == ["160", "1234567"]
 
 
 def test_the_figure_has_every_run_in_both_panels_the_smallest_error_in_front(

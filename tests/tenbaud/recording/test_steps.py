@@ -70,3 +70,25 @@ def test_a_set_point_that_is_known_some_ticks_later_jumps_then() -> None:
     values = second_order(0.7, 3.0, np.arange(1000) * TICK_S)
     (step,) = steps_of(np.arange(1000) * TICK_S, reference, values)
     assert step["time_s"] == 0.04
+
+
+def test_an_output_that_becomes_unknown_has_not_settled() -> None:
+    values = second_order(0.7, 3.0, np.arange(1000) * TICK_S)
+    values[900:] = np.nan
+    (step,) = steps_of(np.arange(1000) * TICK_S, np.ones(1000), values)
+    assert step["settling_time_s"] is None
+    assert step["rise_time_s"] is not None
+
+
+def test_a_step_from_an_unknown_output_is_left_out() -> None:
+    values = second_order(0.7, 3.0, np.arange(1000) * TICK_S)
+    values[0] = np.nan
+    assert steps_of(np.arange(1000) * TICK_S, np.ones(1000), values) == []
+    assert steps_of(np.arange(1000) * TICK_S, np.ones(1000), np.full(1000, np.nan)) == []
+
+
+def test_a_recording_that_begins_in_flight_shows_no_first_step() -> None:
+    values = np.concatenate([np.full(500, 0.9), second_order(0.7, 3.0, np.arange(1000) * TICK_S)])
+    reference = np.concatenate([np.ones(500), np.full(1000, 2.0)])
+    steps = steps_of(30.0 + np.arange(1500) * TICK_S, reference, values)
+    assert [step["time_s"] for step in steps] == [35.0]

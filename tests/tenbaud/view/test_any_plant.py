@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.browser import served, why_no_browser
+from benchmarks.browser import served, state_is, why_no_browser
 from tenbaud.recording.pose import helicopter_lines
 from tenbaud.telemetry.schema import TELEMETRY
 from tests.tenbaud.view.viewers import number, wait
@@ -81,6 +81,7 @@ def test_a_plant_of_any_outputs_is_shown_with_its_names_and_units_and_the_gap_to
             assert "#{:02x}{:02x}{:02x}".format(*found[:3]) == shown
         check_pictures(page, port, message, signals)
         check_pose(page, port, message)
+        check_digests(page, port, message)
         page.get_by_text("takes no commands").wait_for()
         page.close()
     port.close()
@@ -124,6 +125,20 @@ def test_a_set_point_slider_is_in_degrees_whatever_the_unit_of_the_angle(
 
     spread, shown, found = slider_spread({"low": -high * 1.0001, "high": high * 1.0001, "unit": unit})
     assert (spread, shown, found) == ((-45, 45, 5), "°", pytest.approx(factor))
+
+
+def check_digests(page: Any, port: Any, message: dict[str, Any]) -> None:
+    """Check that the digits of a digest that came are compared, and that none are no difference."""
+    own = "0123456789abcdef"
+    cases = [("…cdef", "lockstep", {4: "cdef"}), ("…cdee", "broken", {5: "cdee"}),
+             (own, "lockstep", {6: own, 7: ""})]  # fmt: skip
+    for shown, state, came in cases:
+        one = {"word_sent": [1], "word": [1], "about": [0], "digest": own}
+        message["samples"] = [one | {"sample": sample, "peer_digest": came[sample]} for sample in came]
+        TELEMETRY.validate_python(message)
+        port.publish(json.dumps(message).encode())
+        wait(page, "(text) => document.getElementById('digest-down').textContent === text", shown)
+        state_is(page, state)
 
 
 def check_pose(page: Any, port: Any, message: dict[str, Any]) -> None:

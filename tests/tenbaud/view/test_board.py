@@ -56,6 +56,17 @@ def test_both_ends_are_joined_by_sample() -> None:
     assert board.heads["receiver"]["takes_commands"]
 
 
+def test_whichever_end_is_heard_first_the_digests_are_those_that_were_compared() -> None:
+    for order in ([receiver(3), transmitter(3)], [transmitter(3), receiver(3)]):
+        board = Board()
+        for message in order:
+            board.take([message], 0.0)
+        assert news(board)[1][0]["samples"][0][3:5] == ["aa", "ab"]
+    board = Board()
+    board.take([receiver(3)], 0.0)
+    assert news(board)[1][0]["samples"][0][3:5] == [None, "cc"]
+
+
 def test_a_rig_that_knows_no_true_angle_shows_the_measured_one() -> None:
     board = Board()
     message = json.loads(transmitter())

@@ -10,6 +10,7 @@ import numpy as np
 import orjson
 import pytest
 
+from channel.protocol.recording import Field, RecordChannel
 from tenbaud import Run
 from tenbaud.cli.app import run as command
 from tenbaud.recording.writer import McapRecorder
@@ -17,7 +18,7 @@ from tenbaud.view.recorded import POINTS, RecordedFlight, RunsDiffer, recorded_f
 from tenbaud.view.replay import described, moments
 from tests.tenbaud.flown import SECONDS, flown
 from tests.tenbaud.processes import REPOSITORY
-from tests.tenbaud.recording.rows import TICK, tick_row
+from tests.tenbaud.recording.rows import SAMPLE, TICK, sample_row, tick_row
 
 OLD = REPOSITORY / "tests/golden/recordings/two-epochs-0.1.0"
 AT_S = 7.05
@@ -78,6 +79,19 @@ def test_a_long_window_keeps_the_extremes_and_a_short_one_every_tick(
     assert len(decisions) < 10
 
 
+def test_a_set_point_that_always_changes_keeps_its_extremes_too(
+    lossy: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flight = RecordedFlight(lossy)
+    wave = np.sin(np.arange(len(lossy.time_s)) / 100.0)
+    wave[[701, 905]] = 3.0, -3.0
+    monkeypatch.setattr(flight, "_references", wave[:, np.newaxis])
+    decisions = flight.moment(0.0, (0.0, SECONDS))["decisions"]
+    assert len(decisions) < len(wave)
+    shown = [row[1][0] for row in decisions]
+    assert (min(shown), max(shown)) == (-3.0, 3.0)
+
+
 def test_a_question_without_a_window_gets_no_curves_and_nonsense_is_refused(
     flight: RecordedFlight,
 ) -> None:
@@ -85,18 +99,21 @@ def test_a_question_without_a_window_gets_no_curves_and_nonsense_is_refused(
     assert "points" not in one
     (one,) = orjson.loads(moments([flight], '{"at_s": 1e9, "from_s": -5, "to_s": 1e9}'))["runs"]
     assert one["at_s"] == SECONDS
-    for question in ("", "[]", "{}", '{"at_s": "x"}', '{"at_s": 1, "from_s": 1}', '{"at_s": NaN}', "3"):
+    endless = ('{"at_s":1,"from_s":"-inf","to_s":"inf"}', '{"at_s":"inf"}', '{"at_s":"nan"}')
+    junk = ("", "[]", "{}", '{"at_s": "x"}', '{"at_s": 1, "from_s": 1}', '{"at_s": NaN}', "3")
+    for question in (*junk, *endless):
         with pytest.raises((ValueError, TypeError)):
             moments([flight], question)
 
 
-def test_an_old_recording_is_shown_with_its_version(tmp_path: Path) -> None:
+def test_an_old_recording_is_shown_with_its_version(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tenbaud.config.version.software_version", lambda: "9.9.9")
     flight = RecordedFlight(Run(OLD))
     moment = flight.moment(4.0, (0.0, 8.0))
     # Between two epochs: nothing is estimated there.
-    assert (moment["point"][2], moment["heads"]["transmitter"]["phase"]) == ([None], "rejoining") or (
-        np.isnan(moment["point"][2][0])
-    )
+    assert np.isnan(moment["point"][2]).tolist() == [True]
+    assert moment["heads"]["transmitter"]["phase"] == "rejoining"
+    assert any("was recorded by tenbaud 0.1.0; this is 9.9.9" in note for note in flight.notes)
     assert moment["heads"]["transmitter"]["guard"] == "ramping"
 
 
@@ -148,6 +165,18 @@ def test_ticks_without_estimates_are_shown_as_such(tmp_path: Path) -> None:
     assert orjson.loads(orjson.dumps(moment))["point"][2:] == [[None], [None]]
     assert flight.missing == "no digests were recorded"
     assert "run is without estimates" in flight.notes
+
+
+def test_digests_of_a_recording_that_begins_late_are_compared(tmp_path: Path) -> None:
+    path = tmp_path / "run" / "transmitter.mcap"
+    path.parent.mkdir()
+    sample = RecordChannel("sample", (*SAMPLE.fields, Field("peer_digest", "string")))
+    with McapRecorder(path, {"role": "transmitter"}) as recorder:
+        for tick in range(5000, 5100):
+            recorder.write(TICK, tick * 10_000_000, tick_row(tick, 0.0))
+        row = sample_row(500, word=[1], state=0.0)
+        recorder.write(sample, 5000 * 10_000_000, (*row, row[-1]))
+    assert RecordedFlight(Run(path.parent)).missing == ""
 
 
 def test_runs_of_unlike_outputs_and_too_many_runs_are_refused(lossy: Run, tmp_path: Path) -> None:

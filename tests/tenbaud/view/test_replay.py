@@ -131,7 +131,16 @@ def test_it_plays_at_any_speed_and_stops_at_the_end(open_page: Any, one_run: Ser
     play.click()
     cursor_is(page, SECONDS)
     assert play.inner_text() == "Play"
-    page.get_by_label("Speed, times real time").fill("1000")
+    speed = page.get_by_label("Speed, times real time")
+    speed.fill("-1000")
+    page.locator("#cursor").focus()
+    page.keyboard.press("PageDown")
+    cursor_is(page, SECONDS - 5.0)
+    play.click()
+    page.wait_for_timeout(300.0)
+    play.click()
+    assert float(page.locator("#cursor-text").inner_text().split()[0]) >= SECONDS - 5.0
+    speed.fill("1000")
     play.click()
     wait(page, "() => document.getElementById('play').textContent === 'Play'")
     cursor_is(page, SECONDS)
@@ -181,6 +190,8 @@ def test_two_flights_are_laid_over_each_other_with_their_names_bits_and_digests(
     assert "usual (usual-1000baud)" in legend
     page.keyboard.press("PageUp")
     cursor_is(page, 5.0)
+    # The usual loop names no picture of its own.
+    assert page.locator('[id="helicopter@1"]').is_visible()
     for suffix, run, sample_s in (("", runs[0], 0.1), ("@1", runs[1], 0.01)):
         for end in ("up", "down"):
             shown = page.locator(f'[id="digest-{end}{suffix}"]').inner_text()
@@ -205,6 +216,22 @@ def test_two_flights_are_laid_over_each_other_with_their_names_bits_and_digests(
     assert box["y"] + box["height"] < 900.0
 
 
+def test_flights_of_unlike_inputs_have_bars_and_pictures_of_their_own(
+    open_page: Any, tmp_path: Path
+) -> None:
+    presets = ("integrator-10baud", "servo-10baud")
+    runs = [str(flown(tmp_path / name, name, duration_s=1.0).path) for name in presets]
+    with served(tmp_path, "view", *runs, "--port", "0") as one:
+        page = open_page(one)
+        page.keyboard.press("End")
+        cursor_is(page, 1.0)
+        for suffix, name, unit in (("", "acceleration", "rad/s^2"), ("@1", "voltage", "V")):
+            bars = page.locator(f'[id="inputs{suffix}"]').inner_text().split("\n")
+            assert (bars[0], bars[1].split()[1]) == (name, unit)
+        assert page.locator('[id="dial"]').is_hidden()
+        assert page.locator('[id="dial@1"]').is_visible()
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_phone_shows_two_flights_without_scrolling_sideways(
     open_page: Any, two_runs: Served, scheme: str
@@ -218,6 +245,20 @@ def test_a_phone_shows_two_flights_without_scrolling_sideways(
         box = page.locator(element).bounding_box()
         assert box["x"] >= 0
         assert box["x"] + box["width"] <= 360
+
+
+CLOSED_AFTER = """([frame, isBinary]) => new Promise((go) => {
+  const socket = new WebSocket(new URL("stream", location.href.replace("http", "ws")));
+  socket.onopen = () => socket.send(isBinary ? new TextEncoder().encode(frame) : frame);
+  socket.onclose = ({ code }) => go(code);
+})"""
+
+
+def test_the_stream_closes_on_what_is_no_question(open_page: Any, one_run: Served) -> None:
+    page = open_page(one_run)
+    frames = (('{"at_s":1}', True), ('{"at_s":1,"from_s":"-inf","to_s":"inf"}', False), ("[]", False))
+    for frame in frames:
+        assert page.evaluate(CLOSED_AFTER, list(frame)) == 1003, frame
 
 
 def test_one_address_is_printed_and_nothing_is_served_without_its_secret(

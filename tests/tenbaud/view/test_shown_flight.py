@@ -8,6 +8,7 @@ import pytest
 
 from benchmarks.browser import browser, served, state_is, why_no_browser
 from tenbaud import Run, errors, fly
+from tenbaud.recording.writer import McapRecorder
 
 PROGRAM = """
 from tenbaud import errors, fly
@@ -55,5 +56,23 @@ def test_a_flight_that_failed_gives_its_run(tmp_path: Path) -> None:
     low = {"duration_s": 5.0, "link.impairments": "up:loss=0.97"}
     with pytest.raises(errors.FlightFailed) as failed:
         fly("tuned-10baud", settings=low, out=tmp_path / "run")
-    assert failed.value.run.summary["not_flown"]
-    assert str(failed.value).count(failed.value.run.summary["outcome"]) == 1
+    run = failed.value.run
+    assert run is not None
+    assert run.summary["not_flown"]
+    assert str(failed.value).count(run.summary["outcome"]) == 1
+
+
+def test_a_flight_that_failed_without_a_recording_keeps_its_cause(tmp_path: Path) -> None:
+    failed = errors.FlightFailed("the device is gone", tmp_path)
+    assert failed.run is None
+    assert "the device is gone" in str(failed)
+    assert str(tmp_path) in str(failed)
+
+
+def test_a_recording_without_a_tick_has_a_repr(tmp_path: Path) -> None:
+    flown = fly("tuned-10baud", settings={"duration_s": 1.0}, out=tmp_path / "run")
+    folder = tmp_path / "begun"
+    folder.mkdir()
+    with McapRecorder(folder / flown.folder.transmitter.name, flown.metadata):
+        pass
+    assert "no ticks" in repr(Run(folder))

@@ -26,8 +26,8 @@ from transmitter.rigs.formats.qsb import STAMP_US
 from transmitter.rigs.formats.samples import DeviceFlag, RawSample
 
 COMMAND_BYTES_MAX = 200
-DECLARED_EVERY = 50
-"""In lines of text, one sample in this number follows the line that declares the emulator."""
+DECLARED_EVERY_US = 100_000
+"""In lines of text, the emulator declares itself in a line as often."""
 
 
 class DeviceCommand(NamedTuple):
@@ -111,11 +111,14 @@ class AsciiSpeech(Speech):
         super().__init__()
         self.streams = not polled
         self._form = form
-        self._said = 0
+        self._declared_us: int | None = None
 
     def encode(self, sample: RawSample) -> bytes:
-        self._said += 1
-        declares = DeviceFlag.EMULATED in sample.flags and self._said % DECLARED_EVERY == 1
+        now_us = sample.device_us or 0
+        past = self._declared_us is None or not 0 <= now_us - self._declared_us < DECLARED_EVERY_US
+        declares = DeviceFlag.EMULATED in sample.flags and past
+        if declares:
+            self._declared_us = now_us
         return (EMULATOR_LINE + b"\n" if declares else b"") + self._sample_line(sample)
 
     def _sample_line(self, sample: RawSample) -> bytes:

@@ -72,6 +72,8 @@ class DoublesLayout:
                 time_us = round(value * 1e6)
             elif name == "flags":
                 flags = flags_of(round(value) & 0xFF)
+                if value != float(flags):  # more than flags, so the firmware's own bits
+                    flags &= DeviceFlag(0x0F)
             else:
                 channel = int(name[1:])
                 counts[channel] = math.floor(value * self._scales.get(channel, 1.0) + 0.5)

@@ -20,11 +20,11 @@ from typing import Any
 import numpy as np
 
 from benchmarks.figures import Figure
+from channel.codec.laws import clamped, is_stuck, pid_integral, pid_sum
 from channel.codec.numerics import sin
 from channel.protocol.limits import from_steps, to_steps
 from plant_sim.encoder import angle_of, counts_of
 from plant_sim.pitch import Sine, pitch_step
-from receiver.controllers.pid import clamped, is_stuck, pid_integral, pid_sum
 from tenbaud.config.load import load_config
 from tenbaud.studies.flights import CompiledPoint
 

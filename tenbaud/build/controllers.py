@@ -7,9 +7,10 @@ from dataclasses import replace
 from operator import itemgetter
 
 from channel.codec.codec import Model
+from channel.codec.laws import PidConstants
 from channel.codec.signals import Signals, signals_of
 from receiver.controllers.base import Controller, ControllerContext
-from receiver.controllers.pid import Loop, PidConstants, PidGains, PidLoops, Reading, Vector
+from receiver.controllers.pid import Loop, PidGains, PidLoops, Reading, Vector
 from receiver.controllers.recorded import RecordedController
 from receiver.controllers.references import Constant
 from tenbaud.build.codec import build_model

@@ -14,10 +14,11 @@ import numpy.typing as npt
 from scipy.linalg import LinAlgError, solve_discrete_are
 
 from channel.codec.codec import Model
+from channel.codec.laws import FeedbackLaw, Rows
 from channel.codec.models.learned import plant_model
 from channel.codec.signals import Signal, Signals, signals_of
 from receiver.controllers.base import ControllerContext
-from receiver.controllers.state_feedback import FeedbackLaw, Rows, StateFeedback
+from receiver.controllers.state_feedback import StateFeedback
 from tenbaud.bounds.linear import unreached
 from tenbaud.config.controllers import StateFeedbackSection
 from tenbaud.config.load import ConfigError

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from channel.codec.laws import FeedbackLaw, PidConstants, feedback_command, pid_command
 from channel.codec.signals import Signals
 from receiver.controllers.base import Controller
-from receiver.controllers.pid import PidConstants, PidLoops, pid_command
+from receiver.controllers.pid import PidLoops
 from receiver.controllers.recorded import RecordedController
-from receiver.controllers.state_feedback import FeedbackLaw, StateFeedback, feedback_command
+from receiver.controllers.state_feedback import StateFeedback
 from tenbaud.build.controllers import Difference
 from tenbaud.studies.flight_data import Given, Work
 from tenbaud.studies.parts import INPUTS

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import pytest
 
+from channel.codec.laws import PidConstants, pid_command
 from plant_sim.pitch import PitchParameters, PitchPlant
 from receiver.controllers.base import Controller
-from receiver.controllers.pid import PAPER_GAINS, AntiWindup, Pid, PidConstants, PidGains, pid_command
+from receiver.controllers.pid import PAPER_GAINS, AntiWindup, Pid, PidGains
 from receiver.controllers.references import Constant, Square
 
 TICK_S = 0.01

@@ -1,6 +1,7 @@
 """The messages of the two sessions. Their bytes are in `channel.protocol.wire`.
 
-Uplink: Hello, Symbol, Desync, Bye. Downlink: Welcome, Refuse, Commands, Desync, Unknown, Claim, Bye.
+Uplink: Hello, Symbol, Desync, Bye. Downlink: Welcome, Refuse, Commands, Desync, Unknown, Claim, Bye;
+with the narrow downlink DownSymbol in place of Commands.
 """
 
 from __future__ import annotations
@@ -96,6 +97,18 @@ class Symbol:
     """counted from the first symbol of sample 0"""
     number: int
     """place of the symbol in the coder's alphabet"""
+
+
+@dataclass(frozen=True, slots=True)
+class DownSymbol:
+    """One symbol of the narrow downlink in its slot (`channel.codec.downlink.layout`)."""
+
+    session: int
+    epoch: int
+    slot: int
+    """counted from the first down symbol of sample 0"""
+    number: int
+    """0 or 1"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,6 +232,7 @@ Frame: TypeAlias = (
     | Welcome
     | Refuse
     | Symbol
+    | DownSymbol
     | ShortSymbol
     | LocatedSymbol
     | Commands

@@ -17,8 +17,8 @@ from channel.protocol.lockstep import HISTORY_NS, HISTORY_SAMPLES
 
 Delivery = Literal["start", "end"]
 Clock = Literal["real", "virtual"]
-Rung = Literal["full", "compact"]
-"""What a downlink spends on the echo of a sample."""
+Rung = Literal["full", "compact", "narrow"]
+"""What a downlink spends on a sample."""
 
 # What a command frame can hold (channel/protocol/wire.py): 16 KiB, its echoes counted in one byte.
 ECHO_BYTES = 10
@@ -53,7 +53,14 @@ class Terms:
     signals: Signals
     """of the codec's model"""
     downlink: Rung = "full"
-    """"compact": one command a sample, in frames of few bits (`channel.protocol.compact`)"""
+    """"compact": one command a sample, in frames of few bits (`channel.protocol.compact`); "narrow":
+    symbols on a slot grid (`channel.codec.downlink`)"""
+    downlink_baud: float = 0.0
+    """R_d of the narrow downlink: symbols per second that it may carry"""
+    down_symbols: int = 0
+    """of the narrow downlink: the slots of one sample"""
+    is_mirrored: bool = False
+    """whether the law runs in the state machine of both ends, so that no command is waited for"""
     uplink_line_ns: int = 0
     """on a line of finite rate: how long a symbol is on its way"""
     downlink_line_ns: int = 0
@@ -122,6 +129,14 @@ class Terms:
     def slot_ns(self, slot: int) -> int:
         """Return the flight time at which a slot begins."""
         return slot * self.tick_ns * self.ticks_per_sample // self.symbols_per_word
+
+    def down_slot_ns(self, slot: int) -> int:
+        """Return the flight time at which a slot of the narrow downlink begins.
+
+        The receiver has settled a sample's word by the first slot of the sample.
+        """
+        settled_ns = self.uplink_delivery_ns + self.uplink_line_ns + self.deadline_allowance_ns
+        return settled_ns + slot * self.sample_ns // self.down_symbols
 
     def linger_ns(self, line_delay_ns: int) -> int:
         """Return how long after a flight's last tick its last echo may come.

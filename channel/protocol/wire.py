@@ -16,6 +16,7 @@ there. Bodies, by kind:
     7 bye       ending u8, text
     8 unknown   nothing
     9 claim     session that takes over u32
+    10 down symbol  slot u32, number u8
 
 A text is a u16 length and that many bytes of UTF-8.
 
@@ -39,6 +40,7 @@ from channel.protocol.frames import (
     Claim,
     Commands,
     Desync,
+    DownSymbol,
     Echo,
     ForeignVersion,
     Frame,
@@ -88,6 +90,7 @@ _BODIES = (
     _Body(7, Bye, struct.Struct("<B"), ("ending",), ("text",)),
     _Body(8, Unknown, struct.Struct("<"), ()),
     _Body(9, Claim, struct.Struct("<I"), ("by",)),
+    _Body(10, DownSymbol, struct.Struct("<IB"), ("slot", "number")),
 )
 """Those of the frames that are not written out below."""
 _OF_KIND = {one.kind: one for one in _BODIES}

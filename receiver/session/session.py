@@ -16,6 +16,7 @@ from dataclasses import replace
 from enum import Enum
 
 from channel.codec.codec import ERASED, Codec, CodecState
+from channel.codec.downlink.machine import TwoWay
 from channel.line.meters import BaudMeter
 from channel.protocol.bounds import Bounds, within_text_bounds
 from channel.protocol.endings import End, Ending
@@ -41,6 +42,7 @@ from receiver.controllers.base import Controller
 from receiver.session.asking import Asker
 from receiver.session.commander import Begins, Commander
 from receiver.session.echoes import EchoCommander
+from receiver.session.narrow import NarrowCommander
 from receiver.session.records import write_symbol
 from receiver.session.rejoin import Greeter, Takeover, Verdict, desync_answer, difference, first_sample
 from receiver.session.schedule import Proven, Schedule, SlotClock, Timing
@@ -60,7 +62,8 @@ class ReceiverSession:
     """Converts symbols to commands; see the module's text.
 
     `session_number` is drawn by the caller (32 bits, not zero), so that the session itself stays
-    deterministic. `take_over`: claim a flight that another receiver has.
+    deterministic. `take_over`: claim a flight that another receiver has. `two_way`: the state machine
+    of the narrow downlink.
     """
 
     def __init__(
@@ -74,6 +77,7 @@ class ReceiverSession:
         *,
         take_over: bool = False,
         begins: Begins | None = None,
+        two_way: TwoWay | None = None,
     ) -> None:
         self.codec = codec
         self.terms = terms
@@ -94,7 +98,11 @@ class ReceiverSession:
         self._takeover = Takeover(session_number, take_over)
         self._recorder = recorder or NullRecorder()
         asker = Asker(controller, len(terms.signals.outputs), self.counts, self._emit)
-        self._commander: Commander = EchoCommander(codec, terms, asker, self._recorder, begins)
+        self._commander: Commander = (
+            EchoCommander(codec, terms, asker, self._recorder, begins)
+            if two_way is None
+            else NarrowCommander(two_way, terms, asker, self._recorder, begins)
+        )
         self._clock = SlotClock(terms)
         self._word: list[int | None] = []
         self._advanced = False

@@ -48,18 +48,17 @@ class EchoFollowing:
         return self.copies.lag_samples
 
     @property
-    def reliable_state(self) -> Vector | None:
-        """Return the confirmed state, once it has been compared with the receiver's and is equal."""
-        state = self.copies.confirmed
-        return state.model if self._compared is state else None
-
-    @property
     def last_command(self) -> Vector:
         return self._due.last
 
     @property
     def unrecorded(self) -> int:
         return len(self._confirmed)
+
+    def reliable_state(self, tick: int) -> Vector | None:
+        """Return the confirmed state, once it has been compared with the receiver's and is equal."""
+        state = self.copies.confirmed
+        return state.model if self._compared is state else None
 
     def restart(self, welcome: Welcome, held_ticks: int) -> None:
         codec, terms = self._parts.codec, self._parts.terms
@@ -69,6 +68,9 @@ class EchoFollowing:
         self._echoes.clear()
         self._due.restart(state.sample * terms.ticks_per_sample, hold, held_ticks)
         write_epoch(self._parts.recorder, terms.sample_ns, welcome.epoch, state, hold)
+
+    def pause(self) -> None:
+        """Go on with the commands that are proven; there is nothing to stop."""
 
     def at_tick(self, tick: int) -> Lost | None:
         terms = self._parts.terms

@@ -64,10 +64,6 @@ class Following(Protocol):
         """Return how many samples were sent of which nothing has been heard."""
 
     @property
-    def reliable_state(self) -> Vector | None:
-        """Return the model state to check encoders against; None: none can be relied on."""
-
-    @property
     def last_command(self) -> Vector:
         """Return the last command given out."""
 
@@ -75,8 +71,14 @@ class Following(Protocol):
     def unrecorded(self) -> int:
         """Return how many confirmed samples were not taken yet."""
 
+    def reliable_state(self, tick: int) -> Vector | None:
+        """Return the model state to check encoders against; None: none can be relied on."""
+
     def restart(self, welcome: Welcome, held_ticks: int) -> None:
         """Take the common state of a welcome within bounds; its command is held for some ticks."""
+
+    def pause(self) -> None:
+        """Note that a new epoch is asked for: nothing of the present one is taken any more."""
 
     def at_tick(self, tick: int) -> Lost | None:
         """Let time pass to a tick; samples before it whose word was not sent have none."""

@@ -14,6 +14,7 @@ from dataclasses import replace
 from enum import Enum
 
 from channel.codec.codec import Codec, CodecState, Vector
+from channel.codec.downlink.machine import TwoWay
 from channel.protocol.bounds import Bounds, shown, within_text_bounds
 from channel.protocol.compact import compact_form
 from channel.protocol.endings import End, Ending
@@ -23,6 +24,7 @@ from channel.protocol.frames import (
     Claim,
     Commands,
     Desync,
+    DownSymbol,
     ForeignVersion,
     Frame,
     Hello,
@@ -41,6 +43,7 @@ from channel.protocol.wire import foreign_version_text
 from transmitter.session.copies import CANNOT_FLY, Confirmed
 from transmitter.session.echoes import EchoFollowing, diverged
 from transmitter.session.following import Following, Lost, Parts
+from transmitter.session.narrow.following import NarrowFollowing
 from transmitter.session.owing import Owing
 from transmitter.session.rejoin import Asking
 from transmitter.session.state_observer import StateObserver, default_observer
@@ -63,6 +66,8 @@ class TransmitterSession:
     `stop_on_desync`: end the flight at the first digest that differs, instead of rejoining.
     `state_observer`: finds the states for a coder that uses rates; None: that of angle and rate.
     `overtaking_ticks`: how long after a command frame one may come that was sent before it.
+    `two_way`: the state machine of the narrow downlink; `line_delay_ns`: by how much the two lines may
+    delay its symbols beyond what is agreed.
     """
 
     def __init__(
@@ -76,6 +81,8 @@ class TransmitterSession:
         stop_on_desync: bool = False,
         state_observer: StateObserver | None = None,
         overtaking_ticks: int = 0,
+        two_way: TwoWay | None = None,
+        line_delay_ns: int = 0,
     ) -> None:
         self.codec = codec
         self.terms = terms
@@ -86,7 +93,8 @@ class TransmitterSession:
         self.epoch = 0
         self.counts: Counter[str] = Counter()
         """confirmed, digest_checks, desyncs, rejoins, stale_frames, words_missed, erasures,
-        claims_refused, take_overs, out_of_bounds, diverged"""
+        claims_refused, take_overs, out_of_bounds, diverged; narrow: hash_symbols (that came, of
+        confirmed samples), down_late and down_erased (symbols)"""
         self.rejoins_asked: Counter[Why] = Counter()
         self.end: End | None = None
         self.refusal: End | None = None
@@ -101,7 +109,7 @@ class TransmitterSession:
         self.events: deque[Event] = deque(maxlen=1000)
         self._asking = Asking(identity, incarnation, terms)
         self._takeover = Takeover(terms)
-        self._bounds = Bounds(codec, terms, self.counts, self._emit)
+        self._bounds = Bounds(codec, terms, self.counts, self._emit, two_way)
         self._stop_on_desync = stop_on_desync
         self._observer = state_observer or default_observer(codec, terms.tick_ns / 1e9)
         self._recorder = recorder or NullRecorder()
@@ -111,7 +119,11 @@ class TransmitterSession:
             codec, terms, self.counts, self._bounds, self.owing, self._recorder, self._on_heard
         )
         self._parts = parts
-        self.following: Following = EchoFollowing(parts, overtaking_ticks)
+        self.following: Following = (
+            EchoFollowing(parts, overtaking_ticks)
+            if two_way is None
+            else NarrowFollowing(parts, two_way, line_delay_ns)
+        )
 
     # What happens at a tick
 
@@ -160,6 +172,7 @@ class TransmitterSession:
         if self.phase is not Phase.FLYING:
             return []
         self.phase = Phase.REJOINING
+        self.following.pause()
         self.rejoins_asked[why] += 1
         self._asking.begin(why, self._tick)
         self._emit(replace(details, epoch=self.epoch, cause=why))
@@ -185,7 +198,7 @@ class TransmitterSession:
         """Take one frame; return the frames to send."""
         frame = within_text_bounds(frame)
         match frame:
-            case Commands() if self._is_current(frame.session) and frame.epoch == self.epoch:
+            case Commands() | DownSymbol() if self._is_present(frame.session, frame.epoch):
                 return self._follow(frame)
             case ShortCommands() if commands := self._unpacked(frame):
                 return self._follow(commands)
@@ -194,9 +207,9 @@ class TransmitterSession:
             case Welcome() if self._is_current(frame.session) and self._is_left_behind(frame):
                 detail = f"the receiver has begun epoch {frame.epoch}, unasked"
                 return self.rejoin(Why.UNKNOWN, replace(ASKED, detail=detail))
-            case Unknown() if self._is_current(frame.session) and frame.epoch == self.epoch:
+            case Unknown() if self._is_present(frame.session, frame.epoch):
                 return self._on_unknown()
-            case Claim() if self._is_current(frame.session) and frame.epoch == self.epoch:
+            case Claim() if self._is_present(frame.session, frame.epoch):
                 return self._on_claim(frame)
             case Desync() if not self._report_answered and is_answer(frame, self.desync):
                 self._report_answered = True
@@ -296,6 +309,8 @@ class TransmitterSession:
     def _lose(self, lost: Lost) -> list[Frame]:
         if lost.differing is not None:
             return self._on_desync(lost.differing)
+        if lost.why is Why.REST and self._stop_on_desync:
+            return self.bye(End(Ending.DESYNC))
         return self.rejoin(lost.why, lost.details)
 
     def _on_desync(self, done: Confirmed) -> list[Frame]:
@@ -325,6 +340,9 @@ class TransmitterSession:
     def _is_current(self, session: int) -> bool:
         return self.phase is Phase.FLYING and session == self.session_number
 
+    def _is_present(self, session: int, epoch: int) -> bool:
+        return self._is_current(session) and epoch == self.epoch
+
     @property
     def confirmed_state(self) -> CodecState:
         """Return the last codec state that is certainly the receiver's."""
@@ -348,7 +366,7 @@ class TransmitterSession:
     @property
     def reliable_state(self) -> Vector | None:
         """Return the model state to check encoders against; None: none can be relied on."""
-        return self.following.reliable_state if self.phase is Phase.FLYING else None
+        return self.following.reliable_state(self._tick) if self.phase is Phase.FLYING else None
 
     @property
     def _has_session(self) -> bool:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from channel.codec.codec import ERASED, Vector, Word
-from channel.codec.downlink.machine import TwoWay, TwoWayState
+from channel.codec.downlink.machine import TwoWay, TwoWayState, parity
 from transmitter.session.narrow.paths import Node, Symbols
 from transmitter.session.narrow.priors import Priors
 
@@ -64,18 +64,22 @@ class Branching:
             options = self._options(node.state, heard[:count])
             chance = sum(share for _, share in options)
             predicted += weight * (chance if count == own else 0.5**asked)
-            as_heard, if_erased = self._hash_chances(node.state, heard[count:])
+            hashed = self._hash_chances(node.state, heard[count:])
             chances = self._chances(sent, node.word)
+            arrived = []
             for symbols, share in options:
+                as_heard, if_erased = hashed[parity(symbols)]
+                arrived.append((symbols, as_heard * share))
                 if chances.as_sent > 0.0:
                     arrives = weight * chances.as_sent * as_heard * share
                     found.branches.append((arrives, node, sent, symbols))
                 erased = weight * chances.erased * if_erased * share
                 found.branches.append((erased, node, ERASED, symbols))
             if chances.changed > 0.0:
-                flips.append((weight * chances.changed * as_heard, node, options))
+                flips.append((weight * chances.changed, node, arrived))
             if chances.otherwise > 0.0:
-                found.spilled.append((weight * chances.otherwise * as_heard * chance, node))
+                share = sum(one for _, one in arrived)
+                found.spilled.append((weight * chances.otherwise * share, node))
         if sent is not ERASED:
             self._add_changed(sent, flips, found)
         return found._replace(rest_factor=0.5**hashes * max(0.5**asked, predicted))
@@ -92,18 +96,24 @@ class Branching:
         """Return how many words differ from this one in one symbol."""
         return len(sent) * (len(self._machine.codec.coder.alphabet.symbols) - 1)
 
-    def _hash_chances(self, state: TwoWayState, heard: Symbols) -> tuple[float, float]:
-        """Return how likely these hash symbols come down with a word that is whole, and with none."""
-        whole = erased = 1.0
-        if any(one is not None for one in heard):
-            flip = self._priors.down_flipped
-            bits = self._machine.hashed(state, self._machine.digest(state))
+    def _hash_chances(self, state: TwoWayState, heard: Symbols) -> tuple[tuple[float, float], ...]:
+        """Return how likely these hash symbols come down with a word that is whole, and with none.
+
+        First with command symbols of even parity, then of odd.
+        """
+        found = []
+        flip = self._priors.down_flipped
+        asked = any(one is not None for one in heard)
+        bits = self._machine.hashed(state, self._machine.digest(state)) if asked else 0
+        for odd in (0, 1):
+            whole = erased = 1.0
             for place, one in enumerate(heard):
                 if one is not None:
-                    same = bits >> place & 1 == one
+                    same = (bits ^ odd) >> place & 1 == one
                     whole *= 1.0 - flip if same else flip
                     erased *= flip if same else 1.0 - flip
-        return whole, erased
+            found.append((whole, erased))
+        return tuple(found)
 
     def _options(self, state: TwoWayState, heard: Symbols) -> list[Option]:
         """Return all command symbols of a sample, with their chances and those of what came."""

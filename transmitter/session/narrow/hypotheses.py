@@ -313,7 +313,9 @@ class Hypotheses:
             if weight > 0.0:
                 if node not in leaves:
                     leaves[node] = paths.leaves_at(node)
-                paths.book(weight, leaves[node])
+                # The next hash symbol may agree for certain with what differs in two inputs: that
+                # halving is undone here.
+                paths.book(2.0 * weight, leaves[node])
         total = 0.0
         for weight, _ in followed_on:
             total += weight
@@ -358,7 +360,7 @@ class Hypotheses:
         sent, heard = self._unconfirmed.popleft()
         digest = machine.digest(before)
         commands = tuple([1 if one else 0 for one in node.symbols])
-        hashes = machine.hash_symbols(before, digest, len(heard) - len(commands), node.word)
+        hashes = machine.hash_symbols(before, digest, commands, node.word)
         symbols = commands + hashes
         self.priors.learn(sent, node.word, word_before)
         self.priors.learn_symbols(symbols, heard)

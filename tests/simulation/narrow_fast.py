@@ -103,7 +103,7 @@ class FastTwoWay(TwoWay):
         after = self.codec.close(state.codec, opened, closed)
         law = (*memory.tolist(), 0.0, 1.0)
         down = down[: -self._law_size] + law
-        owed = self._owed(state, word, symbols)
+        owed = self._owed(state, self.digest(state), word, symbols)
         return TwoWaySample(TwoWayState(after, following, decided[-1], down, owed), decided, [], [])
 
 

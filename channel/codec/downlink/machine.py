@@ -200,10 +200,27 @@ class TwoWay:
 
         flown = fly_sample(self.codec, state.codec, word, state.commands, decide)
         known = (*state.commands, *flown.commands)[self.codec.ticks_per_sample :]
-        after = TwoWayState(flown.state, known, hold, down, self._owed(state, word, symbols))
+        owed = self._owed(state, self.digest(state), word, symbols)
+        after = TwoWayState(flown.state, known, hold, down, owed)
         return TwoWaySample(after, flown.commands, flown.live, flown.coded)
 
-    def _owed(self, state: TwoWayState, word: Word, symbols: Sequence[int | None]) -> float:
+    def outlook(
+        self, state: TwoWayState, digest: int, word: Word, symbols: Sequence[int | None]
+    ) -> TwoWayState:
+        """Return what a sample leads to as far as it is known without flying it.
+
+        Its `down` and `owed` tell what the next sample's symbols mean, and its first hash symbol.
+        """
+        scheme, down = self.scheme, state.down
+        for symbol in symbols:
+            down = scheme.guess(down) if symbol is None else scheme.take(down, symbol)
+        after = CodecState(state.codec.sample + 1, (), ())
+        owed = self._owed(state, digest, word, symbols)
+        return TwoWayState(after, (), (), scheme.settle(down), owed)
+
+    def _owed(
+        self, state: TwoWayState, digest: int, word: Word, symbols: Sequence[int | None]
+    ) -> float:
         """Return the bit that is owed after a sample."""
         bit = parity(symbols)
         if len(symbols) == self.layout.symbols_per_sample:
@@ -212,7 +229,7 @@ class TwoWay:
         alphabet = self.codec.coder.alphabet
         for symbol in word or ():
             bit ^= alphabet.symbol_number(symbol) & 1
-        return float(bit ^ self.digest(state) & 1)
+        return float(bit ^ digest & 1)
 
     def pack(self, state: TwoWayState) -> bytes:
         """Return the canonical bytes of a state, little-endian, no minus zero."""

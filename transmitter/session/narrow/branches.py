@@ -44,7 +44,11 @@ class Chances(NamedTuple):
 
 
 class Branching:
-    """Makes the branches; see the module's text. `dropped_below`: of the heaviest one's weight."""
+    """Makes the branches; see the module's text. `dropped_below`: of the heaviest one's weight.
+
+    A hypothesis that was not flown yet is weighed first by what is known without: the command symbols,
+    and the first hash symbol. Where that leaves too little of it, it is dropped and never flown.
+    """
 
     def __init__(self, machine: TwoWay, priors: Priors, dropped_below: float) -> None:
         self._machine = machine
@@ -52,22 +56,24 @@ class Branching:
         self._dropped_below = dropped_below
 
     def of(self, members: Members, sent: Word, heard: Symbols) -> Branched:
-        """Return the branches of a list's members; None in `heard`: erased."""
+        """Return the branches of a list's members, best first; None in `heard`: erased."""
         found = Branched([], 1.0, [])
         flips: list[tuple[float, Node, list[Option]]] = []
-        own = self._machine.commands_in(max(members, key=lambda one: one[0])[1].state)
+        own = self._machine.commands_in(members[0][1].outlook(self._machine))
         asked = len([one for one in heard[:own] if one is not None])
         hashes = len([one for one in heard[own:] if one is not None])
         predicted = 0.0
         for weight, node in members:
-            count = self._machine.commands_in(node.state)
-            options = self._options(node.state, heard[:count])
-            chance = sum(share for _, share in options)
+            state = node.outlook(self._machine)
+            count = self._machine.commands_in(state)
+            chance = sum(share for _, share in self._options(state, heard[:count]))
             predicted += weight * (chance if count == own else 0.5**asked)
-            hashed = self._hash_chances(node.state, heard[count:])
+        for weight, node in self._flown(members, sent, heard, found.spilled):
+            count = self._machine.commands_in(node.state)
+            hashed = self._hash_chances(node.state, heard[count:], node.digest(self._machine))
             chances = self._chances(sent, node.word)
             arrived = []
-            for symbols, share in options:
+            for symbols, share in self._options(node.state, heard[:count]):
                 as_heard, if_erased = hashed[parity(symbols)]
                 arrived.append((symbols, as_heard * share))
                 if chances.as_sent > 0.0:
@@ -80,9 +86,46 @@ class Branching:
             if chances.otherwise > 0.0:
                 share = sum(one for _, one in arrived)
                 found.spilled.append((weight * chances.otherwise * share, node))
-        if sent is not ERASED:
+        if sent is not ERASED and found.branches:
             self._add_changed(sent, flips, found)
         return found._replace(rest_factor=0.5**hashes * max(0.5**asked, predicted))
+
+    def _flown(
+        self, members: Members, sent: Word, heard: Symbols, spilled: list[tuple[float, Node]]
+    ) -> Members:
+        """Fly the members that weigh enough, and make one of those that have come to the same state."""
+        machine, best = self._machine, 0.0
+        kept: dict[TwoWayState, tuple[float, Node]] = {}
+        for weight, node in members:
+            if not node.is_flown:
+                left = weight * self._chance(node, node.outlook(machine), sent, heard, None)
+                if left < self._dropped_below * best or not node.fly(machine):
+                    spilled.append((left, node))
+                    continue
+            digest = node.digest(machine)
+            left = weight * self._chance(node, node.state, sent, heard, digest)
+            best = left if left > best else best
+            if node.state in kept:
+                other, first = kept[node.state]
+                kept[node.state] = (other + weight, first)
+                first.doubt(node, weight)
+            else:
+                kept[node.state] = (weight, node)
+        return list(kept.values())
+
+    def _chance(
+        self, node: Node, state: TwoWayState, sent: Word, heard: Symbols, digest: int | None
+    ) -> float:
+        """Return the chance of what came; without a digest, of its command and first hash symbols."""
+        count = self._machine.commands_in(state)
+        asked = heard[count:] if digest is not None else heard[count : count + 1]
+        hashed = self._hash_chances(state, asked, digest or 0)
+        lost = self._chances(sent, node.word).erased
+        total = 0.0
+        for symbols, share in self._options(state, heard[:count]):
+            as_heard, if_erased = hashed[parity(symbols)]
+            total += share * ((1.0 - lost) * as_heard + lost * if_erased)
+        return total
 
     def _chances(self, sent: Word, before: Word) -> Chances:
         if sent is ERASED:
@@ -96,15 +139,16 @@ class Branching:
         """Return how many words differ from this one in one symbol."""
         return len(sent) * (len(self._machine.codec.coder.alphabet.symbols) - 1)
 
-    def _hash_chances(self, state: TwoWayState, heard: Symbols) -> tuple[tuple[float, float], ...]:
+    def _hash_chances(
+        self, state: TwoWayState, heard: Symbols, digest: int
+    ) -> tuple[tuple[float, float], ...]:
         """Return how likely these hash symbols come down with a word that is whole, and with none.
 
         First with command symbols of even parity, then of odd.
         """
         found = []
         flip = self._priors.down_flipped
-        asked = any(one is not None for one in heard)
-        bits = self._machine.hashed(state, self._machine.digest(state)) if asked else 0
+        bits = self._machine.hashed(state, digest)
         for odd in (0, 1):
             whole = erased = 1.0
             for place, one in enumerate(heard):

@@ -75,6 +75,8 @@ def test_what_is_applied_is_the_weighted_mean_of_what_the_hypotheses_command() -
     hypotheses = Hypotheses(machine)
     hypotheses.sent((1,))
     hypotheses.heard(0, None)
+    assert [node.is_flown for _, node in hypotheses._members] == [False] * 6
+    assert len(hypotheses.members()) == 6
     mean = [0.0, 0.0]
     for weight, node in hypotheses._members:
         for place in (0, 1):
@@ -207,10 +209,9 @@ def test_agreeing_hash_bits_halve_the_rest_and_silence_does_not() -> None:
     hypotheses.sent((1,))
     hypotheses.heard(3, None)
     assert before < hypotheses.rest < 1e-3
-    root = Node(None, -1, (), (), machine.initial(), None)
+    root = Node(None, -1, (), (), machine.initial())
     paths = Paths(root)
-    child = root.child(machine, (1,), (0,))
-    assert child is not None
+    child = root.child((1,), (0,))
     paths.follow(child)
     paths.book(0.25, None)
     paths.scale_rest(0.25)
@@ -219,18 +220,16 @@ def test_agreeing_hash_bits_halve_the_rest_and_silence_does_not() -> None:
 
 def test_weight_that_left_the_old_path_later_leaves_a_new_path_where_the_paths_part() -> None:
     machine = mirrored(Layout(2), 12)
-    paths = Paths(Node(None, -1, (), (), machine.initial(), None))
+    paths = Paths(Node(None, -1, (), (), machine.initial()))
     node = paths.root
     for _ in range(4):
-        after = node.child(machine, (1,), (0,))
-        assert after is not None
+        after = node.child((1,), (0,))
+        assert after.fly(machine)
         paths.follow(after)
         paths.book(1.0, after.sample)
         node = after
-    other = paths.path[0].child(machine, (-1,), (0,))
-    assert other is not None
-    further = other.child(machine, (1,), (0,))
-    assert further is not None
+    other = paths.path[0].child((-1,), (0,))
+    further = other.child((1,), (0,))
     assert paths.leaves_at(further) == 1
     paths.follow(further)
     assert paths.path[1:] == [other, further]

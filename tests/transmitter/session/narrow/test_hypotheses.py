@@ -276,11 +276,11 @@ def test_priors_follow_the_line_and_never_reach_zero() -> None:
         priors.learn((1,), word, (1,))
         priors.learn_symbols((0, 1), (0, None))
         priors.learn_news(False)
-    assert priors.erased((1,)) == pytest.approx(0.1, abs=0.02)
-    assert priors.erased(ERASED) == pytest.approx(0.4)
+    assert priors.erased(False) == pytest.approx(0.1, abs=0.02)
+    assert priors.erased(True) == pytest.approx(0.4)
     assert 0.0 < priors.down_flipped < 2e-4
     assert 0.0 < priors.flipped < 2e-4
     assert 0.0 < priors.news < 3e-3
     for _ in range(300):
         priors.learn((1,), ERASED, ERASED)
-    assert priors.erased(ERASED) > 0.9
+    assert priors.erased(True) > 0.9

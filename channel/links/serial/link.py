@@ -47,8 +47,8 @@ _PORT_ERRORS = (serial.SerialException, OSError, TypeError, ValueError)
 class SerialLink(Link):
     """One end of a session over a serial line; LinkError when the port cannot be opened.
 
-    `symbol_age_max_s`: a symbol that waited longer in this process is dropped, because its counter
-    bits would no longer say which slot it belongs to.
+    `is_narrow`: the downlink brings symbols too. `symbol_age_max_s`: a symbol that waited longer in
+    this process is dropped, because its counter bits would no longer say which slot it belongs to.
     """
 
     name = "serial"
@@ -63,6 +63,7 @@ class SerialLink(Link):
         symbol_age_max_s: float = 1.0,
         quiet_s: float = QUIET_S,
         insecure: bool = False,
+        is_narrow: bool = False,
     ) -> None:
         super().__init__()
         check_port(port, insecure)
@@ -72,8 +73,7 @@ class SerialLink(Link):
         self._line_rate_baud = line_rate_baud
         self._symbol_age_max_s = symbol_age_max_s
         self._quiet_s = quiet_s
-        # Only the receiver is sent symbols.
-        self._deframer = Deframer(wire if role == "receiver" else None, self._drop)
+        self._deframer = Deframer(wire if is_narrow or role == "receiver" else None, self._drop)
         self._inbox: SimpleQueue[tuple[float, bytes]] = SimpleQueue()
         self._busy_until = 0.0
         self._last_message = (b"", 0.0)

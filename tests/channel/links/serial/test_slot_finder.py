@@ -21,7 +21,7 @@ class Line:
     """A finder with the receiver's own idea of the next slot, which its deadlines move on."""
 
     def __init__(self, start_ns: int = START_NS, allowance_ns: int = 20 * MS) -> None:
-        self.finder = SlotFinder(terms(deadline_allowance_ns=allowance_ns))
+        self.finder = SlotFinder(terms(deadline_allowance_ns=allowance_ns).up_grid)
         self.finder.greeted(0)
         self.start_ns = start_ns
         self.allowance_ns = allowance_ns

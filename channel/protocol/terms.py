@@ -216,9 +216,8 @@ class Terms:
     @property
     def down_heard_ns(self) -> int:
         """Return how long after a sample's first tick all its down symbols have come."""
-        delay_ns = self.sample_ns // self.down_symbols if self.delivery == "end" else 0
-        last_ns = self.down_slot_ns(self.down_symbols - 1)
-        return last_ns + delay_ns + self.downlink_line_ns + self.downlink_budget_ns
+        grid = self.down_grid
+        return grid.due_ns(grid.slots - 1) + grid.allowance_ns
 
     def linger_ns(self, line_delay_ns: int) -> int:
         """Return how long after a flight's last tick its last echo may come.

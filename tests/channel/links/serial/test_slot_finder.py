@@ -64,6 +64,23 @@ def test_when_the_first_came_late_then_the_others_are_found_all_the_same() -> No
     assert [line.hear(slot, line.due_ns(slot)).slot for slot in range(1, 50)] == list(range(1, 50))
 
 
+def test_when_the_grid_is_known_then_down_symbols_are_placed_from_the_first_one_on() -> None:
+    chooser = random.Random(4)
+    some = terms(downlink="narrow", downlink_baud=40.0, down_symbols=4, downlink_line_ns=5 * MS)
+    grid = some.down_grid
+    for first in (0, 1, 7, 9, 4003):
+        finder = SlotFinder(grid)
+        finder.expect()
+        for slot in range(first, first + 200):
+            if chooser.random() < 0.3:
+                continue  # lost
+            came_ns = grid.due_ns(slot) + chooser.randrange(9) * MS
+            place = finder.find(ShortSymbol(0, slot % MODULUS, MODULUS), 0, came_ns)
+            assert (place.slot, place.in_time) == (slot, True)
+            noise = (slot + chooser.randrange(2, MODULUS - 1)) % MODULUS
+            assert not finder.find(ShortSymbol(0, noise, MODULUS), 0, came_ns + MS).in_time
+
+
 @pytest.mark.parametrize("first", [1, 3, 7, 8, 9, 20])
 def test_when_the_first_symbols_are_lost_then_the_first_that_comes_is_still_placed(first: int) -> None:
     line = Line()

@@ -140,6 +140,9 @@ class Watch:
         command = session.command(tick)
         if command is None or tick < session.epoch_tick:
             return
+        if self.terms.downlink == "narrow":
+            # It is the mean of what the hypotheses command; what is confirmed is compared elsewhere.
+            return
         key = (session.session_number, session.epoch)
         decided = self.decided_commands.get((*key, tick))
         is_hold = tick < session.epoch_tick + self.terms.lead_ticks

@@ -72,6 +72,6 @@ class Layout:
 def symbols_carried(downlink_baud: float, sample_ns: int) -> int:
     """Return how many down symbols a sample may have on a line of this rate, at least 1."""
     carried = int(1e-9 * downlink_baud * sample_ns * (1.0 + 1e-9))
-    if carried > SYMBOLS_MAX:
-        return SYMBOLS_MAX
-    return carried if carried > 0 else 1
+    if carried < 1:
+        return 1
+    return carried if carried < SYMBOLS_MAX else SYMBOLS_MAX

@@ -59,7 +59,7 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
     scores = Scores(
         agreement.codec.model,
         agreement.window_start_tick,
-        (terms.history_samples + 2) * terms.ticks_per_sample,
+        (terms.confirmation_samples + 2) * terms.ticks_per_sample,
         _followed(agreement),
         gauge.on_errors if gauge is not None else lambda _errors: None,
     )

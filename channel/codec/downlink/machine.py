@@ -106,6 +106,8 @@ class TwoWay:
         self._sizes = (len(first.codec.model), len(first.codec.coder), inputs, len(first.down))
         floats = len(first.codec.model) + len(first.codec.coder) + len(first.down)
         self._layout = struct.Struct(f"<q{floats + inputs * (lead_ticks + 1) + 1}d")
+        self.numbers = floats + codec.ticks_per_sample * len(first.codec.model)
+        """that a sample works on, a measure of its cost that is the same on every machine"""
 
     def initial(self) -> TwoWayState:
         """Return the common state before sample 0."""

@@ -98,7 +98,7 @@ class FastTwoWay(TwoWay):
         )
         if not well:
             raise ValueError("the law was given a state that is not finite")
-        decided = [(front, rear) for front, rear in commands.tolist()]
+        decided: list[Vector] = [(front, rear) for front, rear in commands.tolist()]
         following = (*state.commands, *decided)[TICKS:]
         after = self.codec.close(state.codec, opened, closed)
         law = (*memory.tolist(), 0.0, 1.0)

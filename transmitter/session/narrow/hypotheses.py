@@ -349,7 +349,7 @@ class Hypotheses:
         if count == 0:
             return []
         first = paths.first
-        before, word_before = paths.root.state, paths.root.word
+        before = paths.root
         members = []
         for weight, node, at in leaves:
             if at is None or at >= first + count:
@@ -359,26 +359,26 @@ class Hypotheses:
         self._members = members
         done = []
         for node in paths.confirm(count):
-            done.append(self._learned(node, before, word_before))
-            before, word_before = node.state, node.word
+            done.append(self._learned(node, before))
+            before = node
         return done
 
-    def _learned(self, node: Node, before: TwoWayState, word_before: Word) -> Confirmed:
+    def _learned(self, node: Node, before: Node) -> Confirmed:
         """Return a confirmed sample, and learn from it what the line is like."""
         machine = self.machine
         sent, heard = self._unconfirmed.popleft()
-        digest = machine.digest(before)
+        digest = before.digest(machine)
         commands = tuple([1 if one else 0 for one in node.symbols])
-        hashes = machine.hash_symbols(before, digest, commands, node.word)
+        hashes = machine.hash_symbols(before.state, digest, commands, node.word)
         symbols = commands + hashes
-        self.priors.learn(sent, node.word, word_before)
+        self.priors.learn(sent, node.word, before.word)
         self.priors.learn_symbols(symbols, heard)
-        if commands and machine.scheme.is_idle(before.down):
+        if commands and machine.scheme.is_idle(before.state.down):
             self.priors.learn_news(commands[0] == 1)
         assert node.flown is not None  # only the root has none
         return Confirmed(
             sample=node.sample,
-            before=before,
+            before=before.state,
             digest=digest,
             word_sent=sent,
             word=node.word,

@@ -216,9 +216,15 @@ class Counting(TwoWay):
 
     flown = 0
 
-    def step(self, state: TwoWayState, word: Word, symbols: Sequence[int | None]) -> TwoWaySample:
+    def step(
+        self,
+        state: TwoWayState,
+        word: Word,
+        symbols: Sequence[int | None],
+        digest: int | None = None,
+    ) -> TwoWaySample:
         self.flown += 1
-        return super().step(state, word, symbols)
+        return super().step(state, word, symbols, digest)
 
 
 def test_a_large_model_has_a_short_list_and_no_sample_costs_more() -> None:

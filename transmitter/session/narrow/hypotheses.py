@@ -197,13 +197,17 @@ class Hypotheses:
         Hypotheses are carried to the last word sent. What does not follow from these words is the last
         command that does.
         """
-        total, mean = 0.0, [0.0] * self.machine.codec.model.input_size
-        for weight, node in self._carried():
-            total += weight
-            command = self._command_of(node, tick)
-            for place in range(len(mean)):
-                mean[place] += weight * command[place]
-        return tuple([value / total for value in mean])
+        carried = self._carried()
+        commands = [self._command_of(node, tick) for _, node in carried]
+        total = sum([weight for weight, _ in carried])
+        mean = []
+        for values in zip(*commands, strict=True):
+            value = (
+                sum([weight * one for (weight, _), one in zip(carried, values, strict=True)]) / total
+            )
+            # Rounding must not carry it beyond a limit that all of them keep.
+            mean.append(max(min(values), min(max(values), value)))
+        return tuple(mean)
 
     def _carried(self) -> list[tuple[float, Node]]:
         """Return the hypotheses that count, best first, carried over the words not heard of yet."""

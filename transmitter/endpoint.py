@@ -106,7 +106,7 @@ class TransmitterNode:
     def deliver(self, frame: Frame) -> list[Frame]:
         """Hand an arrived frame to the session; return the answers. `rest` has what it confirmed."""
         answers = self.session.on_frame(frame)
-        if len(self.session.confirmed) >= RESTLESS_SAMPLES_MAX:
+        if self.session.following.unrecorded >= RESTLESS_SAMPLES_MAX:
             self.flush_records()
         if self.guard.stopped and self._may_rearm and self.session.phase is Phase.FLYING:
             self.guard.rearm()
@@ -115,7 +115,7 @@ class TransmitterNode:
 
     def flush_records(self) -> None:
         """Score and record confirmed samples: work for the time after the next symbol is sent."""
-        if not self.session.confirmed:
+        if not self.session.following.unrecorded:
             return
         per_sample = self.session.terms.ticks_per_sample
         for done in self.session.take_confirmed():
@@ -202,7 +202,7 @@ class TransmitterNode:
 
     def tell(self, event: Event) -> None:
         time_ns = self.tick * self.session.terms.tick_ns
-        event = replace(event, time_ns=time_ns, sample=self.session.copies.confirmed.sample)
+        event = replace(event, time_ns=time_ns, sample=self.session.confirmed_state.sample)
         self.session.events.append(event)
         write_event(self._recorder, event)
 
@@ -212,8 +212,7 @@ class TransmitterNode:
     def _check(self, tick: int, reading: Reading) -> None:
         session, fault = self.session, reading.fault
         if fault is None and self._watch is not None:
-            estimate = session.copies.confirmed.model if session.is_proven else None
-            fault = self._watch.check(reading.counts, self._applied, estimate)
+            fault = self._watch.check(reading.counts, self._applied, session.reliable_state)
         if fault is not None and not self.guard.stopped:
             self.sensor_fault = GuardReason(GuardCause.SENSOR, tick, detail=fault)
             self.tell(Event(EventKind.SENSOR, tick=tick, detail=fault))

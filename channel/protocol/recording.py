@@ -94,6 +94,35 @@ EPOCH_CHANNEL = RecordChannel(
     ),
 )
 
+TWO_WAY_CHANNEL = RecordChannel(
+    "two_way",
+    (
+        Field("sample", "integer", "", "first sample of the epoch"),
+        Field("epoch", "integer", "", "counted from 0"),
+        Field("state", "string", "", "state of the two-way machine, its canonical bytes as hex"),
+    ),
+)
+
+DOWN_SYMBOLS_CHANNEL = RecordChannel(
+    "down_symbols",
+    (
+        Field("sample", "integer", "", "index of the sample"),
+        Field("symbols", "integers", "", "its down symbols in the order of their slots; null: erased"),
+    ),
+)
+
+
+def write_two_way(recorder: Recorder, sample_ns: int, sample: int, epoch: int, packed: bytes) -> None:
+    """Record the packed state of the two-way machine that an epoch starts from."""
+    recorder.write(TWO_WAY_CHANNEL, sample * sample_ns, (sample, epoch, packed.hex()))
+
+
+def write_down_symbols(
+    recorder: Recorder, sample_ns: int, sample: int, symbols: Sequence[int | None]
+) -> None:
+    """Record the down symbols of a sample, as they were sent or as they came."""
+    recorder.write(DOWN_SYMBOLS_CHANNEL, sample * sample_ns, (sample, symbols))
+
 
 def write_epoch(
     recorder: Recorder, sample_ns: int, epoch: int, start: CodecState, hold: Vector

@@ -26,6 +26,9 @@ ECHO_BYTES = 10
 ECHOES_MAX = 255
 ECHOES_BYTES_MAX = 16_000
 
+NARROW_LAG_SAMPLES = 512
+"""By how many samples confirmations of the narrow downlink may lag, beyond what is given up."""
+
 
 class SlotGrid(NamedTuple):
     """The slots of one direction, in flight time."""
@@ -238,6 +241,13 @@ class Terms:
     def history_samples(self) -> int:
         """Return by how many samples echoes may lag and symbols may jump ahead."""
         return self.samples_in(HISTORY_NS, HISTORY_SAMPLES)
+
+    @property
+    def confirmation_samples(self) -> int:
+        """Return by how many samples confirmations may lag."""
+        if self.downlink == "narrow":
+            return max(NARROW_LAG_SAMPLES, self.history_samples)
+        return self.history_samples
 
     @property
     def lead_needed_ticks(self) -> int:

@@ -31,7 +31,7 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         "plant": _plant_name(run.agreement),
         "seed": config.seed,
         "duration_s": flown_s,
-        "samples": session.copies.next_sample,
+        "samples": session.next_sample,
         "coder_bits_up": meter.coder_bits,
         "wire_bytes_up": meter.wire_bytes,
         "coder_bits_down": run.endpoint.inlet.meter.coder_bits,
@@ -217,7 +217,7 @@ def _outputs(run: TransmitterRun) -> Summary:
 
 def _learned(run: TransmitterRun) -> Summary:
     """Return the plant's terms as learned by both ends, if they do."""
-    found = learned_of(run.agreement.codec, run.node.session.copies.confirmed)
+    found = learned_of(run.agreement.codec, run.node.session.confirmed_state)
     return {"learned": {name: one._asdict() for name, one in found.items()}} if found else {}
 
 

@@ -95,7 +95,7 @@ def test_when_symbols_are_lost_then_both_ends_count_them_and_stay_in_lockstep(
     assert 990 <= samples <= 1000
     assert flight.transmitter.counts["digest_checks"] == samples
     assert flight.transmitter.counts["desyncs"] == 0
-    assert flight.transmitter.copies.confirmed == flight.receiver.state
+    assert flight.transmitter.confirmed_state == flight.receiver.state
     assert list(result.digests) == flight.receiver_rows.column("sample", "digest")
     erasures = flight.transmitter.counts["erasures"]
     assert erasures == flight.receiver.counts["erasures"]

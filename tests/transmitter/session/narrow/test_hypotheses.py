@@ -10,8 +10,9 @@ from channel.codec.codec import ERASED, Alphabet, Codec, Vector, Word
 from channel.codec.downlink.coded import CodedCommands, held_inputs
 from channel.codec.downlink.layout import Layout
 from channel.codec.downlink.machine import TwoWay
+from channel.protocol.frames import Why
 from tests.simulation.narrow import Faults, NarrowFlight, mirrored, square
-from transmitter.session.narrow.hypotheses import Confirmed, Hypotheses, RejoinReason, Settings
+from transmitter.session.narrow.hypotheses import Confirmed, Hypotheses, Settings
 from transmitter.session.narrow.paths import Node, Paths
 from transmitter.session.narrow.priors import Priors
 
@@ -244,7 +245,7 @@ def test_a_rejoin_is_asked_for_when_nothing_explains_what_comes() -> None:
     while flight.hypotheses.rejoin is None:
         flight.fly(1)
     asked = flight.hypotheses.rejoin
-    assert asked.reason is RejoinReason.REST
+    assert asked.reason is Why.REST
     assert asked.rest > 1.0
     assert asked.sample < 60
     flight.fly(40)

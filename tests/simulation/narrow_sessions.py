@@ -154,7 +154,9 @@ class TimedFlight(NarrowFlight):
             if tick == first:
                 self._send()
             assert self.hypotheses.rejoin is None
-            self.applied.append(self.hypotheses.command(tick))
+            # The guard clamps: a weighted mean may be beyond its terms by a rounding.
+            volts = self.hypotheses.command(tick)
+            self.applied.append(tuple([max(-5.0, min(5.0, one)) for one in volts]))
             self.plant.step(self.applied[-1])
         self.sample += 1
 

@@ -7,6 +7,7 @@ are coded. All that the state machine was built from is shared, numbers by value
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import asdict
 from typing import Any, NamedTuple
 
@@ -91,6 +92,15 @@ def two_way_of(codec: Codec, terms: Terms, scheme: Scheme, layout: Layout) -> Tw
         limits.command_max,
         limits.slew_per_tick,
     )
+
+
+def with_codec(two_way: TwoWay | None, codec: Codec) -> TwoWay | None:
+    """Return the same state machine with an end's own codec; None where there is none."""
+    if two_way is None or two_way.codec is codec:
+        return two_way
+    own = copy(two_way)
+    own.codec = codec
+    return own
 
 
 def said_by_words(two_way: TwoWay | None) -> dict[int, tuple[float, float]]:

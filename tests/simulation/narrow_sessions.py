@@ -17,7 +17,7 @@ from tests.channel.codec.parts import terms
 from tests.simulation.lines import CleanLine
 from tests.simulation.narrow import TICKS, Faults, Line, NarrowFlight, Pitch, Wants, square
 from transmitter.rigs.base import Reading, Rig
-from transmitter.session.narrow_following import NarrowFollowing
+from transmitter.session.down_symbols import NarrowFollowing
 
 MISMATCH, NOISE = 0.1, 2e-3
 CLEAN = Faults()

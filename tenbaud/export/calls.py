@@ -45,8 +45,6 @@ OWN = {
 }
 
 
-
-
 class Calls(Expressions):
     """Evaluates calls."""
 
@@ -63,13 +61,14 @@ class Calls(Expressions):
             return self._rows(node, function)
         if isinstance(function, FunctionType):
             return self._function(node, function, self._arguments(node, function))
-        arguments = [self.value(one) for one in node.args]
-        if node.keywords or len(arguments) != 1:
-            self.refuse(node, f"{called.name or function}() is not in this language")
-        return self._own(node, called, arguments[0])
+        reason = next((why for one, why in REFUSED.items() if one is function), "")
+        if not reason and function not in (len, float, *OWN):
+            reason = "only sqrt, floor and isfinite give equal bits everywhere"
+        if reason or node.keywords or len(node.args) != 1:
+            self.refuse(node, f"{called.name}(): {reason or 'takes one value'}")
+        return self._own(node, function, self.value(node.args[0]))
 
-    def _own(self, node: ast.Call, called: Static, value: Value) -> Value:
-        function = called.value
+    def _own(self, node: ast.Call, function: Any, value: Value) -> Value:
         if function is len:
             if isinstance(value, Static):
                 return Static(len(value.value))
@@ -78,12 +77,7 @@ class Calls(Expressions):
             return Static(self.array(node, value).shape[0])
         if function is float:
             return Scalar(DOUBLE, self.as_kind(node, value, DOUBLE))
-        try:
-            name, taken, given = OWN[function]
-        except (KeyError, TypeError):
-            reason = next((why for one, why in REFUSED.items() if one is function), "")
-            reason = reason or "only sqrt, floor and isfinite give equal bits everywhere"
-            self.refuse(node, f"{called.name}(): {reason}")
+        name, taken, given = OWN[function]
         if isinstance(value, Static):
             return Static(function(value.value))
         one = self.scalar(node, value)
@@ -94,9 +88,7 @@ class Calls(Expressions):
     def _arguments(self, node: ast.Call, function: FunctionType) -> list[Value]:
         """Return a value for each argument, defaults included."""
         names = [one.arg for one in source_of(function).tree.args.args]
-        given: dict[str, Value] = dict(
-            zip(names, [self.value(one) for one in node.args], strict=False)
-        )
+        given: dict[str, Value] = dict(zip(names, [self.value(one) for one in node.args], strict=False))
         given |= {one.arg or "**": self.value(one.value) for one in node.keywords}
         defaults = function.__defaults__ or ()
         for name, default in zip(names[len(names) - len(defaults) :], defaults, strict=True):
@@ -142,7 +134,9 @@ class Calls(Expressions):
             return self._kept(node, callee, Scalar(returns.kind, f"{callee.name}({', '.join(texts)})"))
         self.require_statement(node)
         if returns.shape:
-            made = Array(returns.kind, self.memory(returns.kind, _size(returns)), returns.shape, is_stable=True)
+            made = Array(
+                returns.kind, self.memory(returns.kind, _size(returns)), returns.shape, is_stable=True
+            )
             self.emit(f"{callee.name}({', '.join([*texts, made.text])});")
             return made
         kind, name = self.program.struct(returns), self.temporary()

@@ -50,8 +50,8 @@ def parts_of(codec: Codec, terms: Terms, observer: StateObserver | None) -> Part
         )
     if not isinstance(coder, FunctionCoder):
         raise CannotExport(
-            f"the coder {type(coder).__name__} is no FunctionCoder: write encode and decode as functions "
-            "of numbers (docs/ARCHITECTURE.md, one text for each formula)"
+            f"the coder {type(coder).__name__} is no FunctionCoder: write encode and decode as "
+            "functions of numbers (docs/ARCHITECTURE.md, one text for each formula)"
         )
     states = signals_of(model).output_states
     output = getattr(model, "output_function", None)
@@ -89,7 +89,11 @@ def program(codec: Codec, parts: Parts) -> str:
     def numbers(*shape: int, kind: str = DOUBLE) -> Array:
         return Array(kind, "", shape)
 
-    model, coder, word = numbers(states), numbers(len(codec.coder.initial())), numbers(symbols, kind=WHOLE)
+    model, coder, word = (
+        numbers(states),
+        numbers(len(codec.coder.initial())),
+        numbers(symbols, kind=WHOLE),
+    )
     measured = numbers(parts.corrected if parts.uses_rates else outputs)
     erased = Scalar(TRUTH, "")
     made.function(encode_word, (known, model, coder, measured, word))
@@ -98,7 +102,19 @@ def program(codec: Codec, parts: Parts) -> str:
         (live_step, parts.lead_ticks, numbers(ticks, states)),
     ):
         commands = numbers(ticks + lead, inputs)
-        given = (known, Static(step), Static(lead), model, coder, word, erased, commands, model, coder, live)
+        given = (
+            known,
+            Static(step),
+            Static(lead),
+            model,
+            coder,
+            word,
+            erased,
+            commands,
+            model,
+            coder,
+            live,
+        )
         made.function(fly_word, given)
     if parts.uses_rates:
         made.function(look, (known, model, erased, numbers(outputs), numbers(inputs), model))
@@ -131,7 +147,14 @@ def sizes(codec: Codec, terms: Terms) -> str:
     lines = [f"#define CODEC_{name} {value}" for name, value in values.items()]
     guard = "TENBAUD_CODEC_SIZES_H"
     return "\n".join(
-        ["/* Written by `tenbaud export-c`. */", f"#ifndef {guard}", f"#define {guard}", *lines, "#endif", ""]
+        [
+            "/* Written by `tenbaud export-c`. */",
+            f"#ifndef {guard}",
+            f"#define {guard}",
+            *lines,
+            "#endif",
+            "",
+        ]
     )
 
 

@@ -45,8 +45,8 @@ COMPARISONS: dict[type[ast.AST], tuple[str, Callable[[Any, Any], Any]]] = {
 }
 WHOLE_ONLY = ("//", "%", "&", "|", "^", "<<", ">>")
 REFUSED = {
-    ast.Pow: "** : x**2 is not x*x on every C library: multiply",
-    ast.MatMult: "@ : write the products out, their order is part of the result",
+    ast.Pow: "x**2 is not x*x on every C library: multiply",
+    ast.MatMult: "@: write the products out, their order is part of the result",
 }
 
 
@@ -128,7 +128,8 @@ class Expressions(Scope):
         if isinstance(value, Pack):
             if not isinstance(index, Static):
                 self.refuse(node, "an index into unlike values must be known beforehand")
-            return value.items[index.value]
+            found: Value = value.items[index.value]
+            return found
         return self.element(node, self.array(node, value), index)
 
     def _part(self, node: ast.Subscript, value: Value, part: ast.Slice) -> Value:
@@ -232,9 +233,7 @@ class Expressions(Scope):
                 continue
             a, b = self.scalar(node, left), self.scalar(node, right)
             kind = max(a.kind, b.kind, key=ORDER.index)
-            parts.append(
-                f"({self.as_kind(node, left, kind)} {text} {self.as_kind(node, right, kind)})"
-            )
+            parts.append(f"({self.as_kind(node, left, kind)} {text} {self.as_kind(node, right, kind)})")
         if not parts:
             return Static(True)
         return Scalar(TRUTH, f"({' && '.join(parts)})" if len(parts) > 1 else parts[0])

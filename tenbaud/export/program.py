@@ -90,9 +90,7 @@ class Program:
             found = self._write(key, source_of(function), arguments)
         return found
 
-    def _write(
-        self, key: tuple[object, ...], source: Source, arguments: Sequence[Value]
-    ) -> Written:
+    def _write(self, key: tuple[object, ...], source: Source, arguments: Sequence[Value]) -> Written:
         if len(self.functions) >= FUNCTIONS_MAX:
             raise source.error(source.tree, f"more than {FUNCTIONS_MAX} functions: a call without end?")
         module = source.function.__module__.rpartition(".")[2]
@@ -117,9 +115,7 @@ class Program:
         self._finish(made, source, writer, given)
         return made
 
-    def _finish(
-        self, made: Written, source: Source, writer: Statements, given: list[Argument]
-    ) -> None:
+    def _finish(self, made: Written, source: Source, writer: Statements, given: list[Argument]) -> None:
         returns = made.returns
         parameters = [one.declaration(one.name in writer.written) for one in given]
         kind = returns.kind or "void"
@@ -220,5 +216,3 @@ def annotated(source: Source) -> Shape | None:
         case ast.Constant(value=None):
             return Shape("")
     return None
-
-

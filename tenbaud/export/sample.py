@@ -38,7 +38,7 @@ class Parts(NamedTuple):
     largest: Any = ()
 
 
-def output_of(parts: Parts, model: Any, place: int) -> float:
+def output_of(parts: Parts, model: Any, place: int) -> Any:
     """Return the prediction of an output."""
     if parts.output is None:
         return model[parts.output_states[place]]
@@ -79,9 +79,7 @@ def keep(flight: Any, carried: bool, model: Any) -> bool:
     return is_estimate(model)
 
 
-def move(
-    flight: Any, carried: bool, at: int, within: bool, model: Any, command: Any, held: Any
-) -> Any:
+def move(flight: Any, carried: bool, at: int, within: bool, model: Any, command: Any, held: Any) -> Any:
     """Advance the model by a tick."""
     parts, _, _, _ = flight
     return carried, parts.tick(model, command, held, parts.model)
@@ -99,7 +97,7 @@ def fly_word(
     model_after: Any,
     coder_after: Any,
     live: Any,
-) -> bool:
+) -> Any:
     """Run one whole sample (`fly_sample`); return whether the state after it is an estimate."""
     correction = [0.0] * parts.corrected
     nothing = [0.0] * parts.corrected

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, NoReturn, Protocol
@@ -25,10 +26,10 @@ from tenbaud.export.values import (
     table_of,
 )
 
-KEYWORDS = set(
-    "auto break case char const continue default do double else enum extern float for goto if inline int "
-    "long register restrict return short signed sizeof static struct switch typedef union unsigned void "
-    "volatile while bool true false result".split()
+KEYWORD = re.compile(
+    "auto|bool|break|case|char|const|continue|default|do|double|else|enum|extern|false|float|for|goto|if"
+    "|inline|int|long|register|restrict|result|return|short|signed|sizeof|static|struct|switch|true"
+    "|typedef|union|unsigned|void|volatile|while"
 )
 
 
@@ -100,7 +101,7 @@ class Scope:
     # Names in C
 
     def own_name(self, name: str) -> str:
-        return f"{name}_" if name in KEYWORDS or name.startswith("_") else name
+        return f"{name}_" if KEYWORD.fullmatch(name) or name.startswith("_") else name
 
     def temporary(self) -> str:
         self._temporaries += 1
@@ -179,10 +180,10 @@ class Scope:
                 return Array(kind, text, shape, TABLE, is_stable=True)
             case Pack(items=items) if items:
                 self.require_statement(node)
-                numbers = [self.scalar(node, one) for one in items]
-                kind = max([one.kind for one in numbers], key=ORDER.index)
+                scalars = [self.scalar(node, one) for one in items]
+                kind = max([one.kind for one in scalars], key=ORDER.index)
                 name = self.memory(kind, len(items))
-                for at, one in enumerate(numbers):
+                for at, one in enumerate(scalars):
                     self.emit(f"{name}[{at}] = {self.as_kind(node, one, kind)};")
                 return Array(kind, name, (len(items),), is_stable=True)
         self.refuse(node, "a sequence of numbers is needed here")
@@ -230,6 +231,6 @@ class Scope:
         one = self.scalar(node, index)
         if one.kind == DOUBLE:
             self.refuse(node, "an index is a whole number")
-        if one.low is not None and one.high is not None and 0 <= one.low and one.high < count:
+        if one.low is not None and one.high is not None and one.low >= 0 and one.high < count:
             return one.text
         return f"arithmetic_index({one.text}, {count})"

@@ -9,7 +9,6 @@ from tenbaud.export.calls import Calls
 from tenbaud.export.values import (
     DOUBLE,
     KINDS,
-    TABLE,
     WHOLE,
     Array,
     Pack,
@@ -85,9 +84,7 @@ class Statements(Calls):
             self._store(node, array, index, result)
         elif isinstance(node.target, ast.Name):
             before = self.value(ast.copy_location(ast.Name(node.target.id, ast.Load()), node))
-            self._assign(
-                node.target, self.operation(node, node.op, before, self.value(node.value))
-            )
+            self._assign(node.target, self.operation(node, node.op, before, self.value(node.value)))
         else:
             self.refuse(node, "only names and entries are assigned")
         return False
@@ -211,13 +208,15 @@ class Statements(Calls):
         array, at = self.array(node.iter, self.value(node.iter)), self.temporary()
         count = array.shape[0]
         with self.block(f"for (int32_t {at} = 0; {at} < {count}; {at}++)"):
-            self._name_value(node, node.target.id, self.element(node, array, Scalar(WHOLE, at, 0, count - 1)))
+            self._name_value(
+                node, node.target.id, self.element(node, array, Scalar(WHOLE, at, 0, count - 1))
+            )
             self.body(node.body)
         return False
 
     def _range(self, node: ast.For, ends: list[Value]) -> None:
         step = ends[2].value if len(ends) == 3 and isinstance(ends[2], Static) else 1
-        if len(ends) == 3 and not isinstance(ends[2], Static) or not step:
+        if (len(ends) == 3 and not isinstance(ends[2], Static)) or not step:
             self.refuse(node, "the step of a range must be known beforehand")
         first = self.scalar(node, ends[0] if len(ends) > 1 else Static(0))
         last = self.scalar(node, ends[1] if len(ends) > 1 else ends[0])
@@ -284,5 +283,3 @@ class Statements(Calls):
                 self.copy(field, self.array(node, one))
             else:
                 self.emit(f"{field} = {self.as_kind(node, one, wanted.kind)};")
-
-

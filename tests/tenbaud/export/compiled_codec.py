@@ -31,11 +31,16 @@ def write_files(files: dict[str, str], folder: Path) -> None:
         (folder / name).write_text(text, encoding="utf-8")
 
 
-def compiler(folder: Path, *more: str, flags: Sequence[str] = FLAGS) -> subprocess.CompletedProcess[str]:
+def compiler(
+    folder: Path, *more: str, flags: Sequence[str] = FLAGS
+) -> subprocess.CompletedProcess[str]:
     """Compile all of a folder."""
     sources = sorted(str(one) for one in folder.glob("*.c"))
     return subprocess.run(
-        [os.environ.get("CC", "gcc"), *flags, *sources, *more], capture_output=True, text=True, check=False
+        [os.environ.get("CC", "gcc"), *flags, *sources, *more],
+        capture_output=True,
+        text=True,
+        check=False,
     )
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from channel.codec.codec import Codec, Vector
+from channel.codec.downlink.layout import Layout, symbols_carried
 from channel.codec.signals import Signals, signals_of
 from channel.protocol.limits import CommandLimits, require_carried, require_movable, steps_held
 from channel.protocol.lockstep import HISTORY_NS, HISTORY_SAMPLES
@@ -81,11 +82,14 @@ class Terms:
         initial_command: Vector | None = None,
         limits: CommandLimits | None = None,
         downlink: Rung = "full",
+        downlink_baud: float = 20.0,
+        is_mirrored: bool = False,
     ) -> Terms:
         """Return the terms on which a codec flies with ticks of `tick_s` on the virtual clock.
 
         Without more, the line carries just the symbols that the codec asks for, commands begin at zero,
-        and the command lead is the shortest that is possible. ValueError where they cannot be flown.
+        and the command lead is the shortest that is possible. `downlink_baud` and `is_mirrored` are of
+        the narrow downlink. ValueError where they cannot be flown.
         """
         symbols_per_word = codec.coder.alphabet.symbols_per_word
         signals = signals_of(codec.model)
@@ -105,10 +109,23 @@ class Terms:
             signals=signals,
             downlink=downlink,
         )
+        if downlink == "narrow":
+            count = symbols_carried(downlink_baud, terms.sample_ns)
+            terms = terms.narrowed(downlink_baud, count, is_mirrored)
         if lead_ticks is None:
             terms = terms.with_shortest_lead("virtual")
         terms.check("virtual")
         return terms
+
+    def narrowed(self, downlink_baud: float, down_symbols: int, is_mirrored: bool) -> Terms:
+        """Return these terms with a narrow downlink."""
+        return replace(
+            self,
+            downlink="narrow",
+            downlink_baud=downlink_baud,
+            down_symbols=down_symbols,
+            is_mirrored=is_mirrored,
+        )
 
     @property
     def sample_ns(self) -> int:
@@ -138,11 +155,20 @@ class Terms:
         settled_ns = self.uplink_delivery_ns + self.uplink_line_ns + self.deadline_allowance_ns
         return settled_ns + slot * self.sample_ns // self.down_symbols
 
+    @property
+    def down_heard_ns(self) -> int:
+        """Return how long after a sample's first tick all its down symbols have come."""
+        delay_ns = self.sample_ns // self.down_symbols if self.delivery == "end" else 0
+        last_ns = self.down_slot_ns(self.down_symbols - 1)
+        return last_ns + delay_ns + self.downlink_line_ns + self.downlink_budget_ns
+
     def linger_ns(self, line_delay_ns: int) -> int:
         """Return how long after a flight's last tick its last echo may come.
 
         `line_delay_ns`: by how much the two lines may delay messages beyond what is agreed here.
         """
+        if self.downlink == "narrow":
+            return self.down_heard_ns + self.symbol_delay_ns + line_delay_ns
         agreed_ns = self.uplink_delivery_ns + self.symbol_delay_ns + self.uplink_line_ns
         agreed_ns += self.deadline_allowance_ns + self.downlink_budget_ns + self.downlink_line_ns
         return agreed_ns + line_delay_ns
@@ -159,13 +185,17 @@ class Terms:
     @property
     def lead_needed_ticks(self) -> int:
         """Return the smallest `D` with which every command can be in time on a real clock."""
+        if self.is_mirrored:
+            return 0
+        if self.downlink == "narrow":
+            return -(-self.down_heard_ns // self.tick_ns)
         needed = self.uplink_delivery_ns + self.deadline_allowance_ns + self.downlink_budget_ns
         needed += self.uplink_line_ns + self.downlink_line_ns
         return max(1, -(-needed // self.tick_ns))
 
     def with_shortest_lead(self, clock: Clock) -> Terms:
         """Return these terms with the smallest lead that `check` allows on this clock."""
-        ideal = clock == "virtual" and self.uplink_delivery_ns == 0
+        ideal = clock == "virtual" and self.uplink_delivery_ns == 0 and self.downlink != "narrow"
         return replace(self, lead_ticks=0 if ideal else self.lead_needed_ticks)
 
     def check(self, clock: Clock) -> None:
@@ -184,6 +214,8 @@ class Terms:
                 f"value(s) and there are {len(self.limits.command_max)} limit(s)"
             )
         require_carried("the initial command", self.initial_command, self.signals)
+        if self.downlink == "narrow":
+            Layout(self.down_symbols, command_period=2).check_rate(self.downlink_baud, self.sample_ns)
         compact = self.downlink == "compact"
         per_step = steps_held(self.limits, self.signals) if compact else (1,) * inputs
         require_movable(self.limits, self.signals, per_step)
@@ -201,15 +233,25 @@ class Terms:
             problem = "lead_ticks = 0 exists on the virtual clock only"
         else:
             problem = f"lead_ticks = {self.lead_ticks} is too short"
+        raise ValueError(
+            f"{problem}: {self._lead_parts()} need lead_ticks >= {self.lead_needed_ticks} at "
+            f"{self.tick_ns / 1e6:g} ms a tick"
+        )
+
+    def _lead_parts(self) -> str:
+        """Return what a command waits for."""
+        if self.downlink == "narrow":
+            return (
+                f"down symbols, which are all there {self.down_heard_ns / 1e6:.4g} ms after a sample,"
+            )
         line = ""
         if self.uplink_line_ns or self.downlink_line_ns:
             line = (
                 f" + {self.uplink_line_ns / 1e6:.3g} ms for a symbol and "
                 f"{self.downlink_line_ns / 1e6:.3g} ms for a command frame on the serial line"
             )
-        raise ValueError(
-            f"{problem}: uplink delivery {self.uplink_delivery_ns / 1e6:g} ms + deadline allowance "
+        return (
+            f"uplink delivery {self.uplink_delivery_ns / 1e6:g} ms + deadline allowance "
             f"{self.deadline_allowance_ns / 1e6:g} ms + downlink budget "
-            f"{self.downlink_budget_ns / 1e6:g} ms{line} need lead_ticks >= {self.lead_needed_ticks} "
-            f"at {self.tick_ns / 1e6:g} ms a tick"
+            f"{self.downlink_budget_ns / 1e6:g} ms{line}"
         )

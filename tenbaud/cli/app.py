@@ -17,7 +17,6 @@ def main() -> None:
     # Until the imports below are done, some tenths of a second, Ctrl-C ends this process as any other.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     from tenbaud.cli.streams import leave, lost_output, prepare_streams
-    from tenbaud.cli.units import plain_arguments
     from tenbaud.cli.waiting import begin
     from tenbaud.flight.lifeline import follow_parent
 
@@ -25,7 +24,7 @@ def main() -> None:
     waiting = begin(sys.argv[1:])
     warnings.formatwarning = lambda message, *_: f"tenbaud: {message}\n"  # no place in the code
     follow_parent()
-    code = run(plain_arguments(sys.argv[1:]))
+    code = run(sys.argv[1:])
     waiting.end()
     error = lost_output()
     if error is not None:
@@ -40,13 +39,14 @@ def run(arguments: list[str]) -> int:
     """Run one command in this process, print its error, and return its exit code."""
     from channel.errors import TenbaudError
     from tenbaud.cli.commands import app_for
+    from tenbaud.cli.units import plain_arguments
     from tenbaud.flight.outcome import ExitCode, outcome_of
     from tenbaud.flight.stop import Interruptions
 
     interruptions = Interruptions()
     try:
         with interruptions:
-            app_for(arguments)(arguments, prog_name="tenbaud")
+            app_for(arguments)(plain_arguments(arguments), prog_name="tenbaud")
     except SystemExit as ended:
         code = ended.code if isinstance(ended.code, int) else int(ExitCode.FAILED)
     except KeyboardInterrupt:

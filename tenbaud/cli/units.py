@@ -36,16 +36,28 @@ _NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?) ?([a-zA-Z%/]+
 
 
 def plain_arguments(arguments: list[str]) -> list[str]:
-    """Return a command's arguments, the values of `OPTIONS` without units."""
+    """Return a command's arguments, the values of `OPTIONS` without units.
+
+    ValueError for a unit that the option does not have.
+    """
     found: list[str] = []
     for before, argument in zip(["", *arguments], arguments, strict=False):
         name, equals, value = argument.partition("=")
         if equals and name in OPTIONS:
-            argument = f"{name}={_plain(value, OPTIONS[name])}"
+            argument = f"{name}={_option(name, value)}"
         elif before in OPTIONS:
-            argument = _plain(argument, OPTIONS[before])
+            argument = _option(before, argument)
         found.append(argument)
     return found
+
+
+def _option(name: str, text: str) -> str:
+    units = OPTIONS[name]
+    match = _NUMBER.fullmatch(text)
+    if match is not None and match[2] not in units:
+        known = ", ".join(f"{match[1]}{unit}" for unit in units)
+        raise ValueError(f"{name}: '{text}' has an unknown unit; write {match[1]} or {known}")
+    return _plain(text, units)
 
 
 def plain_setting(field: str, text: str) -> str:

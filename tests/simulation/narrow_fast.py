@@ -74,6 +74,7 @@ class FastTwoWay(TwoWay):
         self,
         state: TwoWayState,
         word: Word,
+        symbols: Sequence[int | None],
         consume: Callable[[int, Vector, Vector], Vector],
         ask: Wanted | None,
     ) -> TwoWaySample:
@@ -102,9 +103,8 @@ class FastTwoWay(TwoWay):
         after = self.codec.close(state.codec, opened, closed)
         law = (*memory.tolist(), 0.0, 1.0)
         down = down[: -self._law_size] + law
-        return TwoWaySample(
-            TwoWayState(after, following, decided[-1], down, self._owed(state, word)), decided, [], []
-        )
+        owed = self._owed(state, self.digest(state), word, symbols)
+        return TwoWaySample(TwoWayState(after, following, decided[-1], down, owed), decided, [], [])
 
 
 def fast_mirrored(layout: Layout, queue: int, lead_ticks: int = 0, bits: int = 9) -> FastTwoWay:

@@ -27,8 +27,6 @@ from tests.tenbaud.processes import run as run_command
         (["--duration", "90ms", "--seed", "3"], ["--duration", "0.09", "--seed", "3"]),
         (["--duration", "1.5min"], ["--duration", "90.0"]),
         (["--rate", "20 bit/s"], ["--rate", "20.0"]),
-        (["--mismatch", "7s"], ["--mismatch", "7s"]),
-        (["--duration", "7%"], ["--duration", "7%"]),
         (["--duration", "1e9999999s"], ["--duration", "1e9999999s"]),
         (["--out", "10%"], ["--out", "10%"]),
         (["--duration", "5", "--", "1e3s"], ["--duration", "5", "--", "1e3s"]),
@@ -36,6 +34,15 @@ from tests.tenbaud.processes import run as run_command
 )
 def test_a_number_may_have_the_unit_of_its_option(given: list[str], plain: list[str]) -> None:
     assert plain_arguments(given) == plain
+
+
+@pytest.mark.parametrize(
+    ("given", "known"),
+    [(["--mismatch", "7s"], "7%"), (["--duration=10m"], "10us, 10ms, 10s, 10min, 10h")],
+)
+def test_when_an_option_has_no_such_unit_then_its_units_are_named(given: list[str], known: str) -> None:
+    with pytest.raises(ValueError, match=f"unknown unit; write .* or {known}"):
+        plain_arguments(given)
 
 
 @pytest.mark.parametrize(

@@ -66,3 +66,11 @@ class Layout:
                 f"a layout of at most {int(1e-9 * downlink_baud * sample_ns + 1e-9)} a sample, "
                 "lengthen symbol_period_s or raise downlink_baud"
             )
+
+
+def symbols_carried(downlink_baud: float, sample_ns: int) -> int:
+    """Return how many down symbols a sample may have on a line of this rate, at least 1."""
+    carried = int(1e-9 * downlink_baud * sample_ns * (1.0 + 1e-9))
+    if carried < 1:
+        return 1
+    return carried if carried < SYMBOLS_MAX else SYMBOLS_MAX

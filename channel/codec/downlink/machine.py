@@ -5,16 +5,20 @@ and the state of the command scheme. Its inputs are, for each sample, the up wor
 consumed and the command symbols that it sent. The receiver's X is the truth; the transmitter finds
 out what X is (`transmitter.session.narrow`). One sample `k`:
 
-    1. hash symbols are read from the digest of X as it stands: its lowest bits, each of them inverted
-       if the word of sample `k` is erased
+    1. hash symbols are read from the digest of X as it stands, each of them inverted if the word of
+       sample `k` is erased
     2. the codec consumes the word
     3. command symbols are consumed, and settle what is commanded
     4. the codec flies its N ticks, and the commands of ticks kN + D ... (k+1)N + D - 1 are decided on
        the model's prediction, as with every other downlink (`channel.codec.lead`)
 
-The command symbols come first within a sample, and hash symbols after them. A sample without a hash
-symbol owes one: the next one that is sent is then the bit of the first state that owes it, inverted
-once for each word that was erased since, so that no erasure stays unseen by the next hash symbol.
+The command symbols come first within a sample, and hash symbols after them. The first hash symbol of
+a sample does not say a bit of X: it says the bit *owed* in X, and the parity of the sample's command
+symbols. What is owed is a bit of the state before the last sample that had a hash symbol, and the
+parity of that sample's inputs (word and command symbols); of samples without a hash symbol since, the
+parity of their command symbols and of [the word is erased]. Two copies that differ in one input alone
+therefore differ in the next hash symbol for certain, where a bit of the digest tells them apart by
+chance.
 """
 
 from __future__ import annotations
@@ -34,9 +38,6 @@ Wanted = Callable[[int, Vector], Vector]
 """(tick, predicted model state) -> what is wanted there: a command, or set-points."""
 
 
-NONE_OWED = -1.0
-
-
 class TwoWayState(NamedTuple):
     """X between two samples."""
 
@@ -47,8 +48,8 @@ class TwoWayState(NamedTuple):
     """the last command decided"""
     down: Vector
     """of the command scheme"""
-    owed: float = NONE_OWED
-    """the hash bit of samples without a hash symbol, 0 or 1, which the next one carries"""
+    owed: float = 0.0
+    """0 or 1: what the next sample's first hash symbol says beside its command symbols"""
 
     @property
     def sample(self) -> int:
@@ -117,15 +118,19 @@ class TwoWay:
         return self.layout.commands_in(state.codec.sample, self.scheme.word_age(state.down))
 
     def hashed(self, state: TwoWayState, digest: int) -> int:
-        """Return the bits that the next sample's hash symbols say, the first one lowest."""
-        if state.owed == NONE_OWED:
-            return digest
+        """Return the bits of the next sample's hash symbols, the first one lowest.
+
+        The parity of the command symbols inverts the first of them, an erased word all.
+        """
         return digest >> 1 << 1 | int(state.owed)
 
-    def hash_symbols(self, state: TwoWayState, digest: int, count: int, word: Word) -> tuple[int, ...]:
-        """Return a sample's hash symbols, of the state before it, with its digest, and of its word."""
+    def hash_symbols(
+        self, state: TwoWayState, digest: int, commands: Sequence[int | None], word: Word
+    ) -> tuple[int, ...]:
+        """Return a sample's hash symbols: of the state before it, its digest, and its inputs."""
         erased = 1 if word is ERASED else 0
-        bits = self.hashed(state, digest)
+        bits = self.hashed(state, digest) ^ parity(commands)
+        count = self.layout.symbols_per_sample - len(commands)
         return tuple([bits >> place & 1 ^ erased for place in range(count)])
 
     def fly(
@@ -149,10 +154,9 @@ class TwoWay:
                 down = scheme.take(down, symbol)
             return down
 
-        flown = self._flown(state, word, chosen, wanted if scheme.asks_every_tick else None)
-        hashes = self.layout.symbols_per_sample - count
-        digest = self.digest(state) if hashes else 0
-        return flown, (*sent, *self.hash_symbols(state, digest, hashes, word))
+        flown = self._flown(state, word, sent, chosen, wanted if scheme.asks_every_tick else None)
+        digest = self.digest(state) if count < self.layout.symbols_per_sample else 0
+        return flown, (*sent, *self.hash_symbols(state, digest, sent, word))
 
     def step(self, state: TwoWayState, word: Word, symbols: Sequence[int | None]) -> TwoWaySample:
         """Fly a sample with these command symbols; None: not known, so predict without it."""
@@ -163,18 +167,20 @@ class TwoWay:
                 down = scheme.guess(down) if symbol is None else scheme.take(down, symbol)
             return down
 
-        return self._flown(state, word, given, None)
+        return self._flown(state, word, symbols, given, None)
 
     def _flown(
         self,
         state: TwoWayState,
         word: Word,
+        symbols: Sequence[int | None],
         consume: Callable[[int, Vector, Vector], Vector],
         ask: Wanted | None,
     ) -> TwoWaySample:
         """Fly a sample; `consume`, called at the first tick decided, takes the command symbols.
 
-        It returns the scheme's state after them. `ask` is a controller that wants to see every tick.
+        It returns the scheme's state after them; `symbols` has them by then. `ask` is a controller that
+        wants to see every tick.
         """
         scheme, measured = self.scheme, self.codec.model.measured
         largest, slew = self._command_max, self._slew
@@ -194,14 +200,36 @@ class TwoWay:
 
         flown = fly_sample(self.codec, state.codec, word, state.commands, decide)
         known = (*state.commands, *flown.commands)[self.codec.ticks_per_sample :]
-        after = TwoWayState(flown.state, known, hold, down, self._owed(state, word))
+        owed = self._owed(state, self.digest(state), word, symbols)
+        after = TwoWayState(flown.state, known, hold, down, owed)
         return TwoWaySample(after, flown.commands, flown.live, flown.coded)
 
-    def _owed(self, state: TwoWayState, word: Word) -> float:
-        """Return the hash bit that is owed after a sample."""
-        if self.commands_in(state) < self.layout.symbols_per_sample:
-            return NONE_OWED
-        return float(self.hash_symbols(state, self.digest(state), 1, word)[0])
+    def outlook(
+        self, state: TwoWayState, digest: int, word: Word, symbols: Sequence[int | None]
+    ) -> TwoWayState:
+        """Return what a sample leads to as far as it is known without flying it.
+
+        Its `down` and `owed` tell what the next sample's symbols mean, and its first hash symbol.
+        """
+        scheme, down = self.scheme, state.down
+        for symbol in symbols:
+            down = scheme.guess(down) if symbol is None else scheme.take(down, symbol)
+        after = CodecState(state.codec.sample + 1, (), ())
+        owed = self._owed(state, digest, word, symbols)
+        return TwoWayState(after, (), (), scheme.settle(down), owed)
+
+    def _owed(
+        self, state: TwoWayState, digest: int, word: Word, symbols: Sequence[int | None]
+    ) -> float:
+        """Return the bit that is owed after a sample."""
+        bit = parity(symbols)
+        if len(symbols) == self.layout.symbols_per_sample:
+            # Nothing has said yet whether the word came.
+            return float(bit ^ int(state.owed) ^ (1 if word is ERASED else 0))
+        alphabet = self.codec.coder.alphabet
+        for symbol in word or ():
+            bit ^= alphabet.symbol_number(symbol) & 1
+        return float(bit ^ digest & 1)
 
     def pack(self, state: TwoWayState) -> bytes:
         """Return the canonical bytes of a state, little-endian, no minus zero."""
@@ -227,13 +255,21 @@ class TwoWay:
             at += size
         codec = CodecState(sample, parts[0], parts[1])
         possible = is_coder_state(self.codec.coder, codec.coder) and self.scheme.is_state(parts[2])
-        if not possible or parts[3] not in ((NONE_OWED,), (0.0,), (1.0,)):
+        if not possible or parts[3] not in ((0.0,), (1.0,)):
             raise ValueError("the state is none that this coder and command scheme can be in")
         return TwoWayState(codec, tuple(parts[5:]), parts[4], parts[2], parts[3][0])
 
     def digest(self, state: TwoWayState) -> int:
         """Return the 64-bit digest of a state."""
         return int.from_bytes(blake2b(self.pack(state), digest_size=8).digest(), "little")
+
+
+def parity(symbols: Sequence[int | None]) -> int:
+    """Return whether an odd number of the symbols is 1."""
+    ones = 0
+    for symbol in symbols:
+        ones ^= 1 if symbol else 0
+    return ones
 
 
 def limited_all(command: Vector, before: Vector, largest: Vector, slew: Vector) -> Vector:

@@ -43,7 +43,10 @@ class Scheme(Protocol):
         """Return the state after all symbols of a sample."""
 
     def command(self, down: Vector, outputs: Vector, live: Vector) -> tuple[Vector, Vector]:
-        """Return (command of a tick, next state); `outputs` are those of the predicted state `live`."""
+        """Return (command of a tick, next state); `outputs` are those of the predicted state `live`.
+
+        The next state differs only in what this method alone reads.
+        """
 
     def is_state(self, down: Vector) -> bool:
         """Return whether a state that came over a line can be one of this scheme."""

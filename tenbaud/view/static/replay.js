@@ -70,7 +70,8 @@ export function replay(news) {
     if (isNew && flights.length > 1) nameCards(flights);
     cursor.max = Math.round(known.duration_s / known.step_s);
     for (const option of span.options) option.hidden = option.value !== "" && Number(option.value) >= known.duration_s;
-    go(timeS);
+    // At its end: every figure is that of the whole flight, and Play begins anew.
+    go(isNew ? known.duration_s : timeS);
   }
 
   function shownSpan() {

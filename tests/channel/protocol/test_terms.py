@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
+from channel.codec.downlink.layout import symbols_carried
 from tests.channel.codec.parts import terms
 
 MS = 1_000_000
@@ -123,3 +126,30 @@ def test_when_a_command_frame_cannot_carry_the_repeats_then_the_terms_are_refuse
 @pytest.mark.parametrize(("period_ns", "samples"), [(100 * MS, 64), (2 * MS, 125), (MS // 2, 500)])
 def test_when_samples_are_short_then_the_bound_on_lag_is_a_time(period_ns: int, samples: int) -> None:
     assert terms(tick_ns=period_ns, ticks_per_sample=1).history_samples == samples
+
+
+def test_when_the_downlink_is_narrow_then_a_coded_command_waits_for_all_symbols_of_its_sample() -> None:
+    narrow = terms().narrowed(20.0, 2, is_mirrored=False)
+    # 20 ms until the word is settled, 50 ms to the second slot, 10 ms on the way.
+    assert (narrow.down_slot_ns(1), narrow.down_heard_ns) == (70 * MS, 80 * MS)
+    assert narrow.with_shortest_lead("virtual").lead_ticks == narrow.lead_needed_ticks == 8
+    with pytest.raises(ValueError) as caught:
+        replace(narrow, lead_ticks=7).check("real")
+    assert str(caught.value) == (
+        "lead_ticks = 7 is too short: down symbols, which are all there 80 ms after a sample, need "
+        "lead_ticks >= 8 at 10 ms a tick"
+    )
+    assert narrow.linger_ns(0) == 80 * MS
+
+
+def test_when_the_law_is_mirrored_then_the_real_clock_needs_no_lead() -> None:
+    mirrored = terms(delivery="end", lead_ticks=0).narrowed(20.0, 2, is_mirrored=True)
+    assert mirrored.with_shortest_lead("real").lead_ticks == 0
+    mirrored.check("real")
+    assert mirrored.down_heard_ns == (100 + 20 + 50 + 50 + 10) * MS
+
+
+def test_when_the_down_line_carries_no_symbol_a_sample_then_the_numbers_are_named() -> None:
+    with pytest.raises(ValueError, match=r"ask for 10 symbols/s, .* carries downlink_baud = 5;"):
+        terms().narrowed(5.0, symbols_carried(5.0, 100 * MS), is_mirrored=True).check("virtual")
+    assert [symbols_carried(baud, 100 * MS) for baud in (5.0, 19.9, 20.0, 1e5)] == [1, 1, 2, 32]

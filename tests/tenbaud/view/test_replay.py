@@ -85,6 +85,8 @@ def test_the_keyboard_moves_the_cursor_and_every_instrument_follows(
     open_page: Any, one_run: Served, runs: tuple[Run, Run]
 ) -> None:
     page, run = open_page(one_run), runs[0]
+    cursor_is(page, SECONDS)
+    page.keyboard.press("Home")
     cursor_is(page, 0.0)
     state_is(page, "waiting")
     page.keyboard.press("PageUp")
@@ -115,6 +117,7 @@ def test_the_keyboard_moves_the_cursor_and_every_instrument_follows(
 
 def test_it_plays_at_any_speed_and_stops_at_the_end(open_page: Any, one_run: Served) -> None:
     page = open_page(one_run)
+    cursor_is(page, SECONDS)
     play = page.locator("#play")
     page.keyboard.press("Space")
     assert play.inner_text() == "Pause"
@@ -150,6 +153,8 @@ def test_events_are_listed_up_to_the_cursor_and_lead_to_their_moment(
     open_page: Any, one_run: Served
 ) -> None:
     page = open_page(one_run)
+    cursor_is(page, SECONDS)
+    page.keyboard.press("Home")
     cursor_is(page, 0.0)
     page.get_by_role("button", name="Next event").click()
     wait(page, "() => parseFloat(document.getElementById('f-time').textContent) > 5")
@@ -171,7 +176,7 @@ def test_a_click_on_a_curve_jumps_there_and_curves_can_be_enlarged(
     open_page: Any, one_run: Served
 ) -> None:
     page = open_page(one_run)
-    cursor_is(page, 0.0)
+    cursor_is(page, SECONDS)
     box = page.locator("#value-0").bounding_box()
     page.locator("#value-0").click(position={"x": 46 + (box["width"] - 50) / 2, "y": 40})
     wait(page, "() => Math.abs(parseFloat(document.getElementById('f-time').textContent) - 6) < 0.11")
@@ -188,6 +193,8 @@ def test_two_flights_are_laid_over_each_other_with_their_names_bits_and_digests(
     legend = page.locator("#curves-legend").inner_text()
     assert "ten (tuned-10baud)" in legend
     assert "usual (usual-1000baud)" in legend
+    cursor_is(page, SECONDS)
+    page.keyboard.press("Home")
     page.keyboard.press("PageUp")
     cursor_is(page, 5.0)
     # The usual loop names no picture of its own.

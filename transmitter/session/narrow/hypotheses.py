@@ -102,7 +102,7 @@ class Hypotheses:
 
     def restart(self, state: TwoWayState) -> None:
         """Take a common state; what is known of the line stays known."""
-        root = Node(None, state.sample - 1, (), (), state, None)
+        root = Node(None, state.sample - 1, (), (), state)
         self._paths = Paths(root)
         self._members: list[tuple[float, Node]] = [(1.0, root)]
         self._unheard: deque[Word] = deque()
@@ -143,11 +143,12 @@ class Hypotheses:
 
     def members(self) -> list[tuple[float, TwoWayState]]:
         """Return the hypotheses: (weight, state before `next_heard`); the weights sum to one."""
-        return [(weight, node.state) for weight, node in self._members]
+        return [(weight, node.state) for weight, node in self._members if node.fly(self.machine)]
 
     def sabotage(self, change: Callable[[TwoWayState], TwoWayState]) -> None:
         """Change the state of every hypothesis, to see that it is found."""
-        self._members = [(weight, node.changed(change)) for weight, node in self._members]
+        for _, node in self._members:
+            node.change(self.machine, change)
         self._ahead = None
 
     # What is used
@@ -199,26 +200,28 @@ class Hypotheses:
         """Return the hypotheses that count, best first, carried over the words not heard of yet."""
         if self._ahead is not None:
             return self._ahead
-        ranked = sorted(self._members, key=lambda one: -one[0])
         left = 1.0
         kept = []
-        for weight, node in ranked:
+        for weight, node in self._members:
             kept.append((weight, node))
             left -= weight
             if left < APPLIED_SHARE or (self._unheard and len(kept) == AHEAD_MAX):
                 break
         ahead = []
         for weight, node in kept:
-            tip: Node | None = node
+            tip = node
             for word in self._unheard:
-                if tip is None:
+                if not tip.fly(self.machine):
                     break
-                tip = tip.child(self.machine, word, self._likeliest(tip.state))
-            if tip is not None:
+                tip = tip.child(word, self._likeliest(tip.state))
+            if tip.fly(self.machine):
                 ahead.append((weight, tip))
         if not ahead:
             # None can be carried: what comes down next will show it.
-            ahead = kept[:1]
+            tip = kept[0][1]
+            while not tip.is_flown and tip.parent is not None:
+                tip = tip.parent
+            ahead = [(1.0, tip)]
         self._ahead = ahead
         return ahead
 
@@ -282,30 +285,21 @@ class Hypotheses:
 
     def _select(self, branched: Branched) -> bool:
         """Follow the branches that weigh enough, book the others; return whether there is one."""
-        branches, rest_factor, spilled = branched
+        branches, rest_factor, dropped = branched
+        if not branches:
+            return False
         branches.sort(key=lambda one: -one[0])
         least = branches[0][0] * self.settings.dropped_below
-        members: dict[TwoWayState, tuple[float, Node]] = {}
-        dropped = list(spilled)
-        whole = sum(one[0] for one in branches) or 1.0
+        followed_on: list[tuple[float, Node]] = []
         for weight, node, word, symbols in branches:
-            followed = weight >= least and weight > 0.0 and len(members) < self.settings.list_max
-            child = node.child(self.machine, word, symbols) if followed else None
-            if child is None:
-                dropped.append((weight, node))
-            elif child.state in members:
-                other, kept = members[child.state]
-                members[child.state] = (other + weight, kept)
-                kept.doubt(child, weight / whole)
+            if weight >= least and weight > 0.0 and len(followed_on) < self.settings.list_max:
+                followed_on.append((weight, node.child(word, symbols)))
             else:
-                members[child.state] = (weight, child)
+                dropped.append((weight, node))
         for _, node in self._members:
             node.children = {}
-        if not members:
-            return False
         paths = self._paths
         paths.scale_rest(rest_factor)
-        followed_on = sorted(members.values(), key=lambda one: -one[0])
         paths.follow(followed_on[0][1])
         paths.book(self.settings.unexplained * rest_factor, None)
         leaves: dict[Node, int | None] = {}
@@ -313,7 +307,9 @@ class Hypotheses:
             if weight > 0.0:
                 if node not in leaves:
                     leaves[node] = paths.leaves_at(node)
-                paths.book(weight, leaves[node])
+                # The next hash symbol may agree for certain with what differs in two inputs: that
+                # halving is undone here.
+                paths.book(2.0 * weight, leaves[node])
         total = 0.0
         for weight, _ in followed_on:
             total += weight
@@ -335,6 +331,8 @@ class Hypotheses:
             if total >= self.settings.confirmed_below:
                 break
             count += 1
+        if count and not paths.path[count - 1].fly(self.machine):
+            count -= 1
         if count == 0:
             return []
         first = paths.first
@@ -358,7 +356,7 @@ class Hypotheses:
         sent, heard = self._unconfirmed.popleft()
         digest = machine.digest(before)
         commands = tuple([1 if one else 0 for one in node.symbols])
-        hashes = machine.hash_symbols(before, digest, len(heard) - len(commands), node.word)
+        hashes = machine.hash_symbols(before, digest, commands, node.word)
         symbols = commands + hashes
         self.priors.learn(sent, node.word, word_before)
         self.priors.learn_symbols(symbols, heard)

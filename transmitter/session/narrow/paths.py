@@ -15,9 +15,15 @@ Symbols = tuple[int | None, ...]
 
 
 class Node:
-    """A sample as the receiver may have flown it, on top of those before it."""
+    """A sample as the receiver may have flown it, on top of those before it.
+
+    It is flown when somebody needs the state after it: most are dropped before, by what comes down.
+    """
 
     __slots__ = (
+        "_cannot_fly",
+        "_digest",
+        "_state",
         "children",
         "commands",
         "doubted",
@@ -25,7 +31,6 @@ class Node:
         "on_path",
         "parent",
         "sample",
-        "state",
         "symbols",
         "word",
     )
@@ -36,41 +41,69 @@ class Node:
         sample: int,
         word: Word,
         symbols: Symbols,
-        state: TwoWayState,
-        flown: TwoWaySample | None,
+        state: TwoWayState | None = None,
     ) -> None:
         self.parent = parent
         self.sample = sample
         self.word = word
         self.symbols = symbols
         """its command symbols"""
-        self.state = state
-        """after it"""
-        self.flown = flown
-        self.commands: list[Vector] = [] if flown is None else flown.commands
+        self._state = state
+        self._digest: int | None = None
+        self._cannot_fly = False
+        self.flown: TwoWaySample | None = None
+        self.commands: list[Vector] = []
         self.on_path = False
         self.doubted = 0.0
         """share of the histories that came to the state of one through here, with other inputs"""
-        self.children: dict[tuple[Word, Symbols], Node | None] = {}
-        """samples flown on top of it; None: cannot be flown"""
+        self.children: dict[tuple[Word, Symbols], Node] = {}
 
-    def child(self, machine: TwoWay, word: Word, symbols: Symbols) -> Node | None:
-        """Return the next sample with these inputs, flown once however often it is asked for."""
+    @property
+    def is_flown(self) -> bool:
+        return self._state is not None
+
+    @property
+    def state(self) -> TwoWayState:
+        """Return the state after it; it must have been flown."""
+        assert self._state is not None
+        return self._state
+
+    def fly(self, machine: TwoWay) -> bool:
+        """Fly it, once however often it is asked for; return whether it can be flown."""
+        if self._state is None and not self._cannot_fly:
+            assert self.parent is not None  # only the root has none, and has a state
+            try:
+                self.flown = machine.step(self.parent.state, self.word, self.symbols)
+            except CANNOT_FLY:
+                self._cannot_fly = True
+            else:
+                self._state, self.commands = self.flown.state, self.flown.commands
+        return self._state is not None
+
+    def outlook(self, machine: TwoWay) -> TwoWayState:
+        """Return the state after it, or, where it was not flown, what is known of that without."""
+        if self._state is not None:
+            return self._state
+        assert self.parent is not None
+        return machine.outlook(self.parent.state, self.parent.digest(machine), self.word, self.symbols)
+
+    def digest(self, machine: TwoWay) -> int:
+        """Return the digest of the state after it; it must have been flown."""
+        if self._digest is None:
+            self._digest = machine.digest(self.state)
+        return self._digest
+
+    def child(self, word: Word, symbols: Symbols) -> Node:
+        """Return the next sample with these inputs, the same one however often it is asked for."""
         key = (word, symbols)
         if key not in self.children:
-            try:
-                flown = machine.step(self.state, word, symbols)
-            except CANNOT_FLY:
-                self.children[key] = None
-            else:
-                self.children[key] = Node(self, self.sample + 1, word, symbols, flown.state, flown)
+            self.children[key] = Node(self, self.sample + 1, word, symbols)
         return self.children[key]
 
-    def changed(self, change: Callable[[TwoWayState], TwoWayState]) -> Node:
-        """Change the state after this sample; return the node."""
-        self.state = change(self.state)
-        self.children = {}
-        return self
+    def change(self, machine: TwoWay, change: Callable[[TwoWayState], TwoWayState]) -> None:
+        """Change the state after this sample."""
+        if self.fly(machine):
+            self._state, self._digest, self.children = change(self.state), None, {}
 
     def forget(self) -> None:
         """Let go of the samples before it."""

@@ -42,9 +42,9 @@ class Priors:
         self._down_flipped = Share(0.005)
         self._news = Share(0.1)
 
-    def erased(self, before: Word) -> float:
-        """Return how likely a word is erased, after this one."""
-        return (self._erased_again if before is ERASED else self._erased).value
+    def erased(self, after_erasure: bool) -> float:
+        """Return how likely a word is erased."""
+        return (self._erased_again if after_erasure else self._erased).value
 
     @property
     def flipped(self) -> float:

@@ -12,7 +12,7 @@ from channel.codec.coders.zoom import ZoomCoder
 from channel.codec.downlink.coded import CodedCommands, held_inputs
 from channel.codec.downlink.laws import MirroredFeedback
 from channel.codec.downlink.layout import Layout
-from channel.codec.downlink.machine import TwoWay
+from channel.codec.downlink.machine import TwoWay, TwoWayState
 from channel.codec.downlink.mirrored import MirroredLaw, SetPointRange
 from channel.codec.downlink.scheme import Scheme
 from channel.codec.laws import FeedbackLaw
@@ -84,31 +84,51 @@ def test_a_replica_that_gets_the_words_and_symbols_has_the_receivers_state(
 
 def test_hash_symbols_are_bits_of_the_digest_before_the_word_inverted_by_an_erasure() -> None:
     two_way = machine(mirrored_law(Layout(4)), Layout(4), 5)
-    state = two_way.initial()
+    state, owed = two_way.initial(), 0
     for word in words(60):
         digest = two_way.digest(state)
         flown, symbols = two_way.fly(state, word, wanted)
-        bits = tuple([digest >> place & 1 for place in range(3)])
+        bits = (owed ^ symbols[0], digest >> 1 & 1, digest >> 2 & 1)
         assert symbols[1:] == (bits if word is not ERASED else tuple([1 - bit for bit in bits]))
+        owed = digest & 1 ^ symbols[0]
+        for symbol in word or ():
+            owed ^= symbol == 1
         state = flown.state
 
 
-def test_a_hash_symbol_shows_every_erasure_since_the_one_before_it() -> None:
-    two_way = machine(CodedCommands((0.0, 0.0), held_inputs(LIMITS)), Layout(1, 1, 3), 5)
-    state, sent, due = two_way.initial(), 0, 0
-    for sample, word in enumerate(words(90)):
-        digest = two_way.digest(state)
+@pytest.mark.parametrize("at", range(len(SCHEMES)))
+def test_one_difference_in_the_inputs_of_a_sample_inverts_the_next_hash_symbol(at: int) -> None:
+    scheme, layout = SCHEMES[at]
+    two_way = machine(scheme, layout, 5)
+    state, chance, seen = two_way.initial(), random.Random(at), 0
+
+    def said(state: TwoWayState, word: Word, commands: tuple[int, ...]) -> int:
+        """Return the first hash symbol from this sample on; those after it have the same inputs."""
+        while len(commands) == layout.symbols_per_sample:
+            state, word = two_way.step(state, word, commands).state, (1, 1)
+            commands = (0,) * two_way.commands_in(state)
+        return two_way.hash_symbols(state, two_way.digest(state), commands, word)[0]
+
+    def after(state: TwoWayState, word: Word, commands: tuple[int, ...]) -> int:
+        state = two_way.step(state, word, commands).state
+        return said(state, (1, 1), (0,) * two_way.commands_in(state))
+
+    for word in words(90):
         flown, symbols = two_way.fly(state, word, wanted)
-        erased = 1 if word is ERASED else 0
-        if sample % 3 == 0:
-            due = digest & 1 ^ erased
-        elif sample % 3 == 1:
-            assert symbols == (due ^ erased,)
-        else:
-            assert symbols == (digest & 1 ^ erased,)
-            sent += erased
+        commands = symbols[: two_way.commands_in(state)]
+        place = chance.randrange(len(commands)) if commands else 0
+        other = tuple([bit ^ (at == place) for at, bit in enumerate(commands)])
+        if commands:
+            assert said(state, word, commands) != said(state, word, other)
+            assert after(state, word, commands) != after(state, word, other)
+        if word is not ERASED:
+            assert said(state, word, commands) != said(state, ERASED, commands)
+            if len(commands) < layout.symbols_per_sample:
+                changed = (-word[0], word[1])
+                assert after(state, word, commands) != after(state, changed, commands)
+                seen += 1
         state = flown.state
-    assert sent > 3
+    assert seen > 20
 
 
 def test_the_codec_flies_as_it_does_with_the_same_commands_on_any_downlink() -> None:

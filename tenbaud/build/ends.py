@@ -24,6 +24,7 @@ from receiver.endpoint import ReceiverEndpoint, SteppedEndpoint
 from receiver.session.session import ReceiverSession
 from tenbaud.build.codec import build_codec
 from tenbaud.build.controllers import build_controller
+from tenbaud.build.downlink import with_codec
 from tenbaud.build.first_contact import require_safe
 from tenbaud.build.flight import Agreement, ticks_of, watchdog_wanted_s
 from tenbaud.build.flight_log import output_steps
@@ -46,8 +47,9 @@ from transmitter.session.state_observer import StateObserver, rate_observer
 def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> TransmitterNode:
     """Return the sensor node of a configuration."""
     config, terms = agreement.config, agreement.terms
+    codec = sabotaged(agreement.codec, config.transmitter.sabotage, agreement.live)
     session = TransmitterSession(
-        sabotaged(agreement.codec, config.transmitter.sabotage, agreement.live),
+        codec,
         terms,
         agreement.identity,
         secrets.randbits(32),
@@ -55,6 +57,8 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
         stop_on_desync=config.transmitter.on_desync == "stop",
         state_observer=build_observer(agreement),
         overtaking_ticks=overtaking_ticks(terms, agreement.faults),
+        two_way=with_codec(agreement.two_way, codec),
+        line_delay_ns=agreement.faults.longest_delay_ns,
     )
     gauge = build_gauge(agreement)
     scores = Scores(
@@ -151,8 +155,9 @@ def build_receiver(
         model = agreement.codec.model
         references = build_references(agreement.config, agreement.signals, model)
     terms = agreement.terms
+    codec = sabotaged(agreement.codec, agreement.config.receiver.sabotage, agreement.live)
     session = ReceiverSession(
-        sabotaged(agreement.codec, agreement.config.receiver.sabotage, agreement.live),
+        codec,
         terms,
         agreement.parts.controller
         or build_controller(agreement.config, references, agreement.codec.model),
@@ -161,6 +166,7 @@ def build_receiver(
         recorder,
         take_over=take_over,
         begins=partial(begin_from, references or ()),
+        two_way=with_codec(agreement.two_way, codec),
     )
     if agreement.clock == "virtual":
         # There the transmitter's process holds both directions of the line, and the receiver's clock.

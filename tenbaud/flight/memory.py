@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from copy import copy
 from dataclasses import asdict
 
 from channel.codec.codec import Codec, Vector
@@ -23,6 +22,7 @@ from plant_sim.plant import Plant
 from receiver.controllers.base import Controller
 from receiver.endpoint import ReceiverEndpoint
 from receiver.session.session import ReceiverSession
+from tenbaud.build.downlink import with_codec
 from tenbaud.build.liveness import round_trip, watchdog_ticks
 from tenbaud.build.parts import PartError, Parts, check_codec
 from tenbaud.config.version import software_version
@@ -97,7 +97,9 @@ class MemoryFlight:
         uplink_line = uplink_line or CleanLine()
         downlink_line = downlink_line or CleanLine()
         identity = Identity(
-            software_version(), json.dumps(asdict(terms), sort_keys=True), numerics_probe(codec)
+            software_version(),
+            json.dumps(asdict(terms), sort_keys=True),
+            numerics_probe(codec, two_way),
         )
         self.transmitter = TransmitterSession(
             codec,
@@ -117,7 +119,7 @@ class MemoryFlight:
             identity,
             SESSION_NUMBER,
             self.receiver_rows,
-            two_way=two_way and _with_codec(two_way, receiver_codec or codec),
+            two_way=with_codec(two_way, receiver_codec or codec),
         )
         up_ns = uplink_line.longest_delay_ns + terms.symbol_delay_ns
         delay_ns = max(up_ns, downlink_line.longest_delay_ns)
@@ -200,12 +202,6 @@ def _observer(codec: Codec, counts_per_turn: int) -> StateObserver | None:
     from tenbaud.design.observer import observer_of_coder
 
     return observer_of_coder(codec, counts_per_turn)
-
-
-def _with_codec(two_way: TwoWay, codec: Codec) -> TwoWay:
-    other = copy(two_way)
-    other.codec = codec
-    return other
 
 
 def _check_two_way(terms: Terms, two_way: TwoWay | None) -> None:

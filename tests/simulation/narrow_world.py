@@ -15,6 +15,8 @@ from tests.simulation.narrow import LIMITS, NO_SLEW, START, paper_law
 from tests.simulation.world import World
 
 LAYOUT = Layout(2, 1, 4)
+WORD_SAMPLES = 15
+FORGOTTEN_SAMPLES = 4
 CONFIRMATION_SAMPLES_MAX = 40
 """How long the first confirmation of an epoch may take."""
 
@@ -31,8 +33,16 @@ def narrowed(plan: Plan) -> Plan:
 class NarrowWorld(World):
     """Confirmation takes longer than an echo does."""
 
+    def __init__(self, plan: Plan) -> None:
+        super().__init__(plan)
+        for _, sabotage in plan.sabotage:
+            # The motors' lag forgets: its last bit is right again after two or three samples.
+            self.watch.unseen.update(range(sabotage.sample, sabotage.sample + FORGOTTEN_SAMPLES))
+
     def two_way(self, codec: Codec) -> TwoWay:
-        scheme = MirroredLaw(paper_law(), (SetPointRange(0, -2.0, 2.0),), 1, 9, 0, LAYOUT)
+        # The transmitter must know a set-point in time: its word, and the way down, take samples.
+        queue = WORD_SAMPLES + 2 + -(-self.plan.round_trip_ns // self.terms.sample_ns)
+        scheme = MirroredLaw(paper_law(), (SetPointRange(0, -2.0, 2.0),), 1, 9, queue, LAYOUT)
         return TwoWay(codec, scheme, LAYOUT, 0, START, LIMITS, NO_SLEW)
 
     @property

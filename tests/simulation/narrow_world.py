@@ -47,4 +47,10 @@ class NarrowWorld(World):
 
     @property
     def recovery_ns_max(self) -> int:
-        return super().recovery_ns_max + CONFIRMATION_SAMPLES_MAX * self.terms.sample_ns
+        # Without a command lead an answer may begin before it has come; the next ones begin later.
+        waiting_ns = CONFIRMATION_SAMPLES_MAX * self.terms.sample_ns + 3 * self.plan.round_trip_ns
+        return super().recovery_ns_max + waiting_ns
+
+    @property
+    def calm_rejoins_max(self) -> int:
+        return super().calm_rejoins_max + 4

@@ -13,9 +13,11 @@ KEYED = (
     ("transmitter", "estimate"),
     ("transmitter", "sample"),
     ("transmitter", "gap"),
+    *(("transmitter", topic) for topic in ("down_symbols", "confirmed", "hypotheses")),
     ("transmitter", "device"),
     ("receiver", "tick"),
     ("receiver", "sample"),
+    ("receiver", "down_symbols"),
 )
 """Topics whose rows have a key each; that of every row is larger than the one before."""
 

@@ -54,31 +54,34 @@ class NullRecorder:
         """Forget the row."""
 
 
-SENT_CHANNEL = RecordChannel(
-    "symbol",
-    (
-        Field("slot", "integer", "", "slot of the symbol, counted from the first one of sample 0"),
-        Field("symbol", "integer", "", "number of the symbol in the coder's alphabet"),
-        Field("left_ns", "integer", "ns", "flight time at which it left; null: refused", timing=True),
-        Field(
-            "wire_bytes",
-            "integer",
-            "",
-            "of its frame on this kind of line, framing included",
-            timing=True,
-        ),
-    ),
-)
+def _sent(topic: str, slot: Field, symbol: Field) -> RecordChannel:
+    """Return the channel of the symbols that one end sent."""
+    left = Field("left_ns", "integer", "ns", "flight time at which it left; null: refused", timing=True)
+    size = Field(
+        "wire_bytes", "integer", "", "of its frame on this kind of line, framing included", timing=True
+    )
+    return RecordChannel(topic, (slot, symbol, left, size))
 
-ARRIVED_CHANNEL = RecordChannel(
-    "symbol",
-    (
-        Field("slot", "integer", "", "slot of the symbol, counted from the first one of sample 0"),
-        Field("symbol", "integer", "", "number of the symbol in the coder's alphabet"),
-        Field("arrived_ns", "integer", "ns", "when it came, on this clock", timing=True),
-        Field("taken", "boolean", "", "false: its slot was settled already", timing=True),
-    ),
+
+def _arrived(topic: str, slot: Field, symbol: Field) -> RecordChannel:
+    """Return the channel of the symbols that came to one end."""
+    came = Field("arrived_ns", "integer", "ns", "when it came, on this clock", timing=True)
+    taken = Field("taken", "boolean", "", "false: its slot was settled already", timing=True)
+    return RecordChannel(topic, (slot, symbol, came, taken))
+
+
+_UP = (
+    Field("slot", "integer", "", "slot of the symbol, counted from the first one of sample 0"),
+    Field("symbol", "integer", "", "number of the symbol in the coder's alphabet"),
 )
+_DOWN = (
+    Field("slot", "integer", "", "slot of the down symbol, counted from the first one of sample 0"),
+    Field("symbol", "integer", "", "0 or 1"),
+)
+SENT_CHANNEL = _sent("symbol", *_UP)
+ARRIVED_CHANNEL = _arrived("symbol", *_UP)
+DOWN_SENT_CHANNEL = _sent("down_symbol", *_DOWN)
+DOWN_ARRIVED_CHANNEL = _arrived("down_symbol", *_DOWN)
 
 EPOCH_CHANNEL = RecordChannel(
     "epoch",

@@ -126,6 +126,10 @@ class ReceiverSession:
         """Return the slot that is not settled yet; None while no flight is on."""
         return self._clock.slot if self.phase is Phase.FLYING else None
 
+    def flight_ns(self, now_ns: int) -> int:
+        """Return the flight time by which down symbols have their slots."""
+        return self._schedule.flight_ns(now_ns)
+
     @property
     def history(self) -> History:
         """Return the last states, for a failure to be looked into."""

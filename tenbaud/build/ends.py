@@ -10,6 +10,7 @@ from functools import partial
 
 from channel.codec.codec import Codec
 from channel.codec.coders.direction import DirectionCoder
+from channel.codec.downlink.layout import DOWN_ALPHABET
 from channel.codec.models.learned import plant_model
 from channel.codec.models.linear import LinearModel
 from channel.line.clocks import SkewedClock
@@ -125,7 +126,7 @@ def build_line(agreement: Agreement, direction: Direction, wire: SymbolWire) -> 
     one = agreement.faults.up if direction == "up" else agreement.faults.down
     if not one.any and not agreement.live:
         return CleanLine()
-    alphabet = agreement.codec.coder.alphabet
+    alphabet = agreement.codec.coder.alphabet if direction == "up" else DOWN_ALPHABET
     return ImpairedLine(one, alphabet, f"{agreement.config.seed} {direction}", wire)
 
 
@@ -153,10 +154,11 @@ def build_receiver(
     if references is None and agreement.parts.controller is None:
         model = agreement.codec.model
         references = build_references(agreement.config, agreement.signals, model)
+    terms = agreement.terms
     codec = sabotaged(agreement.codec, agreement.config.receiver.sabotage, agreement.live)
     session = ReceiverSession(
         codec,
-        agreement.terms,
+        terms,
         agreement.parts.controller
         or build_controller(agreement.config, references, agreement.codec.model),
         agreement.identity,
@@ -168,10 +170,11 @@ def build_receiver(
     )
     if agreement.clock == "virtual":
         # There the transmitter's process holds both directions of the line, and the receiver's clock.
-        return SteppedEndpoint(session, Downlink(wire))
+        return SteppedEndpoint(session, Downlink(wire, None, terms, recorder))
     faults = agreement.faults
     clock = SkewedClock(faults, time.monotonic_ns()) if faults.bad_clock else None
-    return ReceiverEndpoint(session, Downlink(wire, build_line(agreement, "down", wire)), clock)
+    line = build_line(agreement, "down", wire)
+    return ReceiverEndpoint(session, Downlink(wire, line, terms, recorder), clock)
 
 
 def check_parts(config: FlightConfig, parts: Parts | None = None) -> None:

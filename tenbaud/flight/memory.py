@@ -127,7 +127,8 @@ class MemoryFlight:
             encoder_counts_per_turn, safe_command, round(scored_from_s * 1e9), delay_ns
         )
         self.uplink = Uplink(terms, codec.coder.alphabet, uplink_line, wire)
-        self.endpoint = ReceiverEndpoint(self.receiver, Downlink(wire))
+        downlink = Downlink(wire, None, terms, self.receiver_rows)
+        self.endpoint = ReceiverEndpoint(self.receiver, downlink)
         self.loop = VirtualFlight(
             TransmitterEndpoint(self.node, self.uplink), downlink_line, self.endpoint
         )

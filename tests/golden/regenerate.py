@@ -83,6 +83,7 @@ def example_frames() -> list[frames.Frame]:
         frames.Bye(0, Ending(200)),
         frames.Unknown(0x01020304, 5),
         frames.Claim(0x01020304, 5, 0x0A0B0C0D),
+        frames.DownSymbol(0x01020304, 5, 0x0A0B0C0D, 1),
     ]
 
 

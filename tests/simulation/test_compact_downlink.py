@@ -28,8 +28,8 @@ def test_when_it_flies_then_16_bytes_a_sample_go_down_and_a_command_is_held_for_
     flight = compact()
     flight.fly(20.0)
     assert_lockstep(flight, 200)
-    assert flight.endpoint.downlink.command_bytes == 200 * 16
-    assert flight.loop.endpoint.inlet.command_bytes == 200 * 16
+    assert flight.endpoint.downlink.meter.command_bytes == 200 * 16
+    assert flight.loop.endpoint.inlet.meter.command_bytes == 200 * 16
     commands = flight.receiver_rows.column("tick", "command")
     assert len(commands) == 2000
     for first in range(0, 2000, 10):

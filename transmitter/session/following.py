@@ -1,8 +1,8 @@
 """How a transmitter follows the receiver from one welcome to the next: an interface.
 
-`transmitter.session.echoes` advances a copy of the codec on echoes, `transmitter.session.narrow` keeps
-hypotheses of the receiver's state. The session has the handshake and the peer; what follows a welcome
-says which state is certain, which word comes next, and which command is due.
+`transmitter.session.echoes` advances a copy of the codec on echoes, `transmitter.session.down_symbols`
+keeps hypotheses of the receiver's state. The session has the handshake and the peer; what follows a
+welcome says which state is certain, which word comes next, and which command is due.
 """
 
 from __future__ import annotations

@@ -41,9 +41,9 @@ from channel.protocol.recording import NullRecorder, Recorder
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
 from transmitter.session.copies import CANNOT_FLY, Confirmed
+from transmitter.session.down_symbols import NarrowFollowing
 from transmitter.session.echoes import EchoFollowing, diverged
 from transmitter.session.following import Following, Lost, Parts
-from transmitter.session.narrow.following import NarrowFollowing
 from transmitter.session.owing import Owing
 from transmitter.session.rejoin import Asking
 from transmitter.session.state_observer import StateObserver, default_observer

@@ -10,8 +10,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from channel.codec.codec import Alphabet
+
 SYMBOLS_MAX = 32
 """Down symbols a sample; their hash bits are different bits of one digest of 64."""
+
+
+DOWN_ALPHABET = Alphabet((0, 1), 1)
 
 
 @dataclass(frozen=True, slots=True)

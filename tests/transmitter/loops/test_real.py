@@ -160,8 +160,8 @@ def test_when_a_flight_is_flown_in_real_time_then_every_sample_is_checked(
     assert meter.symbols == counts["samples"] - counts["erasures"]
     assert meter.symbols + session.counts["words_missed"] + shaper.refused == TICKS // 4
     assert flight.endpoint.lateness.count == TICKS - flight.endpoint.ticks_missed
-    assert beyond or flight.endpoint.inlet.wire_bytes == end.downlink.wire_bytes
-    assert end.inlet.wire_bytes == meter.wire_bytes, "the farewell is counted too"
+    assert beyond or flight.endpoint.inlet.meter.wire_bytes == end.downlink.meter.wire_bytes
+    assert end.inlet.meter.wire_bytes == meter.wire_bytes, "the farewell is counted too"
     assert flight.endpoint.inlet.malformed == end.inlet.malformed == 0
     assert not node.latched
 

@@ -29,8 +29,8 @@ from transmitter.session.records import CONFIRMED_CHANNEL, HYPOTHESES_CHANNEL, w
 
 AGE_FACTOR = 4
 AGE_LEAST_SAMPLES = 16
-AGE_UNKNOWN_SAMPLES = 64
-"""Before `DELAYS_KNOWN` samples have said how long a confirmation takes."""
+AGE_UNKNOWN_SYMBOLS = 128
+"""Age in down symbols, before `DELAYS_KNOWN` samples have said how long a confirmation takes."""
 DELAYS_KNOWN = 20
 DELAYS_KEPT = 101
 CONFIRMED_KEPT = 1024
@@ -56,7 +56,7 @@ class NarrowFollowing:
         self._confirmed: deque[_Done] = deque(maxlen=CONFIRMED_KEPT)
         self._delays: deque[int] = deque(maxlen=DELAYS_KEPT)
         """samples that passed until each of the last ones was confirmed"""
-        self._age_max = AGE_UNKNOWN_SAMPLES
+        self._age_max = -(-AGE_UNKNOWN_SYMBOLS // parts.terms.down_symbols)
         self._live: deque[Vector | None] = deque()
         self._last = parts.terms.initial_command
         self._epoch = self._epoch_tick = 0

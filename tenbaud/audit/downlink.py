@@ -46,7 +46,11 @@ def check_starts(evidence: Evidence) -> None:
                 place.leak("state", "the receiver recorded something else")
 
 
-@claim("down symbols of every sample", ("receiver", "down_symbols", "sample", "symbols"))
+@claim(
+    "down symbols of every sample",
+    ("receiver", "down_symbols", "sample", "symbols"),
+    ("receiver", "down_symbol", "slot", "symbol"),
+)
 def check_sent(evidence: Evidence) -> None:
     """The receiver's down symbols are one bit a slot, and its hash bits are those of its states."""
     if evidence.agreement.two_way is None or "receiver" not in evidence.rows:

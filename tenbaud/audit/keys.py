@@ -94,6 +94,8 @@ def _filed_under(end: str, topic: str, row: Any, terms: Terms) -> int | None:
             if end == "receiver":
                 return terms.slot_ns(row.slot)
             return None if row.left_ns is None else int(row.left_ns)
+        case "down_symbol":
+            return None if row.left_ns is None else int(row.left_ns)
         case "event":
             return round(float(row.time_s) * 1e9)
     return terms.sample_ns * int(row[0])

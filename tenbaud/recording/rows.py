@@ -16,6 +16,7 @@ from channel.protocol.events import EVENT_CHANNEL
 from channel.protocol.lockstep import LOCKSTEP_CHANNEL
 from channel.protocol.recording import (
     ARRIVED_CHANNEL,
+    DOWN_SENT_CHANNEL,
     DOWN_SYMBOLS_CHANNEL,
     EPOCH_CHANNEL,
     SENT_CHANNEL,
@@ -41,7 +42,7 @@ KNOWN = (
     *(transmitter.TICK_CHANNEL, transmitter.SAMPLE_CHANNEL, transmitter.ESTIMATE_CHANNEL),
     *(transmitter.DEVICE_CHANNEL, receiver.TICK_CHANNEL, receiver.SAMPLE_CHANNEL, SENT_CHANNEL),
     *(ARRIVED_CHANNEL, EPOCH_CHANNEL, EVENT_CHANNEL, LOCKSTEP_CHANNEL, GAP_CHANNEL),
-    *(TWO_WAY_CHANNEL, DOWN_SYMBOLS_CHANNEL),
+    *(TWO_WAY_CHANNEL, DOWN_SYMBOLS_CHANNEL, DOWN_SENT_CHANNEL),
     *(transmitter.CONFIRMED_CHANNEL, transmitter.HYPOTHESES_CHANNEL),
     OLD_EVENT_CHANNEL,
 )

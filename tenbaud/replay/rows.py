@@ -15,6 +15,7 @@ from channel.protocol.events import EVENT_CHANNEL
 from channel.protocol.lockstep import LOCKSTEP_CHANNEL
 from channel.protocol.recording import (
     ARRIVED_CHANNEL,
+    DOWN_SENT_CHANNEL,
     DOWN_SYMBOLS_CHANNEL,
     EPOCH_CHANNEL,
     SENT_CHANNEL,
@@ -83,6 +84,7 @@ KINDS: dict[str, dict[str, Kind]] = {
         "tick": _kind(receiver.TICK_CHANNEL),
         "sample": _kind(receiver.SAMPLE_CHANNEL, "word"),
         "down_symbols": _kind(DOWN_SYMBOLS_CHANNEL),
+        "down_symbol": _kind(DOWN_SENT_CHANNEL, "left_ns"),
     },
 }
 """Every topic of each end. What is written elsewhere in a recording is no part of an audit."""

@@ -27,7 +27,7 @@ from tenbaud.config.outside_code import require_allowed, require_regular_files
 from tenbaud.config.schema import FlightConfig
 from tenbaud.recording.errors import RecordingError
 from tenbaud.replay.record import Epoch, check_epoch
-from transmitter.session.narrow.following import initial_at
+from transmitter.session.down_symbols import initial_at
 
 MAGIC = b"tenbaud symbols 1\n"
 _LENGTH = struct.Struct("<I")

@@ -66,7 +66,7 @@ def test_the_whole_flight_is_its_symbols_of_both_directions(tmp_path: Path) -> N
 
 
 def test_a_state_that_was_corrupt_does_not_follow_from_the_symbols(tmp_path: Path) -> None:
-    broken = flown(tmp_path / "run", **NARROW, receiver__sabotage="sample=40,field=range")
+    broken = flown(tmp_path / "run", **NARROW, receiver__sabotage="sample=40,field=angle")
     assert broken.summary["rejoins"] == 1
     result = audit(broken.path)
     assert not result.passed

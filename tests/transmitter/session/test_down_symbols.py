@@ -10,12 +10,15 @@ import pytest
 from channel.codec.codec import Vector
 from channel.codec.downlink.layout import Layout
 from channel.protocol.endings import Ending
+from channel.protocol.events import ASKED
 from channel.protocol.frames import Commands, DownSymbol, Echo, Frame, Hello, Welcome, Why
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
 from receiver.session.narrow import NarrowCommander
 from receiver.session.session import ReceiverSession
 from tenbaud import MemoryRecorder
+from tenbaud.sentences.events import event_text
 from tests.channel.codec.parts import TICK_NS, identity_of
+from tests.events import event_fields
 from tests.simulation.narrow import mirrored, tuned_codec
 from tests.simulation.narrow_sessions import Announced, memory_flight, narrow_terms
 from transmitter.session.down_symbols import AGE_FACTOR, AGE_LEAST_SAMPLES, NarrowFollowing
@@ -194,3 +197,11 @@ def test_when_a_flight_is_to_stop_at_a_difference_then_it_ends_with_it() -> None
     assert flight.transmitter.end is not None
     assert flight.transmitter.end.ending is Ending.DESYNC
     assert 480 < result.ticks < 700
+
+
+@pytest.mark.parametrize("why", [why for why in Why if why is not Why.START])
+def test_every_reason_for_a_new_epoch_has_a_sentence(why: Why) -> None:
+    event = replace(ASKED, cause=why, sample=3, session=9, epoch=2, number=70, value=1.5)
+    text = event_text(event_fields(event))
+    assert text.endswith("requesting a new epoch after 2")
+    assert "=" not in text

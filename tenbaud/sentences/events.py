@@ -82,9 +82,7 @@ def _rejoin_asked(one: Fields) -> str:
         "desync": lambda: f"the two copies of the codec differ after sample {one['sample']}",
         "gap": lambda: f"the echo of sample {one['sample']} and its repetitions were lost",
         "lag": lambda: _lag(one),
-        "rest": lambda: (
-            f"what came down since sample {one['sample']} fits no state of the receiver"
-        ),
+        "rest": lambda: f"what came down since sample {one['sample']} fits no state of the receiver",
         "unknown": lambda: "the receiver does not know this session",
         "guard": lambda: "the guard stopped",
         "taken_over": lambda: f"receiver session {one['session']:08x} takes over on request",

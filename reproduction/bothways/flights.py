@@ -116,6 +116,13 @@ class NarrowFlight:
         self._last: Vector = machine.initial_command
         self._keep = keep
 
+    def corrupt(self, at_receiver: bool) -> None:
+        """Change one number of an end's state, by so little that rounding might have done it."""
+        if at_receiver:
+            self.state = _corrupted(self.state)
+            return
+        self.hypotheses.sabotage(_corrupted)
+
     def fly(self, samples: int) -> Result:
         for _ in range(samples):
             self._one()
@@ -199,6 +206,12 @@ class NarrowFlight:
             self._start = self.sample
             self._arriving.clear()
             self.truth.clear()
+
+
+def _corrupted(state: TwoWayState) -> TwoWayState:
+    first, *others = state.codec.model
+    model = (first + 1e-12, *others)
+    return state._replace(codec=state.codec._replace(model=model))
 
 
 def full(

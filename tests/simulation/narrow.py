@@ -13,7 +13,7 @@ from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
 from channel.codec.downlink.coded import CodedCommands, CodedDirection
 from channel.codec.downlink.laws import MirroredLoop, MirroredPid
 from channel.codec.downlink.layout import Layout
-from channel.codec.downlink.machine import TwoWay, TwoWayState
+from channel.codec.downlink.machine import TwoWay
 from channel.codec.downlink.mirrored import Law, MirroredLaw, SetPointRange
 from channel.codec.laws import PidConstants
 from channel.codec.models.pitch import PitchModel, PitchParameters, pitch_constants, pitch_tick
@@ -136,19 +136,6 @@ class NarrowFlight(flights.NarrowFlight):
             settings=settings,
             keep=keep,
         )
-
-    def corrupt(self, at_receiver: bool) -> None:
-        """Change one number of an end's state, by so little that rounding might have done it."""
-        if at_receiver:
-            self.state = _corrupted(self.state)
-            return
-        self.hypotheses.sabotage(_corrupted)
-
-
-def _corrupted(state: TwoWayState) -> TwoWayState:
-    first, *others = state.codec.model
-    model = (first + 1e-12, *others)
-    return state._replace(codec=state.codec._replace(model=model))
 
 
 def full(

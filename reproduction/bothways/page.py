@@ -223,9 +223,10 @@ def _table(points: list[Point], found: Points) -> list[str]:
 
 
 def _cells(one: Found) -> str:
+    delay = f"{one.delay:.0f} / {one.delay_late:.0f}" if one.confirmed else "never"
     return (
         f"{one.error:.3f} ± {one.error_half:.3f} | {one.tracking:.3f} | {one.largest:.2f} "
-        f"| {one.delay:.0f} / {one.delay_late:.0f} | {one.size:.1f} | {one.rejoins_h:.1f} "
+        f"| {delay} | {one.size:.1f} | {one.rejoins_h:.1f} "
         f"| {100.0 * one.cpu:.1f} | {one.applied:.3f} V"
     )
 

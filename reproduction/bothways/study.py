@@ -127,6 +127,7 @@ def grid(quick: bool = False) -> list[Point]:
         if (one.subject, one.flip, one.trip) == ("pitch", 0.0, 0)
         and one.baud in (20, 40)
         and one.loss in (0.0, 0.05)
+        and (one.scheme, one.baud) != ("coded", 20)
     ]
 
 

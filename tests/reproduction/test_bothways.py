@@ -50,7 +50,7 @@ def test_a_narrow_flight_of_either_subject_is_as_good_as_a_full_one_on_a_clean_l
 
 def test_loss_costs_a_slow_downlink_more_than_a_fast_one() -> None:
     slow, fast = (
-        fly(Point("pitch", "announced", baud, loss=0.1, seeds=1, samples=200)) for baud in (10, 40)
+        fly(Point("pitch", "announced", baud, loss=0.02, seeds=1, samples=150)) for baud in (10, 40)
     )
     assert slow.size > 3.0 * fast.size
     assert slow.delay > 2.0 * fast.delay

@@ -105,7 +105,7 @@ def counted(faults: Faults, seed: int, samples: int) -> Count:
 
 
 def count_all(name: str, samples: int, on_block: Callable[[Count], None] | None = None) -> Count:
-    """Count over so many samples of a line, in two processes; stop at the first wrong confirmation."""
+    """Count over the samples of a line, in two processes; stop at the first wrong confirmation."""
     found = Count(0, 0, 0, 0)
     seeds = range(FIRST_SEED, FIRST_SEED + -(-samples // BLOCK))
     context = multiprocessing.get_context("spawn")

@@ -16,11 +16,11 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from enum import Enum
 from typing import NamedTuple
 
 from channel.codec.codec import ERASED, CodecState, Vector, Word
 from channel.codec.downlink.machine import TwoWay, TwoWaySample, TwoWayState
+from channel.protocol.frames import Why
 from transmitter.session.narrow.branches import Branched, Branching
 from transmitter.session.narrow.paths import Node, Paths, Symbols
 from transmitter.session.narrow.priors import Priors
@@ -38,26 +38,17 @@ NUMBERS_BESIDE = 100
 """What a sample costs whatever its size."""
 
 
-class RejoinReason(Enum):
-    """Why the list cannot go on."""
-
-    REST = "rest"
-    """what is not followed outweighs the list: the receiver's state is probably none of these"""
-    LAG = "lag"
-    """no sample was confirmed for too long"""
-    EMPTY = "empty"
-    """no hypothesis can be continued"""
-
-
 class Rejoin(NamedTuple):
     """A request for a common state, with its numbers."""
 
-    reason: RejoinReason
+    reason: Why
+    """REST, or LAG: no sample was confirmed for too long, or no hypothesis can be continued"""
     sample: int
     """the last one heard of"""
     rest: float
     """weight of the rest, in units of the list's"""
     lag_samples: int
+    detail: str | None = None
 
 
 class Settings(NamedTuple):
@@ -150,6 +141,11 @@ class Hypotheses:
         return len(self._members)
 
     @property
+    def best(self) -> float:
+        """Return the share of the list that the likeliest hypothesis has."""
+        return max(weight for weight, _ in self._members)
+
+    @property
     def rest(self) -> float:
         """Return the weight of what is not followed, in units of the list's."""
         return self._paths.total_rest
@@ -201,13 +197,17 @@ class Hypotheses:
         Hypotheses are carried to the last word sent. What does not follow from these words is the last
         command that does.
         """
-        total, mean = 0.0, [0.0] * self.machine.codec.model.input_size
-        for weight, node in self._carried():
-            total += weight
-            command = self._command_of(node, tick)
-            for place in range(len(mean)):
-                mean[place] += weight * command[place]
-        return tuple([value / total for value in mean])
+        carried = self._carried()
+        commands = [self._command_of(node, tick) for _, node in carried]
+        total = sum([weight for weight, _ in carried])
+        mean = []
+        for values in zip(*commands, strict=True):
+            value = (
+                sum([weight * one for (weight, _), one in zip(carried, values, strict=True)]) / total
+            )
+            # Rounding must not carry it beyond a limit that all of them keep.
+            mean.append(max(min(values), min(max(values), value)))
+        return tuple(mean)
 
     def _carried(self) -> list[tuple[float, Node]]:
         """Return the hypotheses that count, best first, carried over the words not heard of yet."""
@@ -280,14 +280,16 @@ class Hypotheses:
         self._unconfirmed.append((sent, heard))
         self._ahead = None
         if not self._select(self._branching.of(self._members, sent, heard)):
-            self.rejoin = Rejoin(RejoinReason.EMPTY, sample, self.rest, self._lag)
+            self.rejoin = Rejoin(
+                Why.LAG, sample, self.rest, self._lag, "no hypothesis can be continued"
+            )
             return []
         done = self._confirm()
         reason = None
         if self.rest > 1.0:
-            reason = RejoinReason.REST
+            reason = Why.REST
         elif self._lag > self.settings.lag_samples_max:
-            reason = RejoinReason.LAG
+            reason = Why.LAG
         if reason is not None:
             self.rejoin = Rejoin(reason, sample, self.rest, self._lag)
         return done

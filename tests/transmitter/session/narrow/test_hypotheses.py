@@ -11,6 +11,7 @@ from channel.codec.codec import ERASED, Alphabet, Codec, Vector, Word
 from channel.codec.downlink.coded import CodedCommands, held_inputs
 from channel.codec.downlink.layout import Layout
 from channel.codec.downlink.machine import TwoWay, TwoWaySample, TwoWayState
+from channel.protocol.frames import Why
 from tenbaud.build.codec import build_codec
 from tenbaud.config.load import load_config
 from tests.simulation.narrow import Faults, NarrowFlight, mirrored, square
@@ -18,7 +19,6 @@ from transmitter.session.narrow.hypotheses import (
     AHEAD_MAX,
     Confirmed,
     Hypotheses,
-    RejoinReason,
     Settings,
     longest_list,
 )
@@ -290,7 +290,7 @@ def test_a_rejoin_is_asked_for_when_nothing_explains_what_comes() -> None:
     while flight.hypotheses.rejoin is None:
         flight.fly(1)
     asked = flight.hypotheses.rejoin
-    assert asked.reason is RejoinReason.REST
+    assert asked.reason is Why.REST
     assert asked.rest > 1.0
     assert asked.sample < 60
     flight.fly(40)

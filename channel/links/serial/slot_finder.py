@@ -73,9 +73,9 @@ class SlotFinder:
                 self.begin(answer.first_sample * self._grid.slots, ahead * self._grid.slots)
         self.greeted(now_ns)
 
-    def expect(self) -> None:
-        """Take it as known that slots are due by the grid: times are flight times."""
-        self._zero_ns = self._grid.due_ns(0)
+    def expect(self, line_delay_ns: int = 0) -> None:
+        """Take it as known that slots are due by the grid, delayed by up to this; for flight times."""
+        self._zero_ns = self._grid.due_ns(0) + line_delay_ns // 2
 
     def located(self, symbol: ShortSymbol, due_slot: int, now_ns: int) -> LocatedSymbol:
         """Return a symbol byte that came at `now_ns` with its slot; `due_slot` is not settled yet."""

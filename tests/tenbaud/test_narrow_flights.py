@@ -65,15 +65,17 @@ def test_over_300_baud_a_byte_goes_down_for_each_symbol(tmp_path: Path) -> None:
     with EmulatedLine(tmp_path, 300) as line:
         flown = fly(line, narrow_settings(line_rate_baud=300))
         carried = line.carried("down")
-    assert flown.outcome.code is ExitCode.OK, flown.outcome.text
-    check_equal_where_confirmed(flown)
     meter = flown.receiver.downlink.meter
     assert carried == meter.symbols + meter.control_bytes
-    assert meter.symbols + flown.receiver.downlink.refused == 100
-    assert flown.transmitter.endpoint.inlet.meter.symbols >= meter.symbols - 2
+    assert meter.coder_bits == meter.symbols <= 100
     if flown.receiver.downlink.refused or flown.transmitter.node.session.counts["words_missed"]:
         pytest.skip("the machine was too busy for the symbols' times")
-    assert flown.transmitter.endpoint.down_baud.whole_baud == pytest.approx(20.0, abs=0.5)
+    assert flown.outcome.code is ExitCode.OK, flown.outcome.text
+    check_equal_where_confirmed(flown)
+    assert meter.symbols == 100
+    endpoint = flown.transmitter.endpoint
+    assert endpoint.inlet.meter.symbols >= 98  # the last ones may come after the end
+    assert endpoint.down_baud.whole_baud == pytest.approx(20.0, abs=0.5)
 
 
 def test_when_bytes_are_damaged_and_the_plug_is_out_then_no_wrong_state_is_confirmed(

@@ -8,8 +8,8 @@ that fit each other and not the schedule replaces it.
 
 The transmitter, to which down symbols come, knows the schedule: it counts from its own tick 0
 (`expect`). At the receiver it is known before the first symbol from the handshake: tick 0 lies between
-the hello and `START_NS` after it. A wrong guess anywhere here is a wrong or an erased symbol, which the
-echo covers.
+the end of the answer to its hello and `START_NS` later. A wrong guess anywhere here is a wrong or an
+erased symbol, which the echo covers.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class SlotFinder:
         """of the transmitter that flies"""
 
     def answered(self, hello: Hello, answers: Iterable[Frame], now_ns: int) -> None:
-        """Note a hello that came at `now_ns`, and the session's answer."""
+        """Note the session's answer to a hello, which is on the line until `now_ns`."""
         for answer in answers:
             if isinstance(answer, Welcome) and answer.incarnation != self._incarnation:
                 self._incarnation = answer.incarnation

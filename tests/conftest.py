@@ -66,7 +66,8 @@ COLD = (
     "tests/docs/",
 )
 """Tests of processes as the system shows them: theirs are ordinary ones. Elsewhere a process begins
-with everything imported (`tests/warm.py`): it disturbs less what flies on the real clock beside it."""
+with everything imported (`tests/warm.py`): it disturbs less what flies on the real clock beside it. The
+commands of a page are copies of another kind (`tests/docs/prepared.py`)."""
 
 _MACHINE = Path(tempfile.gettempdir()) / f"tenbaud-tests-{os.getuid()}.lock"
 
@@ -76,9 +77,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=_rank)
 
 
+def pytest_configure() -> None:
+    """Collect no garbage while tests are collected: all of that stays."""
+    gc.disable()
+
+
 def pytest_collection_finish() -> None:
     """Let the garbage collector pass over what all tests together have imported."""
     gc.freeze()
+    gc.enable()
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -26,15 +26,17 @@ import subprocess
 import sys
 import threading
 import traceback
+import types
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 TOP = Path(__file__).parents[1]
 IMPORTED = (
     *("tenbaud.cli.commands", "tenbaud.cli.nodes", "tenbaud.cli.demo", "tenbaud.flight.demo"),
     *("tenbaud.flight.transmit", "tenbaud.flight.receive", "tenbaud.flight.fly", "tenbaud.build.ends"),
     *("tenbaud.flight.screen", "channel.links.zenoh.link", "zenoh", "numpy"),
+    *("scipy.linalg", "scipy.optimize"),
 )
 STARTS_OTHERS = ("demo", "figures")
 CLONE = {"x86_64": 56, "aarch64": 220}.get(platform.machine()) if sys.platform == "linux" else None
@@ -170,7 +172,7 @@ def serve(connection: socket.socket) -> None:
         number = _copy()
         if number == 0:
             connection.close()
-            _begin(json.loads(data), streams)
+            begin(json.loads(data), streams)
         connection.send(str(max(number, 0)).encode())  # 0: there was no room for another process
         for stream in streams:
             os.close(stream)
@@ -188,11 +190,11 @@ def _copy() -> int:
     return int(number)
 
 
-def _begin(request: dict[str, Any], streams: list[int]) -> None:
+def begin(request: dict[str, Any], streams: list[int]) -> NoReturn:
     """Become the process that was asked for; never return."""
     ended: BaseException | None = None
     try:
-        if request["own_session"]:
+        if request.get("own_session"):
             os.setsid()
         if request["arguments"][:1] and request["arguments"][0] in STARTS_OTHERS:
             keep_a_copy()
@@ -210,16 +212,21 @@ def _begin(request: dict[str, Any], streams: list[int]) -> None:
         sys.stderr = io.TextIOWrapper(
             io.FileIO(2, "w", closefd=False), "utf-8", "backslashreplace", line_buffering=True
         )
-        sys.argv[:] = [str(TOP / "tenbaud" / "__main__.py"), *request["arguments"]]
-        _show([sys.executable, "-m", "tenbaud", *request["arguments"]])
-        importlib.import_module("tenbaud.cli.app").main()
+        if "code" in request:
+            sys.argv[:] = ["-c", *request["arguments"]]
+            sys.modules["__main__"] = main_module = types.ModuleType("__main__")
+            exec(compile(request["code"], "<string>", "exec"), main_module.__dict__)
+        else:
+            sys.argv[:] = [str(TOP / "tenbaud" / "__main__.py"), *request["arguments"]]
+            _show([sys.executable, "-m", "tenbaud", *request["arguments"]])
+            importlib.import_module("tenbaud.cli.app").main()
     except BaseException as error:
         ended = error
     finally:
         _end(ended)
 
 
-def _end(ended: BaseException | None) -> None:
+def _end(ended: BaseException | None) -> NoReturn:
     """End as Python does: its threads, what is done at exit, the streams, then a code or SIGINT."""
     code = 0 if ended is None else 1
     try:
@@ -255,7 +262,8 @@ def keep_a_copy() -> None:
     ours, its = _pair()
     if os.fork() == 0:
         ours.close()
-        serve(its)
+        with suppress(KeyboardInterrupt):  # pressed for the command: its children get it too
+            serve(its)
         os._exit(0)
     its.close()
     Popen.server = Server(ours)

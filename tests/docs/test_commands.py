@@ -32,8 +32,8 @@ LONG = [
 NOT_RUN = [block for blocks in RUN.values() for block in blocks if block.skip]
 
 
-def type_in(blocks: list[Block], folder: Path, timeout_s: float) -> None:
-    with Sandbox(folder, timeout_s, copies=True) as sandbox:
+def type_in(blocks: list[Block], folder: Path, timeout_s: float, copies: bool) -> None:
+    with Sandbox(folder, timeout_s, copies) as sandbox:
         for block in blocks:
             sandbox.run(block)
         sandbox.end()
@@ -43,7 +43,7 @@ def type_in(blocks: list[Block], folder: Path, timeout_s: float) -> None:
 def test_when_a_page_is_typed_in_then_every_command_does_what_it_says(
     page: str, tmp_path: Path
 ) -> None:
-    type_in([block for block in RUN[page] if not (block.skip or block.soak)], tmp_path, 150.0)
+    type_in([block for block in RUN[page] if not (block.skip or block.soak)], tmp_path, 150.0, True)
 
 
 @pytest.mark.soak
@@ -51,7 +51,7 @@ def test_when_a_page_is_typed_in_then_every_command_does_what_it_says(
 def test_when_a_page_is_typed_in_whole_then_its_long_commands_work_too(
     page: str, tmp_path: Path
 ) -> None:
-    type_in([block for block in RUN[page] if not block.skip], tmp_path, 3600.0)
+    type_in([block for block in RUN[page] if not block.skip], tmp_path, 3600.0, False)
 
 
 @pytest.mark.parametrize("block", NOT_RUN, ids=lambda block: block.name)

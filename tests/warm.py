@@ -3,11 +3,10 @@
 Most of a short flight is the start of its processes: each imports the same six hundred modules. Here a
 process is a copy (`fork`) of one that has imported them and has done nothing else: with streams,
 environment, folder and session of its own, and a child of the one that asked for it. What is said about
-starting, ending or finding processes is tested with ordinary ones, and so is whatever a shell starts:
-every command of the documentation.
+starting, ending or finding processes is tested with ordinary ones, and so is what a shell starts; the
+commands of the documentation are copies of their own kind (`tests/docs/prepared.py`).
 
-A process that starts others, as `tenbaud demo` does, keeps an untouched copy of itself for that; an
-ordinary one does so too, when it is started as `python -m tests.warm` in place of `python -m tenbaud`.
+A process that starts others, as `tenbaud demo` does, keeps an untouched copy of itself for that.
 """
 
 from __future__ import annotations
@@ -268,12 +267,3 @@ def keep_a_copy() -> None:
     its.close()
     Popen.server = Server(ours)
     subprocess.Popen = Popen  # type: ignore[misc]
-
-
-if __name__ == "__main__":
-    from tests import warm
-
-    if sys.argv[1:2] and sys.argv[1] in STARTS_OTHERS and CLONE is not None:
-        warm.load()
-        warm.keep_a_copy()
-    importlib.import_module("tenbaud.cli.app").main()

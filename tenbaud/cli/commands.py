@@ -7,7 +7,21 @@ from typing import Annotated
 
 import typer
 
-from tenbaud.cli import demo, design, identify, keys, log, nodes, rig, router, runs, sweep, tune, view
+from tenbaud.cli import (
+    demo,
+    design,
+    export,
+    identify,
+    keys,
+    log,
+    nodes,
+    rig,
+    router,
+    runs,
+    sweep,
+    tune,
+    view,
+)
 from tenbaud.cli.checkout import add_commands
 from tenbaud.cli.flags import Command, Group
 
@@ -59,7 +73,15 @@ for panel, commands in (
     ("Rigs and machines", (rig.doctor, rig.rig, rig.rig_check, router.router)),
     (
         "Models, coders, studies",
-        (design.floor, design.design, log.log, identify.identify, sweep.sweep, tune.tune),
+        (
+            design.floor,
+            design.design,
+            log.log,
+            identify.identify,
+            sweep.sweep,
+            tune.tune,
+            export.export_c,
+        ),
     ),
 ):
     for command in commands:

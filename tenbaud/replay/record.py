@@ -127,7 +127,8 @@ def _with_current_names(shared: str) -> str:
     """Return a recorded shared configuration as this version writes the same settings."""
     try:
         values = with_current_names(json.loads(shared), "", warn=False)
-        return FlightConfig.model_validate(values).shared_json(values["timing"]["lead_ticks"])
+        downlink = values.pop("downlink", None)
+        return FlightConfig.model_validate(values).shared_json(values["timing"]["lead_ticks"], downlink)
     except (ValueError, KeyError, TypeError):
         return shared
 

@@ -181,13 +181,13 @@ class Watch:
         session, other = world.node.session, world.endpoint.session
         trip = -(-world.plan.round_trip_ns // self.terms.sample_ns)
         together = (session.session_number, session.epoch) == (other.session_number, other.epoch)
-        flown = session.copies.confirmed.sample * self.terms.ticks_per_sample > session.epoch_tick
+        flown = session.confirmed_state.sample * self.terms.ticks_per_sample > session.epoch_tick
         return (
             session.phase is Phase.FLYING
             and together
             and flown
             and not world.node.guard.stopped
-            and session.copies.lag_samples <= trip + 2
+            and session.lag_samples <= trip + 2
         )
 
     def check_locked(self, world: World) -> None:
@@ -196,7 +196,7 @@ class Watch:
             raise LivenessViolation(
                 f"not locked at the end: {node and node.session.phase}, "
                 f"{endpoint and endpoint.session.phase}, guard {node and node.guard.state}, lag "
-                f"{node and node.session.copies.lag_samples}; last events "
+                f"{node and node.session.lag_samples}; last events "
                 f"{node and list(node.session.events)[-3:]}"
             )
         self.check_recovery(world)

@@ -106,6 +106,8 @@ class TwoWay:
         self._sizes = (len(first.codec.model), len(first.codec.coder), inputs, len(first.down))
         floats = len(first.codec.model) + len(first.codec.coder) + len(first.down)
         self._layout = struct.Struct(f"<q{floats + inputs * (lead_ticks + 1) + 1}d")
+        self.numbers = floats + codec.ticks_per_sample * len(first.codec.model)
+        """that a sample works on, a measure of its cost that is the same on every machine"""
 
     def initial(self) -> TwoWayState:
         """Return the common state before sample 0."""
@@ -154,12 +156,22 @@ class TwoWay:
                 down = scheme.take(down, symbol)
             return down
 
-        flown = self._flown(state, word, sent, chosen, wanted if scheme.asks_every_tick else None)
-        digest = self.digest(state) if count < self.layout.symbols_per_sample else 0
+        digest = self.digest(state)
+        ask = wanted if scheme.asks_every_tick else None
+        flown = self._flown(state, digest, word, sent, chosen, ask)
         return flown, (*sent, *self.hash_symbols(state, digest, sent, word))
 
-    def step(self, state: TwoWayState, word: Word, symbols: Sequence[int | None]) -> TwoWaySample:
-        """Fly a sample with these command symbols; None: not known, so predict without it."""
+    def step(
+        self,
+        state: TwoWayState,
+        word: Word,
+        symbols: Sequence[int | None],
+        digest: int | None = None,
+    ) -> TwoWaySample:
+        """Fly a sample with these command symbols; None: not known, so predict without it.
+
+        `digest`: the state's, where it is known already.
+        """
         scheme = self.scheme
 
         def given(tick: int, live: Vector, down: Vector) -> Vector:
@@ -167,11 +179,13 @@ class TwoWay:
                 down = scheme.guess(down) if symbol is None else scheme.take(down, symbol)
             return down
 
-        return self._flown(state, word, symbols, given, None)
+        digest = self.digest(state) if digest is None else digest
+        return self._flown(state, digest, word, symbols, given, None)
 
     def _flown(
         self,
         state: TwoWayState,
+        digest: int,
         word: Word,
         symbols: Sequence[int | None],
         consume: Callable[[int, Vector, Vector], Vector],
@@ -200,7 +214,7 @@ class TwoWay:
 
         flown = fly_sample(self.codec, state.codec, word, state.commands, decide)
         known = (*state.commands, *flown.commands)[self.codec.ticks_per_sample :]
-        owed = self._owed(state, self.digest(state), word, symbols)
+        owed = self._owed(state, digest, word, symbols)
         after = TwoWayState(flown.state, known, hold, down, owed)
         return TwoWaySample(after, flown.commands, flown.live, flown.coded)
 

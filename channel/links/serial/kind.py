@@ -66,7 +66,10 @@ class SerialKind(LinkKind):
 
         settings = end.settings
         wire = _wire(end.codec)
-        slot_s = end.terms.sample_ns / end.terms.symbols_per_word / 1e9
+        terms = end.terms
+        is_narrow = terms.downlink == "narrow"
+        grids = (terms.up_grid, terms.down_grid) if is_narrow else (terms.up_grid,)
+        slot_s = min(grid.length_ns for grid in grids) / 1e9
 
         def on_port(port: str, rate_baud: int) -> SerialLink:
             return SerialLink(
@@ -76,6 +79,7 @@ class SerialKind(LinkKind):
                 line_rate_baud=rate_baud,
                 symbol_age_max_s=slot_s * wire.slot_modulus / 2,
                 insecure=end.place.get("insecure", False),
+                is_narrow=is_narrow,
             )
 
         up = on_port(settings.port, settings.line_rate_baud)

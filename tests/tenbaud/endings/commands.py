@@ -80,6 +80,7 @@ WRITERS: dict[str, Arguments] = {
     ],
     "sweep": lambda inputs, out: ["sweep", inputs.study, "--workers", "1", "--no-plots", "--out", out],
     "keys init": lambda _, out: ["keys", "init", "--folder", out],
+    "export-c": lambda _, out: ["export-c", "--preset", "paper-10baud", "--out", out],
     "design": lambda inputs, out: ["design", "--config", inputs.plant, "--out", out],
 }
 """Commands that leave something at `out`."""

@@ -97,6 +97,12 @@ UNCLAIMED: tuple[Unclaimed, ...] = (
     ),
     Unclaimed(
         "transmitter",
+        "assumed",
+        _all_fields("transmitter", "assumed"),
+        "what the transmitter assumed of samples before it asked for another state: it may be wrong",
+    ),
+    Unclaimed(
+        "transmitter",
         "down_symbols",
         ("symbols", ORDER),
         "of a sample that was not confirmed, or of a lost symbol: nobody else knows what came",

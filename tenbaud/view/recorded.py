@@ -6,6 +6,7 @@ stay; a short window has every tick.
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
 from functools import cached_property
@@ -36,6 +37,7 @@ COLUMNS: dict[str, dict[str, Sequence[str]]] = {
         "estimate": ("tick", "coded_state"),
         "sample": SAMPLE_FIELDS,
         "gap": ("sample", "rms_over_floor"),
+        "hypotheses": ("sample", "confirmed_to", "size", "rest"),
     },
     "receiver": {
         "tick": ("tick", "reference", "live_state"),
@@ -60,6 +62,7 @@ class RecordedFlight:
         self._has = {end: end in run.ends for end in COLUMNS}
         self._ticks = up.topics.get("tick") if up else None
         self._gap = up.topics.get("gap") if up else None
+        self._listed = up.topics.get("hypotheses") if up else None
         self.base = run.base
         self._source = Source(self.base, up, down)
         self.samples = RecordedSamples(up, down)
@@ -94,7 +97,11 @@ class RecordedFlight:
         """Why digests cannot be compared; empty where they can."""
         if not self._has["transmitter"]:
             return "the transmitter's recording is not here"
-        return "" if self.samples.compared else "no digests were recorded"
+        if self.samples.compared:
+            return ""
+        if self._listed is not None and not self._has["receiver"]:
+            return "no digest comes down, and the receiver's recording is not here"
+        return "no digests were recorded"
 
     @property
     def notes(self) -> list[str]:
@@ -212,6 +219,7 @@ class RecordedFlight:
                 "applied": self._applied[tick].tolist(),
                 "lateness": self._lateness(tick),
                 "gap_to_floor": self._gap_at(sample),
+                "narrow": self._narrow_at(sample),
             }
         if self._has["receiver"]:
             heads["receiver"] = common | {"baud_measured": self.samples.rate_at(sample)}
@@ -235,6 +243,21 @@ class RecordedFlight:
         last = np.zeros(0) if late is None else late[max(0, tick + 1 - LATENESS_TICKS) : tick + 1]
         last = last[~np.isnan(last)]
         return {"p99_ms": float(np.percentile(last, 99.0))} if len(last) else None
+
+    def _narrow_at(self, sample: int) -> dict[str, Any] | None:
+        """Return what the transmitter knew of the receiver's state once it had heard of a sample."""
+        row = _row_of(self._listed, sample)
+        if self._listed is None or row is None:
+            return None
+        names = {"confirmed_to": int, "size": int, "rest": float}
+        shared = json.loads(self.run.metadata["shared_config"])
+        return {name: of(self._listed[name][row]) for name, of in names.items()} | {
+            "sample": sample,
+            "hash_symbols": None,
+            "baud_measured": None,
+            "baud_configured": shared["channel"]["downlink_baud"],
+            "is_mirrored": shared["downlink"]["scheme"] == "mirrored",
+        }
 
     def _gap_at(self, sample: int) -> float | None:
         row = _row_of(self._gap, sample)

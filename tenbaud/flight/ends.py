@@ -285,6 +285,7 @@ def _confirmation(run: TransmitterRun) -> Status:
         "unconfirmed": listed.next_heard - listed.next_confirmed,
         "copies": listed.size,
         "rest": listed.rest,
+        "hash_symbols": run.node.session.counts["hash_symbols"],
         "down_baud": run.endpoint.down_baud.baud,
         "law_beside_plant": run.agreement.terms.is_mirrored,
     }

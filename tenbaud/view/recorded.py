@@ -23,7 +23,7 @@ from tenbaud.recording.signals import Source
 from tenbaud.recording.table import Series, Table
 from tenbaud.telemetry.schema import named_signal
 from tenbaud.view.board import EVENTS_KEPT, OF_TRANSMITTER, SAMPLES_KEPT, is_shown
-from tenbaud.view.samples import SAMPLE_FIELDS, RecordedSamples
+from tenbaud.view.samples import RATE_SPAN_S, SAMPLE_FIELDS, RecordedSamples
 
 RUNS_MAX = 4
 """Runs that have a colour of their own."""
@@ -38,6 +38,7 @@ COLUMNS: dict[str, dict[str, Sequence[str]]] = {
         "sample": SAMPLE_FIELDS,
         "gap": ("sample", "rms_over_floor"),
         "hypotheses": ("sample", "confirmed_to", "size", "rest"),
+        "down_symbols": ("sample", "symbols"),
     },
     "receiver": {
         "tick": ("tick", "reference", "live_state"),
@@ -63,6 +64,7 @@ class RecordedFlight:
         self._ticks = up.topics.get("tick") if up else None
         self._gap = up.topics.get("gap") if up else None
         self._listed = up.topics.get("hypotheses") if up else None
+        self._came_down = up.topics.get("down_symbols") if up else None
         self.base = run.base
         self._source = Source(self.base, up, down)
         self.samples = RecordedSamples(up, down)
@@ -254,10 +256,19 @@ class RecordedFlight:
         return {name: of(self._listed[name][row]) for name, of in names.items()} | {
             "sample": sample,
             "hash_symbols": None,
-            "baud_measured": None,
+            "baud_measured": self._down_rate_at(sample),
             "baud_configured": shared["channel"]["downlink_baud"],
             "is_mirrored": shared["downlink"]["scheme"] == "mirrored",
         }
+
+    def _down_rate_at(self, sample: int) -> float | None:
+        """Return the down symbols per second that came in the last 5 s of flight time."""
+        table, rows = self._came_down, round(RATE_SPAN_S / self.sample_s)
+        if table is None:
+            return None
+        last = int(np.searchsorted(table.keys, sample, side="right"))
+        came = ~np.isnan(table["symbols"][max(0, last - rows) : last])
+        return float(came.sum()) / (len(came) * self.sample_s) if len(came) else None
 
     def _gap_at(self, sample: int) -> float | None:
         row = _row_of(self._gap, sample)

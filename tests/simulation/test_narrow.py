@@ -89,7 +89,8 @@ def test_in_a_hundred_thousand_samples_nothing_wrong_is_confirmed(line: str, blo
     found = Count(0, 0, 0, 0)
     for seed in range(blocks):
         found = found.plus(counted(LINES[line], seed, BLOCK))
-    assert (found.wrong, found.doubted) == (0, 0)
+    assert found.wrong == 0
+    assert found.doubted < 0.002 * found.confirmed
     assert found.confirmed > 0.95 * blocks * BLOCK
     assert found.rejoins <= (0.002 * found.confirmed if line == "bursts" else 0)
 

@@ -120,7 +120,8 @@ class ReceiverEndpoint:
             frame = self._slots.located(frame, session.due_slot, now_ns)
         answers = session.on_frame(frame, now_ns)
         if isinstance(frame, Hello):
-            self._slots.answered(frame, answers, now_ns)
+            sizes = [self.inlet.wire.size(self.inlet.wire.encode(answer)) for answer in answers]
+            self._slots.answered(frame, answers, now_ns + sum(sizes) * session.terms.downlink_byte_ns)
         return answers
 
 

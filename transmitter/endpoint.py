@@ -18,7 +18,6 @@ from channel.protocol.endings import End
 from channel.protocol.events import Dropped, Event, EventKind, write_event
 from channel.protocol.frames import DownSymbol, Frame, ShortCommands, ShortSymbol, Why
 from channel.protocol.recording import NullRecorder, Recorder
-from channel.protocol.terms import Terms
 from transmitter.encoder_watch import EncoderWatch
 from transmitter.guard import Guard, GuardCause, GuardReason, GuardState
 from transmitter.metrics.gap import GAP_CHANNEL, GAP_EVERY_S, GapGauge
@@ -227,12 +226,12 @@ class TransmitterNode:
             self.tell(event if reason is None else replace(event, **asdict(reason)))
 
 
-def _down_slots(terms: Terms) -> SlotFinder | None:
+def _down_slots(session: TransmitterSession) -> SlotFinder | None:
     """Return what finds the slots of symbol bytes that come down; None where none come."""
-    if terms.downlink != "narrow":
+    if session.terms.downlink != "narrow":
         return None
-    finder = SlotFinder(terms.down_grid)
-    finder.expect()
+    finder = SlotFinder(session.terms.down_grid)
+    finder.expect(session.line_delay_ns)
     return finder
 
 
@@ -246,7 +245,7 @@ class TransmitterEndpoint:
         self.down_baud = BaudMeter()
         """of the symbols of a narrow downlink"""
         self._next_down_slot = 0
-        self._down_slots = _down_slots(node.session.terms)
+        self._down_slots = _down_slots(node.session)
         self.lateness = LatenessMeter()
         """of the ticks; on the virtual clock none is late"""
         self.ticks_missed = 0

@@ -81,7 +81,6 @@ _DOWN = (
 SENT_CHANNEL = _sent("symbol", *_UP)
 ARRIVED_CHANNEL = _arrived("symbol", *_UP)
 DOWN_SENT_CHANNEL = _sent("down_symbol", *_DOWN)
-DOWN_ARRIVED_CHANNEL = _arrived("down_symbol", *_DOWN)
 
 EPOCH_CHANNEL = RecordChannel(
     "epoch",

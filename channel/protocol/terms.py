@@ -99,7 +99,9 @@ class Terms:
     uplink_line_ns: int = 0
     """on a line of finite rate: how long a symbol is on its way"""
     downlink_line_ns: int = 0
-    """on a line of finite rate: how long a command frame is on its way"""
+    """on a line of finite rate: how long a command frame, or a down symbol, is on its way"""
+    downlink_byte_ns: int = 0
+    """on a line of finite rate: how long a byte takes on the way down"""
 
     @classmethod
     def for_codec(

@@ -227,7 +227,8 @@ class ReceiverSession:
         last = self._greeter.welcome
         own = self._stand_where_proven(last)
         proven = self._proven.incarnation
-        first = first_sample(hello, own, self.terms, begun=proven is not None)
+        lead = self._greeter.lead_samples(hello)
+        first = first_sample(hello, own, lead, begun=proven is not None)
         count = self.terms.symbols_per_word
         same = hello.incarnation == (last and last.incarnation if proven is None else proven)
         if last is None:

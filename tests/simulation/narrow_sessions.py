@@ -12,10 +12,11 @@ from channel.protocol.terms import Terms
 from channel.protocol.wire import decode, encode
 from plant_sim.plant import Plant
 from receiver.controllers.base import Controller
+from reproduction.bothways.lines import Line
 from tenbaud import MemoryFlight
 from tests.channel.codec.parts import terms
 from tests.simulation.lines import CleanLine
-from tests.simulation.narrow import TICKS, Faults, Line, NarrowFlight, Pitch, Wants, square
+from tests.simulation.narrow import TICKS, Faults, NarrowFlight, Pitch, Wants, square
 from transmitter.rigs.base import Reading, Rig
 from transmitter.session.down_symbols import NarrowFollowing
 

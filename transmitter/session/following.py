@@ -1,7 +1,7 @@
 """How a transmitter follows the receiver from one welcome to the next: an interface.
 
-`transmitter.session.echoes` advances a copy of the codec on echoes, `transmitter.session.down_symbols`
-keeps hypotheses of the receiver's state. The session has the handshake and the peer; what follows a
+`transmitter.session.echoes` advances a copy of the codec on echoes; `transmitter.session.down_symbols`
+keeps hypotheses of the receiver's state. The session has the handshake and the peer. What follows a
 welcome says which state is certain, which word comes next, and which command is due.
 """
 

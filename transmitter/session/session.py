@@ -86,6 +86,7 @@ class TransmitterSession:
     ) -> None:
         self.codec = codec
         self.terms = terms
+        self.line_delay_ns = line_delay_ns
         self.identity = identity
         self.incarnation = incarnation
         self.phase = Phase.GREETING

@@ -50,14 +50,13 @@ class SerialKind(LinkKind):
         """
         check_slot_counter(terms, _wire(codec))
         check_up(terms, settings.line_rate_baud)
+        terms = replace(terms, uplink_line_ns=byte_ns(1, settings.line_rate_baud))
         if settings.downlink == ZENOH:
-            down_ns = 0
-        else:
-            rate = settings.downlink_rate_baud if settings.downlink else settings.line_rate_baud
-            check_down(terms, codec, rate)
-            down_ns = byte_ns(command_bytes(terms, codec), rate)
-        up_ns = byte_ns(1, settings.line_rate_baud)
-        return replace(terms, uplink_line_ns=up_ns, downlink_line_ns=down_ns)
+            return terms
+        rate = settings.downlink_rate_baud if settings.downlink else settings.line_rate_baud
+        check_down(terms, codec, rate)
+        down_ns = byte_ns(command_bytes(terms, codec), rate)
+        return replace(terms, downlink_line_ns=down_ns, downlink_byte_ns=byte_ns(1, rate))
 
     def open(self, end: LinkEnd) -> Link:
         """Return the open link of one end, the downlink on a separate line if so configured."""

@@ -8,8 +8,8 @@ that fit each other and not the schedule replaces it.
 
 The transmitter, to which down symbols come, knows the schedule: it counts from its own tick 0
 (`expect`). At the receiver it is known before the first symbol from the handshake: tick 0 lies between
-the hello and `START_NS` after it. A wrong guess anywhere here is a wrong or an erased symbol, which the
-echo covers.
+the end of the answer to its hello and `START_NS` later. A wrong guess anywhere here is a wrong or an
+erased symbol, which the echo covers.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class SlotFinder:
         """of the transmitter that flies"""
 
     def answered(self, hello: Hello, answers: Iterable[Frame], now_ns: int) -> None:
-        """Note a hello that came at `now_ns`, and the session's answer."""
+        """Note the session's answer to a hello, which is on the line until `now_ns`."""
         for answer in answers:
             if isinstance(answer, Welcome) and answer.incarnation != self._incarnation:
                 self._incarnation = answer.incarnation
@@ -73,9 +73,9 @@ class SlotFinder:
                 self.begin(answer.first_sample * self._grid.slots, ahead * self._grid.slots)
         self.greeted(now_ns)
 
-    def expect(self) -> None:
-        """Take it as known that slots are due by the grid: times are flight times."""
-        self._zero_ns = self._grid.due_ns(0)
+    def expect(self, line_delay_ns: int = 0) -> None:
+        """Take it as known that slots are due by the grid, delayed by up to this; for flight times."""
+        self._zero_ns = self._grid.due_ns(0) + line_delay_ns // 2
 
     def located(self, symbol: ShortSymbol, due_slot: int, now_ns: int) -> LocatedSymbol:
         """Return a symbol byte that came at `now_ns` with its slot; `due_slot` is not settled yet."""

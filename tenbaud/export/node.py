@@ -19,7 +19,8 @@ from tenbaud.export.codec import BY_HAND, codec_files, header, listed
 
 NODE_FILES = (
     *("wire.h", "wire.c", "guard.h", "guard.c", "node.h", "node.c", "session.c", "hardware.h"),
-    *("linux/main.c",),
+    *("simulated/rig.h", "simulated/rig.c", "linux/main.c"),
+    *("qemu/board.h", "qemu/start.c", "qemu/main.c", "qemu/lm3s6965.ld"),
 )
 EXACT = Encoder(65_536.0, turn=1.0)
 """How an output that the simulated rig reads exactly is read by a board: in 65536 counts per unit."""

@@ -12,6 +12,7 @@
 #include "wire.h"
 
 typedef enum { NODE_GREETING, NODE_FLYING, NODE_REJOINING, NODE_ENDED } node_phase;
+enum { ENDING_SAFETY_STOP = 6, ENDING_WIRE_VERSION = 7 }; /* channel/protocol/endings.py */
 typedef enum { WHY_START, WHY_DESYNC, WHY_GAP, WHY_LAG, WHY_UNKNOWN } node_why;
 
 /* Commands that are kept: those of the confirmed sample's ticks, the lead, and ticks already passed. */

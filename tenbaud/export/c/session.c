@@ -1,7 +1,7 @@
 /* What arrives at the node, and what it asks for (transmitter/session). */
 #include "node.h"
 
-enum { PAUSES_MAX = 4, REFUSALS_ACCEPTED = 3, SILENT_SAMPLES = 2, ENDING_WIRE_VERSION = 7 };
+enum { PAUSES_MAX = 4, REFUSALS_ACCEPTED = 3, SILENT_SAMPLES = 2 };
 #define REACH_SAMPLES (2 * TERMS_HISTORY_SAMPLES)
 #define LEAD_SAMPLES ((CODEC_LEAD_TICKS + CODEC_TICKS_PER_SAMPLE - 1) / CODEC_TICKS_PER_SAMPLE)
 

@@ -1,9 +1,9 @@
-/* The node as a program: a serial port, or a socket on this machine, and the model as the plant.
+/* The node as a program: a serial port or a socket, and a simulated rig.
  *
  *     node PORT [SECONDS]      PORT: /dev/ttyUSB0, a pseudo-terminal, or listen:TCP-PORT on 127.0.0.1
  *
  * Every second, and at the end, a line of counts goes to standard output. Exit code 0: the flight went to its
- * end; 3: refused; 5: ended otherwise; 2: the port cannot be opened.
+ * end; 3: refused; 5: ended otherwise; 2: the port cannot be opened. A port that goes away is opened again.
  */
 #define _DEFAULT_SOURCE
 
@@ -21,18 +21,11 @@
 #include <unistd.h>
 
 #include "../hardware.h"
-#include "../node.h"
+#include "../simulated/rig.h"
 
 static int port = -1, server = -1;
 static uint8_t received[4096];
 static int received_at, received_end;
-static double plant[CODEC_ROOM(CODEC_STATES)], outputs[CODEC_OUTPUTS], volts[CODEC_INPUTS];
-static uint64_t plant_ticks, began_ns;
-
-static const double counts_per_turn[CODEC_OUTPUTS] = TERMS_COUNTS_PER_TURN;
-static const double turn[CODEC_OUTPUTS] = TERMS_TURN;
-static const int32_t sign[CODEC_OUTPUTS] = TERMS_SIGN;
-static const int32_t zero_counts[CODEC_OUTPUTS] = TERMS_ZERO_COUNTS;
 
 uint64_t hardware_now_ns(void) {
     struct timespec now;
@@ -40,40 +33,17 @@ uint64_t hardware_now_ns(void) {
     return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
 }
 
-/* The plant is the model with a slow push that the model does not know. */
-static void advance_plant(void) {
-    double push[CODEC_ROOM(CODEC_CORRECTED)] = {0};
-    const uint64_t due = (hardware_now_ns() - began_ns) / TERMS_TICK_NS;
-    while (plant_ticks < due) {
-        const uint64_t phase = plant_ticks * TERMS_TICK_NS / 2000000000u;
-        push[CODEC_CORRECTED - 1] = phase % 2 ? 0.02 : -0.02;
-        if (!codec_simulate(plant, volts, push, outputs)) memset(plant, 0, sizeof plant);
-        plant_ticks++;
-    }
-}
-
-int32_t hardware_read_encoder(int output) {
-    advance_plant();
-    const double counts = outputs[output] / turn[output] * counts_per_turn[output];
-    return sign[output] * arithmetic_floor(counts + 0.5) + zero_counts[output];
-}
-
-void hardware_write_motor(int input, double value) {
-    advance_plant();
-    volts[input] = value;
+static void lose_port(void) {
+    close(port);
+    port = -1;
 }
 
 int hardware_read_byte(void) {
     if (received_at == received_end) {
         if (port < 0) return -1;
         const ssize_t count = read(port, received, sizeof received);
-        if (count <= 0) {
-            if (count == 0 && server >= 0) {
-                close(port);
-                port = -1;
-            }
-            return -1;
-        }
+        if (count == 0 || (count < 0 && errno != EAGAIN && errno != EINTR)) lose_port();
+        if (count <= 0) return -1;
         received_at = 0;
         received_end = (int)count;
     }
@@ -98,6 +68,7 @@ static int open_port(const char *path) {
     const int opened = open(path, O_RDWR | O_NOCTTY | O_NONBLOCK);
     if (opened >= 0 && tcgetattr(opened, &line) == 0) {
         cfmakeraw(&line);
+        line.c_cc[VMIN] = 1; /* nothing to read is no end of the file */
         cfsetspeed(&line, B115200);
         tcsetattr(opened, TCSANOW, &line);
     }
@@ -107,24 +78,24 @@ static int open_port(const char *path) {
 static void accept_peer(void) {
     const int on = 1, peer = accept(server, 0, 0);
     if (peer < 0) return;
-    if (port >= 0) close(port);
+    if (port >= 0) lose_port();
     port = peer;
     fcntl(port, F_SETFL, O_NONBLOCK);
     setsockopt(port, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
 }
 
+static void put(char one) { putchar(one); }
+
 static void tell(const node *own) {
-    const node_counts *counts = &own->counts;
-    printf(
-        "{\"phase\": %d, \"ending\": %d, \"refused\": %d, \"guard\": %d, \"epoch\": %u, \"sample\": %u, "
-        "\"confirmed\": %u, \"digest_checks\": %u, \"desyncs\": %u, \"rejoins\": %u, \"erasures\": %u, "
-        "\"symbols\": %u, \"ticks\": %u, \"ticks_missed\": %u, \"commands_late\": %u, \"out_of_bounds\": %u, "
-        "\"stale_frames\": %u, \"digest\": \"%016llx\"}\n",
-        own->phase, own->ending, own->is_refused, own->guard.state, own->epoch, own->confirmed.sample,
-        counts->confirmed, counts->digest_checks, counts->desyncs, counts->rejoins, counts->erasures,
-        counts->symbols_sent, counts->ticks, counts->ticks_missed, counts->commands_late,
-        counts->out_of_bounds, counts->stale_frames, (unsigned long long)codec_digest(&own->confirmed));
+    rig_tell(own, put);
     fflush(stdout);
+}
+
+static void wait_for_bytes(const char *path) {
+    struct pollfd waiting[2] = {{server, POLLIN, 0}, {port, POLLIN, 0}};
+    poll(waiting, 2, 1);
+    if (server >= 0 && waiting[0].revents & POLLIN) accept_peer();
+    if (server < 0 && port < 0) port = open_port(path);
 }
 
 int main(int count, char **arguments) {
@@ -133,25 +104,20 @@ int main(int count, char **arguments) {
         fprintf(stderr, "usage: %s PORT [SECONDS]\n", arguments[0]);
         return 2;
     }
-    const bool listens = strncmp(arguments[1], "listen:", 7) == 0;
-    if (listens) server = listen_at(arguments[1] + 7);
+    if (strncmp(arguments[1], "listen:", 7) == 0) server = listen_at(arguments[1] + 7);
     else port = open_port(arguments[1]);
     if (server < 0 && port < 0) {
         fprintf(stderr, "%s cannot be opened: %s\n", arguments[1], strerror(errno));
         return 2;
     }
     signal(SIGPIPE, SIG_IGN);
-    codec_state first;
-    codec_initial(&first);
-    memcpy(plant, first.model, sizeof first.model);
-    began_ns = hardware_now_ns();
+    rig_begin();
+    const uint64_t began_ns = hardware_now_ns();
     const uint64_t end_ns = count > 2 ? began_ns + (uint64_t)(atof(arguments[2]) * 1e9) : UINT64_MAX;
     node_begin(&own, (uint32_t)(began_ns ^ began_ns >> 32) * 2654435761u ^ (uint32_t)getpid());
     uint64_t told_ns = began_ns;
     while (hardware_now_ns() < end_ns) {
-        struct pollfd waiting[2] = {{server, POLLIN, 0}, {port, POLLIN, 0}};
-        poll(waiting, 2, 1);
-        if (server >= 0 && waiting[0].revents & POLLIN) accept_peer();
+        wait_for_bytes(arguments[1]);
         node_poll(&own);
         if (hardware_now_ns() - told_ns >= 1000000000u) {
             told_ns += 1000000000u;
@@ -161,5 +127,6 @@ int main(int count, char **arguments) {
     }
     if (own.phase == NODE_FLYING || own.phase == NODE_REJOINING) session_bye(&own, 1);
     tell(&own);
+    usleep(300000); /* the other end reads the farewell before a socket closes */
     return own.is_refused ? 3 : own.ending == 1 ? 0 : 5;
 }

@@ -14,7 +14,7 @@ from channel.protocol.limits import to_steps
 from plant_sim.encoder import Encoder
 from tenbaud.build.ends import build_observer, guard_settings
 from tenbaud.build.flight import Agreement
-from tenbaud.build.rig import build_encoders
+from tenbaud.build.signals import build_encoders
 from tenbaud.export.codec import BY_HAND, codec_files, header, listed
 
 NODE_FILES = (

@@ -98,10 +98,10 @@ def check_equal(node: Node, folder: Path) -> None:
     counts = node.counts
     assert counts["desyncs"] == 0
     assert counts["digest_checks"] == counts["confirmed"] > 0
-    samples = dict(
-        (row["sample"], row["digest"])
+    samples = {
+        row["sample"]: row["digest"]
         for _, row in Recording(folder / "run" / "receiver.mcap").rows("sample")
-    )
+    }
     assert samples[counts["sample"] - 1] == counts["digest"]
 
 
@@ -111,7 +111,7 @@ def test_the_node_flies_with_a_receiver_and_every_digest_is_equal(
 ) -> None:
     with EmulatedLine(tmp_path, 115_200) as line:
         receiver = receive(line, tmp_path)
-        with node_at(program, line.transmitter_port, 6.0) as node:
+        with node_at(program, line.transmitter_port, 5.0) as node:
             assert node.finish() == 0
         ended = finish(receiver)
     assert ended.code == 0, ended.err
@@ -149,7 +149,7 @@ def test_a_node_that_was_killed_joins_again_after_its_reboot(program: Path, tmp_
     check_equal(again, tmp_path)
 
 
-@pytest.mark.real_time
+@pytest.mark.soak
 def test_a_receiver_that_was_killed_is_joined_again(program: Path, tmp_path: Path) -> None:
     (tmp_path / "second").mkdir()
     with EmulatedLine(tmp_path, 115_200) as line:
@@ -167,7 +167,7 @@ def test_a_receiver_that_was_killed_is_joined_again(program: Path, tmp_path: Pat
         finish(receiver)
 
 
-@pytest.mark.real_time
+@pytest.mark.soak
 def test_without_its_receiver_the_node_takes_the_motors_down_and_stays_there(
     tmp_path: Path,
 ) -> None:
@@ -183,7 +183,7 @@ def test_without_its_receiver_the_node_takes_the_motors_down_and_stays_there(
     assert node.counts["ending"] == SAFETY_STOP
 
 
-@pytest.mark.real_time
+@pytest.mark.soak
 def test_a_cable_that_was_pulled_out_costs_words_and_a_rejoin(program: Path, tmp_path: Path) -> None:
     with EmulatedLine(tmp_path, 115_200) as line:
         receiver = receive(line, tmp_path)
@@ -197,7 +197,7 @@ def test_a_cable_that_was_pulled_out_costs_words_and_a_rejoin(program: Path, tmp
         receiver.send_signal(signal.SIGINT)
         finish(receiver)
     assert node.counts["desyncs"] == 0
-    assert node.counts["digest_checks"] == node.counts["confirmed"] > 30
+    assert node.counts["digest_checks"] == node.counts["confirmed"] > 10
     assert node.counts["rejoins"] + node.counts["erasures"] > 0
 
 
@@ -227,7 +227,6 @@ def test_a_receiver_of_another_configuration_refuses_the_node(program: Path, tmp
         receiver = receive(line, tmp_path, "--set", "coder.decay=0.9")
         with node_at(program, line.transmitter_port, 30.0) as node:
             assert node.finish() == 3
-        receiver.send_signal(signal.SIGINT)
         ended = finish(receiver)
     assert node.counts["ending"] == MISMATCH
     assert node.counts["symbols"] == 0

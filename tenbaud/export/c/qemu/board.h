@@ -17,6 +17,7 @@
 #define SYSTICK_LOAD REGISTER(0xE000E014u)
 #define SYSTICK_VALUE REGISTER(0xE000E018u)
 #define SYSTICK_MAX 0xFFFFFFu
+#define STACK_UNUSED 0xA5A5A5A5u
 #define NS_PER_COUNT 80u /* 12.5 MHz, as the chip's clock is after a reset */
 
 #endif

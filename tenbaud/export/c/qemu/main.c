@@ -30,6 +30,14 @@ static void put(char one) {
     UART_DATA(1) = (uint32_t)one;
 }
 
+extern uint32_t bss_end[], stack_top[];
+
+static uint32_t deepest_stack(void) {
+    const uint32_t *at = bss_end;
+    while (at < stack_top && *at == STACK_UNUSED) at++;
+    return (uint32_t)(stack_top - at) * 4u;
+}
+
 /* How long the codec takes; with -icount shift=0 a nanosecond is an instruction. */
 static void measure(void) {
     static const double commands[CODEC_TICKS_PER_SAMPLE * CODEC_INPUTS];
@@ -49,7 +57,10 @@ static void measure(void) {
         step_ns += third - second;
         encode_ns += second - first;
     }
+    uint8_t probe[8];
+    codec_probe(probe);
     put('{');
+    rig_tell_number("stack_bytes", deepest_stack(), put);
     rig_tell_number("encode_ns", (uint32_t)(encode_ns / MEASURED_SAMPLES), put);
     rig_tell_number("step_ns", (uint32_t)(step_ns / MEASURED_SAMPLES), put);
     rig_tell_number("tick_ns", (uint32_t)(step_ns / MEASURED_SAMPLES / CODEC_TICKS_PER_SAMPLE), put);

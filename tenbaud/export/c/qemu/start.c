@@ -2,6 +2,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "board.h"
+
 extern uint32_t data_begin[], data_end[], data_stored[], bss_begin[], bss_end[], stack_top[];
 int main(void);
 
@@ -25,6 +27,8 @@ static void reset(void) {
     const uint32_t *stored = data_stored;
     for (uint32_t *at = data_begin; at < data_end; at++) *at = *stored++;
     for (uint32_t *at = bss_begin; at < bss_end; at++) *at = 0;
+    /* Memory that the stack has not reached keeps this, so that its depth can be told. */
+    for (uint32_t *at = bss_end; at < (uint32_t *)__builtin_frame_address(0) - 32; at++) *at = STACK_UNUSED;
     main();
     for (;;) continue;
 }

@@ -25,8 +25,9 @@ demo: $(FLY) ## fly: both processes on this machine, the plant simulated
 
 # Most tests wait for their processes half of the time: five at once keep two cores busy. What is said
 # about the times of a flight comes after them, two at once; what needs both cores sees to it itself.
+# The project's own rules are part of `make check`.
 test: chromium emulators $(DEVELOP) ## run the tests: most of them first, then those of times on the real clock
-	$(BIN)/python -m pytest -n 5 -m "not soak and not real_time"
+	$(BIN)/python -m pytest -n 5 -m "not soak and not real_time" --ignore tests/rules
 	$(BIN)/python -m pytest -n 2 -m "not soak and real_time" $$(grep -rl --include='test_*.py' real_time tests)
 
 check: $(DEVELOP) ## lint, format, types, and the project's own rules

@@ -135,7 +135,7 @@ def _trip(
     measured = rig.read(tick).measured
     for symbol in session.on_measurement(tick, measured):
         link.send(link.wire.encode(symbol))
-    while session.copies.confirmed.sample <= tick:
+    while session.confirmed_state.sample <= tick:
         data = link.receive(2.0)
         if data is None:
             raise TimeoutError(f"no command for sample {tick}")

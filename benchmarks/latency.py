@@ -196,7 +196,7 @@ def _flight(stack: ExitStack, ticks_per_sample: int, record: bool) -> Ping:
             raise RuntimeError(f"the receiver did not answer the symbol of sample {sample}")
         session.on_frame(decode(answer))
         sample += 1
-        if session.copies.confirmed.sample != sample:
+        if session.confirmed_state.sample != sample:
             raise RuntimeError(f"the echo of sample {sample - 1} did not come with the answer")
         session.command(tick + ticks_per_sample)
         session.confirmed.clear()

@@ -84,7 +84,7 @@ def fly_all(endpoint: str, rigs: int, seconds: float, shards: int = 0) -> dict[s
                 fleet[index].end()
         sessions = [rig.session for rig in fleet]
         return {
-            "samples": sum(session.copies.next_sample for session in sessions),
+            "samples": sum(session.next_sample for session in sessions),
             "digest_checks": sum(session.counts["digest_checks"] for session in sessions),
             "desyncs": sum(session.counts["desyncs"] for session in sessions),
             "erasures": sum(session.counts["erasures"] for session in sessions),

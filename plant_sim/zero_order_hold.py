@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 from numpy.typing import ArrayLike
-from scipy.linalg import expm, logm
 
 Matrix = npt.NDArray[np.float64]
 
@@ -22,7 +22,7 @@ def discretised(A: ArrayLike, B: ArrayLike, period_s: float) -> tuple[Matrix, Ma
     block = np.zeros((states + inputs, states + inputs))
     block[:states, :states] = a
     block[:states, states:] = b
-    grown = expm(block * period_s)
+    grown = scipy.linalg.expm(block * period_s)
     return grown[:states, :states], grown[:states, states:]
 
 
@@ -33,7 +33,7 @@ def continuous(F: ArrayLike, E: ArrayLike, period_s: float) -> tuple[Matrix, Mat
     block = np.eye(states + inputs)
     block[:states, :states] = f
     block[:states, states:] = e
-    grown = np.asarray(logm(block))
+    grown = np.asarray(scipy.linalg.logm(block))
     if not np.isfinite(grown).all() or np.abs(grown.imag).max() > IMAGINARY_MAX:
         raise ValueError(
             f"F = {f.tolist()} is no zero-order hold of a continuous plant: it has an eigenvalue that "

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from channel.errors import ConfigMismatch, FrameError, LinkLost
 from channel.line.clocks import SkewedClock
-from channel.line.line import Downlink, Inlet
+from channel.line.line import Downlink, Inlet, bits_per_symbol
+from channel.line.slots import Departure
 from channel.line.virtual import Reply, decode_step, encode_reply, is_envelope
 from channel.links.serial.slot_finder import SlotFinder
 from channel.protocol.endings import End
@@ -34,8 +35,11 @@ class ReceiverEndpoint:
     ) -> None:
         self.session = session
         self.downlink = downlink or Downlink()
-        self.inlet = Inlet(self.downlink.wire, session.on_malformed)
-        self._slots = SlotFinder(session.terms)
+        alphabet = session.codec.coder.alphabet
+        self.inlet = Inlet(
+            self.downlink.wire, session.on_malformed, bits_per_symbol=bits_per_symbol(alphabet)
+        )
+        self._slots = SlotFinder(session.terms.up_grid)
         """of the symbol bytes of a serial line"""
         self._clock = clock
         self._heard_ns: int | None = None
@@ -66,7 +70,7 @@ class ReceiverEndpoint:
                 )
             frames += self._on_message(data, shown_ns)
         frames += self.session.on_deadline(shown_ns)
-        return self.downlink.offer(frames, now_ns)
+        return self.downlink.offer(frames, now_ns, self.session.flight_ns(shown_ns))
 
     def over(self, now_ns: int, peer_timeout_s: float) -> bool:
         """Return whether the flight is over; LinkLost when nothing came for too long."""
@@ -86,7 +90,7 @@ class ReceiverEndpoint:
 
     def bye(self, end: End) -> list[bytes]:
         """End the session; return the messages that tell the peer."""
-        return self.downlink.encoded(self.session.bye(end))
+        return [self.downlink.encoded(frame) for frame in self.session.bye(end)]
 
     def step(self, time_ns: int, data: bytes | None) -> Reply:
         """Do one step of the virtual clock within this process (`channel.line.virtual.Peer`).
@@ -95,7 +99,17 @@ class ReceiverEndpoint:
         """
         frames = [] if data is None else self._on_message(data, time_ns)
         frames += self.session.on_deadline(time_ns)
-        return Reply(0, self.session.next_deadline(), tuple(self.downlink.encoded(frames)))
+        return self._reply(frames, time_ns)
+
+    def _reply(self, frames: list[Frame], time_ns: int) -> Reply:
+        flight_ns = self.session.flight_ns(time_ns)
+        now, later = [], []
+        for leaves_ns, message in self.downlink.departures(frames, flight_ns):
+            if leaves_ns == flight_ns:
+                now.append(message)
+            else:
+                later.append(Departure(time_ns + leaves_ns - flight_ns, message))
+        return Reply(0, self.session.next_deadline(), tuple(now), tuple(later))
 
     def _on_message(self, data: bytes, now_ns: int) -> list[Frame]:
         session = self.session
@@ -106,7 +120,8 @@ class ReceiverEndpoint:
             frame = self._slots.located(frame, session.due_slot, now_ns)
         answers = session.on_frame(frame, now_ns)
         if isinstance(frame, Hello):
-            self._slots.answered(frame, answers, now_ns)
+            sizes = [self.inlet.wire.size(self.inlet.wire.encode(answer)) for answer in answers]
+            self._slots.answered(frame, answers, now_ns + sum(sizes) * session.terms.downlink_byte_ns)
         return answers
 
 

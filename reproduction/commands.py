@@ -9,7 +9,7 @@ import typer
 
 from tenbaud.studies.progress import progress_bar
 
-DRAWINGS = ("theory", "animation", "axes", "cliff")
+DRAWINGS = ("theory", "animation", "axes", "cliff", "bothways")
 DATA_VARIABLE = "TENBAUD_FLIGHT_DATA"
 
 Out = Annotated[
@@ -22,7 +22,7 @@ def figures(
         list[str] | None,
         typer.Argument(
             help="3, 4, 5, 6, 7, 8 or all; several may be given. For the pages: theory, animation, "
-            "axes, cliff."
+            "axes, cliff, bothways."
         ),
     ] = None,
     docs: Annotated[
@@ -42,14 +42,15 @@ def figures(
         ),
     ] = None,
     quick: Annotated[
-        bool, typer.Option("--quick", help="cliff: few and short flights, to see that it works.")
+        bool,
+        typer.Option("--quick", help="cliff, bothways: few and short flights, to see that it works."),
     ] = False,
     out: Out = None,
 ) -> None:
     """Fly and draw the paper's Figs. 3 to 8; with all of them, write the page that compares them.
 
-    cliff: flights near the smallest rate of a pendulum and a rotary pendulum. It flies only
-    flights that are missing in the folder.
+    cliff: flights near the smallest rate of a pendulum and a rotary pendulum. bothways: narrow
+    downlinks of all rates on lines of all kinds. Both fly only what is missing in the folder.
 
     [dim]tenbaud figures 7[/dim]
 
@@ -72,6 +73,8 @@ def figures(
         _draw_documentation(drawings, pictures)
     if "cliff" in drawings:
         _draw_cliff(docs or folder, pictures, quick)
+    if "bothways" in drawings:
+        _draw_bothways(docs or folder, pictures, quick)
     if wanted:
         _draw_paper(wanted, folder, pictures, found)
 
@@ -164,6 +167,22 @@ def _draw_cliff(docs: Path, pictures: Path, quick: bool) -> None:
     page = docs / "theory" / "cliff.md"
     write_page(page, {one: found[one] for one in swept}, {one: found[one] for one in claimed})
     typer.echo(f"the tables are in {page}, the points in {pictures / 'cliff.json'}")
+
+
+def _draw_bothways(docs: Path, pictures: Path, quick: bool) -> None:
+    """Fly with narrow downlinks; draw them, and write the page."""
+    from reproduction.bothways.draw import draw
+    from reproduction.bothways.page import write_page
+    from reproduction.bothways.study import asked, fly_all, grid
+
+    points = grid(quick)
+    more = [] if quick else list(asked().values())
+    with progress_bar("flights") as update:
+        found = fly_all([*more, *points], pictures / "bothways.json", update)
+    draw(docs, found)
+    page = docs / "BOTHWAYS.md"
+    write_page(page, found, quick)
+    typer.echo(f"the tables are in {page}, the points in {pictures / 'bothways.json'}")
 
 
 def _wanted(names: list[str], known: tuple[str, ...]) -> set[str]:

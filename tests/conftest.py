@@ -41,8 +41,9 @@ COMPILED_ONCE = (
 LONGEST_FIRST = (
     *COMPILED_ONCE,
     "tests/docs/",
-    "tests/tenbaud/view/test_page.py",
+    "tests/tenbaud/view/",
     "tests/network/",
+    "tests/examples/",
     "tests/tenbaud/test_restarts.py",
     "tests/tenbaud/telemetry/test_flights.py",
     "tests/tenbaud/test_emulated_flights.py",
@@ -55,6 +56,9 @@ COMPILED_BEFORE = "[docs/howto/your-log.md]"
 """A page that flies what those above compile: it begins after they have begun, and so finds most of
 their machine code; nothing makes it wait for them."""
 
+PAGES = "tests/docs/test_commands.py::test_when_a_page_is_typed_in_then"
+"""On two workers, each with one process that has imported the libraries (`tests/docs/prepared.py`)."""
+
 COLD = (
     "tests/tenbaud/endings/",
     "tests/tenbaud/test_fire.py",
@@ -66,7 +70,8 @@ COLD = (
     "tests/docs/",
 )
 """Tests of processes as the system shows them: theirs are ordinary ones. Elsewhere a process begins
-with everything imported (`tests/warm.py`): it disturbs less what flies on the real clock beside it."""
+with everything imported (`tests/warm.py`): it disturbs less what flies on the real clock beside it. The
+commands of a page are copies of another kind (`tests/docs/prepared.py`)."""
 
 _MACHINE = Path(tempfile.gettempdir()) / f"tenbaud-tests-{os.getuid()}.lock"
 
@@ -76,9 +81,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=_rank)
 
 
+def pytest_configure() -> None:
+    """Collect no garbage while tests are collected: all of that stays."""
+    gc.disable()
+
+
 def pytest_collection_finish() -> None:
     """Let the garbage collector pass over what all tests together have imported."""
     gc.freeze()
+    gc.enable()
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -86,11 +97,15 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     """Keep the tests of a file with a module-wide fixture on one worker, so that it is made once."""
     from xdist.scheduler import LoadScopeScheduling
 
+    config.option.loadscopereorder = False  # the longest first, not the files with the most tests
+
     class ByFixture(LoadScopeScheduling):
         def _split_scope(self, nodeid: str) -> str:
             file = nodeid.partition("::")[0]
             if file in COMPILED_ONCE:
                 return COMPILED_ONCE[0]
+            if nodeid.startswith(PAGES) and not nodeid.endswith(COMPILED_BEFORE):
+                return f"{PAGES}{nodeid.count('/') % 2}"
             return file if _has_shared_fixture(config.rootpath / file) else nodeid
 
     return ByFixture(config, log)

@@ -3,11 +3,10 @@
 Most of a short flight is the start of its processes: each imports the same six hundred modules. Here a
 process is a copy (`fork`) of one that has imported them and has done nothing else: with streams,
 environment, folder and session of its own, and a child of the one that asked for it. What is said about
-starting, ending or finding processes is tested with ordinary ones, and so is whatever a shell starts:
-every command of the documentation.
+starting, ending or finding processes is tested with ordinary ones, and so is what a shell starts; the
+commands of the documentation are copies of their own kind (`tests/docs/prepared.py`).
 
-A process that starts others, as `tenbaud demo` does, keeps an untouched copy of itself for that; an
-ordinary one does so too, when it is started as `python -m tests.warm` in place of `python -m tenbaud`.
+A process that starts others, as `tenbaud demo` does, keeps an untouched copy of itself for that.
 """
 
 from __future__ import annotations
@@ -26,15 +25,17 @@ import subprocess
 import sys
 import threading
 import traceback
+import types
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 TOP = Path(__file__).parents[1]
 IMPORTED = (
     *("tenbaud.cli.commands", "tenbaud.cli.nodes", "tenbaud.cli.demo", "tenbaud.flight.demo"),
     *("tenbaud.flight.transmit", "tenbaud.flight.receive", "tenbaud.flight.fly", "tenbaud.build.ends"),
     *("tenbaud.flight.screen", "channel.links.zenoh.link", "zenoh", "numpy"),
+    *("scipy.linalg", "scipy.optimize"),
 )
 STARTS_OTHERS = ("demo", "figures")
 CLONE = {"x86_64": 56, "aarch64": 220}.get(platform.machine()) if sys.platform == "linux" else None
@@ -170,7 +171,7 @@ def serve(connection: socket.socket) -> None:
         number = _copy()
         if number == 0:
             connection.close()
-            _begin(json.loads(data), streams)
+            begin(json.loads(data), streams)
         connection.send(str(max(number, 0)).encode())  # 0: there was no room for another process
         for stream in streams:
             os.close(stream)
@@ -188,11 +189,11 @@ def _copy() -> int:
     return int(number)
 
 
-def _begin(request: dict[str, Any], streams: list[int]) -> None:
+def begin(request: dict[str, Any], streams: list[int]) -> NoReturn:
     """Become the process that was asked for; never return."""
     ended: BaseException | None = None
     try:
-        if request["own_session"]:
+        if request.get("own_session"):
             os.setsid()
         if request["arguments"][:1] and request["arguments"][0] in STARTS_OTHERS:
             keep_a_copy()
@@ -210,16 +211,21 @@ def _begin(request: dict[str, Any], streams: list[int]) -> None:
         sys.stderr = io.TextIOWrapper(
             io.FileIO(2, "w", closefd=False), "utf-8", "backslashreplace", line_buffering=True
         )
-        sys.argv[:] = [str(TOP / "tenbaud" / "__main__.py"), *request["arguments"]]
-        _show([sys.executable, "-m", "tenbaud", *request["arguments"]])
-        importlib.import_module("tenbaud.cli.app").main()
+        if "code" in request:
+            sys.argv[:] = ["-c", *request["arguments"]]
+            sys.modules["__main__"] = main_module = types.ModuleType("__main__")
+            exec(compile(request["code"], "<string>", "exec"), main_module.__dict__)
+        else:
+            sys.argv[:] = [str(TOP / "tenbaud" / "__main__.py"), *request["arguments"]]
+            _show([sys.executable, "-m", "tenbaud", *request["arguments"]])
+            importlib.import_module("tenbaud.cli.app").main()
     except BaseException as error:
         ended = error
     finally:
         _end(ended)
 
 
-def _end(ended: BaseException | None) -> None:
+def _end(ended: BaseException | None) -> NoReturn:
     """End as Python does: its threads, what is done at exit, the streams, then a code or SIGINT."""
     code = 0 if ended is None else 1
     try:
@@ -255,17 +261,9 @@ def keep_a_copy() -> None:
     ours, its = _pair()
     if os.fork() == 0:
         ours.close()
-        serve(its)
+        with suppress(KeyboardInterrupt):  # pressed for the command: its children get it too
+            serve(its)
         os._exit(0)
     its.close()
     Popen.server = Server(ours)
     subprocess.Popen = Popen  # type: ignore[misc]
-
-
-if __name__ == "__main__":
-    from tests import warm
-
-    if sys.argv[1:2] and sys.argv[1] in STARTS_OTHERS and CLONE is not None:
-        warm.load()
-        warm.keep_a_copy()
-    importlib.import_module("tenbaud.cli.app").main()

@@ -12,10 +12,11 @@ from dataclasses import asdict, astuple, replace
 
 from channel.codec.codec import Vector
 from channel.line.line import Delivery, Inlet, Uplink, no_compact_commands
-from channel.line.meters import LatenessMeter
+from channel.line.meters import BaudMeter, LatenessMeter
+from channel.links.serial.slot_finder import SlotFinder
 from channel.protocol.endings import End
-from channel.protocol.events import Event, EventKind, write_event
-from channel.protocol.frames import Frame, ShortCommands, Why
+from channel.protocol.events import Dropped, Event, EventKind, write_event
+from channel.protocol.frames import DownSymbol, Frame, ShortCommands, ShortSymbol, Why
 from channel.protocol.recording import NullRecorder, Recorder
 from transmitter.encoder_watch import EncoderWatch
 from transmitter.guard import Guard, GuardCause, GuardReason, GuardState
@@ -104,7 +105,7 @@ class TransmitterNode:
     def deliver(self, frame: Frame) -> list[Frame]:
         """Hand an arrived frame to the session; return the answers. `rest` has what it confirmed."""
         answers = self.session.on_frame(frame)
-        if len(self.session.confirmed) >= RESTLESS_SAMPLES_MAX:
+        if self.session.following.unrecorded >= RESTLESS_SAMPLES_MAX:
             self.flush_records()
         if self.guard.stopped and self._may_rearm and self.session.phase is Phase.FLYING:
             self.guard.rearm()
@@ -113,7 +114,7 @@ class TransmitterNode:
 
     def flush_records(self) -> None:
         """Score and record confirmed samples: work for the time after the next symbol is sent."""
-        if not self.session.confirmed:
+        if not self.session.following.unrecorded:
             return
         per_sample = self.session.terms.ticks_per_sample
         for done in self.session.take_confirmed():
@@ -200,7 +201,7 @@ class TransmitterNode:
 
     def tell(self, event: Event) -> None:
         time_ns = self.tick * self.session.terms.tick_ns
-        event = replace(event, time_ns=time_ns, sample=self.session.copies.confirmed.sample)
+        event = replace(event, time_ns=time_ns, sample=self.session.confirmed_state.sample)
         self.session.events.append(event)
         write_event(self._recorder, event)
 
@@ -210,8 +211,7 @@ class TransmitterNode:
     def _check(self, tick: int, reading: Reading) -> None:
         session, fault = self.session, reading.fault
         if fault is None and self._watch is not None:
-            estimate = session.copies.confirmed.model if session.is_proven else None
-            fault = self._watch.check(reading.counts, self._applied, estimate)
+            fault = self._watch.check(reading.counts, self._applied, session.reliable_state)
         if fault is not None and not self.guard.stopped:
             self.sensor_fault = GuardReason(GuardCause.SENSOR, tick, detail=fault)
             self.tell(Event(EventKind.SENSOR, tick=tick, detail=fault))
@@ -226,6 +226,15 @@ class TransmitterNode:
             self.tell(event if reason is None else replace(event, **asdict(reason)))
 
 
+def _down_slots(session: TransmitterSession) -> SlotFinder | None:
+    """Return what finds the slots of symbol bytes that come down; None where none come."""
+    if session.terms.downlink != "narrow":
+        return None
+    finder = SlotFinder(session.terms.down_grid)
+    finder.expect(session.line_delay_ns)
+    return finder
+
+
 class TransmitterEndpoint:
     """A node with its way in and its way out."""
 
@@ -233,6 +242,10 @@ class TransmitterEndpoint:
         self.node = node
         self.uplink = uplink
         self.inlet = Inlet(uplink.wire, node.on_malformed, self._require_whole)
+        self.down_baud = BaudMeter()
+        """of the symbols of a narrow downlink"""
+        self._next_down_slot = 0
+        self._down_slots = _down_slots(node.session)
         self.lateness = LatenessMeter()
         """of the ticks; on the virtual clock none is late"""
         self.ticks_missed = 0
@@ -298,14 +311,32 @@ class TransmitterEndpoint:
     def take(self, data: bytes, now_ns: int) -> list[Delivery]:
         """Take a message that arrived; return the answers."""
         frame = self.inlet.take(data)
+        if isinstance(frame, ShortSymbol):
+            frame = self._located(frame, now_ns)
+        if isinstance(frame, DownSymbol) and frame.slot >= self._next_down_slot:
+            self._next_down_slot = frame.slot + 1
+            self.down_baud.on_slot(now_ns, came=True)
         return [] if frame is None else self._offer(self.node.deliver(frame), now_ns)
+
+    def _located(self, symbol: ShortSymbol, now_ns: int) -> DownSymbol | None:
+        """Return the down symbol in a byte of a serial line; None, counted, where it fits no slot."""
+        session = self.node.session
+        if self._down_slots is None or session.phase is not Phase.FLYING:
+            session.counts["stale_frames"] += 1
+            return None
+        place = self._down_slots.find(symbol, 0, now_ns)
+        if place.in_time and place.slot is not None:
+            return DownSymbol(session.session_number, session.epoch, place.slot, symbol.number)
+        session.counts["symbols_misplaced"] += 1
+        self.node.tell(Event(EventKind.STALE, slot=symbol.slot_low, cause=Dropped.NOT_DUE))
+        return None
 
     def farewell(self, end: End) -> list[bytes]:
         """End the session; return the messages that tell the receiver.
 
         They bypass the line's delay and impairments: this process is about to end.
         """
-        return [self.uplink.counted(frame)[0] for frame in self.node.session.bye(end)]
+        return [self.uplink.encoded(frame) for frame in self.node.session.bye(end)]
 
     def _offer(self, frames: Iterable[Frame], now_ns: int) -> list[Delivery]:
         return [one for frame in frames for one in self.uplink.offer(frame, now_ns)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from channel.line.impairments import LineFaults
+from channel.line.slots import Departure
 from channel.line.virtual import Peer, Reply
 
 
@@ -48,7 +49,8 @@ class SkewedPeer:
 
     def step(self, time_ns: int, data: bytes | None) -> Reply:
         """Do one step, in the time that the receiver's clock shows."""
+        reached = self._clock.reached
         reply = self._peer.step(self._clock.shown(time_ns), data)
-        if reply.deadline_ns is None:
-            return reply
-        return reply._replace(deadline_ns=self._clock.reached(reply.deadline_ns))
+        later = tuple([Departure(reached(at_ns, time_ns), symbol) for at_ns, symbol in reply.later])
+        deadline_ns = None if reply.deadline_ns is None else reached(reply.deadline_ns)
+        return reply._replace(deadline_ns=deadline_ns, later=later)

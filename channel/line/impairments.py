@@ -2,7 +2,7 @@
 
     loss=0.2              every message is lost with this probability (also 20%)
     burst=0.02/0.25       Gilbert-Elliott: chance per message to enter and leave a state that loses all
-    flip=0.01             a symbol arrives whole, but as another symbol (uplink)
+    flip=0.01             a symbol arrives whole, but as another symbol
     raw=0.01              one bit of the message is inverted; its check then drops it
     duplicate=0.1         a message arrives twice
     reorder=0.1/150ms     a message is held back by up to this time (150ms if not given)
@@ -12,7 +12,9 @@
     skew=200ppm           the receiver's clock runs fast (slow: -200ppm)
     step=50ms@10s         the receiver's clock jumps at 10 s; may be given repeatedly
 
-Items are separated by commas. `up:` or `down:` before an item keeps it to one direction.
+Items are separated by commas. `up:` or `down:` before an item keeps it to one direction. Each direction
+has chances of its own. On the narrow downlink every symbol is a message, as on the uplink. The other
+downlinks carry command frames, and `flip` then acts on the uplink only.
 """
 
 from __future__ import annotations

@@ -4,10 +4,8 @@ On the virtual clock the transmitter's process asks the line of each direction; 
 sender asks its own and holds the message back until it is due (`Outbox`). A line carries bytes: what a
 message is, its wire can tell. `Inlet` is the other end of a line: bytes counted, frames decoded.
 
-`Uplink` is the transmitter's way onto it, and what R baud means there, enforced and measured. Symbols
-leave on a fixed grid of slots, one per slot and none in advance or afterwards: a request for more gets
-an erasure, not a burst. Both loops of the transmitter send through it, so that no frame avoids the baud
-rate. `Downlink` is the receiver's way.
+`Uplink` is the transmitter's way onto it, `Downlink` the receiver's. All loops send through them, so
+that no symbol avoids the baud rate (`channel.line.slots`).
 """
 
 from __future__ import annotations
@@ -19,9 +17,11 @@ from math import log2
 from typing import NamedTuple, Protocol
 
 from channel.codec.codec import Alphabet, Codec
+from channel.codec.downlink.layout import DOWN_ALPHABET
 from channel.errors import FrameError
-from channel.protocol.frames import Commands, Frame, ShortCommands, ShortSymbol, Symbol
-from channel.protocol.recording import SENT_CHANNEL, NullRecorder, Recorder
+from channel.line.slots import Departure, Outlet, SymbolMeter
+from channel.protocol.frames import DownSymbol, Frame, ShortCommands, Symbol
+from channel.protocol.recording import DOWN_SENT_CHANNEL, SENT_CHANNEL, Recorder
 from channel.protocol.terms import Terms
 from channel.protocol.wire import DATAGRAM, Wire
 
@@ -99,6 +99,7 @@ class Inlet:
     """Turns messages into frames. `on_malformed` is called with the reason when one is dropped.
 
     `require_whole` raises FrameError for compact commands that are damaged, as only a session can tell.
+    `bits_per_symbol`: of this direction.
     """
 
     def __init__(
@@ -106,99 +107,29 @@ class Inlet:
         wire: Wire = DATAGRAM,
         on_malformed: Callable[[str], None] | None = None,
         require_whole: Callable[[ShortCommands], None] = no_compact_commands,
+        bits_per_symbol: float = 1.0,
     ) -> None:
         self.wire = wire
-        self.wire_bytes = 0
-        self.control_bytes = 0
-        """of `wire_bytes`, those of frames that carried neither a symbol nor commands"""
-        self.command_bytes = 0
-        """of command frames, without a line's framing"""
+        self.meter = SymbolMeter(bits_per_symbol)
+        """malformed messages count among its `wire_bytes` only"""
         self.malformed = 0
         self._on_malformed = on_malformed
         self._require_whole = require_whole
 
     def take(self, data: bytes) -> Frame | None:
         size = self.wire.size(data)
-        self.wire_bytes += size
         try:
             frame = self.wire.decode(data)
             if isinstance(frame, ShortCommands):
                 self._require_whole(frame)
         except FrameError as error:
             self.malformed += 1
+            self.meter.wire_bytes += size
             if self._on_malformed is not None:
                 self._on_malformed(str(error))
             return None
-        if isinstance(frame, (Commands, ShortCommands)):
-            self.command_bytes += len(data)
-        elif not isinstance(frame, (Symbol, ShortSymbol)):
-            self.control_bytes += size
+        self.meter.count(frame, len(data), size)
         return frame
-
-
-class Downlink:
-    """Everything that goes down. `line` is that of a real clock; its flight time begins with the first
-    message.
-
-    On the virtual clock the transmitter's process holds both lines, and only `encoded` is used.
-    """
-
-    def __init__(self, wire: Wire = DATAGRAM, line: Line | None = None) -> None:
-        self.wire = wire
-        self.line: Line = line or CleanLine()
-        self.wire_bytes = 0
-        self.command_bytes = 0
-        """of command frames, without a line's framing"""
-        self._outbox = Outbox()
-        self._start_ns: int | None = None
-
-    @property
-    def next_due_ns(self) -> int | None:
-        """Return when the next message leaves, None when none waits."""
-        return self._outbox.next_due_ns
-
-    def encoded(self, frames: Iterable[Frame]) -> list[bytes]:
-        """Count frames; return their messages."""
-        messages = []
-        for frame in frames:
-            message = self.wire.encode(frame)
-            self.wire_bytes += self.wire.size(message)
-            if isinstance(frame, (Commands, ShortCommands)):
-                self.command_bytes += len(message)
-            messages.append(message)
-        return messages
-
-    def offer(self, frames: Iterable[Frame], now_ns: int) -> list[bytes]:
-        """Put frames on the line; return the messages that it has delivered by now."""
-        for message in self.encoded(frames):
-            if self._start_ns is None:
-                self._start_ns = now_ns
-            start_ns = self._start_ns
-            self._outbox.put(
-                Delivery(arrival_ns + start_ns, data)
-                for arrival_ns, data in self.line.carry(message, now_ns - start_ns)
-            )
-        return self._outbox.take(now_ns)
-
-
-class SlotShaper:
-    """Lets each slot's symbol leave once, when the slot begins or while it lasts."""
-
-    def __init__(self, terms: Terms) -> None:
-        self._terms = terms
-        self._next_slot = 0
-        self.refused = 0
-        """symbols that asked for a slot already used, over, or more than a sample away"""
-
-    def departure_ns(self, slot: int, now_ns: int) -> int | None:
-        """Return when the symbol of this slot, offered now, leaves; None: it does not."""
-        begins = self._terms.slot_ns(slot)
-        ends = self._terms.slot_ns(slot + 1)
-        if slot < self._next_slot or not begins - self._terms.sample_ns <= now_ns < ends:
-            self.refused += 1
-            return None
-        self._next_slot = slot + 1
-        return max(begins, now_ns)
 
 
 def bits_per_symbol(alphabet: Alphabet) -> float:
@@ -206,29 +137,7 @@ def bits_per_symbol(alphabet: Alphabet) -> float:
     return log2(len(alphabet.symbols))
 
 
-class UplinkMeter:
-    """Counts the transmitter's messages on the line."""
-
-    def __init__(self, alphabet: Alphabet) -> None:
-        self._bits_per_symbol = bits_per_symbol(alphabet)
-        self.symbols = 0
-        self.wire_bytes = 0
-        self.control_bytes = 0
-        """of `wire_bytes`, those that carried no symbol"""
-
-    def count(self, frame: Frame, size: int) -> None:
-        self.wire_bytes += size
-        if isinstance(frame, Symbol):
-            self.symbols += 1
-        else:
-            self.control_bytes += size
-
-    @property
-    def coder_bits(self) -> float:
-        return self.symbols * self._bits_per_symbol
-
-
-class Uplink:
+class Uplink(Outlet):
     """Everything that goes up: symbols in their slots, and control frames between them."""
 
     def __init__(
@@ -239,35 +148,76 @@ class Uplink:
         wire: Wire = DATAGRAM,
         recorder: Recorder | None = None,
     ) -> None:
-        self.shaper = SlotShaper(terms)
-        self.meter = UplinkMeter(alphabet)
+        super().__init__(wire, terms.up_grid, bits_per_symbol(alphabet), SENT_CHANNEL, recorder)
         self.line: Line = line or CleanLine()
-        self.wire = wire
         self._symbol_delay_ns = terms.symbol_delay_ns
-        self._recorder = recorder or NullRecorder()
 
     def offer(self, frame: Frame, now_ns: int) -> list[Delivery]:
         """Return the arrivals of a frame offered at flight time `now_ns`; none if it is refused."""
-        if not isinstance(frame, Symbol):
-            return self.line.carry(self.counted(frame)[0], now_ns)
-        leaves_ns = self.shaper.departure_ns(frame.slot, now_ns)
-        if leaves_ns is None:
-            self._recorder.write(SENT_CHANNEL, now_ns, (frame.slot, frame.number, None, 0))
+        departure = self.departure(frame, now_ns)
+        if departure is None:
             return []
-        data, size = self.counted(frame)
-        self._recorder.write(SENT_CHANNEL, leaves_ns, (frame.slot, frame.number, leaves_ns, size))
-        arrivals = self.line.carry(data, leaves_ns)
+        arrivals = self.line.carry(departure.data, departure.leaves_ns)
         delay_ns = self._symbol_delay_ns
-        if delay_ns:
+        if delay_ns and isinstance(frame, Symbol):
             return [Delivery(arrival_ns + delay_ns, left) for arrival_ns, left in arrivals]
         return arrivals
 
-    def counted(self, frame: Frame) -> tuple[bytes, int]:
-        """Count a frame that bypasses the line; return its bytes and its size on the wire."""
-        data = self.wire.encode(frame)
-        size = self.wire.size(data)
-        self.meter.count(frame, size)
-        return data, size
+
+class Downlink(Outlet):
+    """Everything that goes down. `line` is that of a real clock; its flight time begins with the first
+    message.
+
+    With `terms` of the narrow downlink its symbols leave in their slots. On the virtual clock the
+    transmitter's process holds both lines, and `offer` is not used.
+    """
+
+    def __init__(
+        self,
+        wire: Wire = DATAGRAM,
+        line: Line | None = None,
+        terms: Terms | None = None,
+        recorder: Recorder | None = None,
+    ) -> None:
+        grid = terms.down_grid if terms is not None and terms.downlink == "narrow" else None
+        super().__init__(wire, grid, bits_per_symbol(DOWN_ALPHABET), DOWN_SENT_CHANNEL, recorder)
+        self.line: Line = line or CleanLine()
+        self._delivery_ns = 0 if grid is None else grid.delivery_ns
+        self._outbox = Outbox()
+        self._start_ns: int | None = None
+
+    @property
+    def next_due_ns(self) -> int | None:
+        """Return when the next message leaves, None when none waits."""
+        return self._outbox.next_due_ns
+
+    def departures(self, frames: Iterable[Frame], now_ns: int) -> list[Departure]:
+        """Return the messages of frames offered at flight time `now_ns`, and when the line has them."""
+        ready = []
+        for frame in frames:
+            departure = self.departure(frame, now_ns)
+            if departure is not None and isinstance(frame, DownSymbol):
+                departure = Departure(departure.leaves_ns + self._delivery_ns, departure.data)
+            if departure is not None:
+                ready.append(departure)
+        return ready
+
+    def offer(self, frames: Iterable[Frame], now_ns: int, flight_ns: int) -> list[bytes]:
+        """Put frames on the line; return the messages that it has delivered by now.
+
+        `flight_ns` is the flight time now, by which symbols have slots.
+        """
+        for leaves_ns, message in self.departures(frames, flight_ns):
+            if self._start_ns is None:
+                self._start_ns = now_ns
+            start_ns = self._start_ns
+            self._outbox.put(
+                Delivery(arrival_ns + start_ns, data)
+                for arrival_ns, data in self.line.carry(
+                    message, now_ns - start_ns + leaves_ns - flight_ns
+                )
+            )
+        return self._outbox.take(now_ns)
 
 
 def bit_rate(codec: Codec, tick_s: float) -> float:

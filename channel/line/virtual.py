@@ -9,6 +9,9 @@ flight is as fast as the messages go.
     step   MAGIC u8 | 1 u8 | number u32 | time s64 | message bytes, if any
     reply  MAGIC u8 | 2 u8 | number u32 | next deadline s64 (-1: none) | per frame: u16 length, bytes
 
+A down symbol waits for its slot: its length has the highest bit set, and the time at which it leaves,
+an s64, stands before its bytes.
+
 These envelopes exist on the virtual clock only and are not counted as wire bytes.
 """
 
@@ -18,6 +21,7 @@ import struct
 from typing import NamedTuple, Protocol
 
 from channel.errors import FrameError
+from channel.line.slots import Departure
 
 MAGIC = 0xF5
 """No wire version will ever be this, so an end on the wrong clock notices. A single byte on a serial
@@ -25,6 +29,9 @@ line can be: no envelope is that short."""
 
 _STEP = struct.Struct("<BBIq")
 _LENGTH = struct.Struct("<H")
+_LATER = 0x8000
+"""The bit of a length before a time; no frame is so long."""
+_TIME = struct.Struct("<q")
 
 
 class Step(NamedTuple):
@@ -41,6 +48,9 @@ class Reply(NamedTuple):
     number: int
     deadline_ns: int | None
     frames: tuple[bytes, ...]
+    """those that leave at once"""
+    later: tuple[Departure, ...] = ()
+    """symbols, each in its slot"""
 
 
 class Peer(Protocol):
@@ -72,24 +82,34 @@ def encode_reply(reply: Reply) -> bytes:
     parts = [_STEP.pack(MAGIC, 2, reply.number, deadline)]
     for frame in reply.frames:
         parts += (_LENGTH.pack(len(frame)), frame)
+    for leaves_ns, symbol in reply.later:
+        parts += (_LENGTH.pack(_LATER | len(symbol)), _TIME.pack(leaves_ns), symbol)
     return b"".join(parts)
 
 
 def decode_reply(data: bytes) -> Reply:
     """Return the reply in these bytes, or raise FrameError."""
     number, deadline = _decode_head(data, 2)
-    frames = []
-    offset = _STEP.size
-    while offset < len(data):
-        if len(data) < offset + _LENGTH.size:
-            raise FrameError("truncated reply of the virtual clock")
-        (length,) = _LENGTH.unpack_from(data, offset)
-        offset += _LENGTH.size
-        if len(data) < offset + length:
-            raise FrameError("truncated reply of the virtual clock")
-        frames.append(data[offset : offset + length])
-        offset += length
-    return Reply(number, None if deadline < 0 else deadline, tuple(frames))
+    frames, later = [], []
+    left = data[_STEP.size :]
+    while left:
+        head, left = _take(left, _LENGTH.size)
+        (length,) = _LENGTH.unpack(head)
+        if length & _LATER:
+            time, left = _take(left, _TIME.size)
+            symbol, left = _take(left, length ^ _LATER)
+            later.append(Departure(_TIME.unpack(time)[0], symbol))
+        else:
+            frame, left = _take(left, length)
+            frames.append(frame)
+    return Reply(number, None if deadline < 0 else deadline, tuple(frames), tuple(later))
+
+
+def _take(data: bytes, count: int) -> tuple[bytes, bytes]:
+    """Return the first bytes and those after them."""
+    if len(data) < count:
+        raise FrameError("truncated reply of the virtual clock")
+    return data[:count], data[count:]
 
 
 def _decode_head(data: bytes, kind: int) -> tuple[int, int]:

@@ -21,9 +21,21 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
-from channel.codec.codec import WIRE_ERASED, Codec, is_coder_state, is_estimate
+from channel.codec.codec import WIRE_ERASED, Codec, Vector, is_coder_state, is_estimate
+from channel.codec.downlink.machine import TwoWay
 from channel.protocol.events import Dropped, Event, EventKind, Tell
-from channel.protocol.frames import Bye, Commands, Desync, Echo, Frame, Hello, Refuse, Symbol, Welcome
+from channel.protocol.frames import (
+    Bye,
+    Commands,
+    Desync,
+    DownSymbol,
+    Echo,
+    Frame,
+    Hello,
+    Refuse,
+    Symbol,
+    Welcome,
+)
 from channel.protocol.limits import to_steps
 from channel.protocol.terms import Terms
 
@@ -46,11 +58,19 @@ class Bounds:
     What is dropped is counted in `counts` and reported to `emit`.
     """
 
-    def __init__(self, codec: Codec, terms: Terms, counts: Counter[str], emit: Tell) -> None:
+    def __init__(
+        self,
+        codec: Codec,
+        terms: Terms,
+        counts: Counter[str],
+        emit: Tell,
+        two_way: TwoWay | None = None,
+    ) -> None:
         self._counts = counts
         self._emit = emit
         self._codec = codec
         self._terms = terms
+        self._two_way = two_way
         self._echoes_max = terms.repeats + 1
         # The two counts of samples may differ by the history, by which either end runs on when it hears
         # nothing, and by the round trip, which the history covers as well.
@@ -59,6 +79,7 @@ class Bounds:
         self._values = terms.ticks_per_sample * self._inputs
         pairs = zip(terms.limits.command_max, terms.initial_command, strict=True)
         largest = [max(limit, abs(first)) for limit, first in pairs]
+        self._largest = largest
         self._steps_max = to_steps(largest, terms.signals)
         self._state_bytes = len(codec.pack(codec.initial()))
         self.sample_max = min(COUNTER_MAX // terms.symbols_per_word, TIME_NS_MAX // terms.sample_ns)
@@ -76,6 +97,15 @@ class Bounds:
         if self._codec.coder.alphabet.symbol(symbol.number) is None:
             return f"symbol number {symbol.number} is not in the alphabet"
         return self._of_sample(symbol.slot // self._terms.symbols_per_word)
+
+    def of_down_symbol(self, symbol: DownSymbol, sample: int) -> str | None:
+        """Check a down symbol of the present epoch, but for its time; the clock stands in `sample`."""
+        if symbol.number not in (0, 1):
+            return f"down symbol number {symbol.number} is neither 0 nor 1"
+        of_sample = symbol.slot // self._terms.down_symbols
+        if of_sample > sample + self._reach:
+            return f"a down symbol of sample {of_sample} during sample {sample}"
+        return self._of_sample(of_sample)
 
     def of_hello(self, hello: Hello) -> str | None:
         """Check a request for a session, but for its time."""
@@ -156,10 +186,18 @@ class Bounds:
     def _of_state(self, welcome: Welcome) -> str | None:
         if not welcome.state:
             return None
+        commands: tuple[Vector, ...] = ()
         try:
-            state = self._codec.unpack(welcome.state)
+            if self._two_way is None:
+                state = self._codec.unpack(welcome.state)
+            else:
+                whole = self._two_way.unpack(welcome.state)
+                state, commands = whole.codec, (*whole.commands, whole.hold)
         except ValueError as error:
             return str(error)
+        for command in commands:
+            if not all(-most <= one <= most for one, most in zip(command, self._largest, strict=True)):
+                return f"a state with the command {command}, beyond +-{self._largest}"
         if state.sample != welcome.first_sample:
             return f"a state of sample {state.sample} for sample {welcome.first_sample}"
         if not (is_estimate(state.model) and is_coder_state(self._codec.coder, state.coder)):

@@ -30,6 +30,8 @@ class Why(IntEnum):
     """without commands the watchdog ramped the voltage down"""
     TAKEN_OVER = 6
     """another receiver takes the flight over, on purpose"""
+    REST = 7
+    """what comes down fits no hypothesis of the receiver's state"""
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,8 +2,9 @@
 
 The two copies of the codec stay equal only if both ends run the same configuration with the same
 arithmetic. Both are compared before the first symbol. The numerics probe is a digest of our sine,
-cosine and exponential on fixed arguments and of the configured codec run over fixed inputs: a
-library or a processor that computes otherwise is found out here, not in flight.
+cosine and exponential on fixed arguments and of the configured codec, with a narrow downlink's state
+machine, run over fixed inputs: a library or a processor that computes otherwise is found out here, not
+in flight.
 """
 
 from __future__ import annotations
@@ -16,12 +17,16 @@ from typing import Any
 
 from channel.codec import numerics
 from channel.codec.codec import ERASED, Codec, Word
+from channel.codec.downlink.machine import TwoWay
 from channel.errors import CodecDiverged
 
-LEFT_OUT = {"channel.downlink": "full"}
+RUNG = "channel.downlink"
+OF_NARROW = ("downlink.", "channel.downlink_baud")
+LEFT_OUT = {RUNG: "full"}
 """Fields of the shared configuration that it leaves out at this value: its digest is that of before."""
 
 PROBE_SAMPLES = 40
+PROBE_SAMPLES_BOTH_WAYS = 64
 PROBE_POINTS = 200
 
 
@@ -40,8 +45,11 @@ class Identity:
         return blake2b(self.config.encode(), digest_size=16).digest()
 
 
-def numerics_probe(codec: Codec) -> bytes:
-    """Return 8 bytes that depend on every bit of this machine's codec arithmetic."""
+def numerics_probe(codec: Codec, two_way: TwoWay | None = None) -> bytes:
+    """Return 8 bytes that depend on every bit of this machine's codec arithmetic.
+
+    `two_way`: of the state machine of a narrow downlink as well.
+    """
     digest = blake2b(digest_size=8)
     for point in range(-PROBE_POINTS, PROBE_POINTS):
         x = point * 0.0537109375
@@ -67,7 +75,30 @@ def numerics_probe(codec: Codec) -> bytes:
             # An unstable plant under commands that nobody chose: begin again.
             state = codec.initial()._replace(sample=sample + 1)
         digest.update(codec.pack(state))
+    if two_way is not None:
+        _run_two_way(two_way, digest)
     return digest.digest()
+
+
+def _run_two_way(two_way: TwoWay, digest: blake2b) -> None:
+    """Run the state machine over fixed words and command symbols."""
+    alphabet = two_way.codec.coder.alphabet
+    state = two_way.initial()
+    noise = 1
+    for sample in range(PROBE_SAMPLES_BOTH_WAYS):
+        drawn = []
+        for _ in range(alphabet.symbols_per_word + two_way.commands_in(state)):
+            noise = noise * 1_103_515_245 + 12_345 & 0x7FFFFFFF
+            drawn.append(noise >> 16)
+        letters = drawn[: alphabet.symbols_per_word]
+        word = tuple([alphabet.symbols[one % len(alphabet.symbols)] for one in letters])
+        bits = [one & 1 for one in drawn[len(letters) :]]
+        try:
+            state = two_way.step(state, ERASED if sample % 7 == 6 else word, bits).state
+        except (CodecDiverged, ValueError, ArithmeticError):
+            first = two_way.initial()
+            state = first._replace(codec=first.codec._replace(sample=sample + 1))
+        digest.update(two_way.pack(state))
 
 
 def differing_fields(ours: str, theirs: str) -> list[str]:
@@ -80,7 +111,11 @@ def differing_fields(ours: str, theirs: str) -> list[str]:
         (name, *(side.get(name, LEFT_OUT.get(name, "(absent)")) for side in (left, right)))
         for name in sorted(left.keys() | right.keys())
     ]
-    return [f"{name}: here {here}, there {there}" for name, here, there in pairs if here != there]
+    differing = [one for one in pairs if one[1] != one[2]]
+    if any(name == RUNG for name, _, _ in differing):
+        # What the narrow one is like says nothing beside that.
+        differing = [one for one in differing if not one[0].startswith(OF_NARROW)]
+    return [f"{name}: here {here}, there {there}" for name, here, there in differing]
 
 
 def _flatten(value: Any, prefix: str = "") -> dict[str, Any]:

@@ -54,31 +54,33 @@ class NullRecorder:
         """Forget the row."""
 
 
-SENT_CHANNEL = RecordChannel(
-    "symbol",
-    (
-        Field("slot", "integer", "", "slot of the symbol, counted from the first one of sample 0"),
-        Field("symbol", "integer", "", "number of the symbol in the coder's alphabet"),
-        Field("left_ns", "integer", "ns", "flight time at which it left; null: refused", timing=True),
-        Field(
-            "wire_bytes",
-            "integer",
-            "",
-            "of its frame on this kind of line, framing included",
-            timing=True,
-        ),
-    ),
-)
+def _sent(topic: str, slot: Field, symbol: Field) -> RecordChannel:
+    """Return the channel of the symbols that one end sent."""
+    left = Field("left_ns", "integer", "ns", "flight time at which it left; null: refused", timing=True)
+    size = Field(
+        "wire_bytes", "integer", "", "of its frame on this kind of line, framing included", timing=True
+    )
+    return RecordChannel(topic, (slot, symbol, left, size))
 
-ARRIVED_CHANNEL = RecordChannel(
-    "symbol",
-    (
-        Field("slot", "integer", "", "slot of the symbol, counted from the first one of sample 0"),
-        Field("symbol", "integer", "", "number of the symbol in the coder's alphabet"),
-        Field("arrived_ns", "integer", "ns", "when it came, on this clock", timing=True),
-        Field("taken", "boolean", "", "false: its slot was settled already", timing=True),
-    ),
+
+def _arrived(topic: str, slot: Field, symbol: Field) -> RecordChannel:
+    """Return the channel of the symbols that came to one end."""
+    came = Field("arrived_ns", "integer", "ns", "when it came, on this clock", timing=True)
+    taken = Field("taken", "boolean", "", "false: its slot was settled already", timing=True)
+    return RecordChannel(topic, (slot, symbol, came, taken))
+
+
+_UP = (
+    Field("slot", "integer", "", "slot of the symbol, counted from the first one of sample 0"),
+    Field("symbol", "integer", "", "number of the symbol in the coder's alphabet"),
 )
+_DOWN = (
+    Field("slot", "integer", "", "slot of the down symbol, counted from the first one of sample 0"),
+    Field("symbol", "integer", "", "0 or 1"),
+)
+SENT_CHANNEL = _sent("symbol", *_UP)
+ARRIVED_CHANNEL = _arrived("symbol", *_UP)
+DOWN_SENT_CHANNEL = _sent("down_symbol", *_DOWN)
 
 EPOCH_CHANNEL = RecordChannel(
     "epoch",
@@ -90,6 +92,35 @@ EPOCH_CHANNEL = RecordChannel(
         Field("hold", "numbers", "", "command of its first ticks, until one is decided"),
     ),
 )
+
+TWO_WAY_CHANNEL = RecordChannel(
+    "two_way",
+    (
+        Field("sample", "integer", "", "first sample of the epoch"),
+        Field("epoch", "integer", "", "counted from 0"),
+        Field("state", "string", "", "state of the two-way machine, its canonical bytes as hex"),
+    ),
+)
+
+DOWN_SYMBOLS_CHANNEL = RecordChannel(
+    "down_symbols",
+    (
+        Field("sample", "integer", "", "index of the sample"),
+        Field("symbols", "integers", "", "its down symbols in the order of their slots; null: erased"),
+    ),
+)
+
+
+def write_two_way(recorder: Recorder, sample_ns: int, sample: int, epoch: int, packed: bytes) -> None:
+    """Record the packed state of the two-way machine that an epoch starts from."""
+    recorder.write(TWO_WAY_CHANNEL, sample * sample_ns, (sample, epoch, packed.hex()))
+
+
+def write_down_symbols(
+    recorder: Recorder, sample_ns: int, sample: int, symbols: Sequence[int | None]
+) -> None:
+    """Record the down symbols of a sample, as they were sent or as they came."""
+    recorder.write(DOWN_SYMBOLS_CHANNEL, sample * sample_ns, (sample, symbols))
 
 
 def write_epoch(

@@ -8,7 +8,7 @@ as integers, so that the two clocks and the virtual one never disagree by a roun
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from channel.codec.codec import Codec, Vector
 from channel.codec.downlink.layout import Layout, symbols_carried
@@ -25,6 +25,40 @@ Rung = Literal["full", "compact", "narrow"]
 ECHO_BYTES = 10
 ECHOES_MAX = 255
 ECHOES_BYTES_MAX = 16_000
+
+NARROW_LAG_SAMPLES = 512
+"""By how many samples confirmations of the narrow downlink may lag, beyond what is given up."""
+
+
+class SlotGrid(NamedTuple):
+    """The slots of one direction, in flight time."""
+
+    start_ns: int
+    """when slot 0 begins"""
+    sample_ns: int
+    slots: int
+    """of a sample"""
+    delivery_ns: int
+    """how long after its slot begins a symbol is delivered, by agreement"""
+    line_ns: int
+    """how long a line of finite rate takes for it"""
+    allowance_ns: int
+    """how long after its due time it may come"""
+    ahead_ns: int
+    """how long before its slot a symbol may be offered"""
+
+    def slot_ns(self, slot: int) -> int:
+        """Return when a slot begins."""
+        return self.start_ns + slot * self.sample_ns // self.slots
+
+    def due_ns(self, slot: int) -> int:
+        """Return when a slot's symbol is due at the other end."""
+        return self.slot_ns(slot) + self.delivery_ns + self.line_ns
+
+    @property
+    def length_ns(self) -> float:
+        """Return how long a slot lasts."""
+        return self.sample_ns / self.slots
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +99,9 @@ class Terms:
     uplink_line_ns: int = 0
     """on a line of finite rate: how long a symbol is on its way"""
     downlink_line_ns: int = 0
-    """on a line of finite rate: how long a command frame is on its way"""
+    """on a line of finite rate: how long a command frame, or a down symbol, is on its way"""
+    downlink_byte_ns: int = 0
+    """on a line of finite rate: how long a byte takes on the way down"""
 
     @classmethod
     def for_codec(
@@ -147,20 +183,46 @@ class Terms:
         """Return the flight time at which a slot begins."""
         return slot * self.tick_ns * self.ticks_per_sample // self.symbols_per_word
 
-    def down_slot_ns(self, slot: int) -> int:
-        """Return the flight time at which a slot of the narrow downlink begins.
+    @property
+    def up_grid(self) -> SlotGrid:
+        """Return the slots of the uplink."""
+        return SlotGrid(
+            start_ns=0,
+            sample_ns=self.sample_ns,
+            slots=self.symbols_per_word,
+            delivery_ns=self.symbol_delay_ns,
+            line_ns=self.uplink_line_ns,
+            allowance_ns=self.deadline_allowance_ns,
+            ahead_ns=self.sample_ns,
+        )
 
-        The receiver has settled a sample's word by the first slot of the sample.
+    @property
+    def down_grid(self) -> SlotGrid:
+        """Return the slots of the narrow downlink.
+
+        The receiver has settled a sample's word by the first slot of the sample. Where the word came
+        early it did so up to one sample and one allowance before, and offered all symbols then.
         """
-        settled_ns = self.uplink_delivery_ns + self.uplink_line_ns + self.deadline_allowance_ns
-        return settled_ns + slot * self.sample_ns // self.down_symbols
+        sample_ns, count = self.sample_ns, self.down_symbols
+        return SlotGrid(
+            start_ns=self.uplink_delivery_ns + self.uplink_line_ns + self.deadline_allowance_ns,
+            sample_ns=sample_ns,
+            slots=count,
+            delivery_ns=sample_ns // count if self.delivery == "end" else 0,
+            line_ns=self.downlink_line_ns,
+            allowance_ns=self.downlink_budget_ns,
+            ahead_ns=2 * sample_ns + self.deadline_allowance_ns,
+        )
+
+    def down_slot_ns(self, slot: int) -> int:
+        """Return the flight time at which a slot of the narrow downlink begins."""
+        return self.down_grid.slot_ns(slot)
 
     @property
     def down_heard_ns(self) -> int:
         """Return how long after a sample's first tick all its down symbols have come."""
-        delay_ns = self.sample_ns // self.down_symbols if self.delivery == "end" else 0
-        last_ns = self.down_slot_ns(self.down_symbols - 1)
-        return last_ns + delay_ns + self.downlink_line_ns + self.downlink_budget_ns
+        grid = self.down_grid
+        return grid.due_ns(grid.slots - 1) + grid.allowance_ns
 
     def linger_ns(self, line_delay_ns: int) -> int:
         """Return how long after a flight's last tick its last echo may come.
@@ -181,6 +243,13 @@ class Terms:
     def history_samples(self) -> int:
         """Return by how many samples echoes may lag and symbols may jump ahead."""
         return self.samples_in(HISTORY_NS, HISTORY_SAMPLES)
+
+    @property
+    def confirmation_samples(self) -> int:
+        """Return by how many samples confirmations may lag."""
+        if self.downlink == "narrow":
+            return max(NARROW_LAG_SAMPLES, self.history_samples)
+        return self.history_samples
 
     @property
     def lead_needed_ticks(self) -> int:

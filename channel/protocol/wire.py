@@ -67,7 +67,7 @@ _SYMBOL = struct.Struct("<IB")
 _COMMANDS = struct.Struct("<IB")
 _ECHO = struct.Struct("<HQ")
 _TEXT = struct.Struct("<H")
-_SYMBOL_START = bytes((WIRE_VERSION, 4))
+_SYMBOL_STARTS = (bytes((WIRE_VERSION, 4)), bytes((WIRE_VERSION, 10)))
 
 
 class _Body(NamedTuple):
@@ -98,7 +98,7 @@ _OF_FRAME = {one.frame: one for one in _BODIES}
 
 
 class SymbolWire(Protocol):
-    """How a line carries symbols: the paid path of the uplink."""
+    """How a line carries symbols: the paid path of either direction."""
 
     def is_symbol(self, data: bytes) -> bool:
         """Return whether a message of ours carries a symbol."""
@@ -294,12 +294,12 @@ class DatagramWire:
 
     def is_symbol(self, data: bytes) -> bool:
         """Return whether the head of a frame says that it is a symbol."""
-        return data.startswith(_SYMBOL_START)
+        return data.startswith(_SYMBOL_STARTS)
 
     def renumbered(self, data: bytes, shift: int, kinds: int) -> bytes:
         """Return a symbol's frame with another number, its checksum right again."""
         frame = decode(data)
-        if not isinstance(frame, Symbol):
+        if not isinstance(frame, (Symbol, DownSymbol)):
             raise ValueError(f"{frame} is no symbol")
         return encode(replace(frame, number=(frame.number + shift) % kinds))
 

@@ -23,6 +23,7 @@ from channel.protocol.frames import (
     Claim,
     Commands,
     Desync,
+    DownSymbol,
     Echo,
     Frame,
     Hello,
@@ -70,6 +71,13 @@ FRAMES: dict[str, tuple[Frame, tuple[Field, ...]]] = {
                 "u8",
                 "place of the symbol in the alphabet; of the paper's, 0 is -1 and 1 is +1",
             ),
+        ),
+    ),
+    "down_symbol": (
+        DownSymbol(SESSION, EPOCH, 1401, 1),
+        (
+            Field("slot", "u32", "counted from the first down symbol of sample 0"),
+            Field("number", "u8", "0 or 1"),
         ),
     ),
     "commands": (

@@ -1,29 +1,19 @@
-"""From words to commands: the receiver's copy of the codec, its controller, and the echoes.
+"""From words to what goes down for them: an interface.
 
-The session decides which word was received; this module applies it. Each word advances the codec by
-one sample, the controller is asked for the commands of the sample's ticks `D` ahead, and what was
-consumed and decided becomes an echo. It knows no slot, no frame and no peer.
+The session decides which word was received; a commander applies it. Each word advances its state by
+one sample and settles the commands of the sample's ticks `D` ahead. It knows no slot and no peer.
+`receiver.session.echoes` sends exact commands and echoes, `receiver.session.narrow` down symbols.
 """
 
 from __future__ import annotations
 
-from collections import Counter, deque
-from collections.abc import Callable, Sized
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple, Protocol, TypeAlias
 
-from channel.codec.codec import Codec, CodecState, Vector, Word
-from channel.codec.lead import FlownSample, fly_sample
-from channel.errors import CodecDiverged
-from channel.protocol.compact import compact_form
-from channel.protocol.events import Event, EventKind, Failing, Tell
-from channel.protocol.frames import Echo
-from channel.protocol.limits import are_plausible, from_steps, to_steps
+from channel.codec.codec import CodecState, Vector, Word
+from channel.codec.downlink.machine import TwoWayState
+from channel.protocol.frames import Frame
 from channel.protocol.lockstep import History
-from channel.protocol.recording import Recorder
-from channel.protocol.terms import Terms
-from receiver.controllers.base import Controller
-from receiver.session.records import write_commands, write_sample
-from receiver.session.rejoin import carried_to
 
 Begins = Callable[[int, Vector], None]
 """Is called where the flight begins afresh, with the tick and the outputs estimated there."""
@@ -31,7 +21,7 @@ UNWRITTEN_MAX = 32
 """Samples that may be flown before they are recorded even if nobody finds the time."""
 
 
-class Standing(NamedTuple):
+class EchoStanding(NamedTuple):
     """The state of a flight that determines the next epoch."""
 
     state: CodecState
@@ -39,167 +29,47 @@ class Standing(NamedTuple):
     commands: tuple[Vector, ...]
 
 
-class _Flown(NamedTuple):
-    before: CodecState
-    word: Word
-    flown: FlownSample
-    digest: int
-    now_ns: int
+Standing: TypeAlias = EchoStanding | TwoWayState
 
 
-class Commander:
-    """Flies samples; see the module's text.
+class Start(NamedTuple):
+    """What a welcome says of the state that an epoch starts from."""
 
-    `counts` gets `bad_commands` and `bad_references`, and `emit` gets an event for the first of each.
-    """
+    hold_steps: tuple[int, ...]
+    state: bytes
 
-    def __init__(
-        self,
-        codec: Codec,
-        terms: Terms,
-        controller: Controller,
-        recorder: Recorder,
-        counts: Counter[str],
-        emit: Tell,
-        begins: Begins | None = None,
-    ) -> None:
-        self._begins = begins
-        self.codec = codec
-        self.terms = terms
-        self.state = codec.initial()
-        self.history = History(codec, 2 * terms.history_samples)
-        self.hold = terms.initial_command
-        """last command decided"""
-        self._controller = controller
-        self._no_references: tuple[float | None, ...] = (None,) * len(terms.signals.outputs)
-        self._recorder = recorder
-        self._counts = counts
-        self._emit = emit
-        self._commands: deque[Vector] = deque([self.hold] * terms.lead_ticks)
-        """of the next `D` ticks"""
-        self._echoes: deque[Echo] = deque(maxlen=terms.repeats + 1)
-        self._steps: list[int] = []
-        """decided for the sample that is being flown"""
-        self.compact = compact_form(codec, terms)
-        self._unwritten: list[_Flown] = []
-        self.first_problem = ""
-        """of the controller's commands"""
+
+class Commander(Protocol):
+    """Flies samples; see the module's text."""
+
+    history: History
+
+    @property
+    def state(self) -> CodecState:
+        """Return the codec's state before the next sample."""
+
+    @property
+    def first_problem(self) -> str:
+        """Return what was wrong with the controller's first bad command; empty without one."""
 
     @property
     def standing(self) -> Standing:
         """Return where the flight stands, to be gone back to."""
-        return Standing(self.state, self.hold, tuple(self._commands))
 
     def go_back(self, standing: Standing) -> None:
         """Stand where the flight stood before."""
-        self.state, self.hold, commands = standing
-        self._commands = deque(commands)
-        self._echoes.clear()
 
     def restart(self, sample: int) -> None:
-        """Begin afresh at a sample, from the codec's initial state and command."""
-        self.write_down()
-        self.state = self.codec.initial()._replace(sample=sample)
-        self._hold(self.terms.initial_command)
-        if self._begins is not None:
-            outputs = self.codec.model.measured(self.state.model)
-            self._begins(sample * self.terms.ticks_per_sample, outputs)
+        """Begin afresh at a sample, from the initial state and command."""
 
     def carry_on(self, sample: int, silent_samples: int) -> None:
-        """Begin an epoch at a later sample, the state carried there under the last command.
+        """Begin an epoch at a later sample, the state carried there; the last samples had no symbol."""
 
-        `silent_samples` had no symbol before.
-        """
-        known = tuple(self._commands)
-        self.state = carried_to(
-            self.codec, self.state, sample, known, self.hold, silent_samples, self.terms.history_samples
-        )
-        self._hold(self.hold)
+    def begin(self, epoch: int, *, afresh: bool) -> Start:
+        """Record the start of an epoch; return what the other end is to start from."""
 
-    def _hold(self, command: Vector) -> None:
-        self.hold = command
-        self._commands = deque([command] * self.terms.lead_ticks)
-        self._echoes.clear()
-
-    def fly(self, word: Word, epoch: int, now_ns: int) -> tuple[Echo, ...]:
-        """Consume the word of the next sample; return its echo after those that it repeats."""
-        before = self.state
-        self._steps = []
-        try:
-            flown = self._flown(word)
-        except (ArithmeticError, ValueError) as error:
-            raise CodecDiverged(f"the estimate diverged in sample {before.sample}: {error}") from error
-        self._commands.extend(flown.commands)
-        for _ in range(len(self._commands) - self.terms.lead_ticks):
-            self._commands.popleft()
-        self.state = flown.state
-        self.history.add(epoch, word, self.state)
-        digest = self.codec.digest(self.state)
-        number = self.codec.coder.alphabet.word_number(word)
-        self._echoes.append(Echo(before.sample, number, digest, tuple(self._steps)))
-        self._unwritten.append(_Flown(before, word, flown, digest, now_ns))
-        if len(self._unwritten) >= UNWRITTEN_MAX:
-            self.write_down()
-        return tuple(self._echoes)
-
-    def _flown(self, word: Word) -> FlownSample:
-        """Fly a sample with the commands that the controller decides, or with their mean held."""
-        known, held = tuple(self._commands), self.hold
-        flown = fly_sample(self.codec, self.state, word, known, self._decide)
-        if self.compact is None:
-            return flown
-        # The law's first command, held, would steer half a sample late. The mean moves the plant as the
-        # law's own course would, and the law is asked at every tick as ever.
-        steps = self.compact.held(flown.commands, held)
-        self.hold = from_steps(steps, self.terms.signals)
-        self._steps = [*steps] * self.terms.ticks_per_sample
-        return fly_sample(self.codec, self.state, word, known, lambda _tick, _state: self.hold)
+    def fly(self, word: Word, session: int, epoch: int, now_ns: int) -> list[Frame]:
+        """Consume the word of the next sample; return the frames to send for it."""
 
     def write_down(self) -> None:
-        """Record the samples since the last call. It can wait until the commands were sent."""
-        unwritten, self._unwritten = self._unwritten, []
-        for before, word, flown, digest, now_ns in unwritten:
-            ranges = self.codec.coder.ranges(before.coder)
-            write_sample(self._recorder, self.terms, word, ranges, flown.state, digest, now_ns)
-            write_commands(self._recorder, self.terms, before.sample, flown, self._references)
-
-    def _decide(self, tick: int, state: Vector) -> Vector:
-        """Ask the controller, limit its command, and return it as sent on the wire."""
-        limited = self.terms.limits.apply(self._ask(tick, state), self.hold)
-        steps = to_steps(limited, self.terms.signals)
-        self._steps += steps
-        self.hold = from_steps(steps, self.terms.signals)
-        return self.hold
-
-    def _references(self, tick: int) -> tuple[float | None, ...]:
-        try:
-            references = self._controller.references(tick)
-            if len(references) == len(self._no_references):
-                return references
-            if len(references) < len(self._no_references):
-                return (*references, *self._no_references[len(references) :])
-            problem = f"{len(references)} set-points for {len(self._no_references)} output(s)"
-        except Exception as error:  # the user's code too, and only a column of the recording
-            problem = f"{type(error).__name__}: {error}"
-        self._counts["bad_references"] += 1
-        if self._counts["bad_references"] == 1:
-            self._emit(Event(EventKind.CONTROLLER, tick=tick, cause=Failing.REFERENCE, detail=problem))
-        return self._no_references
-
-    def _ask(self, tick: int, state: Vector) -> Vector:
-        """Return the controller's command; its last one if it fails or is not finite."""
-        command: Vector = ()
-        try:
-            command = self._controller.command(tick, state)
-            if len(command) == len(self.hold) and are_plausible(command):
-                return command
-            problem = f"wants {command}"
-        except Exception as error:  # a controller is the user's code; the flight goes on without it
-            problem = f"failed: {type(error).__name__}: {error}"
-            if not isinstance(command, Sized):
-                problem = f"wants {command!r}, and not a tuple of {len(self.hold)} number(s)"
-        self._counts["bad_commands"] += 1
-        if self._counts["bad_commands"] == 1:
-            self.first_problem = problem
-            self._emit(Event(EventKind.CONTROLLER, tick=tick, cause=Failing.COMMAND, detail=problem))
-        return self.hold
+        """Record the samples since the last call. It can wait until the frames were sent."""

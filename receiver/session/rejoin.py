@@ -46,6 +46,9 @@ AHEAD_SAMPLES_MAX = 8
 """This end counts samples by its own clock, so it is hardly ahead of the transmitter. If it is by more,
 symbols that nobody sent have moved it on, and the start is the transmitter's."""
 
+LEAD_SAMPLES_MAX = 32
+"""How far ahead of its request an answer begins at most, beyond the command lead."""
+
 KNOWN_MAX = 64
 """Transmitters remembered as admitted."""
 
@@ -77,7 +80,12 @@ class Greeter:
 
     def __init__(self, terms: Terms) -> None:
         self._answer_age_max = terms.samples_in(ANSWER_AGE_NS, ANSWER_AGE_SAMPLES_MAX)
-        self._ahead_max = AHEAD_SAMPLES_MAX + _lead_samples(terms)
+        self._lead_agreed = _lead_samples(terms)
+        self._may_double = terms.downlink == "narrow"
+        self._lead = 0
+        """of the last answer, in samples"""
+        self._answered: Hello | None = None
+        """the request that the last answer was for"""
         self.welcome: Welcome | None = None
         """last answer given"""
         self._unknown_incarnation: int | None = None
@@ -90,6 +98,21 @@ class Greeter:
 
     def answer_with(self, welcome: Welcome) -> None:
         self.welcome = welcome
+
+    def lead_samples(self, hello: Hello) -> int:
+        """Return how far ahead of a request its answer is to begin.
+
+        That is the command lead, which is as long as a round trip. The narrow downlink may have none:
+        there a request that is repeated although it was answered is answered further and further ahead.
+        """
+        before, self._answered = self._answered, hello
+        lead = self._lead_agreed
+        if self._may_double:
+            asked = (hello.incarnation, hello.request)
+            if before is not None and (before.incarnation, before.request) == asked:
+                lead = max(lead, min(2 * self._lead + ANSWER_AGE_SAMPLES_MAX, LEAD_SAMPLES_MAX))
+        self._lead = lead
+        return lead
 
     def judge(
         self, hello: Hello, identity: Identity, advanced: bool, silent_slots: int, in_reach: bool
@@ -117,7 +140,8 @@ class Greeter:
     def _still_stands(self, first: int, hello: Hello) -> bool:
         """Return whether a transmitter that asks like this can still begin at this sample."""
         ahead = first - hello.sample
-        return -self._answer_age_max <= ahead and (not hello.sample or ahead <= self._ahead_max)
+        ahead_max = AHEAD_SAMPLES_MAX + max(self._lead_agreed, self._lead)
+        return -self._answer_age_max <= ahead and (not hello.sample or ahead <= ahead_max)
 
     def _admit(self, hello: Hello, identity: Identity) -> Verdict:
         if difference(hello, identity) is not None:
@@ -174,7 +198,7 @@ def difference(hello: Hello, ours: Identity) -> str | None:
     return None
 
 
-def first_sample(hello: Hello, own: int, terms: Terms, begun: bool) -> int:
+def first_sample(hello: Hello, own: int, lead_samples: int, begun: bool) -> int:
     """Return where a session or an epoch begins; `own` is this end's next sample.
 
     At the very start of both there is no line to wait for: tick 0 has not come yet. A transmitter that
@@ -182,7 +206,7 @@ def first_sample(hello: Hello, own: int, terms: Terms, begun: bool) -> int:
     """
     if not begun and hello.sample == 0:
         return own
-    first = hello.sample + _lead_samples(terms)
+    first = hello.sample + lead_samples
     return first if hello.sample and own - first > AHEAD_SAMPLES_MAX else max(own, first)
 
 

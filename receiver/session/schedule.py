@@ -57,7 +57,8 @@ class Schedule:
 
     def __init__(self, terms: Terms) -> None:
         self._terms = terms
-        self._slot_ns = terms.sample_ns / terms.symbols_per_word
+        self._grid = terms.up_grid
+        self._slot_ns = self._grid.length_ns
         self._early_ns = EARLY_SAMPLES * terms.sample_ns + terms.deadline_allowance_ns
         self._zero_ns = 0
         """when slot 0 was, or would have been, due"""
@@ -73,6 +74,10 @@ class Schedule:
         self._heard_ns = now_ns
         self._is_guess = True
         self._rival = None
+
+    def flight_ns(self, now_ns: int) -> int:
+        """Return the flight time as this end knows it: a way up later than at the transmitter."""
+        return now_ns - self._zero_ns + self._grid.due_ns(0)
 
     def reaches(self, sample: int, now_ns: int) -> bool:
         """Return whether the transmitter's clock can say that this sample is the next."""

@@ -16,13 +16,13 @@ from dataclasses import replace
 from enum import Enum
 
 from channel.codec.codec import ERASED, Codec, CodecState
+from channel.codec.downlink.machine import TwoWay
 from channel.line.meters import BaudMeter
 from channel.protocol.bounds import Bounds, within_text_bounds
 from channel.protocol.endings import End, Ending
 from channel.protocol.events import Dropped, Event, EventKind, Presence, ended_event, write_event
 from channel.protocol.frames import (
     Bye,
-    Commands,
     Desync,
     ForeignVersion,
     Frame,
@@ -34,13 +34,15 @@ from channel.protocol.frames import (
     Welcome,
 )
 from channel.protocol.identity import Identity
-from channel.protocol.limits import to_steps
 from channel.protocol.lockstep import History, difference_event, write_failure
-from channel.protocol.recording import NullRecorder, Recorder, write_epoch
+from channel.protocol.recording import NullRecorder, Recorder
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
 from receiver.controllers.base import Controller
+from receiver.session.asking import Asker
 from receiver.session.commander import Begins, Commander
+from receiver.session.echoes import EchoCommander
+from receiver.session.narrow import NarrowCommander
 from receiver.session.records import write_symbol
 from receiver.session.rejoin import Greeter, Takeover, Verdict, desync_answer, difference, first_sample
 from receiver.session.schedule import Proven, Schedule, SlotClock, Timing
@@ -60,7 +62,8 @@ class ReceiverSession:
     """Converts symbols to commands; see the module's text.
 
     `session_number` is drawn by the caller (32 bits, not zero), so that the session itself stays
-    deterministic. `take_over`: claim a flight that another receiver has.
+    deterministic. `take_over`: claim a flight that another receiver has. `two_way`: the state machine
+    of the narrow downlink.
     """
 
     def __init__(
@@ -74,6 +77,7 @@ class ReceiverSession:
         *,
         take_over: bool = False,
         begins: Begins | None = None,
+        two_way: TwoWay | None = None,
     ) -> None:
         self.codec = codec
         self.terms = terms
@@ -93,8 +97,11 @@ class ReceiverSession:
         self._greeter = Greeter(terms)
         self._takeover = Takeover(session_number, take_over)
         self._recorder = recorder or NullRecorder()
-        self._commander = Commander(
-            codec, terms, controller, self._recorder, self.counts, self._emit, begins
+        asker = Asker(controller, len(terms.signals.outputs), self.counts, self._emit)
+        self._commander: Commander = (
+            EchoCommander(codec, terms, asker, self._recorder, begins)
+            if two_way is None
+            else NarrowCommander(two_way, terms, asker, self._recorder, begins)
         )
         self._clock = SlotClock(terms)
         self._word: list[int | None] = []
@@ -118,6 +125,10 @@ class ReceiverSession:
     def due_slot(self) -> int | None:
         """Return the slot that is not settled yet; None while no flight is on."""
         return self._clock.slot if self.phase is Phase.FLYING else None
+
+    def flight_ns(self, now_ns: int) -> int:
+        """Return the flight time by which down symbols have their slots."""
+        return self._schedule.flight_ns(now_ns)
 
     @property
     def history(self) -> History:
@@ -214,11 +225,12 @@ class ReceiverSession:
     def _begin(self, hello: Hello, now_ns: int) -> list[Frame]:
         """Begin a session, or a new epoch of it; return the answer."""
         last = self._greeter.welcome
-        state = b""
         own = self._stand_where_proven(last)
         proven = self._proven.incarnation
-        first = first_sample(hello, own, self.terms, begun=proven is not None)
+        lead = self._greeter.lead_samples(hello)
+        first = first_sample(hello, own, lead, begun=proven is not None)
         count = self.terms.symbols_per_word
+        same = hello.incarnation == (last and last.incarnation if proven is None else proven)
         if last is None:
             self.phase = Phase.FLYING
             self.refusal = None
@@ -230,22 +242,18 @@ class ReceiverSession:
             self.epoch += 1
             self.counts["rejoins"] += 1
             self.counts["samples_skipped"] += max(0, first - self.state.sample)
-            if hello.incarnation == (last.incarnation if proven is None else proven):
+            if same:
                 self._commander.carry_on(first, self._proven.silent_slots // count)
-                state = self.codec.pack(self.state)
             else:
                 # A restarted rig is at rest, and so is its estimate.
                 self._commander.restart(first)
         self._clock, self._word, self._advanced = SlotClock(self.terms, first * count), [], False
         self._schedule = Schedule(self.terms)
         self._schedule.begin(first * count, now_ns)
-        hold = self._commander.hold
-        told = () if hold == self.terms.initial_command else to_steps(hold, self.terms.signals)
+        start = self._commander.begin(self.epoch, afresh=last is None or not same)
         asked = (hello.incarnation, hello.request)
-        welcome = Welcome(self.session_number, self.epoch, first, *asked, told, state)
+        welcome = Welcome(self.session_number, self.epoch, first, *asked, *start)
         self._greeter.answer_with(welcome)
-        self._commander.write_down()
-        write_epoch(self._recorder, self.terms.sample_ns, self.epoch, self.state, hold)
         kind = EventKind.STARTED if last is None else EventKind.REJOIN
         self._emit(Event(kind, first, session=self.session_number, epoch=self.epoch))
         return [welcome]
@@ -353,10 +361,7 @@ class ReceiverSession:
         self._word = []
         word = tuple(symbols) if whole else ERASED
         self.counts.update(samples=1, erasures=int(not whole))
-        echoes = self._commander.fly(word, self.epoch, now_ns)
-        if self._commander.compact is not None:
-            return [self._commander.compact.packed(self.session_number, self.epoch, echoes)]
-        return [Commands(self.session_number, self.epoch, echoes)]
+        return self._commander.fly(word, self.session_number, self.epoch, now_ns)
 
     # Ends and reports
 

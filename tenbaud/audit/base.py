@@ -122,6 +122,11 @@ class Evidence:
         return self.record.summaries.get(end, {})
 
     @cached_property
+    def doubted(self) -> set[int]:
+        """Samples to whose state other inputs lead as well, so that the transmitter's may be others."""
+        return {row.sample for row in self.topic("transmitter", "confirmed") if row.doubt}
+
+    @cached_property
     def is_virtual(self) -> bool:
         """Whether both ends flew on one clock, the transmitter's virtual one."""
         return self.agreement.clock == "virtual" and not self.agreement.faults.bad_clock

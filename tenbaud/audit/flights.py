@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import random
+from typing import NamedTuple
 
-from channel.codec.codec import CodecState, Vector
+from channel.codec.codec import ERASED, CodecState, Vector
+from channel.codec.downlink.machine import TwoWayState
 from receiver.session.rejoin import carried_to
 from tenbaud.audit.base import Evidence, claim
 from tenbaud.replay.control import RecordedCommands
@@ -13,6 +15,17 @@ from tenbaud.replay.refly import Reflown, refly
 
 JITTERED_FLIGHTS = 2
 JITTER_SEED = 20260
+
+
+class _Before(NamedTuple):
+    """Where an epoch ended."""
+
+    state: CodecState
+    known: list[Vector]
+    """commands of the next ticks"""
+    hold: Vector
+    both: TwoWayState | None
+    """of a narrow downlink"""
 
 
 @claim("every word was flown")
@@ -35,28 +48,30 @@ def check_starts(evidence: Evidence) -> None:
     flown: dict[int, list[Reflown]] = {}
     for one in evidence.flown:
         flown.setdefault(one.place, []).append(one)
-    before: tuple[CodecState, list[Vector], Vector] | None = None
+    before: _Before | None = None
     for index, epoch in enumerate(evidence.epochs):
         place = evidence.at(evidence.record.consumer, "epoch", f"epoch {epoch.number}")
         is_initial = epoch.start == codec.initial()._replace(sample=epoch.start.sample)
         if not is_initial and (before is None or not has_receiver):
             place.gap("state", "it starts from a state whose past is not recorded here")
-        elif not is_initial and before is not None and not _is_carried(evidence, epoch, *before[:2]):
+        elif not is_initial and before is not None and not _is_carried(evidence, epoch, before):
             what = "it starts from a state that does not follow from the one before it"
             place.leak("state", what, f"sample {epoch.start.sample}")
         allowed = [terms.initial_command] if is_initial else []
         if before is not None:
-            allowed.append(before[2])
+            allowed.append(before.hold)
         if allowed and has_receiver and epoch.hold not in allowed:
             detail = f"{epoch.hold}, not {' or '.join(map(str, allowed))}"
             place.leak("hold", "the command before it was another", detail)
         samples = flown.get(index, [])
         commands = [command for one in samples for _, _, _, command in one.ticks]
         known = ([epoch.hold] * lead + commands)[-lead:] if lead else []
-        state = epoch.start
+        state, both = epoch.start, epoch.two_way
         if samples:
-            state = CodecState(samples[-1].sample + 1, samples[-1].model, samples[-1].coder)
-        before = (state, known, commands[-1] if commands else epoch.hold)
+            last = samples[-1]
+            state = CodecState(last.sample + 1, last.model, last.coder)
+            both = last.both and last.both.state
+        before = _Before(state, known, commands[-1] if commands else epoch.hold, both)
 
 
 @claim("arrival times within the deadlines do not matter")
@@ -68,7 +83,8 @@ def check_jitter(evidence: Evidence) -> None:
     expected = [one.digest for one in flown]
     # Given what each flight commanded, so that a controller without a place here is no hindrance.
     commands = {tick: command for one in flown for tick, _, _, command in one.ticks}
-    for seed in range(JITTERED_FLIGHTS):
+    # What a narrow downlink sent follows from the controller: `tenbaud.audit.downlink` flies it.
+    for seed in range(JITTERED_FLIGHTS if evidence.agreement.two_way is None else 0):
         noise = random.Random(JITTER_SEED + seed)
 
         def delay(_slot: int, noise: random.Random = noise) -> int:
@@ -85,8 +101,16 @@ def check_jitter(evidence: Evidence) -> None:
         evidence.jittered_states += len(digests)
 
 
-def _is_carried(evidence: Evidence, epoch: Epoch, state: CodecState, known: list[Vector]) -> bool:
-    codec = evidence.agreement.codec
-    carried = carried_to(codec, state, epoch.start.sample, known, epoch.hold, 0)
-    # After a long pause the coder starts anew.
-    return epoch.start in (carried, carried._replace(coder=codec.coder.initial()))
+def _is_carried(evidence: Evidence, epoch: Epoch, before: _Before) -> bool:
+    codec, machine = evidence.agreement.codec, evidence.agreement.two_way
+    anew = codec.coder.initial()  # after a long pause the coder starts anew
+    if machine is None:
+        carried = carried_to(codec, before.state, epoch.start.sample, before.known, epoch.hold, 0)
+        return epoch.start in (carried, carried._replace(coder=anew))
+    both = before.both
+    while both is not None and both.sample < epoch.start.sample:
+        both = machine.step(both, ERASED, (None,) * machine.commands_in(both)).state
+    return both is not None and epoch.two_way in (
+        both,
+        both._replace(codec=both.codec._replace(coder=anew)),
+    )

@@ -13,9 +13,11 @@ KEYED = (
     ("transmitter", "estimate"),
     ("transmitter", "sample"),
     ("transmitter", "gap"),
+    *(("transmitter", topic) for topic in ("down_symbols", "confirmed", "hypotheses")),
     ("transmitter", "device"),
     ("receiver", "tick"),
     ("receiver", "sample"),
+    ("receiver", "down_symbols"),
 )
 """Topics whose rows have a key each; that of every row is larger than the one before."""
 
@@ -91,6 +93,8 @@ def _filed_under(end: str, topic: str, row: Any, terms: Terms) -> int | None:
         case "symbol":
             if end == "receiver":
                 return terms.slot_ns(row.slot)
+            return None if row.left_ns is None else int(row.left_ns)
+        case "down_symbol":
             return None if row.left_ns is None else int(row.left_ns)
         case "event":
             return round(float(row.time_s) * 1e9)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
@@ -20,13 +21,25 @@ def check_recorded(evidence: Evidence) -> None:
             evidence.at(end, "epoch", "first epoch").gap("", "no epochs were recorded")
 
 
-@claim("one symbol a slot, while it lasts", ("transmitter", "symbol", "slot", "symbol", "left_ns"))
+SENDS = (("transmitter", "symbol"), ("receiver", "down_symbol"))
+"""Who sends symbols in slots, and the topic of those that it offered to the line."""
+
+
+@claim("one symbol a slot, while it lasts", *((*where, "slot", "symbol", "left_ns") for where in SENDS))
 def check_slots(evidence: Evidence) -> None:
     """At most one symbol a slot, in the order of slots, each while its slot lasts."""
     terms = evidence.terms
+    _check_slots(evidence, SENDS[0], terms.slot_ns, len(evidence.alphabet.symbols))
+    if terms.downlink == "narrow":
+        _check_slots(evidence, SENDS[1], terms.down_slot_ns, 2)
+
+
+def _check_slots(
+    evidence: Evidence, where: tuple[str, str], slot_ns: Callable[[int], int], symbols: int
+) -> None:
     before: Any = None
-    for place, row in evidence.each("transmitter", "symbol"):
-        if not 0 <= row.symbol < len(evidence.alphabet.symbols):
+    for place, row in evidence.each(*where):
+        if not 0 <= row.symbol < symbols:
             place.leak("symbol", "it is not in the coder's alphabet", f"{row.symbol}")
         if row.left_ns is None:
             continue
@@ -35,7 +48,7 @@ def check_slots(evidence: Evidence) -> None:
         elif before is not None and row.slot < before.slot:
             place.leak("slot", "it is out of order", f"after slot {before.slot}")
         before = row
-        begins, ends = terms.slot_ns(row.slot), terms.slot_ns(row.slot + 1)
+        begins, ends = slot_ns(row.slot), slot_ns(row.slot + 1)
         if row.left_ns < begins:
             early = f"{(begins - row.left_ns) / 1e6:.3f} ms too early"
             place.leak("left_ns", "it left before its slot began", early)
@@ -46,17 +59,17 @@ def check_slots(evidence: Evidence) -> None:
             place.leak("left_ns", "on the virtual clock a symbol leaves as its slot begins")
 
 
-@claim("bytes of a symbol", ("transmitter", "symbol", "wire_bytes"))
+@claim("bytes of a symbol", *((*where, "wire_bytes") for where in SENDS))
 def check_bytes(evidence: Evidence) -> None:
     """All symbols that left took as many bytes on the line, those that did not took none."""
-    rows = evidence.topic("transmitter", "symbol")
-    sizes = [row.wire_bytes for row in rows if row.left_ns is not None]
-    usual = max(set(sizes), key=sizes.count) if sizes else 0
-    for place, row in evidence.each("transmitter", "symbol"):
-        wanted = 0 if row.left_ns is None else usual
-        if row.wire_bytes != wanted or (row.left_ns is not None and row.wire_bytes < 1):
-            detail = f"{row.wire_bytes}, not {wanted}"
-            place.leak("wire_bytes", "this is not a symbol's size", detail)
+    for where in SENDS:
+        sizes = [row.wire_bytes for row in evidence.topic(*where) if row.left_ns is not None]
+        usual = max(set(sizes), key=sizes.count) if sizes else 0
+        for place, row in evidence.each(*where):
+            wanted = 0 if row.left_ns is None else usual
+            if row.wire_bytes != wanted or (row.left_ns is not None and row.wire_bytes < 1):
+                detail = f"{row.wire_bytes}, not {wanted}"
+                place.leak("wire_bytes", "this is not a symbol's size", detail)
 
 
 @claim(

@@ -22,8 +22,7 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
-from scipy.linalg import solve_continuous_are, solve_discrete_lyapunov
-from scipy.optimize import brentq
+import scipy
 
 from tenbaud.bounds.closed import LN2
 from tenbaud.bounds.convex import Value, log_determinant, minimise, traces
@@ -175,7 +174,7 @@ def _start(model: LinearModel, rate_nats: float) -> Matrix:
 
     def covariance(log_gain: float) -> Matrix:
         seen = identity * math.exp(log_gain)
-        found = solve_continuous_are(model.dynamics.T, seen, model.noise, identity)
+        found = scipy.linalg.solve_continuous_are(model.dynamics.T, seen, model.noise, identity)
         return np.asarray(0.5 * (found + found.T))
 
     def excess(log_gain: float) -> float:
@@ -186,7 +185,7 @@ def _start(model: LinearModel, rate_nats: float) -> Matrix:
         low -= 1.0
     while excess(high) < 0.0:
         high += 1.0
-    return covariance(brentq(excess, low, high, xtol=1e-3))
+    return covariance(scipy.optimize.brentq(excess, low, high, xtol=1e-3))
 
 
 class _Flow:
@@ -245,7 +244,7 @@ class _Words:
             # P = share (F P F' + Q) is a fixed point for a share that contracts; its rate is
             # -n/2 log share, all of the states' directions alike.
             contracting = math.sqrt(share) * self.transition
-            return np.asarray(solve_discrete_lyapunov(contracting, share * self.noise))
+            return np.asarray(scipy.linalg.solve_discrete_lyapunov(contracting, share * self.noise))
         return self._riccati_start(rate_nats)
 
     def _riccati_start(self, rate_nats: float) -> Matrix:
@@ -269,7 +268,7 @@ class _Words:
         def excess(log_gain: float) -> float:
             return self.rate(after(math.exp(log_gain)), basis).value - wanted
 
-        return after(math.exp(brentq(excess, -30.0, 30.0, xtol=1e-3)))
+        return after(math.exp(scipy.optimize.brentq(excess, -30.0, 30.0, xtol=1e-3)))
 
     def rate(self, covariance: Matrix, basis: Matrix) -> Value:
         images = self.transition @ basis @ self.transition.T

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import expm
 
 Matrix: TypeAlias = NDArray[np.float64]
 
@@ -155,7 +155,7 @@ def van_loan(dynamics: Matrix, noise: Matrix, period_s: float) -> tuple[Matrix, 
     block[:states, :states] = -dynamics
     block[:states, states:] = noise
     block[states:, states:] = dynamics.T
-    exponential = expm(block * period_s)
+    exponential = scipy.linalg.expm(block * period_s)
     transition = exponential[states:, states:].T
     covariance = transition @ exponential[:states, states:]
     return transition, 0.5 * (covariance + covariance.T)

@@ -15,7 +15,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eigh, null_space
+import scipy
 
 from channel.codec.codec import Codec
 from tenbaud.bounds.linear import Matrix
@@ -134,7 +134,7 @@ def _combinations(
         reached = np.zeros((samples * count, size))
         reached[(push + 1) * count :] = np.concatenate(seen[: samples - push - 1])
         pushed += reached @ noise @ reached.T
-    free = null_space(np.concatenate(seen).T).T
+    free = scipy.linalg.null_space(np.concatenate(seen).T).T
     read = free * np.tile(steps, samples) @ free.T
-    variances, vectors = eigh(free @ pushed @ free.T, read)
+    variances, vectors = scipy.linalg.eigh(free @ pushed @ free.T, read)
     return vectors.T @ free, np.maximum(variances, 0.0)

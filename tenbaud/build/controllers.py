@@ -177,6 +177,13 @@ def _rate_of(
     return Difference(value, context.tick_s)
 
 
+def rate_states(controller: PidLoops, signals: Signals) -> tuple[int, ...]:
+    """Return for each loop the state that is its output's rate; -1: the change of the output."""
+    places = tuple(float(place) for place in range(len(signals.states)))
+    rates = [loop.rate for loop in controller.loops]
+    return tuple([-1 if isinstance(one, Difference) else int(one(places)) for one in rates])
+
+
 class Difference:
     """The change of an output from one tick to the next, per second."""
 

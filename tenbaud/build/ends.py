@@ -10,6 +10,7 @@ from functools import partial
 
 from channel.codec.codec import Codec
 from channel.codec.coders.direction import DirectionCoder
+from channel.codec.downlink.layout import DOWN_ALPHABET
 from channel.codec.models.learned import plant_model
 from channel.codec.models.linear import LinearModel
 from channel.line.clocks import SkewedClock
@@ -23,6 +24,7 @@ from receiver.endpoint import ReceiverEndpoint, SteppedEndpoint
 from receiver.session.session import ReceiverSession
 from tenbaud.build.codec import build_codec
 from tenbaud.build.controllers import build_controller
+from tenbaud.build.downlink import with_codec
 from tenbaud.build.first_contact import require_safe
 from tenbaud.build.flight import Agreement, ticks_of, watchdog_wanted_s
 from tenbaud.build.flight_log import output_steps
@@ -45,8 +47,9 @@ from transmitter.session.state_observer import StateObserver, rate_observer
 def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> TransmitterNode:
     """Return the sensor node of a configuration."""
     config, terms = agreement.config, agreement.terms
+    codec = sabotaged(agreement.codec, config.transmitter.sabotage, agreement.live)
     session = TransmitterSession(
-        sabotaged(agreement.codec, config.transmitter.sabotage, agreement.live),
+        codec,
         terms,
         agreement.identity,
         secrets.randbits(32),
@@ -54,12 +57,14 @@ def build_transmitter(agreement: Agreement, recorder: Recorder | None) -> Transm
         stop_on_desync=config.transmitter.on_desync == "stop",
         state_observer=build_observer(agreement),
         overtaking_ticks=overtaking_ticks(terms, agreement.faults),
+        two_way=with_codec(agreement.two_way, codec),
+        line_delay_ns=agreement.faults.longest_delay_ns,
     )
     gauge = build_gauge(agreement)
     scores = Scores(
         agreement.codec.model,
         agreement.window_start_tick,
-        (terms.history_samples + 2) * terms.ticks_per_sample,
+        (terms.confirmation_samples + 2) * terms.ticks_per_sample,
         _followed(agreement),
         gauge.on_errors if gauge is not None else lambda _errors: None,
     )
@@ -121,7 +126,7 @@ def build_line(agreement: Agreement, direction: Direction, wire: SymbolWire) -> 
     one = agreement.faults.up if direction == "up" else agreement.faults.down
     if not one.any and not agreement.live:
         return CleanLine()
-    alphabet = agreement.codec.coder.alphabet
+    alphabet = agreement.codec.coder.alphabet if direction == "up" else DOWN_ALPHABET
     return ImpairedLine(one, alphabet, f"{agreement.config.seed} {direction}", wire)
 
 
@@ -149,9 +154,11 @@ def build_receiver(
     if references is None and agreement.parts.controller is None:
         model = agreement.codec.model
         references = build_references(agreement.config, agreement.signals, model)
+    terms = agreement.terms
+    codec = sabotaged(agreement.codec, agreement.config.receiver.sabotage, agreement.live)
     session = ReceiverSession(
-        sabotaged(agreement.codec, agreement.config.receiver.sabotage, agreement.live),
-        agreement.terms,
+        codec,
+        terms,
         agreement.parts.controller
         or build_controller(agreement.config, references, agreement.codec.model),
         agreement.identity,
@@ -159,13 +166,15 @@ def build_receiver(
         recorder,
         take_over=take_over,
         begins=partial(begin_from, references or ()),
+        two_way=with_codec(agreement.two_way, codec),
     )
     if agreement.clock == "virtual":
         # There the transmitter's process holds both directions of the line, and the receiver's clock.
-        return SteppedEndpoint(session, Downlink(wire))
+        return SteppedEndpoint(session, Downlink(wire, None, terms, recorder))
     faults = agreement.faults
     clock = SkewedClock(faults, time.monotonic_ns()) if faults.bad_clock else None
-    return ReceiverEndpoint(session, Downlink(wire, build_line(agreement, "down", wire)), clock)
+    line = build_line(agreement, "down", wire)
+    return ReceiverEndpoint(session, Downlink(wire, line, terms, recorder), clock)
 
 
 def check_parts(config: FlightConfig, parts: Parts | None = None) -> None:

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field, replace
 
 from channel.codec.codec import Codec
+from channel.codec.downlink.machine import TwoWay
 from channel.codec.signals import Signals, signals_of
 from channel.line.impairments import LineFaults, parse_impairments
 from channel.links.kind import LinkKind
@@ -13,7 +14,9 @@ from channel.links.registry import LINKS, link_kind
 from channel.protocol.identity import Identity, numerics_probe
 from channel.protocol.terms import Clock, Terms
 from channel.registry import RegistryError
+from receiver.controllers.base import Controller
 from tenbaud.build.codec import build_codec
+from tenbaud.build.downlink import build_two_way, narrowed_terms
 from tenbaud.build.liveness import RoundTrip, check_liveness, round_trip
 from tenbaud.build.parts import Parts
 from tenbaud.build.references import longest_period_s
@@ -39,6 +42,8 @@ class Agreement:
     """whether line, codec and set-point may be changed in flight, by hand"""
     parts: Parts = field(default_factory=Parts)
     """objects in place of what is configured"""
+    two_way: TwoWay | None = None
+    """the state machine of the narrow downlink"""
     scored_from: int | None = None
     """the tick from which errors count, where it is not the usual one"""
 
@@ -101,12 +106,13 @@ def agree(config: FlightConfig, clock: Clock, parts: Parts | None = None) -> Agr
         )
     try:
         codec = build_codec(config, parts)
-        terms = checked_terms(config, codec, clock)
+        terms = checked_terms(config, codec, clock, parts.controller)
+        two_way, described = build_two_way(config, codec, terms, parts.controller)
     except ValueError as error:
         raise ConfigError(str(error)) from error
-    shared = config.shared_json(terms.lead_ticks)
-    identity = Identity(software_version(), shared, numerics_probe(codec))
-    return Agreement(config, clock, codec, terms, identity, parts=parts)
+    shared = config.shared_json(terms.lead_ticks, described)
+    identity = Identity(software_version(), shared, numerics_probe(codec, two_way))
+    return Agreement(config, clock, codec, terms, identity, parts=parts, two_way=two_way)
 
 
 def watchdog_wanted_s(config: FlightConfig) -> float | None:
@@ -115,16 +121,23 @@ def watchdog_wanted_s(config: FlightConfig) -> float | None:
     return None if wanted == "auto" or config.transmitter.rig == "replay" else wanted
 
 
-def checked_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:
-    """Return the terms of a flight; ValueError, with the arithmetic, where they cannot be flown."""
-    terms = build_terms(config, codec, clock)
+def checked_terms(
+    config: FlightConfig, codec: Codec, clock: Clock, controller: Controller | None = None
+) -> Terms:
+    """Return the terms of a flight; ValueError, with the arithmetic, where they cannot be flown.
+
+    `controller` takes the place of the configured one.
+    """
+    terms = build_terms(config, codec, clock, controller)
     terms.check(clock)
     trip = round_trip(terms, parse_impairments(config.link.impairments), clock)
     check_liveness(watchdog_wanted_s(config), terms, trip)
     return terms
 
 
-def build_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:
+def build_terms(
+    config: FlightConfig, codec: Codec, clock: Clock, controller: Controller | None = None
+) -> Terms:
     """Return the terms, with the lead chosen where it is "auto"."""
     lead = config.timing.lead_ticks
     signals = signals_of(codec.model)
@@ -141,14 +154,15 @@ def build_terms(config: FlightConfig, codec: Codec, clock: Clock) -> Terms:
         initial_command=initial_command(config, signals),
         limits=build_limits(config, signals),
         signals=signals,
-        downlink=config.channel.downlink,
+        downlink="compact" if config.channel.downlink == "compact" else "full",
     )
+    terms = narrowed_terms(config, terms, controller)
     terms = kind_of_link(config).terms(config.link, codec, terms)
     if lead != "auto":
         return terms
     shortest = terms.with_shortest_lead(clock)
     delay_ns = parse_impairments(config.link.impairments).longest_delay_ns
-    if not delay_ns:
+    if not delay_ns or terms.is_mirrored:
         return shortest
     return replace(terms, lead_ticks=terms.lead_needed_ticks + -(-delay_ns // terms.tick_ns))
 

@@ -32,6 +32,9 @@ class RoundTrip:
 def round_trip(terms: Terms, faults: LineFaults, clock: Clock) -> RoundTrip:
     """Return the round trip that terms and line allow."""
     delay_ns = faults.longest_delay_ns
+    if terms.downlink == "narrow":
+        heard_ns = terms.down_heard_ns + delay_ns
+        return RoundTrip(_ticks(heard_ns - terms.downlink_budget_ns, terms), _ticks(heard_ns, terms))
     line_ns = terms.uplink_delivery_ns + terms.uplink_line_ns + terms.downlink_line_ns
     ideal = clock == "virtual" and terms.lead_ticks == 0 and terms.uplink_delivery_ns == 0
     needed_ticks = 0 if ideal else terms.lead_needed_ticks
@@ -66,7 +69,7 @@ def check_liveness(wanted_s: float | None, terms: Terms, trip: RoundTrip) -> Non
             f"{terms.history_samples * terms.sample_ns / 1e6:g} ms, or lengthen timing.symbol_period_s"
         )
     last_ticks = terms.lead_ticks + terms.ticks_per_sample - 1
-    if trip.in_time_ticks > last_ticks:
+    if trip.in_time_ticks > last_ticks and not terms.is_mirrored:
         raise ValueError(
             f"lead_ticks = {terms.lead_ticks} is too short for this line: commands come up to "
             f"{trip.in_time_ticks} ticks ({trip.in_time_ticks * tick_ms:g} ms) after the sample they "

@@ -103,19 +103,24 @@ def _require_within(
     stops: tuple[float, float], section: ReferenceSection, reference: Reference | None, output: Signal
 ) -> None:
     """Raise ConfigError for a set-point that goes beyond a stop of its output."""
-    about = reference.about if isinstance(reference, Shifted) else reference
-    if isinstance(about, Listed):
-        reached = about.values
-    else:
-        other = {"step": 0.0, "constant": section.amplitude}.get(section.kind, -section.amplitude)
-        reached = [section.amplitude, other]
-    for value in (min(reached) + section.offset, max(reached) + section.offset):
+    for value in reached(section, reference):
         if not stops[0] <= value <= stops[1]:
             raise ConfigError(
                 f"receiver.reference: the set-point of {output.name} reaches {value:.4g} "
                 f"{output.unit}, beyond the plant's stops at {stops[0]:.4g} and {stops[1]:.4g}; make "
                 "its amplitude or offset smaller"
             )
+
+
+def reached(section: ReferenceSection, reference: Reference | None) -> tuple[float, float]:
+    """Return the least and the largest value of a configured set-point."""
+    about = reference.about if isinstance(reference, Shifted) else reference
+    if isinstance(about, Listed):
+        reached = about.values
+    else:
+        other = {"step": 0.0, "constant": section.amplitude}.get(section.kind, -section.amplitude)
+        reached = [section.amplitude, other]
+    return min(reached) + section.offset, max(reached) + section.offset
 
 
 def values_of(references: References) -> Callable[[int], tuple[float | None, ...]]:

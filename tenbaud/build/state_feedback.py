@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import LinAlgError, solve_discrete_are
+import scipy
 
 from channel.codec.codec import Model
 from channel.codec.laws import FeedbackLaw, Rows
@@ -152,8 +152,8 @@ def _designed(
     )
     _require_controllable(a, b, signals)
     try:
-        p = solve_discrete_are(a, b, q, input_costs)
-    except (LinAlgError, ValueError) as error:
+        p = scipy.linalg.solve_discrete_are(a, b, q, input_costs)
+    except (scipy.linalg.LinAlgError, ValueError) as error:
         raise ConfigError(
             f"{FIELD}: no regulator for these weights: {error}; give every state that must come to "
             "rest a weight in state_weights"

@@ -11,6 +11,7 @@ import time
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
+from channel.codec.downlink.layout import symbols_carried
 from channel.errors import LinkError, TenbaudError
 from channel.links.base import Link
 from channel.links.endpoints import free_endpoint
@@ -134,7 +135,7 @@ def _ports() -> list[Finding]:
 
 
 def serial_line(config: FlightConfig) -> Finding:
-    """Say which serial line carries the flight, with either downlink."""
+    """Say which serial line carries the flight, with each downlink."""
     try:
         needs = ", ".join(f"{least} baud {rung}" for rung, least in line_rates(config).items())
     except (ValueError, TenbaudError) as error:
@@ -149,8 +150,13 @@ def line_rates(config: FlightConfig) -> dict[Rung, int]:
     codec = build_codec(config)
     on_memory = config.model_copy(update={"link": config.link.model_copy(update={"kind": "memory"})})
     terms = build_terms(on_memory, codec, "real")
-    check_slot_counter(terms, SerialWire(len(codec.coder.alphabet.symbols)))
-    return {rung: least_rate_baud(replace(terms, downlink=rung), codec) for rung in get_args(Rung)}
+    baud = config.channel.downlink_baud
+    narrow = terms.narrowed(baud, symbols_carried(baud, terms.sample_ns), is_mirrored=False)
+    check_slot_counter(narrow, SerialWire(len(codec.coder.alphabet.symbols)))
+    return {
+        rung: least_rate_baud(narrow if rung == "narrow" else replace(terms, downlink=rung), codec)
+        for rung in get_args(Rung)
+    }
 
 
 def _vendor() -> list[Finding]:

@@ -1,23 +1,26 @@
 """The configuration of a flight: one TOML file for both ends.
 
 The sections `timing`, `channel`, `model`, `coder` and `limits` are *shared*: both ends must have them
-alike, and the handshake compares their digest. The others concern one end, or how it is run.
+alike, and the handshake compares their digest; so is `downlink` where the downlink is narrow. The
+others concern one end, or how it is run.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field, PrivateAttr, field_validator, model_validator
 
 from channel.line.impairments import parse_impairments
 from channel.links.registry import LINKS
 from channel.protocol.identity import LEFT_OUT
+from channel.protocol.terms import Rung
 from tenbaud.config.coders import ZoomCoderSection
 from tenbaud.config.controllers import PidSection, ReferencesSection, StateFeedbackSection
 from tenbaud.config.deprecated import DIGEST_KINDS
+from tenbaud.config.downlink import DownlinkSection
 from tenbaud.config.kinds import (
     CODERS,
     CONTROLLERS,
@@ -86,9 +89,11 @@ class ChannelSection(Section):
     """time reserved for a command frame to reach the plant"""
     repeats: Annotated[int, Field(ge=0, le=32)] = 2
     """W: earlier samples that each command frame repeats"""
-    downlink: Literal["full", "compact"] = "full"
-    """a command for every tick, or one for each sample in short frames: 16 bytes for two motors, two
-    repeats and words of one symbol"""
+    downlink: Rung = "full"
+    """full: a command for every tick; compact: one for each sample, in frames of 16 bytes for two
+    motors, two repeats and words of one symbol; narrow: single bits, as `[downlink]` says"""
+    downlink_baud: Annotated[float, Field(ge=0.001, le=100_000.0)] = 20.0
+    """R_d: symbols per second that may go down the narrow downlink"""
 
 
 if TYPE_CHECKING:
@@ -292,6 +297,7 @@ class FlightConfig(CodePermission):
     model: ModelSection = PitchModelSection()
     coder: CoderSection = ZoomCoderSection()
     limits: Limits = Limits()
+    downlink: DownlinkSection = DownlinkSection()
     transmitter: TransmitterSection = TransmitterSection()
     receiver: ReceiverSection = ReceiverSection()
     flight_log: FlightLogSection = FlightLogSection()
@@ -330,8 +336,11 @@ class FlightConfig(CodePermission):
         outside = isinstance(self.model, OutsideSection)
         return "pitch" if outside else kind_of(MODELS, self.model.kind).plant
 
-    def shared_json(self, lead_ticks: int) -> str:
-        """Return the shared part as canonical JSON, with the command lead that was chosen."""
+    def shared_json(self, lead_ticks: int, downlink: Mapping[str, Any] | None = None) -> str:
+        """Return the shared part as canonical JSON, with the command lead that was chosen.
+
+        `downlink` is the narrow one as it was built.
+        """
         shared = self.model_dump(mode="json", include=set(SHARED_SECTIONS))
         shared["timing"]["lead_ticks"] = lead_ticks
         for name, section in (("model", self.model), ("coder", self.coder)):
@@ -343,6 +352,10 @@ class FlightConfig(CodePermission):
         for field in ("set_point_max", "set_point_slew_per_s"):
             if shared["limits"][field] is None:
                 del shared["limits"][field]  # likewise
+        if downlink is not None:
+            shared["downlink"] = downlink
+        else:
+            del shared["channel"]["downlink_baud"]
         for place, value in LEFT_OUT.items():
             name, field = place.split(".")
             if shared[name][field] == value:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
+import scipy
 
 from channel.codec.codec import STATE_MAX, Codec, Model
 from channel.codec.coders.direction import DirectionCoder
@@ -52,7 +52,7 @@ def kalman_observer(
     seen = np.diag(np.maximum(np.broadcast_to(steps, (outputs,)), LEAST_STEP) ** 2 / 12.0)
     noise = tick_noise + LEAST_NOISE * float(np.trace(tick_noise)) * np.eye(size)
     try:
-        ahead = solve_discrete_are(transition.T, C.T, noise, seen)
+        ahead = scipy.linalg.solve_discrete_are(transition.T, C.T, noise, seen)
     except (np.linalg.LinAlgError, ValueError) as error:
         raise ValueError(
             f"the outputs do not show every state, so none is observed: {error}"

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.linalg import solve_continuous_are
 
 from tenbaud.bounds.linear import LinearModel, Matrix, linear_model
 
@@ -77,7 +77,7 @@ def behind_encoders(
         raise ValueError(f"tick_s is {tick_s}; it must be above 0")
     outputs = len(plant.C)
     seen: Matrix = np.full(outputs, steps, dtype=np.float64) ** 2 / 12.0 * tick_s
-    found = solve_continuous_are(plant.A.T, plant.C.T, plant.noise, np.diag(seen))
+    found = scipy.linalg.solve_continuous_are(plant.A.T, plant.C.T, plant.noise, np.diag(seen))
     own: Matrix = np.asarray(found, dtype=np.float64)
     return replace(plant, G=own @ plant.C.T / seen, densities=seen), own
 

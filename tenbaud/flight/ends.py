@@ -257,7 +257,7 @@ def transmitter_status(run: TransmitterRun) -> Status:
         "outputs": outputs_status(
             run.agreement.signals,
             [one.last for one in node.scores.outputs],
-            coder.ranges(node.session.copies.confirmed.coder),
+            coder.ranges(node.session.confirmed_state.coder),
             [one.last_coded_error for one in node.scores.outputs],
         ),
         "erasures": node.session.counts["erasures"],

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from channel.codec.codec import Coder, Model
 from channel.errors import TenbaudError
 from channel.links.endpoints import loopback_host
-from channel.protocol.terms import Clock
+from channel.protocol.terms import Clock, Rung
 from plant_sim.plant import Plant
 from receiver.controllers.base import Controller
 from tenbaud.build.controllers import controller_context
@@ -83,6 +83,7 @@ def fly(
     out: str | Path | None = None,
     link: str = "memory",
     clock: Clock = "virtual",
+    downlink: Rung | None = None,
     draw: bool = False,
     model: Model | str | None = None,
     coder: Coder | str | None = None,
@@ -103,12 +104,12 @@ def fly(
     (times, values), a function of the time in seconds; or a table by the names of the outputs.
 
     `settings` are fields by their full names, as with `--set`: `{"duration_s": 20.0, "coder.decay":
-    0.9}`. `model`, `coder` and `plant` take the place of the configured part: a name as in the
-    configuration, or an object that you build for the tick that is flown; a class of a plant is called
-    with its context. With the link "memory" both ends are in this process and the flight is as fast as
-    it computes; the others start two processes and take names only. `out` is a new folder; without it
-    one is made in `runs/`. `accept_risk`: turn the motors of a real rig without the limits of a first
-    flight (docs/rigs).
+    0.9}`. `downlink` is the channel's: "narrow" sends single bits. `model`, `coder` and `plant` take
+    the place of the configured part: a name as in the configuration, or an object that you build for
+    the tick that is flown; a class of a plant is called with its context. With the link "memory" both
+    ends are in this process and the flight is as fast as it computes; the others start two processes
+    and take names only. `out` is a new folder; without it one is made in `runs/`. `accept_risk`: turn
+    the motors of a real rig without the limits of a first flight (docs/rigs).
 
     `show`: in a notebook, draw the flight below its cell while it flies, with a progress bar; elsewhere
     and for a flight of two processes, open the live page in the browser, from which it may be steered.
@@ -117,7 +118,7 @@ def fly(
     Raises ConfigError for plants, settings and parts that make no flight, and FlightFailed for a flight
     that did not end well.
     """
-    settings = dict(settings or {})
+    settings = {**(settings or {}), **({"channel.downlink": downlink} if downlink else {})}
     if _are_gains(controller):
         settings["receiver.state_feedback.gains"] = feedback_gains(controller)
         controller = "state_feedback"

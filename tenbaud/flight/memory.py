@@ -6,6 +6,7 @@ import json
 from dataclasses import asdict
 
 from channel.codec.codec import Codec, Vector
+from channel.codec.downlink.machine import TwoWay
 from channel.codec.models.learned import plant_model
 from channel.codec.models.linear import LinearModel
 from channel.errors import ConfigMismatch, LinkLost
@@ -21,6 +22,7 @@ from plant_sim.plant import Plant
 from receiver.controllers.base import Controller
 from receiver.endpoint import ReceiverEndpoint
 from receiver.session.session import ReceiverSession
+from tenbaud.build.downlink import with_codec
 from tenbaud.build.liveness import round_trip, watchdog_ticks
 from tenbaud.build.parts import PartError, Parts, check_codec
 from tenbaud.config.version import software_version
@@ -59,6 +61,7 @@ class MemoryFlight:
     `encoder_counts_per_turn`: what each measured angle is rounded to.
     `scored_from_s`: flight time at which `node.scores` begins to count errors.
     `stop_on_desync`: end the flight at the first digest that differs, instead of a new epoch.
+    `two_way`: the state machine of the narrow downlink, of this codec.
     `recorder`, `receiver_recorder`: take every row of the transmitter and of the receiver as well.
 
     The parts of the two ends are attributes, to be looked at before, during and after the flight.
@@ -81,16 +84,22 @@ class MemoryFlight:
         recorder: Recorder | None = None,
         receiver_recorder: Recorder | None = None,
         wire: Wire = DATAGRAM,
+        two_way: TwoWay | None = None,
     ) -> None:
         _check(codec, terms, plant, controller)
+        _check_two_way(terms, two_way)
         self.codec = codec
         self.terms = terms
         self.plant = plant
         self.controller = controller
         self.transmitter_rows = MemoryRecorder(recorder)
         self.receiver_rows = MemoryRecorder(receiver_recorder)
+        uplink_line = uplink_line or CleanLine()
+        downlink_line = downlink_line or CleanLine()
         identity = Identity(
-            software_version(), json.dumps(asdict(terms), sort_keys=True), numerics_probe(codec)
+            software_version(),
+            json.dumps(asdict(terms), sort_keys=True),
+            numerics_probe(codec, two_way),
         )
         self.transmitter = TransmitterSession(
             codec,
@@ -100,19 +109,26 @@ class MemoryFlight:
             self.transmitter_rows,
             stop_on_desync=stop_on_desync,
             state_observer=_observer(codec, encoder_counts_per_turn),
+            two_way=two_way,
+            line_delay_ns=uplink_line.longest_delay_ns + downlink_line.longest_delay_ns,
         )
         self.receiver = ReceiverSession(
-            receiver_codec or codec, terms, controller, identity, SESSION_NUMBER, self.receiver_rows
+            receiver_codec or codec,
+            terms,
+            controller,
+            identity,
+            SESSION_NUMBER,
+            self.receiver_rows,
+            two_way=with_codec(two_way, receiver_codec or codec),
         )
-        uplink_line = uplink_line or CleanLine()
-        downlink_line = downlink_line or CleanLine()
         up_ns = uplink_line.longest_delay_ns + terms.symbol_delay_ns
         delay_ns = max(up_ns, downlink_line.longest_delay_ns)
         self.node = self._node(
             encoder_counts_per_turn, safe_command, round(scored_from_s * 1e9), delay_ns
         )
         self.uplink = Uplink(terms, codec.coder.alphabet, uplink_line, wire)
-        self.endpoint = ReceiverEndpoint(self.receiver, Downlink(wire))
+        downlink = Downlink(wire, None, terms, self.receiver_rows)
+        self.endpoint = ReceiverEndpoint(self.receiver, downlink)
         self.loop = VirtualFlight(
             TransmitterEndpoint(self.node, self.uplink), downlink_line, self.endpoint
         )
@@ -136,7 +152,7 @@ class MemoryFlight:
             Scores(
                 self.codec.model,
                 scored_from_ns // terms.tick_ns,
-                (terms.history_samples + SPAN_SAMPLES) * terms.ticks_per_sample,
+                (terms.confirmation_samples + SPAN_SAMPLES) * terms.ticks_per_sample,
                 self.controller.references,
             ),
             self.transmitter_rows,
@@ -186,6 +202,24 @@ def _observer(codec: Codec, counts_per_turn: int) -> StateObserver | None:
     from tenbaud.design.observer import observer_of_coder
 
     return observer_of_coder(codec, counts_per_turn)
+
+
+def _check_two_way(terms: Terms, two_way: TwoWay | None) -> None:
+    """Raise ValueError for a state machine that is not that of the terms' downlink."""
+    if (terms.downlink == "narrow") is not (two_way is not None):
+        raise ValueError(
+            f"terms.downlink is {terms.downlink!r} and two_way is {two_way}; the narrow downlink needs "
+            "one, and no other downlink has one"
+        )
+    if two_way is None:
+        return
+    for name, ours, theirs in (
+        ("down_symbols", terms.down_symbols, two_way.layout.symbols_per_sample),
+        ("lead_ticks", terms.lead_ticks, two_way.lead_ticks),
+        ("initial_command", terms.initial_command, two_way.initial_command),
+    ):
+        if ours != theirs:
+            raise ValueError(f"terms.{name} is {ours}, and that of two_way is {theirs}")
 
 
 def _check(codec: Codec, terms: Terms, plant: Plant, controller: Controller) -> None:

@@ -31,10 +31,10 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         "plant": _plant_name(run.agreement),
         "seed": config.seed,
         "duration_s": flown_s,
-        "samples": session.copies.next_sample,
+        "samples": session.next_sample,
         "coder_bits_up": meter.coder_bits,
         "wire_bytes_up": meter.wire_bytes,
-        "coder_bits_down": 8 * run.endpoint.inlet.command_bytes,
+        "coder_bits_down": run.endpoint.inlet.meter.coder_bits,
         "wire_bytes_down": run.wire_bytes_down,
         "erasures": session.counts["erasures"],
         "digest_checks": session.counts["digest_checks"],
@@ -63,7 +63,7 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         **_learned(run),
         **gap_part(node.gauge.whole if node.gauge is not None else None),
         "commands_late": node.commands_late,
-        "symbols_refused": run.uplink.shaper.refused,
+        "symbols_refused": run.uplink.refused,
         "words_missed": session.counts["words_missed"],
         **_rate(run),
         "sensor_fault": events.guard_text(node.sensor_fault) or None,
@@ -106,9 +106,9 @@ def receiver_part(agreement: Agreement, endpoint: ReceiverEndpoint, outcome: Out
         **_common(agreement, outcome, session.end),
         "samples": session.state.sample,
         "baud_measured": session.meter.whole_baud,
-        "wire_bytes_up": endpoint.inlet.wire_bytes,
-        "coder_bits_down": 8 * endpoint.downlink.command_bytes,
-        "wire_bytes_down": endpoint.downlink.wire_bytes,
+        "wire_bytes_up": endpoint.inlet.meter.wire_bytes,
+        "coder_bits_down": endpoint.downlink.meter.coder_bits,
+        "wire_bytes_down": endpoint.downlink.meter.wire_bytes,
         "erasures": session.counts["erasures"],
         "symbols_late": session.counts["symbols_late"],
         "symbols_misplaced": session.counts["symbols_misplaced"],
@@ -217,7 +217,7 @@ def _outputs(run: TransmitterRun) -> Summary:
 
 def _learned(run: TransmitterRun) -> Summary:
     """Return the plant's terms as learned by both ends, if they do."""
-    found = learned_of(run.agreement.codec, run.node.session.copies.confirmed)
+    found = learned_of(run.agreement.codec, run.node.session.confirmed_state)
     return {"learned": {name: one._asdict() for name, one in found.items()}} if found else {}
 
 

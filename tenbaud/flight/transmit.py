@@ -89,7 +89,7 @@ def _fly(
             flight.finish(ending.farewell)
         finally:
             run.flight_s = time.perf_counter() - started
-            run.wire_bytes_down = inlet.wire_bytes
+            run.wire_bytes_down = inlet.meter.wire_bytes
             run.extra["malformed"] = inlet.malformed
             if figures := rig.figures():
                 run.extra["rig"] = figures
@@ -105,7 +105,7 @@ def _check_welcome(run: TransmitterRun) -> None:
 
 
 def _control_bytes(run: TransmitterRun) -> int:
-    return run.uplink.meter.control_bytes + run.endpoint.inlet.control_bytes
+    return run.uplink.meter.control_bytes + run.endpoint.inlet.meter.control_bytes
 
 
 class _Ending:

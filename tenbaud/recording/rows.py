@@ -16,8 +16,11 @@ from channel.protocol.events import EVENT_CHANNEL
 from channel.protocol.lockstep import LOCKSTEP_CHANNEL
 from channel.protocol.recording import (
     ARRIVED_CHANNEL,
+    DOWN_SENT_CHANNEL,
+    DOWN_SYMBOLS_CHANNEL,
     EPOCH_CHANNEL,
     SENT_CHANNEL,
+    TWO_WAY_CHANNEL,
     Field,
     RecordChannel,
 )
@@ -39,6 +42,8 @@ KNOWN = (
     *(transmitter.TICK_CHANNEL, transmitter.SAMPLE_CHANNEL, transmitter.ESTIMATE_CHANNEL),
     *(transmitter.DEVICE_CHANNEL, receiver.TICK_CHANNEL, receiver.SAMPLE_CHANNEL, SENT_CHANNEL),
     *(ARRIVED_CHANNEL, EPOCH_CHANNEL, EVENT_CHANNEL, LOCKSTEP_CHANNEL, GAP_CHANNEL),
+    *(TWO_WAY_CHANNEL, DOWN_SYMBOLS_CHANNEL, DOWN_SENT_CHANNEL),
+    *(transmitter.CONFIRMED_CHANNEL, transmitter.HYPOTHESES_CHANNEL),
     OLD_EVENT_CHANNEL,
 )
 """The rows that this version's ends write, and the changed ones of earlier versions."""
@@ -46,6 +51,8 @@ KNOWN = (
 NEVER_NULL = {
     ("epoch", "epoch"),
     *(("epoch", name) for name in ("state", "coder", "hold")),
+    *(("two_way", name) for name in ("epoch", "state")),
+    *(("confirmed", name) for name in ("symbols", "commands", "doubt", "lag_samples")),
     *(("sample", name) for name in ("state", "coder", "digest")),
     *(("tick", name) for name in ("live_state", "command", "applied")),
     *(("symbol", name) for name in ("symbol", "arrived_ns", "taken", "wire_bytes")),
@@ -63,7 +70,7 @@ _TYPES: dict[str, frozenset[type]] = {
 }
 _ITEM_TYPES: dict[str, frozenset[type]] = {
     "numbers": frozenset({float, int, _NONE}),
-    "integers": frozenset({int}),
+    "integers": frozenset({int, _NONE}),
 }
 _WORDS = {
     "number": "a number",

@@ -8,6 +8,7 @@ from pathlib import Path, PureWindowsPath
 from typing import Any
 
 from channel.codec.codec import CodecState, Vector, Word
+from channel.codec.downlink.machine import TwoWay, TwoWayState
 from tenbaud.build.flight import Agreement, agree
 from tenbaud.config.deprecated import with_current_names
 from tenbaud.config.outside_code import require_allowed, require_regular_files
@@ -30,6 +31,10 @@ class Epoch:
     start: CodecState
     hold: Vector
     words: list[Word] = field(default_factory=list)
+    two_way: TwoWayState | None = None
+    """of a narrow downlink: X that it starts from"""
+    symbols: list[tuple[int, ...]] = field(default_factory=list)
+    """of a narrow downlink: those sent down in each sample"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +132,8 @@ def _with_current_names(shared: str) -> str:
     """Return a recorded shared configuration as this version writes the same settings."""
     try:
         values = with_current_names(json.loads(shared), "", warn=False)
-        return FlightConfig.model_validate(values).shared_json(values["timing"]["lead_ticks"])
+        downlink = values.pop("downlink", None)
+        return FlightConfig.model_validate(values).shared_json(values["timing"]["lead_ticks"], downlink)
     except (ValueError, KeyError, TypeError):
         return shared
 
@@ -158,8 +164,17 @@ def epochs_of(record: FlightRecord) -> list[Epoch]:
         epochs = [Epoch(0, initial, agreement.terms.initial_command)]
     for epoch in epochs:
         check_epoch(epoch, agreement, str(tables.path))
+    _fill(epochs, record)
+    if agreement.two_way is not None:
+        _fill_downlink(epochs, record, agreement.two_way)
+    return epochs
+
+
+def _fill(epochs: list[Epoch], record: FlightRecord) -> None:
+    """Add the words that were consumed to their epochs."""
+    agreement, tables = record.agreement, record.tables[record.consumer]
     index = 0
-    for row in samples:
+    for row in record.rows[record.consumer].topics["sample"].rows:
         while index + 1 < len(epochs) and epochs[index + 1].start.sample <= row.sample:
             index += 1
         epoch = epochs[index]
@@ -180,7 +195,36 @@ def epochs_of(record: FlightRecord) -> list[Epoch]:
                 "of the flight's coder. The file was changed, or its configuration is another one."
             )
         epoch.words.append(row.word)
-    return epochs
+
+
+def _fill_downlink(epochs: list[Epoch], record: FlightRecord, machine: TwoWay) -> None:
+    """Add to their epochs the state that they start from and the symbols that were sent down."""
+    topics, where = record.rows[record.consumer].topics, record.tables[record.consumer].path
+    starts = {(row.epoch, row.sample): row.state for row in topics["two_way"]}
+    sent = topics["down_symbols" if record.consumer == "receiver" else "confirmed"].rows
+    symbols = {row.sample: row.symbols for row in sent}
+    for epoch in epochs:
+        state = starts.get((epoch.number, epoch.start.sample))
+        if state is None:
+            raise RecordingError(
+                f"{where} lacks the row of the topic two_way of epoch {epoch.number}, and with it the "
+                "state that it starts from: nothing can be computed from its symbols."
+            )
+        try:
+            epoch.two_way = machine.unpack(bytes.fromhex(state))
+        except ValueError as error:
+            raise RecordingError(f"{where}: two_way, epoch {epoch.number}: {error}.") from error
+        for sample in range(epoch.start.sample, epoch.start.sample + len(epoch.words)):
+            found = symbols.get(sample)
+            if found is None:
+                raise RecordingError(f"{where} lacks the down symbols of sample {sample}.")
+            if len(found) != machine.layout.symbols_per_sample or not {0, 1}.issuperset(found):
+                raise RecordingError(
+                    f"{where}: the down symbols of sample {sample} are {list(found)!r:.60}, and not "
+                    f"{machine.layout.symbols_per_sample} bits. The file was changed, or its "
+                    "configuration is another one."
+                )
+            epoch.symbols.append(tuple(found))
 
 
 def check_epoch(epoch: Epoch, agreement: Agreement, where: str) -> None:

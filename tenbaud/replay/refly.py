@@ -12,9 +12,11 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from channel.codec.codec import Codec, CodecState, Vector, Word
+from channel.codec.downlink.machine import TwoWay, TwoWaySample, TwoWayState
 from channel.protocol.frames import Hello, Symbol, Welcome
 from receiver.controllers.base import Controller
 from receiver.session.session import ReceiverSession
+from tenbaud.build.downlink import with_codec
 from tenbaud.build.flight import Agreement
 from tenbaud.recording.memory import MemoryRecorder
 from tenbaud.replay.record import Epoch
@@ -35,6 +37,11 @@ class Reflown(NamedTuple):
     digest: str
     ticks: list[tuple[int, tuple[float | None, ...], Vector, Vector]]
     """(tick, reference, live state, command) of the ticks decided with it"""
+    symbols: tuple[int, ...] = ()
+    """of a narrow downlink: those of the sample"""
+    before: TwoWayState | None = None
+    both: TwoWaySample | None = None
+    """of a narrow downlink, where its state machine was stepped: X before the sample, and the sample"""
 
 
 def refly(
@@ -59,13 +66,27 @@ class _Starting(Codec):
         return self._start
 
 
+class _StartingTwoWay(TwoWay):
+    """The same state machine, but for the state that it starts from."""
+
+    def __init__(self, machine: TwoWay, start: TwoWayState) -> None:
+        vars(self).update(vars(machine))
+        self._start = start
+
+    def initial(self) -> TwoWayState:
+        return self._start
+
+
 def _refly_epoch(
     agreement: Agreement, controller: Controller, place: int, epoch: Epoch, delay: Delay
 ) -> Iterator[Reflown]:
     terms = replace(agreement.terms, initial_command=epoch.hold)
     codec = _Starting(agreement.codec, epoch.start)
-    rows = MemoryRecorder(topics=("sample", "tick"))
-    session = ReceiverSession(codec, terms, controller, agreement.identity, 1, rows)
+    rows = MemoryRecorder(topics=("sample", "tick", "down_symbols"))
+    machine = with_codec(agreement.two_way, codec)
+    if machine is not None and epoch.two_way is not None:
+        machine = _StartingTwoWay(machine, epoch.two_way)
+    session = ReceiverSession(codec, terms, controller, agreement.identity, 1, rows, two_way=machine)
     identity = agreement.identity
     hello = Hello(1, identity.version, identity.config_digest, identity.numerics_probe)
     (welcome,) = session.on_frame(hello, 0)
@@ -105,7 +126,8 @@ def _let_deadlines_pass(session: ReceiverSession, now_ns: int) -> None:
 
 def _taken(rows: MemoryRecorder, place: int) -> Iterator[Reflown]:
     samples, ticks = rows.taken("sample"), rows.taken("tick")
+    down = [tuple(symbols) for _, symbols in rows.taken("down_symbols")] or [()] * len(samples)
     per_sample = len(ticks) // len(samples) if samples else 0
     for index, (sample, word, _, model, coder, digest, _) in enumerate(samples):
         own: Any = [tuple(row) for row in ticks[index * per_sample : (index + 1) * per_sample]]
-        yield Reflown(place, sample, word, model, coder, digest, own)
+        yield Reflown(place, sample, word, model, coder, digest, own, down[index])

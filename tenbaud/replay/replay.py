@@ -12,8 +12,9 @@ from tenbaud.files.whole import make_folder, write_whole
 from tenbaud.recording.errors import RecordingError
 from tenbaud.replay.control import controller_of, steps_by_hand
 from tenbaud.replay.record import FlightRecord, epochs_of
-from tenbaud.replay.refly import Reflown, refly
+from tenbaud.replay.refly import Reflown
 from tenbaud.replay.rows import EndRows
+from tenbaud.replay.stepped import flown_again
 from tenbaud.replay.symbols import Packed, Unpacked, pack
 
 
@@ -45,7 +46,7 @@ def replay(record: FlightRecord) -> Replayed:
     _check_shape(record)
     epochs = epochs_of(record)
     steps = steps_by_hand(record)
-    flown = list(refly(agreement, controller_of(agreement.config, steps), epochs))
+    flown = list(flown_again(agreement, controller_of(agreement.config, steps), epochs))
     differences, compared = compare(record, flown)
     words = [word for epoch in epochs for word in epoch.words]
     if len(flown) != len(words):
@@ -70,7 +71,7 @@ def replay_symbols(unpacked: Unpacked) -> tuple[int, str]:
     """Fly a symbols file; return the number of samples and the digest after the last one."""
     controller = controller_of(unpacked.agreement.config, unpacked.steps)
     samples, digest = 0, ""
-    for one in refly(unpacked.agreement, controller, unpacked.epochs):
+    for one in flown_again(unpacked.agreement, controller, unpacked.epochs):
         samples += 1
         digest = one.digest
     return samples, digest
@@ -86,7 +87,7 @@ def compare(record: FlightRecord, flown: Sequence[Reflown]) -> tuple[list[str], 
         differences += found
     if "receiver" in record.rows:
         differences += _compare_commands(record.rows["receiver"], flown)
-    return differences, compared
+    return differences + _compare_symbols(record, flown), compared
 
 
 def _check_shape(record: FlightRecord) -> None:
@@ -150,6 +151,21 @@ def _compare_commands(rows: EndRows, flown: Sequence[Reflown]) -> list[str]:
     return [f"receiver: {unlike} commands differ from those of the states, first at {first}"]
 
 
+def _compare_symbols(record: FlightRecord, flown: Sequence[Reflown]) -> list[str]:
+    """Return whether the hash symbols that went down are those of the states."""
+    topic = "down_symbols" if record.consumer == "receiver" else "confirmed"
+    sent = {row.sample: row.symbols for row in record.rows[record.consumer].topics[topic]}
+    unlike = [one for one in flown if one.sample in sent and sent[one.sample] != one.symbols]
+    if not unlike:
+        return []
+    first = unlike[0]
+    return [
+        f"{record.consumer}: the down symbols of {len(unlike)} sample(s) differ from those of the "
+        f"states, first at sample {first.sample}: recorded {sent[first.sample]}, computed "
+        f"{first.symbols}"
+    ]
+
+
 def save_symbols(replayed: Replayed, path: Path) -> None:
     """Write the packed flight. Raises WriteError, and RecordingError where the file exists already."""
     if path.exists():
@@ -166,6 +182,8 @@ def replay_text(replayed: Replayed) -> str:
     size = f"{len(packed.symbols)} bytes of symbols"
     if packed.erasures:
         size += f" and {len(packed.erasures)} that mark {replayed.erased} erasures"
+    if packed.down:
+        size += f", and {len(packed.down)} bytes of what came down"
     lines = [
         f"{replayed.samples} samples, {replayed.bits_sent:g} bits: the whole flight is {size}",
         f"known in advance: {len(packed.head)} bytes of configuration, packed",

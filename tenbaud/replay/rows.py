@@ -15,8 +15,11 @@ from channel.protocol.events import EVENT_CHANNEL
 from channel.protocol.lockstep import LOCKSTEP_CHANNEL
 from channel.protocol.recording import (
     ARRIVED_CHANNEL,
+    DOWN_SENT_CHANNEL,
+    DOWN_SYMBOLS_CHANNEL,
     EPOCH_CHANNEL,
     SENT_CHANNEL,
+    TWO_WAY_CHANNEL,
     Field,
     RecordChannel,
 )
@@ -30,8 +33,11 @@ from transmitter.session import records as transmitter
 KEY_MAX = 2**48
 """No flight has a tick, sample or slot beyond this."""
 
-WITH_HOLES = ("measured", "true", "reference")
-"""A rig's reading may be invalid, and an output may have no set-point: a recording holds null."""
+WITH_HOLES = (
+    *(("tick", name) for name in ("measured", "true", "reference")),
+    ("down_symbols", "symbols"),
+)
+"""Lists that may hold null: readings that are not valid, no set-point, erased symbols."""
 
 
 class Kind(NamedTuple):
@@ -49,6 +55,7 @@ def _kind(channel: RecordChannel, *nullable: str) -> Kind:
 
 
 _EPOCH = _kind(EPOCH_CHANNEL)
+_TWO_WAY = _kind(TWO_WAY_CHANNEL)
 _EVENT = _kind(EVENT_CHANNEL, *(one.name for one in EVENT_CHANNEL.fields[2:]))
 _LOCKSTEP = _kind(LOCKSTEP_CHANNEL, "state", "coder", "peer_state", "peer_coder")
 
@@ -56,21 +63,28 @@ KINDS: dict[str, dict[str, Kind]] = {
     "transmitter": {
         "symbol": _kind(SENT_CHANNEL, "left_ns"),
         "epoch": _EPOCH,
+        "two_way": _TWO_WAY,
         "event": _EVENT,
         "lockstep_failure": _LOCKSTEP,
         "tick": _kind(transmitter.TICK_CHANNEL, "true", "commanded"),
         "sample": _kind(transmitter.SAMPLE_CHANNEL, "word_sent", "word", "about"),
         "estimate": _kind(transmitter.ESTIMATE_CHANNEL, "live_state"),
+        "down_symbols": _kind(DOWN_SYMBOLS_CHANNEL),
+        "confirmed": _kind(transmitter.CONFIRMED_CHANNEL, "word"),
+        "hypotheses": _kind(transmitter.HYPOTHESES_CHANNEL),
         "gap": _kind(GAP_CHANNEL, *(one.name for one in GAP_CHANNEL.fields[1:])),
         "device": _kind(transmitter.DEVICE_CHANNEL, "device_s"),
     },
     "receiver": {
         "symbol": _kind(ARRIVED_CHANNEL),
         "epoch": _EPOCH,
+        "two_way": _TWO_WAY,
         "event": _EVENT,
         "lockstep_failure": _LOCKSTEP,
         "tick": _kind(receiver.TICK_CHANNEL),
         "sample": _kind(receiver.SAMPLE_CHANNEL, "word"),
+        "down_symbols": _kind(DOWN_SYMBOLS_CHANNEL),
+        "down_symbol": _kind(DOWN_SENT_CHANNEL, "left_ns"),
     },
 }
 """Every topic of each end. What is written elsewhere in a recording is no part of an audit."""
@@ -145,7 +159,7 @@ def _typed(name: str, kind: Kind, table: Table, misfits: list[Misfit]) -> Topic:
         read = (row.get(one.name) for one in fields)
         values: list[Any] = [tuple(value) if type(value) is list else value for value in read]
         pairs = zip(fields, values, strict=True)
-        wrong = next((one for one, value in pairs if not _fits(value, one, kind.nullable)), None)
+        wrong = next((one for one, value in pairs if not _fits(value, one, kind)), None)
         if wrong is None and fields[0].type == "integer" and not 0 <= values[0] <= KEY_MAX:
             wrong = fields[0]
         if wrong is not None:
@@ -157,8 +171,9 @@ def _typed(name: str, kind: Kind, table: Table, misfits: list[Misfit]) -> Topic:
     return topic
 
 
-def _fits(value: Any, one: Field, nullable: frozenset[str]) -> bool:
+def _fits(value: Any, one: Field, kind: Kind) -> bool:
     """Return whether a value, whose type has been checked already, may be null or hold nulls."""
     if value is None:
-        return one.name in nullable
-    return one.type != "numbers" or one.name in WITH_HOLES or None not in value
+        return one.name in kind.nullable
+    is_list = one.type in ("numbers", "integers")
+    return not is_list or (kind.channel.topic, one.name) in WITH_HOLES or None not in value

@@ -3,11 +3,12 @@
 The configuration, known to both ends in advance, is in the head of the file. What a rejoin sent
 down the link, the start states of later epochs, stands there too, and set-points given by hand.
 
-    "tenbaud symbols 1" and a line feed | head length u32 | head, JSON in zlib | symbols | erasures
+    "tenbaud symbols 1" and a line feed | head length u32 | head, JSON in zlib | symbols |
+    erasures | down
 
 A symbol takes the smallest whole number of bits that its alphabet needs, the first one the lowest
 bits; an erased word counts as the alphabet's first symbols. The erasures are one bit per word, and
-left out when there is none.
+left out when there is none. With a narrow downlink its symbols follow, a bit each.
 """
 
 from __future__ import annotations
@@ -19,13 +20,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from channel.codec.codec import ERASED, Alphabet, Codec, CodecState, Word
+from channel.codec.codec import ERASED, Alphabet, CodecState, Vector, Word
 from tenbaud.build.flight import Agreement, agree
 from tenbaud.config.deprecated import with_current_names
 from tenbaud.config.outside_code import require_allowed, require_regular_files
 from tenbaud.config.schema import FlightConfig
 from tenbaud.recording.errors import RecordingError
 from tenbaud.replay.record import Epoch, check_epoch
+from transmitter.session.down_symbols import initial_at
 
 MAGIC = b"tenbaud symbols 1\n"
 _LENGTH = struct.Struct("<I")
@@ -38,13 +40,16 @@ class Packed:
     head: bytes
     symbols: bytes
     erasures: bytes
+    down: bytes
     start_bytes: int
     """of the head: start states of epochs after the first, before compression"""
 
     @property
     def data(self) -> bytes:
         """The whole file."""
-        return MAGIC + _LENGTH.pack(len(self.head)) + self.head + self.symbols + self.erasures
+        return (
+            MAGIC + _LENGTH.pack(len(self.head)) + self.head + self.symbols + self.erasures + self.down
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +67,7 @@ def pack(
 ) -> Packed:
     """Return the flight as bytes."""
     codec = agreement.codec
-    starts = [_start_hex(codec, epoch) for epoch in epochs]
+    starts = [_start_hex(agreement, epoch) for epoch in epochs]
     head = {
         "config": agreement.config.model_dump(mode="json"),
         "clock": agreement.clock,
@@ -82,6 +87,7 @@ def pack(
         zlib.compress(json.dumps(head).encode(), 9),
         _to_bits(symbols, width),
         _to_bits(erased, 1) if any(erased) else b"",
+        _to_bits([one for epoch in epochs for sent in epoch.symbols for one in sent], 1),
         sum(len(start) // 2 for start in starts if start is not None),
     )
 
@@ -113,7 +119,7 @@ def unpack(path: Path, *, allow_code: bool = False) -> Unpacked:
         require_regular_files(config)
         clock: Literal["real", "virtual"] = "real" if head["clock"] == "real" else "virtual"
         agreement = agree(config, clock)
-        epochs = _epochs(head["epochs"], data[head_at + length :], agreement.codec)
+        epochs = _epochs(head["epochs"], data[head_at + length :], agreement)
         steps = tuple((int(tick), float(angle)) for tick, angle in head["set_points"])
         for epoch in epochs:
             check_epoch(epoch, agreement, str(path))
@@ -129,8 +135,8 @@ def _unpacked_head(packed: bytes) -> bytes:
     return head
 
 
-def _epochs(described: list[list[Any]], data: bytes, codec: Codec) -> list[Epoch]:
-    alphabet = codec.coder.alphabet
+def _epochs(described: list[list[Any]], data: bytes, agreement: Agreement) -> list[Epoch]:
+    alphabet = agreement.codec.coder.alphabet
     count, width = _per_word(alphabet), _width(alphabet)
     for number, first, words, hold, _ in described:
         if not all(type(one) in (int, float) and abs(one) < NUMBER_MAX for one in hold):
@@ -143,16 +149,20 @@ def _epochs(described: list[list[Any]], data: bytes, codec: Codec) -> list[Epoch
         raise ValueError(f"{total} words cannot be in {len(data)} bytes")
     size = -(-total * count * width // 8)
     erasures_size = -(-total // 8)
-    if len(data) not in (size, size + erasures_size):
-        raise ValueError(f"{total} words need {size} bytes, {len(data)} are there")
+    each = agreement.terms.down_symbols
+    down_size = -(-total * each // 8)
+    if len(data) - down_size not in (size, size + erasures_size):
+        raise ValueError(f"{total} words need {size + down_size} bytes, {len(data)} are there")
     digits = _from_bits(data[:size], width, total * count)
-    erased = _from_bits(data[size:], 1, total) if len(data) > size else [0] * total
+    erasures, bits = data[size : len(data) - down_size], data[len(data) - down_size :]
+    erased = _from_bits(erasures, 1, total) if erasures else [0] * total
+    down = _from_bits(bits, 1, total * each) if each else []
     epochs, at = [], 0
     for number, first, words, hold, start in described:
-        state = codec.initial()._replace(sample=first)
-        if start is not None:
-            state = codec.unpack(bytes.fromhex(start))
-        epoch = Epoch(number, state, tuple(hold))
+        epoch = _epoch(agreement, number, first, tuple(hold), start)
+        if each:
+            rows = range(at * each, (at + words) * each, each)
+            epoch.symbols = [tuple(down[row : row + each]) for row in rows]
         for index in range(at, at + words):
             word = tuple(
                 alphabet.symbols[digit] for digit in digits[index * count : (index + 1) * count]
@@ -163,9 +173,25 @@ def _epochs(described: list[list[Any]], data: bytes, codec: Codec) -> list[Epoch
     return epochs
 
 
-def _start_hex(codec: Codec, epoch: Epoch) -> str | None:
+def _epoch(agreement: Agreement, number: int, first: int, hold: Vector, start: str | None) -> Epoch:
+    """Return an epoch without its words."""
+    codec, machine = agreement.codec, agreement.two_way
+    if machine is None:
+        state = codec.initial()._replace(sample=first)
+        if start is not None:
+            state = codec.unpack(bytes.fromhex(start))
+        return Epoch(number, state, hold)
+    both = initial_at(machine, first) if start is None else machine.unpack(bytes.fromhex(start))
+    return Epoch(number, both.codec, hold, two_way=both)
+
+
+def _start_hex(agreement: Agreement, epoch: Epoch) -> str | None:
     """Return the start state of an epoch as text, None where it is the initial one."""
-    initial: CodecState = codec.initial()._replace(sample=epoch.start.sample)
+    codec, machine, sample = agreement.codec, agreement.two_way, epoch.start.sample
+    if machine is not None and epoch.two_way is not None:
+        both = epoch.two_way
+        return None if both == initial_at(machine, sample) else machine.pack(both).hex()
+    initial: CodecState = codec.initial()._replace(sample=sample)
     return None if epoch.start == initial else codec.pack(epoch.start).hex()
 
 

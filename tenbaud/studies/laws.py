@@ -13,7 +13,7 @@ from receiver.controllers.base import Controller
 from receiver.controllers.pid import PidLoops
 from receiver.controllers.recorded import RecordedController
 from receiver.controllers.state_feedback import StateFeedback
-from tenbaud.build.controllers import Difference
+from tenbaud.build.controllers import rate_states
 from tenbaud.studies.flight_data import Given, Work
 from tenbaud.studies.parts import INPUTS
 from tenbaud.studies.schedule import Uncommon
@@ -88,8 +88,7 @@ def law_of(controller: Controller, signals: Signals, tick_s: float) -> tuple[Any
     if not isinstance(controller, PidLoops):
         raise Uncommon(f"the controller {type(controller).__name__}")
     loops = controller.loops
-    places = tuple(float(place) for place in range(len(signals.states)))
-    rates = tuple(-1 if isinstance(loop.rate, Difference) else int(loop.rate(places)) for loop in loops)
+    rates = rate_states(controller, signals)
     outputs = tuple(loop.output for loop in loops)
     constants = tuple(loop.constants for loop in loops)
     return pid_law, PidLaw(constants, outputs, rates, controller.bias, tick_s)

@@ -36,7 +36,7 @@ def fly_plain(config: FlightConfig, window_start: int | None = None, why: str = 
         outcome = outcome_of(error)
     node = run.node
     # While the line rests at the end, the receiver may erase samples that were never flown.
-    heard = node.session.copies.next_sample
+    heard = node.session.next_sample
     flown = min(heard, -(-run.ticks // agreement.terms.ticks_per_sample))
     return FlightFigures(
         outcome="ok" if _has_flown(outcome) else outcome.text,

@@ -136,7 +136,7 @@ class TransmitterComposer(Composer):
             # Plain tuples: named ones are no JSON for the encoder.
             "learned": {
                 name: tuple(one)
-                for name, one in learned_of(self.agreement.codec, session.copies.confirmed).items()
+                for name, one in learned_of(self.agreement.codec, session.confirmed_state).items()
             },
         }
 

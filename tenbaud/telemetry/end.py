@@ -15,6 +15,7 @@ from channel.links.security import Security
 from channel.protocol.recording import Recorder
 from receiver.controllers.references import SteeredReference
 from receiver.endpoint import ReceiverEndpoint
+from tenbaud.build.downlink import said_by_words
 from tenbaud.build.flight import Agreement
 from tenbaud.build.references import build_references
 from tenbaud.build.transmitter_run import Stop, TransmitterRun
@@ -45,6 +46,7 @@ class TelemetryOptions:
 DEFAULT_OPTIONS = TelemetryOptions()
 STEERABLE = ("pid", "state_feedback")
 """Controllers whose set-points may be taken over in flight."""
+FREE = (-math.inf, math.inf)
 
 
 class TelemetryEnd:
@@ -155,10 +157,12 @@ def _steered(agreement: Agreement) -> tuple[SteeredReference | None, ...] | None
         return None
     references = build_references(agreement.config, agreement.signals, agreement.codec.model)
     stops: dict[str, tuple[float, float]] = getattr(agreement.config.model, "stops", {})
+    words = said_by_words(agreement.two_way)
     found: list[SteeredReference | None] = []
-    for output, one in zip(agreement.signals.outputs, references, strict=True):
-        of = stops.get(output.name, (-math.inf, math.inf))
-        found.append(None if one is None else SteeredReference(one, of))
+    for place, (output, one) in enumerate(zip(agreement.signals.outputs, references, strict=True)):
+        ends = stops.get(output.name, FREE), words.get(place, FREE)
+        within = max(low for low, _ in ends), min(high for _, high in ends)
+        found.append(None if one is None else SteeredReference(one, within))
     return tuple(found)
 
 

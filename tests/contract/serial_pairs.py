@@ -6,7 +6,7 @@ import tempfile
 from contextlib import ExitStack
 from pathlib import Path
 
-from channel.links.base import Link
+from channel.links.base import Link, Role
 from channel.links.serial.emulated import EmulatedLine
 from channel.links.serial.link import SerialLink
 from channel.links.serial.split import SplitLink
@@ -21,11 +21,13 @@ def make_serial(stack: ExitStack) -> tuple[Link, Link]:
     folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
     line = stack.enter_context(EmulatedLine(folder, None))
     wire = SerialWire(2)
-    transmitter = stack.enter_context(
-        SerialLink("transmitter", str(line.transmitter_port), wire, line_rate_baud=FAST_BAUD)
+    ports: tuple[tuple[Role, Path], ...] = (
+        ("transmitter", line.transmitter_port),
+        ("receiver", line.receiver_port),
     )
-    receiver = stack.enter_context(
-        SerialLink("receiver", str(line.receiver_port), wire, line_rate_baud=FAST_BAUD)
+    transmitter, receiver = (
+        stack.enter_context(SerialLink(role, str(port), wire, line_rate_baud=FAST_BAUD, is_narrow=True))
+        for role, port in ports
     )
     return transmitter, receiver
 

@@ -14,7 +14,7 @@ import pytest
 from channel.errors import LinkError
 from channel.links.base import Link
 from channel.links.endpoints import free_endpoint
-from channel.protocol.frames import Symbol
+from channel.protocol.frames import DownSymbol, ShortSymbol, Symbol
 from tests.channel.links.memory_pair import memory_pair
 from tests.contract.serial_pairs import make_serial, make_split
 
@@ -92,12 +92,17 @@ def test_when_many_messages_are_sent_then_they_come_whole_and_in_order(way: Pair
     assert taker.receive(0.0) is None
 
 
-def test_when_symbols_are_sent_in_their_slots_then_they_come_in_order(ends: Pair) -> None:
-    transmitter, receiver = ends
+@pytest.mark.parametrize("kind", [Symbol, DownSymbol])
+def test_when_symbols_are_sent_in_their_slots_then_they_come_in_order(
+    ends: Pair, kind: type[Symbol | DownSymbol]
+) -> None:
+    sender, taker = ends if kind is Symbol else (ends[1], ends[0])
     for number in range(100):
-        symbol = transmitter.wire.encode(Symbol(1, 0, number, number % 2))
-        transmitter.send(symbol)
-        assert received(receiver, 1) == [symbol]
+        symbol = sender.wire.encode(kind(1, 0, number, number % 2))
+        assert sender.wire.is_symbol(symbol)
+        assert isinstance(taker.wire.decode(symbol), (kind, ShortSymbol))
+        sender.send(symbol)
+        assert received(taker, 1) == [symbol]
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from channel.errors import LinkError
 from channel.links.serial.link import SerialLink
 from channel.links.serial.wire import SerialWire, stuff, stuff_notice
 from channel.protocol.endings import Ending
-from channel.protocol.frames import Bye, Symbol
+from channel.protocol.frames import Bye, DownSymbol, Symbol
 from channel.protocol.wire import encode
 from tests.channel.links.serial.noisy_line import NoisyLine
 from tests.contract.test_links import PATIENCE_S, SILENCE_S, until
@@ -147,6 +147,30 @@ def test_when_a_symbol_has_waited_too_long_then_it_is_dropped(line: NoisyLine) -
         transmitter.send(FRAME)
         assert receiver.receive(PATIENCE_S) == FRAME
         assert receiver.counts.dropped["stale symbol"] == 1
+
+
+def test_when_the_line_is_far_behind_then_a_symbol_does_not_follow(line: NoisyLine) -> None:
+    with SerialLink(
+        "transmitter", str(line.transmitter_port), WIRE, line_rate_baud=300, symbol_age_max_s=0.4
+    ) as link:
+        link.send(encode(Bye(1, Ending.OVER, "fifty bytes of farewell take more than a second")))
+        link.send(symbol(1))
+        assert link.counts.dropped == {"stale symbol": 1}
+
+
+def test_when_the_downlink_is_narrow_then_its_symbols_and_frames_come_to_the_transmitter(
+    line: NoisyLine,
+) -> None:
+    with (
+        SerialLink("transmitter", str(line.transmitter_port), WIRE, is_narrow=True) as transmitter,
+        SerialLink("receiver", str(line.receiver_port), WIRE, is_narrow=True) as receiver,
+    ):
+        assert until(transmitter.peer_present)
+        sent = [WIRE.encode(DownSymbol(1, 0, slot, slot % 3 % 2)) for slot in range(20)]
+        sent.insert(7, FRAME)
+        for message in sent:
+            receiver.send(message)
+        assert [transmitter.receive(PATIENCE_S) for _ in sent] == sent
 
 
 def test_when_the_line_is_slow_then_a_long_message_is_not_repeated_at_once(

@@ -14,12 +14,15 @@ import re
 import shlex
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tests import warm
+from tests.docs import prepared
 from tests.docs.blocks import Block
 from tests.rules.sources import TOP
 
@@ -28,9 +31,9 @@ LEFT_OUT_AT_TOP = {"runs", "site", "dist", "build"}
 """Left out of the top folder only: `tenbaud/build` is a package."""
 COMMANDS = {"tenbaud": "-m tenbaud", "python": "", "python3": "", "pytest": "-m pytest"}
 COMMANDS |= {name: f"-m {name}" for name in ("ruff", "mypy", "mkdocs")}
-COPIES = {"tenbaud": "-m tests.warm"}
 LOOPBACK_PORT = re.compile(r"(?<=127\.0\.0\.1:)(\d+)\b|(?<=localhost:)(\d+)\b")
 VIEW_PORT = 8710
+EVALUATIONS = ("EVALUATIONS_MAX = 400", "EVALUATIONS_MAX = 30")
 BLOCK_TIMEOUT_S = 150.0
 STARTED_WITHIN_S = 60.0
 ENDED_WITHIN_S = 60.0
@@ -50,9 +53,10 @@ class Sandbox:
     folder: Path
     timeout_s: float = BLOCK_TIMEOUT_S
     copies: bool = False
-    """whether what `tenbaud demo` starts may begin with everything imported (`tests/warm.py`)"""
+    """whether commands may begin with everything imported (`tests/docs/prepared.py`)"""
     ports: dict[str, str] = field(default_factory=dict)
     _settled: bool = True
+    _prepared: socket.socket | None = None
     _background: list[tuple[Block, subprocess.Popen[str], Path]] = field(default_factory=list)
 
     def __enter__(self) -> Sandbox:
@@ -61,16 +65,17 @@ class Sandbox:
         (self.folder / "home").mkdir()
         self._exchange_default_port()
         for name in ("demo", "view"):  # the live page's port: any free one
-            path = self.top / "tenbaud" / "cli" / f"{name}.py"
-            text = path.read_text()
-            assert f" = {VIEW_PORT}" in text
-            path.write_text(text.replace(f" = {VIEW_PORT}", " = 0"))
+            self._exchange(f"tenbaud/cli/{name}.py", f" = {VIEW_PORT}", " = 0")
+        if self.copies:  # of flights to fit a coder's constants: few, as in the tests of that
+            self._exchange("tenbaud/studies/quick.py", *EVALUATIONS)
         programs = self.top / ".venv" / "bin"
         programs.mkdir(parents=True)
-        for name, how in (COMMANDS | (COPIES if self.copies else {})).items():
+        for name, how in COMMANDS.items():
             program = programs / name
             program.write_text(f'#!/bin/sh\nexec "{sys.executable}" {how} "$@"\n')
             program.chmod(0o755)
+        if self.copies and warm.CLONE is not None:
+            self._prepared = prepared.serve_page(self.top, self._environment(), programs)
         (programs / "activate").write_text(f'PATH="{programs}:$PATH"\n')
         for stamp in (".installed", ".installed-dev"):  # in this order: the second needs the first
             (self.top / ".venv" / stamp).touch()
@@ -81,6 +86,8 @@ class Sandbox:
             if process.poll() is None:
                 os.killpg(process.pid, signal.SIGKILL)
                 process.wait()
+        if self._prepared is not None:
+            self._prepared.close()
 
     def run(self, block: Block) -> str:
         """Type a block in; return what it says. BlockFailed if it is not what the page says."""
@@ -127,10 +134,10 @@ class Sandbox:
         while not output.read_text() and process.poll() is None and time.monotonic() < until:
             time.sleep(0.05)
 
-    def _popen(self, script: str, output: object) -> subprocess.Popen[str]:
+    def _environment(self) -> dict[str, str]:
         import matplotlib
 
-        environment = {
+        return {
             **{name: value for name, value in os.environ.items() if not name.startswith("PYTEST")},
             "PATH": os.pathsep.join([str(self.top / ".venv" / "bin"), os.environ.get("PATH", "")]),
             "PYTHONPATH": str(self.top),
@@ -141,10 +148,12 @@ class Sandbox:
             "PYTEST_ADDOPTS": "--collect-only tests/transmitter/loops",
             "NO_COLOR": "1",
         }
+
+    def _popen(self, script: str, output: object) -> subprocess.Popen[str]:
         return subprocess.Popen(
             ["bash", "-euo", "pipefail", "-c", script],
             cwd=self.top,
-            env=environment,
+            env=self._environment(),
             stdin=subprocess.DEVNULL,
             stdout=output,  # type: ignore[call-overload]
             stderr=subprocess.STDOUT,
@@ -180,6 +189,12 @@ class Sandbox:
         assert text.count(setting) == 1
         text = text.replace(setting, re.sub(r"\d+", self._free_port, setting))
         path.write_text(LOOPBACK_PORT.sub(self._free_port, text))
+
+    def _exchange(self, file: str, text: str, other: str) -> None:
+        path = self.top / file
+        whole = path.read_text()
+        assert text in whole
+        path.write_text(whole.replace(text, other))
 
 
 def _left_out(folder: str, names: list[str]) -> set[str]:

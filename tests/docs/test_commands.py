@@ -6,11 +6,13 @@ What is not run says why above it, and is reported as skipped with that reason: 
 from __future__ import annotations
 
 import re
+import time
 from pathlib import Path
 
 import pytest
 
 from docs.tools.commands_page import commands_page
+from tests import warm
 from tests.docs.blocks import COMMAND, Block, NoteError, blocks_of, needed, pages, parse, stray_commands
 from tests.docs.sandbox import BlockFailed, Sandbox
 
@@ -32,8 +34,8 @@ LONG = [
 NOT_RUN = [block for blocks in RUN.values() for block in blocks if block.skip]
 
 
-def type_in(blocks: list[Block], folder: Path, timeout_s: float) -> None:
-    with Sandbox(folder, timeout_s, copies=True) as sandbox:
+def type_in(blocks: list[Block], folder: Path, timeout_s: float, copies: bool) -> None:
+    with Sandbox(folder, timeout_s, copies) as sandbox:
         for block in blocks:
             sandbox.run(block)
         sandbox.end()
@@ -43,7 +45,7 @@ def type_in(blocks: list[Block], folder: Path, timeout_s: float) -> None:
 def test_when_a_page_is_typed_in_then_every_command_does_what_it_says(
     page: str, tmp_path: Path
 ) -> None:
-    type_in([block for block in RUN[page] if not (block.skip or block.soak)], tmp_path, 150.0)
+    type_in([block for block in RUN[page] if not (block.skip or block.soak)], tmp_path, 150.0, True)
 
 
 @pytest.mark.soak
@@ -51,7 +53,7 @@ def test_when_a_page_is_typed_in_then_every_command_does_what_it_says(
 def test_when_a_page_is_typed_in_whole_then_its_long_commands_work_too(
     page: str, tmp_path: Path
 ) -> None:
-    type_in([block for block in RUN[page] if not block.skip], tmp_path, 3600.0)
+    type_in([block for block in RUN[page] if not block.skip], tmp_path, 3600.0, False)
 
 
 @pytest.mark.parametrize("block", NOT_RUN, ids=lambda block: block.name)
@@ -162,8 +164,11 @@ def test_when_a_command_that_is_not_run_has_an_unknown_word_then_it_is_reported(
     assert unknown_words(block_of(f"```sh\n{script}\n```"))
 
 
-def test_when_a_block_fails_or_says_something_else_then_the_page_fails(tmp_path: Path) -> None:
-    with Sandbox(tmp_path) as sandbox:
+@pytest.mark.parametrize("copies", [False, True])
+def test_when_a_block_fails_or_says_something_else_then_the_page_fails(
+    copies: bool, tmp_path: Path
+) -> None:
+    with Sandbox(tmp_path, copies=copies) as sandbox:
         sandbox.run(block_of("```console\n$ echo one; echo two\n...\ntwo\n```"))
         assert sandbox.run(block_of("```python\nprint(\"a\", 'b')\n```")) == "a b\n"
         for text in (
@@ -176,6 +181,24 @@ def test_when_a_block_fails_or_says_something_else_then_the_page_fails(tmp_path:
                 sandbox.run(block_of(text))
         sandbox.run(block_of("<!-- test: background -->\n```sh\necho here; sleep 60\n```"))
         sandbox.end()
+
+
+@pytest.mark.skipif(warm.CLONE is None, reason="copies are made on Linux alone")
+def test_when_a_copied_command_is_interrupted_or_killed_then_so_is_its_copy(tmp_path: Path) -> None:
+    code = "import os, time; open('pid', 'w').write(str(os.getpid())); time.sleep(60)"
+    until_it_runs = "until test -s pid; do sleep 0.1; done"
+    with Sandbox(tmp_path, copies=True) as sandbox:
+        for name, ended in (("INT", 130), ("TERM", 143), ("KILL", 137)):
+            kill = f'python -c "{code}" & {until_it_runs}; kill -{name} $!; wait $!'
+            sandbox.run(block_of(f"<!-- test: exit={ended} -->\n```sh\n{kill}\n```"))
+            copy = Path("/proc") / (sandbox.top / "pid").read_text()
+            until = time.monotonic() + 60.0
+            while copy.exists() and time.monotonic() < until:
+                time.sleep(0.05)
+            assert not copy.exists()
+            (sandbox.top / "pid").unlink()
+        said = sandbox.run(block_of("<!-- test: exit=2 -->\n```sh\ntenbaud inspect nothing\n```"))
+        assert "nothing does not exist" in said
 
 
 def test_when_a_block_takes_too_long_then_it_is_ended(tmp_path: Path) -> None:

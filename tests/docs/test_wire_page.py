@@ -53,7 +53,7 @@ def rows(title: str) -> list[Row]:
     ]
 
 
-TITLES = re.findall(r"^## (\d \w+)$", PAGE, re.MULTILINE)
+TITLES = re.findall(r"^## (\d+ \w+(?: symbol)?)$", PAGE, re.MULTILINE)
 
 
 def shown(row: Row) -> str:
@@ -101,7 +101,7 @@ def test_when_a_table_is_read_then_it_covers_its_frame_and_says_what_the_bytes_s
     message = b"".join(row.data for row in table)
     assert message[1] == int(title.split()[0])
     frame = wire.decode(message)
-    assert type(frame).__name__.lower() == title.split()[1]
+    assert type(frame).__name__.lower() == "".join(title.split()[1:])
     assert wire.encode(frame) == message
 
 

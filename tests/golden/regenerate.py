@@ -24,13 +24,18 @@ from channel.codec.coders.open_loop_zoom import OpenLoopZoomCoder, OpenLoopZoomP
 from channel.codec.coders.pcm import PcmCoder, PcmParameters
 from channel.codec.coders.static import StaticCoder, StaticParameters
 from channel.codec.coders.zoom import ZoomCoder, ZoomParameters
+from channel.codec.downlink.coded import CodedDirection
+from channel.codec.downlink.layout import Layout
+from channel.codec.downlink.machine import TwoWay
 from channel.codec.models.hold import HoldModel
 from channel.codec.models.learned import LearnedLinearModel
 from channel.codec.models.linear import LinearModel
 from channel.codec.models.pitch import PITCH_SIGNALS, PitchModel, PitchParameters
 from channel.protocol import frames, wire
 from channel.protocol.endings import Ending
+from channel.protocol.identity import numerics_probe
 from channel.protocol.limits import from_steps
+from tests.simulation.narrow import coded, mirrored
 
 FOLDER = Path(__file__).resolve().parent
 
@@ -78,6 +83,7 @@ def example_frames() -> list[frames.Frame]:
         frames.Bye(0, Ending(200)),
         frames.Unknown(0x01020304, 5),
         frames.Claim(0x01020304, 5, 0x0A0B0C0D),
+        frames.DownSymbol(0x01020304, 5, 0x0A0B0C0D, 1),
     ]
 
 
@@ -225,6 +231,32 @@ def codec_vectors() -> dict[str, list[list[object]]]:
     return vectors
 
 
+def two_way_machines() -> dict[str, TwoWay]:
+    """Return state machines of the narrow downlink: two symbols a sample, and one."""
+    direction = CodedDirection((0.5, -0.5), (1.0, -1.0))
+    return {
+        "mirrored": mirrored(Layout(2, 1, 4), 15),
+        "mirrored, one symbol": mirrored(Layout(1, 1, 8), 0),
+        "coded": coded(Layout(2), direction, 8),
+    }
+
+
+def two_way_vectors() -> dict[str, list[object]]:
+    """Return [word, command symbols, digest after them] for each machine, and its numerics probe."""
+    vectors: dict[str, list[object]] = {}
+    for name, machine in two_way_machines().items():
+        chooser = random.Random(f"two ways, {name}")
+        state = machine.initial()
+        rows: list[object] = [numerics_probe(machine.codec, machine).hex()]
+        for sample in range(60):
+            word = None if sample % 9 == 8 else _word(machine.codec, chooser)
+            symbols = [chooser.choice((0, 1)) for _ in range(machine.commands_in(state))]
+            state = machine.step(state, word, symbols).state
+            rows.append([word and list(word), symbols, f"{machine.digest(state):016x}"])
+        vectors[name] = rows
+    return vectors
+
+
 def _word(codec: Codec, chooser: random.Random) -> tuple[int, ...]:
     """Return a word; of single signs more +1 than -1, so that ranges grow as well as shrink."""
     alphabet = codec.coder.alphabet
@@ -237,6 +269,7 @@ GENERATORS: dict[str, Callable[[], object]] = {
     "codec": codec_vectors,
     "frames": frame_vectors,
     "numerics": numerics_vectors,
+    "two_way": two_way_vectors,
 }
 """Name of each golden file (without .json) and what makes its content."""
 

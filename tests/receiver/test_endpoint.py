@@ -30,16 +30,16 @@ def test_when_bytes_are_garbage_then_they_are_counted_and_nothing_is_answered() 
     end = endpoint()
     assert end.take(b"garbage", 0) == []
     assert end.inlet.malformed == end.session.counts["malformed"] == 1
-    assert end.inlet.wire_bytes == 7
+    assert end.inlet.meter.wire_bytes == 7
 
 
 def test_when_messages_pass_then_wire_bytes_of_both_ways_are_counted() -> None:
     end = greeted()
     data = wire.encode(Symbol(77, 0, 0, 1))
-    up, down = end.inlet.wire_bytes, end.downlink.wire_bytes
+    up, down = end.inlet.meter.wire_bytes, end.downlink.meter.wire_bytes
     (answer,) = end.take(data, 0)
-    assert end.inlet.wire_bytes - up == len(data)
-    assert end.downlink.wire_bytes - down == len(answer)
+    assert end.inlet.meter.wire_bytes - up == len(data)
+    assert end.downlink.meter.wire_bytes - down == len(answer)
 
 
 def test_when_a_symbol_comes_exactly_at_its_deadline_then_it_is_in_time() -> None:

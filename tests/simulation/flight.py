@@ -62,8 +62,8 @@ def assert_lockstep(flight: MemoryFlight, samples: int) -> None:
     assert flight.transmitter.counts["digest_checks"] == samples
     assert flight.transmitter.counts["desyncs"] == 0
     assert flight.receiver.counts["desyncs"] == 0
-    assert flight.transmitter.copies.confirmed == flight.receiver.state
-    assert flight.transmitter.copies.lag_samples == 0
+    assert flight.transmitter.confirmed_state == flight.receiver.state
+    assert flight.transmitter.lag_samples == 0
     digests = flight.transmitter_rows.column("sample", "digest")
     assert digests == flight.receiver_rows.column("sample", "digest")
     assert len(set(digests)) == samples

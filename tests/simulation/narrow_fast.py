@@ -73,6 +73,7 @@ class FastTwoWay(TwoWay):
     def _flown(
         self,
         state: TwoWayState,
+        digest: int,
         word: Word,
         symbols: Sequence[int | None],
         consume: Callable[[int, Vector, Vector], Vector],
@@ -98,12 +99,12 @@ class FastTwoWay(TwoWay):
         )
         if not well:
             raise ValueError("the law was given a state that is not finite")
-        decided = [(front, rear) for front, rear in commands.tolist()]
+        decided: list[Vector] = [(front, rear) for front, rear in commands.tolist()]
         following = (*state.commands, *decided)[TICKS:]
         after = self.codec.close(state.codec, opened, closed)
         law = (*memory.tolist(), 0.0, 1.0)
         down = down[: -self._law_size] + law
-        owed = self._owed(state, self.digest(state), word, symbols)
+        owed = self._owed(state, digest, word, symbols)
         return TwoWaySample(TwoWayState(after, following, decided[-1], down, owed), decided, [], [])
 
 

@@ -16,6 +16,8 @@ from channel.protocol.wire import encode, is_short
 from tenbaud import MemoryFlight
 from tests.channel.codec.parts import pitch_codec
 from tests.simulation.flight import assert_lockstep, pitch_flight
+from transmitter.session.echoes import EchoFollowing
+from transmitter.session.session import TransmitterSession
 
 
 def compact(**changes: Any) -> MemoryFlight:
@@ -26,8 +28,8 @@ def test_when_it_flies_then_16_bytes_a_sample_go_down_and_a_command_is_held_for_
     flight = compact()
     flight.fly(20.0)
     assert_lockstep(flight, 200)
-    assert flight.endpoint.downlink.command_bytes == 200 * 16
-    assert flight.loop.endpoint.inlet.command_bytes == 200 * 16
+    assert flight.endpoint.downlink.meter.command_bytes == 200 * 16
+    assert flight.loop.endpoint.inlet.meter.command_bytes == 200 * 16
     commands = flight.receiver_rows.column("tick", "command")
     assert len(commands) == 2000
     for first in range(0, 2000, 10):
@@ -76,7 +78,7 @@ def test_when_no_more_frames_in_a_row_are_lost_than_are_repeated_then_no_rejoin_
         0,
         4,
     ]
-    assert flight.transmitter.copies.confirmed == flight.receiver.state
+    assert flight.transmitter.confirmed_state == flight.receiver.state
 
 
 def test_when_more_frames_in_a_row_are_lost_then_a_rejoin_follows() -> None:
@@ -85,20 +87,21 @@ def test_when_more_frames_in_a_row_are_lost_then_a_rejoin_follows() -> None:
     assert flight.transmitter.rejoins_asked == {Why.GAP: 1}
     assert flight.transmitter.counts["rejoins"] == 1
     assert flight.transmitter.counts["desyncs"] == 0
-    assert flight.transmitter.copies.confirmed == flight.receiver.state
+    assert flight.transmitter.confirmed_state == flight.receiver.state
 
 
 def test_when_a_samples_own_frame_was_lost_then_its_state_is_not_compared() -> None:
     flight = compact(lead_ticks=3, downlink_line=LosingDownlink((), {20: 210_000_000}))
     compared: list[bool] = []
     session = flight.transmitter
-    confirm = session.copies.confirm
+    copies = echo_following(session).copies
+    confirm = copies.confirm
 
     def confirming(*given: Any) -> Any:
-        compared.append(session.is_proven)
+        compared.append(session.reliable_state is not None)
         return confirm(*given)
 
-    session.copies.confirm = confirming  # type: ignore[method-assign]
+    copies.confirm = confirming  # type: ignore[method-assign]
     flight.fly(4.0)
     # Asked before each sample is confirmed: 0 has nothing before it, and the frame of 20 came last.
     assert [sample for sample, known in enumerate(compared) if not known] == [0, 21]
@@ -112,6 +115,11 @@ def test_when_a_frame_is_overtaken_then_its_echo_is_taken_from_the_next_one() ->
     assert counts["rejoins"] == 0
 
 
+def echo_following(session: TransmitterSession) -> EchoFollowing:
+    assert isinstance(session.following, EchoFollowing)
+    return session.following
+
+
 @pytest.mark.parametrize("field", ["range", "angle", "rate"])
 @pytest.mark.parametrize("end", ["transmitter", "receiver"])
 def test_when_either_codec_is_wrong_in_its_last_bit_then_its_first_sample_shows_it(
@@ -120,13 +128,13 @@ def test_when_either_codec_is_wrong_in_its_last_bit_then_its_first_sample_shows_
     wrong = SabotagedCodec(pitch_codec(), parse_sabotage(f"sample=47,field={field}"))
     flight = compact(receiver_codec=wrong if end == "receiver" else None)
     if end == "transmitter":
-        flight.transmitter.codec = flight.transmitter.copies.codec = wrong
+        echo_following(flight.transmitter).copies.codec = wrong
     flight.fly(10.0)
     assert flight.transmitter.counts["desyncs"] == flight.receiver.counts["desyncs"] == 1
     assert flight.transmitter.desync is not None
     assert flight.transmitter.desync.sample == 47
     assert flight.transmitter.counts["rejoins"] == 1
-    assert flight.transmitter.copies.confirmed == flight.receiver.state
+    assert flight.transmitter.confirmed_state == flight.receiver.state
 
 
 class OtherDigest(Codec):

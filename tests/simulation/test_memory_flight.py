@@ -59,9 +59,9 @@ def test_when_ten_baud_are_flown_then_one_bit_per_sample_is_paid_and_measured() 
     meter = flight.uplink.meter
     assert meter.coder_bits == 300
     assert flight.receiver.meter.baud == pytest.approx(10.0)
-    assert flight.endpoint.inlet.wire_bytes == meter.wire_bytes
-    assert flight.endpoint.downlink.wire_bytes == flight.loop.endpoint.inlet.wire_bytes
-    assert flight.uplink.shaper.refused == 0
+    assert flight.endpoint.inlet.meter.wire_bytes == meter.wire_bytes
+    assert flight.endpoint.downlink.meter.wire_bytes == flight.loop.endpoint.inlet.meter.wire_bytes
+    assert flight.uplink.refused == 0
 
 
 def test_when_bits_arrive_at_the_end_of_their_slot_then_the_live_error_stays_bounded() -> None:
@@ -95,7 +95,7 @@ def test_when_symbols_are_lost_then_both_ends_count_them_and_stay_in_lockstep(
     assert 990 <= samples <= 1000
     assert flight.transmitter.counts["digest_checks"] == samples
     assert flight.transmitter.counts["desyncs"] == 0
-    assert flight.transmitter.copies.confirmed == flight.receiver.state
+    assert flight.transmitter.confirmed_state == flight.receiver.state
     assert list(result.digests) == flight.receiver_rows.column("sample", "digest")
     erasures = flight.transmitter.counts["erasures"]
     assert erasures == flight.receiver.counts["erasures"]

@@ -18,16 +18,17 @@ from channel.codec.downlink.mirrored import MirroredLaw, SetPointRange
 from receiver.controllers.pid import PAPER_GAINS, Pid
 from receiver.controllers.references import Square
 from receiver.controllers.state_feedback import StateFeedback
+from reproduction.bothways.flights import Wants
+from reproduction.bothways.lines import Faults
 from tenbaud.build.codec import build_codec
 from tenbaud.build.controllers import build_controller
 from tenbaud.config.load import load_config
 from tests.channel.codec.downlink.test_machine import SCHEMES, machine, wanted
+from tests.simulation.confirmations import BLOCK, LINES, Count, count_all, counted
 from tests.simulation.narrow import (
     TICK_S,
     TICKS,
-    Faults,
     NarrowFlight,
-    Wants,
     coded,
     full,
     mirrored,
@@ -78,9 +79,20 @@ def test_on_a_clean_line_every_sample_is_confirmed_as_it_was_flown() -> None:
     ],
 )
 def test_nothing_is_confirmed_that_the_receiver_did_not_fly(faults: Faults) -> None:
-    result = NarrowFlight(mirrored(LAYOUT, QUEUE), announced(QUEUE), 1, faults).fly(1250)
+    result = NarrowFlight(mirrored(LAYOUT, QUEUE), announced(QUEUE), 1, faults).fly(300)
     assert (result.wrong, result.doubted) == (0, 0)
-    assert result.confirmed > 900
+    assert result.confirmed > 200
+
+
+@pytest.mark.parametrize(("line", "blocks"), [("loss 1 %", 2), ("loss 5 %", 2), ("bursts", 1)])
+def test_in_a_hundred_thousand_samples_nothing_wrong_is_confirmed(line: str, blocks: int) -> None:
+    found = Count(0, 0, 0, 0)
+    for seed in range(blocks):
+        found = found.plus(counted(LINES[line], seed, BLOCK))
+    assert found.wrong == 0
+    assert found.doubted < 0.002 * found.confirmed
+    assert found.confirmed > 0.95 * blocks * BLOCK
+    assert found.rejoins <= (0.002 * found.confirmed if line == "bursts" else 0)
 
 
 @pytest.mark.parametrize(("layout", "period"), [(Layout(2), 1), (Layout(1, 1, 2), 2), (Layout(4), 1)])
@@ -180,8 +192,17 @@ def test_a_corrupt_state_is_found_within_twelve_samples_and_replaced(at_receiver
 
 
 @pytest.mark.soak
+@pytest.mark.parametrize("line", ["loss 1 %", "loss 5 %", "bursts"])
+def test_in_ten_million_samples_nothing_wrong_is_confirmed(line: str) -> None:
+    samples = int(1_000_000 * float(os.environ.get("MINUTES", "10")))
+    found = count_all(line, samples)
+    assert (found.wrong, found.doubted) == (0, 0)
+    assert found.confirmed > 0.95 * samples
+
+
+@pytest.mark.soak
 @pytest.mark.parametrize("faults", [Faults.both(0.01), Faults.both(0.05), BURSTS, Faults.both(0, 0.01)])
-def test_nothing_wrong_is_confirmed_in_long_flights(faults: Faults) -> None:
+def test_nothing_wrong_is_confirmed_in_long_flights_of_the_pitch_axis(faults: Faults) -> None:
     from tests.simulation.narrow_fast import fast_mirrored
 
     fast, plain = fast_mirrored(LAYOUT, QUEUE, 14), mirrored(LAYOUT, QUEUE, 14)

@@ -28,7 +28,7 @@ def damaged_flight(seed: int, damage_down: float, **changes: Any) -> tuple[Memor
 def fly_on(flight: MemoryFlight, samples: int) -> int:
     """Fly the given number of samples or to the end of the session; return how many were confirmed."""
     flight.fly(samples * flight.terms.sample_ns / 1e9)
-    return flight.transmitter.copies.confirmed.sample
+    return flight.transmitter.confirmed_state.sample
 
 
 def assert_nothing_silent(flight: MemoryFlight) -> None:
@@ -51,14 +51,14 @@ def uplink_damage(samples: int) -> None:
     )
     assert fly_on(flight, samples) == samples
     assert_nothing_silent(flight)
-    assert flight.transmitter.copies.confirmed == flight.receiver.state
+    assert flight.transmitter.confirmed_state == flight.receiver.state
     # The damage was there and hurt: bytes refused, symbols taken for others, slots erased.
     assert up.bytes_damaged > 0.008 * samples
     assert up.symbols_changed > 0
     assert up.dropped["check bits"] > 0
     assert 0.005 * samples < flight.receiver.counts["erasures"] < 0.03 * samples
     # Yet as many symbols flew, at one byte each, as there were samples.
-    assert flight.node.session.copies.next_sample == samples
+    assert flight.node.session.next_sample == samples
 
 
 def damage_both_ways(samples: int) -> None:

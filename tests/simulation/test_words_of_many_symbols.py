@@ -27,7 +27,7 @@ def test_when_a_word_of_ten_symbols_goes_up_per_tick_then_every_word_arrives_on_
     assert flight.transmitter.counts["digest_checks"] == 2000
     assert flight.transmitter.counts["desyncs"] == 0
     assert flight.receiver.counts["erasures"] == 0
-    assert flight.uplink.shaper.refused == 0
+    assert flight.uplink.refused == 0
     assert flight.receiver.meter.baud is not None
     assert abs(flight.receiver.meter.baud - 1000.0) < 1e-6
     assert flight.node.scores.first.coded.largest < 0.02 / 2

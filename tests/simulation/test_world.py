@@ -52,7 +52,7 @@ def test_when_an_old_recording_is_played_to_a_restarted_end_then_it_comes_back(e
 def test_when_the_watchdog_counted_ticks_that_are_owed_nothing_then_the_harness_would_find_out(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    base = _plan(up=Impairments(), down=Impairments())
+    base = plan_of(up=Impairments(), down=Impairments())
     plan = replace(
         base,
         terms=replace(base.terms, lead_ticks=60),
@@ -79,7 +79,7 @@ def test_when_an_end_stays_silent_about_a_difference_then_the_harness_finds_out(
 def test_when_old_epochs_were_obeyed_then_the_harness_would_find_out(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    plan = _plan(up=Impairments(), down=Impairments(loss=0.3, delay_ns=300_000_000))
+    plan = plan_of(up=Impairments(), down=Impairments(loss=0.3, delay_ns=300_000_000))
     World(plan).fly()
     monkeypatch.setattr(
         TransmitterSession, "command", lambda _session, _tick: (0.123, -0.123), raising=True
@@ -95,7 +95,7 @@ def test_when_one_end_is_corrupted_then_it_is_found_and_corrected_in_time(
 ) -> None:
     delay_ns = delay_periods * 100_000_000 // 2
     line = Impairments(delay_ns=delay_ns)
-    plan = replace(_plan(up=line, down=line), sabotage=((end, Sabotage(60, "coder", 0)),))
+    plan = replace(plan_of(up=line, down=line), sabotage=((end, Sabotage(60, "coder", 0)),))
     world = World(plan)
     times: dict[str, int] = {}
     original = world.watch.on_delivered
@@ -118,7 +118,7 @@ def test_when_one_end_is_corrupted_then_it_is_found_and_corrected_in_time(
     assert world.watch.desyncs_raised == 1
 
 
-def _plan(up: Impairments, down: Impairments) -> Plan:
+def plan_of(up: Impairments, down: Impairments) -> Plan:
     """Return a plan of the paper's flight with these lines and no other fault."""
     base = draw(0)
     delay_ns = up.delay_ns + up.jitter_ns + down.delay_ns + down.jitter_ns

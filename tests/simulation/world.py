@@ -13,10 +13,12 @@ from dataclasses import replace
 from itertools import count
 
 from channel.codec.codec import Codec, Vector
+from channel.codec.downlink.machine import TwoWay
 from channel.errors import FrameError
 from channel.line.clocks import SkewedClock
 from channel.line.impairments import ImpairedLine, Impairments
-from channel.line.line import Uplink
+from channel.line.line import Downlink, Uplink
+from channel.line.slots import Departure
 from channel.protocol.frames import Frame, Symbol
 from channel.protocol.sabotage import Sabotage, SabotagedCodec
 from channel.protocol.wire import decode
@@ -120,6 +122,10 @@ class World:
         """Return how often the ends may rejoin after the last fault."""
         return CALM_REJOINS_MAX
 
+    def two_way(self, codec: Codec) -> TwoWay | None:
+        """Return the state machine of an end; None: echoes and commands go down."""
+        return None
+
     # The two processes
 
     def start_receiver(self) -> None:
@@ -128,23 +134,32 @@ class World:
         controller = Pid(PAPER_GAINS, REFERENCE, TICK_S)
         recorder = self.watch.receiver_started(1000 + self._started)
         session = ReceiverSession(
-            codec, self.terms, controller, self.identity, 1000 + self._started, recorder
+            codec,
+            self.terms,
+            controller,
+            self.identity,
+            1000 + self._started,
+            recorder,
+            two_way=self.two_way(codec),
         )
         recorder.session = session
-        self.endpoint = ReceiverEndpoint(session)
+        self.endpoint = ReceiverEndpoint(session, Downlink(terms=self.terms))
 
     def start_transmitter(self) -> None:
         self._started += 1
         self._generation += 1
         recorder = self.watch.transmitter_started()
         kind = BlindSession if self.blind else TransmitterSession
+        codec = self._codec_of("transmitter")
         session = kind(
-            self._codec_of("transmitter"),
+            codec,
             self.terms,
             self.identity,
             self._started,
             recorder,
             overtaking_ticks=self.plan.overtaking_ticks,
+            two_way=self.two_way(codec),
+            line_delay_ns=self.plan.round_trip_ns,
         )
         guard = Guard(self.terms.limits, GuardSettings(self.plan.watchdog_ticks, 50, (0.0, 0.0)))
         scores = Scores(self.codec.model, 0, 2000, values_of((REFERENCE,)))
@@ -240,6 +255,8 @@ class World:
             return
         frames = self.node.measure(tick)
         self._offer(frames or [])
+        self.node.flush_records()
+        self.watch.on_delivered(self.node)
         self.node.actuate(tick)
         self.watch.on_tick(tick, self.node)
         self._tick(tick + 1, generation)
@@ -277,10 +294,11 @@ class World:
         if self.endpoint is None:
             return
         shown_ns = self.clock.shown(self.now_ns)
-        messages = self.endpoint.step(shown_ns, data).frames
+        reply = self.endpoint.step(shown_ns, data)
         self.endpoint.session.flush_records()
-        for message in messages:
-            for arrival_ns, out in self.down.carry(message, self.now_ns):
+        at_once = [Departure(shown_ns, message) for message in reply.frames]
+        for leaves_ns, message in (*at_once, *reply.later):
+            for arrival_ns, out in self.down.carry(message, self.now_ns + leaves_ns - shown_ns):
                 if out is not None:
                     self.at(arrival_ns, lambda out=out: self._take(out))
 

@@ -150,7 +150,7 @@ class Rig:
                 self.put(encode(frame))
             self._tick += 1
             self.session.command(self._tick)
-            while self.session.copies.lag_samples and self.session.phase is Phase.FLYING:
+            while self.session.lag_samples and self.session.phase is Phase.FLYING:
                 self.hear()
             if self.session.phase is Phase.REJOINING:
                 self.hear()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -62,6 +63,9 @@ MORE = {
     "pendulum-20baud": Flown(10.0, 3.0, {"angle": 0.006}, {"angle": 0.2}),
 }
 """Presets of the same plants at other rates."""
+ALIKE = ("integrator-10baud", "servo-10baud", "aero-20baud", "pendulum-13baud")
+"""Those that differ in memory alone; two processes fly them in the long tests. The others have the
+shortest and the longest period, the most outputs, and words of several bits."""
 WORDS = tuple(preset for preset, flown in MORE.items() if flown.bits > 1)
 """Those that differ between two processes too: a sample has several bits."""
 
@@ -98,13 +102,15 @@ def test_presets_are_listed_by_plant_with_their_rates() -> None:
             assert re.search(rf"{preset} +{rate:g} baud  \w", plants[plant]), plant
 
 
-@pytest.mark.parametrize(
-    ("preset", "clock"),
-    [
-        *[(preset, "virtual") for preset in (*PRESETS, *WORDS)],
-        *[pytest.param(preset, "real", marks=pytest.mark.real_time) for preset in PRESETS],
-    ],
-)
+def _as_processes() -> Iterator[Any]:
+    for preset in (*PRESETS, *WORDS):
+        soak = [pytest.mark.soak] if preset in ALIKE else []
+        yield pytest.param(preset, "virtual", marks=soak)
+        if preset in PRESETS:
+            yield pytest.param(preset, "real", marks=[*soak, pytest.mark.real_time])
+
+
+@pytest.mark.parametrize(("preset", "clock"), _as_processes())
 def test_it_flies_as_two_processes(preset: str, clock: Clock, tmp_path: Path) -> None:
     period_s = load_config(preset).timing.symbol_period_s
     samples = round((PRESETS | MORE)[preset].real_s / period_s)

@@ -129,7 +129,7 @@ def test_when_it_flies_at_ten_baud_then_ten_bytes_a_second_go_up_and_ten_baud_ar
     assert symbol_bytes == meter.symbols == meter.coder_bits
     # A busy machine may hold the loop up past a slot, which is then an erasure and no byte.
     missed = flown.transmitter.node.session.counts["words_missed"]
-    assert symbol_bytes + missed + flown.transmitter.uplink.shaper.refused == 50
+    assert symbol_bytes + missed + flown.transmitter.uplink.refused == 50
     # Beside the symbols only the handshake, the farewell and the links' own notices.
     assert carried == flown.up_bytes
     assert not flown.dropped
@@ -147,9 +147,9 @@ def test_when_the_line_has_2400_baud_then_the_compact_downlink_flies_over_it(tmp
     flown.assert_nothing_silent()
     downlink = flown.receiver.downlink
     samples = flown.receiver.session.counts["samples"]
-    assert downlink.command_bytes == 16 * samples >= 16 * 50
+    assert downlink.meter.command_bytes == 16 * samples >= 16 * 50
     # 19 bytes of each frame on the line; beside them the welcome.
-    assert downlink.wire_bytes - 19 * samples < 200
+    assert downlink.meter.wire_bytes - 19 * samples < 200
     assert carried >= 19 * 50
     node = flown.transmitter.node
     if node.session.counts["words_missed"] or node.commands_late:

@@ -62,7 +62,7 @@ def fly_sample(node: TransmitterNode, sample: int) -> int:
         assert symbols is not None
         if symbols:
             word = ((-1, 1)[symbols[0].number],)
-            state = CODEC.step(node.session.copies.confirmed, word, [(2.0, -2.0)] * 10)
+            state = CODEC.step(node.session.confirmed_state, word, [(2.0, -2.0)] * 10)
             echo = Echo(sample, symbols[0].number, CODEC.digest(state), (2000, -2000) * 10)
             node.deliver(Commands(77, 0, (echo,)))
         sent += len(symbols)
@@ -101,7 +101,7 @@ def test_when_the_guard_has_stopped_then_no_symbol_leaves_although_the_session_f
         assert node.session.phase is Phase.FLYING
     assert node.latched
     assert node.guard.command == (0.0, 0.0)
-    assert node.session.copies.next_sample == 1
+    assert node.session.next_sample == 1
 
 
 def test_when_the_session_ends_then_the_voltage_is_taken_down_with_its_reason() -> None:

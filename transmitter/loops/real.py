@@ -122,9 +122,7 @@ class RealFlight(Flight):
         agreed_ns = session.terms.linger_ns(self.endpoint.uplink.line.longest_delay_ns)
         until_ns = self._now_ns() + agreed_ns + LAST_ECHO_NS
         while (now_ns := self._now_ns()) < until_ns:
-            if session.phase is not Phase.FLYING or (
-                session.copies.lag_samples == 0 and not self._outbox
-            ):
+            if session.phase is not Phase.FLYING or (session.lag_samples == 0 and not self._outbox):
                 break
             ramp_down.step(now_ns)
             self._take_in((min(until_ns, ramp_down.next_ns) - self._now_ns()) / 1e9)
@@ -162,7 +160,7 @@ class RealFlight(Flight):
     @property
     def _answer_due(self) -> bool:
         session = self.endpoint.node.session
-        return session.phase is not Phase.FLYING or session.copies.lag_samples > 0
+        return session.phase is not Phase.FLYING or session.lag_samples > 0
 
     def _take_in(self, timeout_s: float) -> bool:
         """Send what is due and take one message, waiting for either at most `timeout_s`.

@@ -121,6 +121,8 @@ class VirtualFlight(Flight):
         self._deadline_ns = reply.deadline_ns
         for message in reply.frames:
             self._push(self._downlink.carry(message, time_ns), upward=False)
+        for leaves_ns, symbol in reply.later:
+            self._push(self._downlink.carry(symbol, leaves_ns), upward=False)
 
 
 RETRY_S = 0.25

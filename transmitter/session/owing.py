@@ -29,6 +29,8 @@ class Owing:
         """first tick that is owed a command decided in the present epoch"""
         self._pauses = 0
         """in a row, without a command between them"""
+        self.counts_on = False
+        """whether the present epoch has no pause"""
 
     def owed_ticks(self, tick: int) -> int:
         """Return for how many ticks, up to this one, commands are owed; 0: none is yet."""
@@ -45,7 +47,8 @@ class Owing:
         lead, per_sample = self._terms.lead_ticks, self._terms.ticks_per_sample
         if why in (Why.START, Why.GUARD):
             self._pauses = 0
-        if self._pauses >= PAUSES_MAX:
+        self.counts_on = self._pauses >= PAUSES_MAX
+        if self.counts_on:
             return 0
         self._pauses += 1
         if why is Why.START:

@@ -44,7 +44,7 @@ class RateWatch:
         if self._from_tick is None:
             self._begin(tick, session)
         self._looks += 1
-        self._slow += session.copies.lag_samples > self._lag_usual
+        self._slow += session.lag_samples > self._lag_usual
         if tick - (self._from_tick or 0) < self._window_ticks:
             return None
         event = self._judge(tick - (self._from_tick or 0), session)

@@ -64,6 +64,29 @@ SAMPLE_CHANNEL = RecordChannel(
     ),
 )
 
+CONFIRMED_CHANNEL = RecordChannel(
+    "confirmed",
+    (
+        Field("sample", "integer", "", "index of the sample"),
+        Field("word", "integers", "", "symbols as the receiver consumed them; null: erased"),
+        Field("symbols", "integers", "", "its down symbols as the receiver sent them"),
+        Field("commands", "numbers", "", "commands of its ticks, all inputs of a tick together"),
+        Field("doubt", "number", "", "share of other inputs that led to the same state"),
+        Field("lag_samples", "integer", "", "samples heard of beyond it when it was confirmed"),
+    ),
+)
+
+HYPOTHESES_CHANNEL = RecordChannel(
+    "hypotheses",
+    (
+        Field("sample", "integer", "", "the sample whose down symbols were heard"),
+        Field("size", "integer", "", "hypotheses that are followed"),
+        Field("rest", "number", "", "weight of what is not followed, in units of the list's"),
+        Field("best", "number", "", "share of the list that the likeliest one has"),
+        Field("confirmed_to", "integer", "", "the first sample that is not certain"),
+    ),
+)
+
 
 def write_sample(recorder: Recorder, terms: Terms, codec: Codec, done: Confirmed) -> None:
     """Record a confirmed sample, and the estimates of its ticks."""

@@ -2,9 +2,9 @@
 
 Inputs: a measurement at every tick (`on_measurement`), a frame that arrived (`on_frame`), and requests
 for a tick's command (`command`). A slot's symbol depends on the measurement at its sample's first tick
-and on the provisional copy of the codec. Only echoes advance the confirmed copy; its digest is compared
-with the receiver's after every sample. After a loss of lockstep (digests differ, echoes are lost or too
-old, the receiver was restarted) the session sends no symbols until the answer has a common state.
+and on what is known of the receiver's state (`transmitter.session.following`). After a loss of lockstep
+(the states differ, echoes are lost or too old, the receiver was restarted) the session sends no symbols
+until the answer has a common state.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from collections import Counter, deque
 from dataclasses import replace
 from enum import Enum
 
-from channel.codec.codec import ERASED, Codec, CodecState, Vector
+from channel.codec.codec import Codec, CodecState, Vector
+from channel.codec.downlink.machine import TwoWay
 from channel.protocol.bounds import Bounds, shown, within_text_bounds
 from channel.protocol.compact import compact_form
 from channel.protocol.endings import End, Ending
@@ -23,7 +24,7 @@ from channel.protocol.frames import (
     Claim,
     Commands,
     Desync,
-    Echo,
+    DownSymbol,
     ForeignVersion,
     Frame,
     Hello,
@@ -36,14 +37,15 @@ from channel.protocol.frames import (
 )
 from channel.protocol.identity import Identity, differing_fields
 from channel.protocol.lockstep import History, difference_event, is_answer, write_failure
-from channel.protocol.recording import NullRecorder, Recorder, write_epoch
+from channel.protocol.recording import NullRecorder, Recorder
 from channel.protocol.terms import Terms
 from channel.protocol.wire import foreign_version_text
-from transmitter.session.copies import CANNOT_FLY, Confirmed, Copies, EchoOrder, commands_of
-from transmitter.session.due import DueCommands
+from transmitter.session.copies import CANNOT_FLY, Confirmed
+from transmitter.session.down_symbols import NarrowFollowing
+from transmitter.session.echoes import EchoFollowing, diverged
+from transmitter.session.following import Following, Lost, Parts
 from transmitter.session.owing import Owing
-from transmitter.session.records import write_sample
-from transmitter.session.rejoin import Asking, start_of
+from transmitter.session.rejoin import Asking
 from transmitter.session.state_observer import StateObserver, default_observer
 from transmitter.session.takeover import Takeover
 
@@ -64,6 +66,8 @@ class TransmitterSession:
     `stop_on_desync`: end the flight at the first digest that differs, instead of rejoining.
     `state_observer`: finds the states for a coder that uses rates; None: that of angle and rate.
     `overtaking_ticks`: how long after a command frame one may come that was sent before it.
+    `two_way`: the state machine of the narrow downlink; `line_delay_ns`: by how much the two lines may
+    delay its symbols beyond what is agreed.
     """
 
     def __init__(
@@ -77,18 +81,21 @@ class TransmitterSession:
         stop_on_desync: bool = False,
         state_observer: StateObserver | None = None,
         overtaking_ticks: int = 0,
+        two_way: TwoWay | None = None,
+        line_delay_ns: int = 0,
     ) -> None:
         self.codec = codec
         self.terms = terms
+        self.line_delay_ns = line_delay_ns
         self.identity = identity
         self.incarnation = incarnation
         self.phase = Phase.GREETING
         self.session_number = 0
         self.epoch = 0
-        self.copies = Copies(codec, terms)
         self.counts: Counter[str] = Counter()
         """confirmed, digest_checks, desyncs, rejoins, stale_frames, words_missed, erasures,
-        claims_refused, take_overs, out_of_bounds, diverged"""
+        claims_refused, take_overs, out_of_bounds, diverged; narrow: hash_symbols (that came, of
+        confirmed samples), down_late and down_erased (symbols)"""
         self.rejoins_asked: Counter[Why] = Counter()
         self.end: End | None = None
         self.refusal: End | None = None
@@ -99,24 +106,25 @@ class TransmitterSession:
         """when the receiver last sent something new in the present epoch"""
         self.epoch_tick = 0
         """first tick of the present epoch"""
-        self._compared: CodecState | None = None  # last state found equal to the receiver's
         self.owing = Owing(terms)
-        self.confirmed: deque[Confirmed] = deque(maxlen=2 * terms.history_samples)
-        """samples confirmed and not yet recorded (`take_confirmed`)"""
         self.events: deque[Event] = deque(maxlen=1000)
-        self.history = History(codec, 2 * terms.history_samples)
         self._asking = Asking(identity, incarnation, terms)
         self._takeover = Takeover(terms)
-        self._bounds = Bounds(codec, terms, self.counts, self._emit)
+        self._bounds = Bounds(codec, terms, self.counts, self._emit, two_way)
         self._stop_on_desync = stop_on_desync
-        self._echoes = EchoOrder(overtaking_ticks, terms.history_samples)
-        self._lag_samples_max = terms.history_samples
-        """Echoes may be this many samples behind before a rejoin is asked for."""
         self._observer = state_observer or default_observer(codec, terms.tick_ns / 1e9)
         self._recorder = recorder or NullRecorder()
-        self._due = DueCommands(terms.initial_command, terms.lead_ticks)
         self._tick = -1
         self.compact = compact_form(codec, terms)
+        parts = Parts(
+            codec, terms, self.counts, self._bounds, self.owing, self._recorder, self._on_heard
+        )
+        self._parts = parts
+        self.following: Following = (
+            EchoFollowing(parts, overtaking_ticks)
+            if two_way is None
+            else NarrowFollowing(parts, two_way, line_delay_ns)
+        )
 
     # What happens at a tick
 
@@ -134,24 +142,20 @@ class TransmitterSession:
         """
         self._tick = tick
         if self._observer is not None:
-            measurement = self._observer.look(tick, measurement, self._due.last)
+            measurement = self._observer.look(tick, measurement, self.following.last_command)
         if self.phase is Phase.REJOINING:
             return self._ask()
         if self.phase is not Phase.FLYING:
             return []
         sample, offset = divmod(tick, self.terms.ticks_per_sample)
-        if sample - self.copies.confirmed.sample > self._lag_samples_max:
-            return self.rejoin(Why.LAG, replace(ASKED, number=self._lag_samples_max))
-        if frames := self._check_gap():
-            return frames
-        self.counts["words_missed"] += self.copies.skip_to(sample)
-        if offset != 0 or self.copies.next_sample != sample:
+        if lost := self.following.at_tick(tick):
+            return self._lose(lost)
+        if offset != 0 or self.following.next_sample != sample:
             return []
         try:
-            word = self.codec.encode(self.copies.state_before_next(), measurement)
+            word = self.following.encode(measurement)
         except CANNOT_FLY as error:
-            return self._on_diverged(error)
-        self.copies.sent(word)
+            return self._lose(diverged(self._parts, error))
         first = sample * self.terms.symbols_per_word
         number = self.codec.coder.alphabet.symbol_number
         here = (self.session_number, self.epoch)
@@ -159,16 +163,17 @@ class TransmitterSession:
 
     def conclude(self, tick: int, *, withheld: bool = False) -> None:
         """End the flight before `tick`; last words that were missed, not `withheld`, are erasures."""
-        self._echoes.end_before(end := -(-tick // self.terms.ticks_per_sample))
-        if self.phase is Phase.FLYING and not withheld:
+        withheld = withheld or self.phase is not Phase.FLYING
+        if not withheld:
             self._tick = max(self._tick, tick - 1)
-            self.counts["words_missed"] += self.copies.skip_to(end)
+        self.following.conclude(-(-tick // self.terms.ticks_per_sample), withheld=withheld)
 
     def rejoin(self, why: Why, details: Event = ASKED) -> list[Frame]:
         """Stop sending symbols and ask for a new epoch; return the frames that do."""
         if self.phase is not Phase.FLYING:
             return []
         self.phase = Phase.REJOINING
+        self.following.pause()
         self.rejoins_asked[why] += 1
         self._asking.begin(why, self._tick)
         self._emit(replace(details, epoch=self.epoch, cause=why))
@@ -182,15 +187,11 @@ class TransmitterSession:
 
     def command(self, tick: int) -> Vector | None:
         """Return the command of this tick, None when it has not come; earlier ones are forgotten."""
-        return self._due.take(tick)
+        return self.following.command(tick)
 
     def take_confirmed(self) -> list[Confirmed]:
         """Record and return the samples confirmed since the last call; the next symbol goes first."""
-        taken = [self.copies.explained(done) for done in self.confirmed]
-        self.confirmed.clear()
-        for done in taken:
-            write_sample(self._recorder, self.terms, self.codec, done)
-        return taken
+        return self.following.take_confirmed()
 
     # What arrives
 
@@ -198,18 +199,18 @@ class TransmitterSession:
         """Take one frame; return the frames to send."""
         frame = within_text_bounds(frame)
         match frame:
-            case Commands() if self._is_current(frame.session) and frame.epoch == self.epoch:
-                return self._on_commands(frame)
+            case Commands() | DownSymbol() if self._is_present(frame.session, frame.epoch):
+                return self._follow(frame)
             case ShortCommands() if commands := self._unpacked(frame):
-                return self._on_commands(commands)
+                return self._follow(commands)
             case Welcome() if self._asking.is_answered_by(frame):
                 return self._on_welcome(frame)
             case Welcome() if self._is_current(frame.session) and self._is_left_behind(frame):
                 detail = f"the receiver has begun epoch {frame.epoch}, unasked"
                 return self.rejoin(Why.UNKNOWN, replace(ASKED, detail=detail))
-            case Unknown() if self._is_current(frame.session) and frame.epoch == self.epoch:
+            case Unknown() if self._is_present(frame.session, frame.epoch):
                 return self._on_unknown()
-            case Claim() if self._is_current(frame.session) and frame.epoch == self.epoch:
+            case Claim() if self._is_present(frame.session, frame.epoch):
                 return self._on_claim(frame)
             case Desync() if not self._report_answered and is_answer(frame, self.desync):
                 self._report_answered = True
@@ -254,7 +255,6 @@ class TransmitterSession:
         again = self.phase is not Phase.GREETING
         if self._bounds.drops(self._bounds.of_welcome(welcome, self._sample if again else None)):
             return []
-        state, hold = start_of(welcome, self.codec, self.terms)
         farewell: list[Frame] = []
         if successor is not None and welcome.session != self.session_number:
             self.counts["take_overs"] += 1
@@ -263,16 +263,13 @@ class TransmitterSession:
         self.session_number = welcome.session
         self.epoch = welcome.epoch
         self.heard_tick = self._tick
-        self.copies.restart(state, hold)
-        self._echoes.clear()
-        self.epoch_tick = state.sample * self.terms.ticks_per_sample
+        self.epoch_tick = welcome.first_sample * self.terms.ticks_per_sample
         held = self.owing.begin(self.epoch_tick, self._tick, self._asking.why)
-        self._due.restart(self.epoch_tick, hold, held)
+        self.following.restart(welcome, held)
         self.phase = Phase.FLYING
-        write_epoch(self._recorder, self.terms.sample_ns, self.epoch, state, hold)
         self.counts["rejoins"] += again
         kind = EventKind.REJOIN if again else EventKind.STARTED
-        self._emit(Event(kind, state.sample, session=welcome.session, epoch=welcome.epoch))
+        self._emit(Event(kind, welcome.first_sample, session=welcome.session, epoch=welcome.epoch))
         return farewell
 
     def _on_refuse(self, refuse: Refuse) -> list[Frame]:
@@ -302,48 +299,20 @@ class TransmitterSession:
             return None
         return self.compact.unpacked(frame, self.session_number, self.epoch, self._sample)
 
-    def _on_commands(self, frame: Commands) -> list[Frame]:
-        if frame.echoes[-1].sample < self.copies.confirmed.sample:
-            # A copy, or a recording: it brings nothing, and proves nobody alive.
-            self.counts["stale_frames"] += 1
-            return []
-        sent = (self.copies.confirmed.sample, self.copies.next_sample)
-        if self._bounds.drops(self._bounds.of_commands(frame, self._sample, *sent)):
-            return []
+    def _follow(self, frame: Frame) -> list[Frame]:
+        lost = self.following.take(frame, self._tick)
+        return [] if lost is None else self._lose(lost)
+
+    def _on_heard(self) -> None:
         self.heard_tick = self._tick
         self._takeover.on_command()
-        self._echoes.add(frame.echoes, self.copies.confirmed.sample, self._tick, self._sample)
-        while (echo := self._echoes.take(self.copies.confirmed.sample)) is not None:
-            if frames := self._confirm(echo):
-                return frames
-        return self._check_gap()
 
-    def _check_gap(self) -> list[Frame]:
-        if not self._echoes.is_lost(expected := self.copies.confirmed.sample, self._tick):
-            return []
-        return self.rejoin(Why.GAP, replace(ASKED, sample=expected))
-
-    def _confirm(self, echo: Echo) -> list[Frame]:
-        """Advance the confirmed copy by one echo; return the report of a desync, if it is one."""
-        word = self.codec.coder.alphabet.word(echo.word_number)
-        commands = commands_of(echo, self.terms)
-        try:
-            done = self.copies.confirm(word, commands, echo.digest, echo.digest_mask)
-        except CANNOT_FLY as error:
-            return self._on_diverged(error)
-        self.confirmed.append(done)
-        self.history.add(self.epoch, word, done.flown.state)
-        checked, erased, unsent = echo.digest_mask > 0, word is ERASED, done.lag_samples == 0
-        self.counts.update(confirmed=1, digest_checks=checked, erasures=erased, words_missed=unsent)
-        if done.digest != done.peer_digest:
-            return self._on_desync(done)
-        # Only now: a receiver with a different state must move no motor.
-        if checked:
-            self._compared = done.flown.state
-            self.owing.on_confirmed()
-        first_tick = echo.sample * self.terms.ticks_per_sample + self.terms.lead_ticks
-        self._due.add(first_tick, commands, proven=checked)
-        return []
+    def _lose(self, lost: Lost) -> list[Frame]:
+        if lost.differing is not None:
+            return self._on_desync(lost.differing)
+        if lost.why is Why.REST and self._stop_on_desync:
+            return self.bye(End(Ending.DESYNC))
+        return self.rejoin(lost.why, lost.details)
 
     def _on_desync(self, done: Confirmed) -> list[Frame]:
         self.counts["desyncs"] += 1
@@ -356,11 +325,6 @@ class TransmitterSession:
         if self._stop_on_desync:
             return [self.desync, *self.bye(End(Ending.DESYNC))]
         return self.rejoin(Why.DESYNC, replace(ASKED, sample=done.sample))
-
-    def _on_diverged(self, error: Exception) -> list[Frame]:
-        """Request another state: the receiver continues from its own, so this one differs."""
-        self.counts["diverged"] += 1
-        return self.rejoin(Why.LAG, replace(ASKED, detail=repr(error)))
 
     # Reports
 
@@ -377,10 +341,33 @@ class TransmitterSession:
     def _is_current(self, session: int) -> bool:
         return self.phase is Phase.FLYING and session == self.session_number
 
+    def _is_present(self, session: int, epoch: int) -> bool:
+        return self._is_current(session) and epoch == self.epoch
+
     @property
-    def is_proven(self) -> bool:
-        """Return whether the confirmed state has been compared with the receiver's, and is equal."""
-        return self.phase is Phase.FLYING and self._compared is self.copies.confirmed
+    def confirmed_state(self) -> CodecState:
+        """Return the last codec state that is certainly the receiver's."""
+        return self.following.confirmed_state
+
+    @property
+    def next_sample(self) -> int:
+        """Return the sample whose word is sent next."""
+        return self.following.next_sample
+
+    @property
+    def lag_samples(self) -> int:
+        """Return how many samples were sent of which nothing has been heard."""
+        return self.following.lag_samples
+
+    @property
+    def history(self) -> History:
+        """Return the last confirmed states, for a failure to be looked into."""
+        return self.following.history
+
+    @property
+    def reliable_state(self) -> Vector | None:
+        """Return the model state to check encoders against; None: none can be relied on."""
+        return self.following.reliable_state(self._tick) if self.phase is Phase.FLYING else None
 
     @property
     def _has_session(self) -> bool:
@@ -394,7 +381,7 @@ class TransmitterSession:
 
     def _emit(self, event: Event) -> None:
         now_ns = self._tick * self.terms.tick_ns
-        at = self.copies.confirmed.sample if event.sample is None else event.sample
+        at = self.confirmed_state.sample if event.sample is None else event.sample
         event = replace(event, time_ns=now_ns, sample=at)
         self.events.append(event)
         write_event(self._recorder, event)

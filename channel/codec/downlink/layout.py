@@ -10,8 +10,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from channel.codec.codec import Alphabet
+
 SYMBOLS_MAX = 32
 """Down symbols a sample; their hash bits are different bits of one digest of 64."""
+
+
+DOWN_ALPHABET = Alphabet((0, 1), 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,10 +65,11 @@ class Layout:
         """Raise ValueError, with the numbers, where a line of this rate does not carry the layout."""
         needed = self.symbols_per_sample * 1e9 / sample_ns
         if needed > downlink_baud * (1.0 + 1e-9):
+            carried = int(1e-9 * downlink_baud * sample_ns + 1e-9)
+            fewer = f"choose a layout of at most {carried} a sample, " if carried else ""
             raise ValueError(
                 f"{self.symbols_per_sample} down symbol(s) every {sample_ns / 1e9:g} s ask for "
-                f"{needed:g} symbols/s, but the line carries downlink_baud = {downlink_baud:g}; choose "
-                f"a layout of at most {int(1e-9 * downlink_baud * sample_ns + 1e-9)} a sample, "
+                f"{needed:g} symbols/s, but the line carries downlink_baud = {downlink_baud:g}; {fewer}"
                 "lengthen symbol_period_s or raise downlink_baud"
             )
 

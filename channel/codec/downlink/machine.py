@@ -16,9 +16,10 @@ The command symbols come first within a sample, and hash symbols after them. The
 a sample does not say a bit of X: it says the bit *owed* in X, and the parity of the sample's command
 symbols. What is owed is a bit of the state before the last sample that had a hash symbol, and the
 parity of that sample's inputs (word and command symbols); of samples without a hash symbol since, the
-parity of their command symbols and of [the word is erased]. Two copies that differ in one input alone
-therefore differ in the next hash symbol for certain, where a bit of the digest tells them apart by
-chance.
+parity of their command symbols and of [the word is erased]. The second hash symbol of a sample, where
+it has one, says a bit of X and the parity of the word. Two copies that differ in one input alone
+therefore differ in a hash symbol of the same sample or the next for certain, where a bit of the digest
+tells them apart by chance.
 """
 
 from __future__ import annotations
@@ -106,6 +107,8 @@ class TwoWay:
         self._sizes = (len(first.codec.model), len(first.codec.coder), inputs, len(first.down))
         floats = len(first.codec.model) + len(first.codec.coder) + len(first.down)
         self._layout = struct.Struct(f"<q{floats + inputs * (lead_ticks + 1) + 1}d")
+        self.numbers = floats + codec.ticks_per_sample * len(first.codec.model)
+        """that a sample works on, a measure of its cost that is the same on every machine"""
 
     def initial(self) -> TwoWayState:
         """Return the common state before sample 0."""
@@ -120,7 +123,8 @@ class TwoWay:
     def hashed(self, state: TwoWayState, digest: int) -> int:
         """Return the bits of the next sample's hash symbols, the first one lowest.
 
-        The parity of the command symbols inverts the first of them, an erased word all.
+        The parity of the command symbols inverts the first of them, that of the word the second, and an
+        erased word all.
         """
         return digest >> 1 << 1 | int(state.owed)
 
@@ -129,7 +133,7 @@ class TwoWay:
     ) -> tuple[int, ...]:
         """Return a sample's hash symbols: of the state before it, its digest, and its inputs."""
         erased = 1 if word is ERASED else 0
-        bits = self.hashed(state, digest) ^ parity(commands)
+        bits = self.hashed(state, digest) ^ parity(commands) ^ self.word_parity(word) << 1
         count = self.layout.symbols_per_sample - len(commands)
         return tuple([bits >> place & 1 ^ erased for place in range(count)])
 
@@ -154,12 +158,22 @@ class TwoWay:
                 down = scheme.take(down, symbol)
             return down
 
-        flown = self._flown(state, word, sent, chosen, wanted if scheme.asks_every_tick else None)
-        digest = self.digest(state) if count < self.layout.symbols_per_sample else 0
+        digest = self.digest(state)
+        ask = wanted if scheme.asks_every_tick else None
+        flown = self._flown(state, digest, word, sent, chosen, ask)
         return flown, (*sent, *self.hash_symbols(state, digest, sent, word))
 
-    def step(self, state: TwoWayState, word: Word, symbols: Sequence[int | None]) -> TwoWaySample:
-        """Fly a sample with these command symbols; None: not known, so predict without it."""
+    def step(
+        self,
+        state: TwoWayState,
+        word: Word,
+        symbols: Sequence[int | None],
+        digest: int | None = None,
+    ) -> TwoWaySample:
+        """Fly a sample with these command symbols; None: not known, so predict without it.
+
+        `digest`: the state's, where it is known already.
+        """
         scheme = self.scheme
 
         def given(tick: int, live: Vector, down: Vector) -> Vector:
@@ -167,11 +181,13 @@ class TwoWay:
                 down = scheme.guess(down) if symbol is None else scheme.take(down, symbol)
             return down
 
-        return self._flown(state, word, symbols, given, None)
+        digest = self.digest(state) if digest is None else digest
+        return self._flown(state, digest, word, symbols, given, None)
 
     def _flown(
         self,
         state: TwoWayState,
+        digest: int,
         word: Word,
         symbols: Sequence[int | None],
         consume: Callable[[int, Vector, Vector], Vector],
@@ -200,7 +216,7 @@ class TwoWay:
 
         flown = fly_sample(self.codec, state.codec, word, state.commands, decide)
         known = (*state.commands, *flown.commands)[self.codec.ticks_per_sample :]
-        owed = self._owed(state, self.digest(state), word, symbols)
+        owed = self._owed(state, digest, word, symbols)
         after = TwoWayState(flown.state, known, hold, down, owed)
         return TwoWaySample(after, flown.commands, flown.live, flown.coded)
 
@@ -226,10 +242,14 @@ class TwoWay:
         if len(symbols) == self.layout.symbols_per_sample:
             # Nothing has said yet whether the word came.
             return float(bit ^ int(state.owed) ^ (1 if word is ERASED else 0))
-        alphabet = self.codec.coder.alphabet
+        return float(bit ^ self.word_parity(word) ^ digest & 1)
+
+    def word_parity(self, word: Word) -> int:
+        """Return the parity of the digits of a word; 0 for one that is erased."""
+        odd, alphabet = 0, self.codec.coder.alphabet
         for symbol in word or ():
-            bit ^= alphabet.symbol_number(symbol) & 1
-        return float(bit ^ digest & 1)
+            odd ^= alphabet.symbol_number(symbol) & 1
+        return odd
 
     def pack(self, state: TwoWayState) -> bytes:
         """Return the canonical bytes of a state, little-endian, no minus zero."""

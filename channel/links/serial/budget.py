@@ -1,8 +1,9 @@
 """The load of a serial line and its transmission times: the arithmetic behind a refusal.
 
 Up the line goes one byte per symbol; down it one command frame per sample, which is
-`(head + CRC) + (1 + W) * echo` bytes before COBS, or what the compact downlink makes of it. A line of
-8N1 spends ten bits on a byte, and each direction has its own wire.
+`(head + CRC) + (1 + W) * echo` bytes before COBS, or what the compact downlink makes of it, or one byte
+per symbol of the narrow downlink. A line of 8N1 spends ten bits on a byte, and each direction has its
+own wire. Control frames are few, and symbols that they hold up too long are lost; none is budgeted.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from channel.links.serial.cobs import cobs_encode
 from channel.links.serial.wire import SerialWire
 from channel.protocol.compact import CompactForm
 from channel.protocol.frames import Commands, Echo
-from channel.protocol.terms import Terms
+from channel.protocol.terms import SlotGrid, Terms
 from channel.protocol.wire import encode
 
 LINE_BITS_PER_BYTE = 10
@@ -34,25 +35,30 @@ def message_bytes(terms: Terms, codec: Codec) -> int:
 
 
 def command_bytes(terms: Terms, codec: Codec) -> int:
-    """Return the bytes of a command frame, COBS and delimiters included."""
+    """Return the bytes of a command frame, COBS and delimiters included; 1 for a down symbol."""
+    if terms.downlink == "narrow":
+        return 1
     # COBS adds a byte for every 254; a frame full of zeros is not shorter.
     content = message_bytes(terms, codec)
     return len(cobs_encode(b"\1" * content)) + 2
 
 
-def up_bits_per_s(terms: Terms) -> float:
-    """Return the line bits of the symbols."""
-    return 1e9 * terms.symbols_per_word / terms.sample_ns * LINE_BITS_PER_BYTE
-
-
 def down_bits_per_s(terms: Terms, codec: Codec) -> float:
-    """Return the line bits of the command frames."""
+    """Return the line bits of the command frames, or of the down symbols."""
+    if terms.downlink == "narrow":
+        return symbol_bits_per_s(terms.down_grid)
     return 1e9 / terms.sample_ns * command_bytes(terms, codec) * LINE_BITS_PER_BYTE
+
+
+def symbol_bits_per_s(grid: SlotGrid) -> float:
+    """Return the line bits of the symbols of a direction."""
+    return 1e9 * grid.slots / grid.sample_ns * LINE_BITS_PER_BYTE
 
 
 def least_rate_baud(terms: Terms, codec: Codec) -> int:
     """Return the slowest line that carries both directions."""
-    return math.ceil(max(up_bits_per_s(terms), down_bits_per_s(terms, codec)) - 1e-6)
+    bits_per_s = max(symbol_bits_per_s(terms.up_grid), down_bits_per_s(terms, codec))
+    return math.ceil(bits_per_s - 1e-6)
 
 
 def usual_rate_baud(least: int) -> int:
@@ -62,18 +68,24 @@ def usual_rate_baud(least: int) -> int:
 
 def check_up(terms: Terms, line_rate_baud: int) -> None:
     """Raise ValueError, with the arithmetic, where the line cannot carry the symbols."""
-    slots_per_s = 1e9 * terms.symbols_per_word / terms.sample_ns
-    bits_per_s = up_bits_per_s(terms)
+    _check_symbols("uplink", terms.up_grid, line_rate_baud, "lengthen symbol_period_s")
+
+
+def _check_symbols(direction: str, grid: SlotGrid, line_rate_baud: int, remedy: str) -> None:
+    bits_per_s = symbol_bits_per_s(grid)
     if bits_per_s > line_rate_baud:
         raise ValueError(
-            f"the serial line cannot carry the uplink: {slots_per_s:g} symbols/s x 1 byte x "
-            f"{LINE_BITS_PER_BYTE} line bits = {bits_per_s:g} bit/s, but line_rate_baud = "
-            f"{line_rate_baud}; raise it, or lengthen symbol_period_s"
+            f"the serial line cannot carry the {direction}: {bits_per_s / LINE_BITS_PER_BYTE:g} "
+            f"symbols/s x 1 byte x {LINE_BITS_PER_BYTE} line bits = {bits_per_s:g} bit/s, but "
+            f"line_rate_baud = {line_rate_baud}; raise it, or {remedy}"
         )
 
 
 def check_down(terms: Terms, codec: Codec, line_rate_baud: int) -> None:
-    """Raise ValueError, with the arithmetic, where the line cannot carry the command frames."""
+    """Raise ValueError, with the arithmetic, where the line cannot carry the downlink."""
+    if terms.downlink == "narrow":
+        _check_symbols("downlink", terms.down_grid, line_rate_baud, "lower channel.downlink_baud")
+        return
     bits_per_s = down_bits_per_s(terms, codec)
     if bits_per_s <= line_rate_baud:
         return
@@ -97,13 +109,17 @@ def byte_ns(count: int, line_rate_baud: int) -> int:
 
 def check_slot_counter(terms: Terms, wire: SerialWire) -> None:
     """Raise ValueError where the counter bits of a symbol byte could not tell slots apart."""
-    slot_ns = terms.sample_ns / terms.symbols_per_word
-    slots = terms.deadline_allowance_ns / slot_ns
-    limit = wire.slot_modulus / 4
+    _check_counter("deadline_allowance_s", terms.up_grid, wire.slot_modulus)
+    if terms.downlink == "narrow":
+        _check_counter("downlink_budget_s", terms.down_grid, wire.slot_modulus)
+
+
+def _check_counter(setting: str, grid: SlotGrid, modulus: int) -> None:
+    slots = grid.allowance_ns / grid.length_ns
+    limit = modulus / 4
     if slots > limit:
         raise ValueError(
-            f"deadline_allowance_s = {terms.deadline_allowance_ns / 1e9:g} is {slots:g} slots of "
-            f"{slot_ns / 1e6:g} ms, but a symbol byte counts slots modulo {wire.slot_modulus} and can "
-            f"be late by {limit:g} at most; keep deadline_allowance_s within "
-            f"{limit * slot_ns / 1e9:g} s"
+            f"{setting} = {grid.allowance_ns / 1e9:g} is {slots:g} slots of "
+            f"{grid.length_ns / 1e6:g} ms, but a symbol byte counts slots modulo {modulus} and can be "
+            f"late by {limit:g} at most; keep {setting} within {limit * grid.length_ns / 1e9:g} s"
         )

@@ -50,14 +50,13 @@ class SerialKind(LinkKind):
         """
         check_slot_counter(terms, _wire(codec))
         check_up(terms, settings.line_rate_baud)
+        terms = replace(terms, uplink_line_ns=byte_ns(1, settings.line_rate_baud))
         if settings.downlink == ZENOH:
-            down_ns = 0
-        else:
-            rate = settings.downlink_rate_baud if settings.downlink else settings.line_rate_baud
-            check_down(terms, codec, rate)
-            down_ns = byte_ns(command_bytes(terms, codec), rate)
-        up_ns = byte_ns(1, settings.line_rate_baud)
-        return replace(terms, uplink_line_ns=up_ns, downlink_line_ns=down_ns)
+            return terms
+        rate = settings.downlink_rate_baud if settings.downlink else settings.line_rate_baud
+        check_down(terms, codec, rate)
+        down_ns = byte_ns(command_bytes(terms, codec), rate)
+        return replace(terms, downlink_line_ns=down_ns, downlink_byte_ns=byte_ns(1, rate))
 
     def open(self, end: LinkEnd) -> Link:
         """Return the open link of one end, the downlink on a separate line if so configured."""
@@ -66,7 +65,10 @@ class SerialKind(LinkKind):
 
         settings = end.settings
         wire = _wire(end.codec)
-        slot_s = end.terms.sample_ns / end.terms.symbols_per_word / 1e9
+        terms = end.terms
+        is_narrow = terms.downlink == "narrow"
+        grids = (terms.up_grid, terms.down_grid) if is_narrow else (terms.up_grid,)
+        slot_s = min(grid.length_ns for grid in grids) / 1e9
 
         def on_port(port: str, rate_baud: int) -> SerialLink:
             return SerialLink(
@@ -76,6 +78,7 @@ class SerialKind(LinkKind):
                 line_rate_baud=rate_baud,
                 symbol_age_max_s=slot_s * wire.slot_modulus / 2,
                 insecure=end.place.get("insecure", False),
+                is_narrow=is_narrow,
             )
 
         up = on_port(settings.port, settings.line_rate_baud)

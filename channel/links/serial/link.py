@@ -47,8 +47,9 @@ _PORT_ERRORS = (serial.SerialException, OSError, TypeError, ValueError)
 class SerialLink(Link):
     """One end of a session over a serial line; LinkError when the port cannot be opened.
 
-    `symbol_age_max_s`: a symbol that waited longer in this process is dropped, because its counter
-    bits would no longer say which slot it belongs to.
+    `is_narrow`: the downlink brings symbols too. `symbol_age_max_s`: a symbol that waited longer in
+    this process, or would wait longer behind other bytes, is dropped, because its counter bits would
+    no longer say which slot it belongs to.
     """
 
     name = "serial"
@@ -63,6 +64,7 @@ class SerialLink(Link):
         symbol_age_max_s: float = 1.0,
         quiet_s: float = QUIET_S,
         insecure: bool = False,
+        is_narrow: bool = False,
     ) -> None:
         super().__init__()
         check_port(port, insecure)
@@ -72,8 +74,7 @@ class SerialLink(Link):
         self._line_rate_baud = line_rate_baud
         self._symbol_age_max_s = symbol_age_max_s
         self._quiet_s = quiet_s
-        # Only the receiver is sent symbols.
-        self._deframer = Deframer(wire if role == "receiver" else None, self._drop)
+        self._deframer = Deframer(wire if is_narrow or role == "receiver" else None, self._drop)
         self._inbox: SimpleQueue[tuple[float, bytes]] = SimpleQueue()
         self._busy_until = 0.0
         self._last_message = (b"", 0.0)
@@ -91,14 +92,19 @@ class SerialLink(Link):
         """Put one message on the line; dropped and counted when the line is gone or far behind."""
         if self._stop.is_set():
             raise LinkError("the link is closed")
-        raw = data if self._symbols.is_symbol(data) else stuff(data)
+        is_symbol = self._symbols.is_symbol(data)
+        raw = data if is_symbol else stuff(data)
         now = time.monotonic()
         duration_s = self._duration_s(raw)
         last, again_at = self._last_message
         if duration_s > LONG_MESSAGE_S and data == last and now < again_at:
             self._drop("repeated too soon")
             return
-        if self._busy_until - now > BACKLOG_S_MAX:
+        behind_s = self._busy_until - now
+        if is_symbol and behind_s > self._symbol_age_max_s:
+            self._drop("stale symbol")
+            return
+        if behind_s > BACKLOG_S_MAX:
             self._drop("line busy")
             return
         if self._write(raw):

@@ -6,8 +6,10 @@ taken, one before its time is refused, one after its deadline is late. What is t
 only a little, so that a byte which noise has made cannot drag it along; but a row of `RIVALS` bytes
 that fit each other and not the schedule replaces it.
 
-Before the first symbol the schedule is known from the handshake: tick 0 lies between the hello and
-`START_NS` after it. A wrong guess anywhere here is a wrong or an erased symbol, which the echo covers.
+The transmitter, to which down symbols come, knows the schedule: it counts from its own tick 0
+(`expect`). At the receiver it is known before the first symbol from the handshake: tick 0 lies between
+the end of the answer to its hello and `START_NS` later. A wrong guess anywhere here is a wrong or an
+erased symbol, which the echo covers.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from channel.protocol.frames import Frame, Hello, LocatedSymbol, ShortSymbol, Welcome
-from channel.protocol.terms import Terms
+from channel.protocol.terms import SlotGrid
 
 START_NS = 250_000_000
 """The hello is answered, the welcome travels, the transmitter begins: all within this."""
@@ -48,10 +50,10 @@ class _Rival:
 class SlotFinder:
     """Finds the slots of symbol bytes for one session."""
 
-    def __init__(self, terms: Terms) -> None:
-        self._slot_ns = terms.sample_ns / terms.symbols_per_word
-        self._delay_ns = terms.symbol_delay_ns
-        self._allowance = terms.deadline_allowance_ns / self._slot_ns
+    def __init__(self, grid: SlotGrid) -> None:
+        self._grid = grid
+        self._slot_ns = grid.length_ns
+        self._allowance = grid.allowance_ns / self._slot_ns
         self._greeted_ns = 0
         self._first_slot = 0
         self._ahead_ns = 0
@@ -59,18 +61,21 @@ class SlotFinder:
         """when slot 0 would have arrived, by the schedule"""
         self._taken = 0
         self._rival: _Rival | None = None
-        self._symbols_per_word = terms.symbols_per_word
         self._incarnation: int | None = None
         """of the transmitter that flies"""
 
     def answered(self, hello: Hello, answers: Iterable[Frame], now_ns: int) -> None:
-        """Note a hello that came at `now_ns`, and the session's answer."""
+        """Note the session's answer to a hello, which is on the line until `now_ns`."""
         for answer in answers:
             if isinstance(answer, Welcome) and answer.incarnation != self._incarnation:
                 self._incarnation = answer.incarnation
                 ahead = answer.first_sample - hello.sample if hello.sample else 0
-                self.begin(answer.first_sample * self._symbols_per_word, ahead * self._symbols_per_word)
+                self.begin(answer.first_sample * self._grid.slots, ahead * self._grid.slots)
         self.greeted(now_ns)
+
+    def expect(self, line_delay_ns: int = 0) -> None:
+        """Take it as known that slots are due by the grid, delayed by up to this; for flight times."""
+        self._zero_ns = self._grid.due_ns(0) + line_delay_ns // 2
 
     def located(self, symbol: ShortSymbol, due_slot: int, now_ns: int) -> LocatedSymbol:
         """Return a symbol byte that came at `now_ns` with its slot; `due_slot` is not settled yet."""
@@ -112,7 +117,7 @@ class SlotFinder:
         return Place(None if early > 0.0 and slot >= expected else slot, False, None)
 
     def _first(self, symbol: ShortSymbol, now_ns: int) -> Place:
-        since_ns = now_ns - self._greeted_ns - self._delay_ns - self._ahead_ns
+        since_ns = now_ns - self._greeted_ns - self._grid.delivery_ns - self._ahead_ns
         first = self._first_slot
         place = (since_ns - START_NS / 2) / self._slot_ns
         slot = _nearest(symbol, first + max(0.0, place))

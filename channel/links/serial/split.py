@@ -3,19 +3,30 @@
 from __future__ import annotations
 
 from channel.links.base import Link, LinkCounts, Role
+from channel.protocol.frames import DownSymbol, Frame
 from channel.protocol.wire import Wire, is_short
 
-DOWNWARD_KINDS = (2, 3, 5, 8, 9)
-"""Frame kinds that only the receiver sends: welcome, refuse, commands, unknown, claim."""
+DOWNWARD_KINDS = (2, 3, 5, 8, 9, 10)
+"""Frame kinds that only the receiver sends: welcome, refuse, commands, unknown, claim, down symbol."""
 
 
 class SplitWire:
     """Looks like the upward line's wire; sizes of downward frames are the downward line's."""
 
     def __init__(self, up: Wire, down: Wire) -> None:
-        self.encode, self.decode = up.encode, up.decode
-        self.is_symbol, self.renumbered = up.is_symbol, up.renumbered
+        self.decode = up.decode
         self._up, self._down = up, down
+
+    def encode(self, frame: Frame) -> bytes:
+        """Return the message for a frame, a down symbol's as the downward line has it."""
+        return (self._down if isinstance(frame, DownSymbol) else self._up).encode(frame)
+
+    def is_symbol(self, data: bytes) -> bool:
+        return self._up.is_symbol(data) or self._down.is_symbol(data)
+
+    def renumbered(self, data: bytes, shift: int, kinds: int) -> bytes:
+        wire = self._up if self._up.is_symbol(data) else self._down
+        return wire.renumbered(data, shift, kinds)
 
     def size(self, data: bytes) -> int:
         downward = is_short(data) or (len(data) > 1 and data[1] in DOWNWARD_KINDS)

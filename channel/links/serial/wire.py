@@ -1,14 +1,15 @@
 """Frames on a serial line: one byte per symbol, everything else a COBS frame.
 
-A symbol is one byte, from the highest bit to the lowest:
+A symbol, and one of the narrow downlink, is one byte, from the highest bit to the lowest:
 
     1 | check | slot | number        for an alphabet of
     1 | c c c | s s s | n            2 symbols
     1 | c c   | s s s | n n          3 and 4
     1 | c c   | s s   | n n n        5 to 8
 
-`number` is the place in the alphabet, `slot` the slot counter modulo 8 or 4. `check` is the remainder
-of `slot, number` times x^3 or x^2 by a polynomial, x^3 + x + 1 or x^2 + x + 1, xor 101 or 10 (binary).
+`number` is the place in the alphabet, 0 or 1 on the way down, `slot` the slot counter modulo 8 or 4.
+`check` is the remainder of `slot, number` times x^3 or x^2 by a polynomial, x^3 + x + 1 or x^2 + x + 1,
+xor 101 or 10 (binary).
 With three check bits any one or two wrong bits of the seven are found, with two any single one. The
 xor makes 0x80 and 0xFF, what a disturbed idle line likes to show, no symbols.
 
@@ -35,7 +36,7 @@ from binascii import crc_hqx
 
 from channel.errors import FrameError
 from channel.links.serial.cobs import cobs_decode, cobs_encode
-from channel.protocol.frames import Frame, ShortSymbol, Symbol
+from channel.protocol.frames import DownSymbol, Frame, ShortSymbol, Symbol
 from channel.protocol.wire import CRC_START, FRAME_BYTES_MAX, decode, encode, is_short
 
 SYMBOL_MARK = 0x80
@@ -76,7 +77,7 @@ class SerialWire:
 
     def encode(self, frame: Frame) -> bytes:
         """Return the message for a frame: one byte for a symbol."""
-        if not isinstance(frame, Symbol):
+        if not isinstance(frame, (Symbol, DownSymbol)):
             return encode(frame)
         if not 0 <= frame.number < self._alphabet_size:
             raise ValueError(f"symbol {frame.number} is not one of {self._alphabet_size}")

@@ -7,12 +7,14 @@ from typing import Any
 import pytest
 
 from channel.codec.codec import Alphabet
+from channel.codec.downlink.layout import DOWN_ALPHABET
 from channel.line.impairments import FOR_EVER_NS, ImpairedLine, Impairments, parse_impairments
 from channel.line.line import CleanLine, Delivery, Inlet
 from channel.links.serial.wire import SerialWire
 from channel.protocol import wire
 from channel.protocol.endings import Ending
-from channel.protocol.frames import Bye, ShortSymbol, Symbol
+from channel.protocol.frames import Bye, DownSymbol, ShortSymbol, Symbol
+from channel.protocol.wire import Wire
 
 MS = 1_000_000
 SECOND = 1_000_000_000
@@ -148,6 +150,15 @@ def test_when_a_symbol_byte_of_a_serial_line_is_flipped_then_its_slot_stays() ->
     assert data is not None
     assert serial.decode(data) == ShortSymbol(0, 5, serial.slot_modulus)
     assert one.counts["flipped"] == 1
+
+
+@pytest.mark.parametrize("form", [wire.DATAGRAM, SerialWire(8)])
+def test_when_a_down_symbol_is_flipped_then_it_is_the_other_one_in_the_same_slot(form: Wire) -> None:
+    one = ImpairedLine(Impairments(flip=1.0), DOWN_ALPHABET, "a", form)
+    for number in (0, 1):
+        ((_, data),) = one.carry(form.encode(DownSymbol(1, 2, 7, number)), 0)
+        assert data == form.encode(DownSymbol(1, 2, 7, 1 - number))
+    assert one.counts["flipped"] == 2
 
 
 def test_when_a_line_has_a_delay_of_its_own_then_impairments_come_on_top() -> None:

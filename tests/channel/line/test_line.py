@@ -30,15 +30,15 @@ def test_when_messages_wait_then_they_leave_when_due_and_in_order_of_being_put()
 def test_when_a_symbol_comes_then_its_bytes_are_no_control_bytes() -> None:
     inlet = Inlet()
     assert inlet.take(SYMBOL) == Symbol(7, 0, 3, 1)
-    assert (inlet.wire_bytes, inlet.control_bytes, inlet.malformed) == (len(SYMBOL), 0, 0)
+    assert (inlet.meter.wire_bytes, inlet.meter.control_bytes, inlet.malformed) == (len(SYMBOL), 0, 0)
 
 
 def test_when_a_farewell_comes_then_its_bytes_are_control_bytes() -> None:
     inlet = Inlet()
     inlet.take(SYMBOL)
     assert inlet.take(BYE) == Bye(7, Ending.OVER, "enough")
-    assert inlet.wire_bytes == len(SYMBOL) + len(BYE)
-    assert inlet.control_bytes == len(BYE)
+    assert inlet.meter.wire_bytes == len(SYMBOL) + len(BYE)
+    assert inlet.meter.control_bytes == len(BYE)
 
 
 def test_when_garbage_comes_then_it_is_counted_reported_and_no_frame() -> None:
@@ -46,4 +46,4 @@ def test_when_garbage_comes_then_it_is_counted_reported_and_no_frame() -> None:
     inlet = Inlet(on_malformed=told.append)
     assert inlet.take(SYMBOL[:-1] + b"?") is None
     assert told == ["checksum"]
-    assert (inlet.wire_bytes, inlet.control_bytes, inlet.malformed) == (len(SYMBOL), 0, 1)
+    assert (inlet.meter.wire_bytes, inlet.meter.control_bytes, inlet.malformed) == (len(SYMBOL), 0, 1)

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from channel.errors import FrameError
+from channel.line.slots import Departure
 from channel.line.virtual import (
     MAGIC,
     Reply,
@@ -27,6 +28,8 @@ SEED = 20240616
 fixed = settings(derandomize=True, database=None, deadline=None, max_examples=200)
 numbers = st.integers(0, 2**32 - 1)
 times = st.integers(0, 2**63 - 1)
+departures = st.lists(st.builds(Departure, times, st.binary()), max_size=5)
+messages = st.lists(st.binary(max_size=300), max_size=5)
 
 
 @fixed
@@ -41,11 +44,13 @@ def test_when_a_step_is_encoded_then_decoding_gives_it_back(
 
 
 @fixed
-@given(numbers, st.none() | times, st.lists(st.binary(max_size=300), max_size=5))
+@given(
+    numbers, st.none() | times, messages, st.lists(st.builds(Departure, times, st.binary()), max_size=5)
+)
 def test_when_a_reply_is_encoded_then_decoding_gives_it_back(
-    number: int, deadline_ns: int | None, frames: list[bytes]
+    number: int, deadline_ns: int | None, frames: list[bytes], later: list[Departure]
 ) -> None:
-    reply = Reply(number, deadline_ns, tuple(frames))
+    reply = Reply(number, deadline_ns, tuple(frames), tuple(later))
     encoded = encode_reply(reply)
     assert is_envelope(encoded)
     assert decode_reply(encoded) == reply

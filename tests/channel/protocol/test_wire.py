@@ -17,6 +17,7 @@ from channel.protocol.frames import (
     Bye,
     Commands,
     Desync,
+    DownSymbol,
     Echo,
     ForeignVersion,
     Frame,
@@ -64,6 +65,7 @@ frames = st.one_of(
     st.builds(Welcome, u32, u16, u32, u32),
     st.builds(Refuse, u32, endings, texts, texts),
     st.builds(Symbol, u32, u16, u32, u8),
+    st.builds(DownSymbol, u32, u16, u32, u8),
     commands(),
     st.builds(Desync, u32, u16, u32, u64, u64, st.binary(max_size=300)),
     st.builds(Bye, u32, endings, texts),
@@ -84,7 +86,8 @@ def test_when_the_examples_are_encoded_then_the_bytes_are_as_written() -> None:
 def test_when_the_pinned_bytes_are_decoded_then_they_are_the_examples() -> None:
     assert [wire.decode(bytes.fromhex(data)) for _, data in GOLDEN] == example_frames()
     assert {kind for kind, _ in GOLDEN} == {
-        "Hello", "Welcome", "Refuse", "Symbol", "Commands", "Desync", "Bye", "Unknown", "Claim"
+        "Hello", "Welcome", "Refuse", "Symbol", "Commands", "Desync", "Bye", "Unknown", "Claim",
+        "DownSymbol",
     }  # fmt: skip
 
 

@@ -112,7 +112,7 @@ def found_in(case: Case, record: Record) -> Identification:
     return identify(record, structure)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(one, marks=pytest.mark.soak) for one in (2, 3))])
 @pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.structure}-{case.lag_s:g}")
 def test_when_sixty_seconds_are_seen_by_12_bits_then_each_structure_is_found_within_5_percent(
     case: Case, seed: int

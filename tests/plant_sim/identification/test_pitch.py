@@ -157,7 +157,7 @@ def test_when_a_record_begins_in_motion_then_its_beginning_does_not_bend_the_est
     assert [item.value for item in found.parameters][:3] == pytest.approx([0.4, 4.0, 0.2], rel=0.03)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(one, marks=pytest.mark.soak) for one in (1, 2, 3))])
 def test_when_there_is_no_friction_then_the_damping_is_never_below_0(seed: int) -> None:
     record = swing(0.02, random_volts(1500, 3.0, 60, seed), 0.0, 4.0, 0.2)
     noise = np.random.default_rng(seed).normal(0.0, 2e-3, record.outputs.shape)

@@ -222,7 +222,7 @@ def test_when_there_is_lead_then_commands_are_of_the_ticks_after_it() -> None:
 def test_when_the_controller_gives_no_number_then_the_last_command_is_held(bad: float) -> None:
     session = flying(2.0, -1.5)
     session.on_frame(symbol(0), 0)
-    session._commander._controller.volts = (3.0, bad)  # type: ignore[attr-defined]
+    session._commander._asker._controller.volts = (3.0, bad)  # type: ignore[attr-defined]
     (answer,) = session.on_frame(symbol(1), 0)
     assert isinstance(answer, Commands)
     assert answer.echoes[-1].steps == (2000, -1500) * 10
@@ -235,7 +235,7 @@ def test_when_the_controller_has_no_reference_then_the_flight_goes_on_and_says_s
     def fail(tick: int) -> tuple[float, ...]:
         raise LookupError("the table ends")
 
-    session._commander._controller.references = fail  # type: ignore[method-assign]
+    session._commander._asker._controller.references = fail  # type: ignore[method-assign]
     for slot in range(2):
         session.on_frame(symbol(slot), 0)
         session.flush_records()

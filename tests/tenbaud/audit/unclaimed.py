@@ -85,6 +85,25 @@ UNCLAIMED: tuple[Unclaimed, ...] = (
     ),
     Unclaimed(
         "transmitter",
+        "confirmed",
+        ("doubt", "lag_samples"),
+        "how sure the transmitter was, and when: no state depends on it",
+    ),
+    Unclaimed(
+        "transmitter",
+        "hypotheses",
+        ("size", "rest", "best", "confirmed_to"),
+        "what the transmitter took for possible; that it never goes back is all that can be shown",
+    ),
+    Unclaimed(
+        "transmitter",
+        "down_symbols",
+        ("symbols", ORDER),
+        "of a sample that was not confirmed, or of a lost symbol: nobody else knows what came",
+        lambda row, evidence: _is_unheard(row, evidence),
+    ),
+    Unclaimed(
+        "transmitter",
         "gap",
         _all_fields("transmitter", "gap")[1:],
         "a gauge for people, worked out afterwards; nothing rests on it",
@@ -174,6 +193,10 @@ def _is_unconfirmed(row: Any, evidence: Evidence) -> bool:
     confirmed = evidence.topic("transmitter", "sample").by_key()
     taken = any(one.slot == row.slot for one in evidence.topic("receiver", "symbol"))
     return row.slot // count not in confirmed and (not taken or bool(evidence.agreement.faults.up.flip))
+
+
+def _is_unheard(row: Any, evidence: Evidence) -> bool:
+    return row.sample not in evidence.topic("transmitter", "confirmed").by_key() or None in row.symbols
 
 
 def _is_given_up(row: Any, evidence: Evidence) -> bool:

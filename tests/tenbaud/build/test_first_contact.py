@@ -275,7 +275,7 @@ def test_a_receiver_that_starts_late_moves_the_set_point_from_its_estimate() -> 
     (welcome,) = session.on_frame(late, 0)
     assert isinstance(welcome, Welcome)
     first = welcome.first_sample * agreement.terms.ticks_per_sample
-    controller = session._commander._controller
+    controller = session._commander._asker._controller
     values = [controller.references(tick)[0] for tick in range(first, first + 100)]
     steps = [abs(after - before) for before, after in pairwise([0.1, *values])]
     assert first >= sample * 10

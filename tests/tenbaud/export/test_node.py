@@ -57,7 +57,7 @@ class Node:
         self.counts: dict[str, Any] = {}
 
     def wait_for(self, sample: int) -> None:
-        """Read until so many samples are confirmed, or the node has ended."""
+        """Read until this sample is reached, or the node has ended."""
         assert self._process.stdout is not None
         for line in self._process.stdout:
             self.counts = json.loads(line)

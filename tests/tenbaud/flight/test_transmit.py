@@ -43,7 +43,7 @@ def fly_virtual(**transmitter: Any) -> tuple[Outcome, ReceiverEndpoint]:
     run = transmit.prepare(agreement_on("virtual", transmitter=transmitter), None, DATAGRAM)
     endpoint = corrupted_receiver("virtual")
     outcome = transmit.fly_virtual(run, endpoint, lambda: False)
-    assert run.node.session.copies.confirmed.sample == LAST_SAMPLE + 1
+    assert run.node.session.confirmed_state.sample == LAST_SAMPLE + 1
     return outcome, endpoint
 
 

@@ -57,6 +57,9 @@ LOOPS = {
 }
 """One with the rate of a state, one with that of an output that has none."""
 
+FLOOR = {"coder": {"floor_gain": 0.1, "floor_exponent": 0.4}}
+"""The smallest range of the history coder follows its range."""
+
 CLEAN: dict[str, Any] = {}
 REAL_WIRE = {
     "channel": {"delivery": "end"},
@@ -160,7 +163,8 @@ def test_when_a_flight_is_compiled_then_no_bit_differs(preset: str, changes: dic
 @pytest.mark.parametrize("preset", BY_PART)
 def test_when_the_functions_of_a_codec_are_compiled_then_no_bit_differs(preset: str) -> None:
     learns = preset == "learning"
-    config = load_config("integrator-10baud", None, learning()) if learns else load_config(preset)
+    changes = learning() if learns else FLOOR if preset == "history-10baud" else {}
+    config = load_config("integrator-10baud" if learns else preset, None, changes)
     codec = build_codec(config)
     chooser = random.Random(7)
     model: Any = codec.model
@@ -191,6 +195,7 @@ def test_when_the_functions_of_a_codec_are_compiled_then_no_bit_differs(preset: 
         assert ticked == model.tick(opened.model, command, opened.held)
         state = codec.step(state, word, [command] * codec.ticks_per_sample)
     assert not learns or np.abs(state.model[2:4]).max() > 0.0
+    assert changes is not FLOOR or state.coder[2] > 0.1
 
 
 @pytest.mark.soak
@@ -213,9 +218,9 @@ def learning() -> dict[str, Any]:
     return completed({"model": model, "coder": {"kind": "learning"}})
 
 
+@pytest.mark.soak
 def test_when_the_smallest_range_follows_the_range_then_no_bit_differs() -> None:
-    floor = {"coder": {"floor_gain": 0.1, "floor_exponent": 0.4}}
-    point = CompiledPoint(config_of("history-10baud", {**REAL_WIRE, **floor}))
+    point = CompiledPoint(config_of("history-10baud", {**REAL_WIRE, **FLOOR}))
     compare(point)
     assert point._work.coders[-1, 2] > 0.1
 

@@ -148,11 +148,11 @@ def test_when_a_flight_is_flown_in_real_time_then_every_sample_is_checked(
     # Whatever the machine did meanwhile, both ends have seen the same, and say so sample by sample.
     checked = session.counts["digest_checks"]
     assert checked == TICKS // 4 or session.counts["rejoins"]
-    assert checked == session.copies.confirmed.sample
+    assert checked == session.confirmed_state.sample
     # What the receiver erases before the farewell comes was not flown.
     beyond = end.session.state.sample - checked
     assert beyond >= 0
-    assert beyond or session.copies.confirmed == end.session.state
+    assert beyond or session.confirmed_state == end.session.state
     assert session.counts["desyncs"] == end.session.counts["desyncs"] == 0
     assert session.counts["erasures"] == end.session.counts["erasures"] - beyond
     meter, shaper = flight.endpoint.uplink.meter, flight.endpoint.uplink.shaper
@@ -160,8 +160,8 @@ def test_when_a_flight_is_flown_in_real_time_then_every_sample_is_checked(
     assert meter.symbols == counts["samples"] - counts["erasures"]
     assert meter.symbols + session.counts["words_missed"] + shaper.refused == TICKS // 4
     assert flight.endpoint.lateness.count == TICKS - flight.endpoint.ticks_missed
-    assert beyond or flight.endpoint.inlet.wire_bytes == end.downlink.wire_bytes
-    assert end.inlet.wire_bytes == meter.wire_bytes, "the farewell is counted too"
+    assert beyond or flight.endpoint.inlet.meter.wire_bytes == end.downlink.meter.wire_bytes
+    assert end.inlet.meter.wire_bytes == meter.wire_bytes, "the farewell is counted too"
     assert flight.endpoint.inlet.malformed == end.inlet.malformed == 0
     assert not node.latched
 

@@ -54,7 +54,7 @@ def test_when_a_state_within_bounds_cannot_be_flown_then_another_is_asked_for(ra
     assert session.counts["diverged"] == 1
     assert session.phase is Phase.REJOINING
     assert any(isinstance(frame, Hello) for frame in asked)
-    assert not session.is_proven
+    assert session.reliable_state is None
 
 
 def test_when_the_digest_does_not_agree_then_the_commands_move_no_motor() -> None:

@@ -108,7 +108,7 @@ def test_when_a_second_welcome_comes_then_the_flight_is_not_begun_again() -> Non
 def test_when_it_has_not_been_welcomed_then_no_symbol_leaves() -> None:
     session = transmitter()
     assert session.on_measurement(0, (1.0,)) == []
-    assert session.copies.next_sample == 0
+    assert session.next_sample == 0
 
 
 def test_when_it_is_refused_for_its_configuration_then_the_fields_are_named_to_both() -> None:
@@ -148,7 +148,7 @@ def test_when_angles_are_measured_then_a_symbol_leaves_at_the_first_tick_of_each
             assert word == CODEC.encode(far.state, (0.5 if tick < 50 else -0.5,))
             assert session.on_frame(frame(far.echo(word))) == []
     assert session.counts["digest_checks"] == 10
-    assert session.copies.confirmed == far.state
+    assert session.confirmed_state == far.state
 
 
 def test_when_ticks_were_missed_then_their_samples_send_nothing_and_nothing_is_made_up_for() -> None:
@@ -160,7 +160,7 @@ def test_when_ticks_were_missed_then_their_samples_send_nothing_and_nothing_is_m
     (symbol,) = session.on_measurement(40, (1.0,))
     assert symbol.slot == 4
     assert session.counts["words_missed"] == 3
-    assert session.copies.lag_samples == 5
+    assert session.lag_samples == 5
 
 
 def two_axes() -> TransmitterSession:
@@ -176,9 +176,9 @@ def test_when_the_last_samples_first_tick_was_missed_then_its_erasure_is_confirm
     session.on_measurement(0, (0.0,))
     session.on_frame(frame(far.echo()))
     assert session.on_measurement(11, (0.0,)) == [], "tick 10 was missed"
-    assert session.copies.lag_samples == 0
+    assert session.lag_samples == 0
     session.conclude(20)
-    assert (session.counts["words_missed"], session.copies.lag_samples) == (1, 1)
+    assert (session.counts["words_missed"], session.lag_samples) == (1, 1)
     session.on_frame(frame(far.echo(ERASED)))
     assert (session.counts["digest_checks"], session.counts["erasures"]) == (2, 1)
     session.on_frame(frame(far.echo(ERASED)))
@@ -276,7 +276,7 @@ def test_when_frames_repeat_samples_then_each_is_taken_once() -> None:
             session.on_frame(frame(*echoes[-3:]))
             session.on_frame(frame(*echoes[-3:]))
     assert session.counts["digest_checks"] == 12
-    assert session.copies.confirmed == far.state
+    assert session.confirmed_state == far.state
 
 
 def test_when_a_sample_was_not_repeated_often_enough_then_a_rejoin_is_asked_for() -> None:
@@ -301,7 +301,7 @@ def test_when_a_symbol_was_lost_then_the_copy_follows_what_was_received() -> Non
     session.on_frame(frame(far.echo((-1,))))  # flipped on its way
     assert session.counts["erasures"] == 1
     assert session.counts["desyncs"] == 0
-    assert session.copies.confirmed == far.state
+    assert session.confirmed_state == far.state
 
 
 @pytest.mark.parametrize("stale", [{"session": SESSION + 1}, {"epoch": 2}])
@@ -331,7 +331,7 @@ def test_when_an_echo_makes_no_sense_then_it_is_dropped_and_counted(echo: Echo) 
     session.on_measurement(0, (1.0,))
     assert session.on_frame(frame(echo)) == []
     assert session.counts["out_of_bounds"] == 1
-    assert session.copies.confirmed == CODEC.initial()
+    assert session.confirmed_state == CODEC.initial()
     assert session.phase is Phase.FLYING
 
 
@@ -339,7 +339,7 @@ def test_when_a_word_is_echoed_that_was_never_sent_then_it_is_dropped() -> None:
     session, far = flying(), Far()
     assert session.on_frame(frame(far.echo((1,)))) == []
     assert session.counts["out_of_bounds"] == 1
-    assert session.copies.confirmed == CODEC.initial()
+    assert session.confirmed_state == CODEC.initial()
 
 
 def test_when_the_digests_differ_and_it_is_set_to_stop_then_it_reports_and_ends() -> None:

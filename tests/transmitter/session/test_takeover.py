@@ -181,10 +181,10 @@ def test_when_commands_are_played_back_then_they_do_not_prove_the_receiver_alive
 
 def test_when_another_flights_commands_are_played_back_then_nothing_moves() -> None:
     node = flying(10)
-    state = node.session.copies.confirmed
+    state = node.session.confirmed_state
     echo = Echo(10, 1, 123, (5000, -5000) * 10)
     for frame in (Commands(OTHER, 0, (echo,)), Commands(SESSION, 7, (echo,))):
         assert node.deliver(frame) == []
-    assert node.session.copies.confirmed == state
+    assert node.session.confirmed_state == state
     assert node.session.command(110) is None
     assert node.session.counts["stale_frames"] == 2

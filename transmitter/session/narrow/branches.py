@@ -20,9 +20,15 @@ Members = Sequence[tuple[float, Node]]
 Option = tuple[Symbols, float]
 """Command symbols of a sample, and their chance together with that of what came."""
 
-Hashed = tuple[tuple[float, float], tuple[float, float]]
-"""Chance of the hash symbols that came, with a word that is whole and with one that is erased: first
-with command symbols of even parity, then of odd."""
+LOST = 2
+Hashed = tuple[tuple[float, float, float], ...]
+"""Chance of the hash symbols that came, with a word of even parity, of odd, and with none: first with
+command symbols of even parity, then of odd."""
+
+
+Flip = tuple[float, Node, Symbols, tuple[float, float, float]]
+"""Weight of a changed word before the hash symbols, what it branches from, command symbols, and the
+chances of the hash symbols."""
 
 
 class Branched(NamedTuple):
@@ -71,22 +77,22 @@ class Branching:
     def of(self, members: Members, sent: Word, heard: Symbols) -> Branched:
         """Return the branches of a list's members, best first; None in `heard`: erased."""
         found = Branched([], 1.0, [])
-        flips: list[tuple[float, Node, list[Option]]] = []
+        flips: list[Flip] = []
         chances = {before: self._chances(sent, before) for before in (False, True)}
-        weighed, rest_factor = self._weighed(members, chances, heard, found.spilled)
+        odd = self._machine.word_parity(sent)
+        weighed, rest_factor = self._weighed(members, chances, odd, heard, found.spilled)
         for weight, node, options, hashed in weighed:
             as_sent, erased, changed, otherwise = chances[node.word is ERASED]
-            arrived = []
             for symbols, share in options:
-                as_heard, if_erased = hashed[parity(symbols)]
-                arrived.append((symbols, as_heard * share))
+                came = hashed[parity(symbols)]
                 if as_sent > 0.0:
-                    found.branches.append((weight * as_sent * as_heard * share, node, sent, symbols))
-                found.branches.append((weight * erased * if_erased * share, node, ERASED, symbols))
-            if changed > 0.0:
-                flips.append((weight * changed, node, arrived))
-            if otherwise > 0.0:
-                found.spilled.append((weight * otherwise * sum(one for _, one in arrived), node))
+                    found.branches.append((weight * as_sent * came[odd] * share, node, sent, symbols))
+                found.branches.append((weight * erased * came[LOST] * share, node, ERASED, symbols))
+                if changed > 0.0:
+                    flips.append((weight * changed * share, node, symbols, came))
+                if otherwise > 0.0:
+                    more = max(came[0], came[1])
+                    found.spilled.append((weight * otherwise * more * share, node))
         if sent is not ERASED and found.branches:
             self._add_changed(sent, flips, found)
         return found._replace(rest_factor=rest_factor)
@@ -95,6 +101,7 @@ class Branching:
         self,
         members: Members,
         chances: dict[bool, Chances],
+        odd: int,
         heard: Symbols,
         spilled: list[tuple[float, Node]],
     ) -> tuple[list[Weighed], float]:
@@ -114,12 +121,12 @@ class Branching:
             predicted += weight * (sum(one for _, one in options) if count == own else 0.5**asked)
             if not node.is_flown:
                 hashed = self._hash_chances(state, heard[count : count + 1], 0)
-                left = weight * _chance(options, hashed, lost)
+                left = weight * _chance(options, hashed, odd, lost)
                 if left < self._dropped_below * best or not node.fly(machine):
                     spilled.append((left, node))
                     continue
             hashed = self._hash_chances(node.state, heard[count:], node.digest(machine))
-            left = weight * _chance(options, hashed, lost)
+            left = weight * _chance(options, hashed, odd, lost)
             best = left if left > best else best
             first = kept.get(node.state)
             if first is not None:
@@ -143,16 +150,22 @@ class Branching:
     def _hash_chances(self, state: TwoWayState, heard: Symbols, digest: int) -> Hashed:
         """Return how likely these hash symbols come down; without digest, for the first one alone."""
         flip, bits = self._priors.down_flipped, self._machine.hashed(state, digest)
-        whole = erased = 1.0
-        for place in range(1, len(heard)):
-            if heard[place] is not None:
-                same = bits >> place & 1 == heard[place]
-                whole *= 1.0 - flip if same else flip
-                erased *= flip if same else 1.0 - flip
-        if not heard or heard[0] is None:
-            return (whole, erased), (whole, erased)
-        one, other = (1.0 - flip, flip) if bits & 1 == heard[0] else (flip, 1.0 - flip)
-        return (whole * one, erased * other), (whole * other, erased * one)
+        # Of the first symbol, the second, and all others, with a word that is whole and with none.
+        first = second = others = (1.0, 1.0)
+        for place, one in enumerate(heard):
+            if one is not None:
+                pair = (1.0 - flip, flip) if bits >> place & 1 == one else (flip, 1.0 - flip)
+                if place == 0:
+                    first = pair
+                elif place == 1:
+                    second = pair
+                else:
+                    others = (others[0] * pair[0], others[1] * pair[1])
+        found = []
+        for whole, erased in (first, first[::-1]):
+            whole, erased = whole * others[0], erased * others[1]
+            found.append((whole * second[0], whole * second[1], erased * second[1]))
+        return tuple(found)
 
     def _options(self, state: TwoWayState, heard: Symbols) -> list[Option]:
         """Return all command symbols of a sample, with their chances and those of what came."""
@@ -171,31 +184,30 @@ class Branching:
             found = longer
         return [(symbols, share) for symbols, share, _ in found]
 
-    def _add_changed(
-        self,
-        sent: tuple[int, ...],
-        flips: Sequence[tuple[float, Node, list[Option]]],
-        found: Branched,
-    ) -> None:
+    def _add_changed(self, sent: tuple[int, ...], flips: Sequence[Flip], found: Branched) -> None:
         """Add the words that differ from the one sent in one symbol, where they weigh enough."""
         least = self._dropped_below * max(one[0] for one in found.branches)
         alphabet = self._machine.codec.coder.alphabet.symbols
-        for weight, node, options in flips:
-            for symbols, share in options:
-                if weight * share < least:
-                    found.spilled.append((self._others(sent) * weight * share, node))
-                    continue
-                for place in range(len(sent)):
-                    for symbol in alphabet:
-                        if symbol != sent[place]:
-                            word = (*sent[:place], symbol, *sent[place + 1 :])
-                            found.branches.append((weight * share, node, word, symbols))
+        words = [
+            (*sent[:place], symbol, *sent[place + 1 :])
+            for place in range(len(sent))
+            for symbol in alphabet
+            if symbol != sent[place]
+        ]
+        parities = [self._machine.word_parity(word) for word in words]
+        for weight, node, symbols, came in flips:
+            most = weight * max(came[0], came[1])
+            if most < least:
+                found.spilled.append((len(words) * most, node))
+                continue
+            for word, odd in zip(words, parities, strict=True):
+                found.branches.append((weight * came[odd], node, word, symbols))
 
 
-def _chance(options: list[Option], hashed: Hashed, lost: float) -> float:
-    """Return the chance of what came, over all branches."""
+def _chance(options: list[Option], hashed: Hashed, odd: int, lost: float) -> float:
+    """Return the chance of what came, with the word as it was sent, or erased."""
     total = 0.0
     for symbols, share in options:
-        as_heard, if_erased = hashed[parity(symbols)]
-        total += share * ((1.0 - lost) * as_heard + lost * if_erased)
+        came = hashed[parity(symbols)]
+        total += share * ((1.0 - lost) * came[odd] + lost * came[LOST])
     return total

@@ -16,11 +16,11 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
-from enum import Enum
 from typing import NamedTuple
 
 from channel.codec.codec import ERASED, CodecState, Vector, Word
 from channel.codec.downlink.machine import TwoWay, TwoWaySample, TwoWayState
+from channel.protocol.frames import Why
 from transmitter.session.narrow.branches import Branched, Branching
 from transmitter.session.narrow.paths import Node, Paths, Symbols
 from transmitter.session.narrow.priors import Priors
@@ -29,34 +29,32 @@ APPLIED_SHARE = 1.0 / 256.0
 """Of the list: what weighs less, all together, has no say in what is applied."""
 AHEAD_MAX = 4
 """Hypotheses that are carried ahead of what has been heard of."""
-
-
-class RejoinReason(Enum):
-    """Why the list cannot go on."""
-
-    REST = "rest"
-    """what is not followed outweighs the list: the receiver's state is probably none of these"""
-    LAG = "lag"
-    """no sample was confirmed for too long"""
-    EMPTY = "empty"
-    """no hypothesis can be continued"""
+LIST_MIN, LIST_MAX = 16, 256
+NUMBERS_PER_TICK = 2000
+"""What the list may work on. A large model has a short list, so that the transmitter is never late
+because of it, and one that depends on no clock. In one sample the list and its likely branches are
+flown at most: twice the list, and `AHEAD_MAX` for each word on its way."""
+NUMBERS_BESIDE = 100
+"""What a sample costs whatever its size."""
 
 
 class Rejoin(NamedTuple):
     """A request for a common state, with its numbers."""
 
-    reason: RejoinReason
+    reason: Why
+    """REST, or LAG: no sample was confirmed for too long, or no hypothesis can be continued"""
     sample: int
     """the last one heard of"""
     rest: float
     """weight of the rest, in units of the list's"""
     lag_samples: int
+    detail: str | None = None
 
 
 class Settings(NamedTuple):
     """Numbers of the list."""
 
-    list_max: int = 256
+    list_max: int = LIST_MAX
     lag_samples_max: int = 470
     dropped_below: float = 2.0**-20
     """of the best hypothesis' weight"""
@@ -88,12 +86,18 @@ class Confirmed(NamedTuple):
     nothing can tell them apart; 0 with a codec that forgets nothing"""
 
 
+def longest_list(machine: TwoWay) -> int:
+    """Return how many hypotheses are followed at most."""
+    allowed = NUMBERS_PER_TICK * machine.codec.ticks_per_sample
+    return max(LIST_MIN, min(LIST_MAX, allowed // (machine.numbers + NUMBERS_BESIDE)))
+
+
 class Hypotheses:
     """The list; see the module's text."""
 
     def __init__(self, machine: TwoWay, settings: Settings | None = None) -> None:
         self.machine = machine
-        self.settings = settings or Settings()
+        self.settings = settings or Settings(list_max=longest_list(machine))
         self.priors = Priors()
         self._branching = Branching(machine, self.priors, self.settings.dropped_below)
         self.rejoin: Rejoin | None = None
@@ -135,6 +139,11 @@ class Hypotheses:
     @property
     def size(self) -> int:
         return len(self._members)
+
+    @property
+    def best(self) -> float:
+        """Return the share of the list that the likeliest hypothesis has."""
+        return max(weight for weight, _ in self._members)
 
     @property
     def rest(self) -> float:
@@ -188,13 +197,17 @@ class Hypotheses:
         Hypotheses are carried to the last word sent. What does not follow from these words is the last
         command that does.
         """
-        total, mean = 0.0, [0.0] * self.machine.codec.model.input_size
-        for weight, node in self._carried():
-            total += weight
-            command = self._command_of(node, tick)
-            for place in range(len(mean)):
-                mean[place] += weight * command[place]
-        return tuple([value / total for value in mean])
+        carried = self._carried()
+        commands = [self._command_of(node, tick) for _, node in carried]
+        total = sum([weight for weight, _ in carried])
+        mean = []
+        for values in zip(*commands, strict=True):
+            value = (
+                sum([weight * one for (weight, _), one in zip(carried, values, strict=True)]) / total
+            )
+            # Rounding must not carry it beyond a limit that all of them keep.
+            mean.append(max(min(values), min(max(values), value)))
+        return tuple(mean)
 
     def _carried(self) -> list[tuple[float, Node]]:
         """Return the hypotheses that count, best first, carried over the words not heard of yet."""
@@ -267,14 +280,16 @@ class Hypotheses:
         self._unconfirmed.append((sent, heard))
         self._ahead = None
         if not self._select(self._branching.of(self._members, sent, heard)):
-            self.rejoin = Rejoin(RejoinReason.EMPTY, sample, self.rest, self._lag)
+            self.rejoin = Rejoin(
+                Why.LAG, sample, self.rest, self._lag, "no hypothesis can be continued"
+            )
             return []
         done = self._confirm()
         reason = None
         if self.rest > 1.0:
-            reason = RejoinReason.REST
+            reason = Why.REST
         elif self._lag > self.settings.lag_samples_max:
-            reason = RejoinReason.LAG
+            reason = Why.LAG
         if reason is not None:
             self.rejoin = Rejoin(reason, sample, self.rest, self._lag)
         return done
@@ -336,7 +351,7 @@ class Hypotheses:
         if count == 0:
             return []
         first = paths.first
-        before, word_before = paths.root.state, paths.root.word
+        before = paths.root
         members = []
         for weight, node, at in leaves:
             if at is None or at >= first + count:
@@ -346,26 +361,26 @@ class Hypotheses:
         self._members = members
         done = []
         for node in paths.confirm(count):
-            done.append(self._learned(node, before, word_before))
-            before, word_before = node.state, node.word
+            done.append(self._learned(node, before))
+            before = node
         return done
 
-    def _learned(self, node: Node, before: TwoWayState, word_before: Word) -> Confirmed:
+    def _learned(self, node: Node, before: Node) -> Confirmed:
         """Return a confirmed sample, and learn from it what the line is like."""
         machine = self.machine
         sent, heard = self._unconfirmed.popleft()
-        digest = machine.digest(before)
+        digest = before.digest(machine)
         commands = tuple([1 if one else 0 for one in node.symbols])
-        hashes = machine.hash_symbols(before, digest, commands, node.word)
+        hashes = machine.hash_symbols(before.state, digest, commands, node.word)
         symbols = commands + hashes
-        self.priors.learn(sent, node.word, word_before)
+        self.priors.learn(sent, node.word, before.word)
         self.priors.learn_symbols(symbols, heard)
-        if commands and machine.scheme.is_idle(before.down):
+        if commands and machine.scheme.is_idle(before.state.down):
             self.priors.learn_news(commands[0] == 1)
         assert node.flown is not None  # only the root has none
         return Confirmed(
             sample=node.sample,
-            before=before,
+            before=before.state,
             digest=digest,
             word_sent=sent,
             word=node.word,

@@ -73,7 +73,8 @@ class Node:
         if self._state is None and not self._cannot_fly:
             assert self.parent is not None  # only the root has none, and has a state
             try:
-                self.flown = machine.step(self.parent.state, self.word, self.symbols)
+                before, digest = self.parent.state, self.parent.digest(machine)
+                self.flown = machine.step(before, self.word, self.symbols, digest)
             except CANNOT_FLY:
                 self._cannot_fly = True
             else:

@@ -88,11 +88,10 @@ def test_hash_symbols_are_bits_of_the_digest_before_the_word_inverted_by_an_eras
     for word in words(60):
         digest = two_way.digest(state)
         flown, symbols = two_way.fly(state, word, wanted)
-        bits = (owed ^ symbols[0], digest >> 1 & 1, digest >> 2 & 1)
+        odd = sum(symbol == 1 for symbol in word or ()) & 1
+        bits = (owed ^ symbols[0], digest >> 1 & 1 ^ odd, digest >> 2 & 1)
         assert symbols[1:] == (bits if word is not ERASED else tuple([1 - bit for bit in bits]))
-        owed = digest & 1 ^ symbols[0]
-        for symbol in word or ():
-            owed ^= symbol == 1
+        owed = digest & 1 ^ symbols[0] ^ odd
         state = flown.state
 
 
@@ -102,12 +101,15 @@ def test_one_difference_in_the_inputs_of_a_sample_inverts_the_next_hash_symbol(a
     two_way = machine(scheme, layout, 5)
     state, chance, seen = two_way.initial(), random.Random(at), 0
 
+    def hashes(state: TwoWayState, word: Word, commands: tuple[int, ...]) -> tuple[int, ...]:
+        return two_way.hash_symbols(state, two_way.digest(state), commands, word)
+
     def said(state: TwoWayState, word: Word, commands: tuple[int, ...]) -> int:
         """Return the first hash symbol from this sample on; those after it have the same inputs."""
         while len(commands) == layout.symbols_per_sample:
             state, word = two_way.step(state, word, commands).state, (1, 1)
             commands = (0,) * two_way.commands_in(state)
-        return two_way.hash_symbols(state, two_way.digest(state), commands, word)[0]
+        return hashes(state, word, commands)[0]
 
     def after(state: TwoWayState, word: Word, commands: tuple[int, ...]) -> int:
         state = two_way.step(state, word, commands).state
@@ -126,6 +128,8 @@ def test_one_difference_in_the_inputs_of_a_sample_inverts_the_next_hash_symbol(a
             if len(commands) < layout.symbols_per_sample:
                 changed = (-word[0], word[1])
                 assert after(state, word, commands) != after(state, changed, commands)
+                if len(commands) + 1 < layout.symbols_per_sample:
+                    assert symbols[len(commands) + 1] != hashes(state, changed, commands)[1]
                 seen += 1
         state = flown.state
     assert seen > 20

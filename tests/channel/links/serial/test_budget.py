@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from channel.links.serial.budget import (
@@ -62,6 +64,26 @@ def test_when_the_downlink_is_compact_then_2400_baud_carry_the_papers_flight() -
         check_down(compact, CODEC, 1899)
     assert "channel.downlink" not in str(caught.value)
     assert [usual_rate_baud(rate) for rate in (1900, 2400, 2401, 10**6)] == [2400, 2400, 4800, 10**6]
+
+
+def test_when_the_downlink_is_narrow_then_a_symbol_is_a_byte_in_either_direction() -> None:
+    narrow = terms(downlink="narrow", downlink_baud=20.0, down_symbols=2)
+    assert command_bytes(narrow, CODEC) == 1
+    assert least_rate_baud(narrow, CODEC) == 200
+    assert least_rate_baud(replace(narrow, down_symbols=1), CODEC) == 100
+    check_down(narrow, CODEC, 200)
+    with pytest.raises(
+        ValueError, match=r"downlink: 20 symbols/s x 1 byte x 10 line bits = 200"
+    ) as caught:
+        check_down(narrow, CODEC, 199)
+    assert "channel.downlink_baud" in str(caught.value)
+
+
+def test_when_the_budget_spans_too_many_down_slots_then_it_is_refused() -> None:
+    narrow = terms(downlink="narrow", downlink_baud=20.0, down_symbols=2)
+    check_slot_counter(replace(narrow, downlink_budget_ns=100_000_000), SerialWire(2))
+    with pytest.raises(ValueError, match=r"downlink_budget_s = 0.101 is 2.02 slots of 50 ms"):
+        check_slot_counter(replace(narrow, downlink_budget_ns=101_000_000), SerialWire(2))
 
 
 def test_when_bytes_take_a_fraction_of_a_nanosecond_then_it_is_rounded_up() -> None:

@@ -9,7 +9,7 @@ import pytest
 from channel.errors import FrameError
 from channel.links.serial.wire import SerialWire, stuff, stuff_notice, unstuff
 from channel.protocol.endings import Ending
-from channel.protocol.frames import Bye, ForeignVersion, ShortSymbol, Symbol
+from channel.protocol.frames import Bye, DownSymbol, ForeignVersion, ShortSymbol, Symbol
 from channel.protocol.wire import DATAGRAM, encode
 from tests.golden.regenerate import example_frames
 
@@ -64,6 +64,8 @@ def test_when_all_byte_values_are_decoded_then_only_the_symbols_are_symbols(
     for slot in range(40):
         for number in range(size):
             assert found[byte_of(wire, slot, number)] == ShortSymbol(number, slot % modulus, modulus)
+        for bit in (0, 1):
+            assert wire.encode(DownSymbol(9, 9, slot, bit)) == wire.encode(Symbol(1, 0, slot, bit))
 
 
 @pytest.mark.parametrize(("size", "bits"), [(2, 2), (4, 1), (8, 1)])
@@ -92,7 +94,7 @@ def test_when_a_symbol_is_not_of_the_alphabet_then_it_is_refused() -> None:
 def test_when_a_frame_is_no_symbol_then_it_is_the_datagram_frame_and_ends_in_its_own_crc() -> None:
     wire = SerialWire(2)
     for frame in example_frames():
-        if isinstance(frame, Symbol | ForeignVersion):
+        if isinstance(frame, Symbol | DownSymbol | ForeignVersion):
             continue
         data = wire.encode(frame)
         assert data == DATAGRAM.encode(frame)

@@ -21,7 +21,7 @@ class Line:
     """A finder with the receiver's own idea of the next slot, which its deadlines move on."""
 
     def __init__(self, start_ns: int = START_NS, allowance_ns: int = 20 * MS) -> None:
-        self.finder = SlotFinder(terms(deadline_allowance_ns=allowance_ns))
+        self.finder = SlotFinder(terms(deadline_allowance_ns=allowance_ns).up_grid)
         self.finder.greeted(0)
         self.start_ns = start_ns
         self.allowance_ns = allowance_ns
@@ -62,6 +62,23 @@ def test_when_the_first_came_late_then_the_others_are_found_all_the_same() -> No
     line = Line()
     assert line.hear(0, line.due_ns(0) + 45 * MS).slot == 0
     assert [line.hear(slot, line.due_ns(slot)).slot for slot in range(1, 50)] == list(range(1, 50))
+
+
+def test_when_the_grid_is_known_then_down_symbols_are_placed_from_the_first_one_on() -> None:
+    chooser = random.Random(4)
+    some = terms(downlink="narrow", downlink_baud=40.0, down_symbols=4, downlink_line_ns=5 * MS)
+    grid = some.down_grid
+    for first in (0, 1, 7, 9, 4003):
+        finder = SlotFinder(grid)
+        finder.expect()
+        for slot in range(first, first + 200):
+            if chooser.random() < 0.3:
+                continue  # lost
+            came_ns = grid.due_ns(slot) + chooser.randrange(9) * MS
+            place = finder.find(ShortSymbol(0, slot % MODULUS, MODULUS), 0, came_ns)
+            assert (place.slot, place.in_time) == (slot, True)
+            noise = (slot + chooser.randrange(2, MODULUS - 1)) % MODULUS
+            assert not finder.find(ShortSymbol(0, noise, MODULUS), 0, came_ns + MS).in_time
 
 
 @pytest.mark.parametrize("first", [1, 3, 7, 8, 9, 20])

@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import pytest
 
 from channel.codec.codec import ERASED, Alphabet, Codec, Vector, Word
 from channel.codec.downlink.coded import CodedCommands, held_inputs
 from channel.codec.downlink.layout import Layout
-from channel.codec.downlink.machine import TwoWay
+from channel.codec.downlink.machine import TwoWay, TwoWaySample, TwoWayState
+from channel.protocol.frames import Why
+from tenbaud.build.codec import build_codec
+from tenbaud.config.load import load_config
 from tests.simulation.narrow import Faults, NarrowFlight, mirrored, square
-from transmitter.session.narrow.hypotheses import Confirmed, Hypotheses, RejoinReason, Settings
+from transmitter.session.narrow.hypotheses import (
+    AHEAD_MAX,
+    Confirmed,
+    Hypotheses,
+    Settings,
+    longest_list,
+)
 from transmitter.session.narrow.paths import Node, Paths
 from transmitter.session.narrow.priors import Priors
 
@@ -201,6 +211,42 @@ def test_the_list_keeps_to_its_cap_and_books_what_it_drops() -> None:
     assert hypotheses.rest > 1e-3
 
 
+class Counting(TwoWay):
+    """Counts the samples it flies."""
+
+    flown = 0
+
+    def step(
+        self,
+        state: TwoWayState,
+        word: Word,
+        symbols: Sequence[int | None],
+        digest: int | None = None,
+    ) -> TwoWaySample:
+        self.flown += 1
+        return super().step(state, word, symbols, digest)
+
+
+def test_a_large_model_has_a_short_list_and_no_sample_costs_more() -> None:
+    config = load_config("helicopter-20baud")
+    codec, small = build_codec(config), mirrored(Layout(2), 12)
+    inputs = (0.0, 0.0)
+    scheme = CodedCommands(inputs, held_inputs((5.0, 5.0)))
+    large = Counting(codec, scheme, Layout(2), 0, inputs, (5.0, 5.0), (math.inf, math.inf))
+    assert longest_list(large) == 16
+    assert 64 < longest_list(small) < 256
+    hypotheses, most = Hypotheses(large), 0
+    for sample in range(12):
+        large.flown = 0
+        hypotheses.sent((1,))
+        hypotheses.command(5 * sample)
+        hypotheses.heard(sample, None)
+        hypotheses.state_before_next()
+        most = max(most, large.flown)
+    assert hypotheses.size == 16
+    assert 16 < most <= 2 * 16 + AHEAD_MAX
+
+
 def test_agreeing_hash_bits_halve_the_rest_and_silence_does_not() -> None:
     machine = mirrored(Layout(3), 12)
     words: list[Word] = [(1,)] * 3
@@ -244,7 +290,7 @@ def test_a_rejoin_is_asked_for_when_nothing_explains_what_comes() -> None:
     while flight.hypotheses.rejoin is None:
         flight.fly(1)
     asked = flight.hypotheses.rejoin
-    assert asked.reason is RejoinReason.REST
+    assert asked.reason is Why.REST
     assert asked.rest > 1.0
     assert asked.sample < 60
     flight.fly(40)

@@ -161,9 +161,10 @@ def check_heard(evidence: Evidence) -> None:
     confirmed = evidence.topic("transmitter", "confirmed").by_key()
     heard = {row.sample for row in evidence.topic("transmitter", "down_symbols")}
     _same_keys(evidence, "hypotheses", heard)
-    for sample in sorted(confirmed.keys() - heard):
+    weighed = evidence.topic("transmitter", "hypotheses").by_key()
+    for sample in sorted((confirmed.keys() | weighed.keys()) - heard):
         place = evidence.at("transmitter", "down_symbols", f"sample {sample}")
-        place.gap("", "it is missing, and the sample was confirmed")
+        place.gap("", "it is missing, and the sample was heard of")
     flips = evidence.agreement.faults.down.flip or evidence.agreement.faults.down.raw
     for place, row in evidence.each("transmitter", "down_symbols"):
         sent = confirmed.get(row.sample)

@@ -27,7 +27,13 @@ from tenbaud.flight.drawing import NotebookDrawing
 from tenbaud.flight.outcome import SAFE, ExitCode, Outcome, outcome_of
 from tenbaud.flight.status import Status, StatusMode, outputs_status
 from tenbaud.flight.stop import StopFlag
-from tenbaud.flight.summary import gap_part, link_part, receiver_part, transmitter_part
+from tenbaud.flight.summary import (
+    gap_part,
+    link_part,
+    narrow_part,
+    receiver_part,
+    transmitter_part,
+)
 from tenbaud.flight.trouble import Trouble
 from tenbaud.flight.viewing import ALONE, ENDS, Viewing
 from tenbaud.recording.encoding import SIGNALS_KEY, signals_text
@@ -269,6 +275,7 @@ def transmitter_status(run: TransmitterRun) -> Status:
         "guard": node.guard.state.value,
         "kept_symbols_per_s": run.endpoint.rate.kept_symbols_per_s,
         **gap_part(node.gauge.now if node.gauge is not None else None),
+        **narrow_part(run),
     }
 
 

@@ -154,8 +154,15 @@ def _lockstep(status: Status) -> Text:
     text = Text("equal" if status["phase"] == "flying" else "open", style="green")
     if status["phase"] != "flying":
         text.stylize("yellow")
-    text.append(f"  {status['digest_checks']} digests", style="default")
-    text.append(f", {desyncs} differed", style="red" if desyncs else "default")
+    if narrow := status.get("narrow"):
+        # No digest comes down whole: samples become certain, a hash bit at a time.
+        text = Text(f"certain to sample {narrow['confirmed_to']}", style=text.style)
+        text.append(f", rest {narrow['rest']:.0e}", style="default")
+        if bits := narrow["hash_bits_per_sample"]:
+            text.append(f", n unseen: 2^(-{bits:.2g} n)", style="default")
+    else:
+        text.append(f"  {status['digest_checks']} digests", style="default")
+        text.append(f", {desyncs} differed", style="red" if desyncs else "default")
     if status.get("rejoins"):
         text.append(f", {status['rejoins']} rejoins", style="yellow")
     return text

@@ -56,6 +56,15 @@ def test_it_says_all_that_matters() -> None:
     assert "▀×▄" in text  # noqa: RUF001
 
 
+def test_with_a_narrow_downlink_it_says_how_certain_the_lockstep_is() -> None:
+    screen = Screen()
+    narrow = {"confirmed_to": 391, "rest": 5.07e-7, "hash_bits_per_sample": 1.74}
+    screen.update({**STATUS, "digest_checks": 0, "narrow": narrow})
+    text = drawn(screen, color_system=None)
+    assert "certain to sample 391, rest 5e-07, n unseen: 2^(-1.7 n), 1 rejoins" in text
+    assert "digests" not in text
+
+
 def test_bits_have_the_colour_of_the_output_that_they_were_about() -> None:
     screen = Screen()
     outputs = [{**STATUS["outputs"][0], "name": name} for name in ("arm", "cart")]

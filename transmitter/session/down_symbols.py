@@ -24,6 +24,7 @@ from transmitter.session.copies import CANNOT_FLY, Confirmed
 from transmitter.session.echoes import diverged
 from transmitter.session.following import Lost, Parts
 from transmitter.session.narrow import hypotheses as narrow
+from transmitter.session.narrow.certainty import Certainty
 from transmitter.session.narrow.slots import Came, DownSlots, Symbols
 from transmitter.session.records import (
     ASSUMED_CHANNEL,
@@ -55,6 +56,7 @@ class NarrowFollowing:
     def __init__(self, parts: Parts, machine: TwoWay, line_delay_ns: int) -> None:
         self.machine = machine
         self.hypotheses = narrow.Hypotheses(machine)
+        self.certainty = Certainty()
         self.history = History(parts.codec, 2 * parts.terms.history_samples)
         self._parts = parts
         self._slots = DownSlots(parts.terms, line_delay_ns)
@@ -195,6 +197,7 @@ class NarrowFollowing:
             self._confirm(done, tick)
         row = (sample, listed.size, listed.rest, listed.best, listed.next_confirmed)
         parts.recorder.write(HYPOTHESES_CHANNEL, sample * parts.terms.sample_ns, row)
+        self.certainty.on_heard(listed.size)
         if listed.rejoin is None:
             return None
         why, _, rest, lag, detail = listed.rejoin
@@ -225,7 +228,9 @@ class NarrowFollowing:
         )
         parts.owing.on_confirmed()
         self._steers = True
-        self._delays.append(tick // terms.ticks_per_sample - done.sample)
+        delay = tick // terms.ticks_per_sample - done.sample
+        self.certainty.on_confirmed(delay)
+        self._delays.append(delay)
         if len(self._delays) >= DELAYS_KNOWN:
             self._age_max = max(AGE_LEAST_SAMPLES, round(AGE_FACTOR * median(self._delays)))
 

@@ -97,12 +97,6 @@ UNCLAIMED: tuple[Unclaimed, ...] = (
     ),
     Unclaimed(
         "transmitter",
-        "assumed",
-        _all_fields("transmitter", "assumed"),
-        "what the transmitter assumed of samples before it asked for another state: it may be wrong",
-    ),
-    Unclaimed(
-        "transmitter",
         "down_symbols",
         ("symbols", ORDER),
         "of a sample that was not confirmed, or of a lost symbol: nobody else knows what came",
@@ -172,6 +166,12 @@ UNCLAIMED: tuple[Unclaimed, ...] = (
         ("arrival_s",),
         "of an erased word: when the receiver gave it up, after the one before it and before the next",
         lambda row, evidence: _is_given_up(row, evidence),
+    ),
+    Unclaimed(
+        "transmitter",
+        "assumed",
+        (ORDER, *_all_fields("transmitter", "assumed"), FILED),
+        "what a list that fitted nothing had followed; only its difference from the receiver's is read",
     ),
     *(
         Unclaimed(

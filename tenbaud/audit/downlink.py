@@ -160,11 +160,12 @@ def check_heard(evidence: Evidence) -> None:
         return
     confirmed = evidence.topic("transmitter", "confirmed").by_key()
     heard = {row.sample for row in evidence.topic("transmitter", "down_symbols")}
-    _same_keys(evidence, "hypotheses", heard)
-    weighed = evidence.topic("transmitter", "hypotheses").by_key()
-    for sample in sorted((confirmed.keys() | weighed.keys()) - heard):
+    followed = set(evidence.topic("transmitter", "hypotheses").by_key())
+    _same_keys(evidence, "hypotheses", heard | followed)
+    for sample in sorted((confirmed.keys() | followed) - heard):
         place = evidence.at("transmitter", "down_symbols", f"sample {sample}")
-        place.gap("", "it is missing, and the sample was heard of")
+        why = "confirmed" if sample in confirmed else "heard of"
+        place.gap("", f"it is missing, and the sample was {why}")
     flips = evidence.agreement.faults.down.flip or evidence.agreement.faults.down.raw
     for place, row in evidence.each("transmitter", "down_symbols"):
         sent = confirmed.get(row.sample)

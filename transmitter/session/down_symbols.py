@@ -26,7 +26,12 @@ from transmitter.session.following import Lost, Parts
 from transmitter.session.narrow import hypotheses as narrow
 from transmitter.session.narrow.certainty import Certainty
 from transmitter.session.narrow.slots import Came, DownSlots, Symbols
-from transmitter.session.records import CONFIRMED_CHANNEL, HYPOTHESES_CHANNEL, write_sample
+from transmitter.session.records import (
+    ASSUMED_CHANNEL,
+    CONFIRMED_CHANNEL,
+    HYPOTHESES_CHANNEL,
+    write_sample,
+)
 
 AGE_FACTOR = 4
 AGE_LEAST_SAMPLES = 16
@@ -196,8 +201,18 @@ class NarrowFollowing:
         if listed.rejoin is None:
             return None
         why, _, rest, lag, detail = listed.rejoin
+        if why is Why.REST:
+            self._write_assumed()
         asked = replace(ASKED, sample=listed.next_confirmed, number=lag, value=rest, detail=detail)
         return Lost(why, asked)
+
+    def _write_assumed(self) -> None:
+        """Record the samples that are not certain: the first one that differs may be among them."""
+        recorder, sample_ns = self._parts.recorder, self._parts.terms.sample_ns
+        for node in self.hypotheses.likeliest():
+            codec = node.state.codec
+            row = (node.sample, self._epoch, node.word, node.symbols, codec.model, codec.coder)
+            recorder.write(ASSUMED_CHANNEL, node.sample * sample_ns, row)
 
     def _confirm(self, done: narrow.Confirmed, tick: int) -> None:
         parts, terms = self._parts, self._parts.terms

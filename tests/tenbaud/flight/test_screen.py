@@ -56,13 +56,19 @@ def test_it_says_all_that_matters() -> None:
     assert "▀×▄" in text  # noqa: RUF001
 
 
-def test_with_a_narrow_downlink_it_says_how_certain_the_lockstep_is() -> None:
+def test_a_narrow_flight_says_what_is_certain_and_where_the_law_runs() -> None:
+    narrow = {
+        "confirmed_to": 480, "unconfirmed": 7, "copies": 3, "rest": 2e-6, "hash_symbols": 840,
+        "down_baud": 19.98, "law_beside_plant": True,
+    }  # fmt: skip
     screen = Screen()
-    narrow = {"confirmed_to": 391, "rest": 5.07e-7, "hash_bits_per_sample": 1.74}
-    screen.update({**STATUS, "digest_checks": 0, "narrow": narrow})
+    screen.update({**STATUS, **narrow})
     text = drawn(screen, color_system=None)
-    assert "certain to sample 391, rest 5e-07, n unseen: 2^(-1.7 n), 1 rejoins" in text
-    assert "digests" not in text
+    assert "certain before sample 480, 7 behind, 840 hash bits; 3 copies, rest 2e-06" in text
+    assert "19.98 symbols/s down" in text
+    assert "beside the plant too" in text
+    line = status_line({**STATUS, **narrow})
+    assert "unconfirmed 7  copies 3  rest 2e-06  down 20.0/s  law beside the plant" in line
 
 
 def test_bits_have_the_colour_of_the_output_that_they_were_about() -> None:

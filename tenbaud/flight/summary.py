@@ -72,12 +72,12 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         "loop_late_ms_p99": None,
         "loop_late_ms_max": None,
         "realtime_factor": flown_s / run.flight_s if run.flight_s else None,
-        **_narrow(run),
+        **narrow_part(run),
         **run.extra,
     }
 
 
-def _narrow(run: TransmitterRun) -> Summary:
+def narrow_part(run: TransmitterRun) -> Summary:
     """Return the figures of a narrow downlink, and of how sure this end is of the other."""
     session, terms, meter = run.node.session, run.agreement.terms, run.endpoint.inlet.meter
     following, counts = session.following, session.counts

@@ -14,7 +14,7 @@ PYTHON ?= $(shell for candidate in python3.11 python3.12 python3.13 python3.14 p
 	>/dev/null 2>&1; then echo $$candidate; break; fi; done)
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check bench soak docs reference chromium screenshots clean
+.PHONY: help demo test check bench soak docs reference chromium emulators screenshots clean
 
 help: ## list the targets
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /|/' \
@@ -26,7 +26,7 @@ demo: $(FLY) ## fly: both processes on this machine, the plant simulated
 # Most tests wait for their processes half of the time: five at once keep two cores busy. What is said
 # about the times of a flight comes after them, two at once; what needs both cores sees to it itself.
 # The project's own rules are part of `make check`.
-test: chromium $(DEVELOP) ## run the tests: most of them first, then those of times on the real clock
+test: chromium emulators $(DEVELOP) ## run the tests: most of them first, then those of times on the real clock
 	$(BIN)/python -m pytest -n 5 -m "not soak and not real_time" --ignore tests/rules
 	$(BIN)/python -m pytest -n 2 -m "not soak and real_time" $$(grep -rl --include='test_*.py' real_time tests)
 
@@ -49,6 +49,16 @@ chromium: ## install Debian's Chromium if it is missing and this is root's machi
 		test "$$(id -u)" = 0 && command -v apt-get >/dev/null 2>&1 && \
 		apt-get -qq update && apt-get -qq install --yes --no-install-recommends chromium; } || \
 		echo "no Chromium and no way to install it here: the tests of the page will skip" >&2
+
+# The sensor node in C is compiled for this machine and for a Cortex-M3 that QEMU emulates.
+BOARD_PACKAGES := gcc gcc-arm-none-eabi libnewlib-arm-none-eabi qemu-system-arm
+
+emulators: ## install Debian's compilers and QEMU if they are missing and this is root's machine to change
+	@command -v gcc >/dev/null 2>&1 && command -v arm-none-eabi-gcc >/dev/null 2>&1 && \
+		command -v qemu-system-arm >/dev/null 2>&1 || { \
+		test "$$(id -u)" = 0 && command -v apt-get >/dev/null 2>&1 && \
+		apt-get -qq update && apt-get -qq install --yes --no-install-recommends $(BOARD_PACKAGES); } || \
+		echo "no way to install $(BOARD_PACKAGES) here: tests of the node in C will skip" >&2
 
 screenshots: $(DEVELOP) ## fly with the live page, and make its pictures in docs/figures
 	$(BIN)/python -m benchmarks.screenshots

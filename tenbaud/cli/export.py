@@ -1,4 +1,4 @@
-"""`tenbaud export-c`: the codec of a configuration as a program in C."""
+"""`tenbaud export-c`: the sensor node of a configuration as a program in C."""
 
 from __future__ import annotations
 
@@ -19,23 +19,21 @@ def export_c(
     settings: options.Settings = None,
     allow_code: options.AllowCode = False,
 ) -> None:
-    """Write the codec in C99, translated from the functions of its model and its coder.
+    """Write the sensor node in C99, its codec translated from the functions of model and coder.
 
-    It has the bits of the codec in Python: no heap, no library. A model or coder that is not written as
-    functions of numbers is refused, with the place.
+    It has the bits of `transmit`, and flies over a serial line with `receive`: no heap, no library. A
+    model or coder that is not written as functions of numbers is refused, with the place.
 
     [dim]tenbaud export-c --preset paper-10baud --out firmware[/dim]
     """
-    from tenbaud.build.ends import build_observer
     from tenbaud.build.flight import agree
     from tenbaud.config.load import load_config
-    from tenbaud.export.codec import codec_files
+    from tenbaud.export.node import node_files
     from tenbaud.files.whole import make_folder, write_whole
 
-    given = options.overrides(settings=settings)
-    agreement = agree(load_config(preset, config, given, allow_code=allow_code), "real")
-    made = codec_files(agreement.codec, agreement.terms, build_observer(agreement))
-    make_folder(out)
+    given = options.overrides(settings=["link.kind=serial", *(settings or [])])
+    made = node_files(agree(load_config(preset, config, given, allow_code=allow_code), "real"))
     for name, text in made.items():
+        make_folder((out / name).parent)
         write_whole(out / name, text)
     typer.echo(f"wrote {len(made)} files to {out}; compile them with -std=c99 -ffp-contract=off")

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from importlib.resources import files
 from typing import Any
 
-from channel.codec.codec import Codec
+from channel.codec.codec import Codec, is_estimate
 from channel.codec.coders.base import FunctionCoder
 from channel.codec.signals import signals_of
+from channel.protocol.limits import limited
 from channel.protocol.terms import Terms
 from tenbaud.export.program import Program
 from tenbaud.export.sample import (
@@ -19,11 +20,13 @@ from tenbaud.export.sample import (
     live_step,
     look,
     numbers_of,
+    simulate,
 )
 from tenbaud.export.source import CannotExport
 from tenbaud.export.values import DOUBLE, TRUTH, WHOLE, Array, Rows, Scalar, Static, literal
 from transmitter.session.state_observer import StateObserver
 
+WRITTEN = "/* Written by `tenbaud export-c`. */"
 BY_HAND = files("tenbaud.export") / "c"
 CODEC_FILES = ("arithmetic.h", "arithmetic.c", "blake2b.h", "blake2b.c", "codec.h", "codec.c")
 
@@ -84,7 +87,7 @@ def program(codec: Codec, parts: Parts) -> str:
     made, known = Program(), Static(parts)
     outputs, inputs = len(signals_of(codec.model).outputs), codec.model.input_size
     states, symbols = parts.states, codec.coder.alphabet.symbols_per_word
-    ticks = parts.ticks_per_sample
+    ticks, number = parts.ticks_per_sample, Scalar(DOUBLE, "")
 
     def numbers(*shape: int, kind: str = DOUBLE) -> Array:
         return Array(kind, "", shape)
@@ -96,10 +99,12 @@ def program(codec: Codec, parts: Parts) -> str:
     )
     measured = numbers(parts.corrected if parts.uses_rates else outputs)
     erased = Scalar(TRUTH, "")
-    made.function(encode_word, (known, model, coder, measured, word))
-    for step, lead, live in (
-        (known_step, 0, Static(None)),
-        (live_step, parts.lead_ticks, numbers(ticks, states)),
+    # First: others call it too, and a function has one name.
+    made.function(is_estimate, (model,), "entry_is_estimate")
+    made.function(encode_word, (known, model, coder, measured, word), "entry_encode")
+    for name, step, lead, live in (
+        ("entry_step", known_step, 0, Static(None)),
+        ("entry_fly", live_step, parts.lead_ticks, numbers(ticks, states)),
     ):
         commands = numbers(ticks + lead, inputs)
         given = (
@@ -115,11 +120,17 @@ def program(codec: Codec, parts: Parts) -> str:
             coder,
             live,
         )
-        made.function(fly_word, given)
+        made.function(fly_word, given, name)
     if parts.uses_rates:
-        made.function(look, (known, model, erased, numbers(outputs), numbers(inputs), model))
-    made.function(numbers_of, (Scalar(DOUBLE, ""), numbers(3)))
-    return f"/* Written by `tenbaud export-c`. */\n{made.text()}"
+        seen = (known, model, erased, numbers(outputs), numbers(inputs), model)
+        made.function(look, seen, "entry_look")
+    held = numbers(parts.corrected)
+    made.function(
+        simulate, (known, model, numbers(inputs), held, model, numbers(outputs)), "entry_simulate"
+    )
+    made.function(numbers_of, (number, numbers(3)), "entry_numbers")
+    made.function(limited, (number,) * 4, "entry_limited")
+    return f"{WRITTEN}\n{made.text()}"
 
 
 def sizes(codec: Codec, terms: Terms) -> str:
@@ -144,18 +155,14 @@ def sizes(codec: Codec, terms: Terms) -> str:
         "INITIAL_MODEL": listed(model.initial()),
         "INITIAL_CODER": listed(coder.initial()),
     }
-    lines = [f"#define CODEC_{name} {value}" for name, value in values.items()]
-    guard = "TENBAUD_CODEC_SIZES_H"
-    return "\n".join(
-        [
-            "/* Written by `tenbaud export-c`. */",
-            f"#ifndef {guard}",
-            f"#define {guard}",
-            *lines,
-            "#endif",
-            "",
-        ]
-    )
+    return header("CODEC", values)
+
+
+def header(name: str, values: dict[str, Any]) -> str:
+    """Return a file that defines values, the name before each."""
+    guard = f"TENBAUD_{name}_VALUES_H"
+    lines = [f"#define {name}_{key} {value}" for key, value in values.items()]
+    return "\n".join([WRITTEN, f"#ifndef {guard}", f"#define {guard}", *lines, "#endif", ""])
 
 
 def listed(values: Sequence[float]) -> str:

@@ -46,7 +46,8 @@ class Program:
         self._order: list[Written] = []
         self._tables: dict[tuple[str, tuple[str, ...]], str] = {}
         self._structs: dict[str, str] = {}
-        self._names: set[str] = set()
+        # Those of codec.h: a module of that name may be translated too.
+        self._names: set[str] = {"codec_is_estimate", "codec_limited", "codec_simulate"}
         self._kept: list[object] = []
         """what is known by its identity"""
 
@@ -81,20 +82,22 @@ class Program:
             self._structs[name] = f"{name} {{ {' '.join(fields)} }};"
         return name
 
-    def function(self, function: Any, arguments: Sequence[Value]) -> Written:
-        """Return a function for arguments of these types, written if it is not yet."""
+    def function(self, function: Any, arguments: Sequence[Value], name: str = "") -> Written:
+        """Return a function for arguments of these types, written if it is not yet, with this name."""
         key = (id(function), *[self._key(one) for one in arguments])
         found = self.functions.get(key)
         if found is None:
             self._kept.append(function)
-            found = self._write(key, source_of(function), arguments)
+            found = self._write(key, source_of(function), arguments, name)
         return found
 
-    def _write(self, key: tuple[object, ...], source: Source, arguments: Sequence[Value]) -> Written:
+    def _write(
+        self, key: tuple[object, ...], source: Source, arguments: Sequence[Value], name: str
+    ) -> Written:
         if len(self.functions) >= FUNCTIONS_MAX:
             raise source.error(source.tree, f"more than {FUNCTIONS_MAX} functions: a call without end?")
         module = source.function.__module__.rpartition(".")[2]
-        name = self._free(f"{module}_{source.function.__name__.strip('_')}")
+        name = self._free(name or f"{module}_{source.function.__name__.strip('_')}")
         made = Written(name, annotated(source) or Shape(""))
         self.functions[key] = made
         writer = Statements(self, source)

@@ -132,6 +132,15 @@ def look(
             after[row] = seen_row(state, errors, parts.anew, parts.largest, row)
 
 
+def simulate(parts: Parts, state: Any, command: Any, push: Any, after: Any, outputs: Any) -> None:
+    """Write state and outputs of the model as a plant one tick later; `push` is added to the rates."""
+    moved = parts.tick(state, command, push, parts.model)
+    for index in range(parts.states):
+        after[index] = moved[index]
+    for place in range(len(outputs)):
+        outputs[place] = output_of(parts, moved, place)
+
+
 def numbers_of(x: float, results: Any) -> None:
     """Write sine, cosine and exponential."""
     results[0] = sin(x)

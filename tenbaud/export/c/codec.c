@@ -15,7 +15,7 @@ void codec_initial(codec_state *state) {
 
 bool codec_encode(const codec_state *state, const double *measurement, int32_t *symbols) {
     arithmetic_fault = false;
-    sample_encode_word(state->model, state->coder, measurement, symbols);
+    entry_encode(state->model, state->coder, measurement, symbols);
     return !arithmetic_fault;
 }
 
@@ -31,7 +31,7 @@ bool codec_step(codec_state *state, const int32_t *symbols, bool is_erased, cons
     double model[CODEC_ROOM(CODEC_STATES)], coder[CODEC_ROOM(CODEC_CODER_STATES)];
     arithmetic_fault = false;
     const bool is_good =
-        sample_fly_word(state->model, state->coder, symbols, is_erased, commands, model, coder);
+        entry_step(state->model, state->coder, symbols, is_erased, commands, model, coder);
     return taken(state, is_good, model, coder);
 }
 
@@ -40,7 +40,7 @@ bool codec_fly(
     double model[CODEC_ROOM(CODEC_STATES)], coder[CODEC_ROOM(CODEC_CODER_STATES)];
     arithmetic_fault = false;
     const bool is_good =
-        sample_fly_word_2(state->model, state->coder, symbols, is_erased, commands, model, coder, live);
+        entry_fly(state->model, state->coder, symbols, is_erased, commands, model, coder, live);
     return taken(state, is_good, model, coder);
 }
 
@@ -48,12 +48,27 @@ bool codec_fly(
 bool codec_look(double *state, bool is_expected, const double *measurement, const double *command) {
     double after[CODEC_STATES];
     arithmetic_fault = false;
-    sample_look(state, is_expected, measurement, command, after);
+    entry_look(state, is_expected, measurement, command, after);
     if (arithmetic_fault) return false;
     memcpy(state, after, sizeof after);
     return true;
 }
 #endif
+
+bool codec_simulate(double *state, const double *command, const double *push, double *outputs) {
+    double after[CODEC_STATES];
+    arithmetic_fault = false;
+    entry_simulate(state, command, push, after, outputs);
+    if (arithmetic_fault) return false;
+    memcpy(state, after, sizeof after);
+    return true;
+}
+
+bool codec_is_estimate(const codec_state *state) { return entry_is_estimate(state->model); }
+
+double codec_limited(double wanted, double before, double largest, double step) {
+    return entry_limited(wanted, before, largest, step);
+}
 
 static void put_double(uint8_t *bytes, double value) {
     uint64_t bits;
@@ -108,7 +123,7 @@ bool codec_probe(uint8_t *probe) {
     for (int point = -200; point < 200; point++) {
         double numbers[3];
         arithmetic_fault = false;
-        sample_numbers_of(point * 0.0537109375, numbers);
+        entry_numbers(point * 0.0537109375, numbers);
         for (int at = 0; at < 3; at++) {
             put_double(bytes, numbers[at]);
             blake2b_add(&digest, bytes, 8);

@@ -40,6 +40,16 @@ bool codec_fly(
 bool codec_look(double *state, bool is_expected, const double *measurement, const double *command);
 #endif
 
+/* The model as a plant: its state and outputs one tick later. `push` is added to the rates of the corrected
+ * states, CODEC_CORRECTED numbers. For tests without a rig. */
+bool codec_simulate(double *state, const double *command, const double *push, double *outputs);
+
+/* Whether the model's state is finite and near enough for a flight. */
+bool codec_is_estimate(const codec_state *state);
+
+/* A command within +-largest, at most a step away from the one before. */
+double codec_limited(double wanted, double before, double largest, double step);
+
 /* The CODEC_BYTES canonical bytes of a state, and back; false for bytes of another codec, or numbers that are not finite. */
 void codec_pack(const codec_state *state, uint8_t *bytes);
 bool codec_unpack(codec_state *state, const uint8_t *bytes, uint32_t size);

@@ -19,7 +19,7 @@ from tenbaud.design.complete import completed
 from tests.tenbaud.export.compiled_codec import CompiledCodec, need
 from transmitter.session.copies import CANNOT_FLY
 
-SAMPLES, SOAK_SAMPLES = 150, 100_000
+SAMPLES, SOAK_SAMPLES = 60, 100_000
 OFTEN = ("paper-10baud", "history-10baud", "pendulum-20baud", "helicopter-20baud", "usual-1000baud")
 WILD = (0.0, -0.0, 1e-310, 1e9, -1e9, 1e300, math.inf, math.nan)
 

@@ -41,8 +41,32 @@ FIELDS: dict[str, tuple[str, str]] = {
     "duration_s": ("s", "flight time flown"),
     "samples": ("samples", "that both ends share"),
     "coder_bits_up": ("bits", "sent to the receiver; the rate R limits these"),
-    "downlink": ("", "how commands and echoes come back: full or compact"),
-    "coder_bits_down": ("bits", "of command frames from the receiver, without a serial line's framing"),
+    "downlink": ("", "how commands and echoes come back: full, compact or narrow"),
+    "coder_bits_down": (
+        "bits",
+        "of command frames from the receiver, without a serial line's framing, or of down symbols",
+    ),
+    "narrow": ("", "of a narrow downlink:"),
+    "narrow.scheme": ("", "mirrored: the law runs beside the plant as well; coded: commands come down"),
+    "narrow.baud_configured": ("baud", "largest number of symbols per second down the link"),
+    "narrow.symbols_down": ("symbols", "sent to the transmitter, a bit each"),
+    "narrow.control_bytes_down": ("bytes", "of frames of the handshake and of rejoins, with framing"),
+    "narrow.symbols_erased": ("symbols", "that did not come within their deadline"),
+    "narrow.symbols_late": ("symbols", "that came after it"),
+    "narrow.samples_confirmed": ("samples", "of which the transmitter became certain"),
+    "narrow.confirmed_to": ("samples", "the first sample that was not certain at the end"),
+    "narrow.rest": ("", "weight of all that the transmitter does not follow, in units of what it does"),
+    "narrow.confirmed_after_median": ("samples", "that passed until a sample was certain, median"),
+    "narrow.confirmed_after_max": ("samples", "the longest that it took"),
+    "narrow.hypotheses_mean": (
+        "",
+        "states that the transmitter took for possible, mean",
+    ),
+    "narrow.hypotheses_max": ("", "largest number of them"),
+    "narrow.hash_bits_per_sample": (
+        "bits",
+        "h, as they came: a difference stays unseen for n samples with probability 2^(-h n)",
+    ),
     "wire_bytes_up": ("bytes", "of all frames to the receiver, framing included"),
     "wire_bytes_down": ("bytes", "of all frames to the transmitter, framing included"),
     "line_bytes_out": ("bytes", "that this end put on a serial line"),
@@ -137,7 +161,7 @@ FIELDS: dict[str, tuple[str, str]] = {
     "recording_error": ("", "why the recording is incomplete"),
 }
 SOMETIMES = {
-    *("flight_log_notes", "ticks_missed", "rig", "usual_loop", "commands_refused"),
+    *("flight_log_notes", "ticks_missed", "rig", "usual_loop", "commands_refused", "narrow"),
 }
 """Fields that only some flights have."""
 

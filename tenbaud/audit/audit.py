@@ -25,6 +25,7 @@ from tenbaud.replay.expected import expect
 from tenbaud.replay.record import FlightRecord, epochs_of, load_record
 from tenbaud.replay.refly import Reflown
 from tenbaud.replay.replay import compare
+from tenbaud.replay.rows import Topic
 from tenbaud.replay.stepped import flown_again
 
 
@@ -44,6 +45,8 @@ class Counted:
     """symbols per second on the receiver's clock"""
     samples: int
     erased: int
+    down_symbols: int | None
+    """sent down a narrow downlink"""
 
 
 def count(evidence: Evidence) -> Counted:
@@ -67,7 +70,12 @@ def count(evidence: Evidence) -> Counted:
         baud=_baud(taken or []),
         samples=len(samples),
         erased=sum(row.word is None for row in samples),
+        down_symbols=_left(evidence.topic("receiver", "down_symbol")),
     )
+
+
+def _left(sent: Topic) -> int | None:
+    return sum(row.left_ns is not None for row in sent) if sent.recorded else None
 
 
 def _baud(taken: list[Any]) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from collections import Counter
 from typing import Any
 
 from channel.errors import CodecDiverged, TenbaudError
@@ -30,9 +31,13 @@ def check_starts(evidence: Evidence) -> None:
     for end in evidence.rows:
         rows = evidence.topic(end, "two_way").rows
         epochs = evidence.topic(end, "epoch").rows
-        if [row[:2] for row in rows] != [row[:2] for row in epochs]:
-            place = evidence.at(end, "two_way", "all rows")
-            place.gap("epoch", "its epochs are not those of the topic epoch")
+        unlike = Counter(row[:2] for row in rows)
+        unlike.subtract(row[:2] for row in epochs)
+        for (sample, _), excess in unlike.items():
+            if excess:
+                place = evidence.at(end, "two_way", f"sample {sample}")
+                place.gap("epoch", "it is missing" if excess < 0 else "the topic epoch has no such row")
+        if any(unlike.values()):
             continue
         for (place, row), epoch in zip(evidence.each(end, "two_way"), epochs, strict=True):
             try:
@@ -65,9 +70,28 @@ def check_sent(evidence: Evidence) -> None:
         if wanted is None:
             place.gap("sample", "no sample that was recorded brings it")
         elif wanted != row.symbols:
-            place.leak(
-                "symbols", "its hash bits are not those of the state", BOTH.format(row.symbols, wanted)
-            )
+            detail = BOTH.format(row.symbols, wanted)
+            place.leak("symbols", "its hash bits are not those of the state", detail)
+    _check_left(evidence, found)
+
+
+def _check_left(evidence: Evidence, sent: dict[int, Any]) -> None:
+    """The symbols of each sample were offered to the line, each in its slot, and no others."""
+    count, left = evidence.terms.down_symbols, evidence.topic("receiver", "down_symbol")
+    if not left.recorded:
+        evidence.at("receiver", "down_symbol", "every slot").gap("", "no symbols were recorded")
+        return
+    slots = left.by_key()
+    for place, row in evidence.each("receiver", "down_symbol"):
+        symbols = () if row.slot // count not in sent else sent[row.slot // count].symbols
+        if row.slot % count >= len(symbols) or symbols[row.slot % count] != row.symbol:
+            place.leak("symbol", "this is not the symbol of the sample", f"{symbols}")
+    # The symbols still waiting for their slots are dropped when an epoch or the flight ends.
+    lasts = {row.sample - 1 for row in evidence.topic("receiver", "epoch")} | {max(sent, default=0)}
+    for sample in sorted(sent.keys() - lasts):
+        for slot in range(sample * count, (sample + 1) * count):
+            if slot not in slots:
+                evidence.at("receiver", "down_symbol", f"slot {slot}").gap("slot", "it is missing")
 
 
 @claim(
@@ -136,10 +160,12 @@ def check_heard(evidence: Evidence) -> None:
         return
     confirmed = evidence.topic("transmitter", "confirmed").by_key()
     heard = {row.sample for row in evidence.topic("transmitter", "down_symbols")}
-    _same_keys(evidence, "hypotheses", heard)
-    for sample in sorted(confirmed.keys() - heard):
+    followed = set(evidence.topic("transmitter", "hypotheses").by_key())
+    _same_keys(evidence, "hypotheses", heard | followed)
+    for sample in sorted((confirmed.keys() | followed) - heard):
         place = evidence.at("transmitter", "down_symbols", f"sample {sample}")
-        place.gap("", "it is missing, and the sample was confirmed")
+        why = "confirmed" if sample in confirmed else "heard of"
+        place.gap("", f"it is missing, and the sample was {why}")
     flips = evidence.agreement.faults.down.flip or evidence.agreement.faults.down.raw
     for place, row in evidence.each("transmitter", "down_symbols"):
         sent = confirmed.get(row.sample)

@@ -93,8 +93,9 @@ def check_accounts(evidence: Evidence) -> None:
         if not row.digest.endswith(row.peer_digest):
             detail = f"{row.digest} and {row.peer_digest}"
             place.leak("peer_digest", "the two ends differed here", detail)
-        if other is not None and row.sample not in evidence.doubted:
-            place.compare(SAMPLE_FIELDS, row, other, UNLIKE, BOTH)
+        if other is not None:
+            if row.sample not in evidence.doubted:
+                place.compare(SAMPLE_FIELDS, row, other, UNLIKE, BOTH)
             if not other.digest.endswith(row.peer_digest):
                 place.leak("peer_digest", UNLIKE, BOTH.format(row.peer_digest, other.digest))
         elif evidence.is_whole("receiver") and any(a <= row.sample < b for a, b in epochs):

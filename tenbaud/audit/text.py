@@ -45,6 +45,8 @@ def _counts(result: Audit) -> list[str]:
         lines.append(f"baud                {counted.baud:.3f} measured, {terms.rate_baud:g} paid for")
     if counted.symbols_taken is not None:
         lines.append(f"symbols received    {counted.symbols_taken}, {counted.symbols_late} too late")
+    if counted.down_symbols is not None:
+        lines.append(f"coder bits down     {counted.down_symbols}")
     lines.append(f"samples             {counted.samples}, of which {counted.erased} erased")
     if result.rejoin_bytes:
         lines.append(f"states down, bytes  {result.rejoin_bytes} at rejoins")

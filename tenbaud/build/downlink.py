@@ -25,6 +25,7 @@ from receiver.controllers.base import Controller
 from receiver.controllers.pid import PidLoops
 from receiver.controllers.state_feedback import StateFeedback
 from tenbaud.build.controllers import build_controller, rate_states
+from tenbaud.build.references import ANNOUNCED_SAMPLES_MAX
 from tenbaud.build.set_point_ranges import set_point_ranges
 from tenbaud.config.downlink import DownlinkSection
 from tenbaud.config.load import ConfigError
@@ -143,7 +144,13 @@ def _queue(config: FlightConfig, terms: Terms, needed: int) -> int:
     """Return how many samples after a set-point changes it takes effect."""
     announce_s = config.downlink.announce_s
     if announce_s != "auto":
-        return round(announce_s * 1e9 / terms.sample_ns)
+        samples = round(announce_s * 1e9 / terms.sample_ns)
+        if samples > ANNOUNCED_SAMPLES_MAX:
+            raise ConfigError(
+                f"downlink.announce_s = {announce_s:g} is {samples} samples, more than the "
+                f"{ANNOUNCED_SAMPLES_MAX} that both ends keep"
+            )
+        return samples
     # The transmitter has to know it in time as well.
     trip_ns = terms.down_heard_ns + parse_impairments(config.link.impairments).longest_delay_ns
     late_ns = trip_ns - terms.sample_ns - terms.lead_ticks * terms.tick_ns

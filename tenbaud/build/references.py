@@ -30,6 +30,7 @@ from tenbaud.design.encoders import check_outputs
 
 References = tuple[Reference | None, ...]
 PERIODIC = ("square", "sine")
+ANNOUNCED_SAMPLES_MAX = 1000
 
 
 def reference_sections(
@@ -63,6 +64,9 @@ def build_references(config: FlightConfig, signals: Signals, model: Model | None
     # The receiver records the set-points of so many samples after it has flown them.
     ticks = round(config.timing.symbol_period_s / tick_s)
     kept = max(LimitedReference.KEPT, 2 * UNWRITTEN_MAX * ticks)
+    if config.channel.downlink == "narrow":
+        # It sends them so much ahead of time.
+        kept += ANNOUNCED_SAMPLES_MAX * ticks
     return tuple([one and limits_kept(one, of, kept) for one, of in zip(found, limits, strict=True)])
 
 

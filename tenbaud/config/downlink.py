@@ -62,7 +62,8 @@ class DownlinkSection(Section):
     configured set-points and a sixth of their span beyond"""
     law: StateLawSection = StateLawSection()
     directions: tuple[tuple[Factor, ...], ...] = ()
-    """coded: rows with a share of each input; a symbol is about one row's value. Empty: each input"""
+    """coded: rows with a share of each input; a symbol is about one row's value. Two motors that push
+    against each other: [[0.5, -0.5]]. Empty: each input"""
     turns: tuple[Annotated[int, Field(ge=0, le=1000)], ...] = ()
     """coded: the direction that each symbol is about, repeated; empty: one after another"""
     feedback: tuple[tuple[Factor, ...], ...] = ()

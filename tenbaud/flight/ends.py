@@ -40,6 +40,7 @@ from tenbaud.telemetry.compose import ReceiverComposer, TransmitterComposer
 from tenbaud.telemetry.end import DEFAULT_OPTIONS, TelemetryEnd, TelemetryOptions
 from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
 from transmitter.loops.virtual import LinkPeer
+from transmitter.session.down_symbols import NarrowFollowing
 
 SWITCH_INTERVAL_S = 0.0002
 """A busy recorder thread may keep the loop waiting this long; Python's default is 5 ms."""
@@ -269,6 +270,24 @@ def transmitter_status(run: TransmitterRun) -> Status:
         "guard": node.guard.state.value,
         "kept_symbols_per_s": run.endpoint.rate.kept_symbols_per_s,
         **gap_part(node.gauge.now if node.gauge is not None else None),
+        **_confirmation(run),
+    }
+
+
+def _confirmation(run: TransmitterRun) -> Status:
+    """Return what is known of the receiver's state, where down symbols alone tell it."""
+    following = run.node.session.following
+    if not isinstance(following, NarrowFollowing):
+        return {}
+    listed = following.hypotheses
+    return {
+        "confirmed_to": listed.next_confirmed,
+        "unconfirmed": listed.next_heard - listed.next_confirmed,
+        "copies": listed.size,
+        "rest": listed.rest,
+        "hash_symbols": run.node.session.counts["hash_symbols"],
+        "down_baud": run.endpoint.down_baud.baud,
+        "law_beside_plant": run.agreement.terms.is_mirrored,
     }
 
 

@@ -76,6 +76,8 @@ class Screen:
             table.add_row("lockstep", _lockstep(status))
         if counts := _counts(status):
             table.add_row("line", counts)
+        if status.get("law_beside_plant"):
+            table.add_row("law", "beside the plant too")
         return table
 
     def _output(self, table: Table, one: Status) -> None:
@@ -150,6 +152,8 @@ def _time_text(status: Status) -> str:
 
 
 def _lockstep(status: Status) -> Text:
+    if status.get("confirmed_to") is not None:
+        return _confirmed(status)
     desyncs = status["desyncs"]
     text = Text("equal" if status["phase"] == "flying" else "open", style="green")
     if status["phase"] != "flying":
@@ -161,9 +165,26 @@ def _lockstep(status: Status) -> Text:
     return text
 
 
+def _confirmed(status: Status) -> Text:
+    """Return what down symbols tell of the receiver's state."""
+    text = Text(f"certain before sample {status['confirmed_to']}", style="green")
+    text.append(
+        f", {status['unconfirmed']} behind, {status['hash_symbols']} hash bits", style="default"
+    )
+    text.append(f"; {status['copies']} copies, rest {status['rest']:.0e}", style="default")
+    if status.get("rejoins"):
+        text.append(f", {status['rejoins']} rejoins", style="yellow")
+    return text
+
+
 def _counts(status: Status) -> str:
     words = []
-    for name, form in (("baud", "{:.2f} baud"), ("erasures", "{} erased"), ("guard", "guard {}")):
+    for name, form in (
+        ("baud", "{:.2f} baud"),
+        ("down_baud", "{:.2f} symbols/s down"),
+        ("erasures", "{} erased"),
+        ("guard", "guard {}"),
+    ):
         if status.get(name) is not None:
             words.append(form.format(status[name]))
     return "  ".join(words)

@@ -19,6 +19,7 @@ from tenbaud.sentences import events
 from tenbaud.sentences.flown import Summary
 from transmitter.metrics.gap import Gap
 from transmitter.metrics.scores import ErrorMeter
+from transmitter.session.down_symbols import NarrowFollowing
 
 
 def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
@@ -71,7 +72,35 @@ def transmitter_part(run: TransmitterRun, outcome: Outcome) -> Summary:
         "loop_late_ms_p99": None,
         "loop_late_ms_max": None,
         "realtime_factor": flown_s / run.flight_s if run.flight_s else None,
+        **narrow_part(run),
         **run.extra,
+    }
+
+
+def narrow_part(run: TransmitterRun) -> Summary:
+    """Return the figures of a narrow downlink, and of how sure this end is of the other."""
+    session, terms, meter = run.node.session, run.agreement.terms, run.endpoint.inlet.meter
+    following, counts = session.following, session.counts
+    if not isinstance(following, NarrowFollowing):
+        return {}
+    listed, certainty, confirmed = following.hypotheses, following.certainty, counts["confirmed"]
+    return {
+        "narrow": {
+            "scheme": "mirrored" if terms.is_mirrored else "coded",
+            "baud_configured": terms.downlink_baud,
+            "symbols_down": meter.symbols,
+            "control_bytes_down": meter.control_bytes,
+            "symbols_erased": counts["down_erased"],
+            "symbols_late": counts["down_late"],
+            "samples_confirmed": confirmed,
+            "confirmed_to": listed.next_confirmed,
+            "rest": listed.rest,
+            "confirmed_after_median": certainty.delay_median,
+            "confirmed_after_max": certainty.delay_max,
+            "hypotheses_mean": certainty.size_mean,
+            "hypotheses_max": certainty.size_max,
+            "hash_bits_per_sample": counts["hash_symbols"] / confirmed if confirmed else None,
+        }
     }
 
 
@@ -82,6 +111,9 @@ def _rate(run: TransmitterRun) -> Summary:
     if not run.ticks:
         return {"symbols_per_s_asked": asked, "symbols_per_s_kept": None, "symbols_missing_share": None}
     samples = run.ticks / terms.ticks_per_sample
+    if terms.downlink == "narrow":
+        # Whether the last words were consumed was not certain yet.
+        samples = max(1, counts["confirmed"])
     share = min(1.0, (counts["confirmed"] - counts["erasures"]) / samples)
     return {
         "symbols_per_s_asked": asked,
@@ -101,9 +133,11 @@ def gap_part(gap: Gap | None) -> Summary:
 
 def receiver_part(agreement: Agreement, endpoint: ReceiverEndpoint, outcome: Outcome) -> Summary:
     """Return the receiver's figures: symbols as they arrived, on its own clock."""
-    session = endpoint.session
+    session, sent = endpoint.session, endpoint.downlink.meter
+    narrow = {"symbols_down": sent.symbols, "control_bytes_down": sent.control_bytes}
     return {
         **_common(agreement, outcome, session.end),
+        **({} if agreement.two_way is None else {"narrow": narrow}),
         "samples": session.state.sample,
         "baud_measured": session.meter.whole_baud,
         "wire_bytes_up": endpoint.inlet.meter.wire_bytes,
@@ -154,6 +188,8 @@ def joined(transmitter: Summary, receiver: Summary) -> Summary:
     both["recording_error"] = transmitter.get("recording_error") or receiver.get("recording_error")
     if receiver.get("coder_bits_down"):
         both["coder_bits_down"] = receiver["coder_bits_down"]
+    if "narrow" in transmitter:
+        both["narrow"] = {**transmitter["narrow"], **receiver.get("narrow", {})}
     if receiver.get("impaired_down"):
         both["impaired_down"] = receiver["impaired_down"]
     return {**transmitter, **both, **{name: receiver.get(name) for name in own}}

@@ -92,6 +92,7 @@ class Settings:
     deadline_allowance_s: float
     uplink_spread_s: float
     repeats: int
+    is_narrow: bool = False
 
 
 def settings_of(agreement: Agreement) -> Settings:
@@ -110,6 +111,7 @@ def settings_of(agreement: Agreement) -> Settings:
         deadline_allowance_s=terms.deadline_allowance_ns / 1e9,
         uplink_spread_s=2 * up.jitter_ns / 1e9,
         repeats=terms.repeats,
+        is_narrow=terms.downlink == "narrow",
     )
 
 
@@ -160,6 +162,12 @@ def _on_commands(one: Settings) -> str:
 
 
 def _on_rejoins(one: Settings) -> str:
+    if one.is_narrow:
+        return (
+            "too much is lost or flipped for the down symbols of a sample to say what was consumed: "
+            "raise channel.downlink_baud at both ends, so that more of them are hash symbols; "
+            + _on_commands(one)
+        )
     return (
         f"each command frame repeats channel.repeats = {one.repeats} samples: raise it at both ends if "
         "command frames are lost; " + _on_commands(one)

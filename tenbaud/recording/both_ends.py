@@ -44,6 +44,7 @@ def compare_ends(first: Recording, second: Recording, compared: Compared) -> Non
     walk = _Walk(upper, lower, shared, fields, compared)
     seen = walk.run()
     _check_failures(ends, shared, seen, compared)
+    _compare_assumed(upper, lower, compared)
     alone = len(set(_epochs(lower)) - shared) + len(set(_epochs(upper)) - shared)
     if alone:
         compared.notes.append(f"epochs that one end alone began: {alone}; not compared")
@@ -129,6 +130,37 @@ def _check_failures(
             compared.faults.append(
                 f"sample {sample} is missing, of which an end recorded that the two differed after it"
             )
+
+
+def _compare_assumed(upper: Recording, lower: Recording, compared: Compared) -> None:
+    """Find the first difference among samples that were never confirmed (narrow downlink).
+
+    The transmitter recorded what it assumed of them when what came down fitted no state. Where its
+    assumption of word or command symbols was wrong, the states after that need not be equal.
+    """
+    assumed = {
+        (row["epoch"], row[KEY]): (time_ns, row)
+        for time_ns, row in upper.rows("assumed")
+        if _are_numbers(row, "epoch", KEY)
+    }
+    if not assumed:
+        return
+    sent = {row.get(KEY): row.get("symbols") or [] for _, row in lower.rows("down_symbols")}
+    over: set[object] = set()
+    for there in _samples(lower, Compared()):
+        number = there.epoch[0]
+        time_ns, here = assumed.get((number, there.sample), (0, None))
+        if here is None or number in over:
+            continue
+        symbols = here.get("symbols") or []
+        same = sent.get(there.sample, [])[: len(symbols)] == symbols
+        same = same and here.get("word") == there.row.get("word")
+        unlike = unlike_field(here, there.row, ["state", "coder"])
+        if not same or unlike is not None:
+            over.add(number)
+        if same and unlike is not None:
+            where = ("assumed", KEY, there.sample, time_ns)
+            compared.differences.append(Difference(*where, *unlike, upper.path, lower.path))
 
 
 def _failures(recording: Recording) -> set[tuple[int, int]]:

@@ -207,8 +207,9 @@ def _fill_downlink(epochs: list[Epoch], record: FlightRecord, machine: TwoWay) -
         state = starts.get((epoch.number, epoch.start.sample))
         if state is None:
             raise RecordingError(
-                f"{where} lacks the row of the topic two_way of epoch {epoch.number}, and with it the "
-                "state that it starts from: nothing can be computed from its symbols."
+                f"{where} lacks the row of the topic two_way of epoch {epoch.number}, sample "
+                f"{epoch.start.sample}, and with it the state that it starts from: nothing can be "
+                "computed from its symbols."
             )
         try:
             epoch.two_way = machine.unpack(bytes.fromhex(state))

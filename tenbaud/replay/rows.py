@@ -72,6 +72,7 @@ KINDS: dict[str, dict[str, Kind]] = {
         "down_symbols": _kind(DOWN_SYMBOLS_CHANNEL),
         "confirmed": _kind(transmitter.CONFIRMED_CHANNEL, "word"),
         "hypotheses": _kind(transmitter.HYPOTHESES_CHANNEL),
+        "assumed": _kind(transmitter.ASSUMED_CHANNEL, "word", "symbols"),
         "gap": _kind(GAP_CHANNEL, *(one.name for one in GAP_CHANNEL.fields[1:])),
         "device": _kind(transmitter.DEVICE_CHANNEL, "device_s"),
     },

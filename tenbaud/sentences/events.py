@@ -82,6 +82,7 @@ def _rejoin_asked(one: Fields) -> str:
         "desync": lambda: f"the two copies of the codec differ after sample {one['sample']}",
         "gap": lambda: f"the echo of sample {one['sample']} and its repetitions were lost",
         "lag": lambda: _lag(one),
+        "rest": lambda: f"what came down since sample {one['sample']} fits no state of the receiver",
         "unknown": lambda: "the receiver does not know this session",
         "guard": lambda: "the guard stopped",
         "taken_over": lambda: f"receiver session {one['session']:08x} takes over on request",
@@ -92,6 +93,8 @@ def _rejoin_asked(one: Fields) -> str:
 def _lag(one: Fields) -> str:
     if one["detail"]:
         return f"this end's copy of the codec cannot continue ({one['detail']})"
+    if one["value"] is not None:
+        return f"none of the last {one['number']} samples was confirmed"
     return f"no echo for {one['number']} samples"
 
 

@@ -29,12 +29,23 @@ def verdict_of(summary: Summary, unicode: bool = True) -> str:
     text = f"{'✓' if unicode else '+'} Flight finished: {flown}"
     if code:
         text = f"{'■' if unicode else '='} Flight stopped after {flown}: {summary['outcome']}"
+    if summary.get("downlink") == "narrow":
+        return text + _both_ways(summary)
     checks, desyncs = summary.get("digest_checks"), summary.get("desyncs") or 0
     if checks is None:
         return text
     if desyncs:
         return f"{text}, {checks} checks of the two codecs, {desyncs} found a difference"
     return f"{text}, both codecs equal in {checks} of {checks} checks"
+
+
+def _both_ways(summary: Summary) -> str:
+    """Return what went both ways, and of how much of it the transmitter is certain."""
+    narrow = summary.get("narrow") or {}
+    if "baud_configured" not in narrow:
+        return ""
+    rates = f"{summary['baud_configured']:g} bit/s up, {narrow['baud_configured']:g} down"
+    return f" ({rates}), {narrow['samples_confirmed']} of {summary['samples']} samples confirmed"
 
 
 def warnings_of(summary: Summary) -> list[str]:
@@ -94,7 +105,9 @@ def figures_of(summary: Summary, unicode: bool = True) -> Iterator[tuple[str, st
     if get("coder_bits_up") is not None:
         yield "Uplink", _uplink(summary)
     if get("downlink", "full") != "full":
-        yield "Downlink", f"{get('downlink')}: {_bits(summary, 'down')}"
+        yield "Downlink", f"{get('downlink')}: {_bits(summary, 'down')}{_scheme(summary)}"
+    if (narrow := get("narrow") or {}).get("samples_confirmed"):
+        yield "Lockstep", _lockstep(narrow)
     yield from _errors(summary, unicode)
     if learned := summary.get("learned"):
         seen = [learned_text(name, **one) for name, one in learned.items() if is_seen(**one)]
@@ -159,6 +172,21 @@ def _uplink(summary: Summary) -> str:
     if up is not None and down is not None:
         text += f"; with framing {_bytes(up)} up, {_bytes(down)} down"
     return text
+
+
+def _scheme(summary: Summary) -> str:
+    scheme = (summary.get("narrow") or {}).get("scheme")
+    if scheme == "mirrored":
+        return "; set-points only, the law runs beside the plant as well"
+    return "; commands, coded" if scheme else ""
+
+
+def _lockstep(narrow: Summary) -> str:
+    return (
+        f"certain after {narrow['confirmed_after_median']} samples (median), "
+        f"{narrow['confirmed_after_max']} at most; a difference unseen for n samples: probability "
+        f"2^(-{narrow['hash_bits_per_sample']:.2g} n)"
+    )
 
 
 def _bits(summary: Summary, way: str) -> str:

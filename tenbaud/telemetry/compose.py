@@ -18,7 +18,12 @@ from tenbaud.build.transmitter_run import TransmitterRun
 from tenbaud.telemetry.live import LiveReceiver, LiveTransmitter
 from tenbaud.telemetry.schema import SCHEMA_VERSION, named_signal
 from tenbaud.telemetry.tap import Tap
-from transmitter.session.records import ESTIMATE_CHANNEL, SAMPLE_CHANNEL, TICK_CHANNEL
+from transmitter.session.records import (
+    ESTIMATE_CHANNEL,
+    HYPOTHESES_CHANNEL,
+    SAMPLE_CHANNEL,
+    TICK_CHANNEL,
+)
 
 POINT_PERIOD_S = 0.05
 POINTS_MAX = 16
@@ -37,10 +42,10 @@ def _reader(channel: RecordChannel) -> Callable[[Row], dict[str, Any]]:
     return lambda row: dict(zip(names, row, strict=True))
 
 
-READ, ESTIMATED, SAMPLED, DECIDED, TAKEN = map(
-    _reader,
-    (TICK_CHANNEL, ESTIMATE_CHANNEL, SAMPLE_CHANNEL, receiver.TICK_CHANNEL, receiver.SAMPLE_CHANNEL),
+READ, ESTIMATED, SAMPLED, LISTED = map(
+    _reader, (TICK_CHANNEL, ESTIMATE_CHANNEL, SAMPLE_CHANNEL, HYPOTHESES_CHANNEL)
 )
+DECIDED, TAKEN = map(_reader, (receiver.TICK_CHANNEL, receiver.SAMPLE_CHANNEL))
 
 
 class Composer(ABC):
@@ -104,6 +109,8 @@ class TransmitterComposer(Composer):
         self._estimated_of: dict[int, dict[str, Any]] = {}
         self._lateness_ms: deque[float] = deque(maxlen=LATENESS_TICKS)
         self._applied: Vector | None = None
+        self._listed: dict[str, Any] | None = None
+        """of the narrow downlink: the newest row of the hypotheses"""
 
     def compose(self) -> dict[str, Any]:
         run, config, terms = self._run, self.agreement.config, self.agreement.terms
@@ -133,6 +140,7 @@ class TransmitterComposer(Composer):
             "paused": self._live.paused,
             "pace": self._live.pace if self.agreement.clock == "virtual" else None,
             "gap_to_floor": gap and gap.rms_over_floor,
+            "narrow": self._listed and narrow_part(run, self._listed),
             # Plain tuples: named ones are no JSON for the encoder.
             "learned": {
                 name: tuple(one)
@@ -170,6 +178,8 @@ class TransmitterComposer(Composer):
                 words = {name: _word(sample[name]) for name in ("word_sent", "word", "about")}
                 known = {name: sample[name] for name in ("sample", "digest", "peer_digest")}
                 samples.append(known | words)
+            elif topic == "hypotheses":
+                self._listed = LISTED(row)
         for waiting in (self._read_of, self._estimated_of):
             while len(waiting) > TICKS_WAITING_MAX:
                 del waiting[next(iter(waiting))]
@@ -235,6 +245,18 @@ class ReceiverComposer(Composer):
             "set_points": [None if one is None else one.by_hand for one in steering],
             "steerable": [one is not None for one in steering],
         }
+
+
+def narrow_part(run: TransmitterRun, listed: dict[str, Any]) -> dict[str, Any]:
+    """Return what a row of the hypotheses says, with what else is known of the narrow downlink."""
+    terms = run.agreement.terms
+    return {
+        **{name: listed[name] for name in ("sample", "confirmed_to", "size", "rest")},
+        "hash_symbols": run.node.session.counts["hash_symbols"],
+        "baud_measured": run.endpoint.down_baud.baud,
+        "baud_configured": terms.downlink_baud,
+        "is_mirrored": terms.is_mirrored,
+    }
 
 
 COUNTED_UP = ("erasures", "desyncs", "rejoins", "digest_checks", "words_missed", "stale_frames")

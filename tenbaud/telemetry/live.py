@@ -115,7 +115,7 @@ class LiveTransmitter:
     def _corrupt(self, end: Role, field: str) -> Event | None:
         session = self._run.node.session
         # Both codecs are the same kind: what this one cannot do, the receiver's refuses too.
-        event = corrupt(session, field, session.confirmed_state.sample, end == "transmitter")
+        event = corrupt(session, field, session.next_sample, end == "transmitter")
         if event.cause is ByHand.CORRUPT:
             self._run.expect_desyncs(1)
         return event if end == "transmitter" else None

@@ -126,6 +126,24 @@ class _EndMessage(_Message):
     dropped: int = Field(description="messages and rows of telemetry left out so far")
 
 
+class Confirmation(_Message):
+    """What the transmitter of a narrow downlink knows of the receiver's state."""
+
+    sample: int = Field(description="the last one whose down symbols came or were given up")
+    confirmed_to: int = Field(description="the first sample that is not certain")
+    size: int = Field(description="copies of the state that are followed")
+    rest: float = Field(description="weight of what is not followed, in units of theirs")
+    hash_symbols: int | None = Field(
+        description="hash bits that came, of confirmed samples; a difference of the states stays "
+        "unseen for n of them with a probability of 2^-n; null: not counted"
+    )
+    baud_measured: float | None = Field(
+        description="down symbols per second on this end's clock, over the last 5 s"
+    )
+    baud_configured: float = Field(description="down symbols per second that the line may carry")
+    is_mirrored: bool = Field(description="whether the law runs beside the plant too")
+
+
 class TransmitterTelemetry(_EndMessage):
     """The telemetry of the sensor node."""
 
@@ -145,6 +163,7 @@ class TransmitterTelemetry(_EndMessage):
     gap_to_floor: float | None = Field(
         default=None, description="estimation error over the least that any coder could reach"
     )
+    narrow: Confirmation | None = Field(default=None, description="null: another downlink")
     learned: dict[str, tuple[float, float]] = Field(
         default_factory=dict,
         description="of each term that the codec learns: its relative error (a force: the force), and "

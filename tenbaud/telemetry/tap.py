@@ -16,7 +16,7 @@ from channel.protocol.recording import RecordChannel, Recorder
 from tenbaud.telemetry.schema import COMMAND, Command
 
 ROWS_MAX = 8192
-TOPICS = frozenset(("tick", "estimate", "sample", "event"))
+TOPICS = frozenset(("tick", "estimate", "sample", "event", "hypotheses"))
 
 
 class Tap:

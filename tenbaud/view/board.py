@@ -134,7 +134,8 @@ class Board:
         for sample in message["samples"]:
             kept = self._sample(sample["sample"])
             kept[1], kept[2] = sample["word_sent"], sample["word"]
-            kept[3], kept[4] = sample["digest"], sample["peer_digest"]
+            # On the narrow downlink no digest comes: the receiver's telemetry has the only one.
+            kept[3], kept[4] = sample["digest"], sample["peer_digest"] or kept[4]
             kept[5] = sample["about"]
 
     def _on_receiver(self, message: dict[str, Any]) -> None:
@@ -146,7 +147,7 @@ class Board:
             kept = self._sample(sample["sample"])
             kept[2] = sample["word"]
             # What came over the line is compared, where it is known already.
-            if kept[3] is None:
+            if kept[3] is None or not kept[4]:
                 kept[4] = sample["digest"]
 
     def _sample(self, number: int) -> list[Any]:

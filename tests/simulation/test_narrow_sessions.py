@@ -10,8 +10,9 @@ from channel.codec.downlink.layout import Layout
 from receiver.controllers.pid import PAPER_GAINS, Pid
 from receiver.controllers.references import Square
 from receiver.session.narrow import NarrowCommander
+from reproduction.bothways.lines import Faults
 from tests.channel.codec.parts import TICK_S
-from tests.simulation.narrow import Faults, coded, mirrored
+from tests.simulation.narrow import coded, mirrored
 from tests.simulation.narrow_sessions import Announced, TimedFlight, memory_flight, narrow_terms
 from tests.simulation.test_narrow import DIRECTION, announced, pid
 

@@ -66,13 +66,14 @@ def test_over_300_baud_a_byte_goes_down_for_each_symbol(tmp_path: Path) -> None:
         flown = fly(line, narrow_settings(line_rate_baud=300))
         carried = line.carried("down")
     meter = flown.receiver.downlink.meter
-    assert carried == meter.symbols + meter.control_bytes
-    assert meter.coder_bits == meter.symbols <= 100
+    assert meter.wire_bytes == meter.symbols + meter.control_bytes >= carried
+    assert meter.coder_bits == meter.symbols
     if flown.receiver.downlink.refused or flown.transmitter.node.session.counts["words_missed"]:
         pytest.skip("the machine was too busy for the symbols' times")
     assert flown.outcome.code is ExitCode.OK, flown.outcome.text
     check_equal_where_confirmed(flown)
-    assert meter.symbols == 100
+    assert 100 <= meter.symbols <= 104
+    assert carried >= 100
     endpoint = flown.transmitter.endpoint
     assert endpoint.inlet.meter.symbols >= 98  # the last ones may come after the end
     assert endpoint.down_baud.whole_baud == pytest.approx(20.0, abs=0.5)
@@ -84,14 +85,15 @@ def test_when_bytes_are_damaged_and_the_plug_is_out_then_no_wrong_state_is_confi
     with NoisyLine(tmp_path, 115_200, seed=6) as line:
 
         def disturb() -> None:
-            line.corrupt("up", 0.1)
-            line.corrupt("down", 0.1)
-            time.sleep(1.0)
+            for share in (0.1, 0.0):  # of bytes; no frame with a state could pass
+                line.corrupt("up", share)
+                line.corrupt("down", share)
+                time.sleep(1.0)
             line.unplug()
             time.sleep(0.4)
             line.plug()
 
-        flown = fly(line, narrow_settings(), disturb)
+        flown = fly(line, {**narrow_settings(), "duration_s": 8.0}, disturb)
         assert line.damaged["down"] > 0
     assert flown.outcome.code is ExitCode.OK, flown.outcome.text
     check_equal_where_confirmed(flown)

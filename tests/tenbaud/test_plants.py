@@ -110,7 +110,7 @@ def _as_processes() -> Iterator[Any]:
             yield pytest.param(preset, "real", marks=[*soak, pytest.mark.real_time])
 
 
-@pytest.mark.parametrize(("preset", "clock"), _as_processes())
+@pytest.mark.parametrize(("preset", "clock"), tuple(_as_processes()))
 def test_it_flies_as_two_processes(preset: str, clock: Clock, tmp_path: Path) -> None:
     period_s = load_config(preset).timing.symbol_period_s
     samples = round((PRESETS | MORE)[preset].real_s / period_s)

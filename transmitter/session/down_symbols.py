@@ -24,8 +24,14 @@ from transmitter.session.copies import CANNOT_FLY, Confirmed
 from transmitter.session.echoes import diverged
 from transmitter.session.following import Lost, Parts
 from transmitter.session.narrow import hypotheses as narrow
+from transmitter.session.narrow.certainty import Certainty
 from transmitter.session.narrow.slots import Came, DownSlots, Symbols
-from transmitter.session.records import CONFIRMED_CHANNEL, HYPOTHESES_CHANNEL, write_sample
+from transmitter.session.records import (
+    ASSUMED_CHANNEL,
+    CONFIRMED_CHANNEL,
+    HYPOTHESES_CHANNEL,
+    write_sample,
+)
 
 AGE_FACTOR = 4
 AGE_LEAST_SAMPLES = 16
@@ -50,6 +56,7 @@ class NarrowFollowing:
     def __init__(self, parts: Parts, machine: TwoWay, line_delay_ns: int) -> None:
         self.machine = machine
         self.hypotheses = narrow.Hypotheses(machine)
+        self.certainty = Certainty()
         self.history = History(parts.codec, 2 * parts.terms.history_samples)
         self._parts = parts
         self._slots = DownSlots(parts.terms, line_delay_ns)
@@ -190,11 +197,22 @@ class NarrowFollowing:
             self._confirm(done, tick)
         row = (sample, listed.size, listed.rest, listed.best, listed.next_confirmed)
         parts.recorder.write(HYPOTHESES_CHANNEL, sample * parts.terms.sample_ns, row)
+        self.certainty.on_heard(listed.size)
         if listed.rejoin is None:
             return None
         why, _, rest, lag, detail = listed.rejoin
+        if why is Why.REST:
+            self._write_assumed()
         asked = replace(ASKED, sample=listed.next_confirmed, number=lag, value=rest, detail=detail)
         return Lost(why, asked)
+
+    def _write_assumed(self) -> None:
+        """Record the samples that are not certain: the first one that differs may be among them."""
+        recorder, sample_ns = self._parts.recorder, self._parts.terms.sample_ns
+        for node in self.hypotheses.likeliest():
+            codec = node.state.codec
+            row = (node.sample, self._epoch, node.word, node.symbols, codec.model, codec.coder)
+            recorder.write(ASSUMED_CHANNEL, node.sample * sample_ns, row)
 
     def _confirm(self, done: narrow.Confirmed, tick: int) -> None:
         parts, terms = self._parts, self._parts.terms
@@ -210,7 +228,9 @@ class NarrowFollowing:
         )
         parts.owing.on_confirmed()
         self._steers = True
-        self._delays.append(tick // terms.ticks_per_sample - done.sample)
+        delay = tick // terms.ticks_per_sample - done.sample
+        self.certainty.on_confirmed(delay)
+        self._delays.append(delay)
         if len(self._delays) >= DELAYS_KNOWN:
             self._age_max = max(AGE_LEAST_SAMPLES, round(AGE_FACTOR * median(self._delays)))
 

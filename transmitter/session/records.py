@@ -87,6 +87,20 @@ HYPOTHESES_CHANNEL = RecordChannel(
     ),
 )
 
+ASSUMED_CHANNEL = RecordChannel(
+    "assumed",
+    (
+        Field("sample", "integer", "", "a sample that was not certain when what came down fitted none"),
+        Field("epoch", "integer", "", "epoch of that sample"),
+        Field("word", "integers", "", "symbols that the receiver was assumed to consume; null: erased"),
+        Field(
+            "symbols", "integers", "", "command symbols that it was assumed to send; null: not known"
+        ),
+        Field("state", "numbers", "", "this end's model state after the sample"),
+        Field("coder", "numbers", "", "this end's coder state after the sample"),
+    ),
+)
+
 
 def write_sample(recorder: Recorder, terms: Terms, codec: Codec, done: Confirmed) -> None:
     """Record a confirmed sample, and the estimates of its ticks."""

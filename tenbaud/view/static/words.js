@@ -22,14 +22,19 @@ function state(flight) {
   if (!head) return ["waiting", "Waiting", "for a transmitter"];
   if (isSilent(flight) && head.phase !== "ended") return ["silent", "Unknown", "no data from this flight"];
   const broken = flight.broken ? `the codecs differ after sample ${flight.broken.sample}` : "";
-  const compared = `${head.counts.digest_checks} digests compared, ${head.counts.desyncs} differed`;
+  const compared = head.narrow ? confirmed(head.narrow) : `${head.counts.digest_checks} digests compared, ${head.counts.desyncs} differed`;
   if (flight.now - flight.brokenAt < BROKEN_SHOWN_MS) return ["broken", "Lockstep broken", broken];
   if (head.phase === "rejoining") return ["rejoining", "Resynchronising", `epoch ${head.epoch} is over; bits count again once both ends have a common state`];
   if (head.phase === "ended") return ["waiting", "The flight is over", compared];
   const sample = flight.lastCompared();
-  if (!sample) return ["waiting", "Waiting", "for the first digests"];
+  if (!sample) return ["waiting", "Waiting", head.narrow ? compared : "for the first digests"];
   if (!sample[3].endsWith(sample[4])) return ["broken", "Lockstep broken", broken];
   return ["lockstep", head.paused ? "In lockstep, paused" : "In lockstep", flight.repaired || compared];
+}
+
+// Of the narrow downlink, which brings no digests.
+function confirmed({ confirmed_to: first, hash_symbols: bits }) {
+  return `${first ? `confirmed up to sample ${first - 1}` : "no sample is confirmed"}${bits === null ? "" : `; ${bits} hash bits agreed`}`;
 }
 
 // The receiver's digest: of the compact downlink, the last digits that came.
@@ -64,6 +69,7 @@ function showFigures(flight) {
     show("tape-text", `one every ${trimmed(up.symbol_period_s, 3)} s of flight, as the receiver consumes them`);
     flight.at("gap-box").hidden = up.gap_to_floor === undefined || up.gap_to_floor === null;
     if (!flight.at("gap-box").hidden) show("f-gap", `${up.gap_to_floor.toFixed(2)} ×`);
+    showNarrow(flight, up.narrow);
     const learned = Object.entries(up.learned || {});
     flight.at("learned-box").hidden = !learned.length;
     show("f-learned", learned.map(learnedText).join(", "));
@@ -78,6 +84,16 @@ function showFigures(flight) {
     show("f-error", ofOutputs((place) => less(point[1][place], point[2][place]), 2));
     show("f-range", ofOutputs((place) => point[3][place] ?? null, 2).replaceAll("+", ""));
   }
+}
+
+function showNarrow(flight, narrow) {
+  for (const id of ["confirmed-box", "copies-box", "down-box"]) flight.at(id).hidden = !narrow;
+  flight.at("law-note").hidden = !narrow?.is_mirrored;
+  if (!narrow) return;
+  const { sample, confirmed_to: first, size, rest, baud_measured: baud, baud_configured: most } = narrow;
+  set(flight.at("f-confirmed"), first ? `sample ${first - 1}, ${Math.max(0, sample - first + 1)} behind` : "none");
+  set(flight.at("f-copies"), `${size}, ${rest.toExponential(0)}`);
+  set(flight.at("f-down"), `${baud === null ? "–" : baud.toFixed(2)} of ${trimmed(most, 2)}`);
 }
 
 function learnedText([name, [error, sd]]) {

@@ -92,10 +92,21 @@ def test_every_change_of_a_flight_is_found(tmp_path: Path) -> None:
     assert found > SHARE_MIN * tried
 
 
+def test_every_change_of_a_narrow_flight_is_found(tmp_path: Path) -> None:
+    narrow = {"channel__downlink": "narrow", "link__impairments": "loss=0.03", "duration_s": 4.0}
+    run = flown(tmp_path / "run", **narrow)
+    tried, found, missed = survey(run.path, tmp_path / "mutant", 1)
+    assert tried > 110
+    assert not missed, "\n".join([f"seed {SEED}", *missed])
+    assert found > SHARE_MIN * tried
+
+
 @pytest.mark.soak
 @pytest.mark.parametrize(
     ("preset", "settings"),
     [
+        ("tuned-10baud", {"channel__downlink": "narrow", "link__impairments": "loss=0.1,flip=0.01"}),
+        ("tuned-10baud", {"channel__downlink": "narrow", "downlink__scheme": "coded"}),
         ("tuned-10baud", {"link__impairments": "loss=0.2,up:flip=0.05,delay=20ms±10ms,duplicate=0.1"}),
         ("tuned-10baud", {"link__impairments": "cut=3s+1.5s", "timing__lead_ticks": 5}),
         ("usual-1000baud", {"duration_s": 2.0, "link__impairments": "loss=0.002"}),

@@ -167,6 +167,12 @@ UNCLAIMED: tuple[Unclaimed, ...] = (
         "of an erased word: when the receiver gave it up, after the one before it and before the next",
         lambda row, evidence: _is_given_up(row, evidence),
     ),
+    Unclaimed(
+        "transmitter",
+        "assumed",
+        (ORDER, *_all_fields("transmitter", "assumed"), FILED),
+        "what a list that fitted nothing had followed; only its difference from the receiver's is read",
+    ),
     *(
         Unclaimed(
             end,

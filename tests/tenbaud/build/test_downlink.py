@@ -184,6 +184,15 @@ def test_numbers_of_the_law_by_value_take_the_place_of_the_designed_ones() -> No
             {"receiver__reference": {"kind": "constant", "amplitude": 0.3}},
             r"range 0\.3 to 0\.3 rad, which is empty.*set_point_min and downlink\.set_point_max",
         ),
+        (
+            {
+                "downlink__announce_s": 60.0,
+                "timing__tick_s": 0.05,
+                "timing__symbol_period_s": 0.05,
+                "channel__rate_baud": 20.0,
+            },
+            "announce_s = 60 is 1200 samples, more than the 1000",
+        ),
         ({"receiver__reference": {"kind": "none"}}, "no output has a set-point"),
         ({"timing__lead_ticks": 7, "downlink__scheme": "coded"}, "need lead_ticks >= 8"),
         ({"downlink__scheme": "coded", "downlink__directions": [[1.0]]}, r"1 row\(s\) of 1 numbers"),

@@ -148,7 +148,7 @@ def test_doctor_and_symbols_files_are_no_way_around_it(here: Path) -> None:
     head = json.loads(zlib.decompress(packed.head))
     head["config"] = Run(run).config.model_dump(mode="json")
     file = here / "theirs.symbols"
-    whole = Packed(zlib.compress(json.dumps(head).encode()), packed.symbols, packed.erasures, 0)
+    whole = Packed(zlib.compress(json.dumps(head).encode()), packed.symbols, packed.erasures, b"", 0)
     file.write_bytes(whole.data)
     with pytest.raises(CodeNotAllowed, match="would import hostile"):
         unpack(file)

@@ -65,6 +65,25 @@ def test_a_downlink_that_is_not_full_says_its_bits(tmp_path: Path) -> None:
     assert "  Downlink        compact: 128000 bits, 1280 bit/s" in lines
 
 
+def test_a_narrow_downlink_says_both_rates_and_how_certain_the_lockstep_was(tmp_path: Path) -> None:
+    narrow = {
+        "scheme": "mirrored",
+        "baud_configured": 20.0,
+        "samples_confirmed": 992,
+        "confirmed_after_median": 9,
+        "confirmed_after_max": 17,
+        "hash_bits_per_sample": 1.75,
+    }
+    changed = {"downlink": "narrow", "coder_bits_down": 2000, "narrow": narrow, "baud_configured": 10.0}
+    lines = lines_of(tmp_path, **changed, duration_s=100.0)
+    verdict = "✓ Flight finished: 100 s (10 bit/s up, 20 down), 992 of 1000 samples confirmed"
+    assert lines[0] == verdict
+    text = "\n".join(lines)
+    assert "narrow: 2000 bits, 20 bit/s; set-points only, the law runs beside the plant as well" in text
+    assert "certain after 9 samples (median), 17 at most" in text
+    assert "a difference unseen for n samples: probability 2^(-1.8 n)" in text
+
+
 def test_the_usual_loop_stands_beside_the_tracking_error(tmp_path: Path) -> None:
     lines = lines_of(tmp_path, usual_loop={"tracking_rms_rad": 0.84976})
     assert lines[4].startswith("  Tracking error  48.9° rms (48.7° over 1000 bit/s), steps of")

@@ -56,6 +56,21 @@ def test_it_says_all_that_matters() -> None:
     assert "▀×▄" in text  # noqa: RUF001
 
 
+def test_a_narrow_flight_says_what_is_certain_and_where_the_law_runs() -> None:
+    narrow = {
+        "confirmed_to": 480, "unconfirmed": 7, "copies": 3, "rest": 2e-6, "hash_symbols": 840,
+        "down_baud": 19.98, "law_beside_plant": True,
+    }  # fmt: skip
+    screen = Screen()
+    screen.update({**STATUS, **narrow})
+    text = drawn(screen, color_system=None)
+    assert "certain before sample 480, 7 behind, 840 hash bits; 3 copies, rest 2e-06" in text
+    assert "19.98 symbols/s down" in text
+    assert "beside the plant too" in text
+    line = status_line({**STATUS, **narrow})
+    assert "unconfirmed 7  copies 3  rest 2e-06  down 20.0/s  law beside the plant" in line
+
+
 def test_bits_have_the_colour_of_the_output_that_they_were_about() -> None:
     screen = Screen()
     outputs = [{**STATUS["outputs"][0], "name": name} for name in ("arm", "cart")]

@@ -103,6 +103,24 @@ def controls(path: Path) -> list[str]:
     return [event_text(row) for row in rows if row["kind"] == "control"]
 
 
+def test_when_a_narrow_flight_is_watched_then_a_corrupt_codec_of_either_end_is_found(
+    tmp_path: Path,
+) -> None:
+    narrow = ("--set", "channel.downlink=narrow", "--clock", "virtual", "--allow-control")
+    with watched(tmp_path, *narrow, transmitter=("--duration", "3600", "--pace", "5")) as pair:
+        pair.wait(lambda: (up := pair.newest("transmitter")) and up.narrow and up.narrow.confirmed_to)
+        for rejoins, end in enumerate(("transmitter", "receiver"), 1):
+            pair.send(kind="corrupt", end=end)
+            pair.wait(lambda count=rejoins: pair.newest("transmitter").counts["rejoins"] == count)
+        pair.wait(lambda: pair.newest("transmitter").narrow.confirmed_to > 0)
+        known = pair.newest("transmitter").narrow
+        pair.stopped()
+    assert (known.baud_configured, known.is_mirrored) == (20.0, True)
+    assert known.size >= 1
+    assert known.hash_symbols > 0
+    assert 0.0 < known.rest < 1.0
+
+
 def test_when_a_flight_is_looked_at_then_every_message_keeps_to_the_schema(tmp_path: Path) -> None:
     with watched(tmp_path, "--clock", "real", transmitter=("--duration", "600")) as pair:
         # However late the viewer finds the flight.

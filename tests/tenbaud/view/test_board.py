@@ -56,6 +56,15 @@ def test_both_ends_are_joined_by_sample() -> None:
     assert board.heads["receiver"]["takes_commands"]
 
 
+def test_where_no_digest_comes_down_those_of_both_ends_telemetry_are_compared() -> None:
+    for order in ([receiver(3), transmitter(3)], [transmitter(3), receiver(3)]):
+        board = Board()
+        without = [data.replace(b'"ab"', b'""') for data in order]
+        assert board.take(without, 0.0)
+        _, (whole,) = news(board)
+        assert whole["samples"][0][3:5] == ["aa", "cc"]
+
+
 def test_whichever_end_is_heard_first_the_digests_are_those_that_were_compared() -> None:
     for order in ([receiver(3), transmitter(3)], [transmitter(3), receiver(3)]):
         board = Board()

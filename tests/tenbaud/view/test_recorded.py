@@ -36,6 +36,24 @@ def flight(lossy: Run) -> RecordedFlight:
     return RecordedFlight(lossy)
 
 
+def test_a_moment_of_a_narrow_flight_says_what_was_certain(tmp_path: Path) -> None:
+    run = flown(tmp_path / "narrow", channel__downlink="narrow")
+    flight = RecordedFlight(run)
+    assert flight.missing == ""
+    head = flight.moment(AT_S)["heads"]["transmitter"]
+    (row,) = [one for one in run.table("transmitter", "hypotheses").rows if one["sample"] == 69]
+    narrow = head["narrow"]
+    assert [narrow[name] for name in ("confirmed_to", "size", "rest")] == [
+        row[name] for name in ("confirmed_to", "size", "rest")
+    ]
+    assert narrow["sample"] - narrow["confirmed_to"] < 40
+    assert (narrow["baud_measured"], narrow["baud_configured"]) == (20.0, 20.0)
+    assert narrow["is_mirrored"]
+    number, _, _, digest, peer, _ = flight.moment(AT_S)["samples"][row["confirmed_to"] - 1]
+    assert number == row["confirmed_to"] - 1
+    assert digest == peer != ""
+
+
 def test_a_moment_is_what_the_run_recorded_up_to_then(lossy: Run, flight: RecordedFlight) -> None:
     moment = flight.moment(AT_S)
     tick, samples = round(AT_S * 100), int(AT_S * 10)

@@ -10,12 +10,15 @@ import pytest
 from channel.codec.codec import Vector
 from channel.codec.downlink.layout import Layout
 from channel.protocol.endings import Ending
-from channel.protocol.frames import Commands, DownSymbol, Echo, Frame, Hello, Welcome, Why
+from channel.protocol.events import ASKED
+from channel.protocol.frames import Bye, Commands, DownSymbol, Echo, Frame, Hello, Symbol, Welcome, Why
 from channel.protocol.sabotage import SabotagedCodec, parse_sabotage
 from receiver.session.narrow import NarrowCommander
 from receiver.session.session import ReceiverSession
 from tenbaud import MemoryRecorder
+from tenbaud.sentences.events import event_text
 from tests.channel.codec.parts import TICK_NS, identity_of
+from tests.events import event_fields
 from tests.simulation.narrow import mirrored, tuned_codec
 from tests.simulation.narrow_sessions import Announced, memory_flight, narrow_terms
 from transmitter.session.down_symbols import AGE_FACTOR, AGE_LEAST_SAMPLES, NarrowFollowing
@@ -39,6 +42,7 @@ class Pair:
         self.receiver = ReceiverSession(MACHINE.codec, TERMS, Announced(), identity, 9, two_way=MACHINE)
         self.tick = -1
         self.commands: list[Vector | None] = []
+        self.up: list[Frame] = []
         self.down: list[Frame] = []
         self.drops = False
         self._pass([self.transmitter.hello()])
@@ -51,6 +55,7 @@ class Pair:
 
     def _pass(self, frames: list[Frame]) -> None:
         for frame in frames:
+            self.up.append(frame)
             for answer in self.receiver.on_frame(frame, max(0, self.tick) * TICK_NS):
                 self.down.append(answer)
                 if not self.drops:
@@ -187,6 +192,41 @@ def test_when_either_codec_is_wrong_in_its_last_bit_then_a_new_epoch_brings_them
     assert max(ours) > 85
 
 
+def receiver_beside(number: int, *, take_over: bool) -> ReceiverSession:
+    identity = identity_of(MACHINE.codec)
+    return ReceiverSession(
+        MACHINE.codec, TERMS, Announced(), identity, number, take_over=take_over, two_way=MACHINE
+    )
+
+
+def test_when_another_receiver_takes_over_then_the_flight_goes_on_with_its_state() -> None:
+    pair = Pair()
+    pair.fly(20)
+    other = receiver_beside(77, take_over=True)
+    symbol = next(frame for frame in reversed(pair.up) if isinstance(frame, Symbol))
+    (claim,) = other.on_frame(symbol, pair.tick * TICK_NS)
+    (hello,) = pair.transmitter.on_frame(claim)
+    (welcome,) = other.on_frame(hello, pair.tick * TICK_NS)
+    assert pair.transmitter.on_frame(welcome) == [Bye(9, Ending.TAKEN_OVER)]
+    pair.receiver = other
+    pair.fly(40)
+    assert (pair.transmitter.session_number, pair.transmitter.counts["take_overs"]) == (77, 1)
+    assert pair.following.hypotheses.next_confirmed > 45
+    assert pair.transmitter.rejoins_asked == {Why.TAKEN_OVER: 1}
+
+
+def test_when_a_second_receiver_asks_while_down_symbols_come_then_it_is_refused() -> None:
+    pair = Pair()
+    pair.fly(20)
+    other = receiver_beside(77, take_over=False)
+    symbol = next(frame for frame in reversed(pair.up) if isinstance(frame, Symbol))
+    (unknown,) = other.on_frame(symbol, pair.tick * TICK_NS)
+    assert pair.transmitter.on_frame(unknown) == []
+    pair.fly(2)
+    assert pair.transmitter.on_frame(unknown) == [Bye(0, Ending.SECOND_RECEIVER)]
+    assert pair.transmitter.session_number == 9
+
+
 def test_when_a_flight_is_to_stop_at_a_difference_then_it_ends_with_it() -> None:
     wrong = SabotagedCodec(MACHINE.codec, parse_sabotage("sample=47,field=angle"))
     flight = memory_flight(MACHINE, Announced(), 1, receiver_codec=wrong, stop_on_desync=True)
@@ -194,3 +234,11 @@ def test_when_a_flight_is_to_stop_at_a_difference_then_it_ends_with_it() -> None
     assert flight.transmitter.end is not None
     assert flight.transmitter.end.ending is Ending.DESYNC
     assert 480 < result.ticks < 700
+
+
+@pytest.mark.parametrize("why", [why for why in Why if why is not Why.START])
+def test_every_reason_for_a_new_epoch_has_a_sentence(why: Why) -> None:
+    event = replace(ASKED, cause=why, sample=3, session=9, epoch=2, number=70, value=1.5)
+    text = event_text(event_fields(event))
+    assert text.endswith("requesting a new epoch after 2")
+    assert "=" not in text

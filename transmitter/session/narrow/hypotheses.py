@@ -150,6 +150,10 @@ class Hypotheses:
         """Return the weight of what is not followed, in units of the list's."""
         return self._paths.total_rest
 
+    def likeliest(self) -> list[Node]:
+        """Return the samples from `next_confirmed` on, as the receiver most probably flew them."""
+        return [node for node in self._paths.path if node.fly(self.machine)]
+
     def members(self) -> list[tuple[float, TwoWayState]]:
         """Return the hypotheses: (weight, state before `next_heard`); the weights sum to one."""
         return [(weight, node.state) for weight, node in self._members if node.fly(self.machine)]

@@ -12,9 +12,10 @@ from channel.codec.downlink.coded import CodedCommands, held_inputs
 from channel.codec.downlink.layout import Layout
 from channel.codec.downlink.machine import TwoWay, TwoWaySample, TwoWayState
 from channel.protocol.frames import Why
+from reproduction.bothways.lines import Faults
 from tenbaud.build.codec import build_codec
 from tenbaud.config.load import load_config
-from tests.simulation.narrow import Faults, NarrowFlight, mirrored, square
+from tests.simulation.narrow import NarrowFlight, mirrored, square
 from transmitter.session.narrow.hypotheses import (
     AHEAD_MAX,
     Confirmed,

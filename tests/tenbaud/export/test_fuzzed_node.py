@@ -97,4 +97,6 @@ def test_no_frame_leads_the_node_out_of_its_memory(preset: str, tmp_path: Path) 
     assert done.returncode == 0, done.stderr.decode()[-3000:]
     assert b"motor" not in done.stdout
     sessions, ticks, confirmed = map(int, done.stdout.split())
-    assert sessions > 10 and ticks > 1000 and confirmed > 0, "the frames led nowhere"
+    assert sessions > 10, "the frames led nowhere"
+    assert ticks > 1000
+    assert confirmed > 0

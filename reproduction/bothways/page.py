@@ -130,8 +130,8 @@ def _asked(found: Points) -> str:
         if one is None:
             continue
         rows += [
-            f"| {subject}, {baud} down (two symbols a sample), announced, loss 5 %: CPU of the list, % of a "
-            f"core | 10 | {100.0 * one.cpu:.1f} | {_reached(100.0 * one.cpu, 10.0)} |",
+            f"| {subject}, {baud} down (two symbols a sample), announced, loss 5 %: CPU of the list, "
+            f"% of a core | 10 | {100.0 * one.cpu:.1f} | {_reached(100.0 * one.cpu, 10.0)} |",
             "| the same: times real time, both ends and the plant in one process | at least 20 "
             f"| {one.speed:.0f} | {'yes' if one.speed >= 20 else 'no'} |",
         ]
@@ -155,8 +155,8 @@ def _needed(found: Points) -> str:
         "## Which rate a line needs",
         "",
         f"The least of {', '.join(map(str, BAUDS))} symbols/s down with which error and tracking are",
-        f"at most {ENOUGH} times those of `full`. Round trips are in samples; faults act both ways. Two seeds",
-        "leave a few hundredths to chance: the intervals below say where a rate is near the edge.",
+        f"at most {ENOUGH} times those of `full`. Round trips are in samples; faults act both ways.",
+        "Two seeds leave a few hundredths to chance: the intervals below say where a rate is near the edge.",
         "",
     ]
     kinds = [

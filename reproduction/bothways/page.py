@@ -156,7 +156,8 @@ def _needed(found: Points) -> str:
         "",
         f"The least of {', '.join(map(str, BAUDS))} symbols/s down with which error and tracking are",
         f"at most {ENOUGH} times those of `full`. Round trips are in samples; faults act both ways.",
-        "Two seeds leave a few hundredths to chance: the intervals below say where a rate is near the edge.",
+        "Two seeds leave a few hundredths to chance: the intervals below say where a rate is near the "
+        "edge.",
         "",
     ]
     kinds = [

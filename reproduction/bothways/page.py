@@ -126,14 +126,14 @@ def _asked(found: Points) -> str:
         f"| {_reached(wrong, 0)} |"
     )
     for subject, baud in (("pitch", 20), ("helicopter", 40)):
-        one = found.get(Point(subject, "announced", baud, loss=0.05))
-        if one is None:
+        lossy = found.get(Point(subject, "announced", baud, loss=0.05))
+        if lossy is None:
             continue
         rows += [
             f"| {subject}, {baud} down (two symbols a sample), announced, loss 5 %: CPU of the list, "
-            f"% of a core | 10 | {100.0 * one.cpu:.1f} | {_reached(100.0 * one.cpu, 10.0)} |",
+            f"% of a core | 10 | {100.0 * lossy.cpu:.1f} | {_reached(100.0 * lossy.cpu, 10.0)} |",
             "| the same: times real time, both ends and the plant in one process | at least 20 "
-            f"| {one.speed:.0f} | {'yes' if one.speed >= 20 else 'no'} |",
+            f"| {lossy.speed:.0f} | {'yes' if lossy.speed >= 20 else 'no'} |",
         ]
     return "\n".join(rows) + "\n"
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from reproduction.bothways.study import ASKED_SAMPLES, BAUDS, FLIPS, LOSSES, TRIPS, Found, Point
+from reproduction.bothways.study import AIM_SAMPLES, BAUDS, FLIPS, LOSSES, TRIPS, Found, Point
 from tenbaud.recording.style import FAINT, save
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ def _along(found: Points, scheme: str, baud: int, axis: str) -> list[Point]:
         one
         for one in found
         if (one.subject, one.scheme, one.baud) == ("pitch", scheme, baud)
-        and one.samples != ASKED_SAMPLES
+        and one.samples != AIM_SAMPLES
         and not any(getattr(one, other) for other in others)
         and getattr(one, axis) in steps
     ]

@@ -1,4 +1,4 @@
-"""docs/BOTHWAYS.md: what was asked beside what was measured, which rate a line needs, all points."""
+"""docs/BOTHWAYS.md: aims beside what was measured, which rate a line needs, all points."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from reproduction.bothways.draw import ERRORS, LISTS, Points
 from reproduction.bothways.flights import SCORED_FROM
 from reproduction.bothways.study import (
-    ASKED_SAMPLES,
+    AIM_SAMPLES,
     BAUDS,
     FIRST_SEED,
     FLIPS,
@@ -16,7 +16,7 @@ from reproduction.bothways.study import (
     TRIPS,
     Found,
     Point,
-    asked,
+    aims,
     corruptions,
 )
 from reproduction.bothways.subjects import BITS, SUBJECTS
@@ -29,7 +29,7 @@ NAMES = {
     "live": "mirrored law, live set-points",
     "coded": "coded commands",
 }
-ASKED = {
+AIMS = {
     "20 down, announced, clean": ("error", 1.02),
     "20 down, announced, loss 1 %": ("error", 1.02),
     "20 down, announced, a round trip of one sample": ("error", 1.02),
@@ -81,7 +81,7 @@ def write_page(path: Path, found: Points, quick: bool) -> None:
         INTRODUCTION.format(
             quick="; this is the quick form, of few and short flights" if quick else "",
         ),
-        *([] if quick else [_asked(found)]),
+        *([] if quick else [_aims(found)]),
         _needed(found),
         f"![Error over that of the full downlink]({ERRORS})\n",
         "Pitch axis. Bars are 95 % intervals over the seeds. Points above 10 are drawn at 10.\n",
@@ -92,18 +92,18 @@ def write_page(path: Path, found: Points, quick: bool) -> None:
     write_whole(path, "\n".join(parts).rstrip() + "\n")
 
 
-def _asked(found: Points) -> str:
+def _aims(found: Points) -> str:
     rows = [
-        "## Asked and measured",
+        "## Aims and measurements",
         "",
         "Pitch axis, 10 bit/s up, 10 % off the model, q = 2e-3 rad²/s³. Error and tracking are rms,",
         "over those of `full`; ± is a 95 % interval.",
         "",
-        "| | asked, at most | measured | reached |",
+        "| | aim, at most | measured | reached |",
         "|---|---|---|---|",
     ]
-    for name, point in asked().items():
-        kind, most = ASKED[name]
+    for name, point in aims().items():
+        kind, most = AIMS[name]
         one = found[point]
         value = one.error if kind == "error" else one.tracking
         half = f" ± {one.error_half:.3f}" if kind == "error" else ""
@@ -184,7 +184,7 @@ def _needed(found: Points) -> str:
 
 
 def _is_of(point: Point, subject: str, scheme: str) -> bool:
-    return (point.subject, point.scheme) == (subject, scheme) and point.samples != ASKED_SAMPLES
+    return (point.subject, point.scheme) == (subject, scheme) and point.samples != AIM_SAMPLES
 
 
 def _is_on(point: Point, line: dict[str, float]) -> bool:

@@ -29,8 +29,8 @@ BAUDS = (10, 20, 40, 100)
 LOSSES = (0.0, 0.01, 0.05, 0.1, 0.2)
 FLIPS = (0.01, 0.05)
 TRIPS = (1, 5, 10)
-ASKED_SAMPLES = 2500
-"""of the points of the table of figures that were asked for"""
+AIM_SAMPLES = 2500
+"""of the points of the table of aims"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,11 +86,11 @@ def symbols_of(point: Point) -> int:
     return int(point.baud * parts_of(point.subject).sample_s + 1e-9)
 
 
-def asked() -> dict[str, Point]:
-    """Return the points of the table of figures that were asked for."""
+def aims() -> dict[str, Point]:
+    """Return the points of the table of aims."""
 
     def more(scheme: str, baud: int, **line: float) -> Point:
-        return Point("pitch", scheme, baud, seeds=4, samples=ASKED_SAMPLES, **line)  # type: ignore[arg-type]
+        return Point("pitch", scheme, baud, seeds=4, samples=AIM_SAMPLES, **line)  # type: ignore[arg-type]
 
     return {
         "20 down, announced, clean": more("announced", 20),
@@ -110,7 +110,7 @@ def grid(quick: bool = False) -> list[Point]:
     found = []
     for scheme in ("announced", "coded"):
         for baud in reversed(BAUDS):
-            # At 10 down coded commands are lost at the first of these.
+            # Coded commands at 10 down: on fewer lines.
             few = (scheme, baud) == ("coded", 10)
             found += [Point("pitch", scheme, baud, loss=loss) for loss in LOSSES[: 3 if few else None]]
             found += [Point("pitch", scheme, baud, flip=flip) for flip in FLIPS[: 1 if few else None]]

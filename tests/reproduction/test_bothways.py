@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from reproduction.bothways.page import ASKED
-from reproduction.bothways.study import Found, Point, asked, corruptions, fly, grid, symbols_of
+from reproduction.bothways.page import AIMS
+from reproduction.bothways.study import Found, Point, aims, corruptions, fly, grid, symbols_of
 from tenbaud.cli.commands import app
 
 
@@ -63,8 +63,8 @@ def test_every_corruption_is_found_soon() -> None:
     assert largest < 40
 
 
-def test_every_figure_that_was_asked_for_has_a_point_that_is_flown() -> None:
-    assert asked().keys() == ASKED.keys()
+def test_every_aim_has_a_point_that_is_flown() -> None:
+    assert aims().keys() == AIMS.keys()
     assert {one.subject for one in grid()} == {"pitch", "helicopter"}
     assert all(symbols_of(one) >= 1 for one in grid())
     assert set(Found.__dataclass_fields__) >= {"error", "tracking", "delay", "size", "rejoins_h", "cpu"}

@@ -173,10 +173,10 @@ def _draw_bothways(docs: Path, pictures: Path, quick: bool) -> None:
     """Fly with narrow downlinks; draw them, and write the page."""
     from reproduction.bothways.draw import draw
     from reproduction.bothways.page import write_page
-    from reproduction.bothways.study import asked, fly_all, grid
+    from reproduction.bothways.study import aims, fly_all, grid
 
     points = grid(quick)
-    more = [] if quick else list(asked().values())
+    more = [] if quick else list(aims().values())
     with progress_bar("flights") as update:
         found = fly_all([*more, *points], pictures / "bothways.json", update)
     draw(docs, found)

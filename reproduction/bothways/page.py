@@ -43,11 +43,11 @@ ASKED = {
 CORRUPTED = 30
 INTRODUCTION = """# Both directions
 
-A flight at {up} bit/s up and R_d symbols/s down: what the downlink costs when it is as narrow as the
-uplink. The state machine, the words and the list of hypotheses are explained in
-[a narrow downlink](theory/downlink.md). Ratios are to the downlink `full`, whose commands and echoes
-are exact, in a flight with the same disturbances and the same uplink faults; faults act on both
-directions of the narrow flight alike. **A mirrored law runs beside the plant as well as at the
+A flight at 10 bit/s up (pitch axis) or 20 (helicopter) and R_d symbols/s down: what the downlink costs
+when it is as narrow as the uplink. The state machine, the words and the list of hypotheses are
+explained in [a narrow downlink](theory/downlink.md). Ratios are to the downlink `full`, whose commands
+and echoes are exact, in a flight with the same disturbances and the same uplink faults; faults act on
+both directions of the narrow flight alike. **A mirrored law runs beside the plant as well as at the
 receiver**: only set-points cross the line. With coded commands the controller is at the receiver alone.
 
 `tenbaud figures bothways --docs docs` makes this page{quick}.
@@ -79,7 +79,6 @@ def write_page(path: Path, found: Points, quick: bool) -> None:
     """Write the page."""
     parts = [
         INTRODUCTION.format(
-            up="10 (pitch) or 20 (helicopter)",
             quick="; this is the quick form, of few and short flights" if quick else "",
         ),
         *([] if quick else [_asked(found)]),
@@ -132,6 +131,8 @@ def _asked(found: Points) -> str:
             for one, two in found.items()
             if (one.subject, one.scheme, one.loss) == (subject, "announced", 0.05)
         ]
+        if not lossy:
+            continue
         most = max(one.cpu for one in lossy)
         rows.append(
             f"| CPU of the list at loss 5 %, announced, {subject}, any rate: % of a core | 10 "

@@ -27,7 +27,6 @@ from tenbaud.config.outside_code import require_allowed, require_regular_files
 from tenbaud.config.schema import FlightConfig
 from tenbaud.recording.errors import RecordingError
 from tenbaud.replay.record import Epoch, check_epoch
-from transmitter.session.down_symbols import initial_at
 
 MAGIC = b"tenbaud symbols 1\n"
 _LENGTH = struct.Struct("<I")
@@ -181,7 +180,7 @@ def _epoch(agreement: Agreement, number: int, first: int, hold: Vector, start: s
         if start is not None:
             state = codec.unpack(bytes.fromhex(start))
         return Epoch(number, state, hold)
-    both = initial_at(machine, first) if start is None else machine.unpack(bytes.fromhex(start))
+    both = machine.initial(first) if start is None else machine.unpack(bytes.fromhex(start))
     return Epoch(number, both.codec, hold, two_way=both)
 
 
@@ -190,7 +189,7 @@ def _start_hex(agreement: Agreement, epoch: Epoch) -> str | None:
     codec, machine, sample = agreement.codec, agreement.two_way, epoch.start.sample
     if machine is not None and epoch.two_way is not None:
         both = epoch.two_way
-        return None if both == initial_at(machine, sample) else machine.pack(both).hex()
+        return None if both == machine.initial(sample) else machine.pack(both).hex()
     initial: CodecState = codec.initial()._replace(sample=sample)
     return None if epoch.start == initial else codec.pack(epoch.start).hex()
 

@@ -184,8 +184,8 @@ def _scheme(summary: Summary) -> str:
 def _lockstep(narrow: Summary) -> str:
     return (
         f"certain after {narrow['confirmed_after_median']} samples (median), "
-        f"{narrow['confirmed_after_max']} at most; a difference unseen for n samples: probability "
-        f"2^(-{narrow['hash_bits_per_sample']:.2g} n)"
+        f"{narrow['confirmed_after_max']} at most; a difference stays unseen for n samples with "
+        f"probability 2^(-{narrow['hash_bits_per_sample']:.2g} n)"
     )
 
 

@@ -81,7 +81,7 @@ def test_a_narrow_downlink_says_both_rates_and_how_certain_the_lockstep_was(tmp_
     text = "\n".join(lines)
     assert "narrow: 2000 bits, 20 bit/s; set-points only, the law runs beside the plant as well" in text
     assert "certain after 9 samples (median), 17 at most" in text
-    assert "a difference unseen for n samples: probability 2^(-1.8 n)" in text
+    assert "a difference stays unseen for n samples with probability 2^(-1.8 n)" in text
 
 
 def test_the_usual_loop_stands_beside_the_tracking_error(tmp_path: Path) -> None:

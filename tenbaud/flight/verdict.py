@@ -155,9 +155,9 @@ def _on_words(one: Settings) -> str:
 
 
 DOWN_SYMBOLS = (
-    "too few down symbols come, or too many are flipped, to tell what the receiver consumed: look at the "
-    "downlink; where it loses some, raise channel.downlink_baud at both ends, so that more of them are "
-    "hash symbols"
+    "too few down symbols come, or too many are flipped, to tell what the receiver consumed: look at "
+    "the downlink; where it loses some, raise channel.downlink_baud at both ends, so that more of them "
+    "are hash symbols"
 )
 
 

@@ -158,6 +158,11 @@ def test_what_went_wrong_is_said_right_below_the_verdict(
     assert said in lines_of(tmp_path, **changes)[1]
 
 
+def test_ticks_without_a_command_of_a_narrow_flight_are_not_put_down_to_late_ones() -> None:
+    (said,) = warnings_of(FLOWN | {"commands_late": 194, "downlink": "narrow"})
+    assert said == "no command for 194 ticks, so the last one was held (too little was certain)"
+
+
 def test_a_terminal_without_unicode_gets_plain_characters(tmp_path: Path) -> None:
     text = "\n".join(closing_lines(FLOWN | {"bad_commands": 1}, RunFolder(tmp_path), unicode=False))
     assert text.isascii()

@@ -1,4 +1,4 @@
-"""docs/BOTHWAYS.md: what was aimed at beside what was measured, which rate a line needs, all points."""
+"""docs/BOTHWAYS.md: what was asked beside what was measured, which rate a line needs, all points."""
 
 from __future__ import annotations
 
@@ -94,12 +94,12 @@ def write_page(path: Path, found: Points, quick: bool) -> None:
 
 def _asked(found: Points) -> str:
     rows = [
-        "## Aims and measurements",
+        "## Asked and measured",
         "",
         "Pitch axis, 10 bit/s up, 10 % off the model, q = 2e-3 rad²/s³. Error and tracking are rms,",
         "over those of `full`; ± is a 95 % interval.",
         "",
-        "| | aim, at most | measured | reached |",
+        "| | asked, at most | measured | reached |",
         "|---|---|---|---|",
     ]
     for name, point in asked().items():

@@ -244,7 +244,6 @@ class TransmitterEndpoint:
         self.inlet = Inlet(uplink.wire, node.on_malformed, self._require_whole)
         self.down_baud = BaudMeter()
         """of the symbols of a narrow downlink"""
-        self._next_down_slot = 0
         self._down_slots = _down_slots(node.session)
         self.lateness = LatenessMeter()
         """of the ticks; on the virtual clock none is late"""
@@ -313,10 +312,14 @@ class TransmitterEndpoint:
         frame = self.inlet.take(data)
         if isinstance(frame, ShortSymbol):
             frame = self._located(frame, now_ns)
-        if isinstance(frame, DownSymbol) and frame.slot >= self._next_down_slot:
-            self._next_down_slot = frame.slot + 1
+        if frame is None:
+            return []
+        counts = self.node.session.counts
+        before = counts["down_came"]
+        answers = self.node.deliver(frame)
+        if counts["down_came"] > before:
             self.down_baud.on_slot(now_ns, came=True)
-        return [] if frame is None else self._offer(self.node.deliver(frame), now_ns)
+        return self._offer(answers, now_ns)
 
     def _located(self, symbol: ShortSymbol, now_ns: int) -> DownSymbol | None:
         """Return the down symbol in a byte of a serial line; None, counted, where it fits no slot."""

@@ -27,7 +27,7 @@ from receiver.controllers.state_feedback import StateFeedback
 from tenbaud.build.controllers import build_controller, rate_states
 from tenbaud.build.references import ANNOUNCED_SAMPLES_MAX
 from tenbaud.build.set_point_ranges import set_point_ranges
-from tenbaud.config.downlink import DownlinkSection
+from tenbaud.config.downlink import DownlinkSection, StateLawSection
 from tenbaud.config.load import ConfigError
 from tenbaud.config.schema import FlightConfig
 
@@ -162,6 +162,12 @@ def _law(
 ) -> tuple[Law, Description]:
     """Return a controller's law as both ends run it, and its numbers."""
     largest, tick_s = terms.limits.command_max, config.timing.tick_s
+    if config.downlink.law != StateLawSection() and not isinstance(controller, StateFeedback):
+        raise ConfigError(
+            "downlink.law has the numbers of a state feedback, and the controller is "
+            f"{config.receiver.controller}: leave it out, or set receiver.controller = "
+            '"state_feedback"'
+        )
     if isinstance(controller, PidLoops):
         rates = rate_states(controller, terms.signals)
         loops = tuple(
@@ -176,7 +182,7 @@ def _law(
     if isinstance(controller, StateFeedback):
         section = config.downlink.law
         numbers_of = controller.law
-        if section.base:
+        if section != StateLawSection():
             numbers_of = FeedbackLaw(**{name: getattr(section, name) for name in FeedbackLaw._fields})
             _check_shape(numbers_of, controller.law)
         return MirroredFeedback(numbers_of, largest, tick_s), numbers_of._asdict()
@@ -223,6 +229,11 @@ def _coded(
                 f"{', '.join(str(len(row)) for row in given_rows)} numbers; there are {len(rows)} "
                 f"direction(s), {count} input(s) and {states} state(s)"
             )
+    if not section.range_min <= section.range_max <= section.value_max:
+        raise ConfigError(
+            f"downlink.range_min = {section.range_min:g}, range_max = {section.range_max:g} and "
+            f"value_max = {section.value_max:g} must rise in this order"
+        )
     directions = []
     for place, (row, read) in enumerate(zip(rows, _readings(rows), strict=True)):
         most = 0.0
@@ -249,7 +260,10 @@ def _readings(rows: Sequence[Vector]) -> list[Vector]:
 
     matrix = np.array(rows, dtype=np.float64)
     if np.linalg.matrix_rank(matrix) < len(rows):
-        raise ConfigError(f"downlink.directions {[list(row) for row in rows]} depend on each other")
+        raise ConfigError(
+            f"downlink.directions {[list(row) for row in rows]}: a row is zero, or a sum of others; no "
+            "symbol can be about it, so leave it out"
+        )
     # Rounded, as two libraries differ in the last digits: ranges follow from it at both ends.
     inverse = np.linalg.pinv(matrix).T
     return [tuple([float(f"{value:.10g}") + 0.0 for value in row]) for row in inverse.tolist()]

@@ -171,7 +171,7 @@ def _lockstep(status: Status) -> Text:
 def _down(narrow: Status) -> Iterator[str]:
     """Yield what is to be known of a narrow downlink, line by line."""
     if bits := narrow["hash_bits_per_sample"]:
-        yield f"a difference stays unseen for n samples with 2^(-{bits:.2g} n)"
+        yield f"a difference stays unseen for n samples with probability 2^(-{bits:.2g} n)"
     rate = "" if narrow["baud"] is None else f"{narrow['baud']:.2f} symbols/s"
     law = "the law runs beside the plant too" if narrow["scheme"] == "mirrored" else ""
     yield "; ".join(filter(None, (rate, law)))

@@ -93,6 +93,7 @@ class Settings:
     uplink_spread_s: float
     repeats: int
     is_narrow: bool = False
+    is_mirrored: bool = False
 
 
 def settings_of(agreement: Agreement) -> Settings:
@@ -112,6 +113,7 @@ def settings_of(agreement: Agreement) -> Settings:
         uplink_spread_s=2 * up.jitter_ns / 1e9,
         repeats=terms.repeats,
         is_narrow=terms.downlink == "narrow",
+        is_mirrored=terms.is_mirrored,
     )
 
 
@@ -152,7 +154,16 @@ def _on_words(one: Settings) -> str:
     )
 
 
+DOWN_SYMBOLS = (
+    "too few down symbols come, or too many are flipped, to tell what the receiver consumed: look at "
+    "the downlink; where it loses some, raise channel.downlink_baud at both ends, so that more of them "
+    "are hash symbols"
+)
+
+
 def _on_commands(one: Settings) -> str:
+    if one.is_mirrored:
+        return DOWN_SYMBOLS  # its commands wait for no line: they stop when nothing is confirmed
     return (
         f"the command lead is {one.lead_s:g} s, the watchdog {one.watchdog_s:g} s, and the "
         f"configuration knows of a round trip of {one.round_trip_s:g} s; if the line takes longer, "
@@ -162,12 +173,10 @@ def _on_commands(one: Settings) -> str:
 
 
 def _on_rejoins(one: Settings) -> str:
+    if one.is_mirrored:
+        return DOWN_SYMBOLS
     if one.is_narrow:
-        return (
-            "too much is lost or flipped for the down symbols of a sample to say what was consumed: "
-            "raise channel.downlink_baud at both ends, so that more of them are hash symbols; "
-            + _on_commands(one)
-        )
+        return f"{DOWN_SYMBOLS}; {_on_commands(one)}"
     return (
         f"each command frame repeats channel.repeats = {one.repeats} samples: raise it at both ends if "
         "command frames are lost; " + _on_commands(one)

@@ -50,7 +50,7 @@ def compare_ends(first: Recording, second: Recording, compared: Compared) -> Non
         compared.notes.append(f"epochs that one end alone began: {alone}; not compared")
     if walk.unheard:
         compared.notes.append(
-            f"samples of the receiver whose echo the transmitter never had: {walk.unheard}"
+            f"samples of the receiver that the transmitter never confirmed: {walk.unheard}"
         )
 
 

@@ -74,8 +74,11 @@ def warnings_of(summary: Summary) -> list[str]:
         found.append(f"the guard held the safe voltage for {get('ticks_guard_down')} ticks")
     late = get("commands_late") or 0
     if ticks and late > LATE_SHARE_WORTH_A_WARNING * ticks:
+        narrow = get("downlink") == "narrow"
         found.append(
-            f"{late} commands came too late, so the last one was held (a lost symbol delays the "
+            f"no command for {late} ticks, so the last one was held (too little was certain)"
+            if narrow
+            else f"{late} commands came too late, so the last one was held (a lost symbol delays the "
             "command of its sample)"
         )
     at_limit = get("ticks_at_limit") or 0
@@ -184,8 +187,8 @@ def _scheme(summary: Summary) -> str:
 def _lockstep(narrow: Summary) -> str:
     return (
         f"certain after {narrow['confirmed_after_median']} samples (median), "
-        f"{narrow['confirmed_after_max']} at most; a difference unseen for n samples: probability "
-        f"2^(-{narrow['hash_bits_per_sample']:.2g} n)"
+        f"{narrow['confirmed_after_max']} at most; a difference stays unseen for n samples with "
+        f"probability 2^(-{narrow['hash_bits_per_sample']:.2g} n)"
     )
 
 

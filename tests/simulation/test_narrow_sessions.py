@@ -7,6 +7,8 @@ import math
 import pytest
 
 from channel.codec.downlink.layout import Layout
+from channel.protocol.frames import DownSymbol
+from channel.protocol.wire import encode
 from receiver.controllers.pid import PAPER_GAINS, Pid
 from receiver.controllers.references import Square
 from receiver.session.narrow import NarrowCommander
@@ -67,3 +69,16 @@ def test_when_sessions_fly_then_all_bits_are_those_of_the_flight_without(
     lost = sum(row["symbols"].count(None) for row in up.topic("down_symbols"))
     assert flight.transmitter.counts["down_erased"] == lost
     assert (lost > 0) is (faults is LOSSES)
+
+
+def test_when_a_down_symbol_is_not_taken_then_it_is_not_measured() -> None:
+    machine, queue = SCHEMES["mirrored 2"]
+    flight = memory_flight(machine, controller_of(queue), 3)
+    flight.fly(2.0)
+    endpoint, session = flight.loop.endpoint, flight.transmitter
+    came = session.counts["down_came"]
+    assert came == endpoint.inlet.meter.symbols
+    forged = DownSymbol(session.session_number, session.epoch, 2**32 - 1, 1)
+    endpoint.take(encode(forged), 10_000_000_000)
+    assert session.counts["down_came"] == came
+    assert endpoint.down_baud.whole_baud == pytest.approx(20.0, rel=0.05)

@@ -114,7 +114,7 @@ class NarrowFollowing:
         terms = self._parts.terms
         sample, lag_max = tick // terms.ticks_per_sample, terms.history_samples
         if sample - self.hypotheses.next_heard > lag_max:
-            return Lost(Why.LAG, replace(ASKED, number=lag_max))
+            return Lost(Why.LAG, replace(ASKED, number=lag_max, value=self.hypotheses.rest))
         self._skip_to(sample)
         return self._hear(tick)
 
@@ -141,15 +141,16 @@ class NarrowFollowing:
         sample = max(0, tick) // self._parts.terms.ticks_per_sample
         if bounds.drops(bounds.of_down_symbol(frame, sample)):
             return None
-        match self._slots.put(frame.slot, frame.number, tick):
-            case Came.LATE:
-                counts["down_late"] += 1
-            case Came.AGAIN:
-                counts["stale_frames"] += 1
-            case Came.NEW:
-                self._parts.on_heard()
-                return self._hear(tick)
-        return None
+        came = self._slots.put(frame.slot, frame.number, tick)
+        if came is Came.AGAIN:
+            counts["stale_frames"] += 1
+            return None
+        counts["down_came"] += 1
+        if came is Came.LATE:
+            counts["down_late"] += 1
+            return None
+        self._parts.on_heard()
+        return self._hear(tick)
 
     def take_confirmed(self) -> list[Confirmed]:
         taken = []

@@ -95,7 +95,7 @@ class TransmitterSession:
         self.counts: Counter[str] = Counter()
         """confirmed, digest_checks, desyncs, rejoins, stale_frames, words_missed, erasures,
         claims_refused, take_overs, out_of_bounds, diverged; narrow: hash_symbols (that came, of
-        confirmed samples), down_late and down_erased (symbols)"""
+        confirmed samples), down_came, down_late and down_erased (symbols)"""
         self.rejoins_asked: Counter[Why] = Counter()
         self.end: End | None = None
         self.refusal: End | None = None

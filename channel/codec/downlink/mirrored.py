@@ -113,15 +113,6 @@ class MirroredLaw:
         one = self.ranges[place]
         return (one.high - one.low) / (1 << self.bits)
 
-    def check_set_points(self, targets: Vector) -> None:
-        """Raise ValueError, with the numbers, for a set-point that no word can say."""
-        for one in self.ranges:
-            if not one.low <= targets[one.output] <= one.high:
-                raise ValueError(
-                    f"the set-point {targets[one.output]:g} of output {one.output} is outside the "
-                    f"range of its words, {one.low:g} to {one.high:g}; widen it or change the set-point"
-                )
-
     def initial(self) -> Vector:
         start = tuple([one.start for one in self.ranges])
         return start + start + (0.0,) * WORD + start * self.queue + self.law.initial()

@@ -84,7 +84,7 @@ def test_the_ends_of_a_square_wave_are_words_to_the_last_digit() -> None:
     for target in (math.pi / 2, -math.pi / 2):
         words = (target - one.low) / scheme.quantum(0) - 0.5
         assert words == pytest.approx(round(words), abs=1e-9)
-        scheme.check_set_points((target,))
+        assert one.low <= target <= one.high
 
 
 def test_a_longer_round_trip_is_announced_earlier() -> None:
@@ -160,6 +160,8 @@ def test_numbers_of_the_law_by_value_take_the_place_of_the_designed_ones() -> No
     law["gains"][0].append(1.0)
     with pytest.raises(ConfigError, match=r"\.gains has the shape \[1, \d\], not \[1, \d\]"):
         agreed("servo-10baud", downlink__law=law)
+    with pytest.raises(ConfigError, match=r"downlink\.law\.base has the shape \[0\], not \[1\]"):
+        agreed("servo-10baud", downlink__law={"gains": [[1.0, 2.0]]})
 
 
 @pytest.mark.parametrize(
@@ -199,7 +201,16 @@ def test_numbers_of_the_law_by_value_take_the_place_of_the_designed_ones() -> No
         ({"downlink__scheme": "coded", "downlink__feedback": [[1.0]]}, r"downlink\.feedback has 1 row"),
         (
             {"downlink__scheme": "coded", "downlink__directions": [[1.0, 1.0], [2.0, 2.0]]},
-            "depend on each other",
+            r"\[2\.0, 2\.0\]\]: a row is zero, or a sum of others",
+        ),
+        ({"downlink__scheme": "coded", "downlink__directions": [[0.0, 0.0]]}, "a row is zero"),
+        (
+            {"downlink__scheme": "coded", "downlink__range_min": 3.0},
+            r"downlink\.range_min = 3, range_max = 0\.8 and value_max = 2 must rise",
+        ),
+        (
+            {"downlink__law": {"base": [1.0]}},
+            r"downlink\.law .* and the controller is pid: leave it out",
         ),
         ({"downlink__scheme": "coded", "downlink__turns": [0]}, "must name each of the 2 directions"),
         (

@@ -81,7 +81,7 @@ def test_a_narrow_downlink_says_both_rates_and_how_certain_the_lockstep_was(tmp_
     text = "\n".join(lines)
     assert "narrow: 2000 bits, 20 bit/s; set-points only, the law runs beside the plant as well" in text
     assert "certain after 9 samples (median), 17 at most" in text
-    assert "a difference unseen for n samples: probability 2^(-1.8 n)" in text
+    assert "a difference stays unseen for n samples with probability 2^(-1.8 n)" in text
 
 
 def test_the_usual_loop_stands_beside_the_tracking_error(tmp_path: Path) -> None:
@@ -156,6 +156,11 @@ def test_what_went_wrong_is_said_right_below_the_verdict(
 ) -> None:
     assert warnings_of(FLOWN) == []
     assert said in lines_of(tmp_path, **changes)[1]
+
+
+def test_ticks_without_a_command_of_a_narrow_flight_are_not_put_down_to_late_ones() -> None:
+    (said,) = warnings_of(FLOWN | {"commands_late": 194, "downlink": "narrow"})
+    assert said == "no command for 194 ticks, so the last one was held (too little was certain)"
 
 
 def test_a_terminal_without_unicode_gets_plain_characters(tmp_path: Path) -> None:

@@ -66,7 +66,7 @@ def test_a_narrow_flight_says_what_is_certain_and_where_the_law_runs() -> None:
     screen.update(status)
     text = drawn(screen, color_system=None)
     assert "certain before sample 391, 7 behind; 3 copies, rest 5e-07, 1 rejoins" in text
-    assert "unseen for n samples with 2^(-1.7 n)" in text
+    assert "unseen for n samples with probability 2^(-1.7 n)" in text
     assert "digests" not in text
     assert "19.98 symbols/s; the law runs beside the plant too" in text
     assert status_line(status).endswith(

@@ -57,6 +57,15 @@ def test_when_an_end_does_not_see_the_motors_then_it_does_not_judge_them() -> No
     assert faults_of(replace(GOOD, ticks=0, ticks_down=0, ticks_commanded=0)) == ()
 
 
+@pytest.mark.parametrize("fault", [NotFlown.NO_COMMANDS, NotFlown.REJOINING, NotFlown.UNCONFIRMED])
+def test_when_the_law_is_mirrored_then_no_longer_lead_is_advised(fault: NotFlown) -> None:
+    coded = replace(SETTINGS, is_narrow=True)
+    advice = verdict_text((fault,), GOOD, replace(coded, is_mirrored=True), {}).splitlines()[-1]
+    assert "look at the downlink" in advice
+    assert "timing.lead_ticks" not in advice
+    assert "timing.lead_ticks" in verdict_text((fault,), GOOD, coded, {})
+
+
 def test_when_it_is_reported_then_with_its_numbers_and_what_to_change() -> None:
     endless = replace(GOOD, confirmed=101, erased=0, rejoins=99, ticks_down=4860, ticks_commanded=1010)
     faults = faults_of(endless)

@@ -147,7 +147,7 @@ TWO = epoch_rows((0, 0), (1, 20))
     ("upper", "lower", "verdict", "words"),
     [
         # The last echoes of an epoch, and of the flight, may be lost.
-        ([*range(8), *range(20, 28)], range(30), Verdict.EQUAL, "never had: 14"),
+        ([*range(8), *range(20, 28)], range(30), Verdict.EQUAL, "never confirmed: 14"),
         (range(10), range(10), Verdict.EQUAL, ""),
         # Between others nothing is missing that the other end has.
         ([*range(4), *range(5, 10)], range(10), Verdict.NOT_COMPARABLE, "sample 4 missing in"),

@@ -88,11 +88,12 @@ def test_when_symbols_are_foreign_or_impossible_then_they_are_dropped_and_counte
         assert session.on_frame(bad) == []
     assert session.counts["out_of_bounds"] == 3
     assert session.on_frame(last) == []
-    assert session.counts["down_late"] == 1
+    assert (session.counts["stale_frames"], session.counts["down_late"]) == (4, 0)
     ahead = replace(last, slot=2 * heard)
     session.on_frame(ahead)
     session.on_frame(replace(ahead, number=1 - ahead.number))
-    assert session.counts["stale_frames"] == 4
+    assert session.counts["stale_frames"] == 5
+    assert session.counts["down_came"] == len(pair.down)  # without the welcome, and with `ahead`
     assert pair.following.hypotheses.next_heard == heard
 
 

@@ -24,7 +24,7 @@ class Came(Enum):
 
     NEW = auto()
     AGAIN = auto()
-    """its slot has a symbol"""
+    """its slot had a symbol, or is long past: a copy"""
     LATE = auto()
     """its sample was heard without it"""
 
@@ -44,18 +44,25 @@ class DownSlots:
         self._needed: deque[int] = deque(maxlen=REMEMBERED)
         """ticks beyond the agreed deadline"""
         self._late: list[int] = []
+        self._given_up: deque[int] = deque(maxlen=terms.history_samples * terms.down_symbols)
+        """slots of samples that were heard without their symbol, and to which none has come since"""
 
     def restart(self, sample: int) -> None:
         """Forget what came; this sample is heard next."""
         self.sample = sample
         self._kept.clear()
         self._late.clear()
+        self._given_up.clear()
 
     def put(self, slot: int, number: int, tick: int) -> Came:
         """Take a symbol that came at a tick."""
         sample, place = divmod(slot, self._terms.down_symbols)
         over = tick - self._agreed_tick(sample)
         if sample < self.sample:
+            if slot not in self._given_up:
+                # A copy says nothing of how late the line is.
+                return Came.AGAIN
+            self._given_up.remove(slot)
             self._late.append(max(0, over))
             if len(self._late) == LATE_IN_A_ROW:
                 self._needed.append(min(max(self._late), self._longest))
@@ -77,6 +84,8 @@ class DownSlots:
             if tick < self._agreed_tick(self.sample) + max(self._needed, default=0):
                 return None
             symbols = symbols or [None] * self._terms.down_symbols
+            first = self.sample * len(symbols)
+            self._given_up += [slot for slot, one in enumerate(symbols, first) if one is None]
         self._kept.pop(self.sample, None)
         self.sample += 1
         return tuple(symbols)

@@ -144,6 +144,9 @@ class TimedFlight(NarrowFlight):
     ) -> None:
         super().__init__(machine, wanted, seed, faults, noise=NOISE, mismatch=MISMATCH, keep=True)
         self._heard_ticks = -(-heard_ns // 10_000_000)
+        self._terms = narrow_terms(machine, is_mirrored=True)
+        self._live_tick: int | None = None
+        """at which the first down symbol is there: before it nothing is commanded"""
         self.digests: list[str] = []
         self.commands: list[Vector] = []
         self.applied: list[Vector] = []
@@ -157,7 +160,8 @@ class TimedFlight(NarrowFlight):
                 self._send()
             assert self.hypotheses.rejoin is None
             # The guard clamps: a weighted mean may be beyond its terms by a rounding.
-            volts = self.hypotheses.command(tick)
+            is_live = self._live_tick is not None and tick >= self._live_tick
+            volts = self.hypotheses.command(tick) if is_live else self.machine.initial_command
             self.applied.append(tuple([max(-5.0, min(5.0, one)) for one in volts]))
             self.plant.step(self.applied[-1])
         self.sample += 1
@@ -172,4 +176,8 @@ class TimedFlight(NarrowFlight):
         self.state = flown.state
         self.digests.append(f"{machine.digest(self.state):016x}")
         self.commands += flown.commands
-        self._arriving.append((self.sample, tuple([self._down.carry(one, (0, 1)) for one in symbols])))
+        heard = tuple([self._down.carry(one, (0, 1)) for one in symbols])
+        self._arriving.append((self.sample, heard))
+        for slot, one in enumerate(heard, self.sample * len(heard)):
+            if self._live_tick is None and one is not None:
+                self._live_tick = -(-self._terms.down_slot_ns(slot) // 10_000_000)

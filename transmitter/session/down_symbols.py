@@ -1,9 +1,10 @@
 """Following the receiver by down symbols: hypotheses of its state, confirmed in time.
 
 A command follows from the hypotheses at every tick, so that commands are never missing. What may be
-missing is certainty: with the line cut no sample is confirmed any more. There is no command while the
-newest confirmed sample is older than `AGE_FACTOR` times the usual confirmation takes, and the guard
-then counts as it does when commands stay away.
+missing is certainty: with the line cut no sample is confirmed any more. There is no command before the
+first down symbol of a flight, after `SILENT_SLOTS` slots in a row without one, and while the newest
+confirmed sample is older than `AGE_FACTOR` times the usual confirmation takes. The guard then counts as
+it does when commands stay away.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ from transmitter.session.records import (
     write_sample,
 )
 
+SILENT_SLOTS = 12
 AGE_FACTOR = 4
 AGE_LEAST_SAMPLES = 16
 AGE_UNKNOWN_SYMBOLS = 128
@@ -64,6 +66,12 @@ class NarrowFollowing:
         self._delays: deque[int] = deque(maxlen=DELAYS_KEPT)
         """samples that passed until each of the last ones was confirmed"""
         self._age_max = -(-AGE_UNKNOWN_SYMBOLS // parts.terms.down_symbols)
+        terms = parts.terms
+        slots_ns = SILENT_SLOTS * terms.sample_ns // terms.down_symbols
+        silent_ns = slots_ns + terms.down_heard_ns + line_delay_ns
+        self._silent_ticks_max = -(-silent_ns // terms.tick_ns)
+        self._came_tick: int | None = None
+        """of the last down symbol, or of the epoch's beginning; None: none has come in this flight"""
         self._live: deque[Vector | None] = deque()
         self._last = parts.terms.initial_command
         self._epoch = self._epoch_tick = 0
@@ -102,6 +110,8 @@ class NarrowFollowing:
         self._slots.restart(sample)
         self._live = deque([None] * terms.lead_ticks)
         self._epoch, self._epoch_tick = welcome.epoch, sample * terms.ticks_per_sample
+        if self._came_tick is not None:
+            self._came_tick = self._epoch_tick
         # After epochs in a row without a confirmation there is no command before the first one.
         self._steers = not self._parts.owing.counts_on
         write_epoch(recorder, terms.sample_ns, welcome.epoch, state.codec, state.hold)
@@ -124,7 +134,7 @@ class NarrowFollowing:
         return word
 
     def command(self, tick: int) -> Vector | None:
-        if not self._steers or tick < self._epoch_tick or not self._is_certain(tick):
+        if not self._steers or tick < self._epoch_tick or not self._is_live(tick):
             return None
         self._last = self.hypotheses.command(tick)
         return self._last
@@ -149,6 +159,7 @@ class NarrowFollowing:
         if came is Came.LATE:
             counts["down_late"] += 1
             return None
+        self._came_tick = tick
         self._parts.on_heard()
         return self._hear(tick)
 
@@ -165,6 +176,12 @@ class NarrowFollowing:
             taken.append(one)
         self._confirmed.clear()
         return taken
+
+    def _is_live(self, tick: int) -> bool:
+        """Return whether symbols come, and samples are confirmed."""
+        if self._came_tick is None or tick - self._came_tick > self._silent_ticks_max:
+            return False
+        return self._is_certain(tick)
 
     def _is_certain(self, tick: int) -> bool:
         sample = tick // self._parts.terms.ticks_per_sample

@@ -21,7 +21,12 @@ from tests.channel.codec.parts import TICK_NS, identity_of
 from tests.events import event_fields
 from tests.simulation.narrow import mirrored, tuned_codec
 from tests.simulation.narrow_sessions import Announced, memory_flight, narrow_terms
-from transmitter.session.down_symbols import AGE_FACTOR, AGE_LEAST_SAMPLES, NarrowFollowing
+from transmitter.session.down_symbols import (
+    AGE_FACTOR,
+    AGE_LEAST_SAMPLES,
+    SILENT_SLOTS,
+    NarrowFollowing,
+)
 from transmitter.session.owing import PAUSES_MAX
 from transmitter.session.session import Phase, TransmitterSession
 
@@ -100,21 +105,43 @@ def test_when_symbols_are_foreign_or_impossible_then_they_are_dropped_and_counte
 def test_when_nothing_is_confirmed_any_more_then_commands_stop_after_four_usual_delays() -> None:
     pair = Pair()
     pair.fly(50)
-    assert None not in pair.commands
+    assert None not in pair.commands[PER_SAMPLE:]
     pair.transmitter.take_confirmed()
     sure = pair.following.hypotheses.next_confirmed
     usual = median(pair.rows.column("confirmed", "lag_samples"))
     assert pair.following._age_max == max(AGE_LEAST_SAMPLES, round(AGE_FACTOR * usual))
     # Sooner than usual, or what is not followed would outweigh the list before.
     pair.following._age_max = 20
+    pair.following._silent_ticks_max = 1000
     pair.drops = True
     pair.fly(15)
-    missing = [tick // PER_SAMPLE for tick, command in enumerate(pair.commands) if command is None]
+    commands = pair.commands[PER_SAMPLE:]
+    missing = [tick // PER_SAMPLE + 1 for tick, command in enumerate(commands) if command is None]
     assert missing[0] - sure == 20 + 1
     assert pair.transmitter.phase is Phase.FLYING
     assert pair.transmitter.counts["down_erased"] > 20
     pair.fly(30)
     assert pair.transmitter.rejoins_asked == {Why.REST: 1}
+
+
+def test_when_no_symbol_comes_any_more_then_commands_stop_after_twelve_slots() -> None:
+    pair = Pair()
+    pair.fly(50)
+    pair.drops = True
+    pair.fly(15)
+    missing = [
+        tick for tick, command in enumerate(pair.commands) if command is None and tick > PER_SAMPLE
+    ]
+    silent_ns = SILENT_SLOTS * TERMS.sample_ns // 2 + TERMS.down_heard_ns
+    # The last symbols came at the first tick of sample 49.
+    assert missing[0] == 49 * PER_SAMPLE + -(-silent_ns // TICK_NS) + 1
+
+
+def test_when_no_symbol_has_come_in_a_flight_then_nothing_is_commanded() -> None:
+    pair = Pair()
+    pair.drops = True
+    pair.fly(40)
+    assert set(pair.commands) == {None}
 
 
 def test_when_it_rejoins_then_both_stand_in_the_same_state_and_no_command_is_given_before() -> None:

@@ -49,6 +49,7 @@ FIELDS: dict[str, tuple[str, str]] = {
     "narrow": ("", "of a narrow downlink:"),
     "narrow.scheme": ("", "mirrored: the law runs beside the plant as well; coded: commands come down"),
     "narrow.baud_configured": ("baud", "largest number of symbols per second down the link"),
+    "narrow.symbols_per_s_asked": ("symbols/s", "that the layout sends"),
     "narrow.symbols_down": ("symbols", "sent to the transmitter, a bit each"),
     "narrow.control_bytes_down": ("bytes", "of frames of the handshake and of rejoins, with framing"),
     "narrow.symbols_erased": ("symbols", "that did not come within their deadline"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sized
+from math import isfinite
 
 from channel.codec.codec import Vector
 from channel.protocol.events import Event, EventKind, Failing, Tell
@@ -46,7 +47,10 @@ class Asker:
     def references(self, tick: int) -> tuple[float | None, ...]:
         """Return the set-point of each output; None for one that has none."""
         try:
-            references = self._controller.references(tick)
+            given = self._controller.references(tick)
+            references = tuple([None if one is None else float(one) for one in given])
+            if not all(one is None or isfinite(one) for one in references):
+                raise ValueError(f"wants {given}")
             if len(references) == len(self._no_references):
                 return references
             if len(references) < len(self._no_references):

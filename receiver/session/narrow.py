@@ -50,15 +50,13 @@ class NarrowCommander:
         scheme = machine.scheme
         self._ahead_ticks = 0
         """how far ahead of a tick the set-points are taken that are sent at it"""
-        self._starts = (0.0,) * len(terms.signals.outputs)
-        """set-points of outputs for which the controller has none"""
+        self._set_points_held = [0.0] * len(terms.signals.outputs)
+        """the last set-points, for outputs for which the controller has none, or failed"""
         self._wanted = self._command
         if isinstance(scheme, MirroredLaw):
             self._ahead_ticks = scheme.queue * terms.ticks_per_sample
-            starts = list(self._starts)
             for one in scheme.ranges:
-                starts[one.output] = one.start
-            self._starts = tuple(starts)
+                self._set_points_held[one.output] = one.start
             self._wanted = self._set_points
 
     @property
@@ -142,5 +140,7 @@ class NarrowCommander:
 
     def _set_points(self, tick: int, live: Vector) -> Vector:
         wanted = self._asker.references(tick + self._ahead_ticks)
-        pairs = zip(wanted, self._starts, strict=True)
-        return tuple([start if one is None else float(one) for one, start in pairs])
+        for output, one in enumerate(wanted):
+            if one is not None:
+                self._set_points_held[output] = one
+        return tuple(self._set_points_held)

@@ -88,6 +88,7 @@ def narrow_part(run: TransmitterRun) -> Summary:
         "narrow": {
             "scheme": "mirrored" if terms.is_mirrored else "coded",
             "baud_configured": terms.downlink_baud,
+            "symbols_per_s_asked": 1e9 * terms.down_symbols / terms.sample_ns,
             "symbols_down": meter.symbols,
             "control_bytes_down": meter.control_bytes,
             "symbols_erased": counts["down_erased"],

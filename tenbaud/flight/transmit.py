@@ -184,7 +184,9 @@ def flight_counts(run: TransmitterRun) -> FlightCounts:
     samples = -(-run.ticks // run.agreement.terms.ticks_per_sample)
     if isinstance(session.following, NarrowFollowing):
         # The last samples of a flight are not certain yet when it ends.
-        samples = max(0, samples - (session.following.certainty.delay_max or LATEST_CERTAIN_SAMPLES))
+        certainty = session.following.certainty
+        usual = max(LATEST_CERTAIN_SAMPLES, round(4 * (certainty.delay_median or 0)))
+        samples = max(0, samples - min(usual, certainty.delay_max or usual))
     return FlightCounts(
         samples=samples,
         confirmed=session.counts["confirmed"],

@@ -42,9 +42,9 @@ def verdict_of(summary: Summary, unicode: bool = True) -> str:
 def _both_ways(summary: Summary) -> str:
     """Return what went both ways, and of how much of it the transmitter is certain."""
     narrow = summary.get("narrow") or {}
-    if "baud_configured" not in narrow:
+    if "symbols_per_s_asked" not in narrow:
         return ""
-    rates = f"{summary['baud_configured']:g} bit/s up, {narrow['baud_configured']:g} down"
+    rates = f"{summary['baud_configured']:g} bit/s up, {narrow['symbols_per_s_asked']:g} down"
     return f" ({rates}), {narrow['samples_confirmed']} of {summary['samples']} samples confirmed"
 
 

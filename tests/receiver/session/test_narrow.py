@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
+from typing import Any
 
 import pytest
 
@@ -30,6 +32,8 @@ class Programme:
 
     def __init__(self, wanted: float | None) -> None:
         self.wanted = wanted
+        self.given: Any = None
+        """in place of it, whatever it is"""
         self.asked: list[int] = []
 
     def command(self, tick: int, state: Vector) -> Vector:
@@ -37,7 +41,7 @@ class Programme:
 
     def references(self, tick: int) -> tuple[float | None, ...]:
         self.asked.append(tick)
-        return (self.wanted,)
+        return (self.wanted,) if self.given is None else self.given  # type: ignore[no-any-return]
 
 
 def commander_of(
@@ -80,6 +84,19 @@ def test_when_there_is_no_set_point_then_that_of_the_start_stays() -> None:
     fly(commander, 30)
     assert commander.two_way_state.down[:2] == (0.0, 0.0)
     assert counts["bad_references"] == 0
+
+
+@pytest.mark.parametrize("given", ["no number", [math.inf], 3.0])
+def test_when_a_set_point_is_no_number_then_the_last_one_stays(given: object) -> None:
+    programme = Programme(0.5)
+    commander, counts, events = commander_of(mirrored(LAYOUT, 15), programme)
+    fly(commander, 30)
+    reached = commander.two_way_state.down[:1]
+    programme.given = given
+    fly(commander, 30)
+    assert commander.two_way_state.down[:1] == reached
+    assert counts["bad_references"] > 0
+    assert [one.cause for one in events] == [Failing.REFERENCE]
 
 
 def test_when_a_controller_fails_then_its_last_command_is_held_and_the_first_failure_reported() -> None:

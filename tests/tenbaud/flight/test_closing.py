@@ -68,7 +68,7 @@ def test_a_downlink_that_is_not_full_says_its_bits(tmp_path: Path) -> None:
 def test_a_narrow_downlink_says_both_rates_and_how_certain_the_lockstep_was(tmp_path: Path) -> None:
     narrow = {
         "scheme": "mirrored",
-        "baud_configured": 20.0,
+        "symbols_per_s_asked": 20.0,
         "samples_confirmed": 992,
         "confirmed_after_median": 9,
         "confirmed_after_max": 17,

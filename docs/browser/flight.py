@@ -45,6 +45,7 @@ from transmitter.session.state_observer import StateObserver
 
 SESSION_NUMBER = 1
 """Fixed: both ends are in this page, and nobody else answers."""
+SAMPLE_FIELDS = ("sample", "word_sent", "word", "digest", "peer_digest", "about")
 TICKS_AT_ONCE = 20
 """Between two looks at the clock of the wall."""
 
@@ -163,7 +164,7 @@ class BrowserFlight:
     """One flight, from the bytes of its `FlightParts`."""
 
     def __init__(self, data: bytes) -> None:
-        parts: FlightParts = pickle.load(io.BytesIO(data))  # noqa: S301 - of the site itself
+        parts: FlightParts = pickle.load(io.BytesIO(data))
         ends = build_ends(parts)
         self._terms, self._lines = parts.terms, parts.lines
         self._run, self._receiver = ends.run, ends.receiver
@@ -217,9 +218,10 @@ class BrowserFlight:
         up, down = (composer.compose() for composer in self._composers)
         events = [
             {"role": one["role"], **event, "text": event_text(event)}
-            for one in (up, down)
+            for one in (down, up)
             for event in one.pop("events")
         ]
+        events.sort(key=lambda one: one["time_s"])
         down.pop("samples")
         return json.dumps(
             {
@@ -228,10 +230,7 @@ class BrowserFlight:
                     for one in up.pop("points")
                 ],
                 "decisions": [[one["time_s"], one["reference"]] for one in down.pop("points")],
-                "samples": [
-                    [one[name] for name in ("sample", "word_sent", "word", "digest", "peer_digest", "about")]
-                    for one in up.pop("samples")
-                ],
+                "samples": [[one[name] for name in SAMPLE_FIELDS] for one in up.pop("samples")],
                 "events": [one for one in events if is_shown(one)],
                 "heads": {"transmitter": up, "receiver": down},
             }
@@ -247,9 +246,7 @@ class BrowserFlight:
         self._node.scores.forget_reference()
         cause = ByHand.FOLLOW if value is None else ByHand.SET_POINT
         unit = self._terms.signals.outputs[0].unit
-        self._report(
-            cause, self._receiver.session, value=value, detail=None if value is None else unit
-        )
+        self._report(cause, self._receiver.session, value=value, detail=None if value is None else unit)
 
     def impair(self, text: str) -> None:
         """Change the impairments of the line."""
@@ -278,8 +275,6 @@ class BrowserFlight:
     ) -> None:
         tick, sample = self._run.tick, self._receiver.session.state.sample
         time_ns = tick * self._terms.tick_ns
-        event = Event(
-            EventKind.CONTROL, sample, time_ns, tick, cause=cause, value=value, detail=detail
-        )
+        event = Event(EventKind.CONTROL, sample, time_ns, tick, cause=cause, value=value, detail=detail)
         session.events.append(event)
         write_event(self._taps[session is self._receiver.session], event)

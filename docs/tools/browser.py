@@ -29,7 +29,7 @@ from tenbaud.telemetry.end import steered
 TOP = Path(__file__).resolve().parents[2]
 SOURCE = TOP / "docs" / "browser"
 STATIC = TOP / "tenbaud" / "view" / "static"
-PYODIDE = SOURCE / "node_modules" / "pyodide"
+PYODIDE = TOP / ".cache" / "pyodide" / "node_modules" / "pyodide"
 RUNTIME = (
     "pyodide.mjs",
     "pyodide.asm.mjs",
@@ -37,8 +37,18 @@ RUNTIME = (
     "python_stdlib.zip",
     "pyodide-lock.json",
 )
+STYLED = (".js", ".css", ".svg")
 PRESET = "tuned-10baud"
-SETTINGS = {"transmitter": {"plant": {"mismatch": 0.1}}, "link": {"kind": "memory"}, "duration_s": 3600.0}
+SETTINGS = {
+    "transmitter": {"plant": {"mismatch": 0.1}},
+    "link": {"kind": "memory"},
+    "duration_s": 3600.0,
+}
+WITHOUT = """<!doctype html>
+<html lang="en"><meta charset="utf-8"><title>tenbaud in the browser</title>
+<p>This site was built without Pyodide, npm's Python for browsers, so the flight is not here.
+Install npm and build the site again: <code>make docs</code></p></html>
+"""
 SCRIPT = '<script type="module" src="view/view.js"></script>'
 FLY_BARE = """
 import sys
@@ -55,9 +65,9 @@ print("\\n".join(sorted(one.removeprefix(top) for one in files if one.startswith
 
 
 def page_files() -> dict[str, bytes]:
-    """Return the files of the page by their place on the site; none without Pyodide."""
-    if not all((PYODIDE / name).is_file() for name in RUNTIME):
-        return {}
+    """Return the files of the page by their place on the site; without Pyodide a page that says so."""
+    if why_no_pyodide() is not None:
+        return {"browser/flight.html": WITHOUT.encode()}
     parts = flight_parts()
     found = {
         "flight.html": page().encode(),
@@ -65,9 +75,15 @@ def page_files() -> dict[str, bytes]:
         "heart.zip": heart(modules_of(parts)),
     }
     found |= {one.name: one.read_bytes() for one in SOURCE.glob("*.js")}
-    found |= {f"view/{one.name}": one.read_bytes() for one in STATIC.iterdir() if one.is_file()}
+    found |= {f"view/{one.name}": one.read_bytes() for one in STATIC.iterdir() if one.suffix in STYLED}
     found |= {f"pyodide/{name}": (PYODIDE / name).read_bytes() for name in RUNTIME}
     return {f"browser/{name}": content for name, content in found.items()}
+
+
+def why_no_pyodide() -> str | None:
+    """Return why the page cannot be built here, None when it can."""
+    missing = [name for name in RUNTIME if not (PYODIDE / name).is_file()]
+    return f"no {missing[0]} of npm's pyodide in {PYODIDE}: make pyodide" if missing else None
 
 
 def page() -> str:
@@ -79,7 +95,7 @@ def page() -> str:
     return frame.replace("<!-- instruments -->", instruments.replace(SCRIPT, ""))
 
 
-class _Pickler(pickle.Pickler):
+class PartsPickler(pickle.Pickler):
     """Pickles the layouts of packed states too, which are made again from their formats."""
 
     def reducer_override(self, obj: Any) -> Any:
@@ -115,7 +131,7 @@ def flight_parts() -> bytes:
         agreement.flight_ticks,
     )
     file = io.BytesIO()
-    _Pickler(file, protocol=4).dump(parts)
+    PartsPickler(file, protocol=4).dump(parts)
     return file.getvalue()
 
 

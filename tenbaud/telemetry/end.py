@@ -154,6 +154,7 @@ class TelemetryEnd:
 
 
 def steered(agreement: Agreement) -> tuple[SteeredReference | None, ...] | None:
+    """Return the set-points of a flight so that they can be steered; None where they cannot."""
     if not (agreement.live and agreement.config.receiver.controller in STEERABLE):
         return None
     references = build_references(agreement.config, agreement.signals, agreement.codec.model)
